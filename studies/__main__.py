@@ -53,14 +53,14 @@ STUDIES = (
         "Predict what no search has used: force, spheres by force, gratings, adaptation, volume, thresholds.",
         held_out.run,
         held_out_page,
-        materials="human",
+        tissues="human",
     ),
     Study(
         "tissue-posterior",
         "Draw tissues, afferent and noise from one posterior, with bands on all figures.",
         tissue_posterior.run,
         tissue_posterior_page,
-        materials="human",
+        tissues="human",
     ),
     Study(
         "drives",
@@ -116,7 +116,12 @@ STUDIES = (
 )
 """Studies without options of their own."""
 
-app = typer.Typer(help="Research on the model itself.", add_completion=False, pretty_exceptions_enable=False)
+app = typer.Typer(
+    help="Research on the model itself.",
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    rich_markup_mode=None,
+)
 app.command("results", cls=Command)(results_command)
 for study in STUDIES:
     app.command(study.name, cls=Command)(command_of(study))

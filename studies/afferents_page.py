@@ -68,11 +68,11 @@ BRANCHES = {"SAI": (6, 1.0), "RA": (14, 1.2)}
 """End organs per afferent and the radius of the disc in which they are scattered. [mm]"""
 
 
-def indented(indenter: fp.Indenter, motion: Any, materials: str = "human", **more: Any) -> fp.SkinResponse:
+def indented(indenter: fp.Indenter, motion: Any, tissues: str = "human", **more: Any) -> fp.SkinResponse:
     """Press at quick resolution, without the warning of inertia, about which the page speaks."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", InertiaWarning)
-        return fp.indent(fp.Fingertip(), indenter, motion, materials, **more)
+        return fp.indent(fp.Fingertip(), indenter, motion, tissues, **more)
 
 
 def mixed() -> None:
@@ -424,8 +424,8 @@ def reach() -> None:
     pad = UnrolledSkin(finger)
     layout = poisson_disc(pad.pad(), density_per_cm2=70.0, seed=1)
     rows = []
-    for name, (materials, afferent) in REACH_OF.items():
-        skin = indented(BALL, fp.ForceRampAndHold(force_mn=REACH_FORCE_MN), materials)
+    for name, (tissues, afferent) in REACH_OF.items():
+        skin = indented(BALL, fp.ForceRampAndHold(force_mn=REACH_FORCE_MN), tissues)
         population = fp.Population.of_layout(layout, pad.points, afferent)
         response = population.respond(skin)
         away = np.linalg.norm(population.positions_mm - finger.skin_point(X_MM, 0.0), axis=1)

@@ -621,7 +621,7 @@ def grating_touch(conditions: Conditions, ridge_mm: float, spin_deg: float = 0.0
     return touch_of(
         conditions.finger,
         Grating(ridge_mm, ridge_mm, min(protocol.LIP_RADIUS.value, ridge_mm / 2)),
-        materials=conditions.materials,
+        tissues=conditions.tissues,
         resolution=conditions.resolution,
         tilt_deg=conditions.skin_tilt_deg,
         spin_deg=spin_deg,
@@ -793,7 +793,7 @@ def _steady(conditions: Conditions, depth_mm: float) -> tuple[Touch, list[tuple[
         conditions.finger,
         FlatPunch(facts.DECLINE_PROBE.value),
         RampAndHold(depth_mm, ramp_ms, hold_ms),
-        conditions.materials,
+        conditions.tissues,
         conditions.resolution,
         tilt_deg=conditions.skin_tilt_deg,
         settings=DECLINE_STEPS,
@@ -847,7 +847,7 @@ def volume_changes(conditions: Conditions, runner: Runner) -> Volumes:
     """Predict the decrease of volume under plate and disc."""
     touches = {
         (name, depth): touch_of(
-            conditions.finger, body, RampAndHold(depth), conditions.materials, conditions.resolution
+            conditions.finger, body, RampAndHold(depth), conditions.tissues, conditions.resolution
         )
         for name, body in VOLUME_INDENTERS.items()
         for depth in VOLUME_DEPTHS_MM

@@ -91,12 +91,12 @@ class Level:
 
     def bars(self) -> dict[int, Touch]:
         """Touches of the bar, by the number of their shift."""
-        touches = single_unit.bar_touches(Conditions(self.resolution, materials=TISSUES))
+        touches = single_unit.bar_touches(Conditions(self.resolution, tissues=TISSUES))
         return {shift: _at_factor(touches[shift], self.factor) for shift in self.shifts}
 
     def balls(self) -> dict[Sphere, Touch]:
         """Touches of the spheres, by position and curvature."""
-        touches = sphere_discrimination.discrimination_touches(Conditions(self.resolution, materials=TISSUES))
+        touches = sphere_discrimination.discrimination_touches(Conditions(self.resolution, tissues=TISSUES))
         return {sphere: _at_factor(touches[sphere], self.factor) for sphere in self.spheres}
 
 
@@ -179,7 +179,7 @@ def _at_factor(touch: Touch, factor: float) -> Touch:
 
 def single_changes() -> dict[str, dict[str, Touch]]:
     """Return bar and sphere on standard meshes that differ from the preset in one thing."""
-    presets = _examples(Conditions("standard", materials=TISSUES))
+    presets = _examples(Conditions("standard", tissues=TISSUES))
     return {
         name: {
             change: replace(touch, grading=replace(touch.grading, **values))
@@ -193,7 +193,7 @@ def step_changes() -> dict[str, dict[int, Touch]]:
     """Return bar and sphere on quick meshes, by number of steps."""
     return {
         name: {count: replace(touch, settings=PressSettings(count, count)) for count in STEPS}
-        for name, touch in _examples(Conditions("quick", materials=TISSUES)).items()
+        for name, touch in _examples(Conditions("quick", tissues=TISSUES)).items()
     }
 
 

@@ -90,7 +90,7 @@ class Touches:
     @classmethod
     def of(cls, resolution: str) -> Touches:
         """Touches of a named resolution, half of the finger."""
-        conditions = Conditions(resolution, materials=TISSUES)
+        conditions = Conditions(resolution, tissues=TISSUES)
         bars = single_unit.bar_touches(conditions)
         spheres = sphere_discrimination.discrimination_touches(conditions)
         return cls(

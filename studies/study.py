@@ -9,7 +9,7 @@ from typing import Annotated, Any
 
 import typer
 
-from fingerpad.cli.options import Jobs, Materials, Resolution, to_whole
+from fingerpad.cli.options import Jobs, Resolution, Tissues, to_whole
 from fingerpad.cli.running import interruptible, make_writable, processes, progress
 from fingerpad.core.files import write_atomically
 from fingerpad.core.results import to_json
@@ -41,7 +41,7 @@ class Study:
         From that result to its page.
     resolution : str or None, optional
         Resolution by default; None for a study that has resolutions and random numbers of its own.
-    materials : str, optional
+    tissues : str, optional
         Tissues by default.
     """
 
@@ -50,7 +50,7 @@ class Study:
     run: Callable[[Runner, Conditions], Any]
     page: Callable[[Any], Page]
     resolution: str | None = "quick"
-    materials: str = TISSUES
+    tissues: str = TISSUES
 
 
 def run_study(study: Study, runner: Runner, conditions: Conditions) -> tuple[Path, Path]:
@@ -91,12 +91,12 @@ def command_of(study: Study) -> Callable[..., None]:
         out: Out = Path(study.name),
         jobs: Jobs = None,
         seed: Seed = 0,
-        materials: Materials = study.materials,
+        tissues: Tissues = study.tissues,
     ) -> None:
-        execute(study, Conditions(resolution, seed, materials), out, jobs)
+        execute(study, Conditions(resolution, seed, tissues), out, jobs)
 
     def without_conditions(out: Out = Path(study.name), jobs: Jobs = None) -> None:
-        execute(study, Conditions(materials=study.materials), out, jobs)
+        execute(study, Conditions(tissues=study.tissues), out, jobs)
 
     chosen = command if study.resolution else without_conditions
     chosen.__doc__ = study.help

@@ -8,7 +8,7 @@ from fingerpad.report.tissues import tissue_table
 from studies.pages.markdown import markdown
 
 INTRODUCTION = (
-    "Every set that `materials` of `fingerpad.indent` and of the commands accepts by name. A report of "
+    "Every set that `tissues` of `fingerpad.indent` and of the commands accepts by name. A report of "
     "`fingerpad reproduce` has the same table. `python -m studies results` writes this page. Reasons are on "
     "[substitutes for the lost hyperelastic coefficients](decisions/lost-hyperelastic-coefficients.md) and "
     "[two sets: paper and human](decisions/paper-and-human.md). Status: *paper*, printed there; *read*, in "

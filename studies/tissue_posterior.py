@@ -809,7 +809,7 @@ def run(runner: Runner, conditions: Conditions) -> TissuePosterior:
     runner : Runner
         Where indentations are stored; a stopped run continues after the last one.
     conditions : Conditions
-        Finger, resolution and seed; its materials are not used.
+        Finger, resolution and seed; its tissues are not used.
 
     Returns
     -------

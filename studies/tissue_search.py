@@ -90,7 +90,7 @@ def touches(candidate: Candidate, conditions: Conditions) -> dict[Key, Touch]:
     candidate : Candidate
         Its tissues, and whether it is a finalist.
     conditions : Conditions
-        Finger and resolution; its materials are not used.
+        Finger and resolution; its tissues are not used.
 
     Returns
     -------
@@ -98,7 +98,7 @@ def touches(candidate: Candidate, conditions: Conditions) -> dict[Key, Touch]:
         `("cylinder", diameter, 0)`, `("plate", depth, 0)`, `("bar", shift, 0)` and `("sphere", curvature,
         position)`, in mm and 1/m; `ONE_BAR` for a bar that is read at shifted sites.
     """
-    own, cylinder = replace(conditions, materials=candidate.tissues), Cylinder()
+    own, cylinder = replace(conditions, tissues=candidate.tissues), Cylinder()
     pressed: dict[Key, Touch] = {
         ("cylinder", cylinder.diameter_mm, 0.0): own.touch(
             cylinder, RECEPTOR_X_MM, own.deflection_grading(cylinder)
@@ -633,7 +633,7 @@ def search_one(candidate: Candidate, runner: Runner, conditions: Conditions, fol
     runner : Runner
         Where indentations are stored: candidates with the same tissues share them.
     conditions : Conditions
-        Finger, resolution and seed; its materials are not used.
+        Finger, resolution and seed; its tissues are not used.
     folds : bool, optional
         As of `evaluate`.
 
@@ -677,7 +677,7 @@ def run(runner: Runner, conditions: Conditions) -> TissueSearch:
     runner : Runner
         Where indentations are stored; a stopped run continues after the last one.
     conditions : Conditions
-        Finger, resolution and seed; its materials are not used.
+        Finger, resolution and seed; its tissues are not used.
 
     Returns
     -------

@@ -109,10 +109,10 @@ def error_rows() -> Iterable[Sequence[str]]:
 
 def inertia_rows() -> Iterable[Sequence[str]]:
     """Press fast small steps on a hold: moved mass, stiffness, and the resonance that follows from them."""
-    for materials in ("human", "trial3"):
+    for tissues in ("human", "trial3"):
         for name, body in MASS_BODIES.items():
             motion = Trajectory((0.0, 50.0, 500.0, 520.0), (0.0, 1.0, 1.0, 1.02))
-            touch = touch_of(Fingertip(), body, motion, materials)
+            touch = touch_of(Fingertip(), body, motion, tissues)
             done = touch.solve(whole=True).deformation
             assert done is not None
             way_mm = done.depth_mm[-1] - done.depth_mm[-2]
@@ -124,7 +124,7 @@ def inertia_rows() -> Iterable[Sequence[str]]:
             estimate = resonance_hz(touch.tissues.layers, touch.layers_mm)
             shares = (f"{(frequency / measured) ** 2:.0%}" for frequency in (20.0, 50.0, 100.0, 200.0))
             yield (
-                materials, name, f"{mass_mg:.0f}", f"{stiffness:.0f}", f"{measured:.0f}", f"{estimate:.0f}",
+                tissues, name, f"{mass_mg:.0f}", f"{stiffness:.0f}", f"{measured:.0f}", f"{estimate:.0f}",
                 *shares,
             )  # fmt: skip
 

@@ -51,9 +51,17 @@ def test_help_names_every_option_and_resolution(call):
         assert option in words
 
 
+def test_the_help_keeps_every_unit(call):
+    for name, command in typer.main.get_command(cli.app).commands.items():
+        said = " ".join(call(name, "--help")[1].split())
+        units = [unit for each in command.params for unit in re.findall(r"\[\S+\]", each.help or "")]
+        assert all(said.count(unit) >= units.count(unit) for unit in units), name
+        assert " ".join(command.help.partition("\n\n")[0].split()) in " ".join(call("--help")[1].split())
+
+
 def test_the_help_names_what_the_modules_know():
     assert choices.RESOLUTION_CHOICES == RESOLUTIONS
-    assert tuple(TISSUES) == choices.MATERIAL_CHOICES
+    assert tuple(TISSUES) == choices.TISSUES_CHOICES
     assert tuple(formats.FORMATS) == choices.FORMAT_CHOICES
     assert tuple(INDENTERS) == choices.INDENTER_CHOICES
     assert tuple(FINGERS) == choices.FINGER_CHOICES
@@ -65,11 +73,12 @@ def test_one_set_of_tissues_is_the_default_everywhere():
     options = {
         name: {each.name: each.default for each in command.params} for name, command in commands.items()
     }
-    pressed = {name: each["materials"] for name, each in options.items() if "materials" in each}
+    pressed = {name: each["tissues"] for name, each in options.items() if "tissues" in each}
     assert set(pressed) == {"reproduce", "fit", "validate", "export"}
+    assert pressed.pop("reproduce") == "paper"  # the first column; the default tissues are the second
     assert pressed.pop("fit") is None  # those of the file of stimuli, which are the default tissues
-    functions = [inspect.signature(function).parameters["materials"] for function in (fp.indent, touch_of)]
-    found = {*pressed.values(), *(each.default for each in functions), Conditions().materials}
+    functions = [inspect.signature(function).parameters["tissues"] for function in (fp.indent, touch_of)]
+    found = {*pressed.values(), *(each.default for each in functions), Conditions().tissues}
     assert found | {FingerDescription().tissues, choices.DEFAULT_TISSUES} == {DEFAULT_TISSUES}
     assert Conditions().afferent == fp.Afferent() == fp.Population.grid().afferent
 
@@ -87,7 +96,7 @@ def test_without_a_command_the_help_is_shown(call):
         (["reproduce", "--resolution", "qick"], "resolution must be one of quick, standard, paper", "'qick'"),
         (["reproduce", "--resolution", "nan"], "resolution must be one of quick, standard, paper", "'nan'"),
         (["reproduce", "--resolution", ""], "resolution must be one of quick, standard, paper", "''"),
-        (["reproduce", "--materials", "humann"], "materials must be one of human, paper", "'humann'"),
+        (["reproduce", "--tissues", "humann"], "tissues must be one of human, paper", "'humann'"),
         (["reproduce", "--jobs", "0"], "jobs must be a whole number of at least 1", "0"),
         (["reproduce", "--jobs", "-2"], "jobs must be a whole number of at least 1", "-2"),
         (["reproduce", "--jobs", "nan"], "'--jobs': must be a whole number", "'nan'"),
@@ -103,6 +112,7 @@ def test_without_a_command_the_help_is_shown(call):
         (["reproduce", "--out", "--no-extended"], "'--out' requires an argument", "'--no-extended'"),
         (["reproduce", "--quick"], "No such option: --quick; write --resolution quick", "quick"),
         (["reproduce", "--quickly"], "No such option: --quickly.", "--quickly"),
+        (["export", "out", "--materials", "a"], "No such option: --materials; write --tissues", ""),
         (["export"], "Missing argument", "'FOLDER'"),
         (["view"], "Missing argument", "'RESULT'"),
         (["store"], "store needs a command: list, verify, prune", "list"),
@@ -122,7 +132,7 @@ def test_without_a_command_the_help_is_shown(call):
         (["export", "out", "--depth", "1", "--trajectory", "a.csv"], "--depth is that of a hold", "a.csv"),
         (["export", "out", "--tolerance", "0.02"], "--tolerance is that of a --trajectory", "give both"),
         (["export", "out", "--trajectory", "gone.csv"], "gone.csv must be a file", "No such file"),
-        (["export", "out", "--materials", "steel"], "tissues must be one of", "'steel'"),
+        (["export", "out", "--tissues", "steel"], "tissues must be one of", "'steel'"),
         (["export", "out", "--resolution", "fine"], "resolution must be one of", "'fine'"),
         (["export", "out", "--touch", "gone.yaml"], "gone.yaml must be a file", "No such file"),
         (["export", "out", "--touch", "a.yaml", "--depth", "1"], "leave the other options", "a.yaml"),
@@ -219,7 +229,7 @@ def test_options_reach_the_export(call, monkeypatch, tmp_path):
         return (folder / "touch.pvd",)
 
     monkeypatch.setattr(formats, "export_touch", note)
-    given = ("--curvature", "340", "--depth", "0.5", "--materials", "trial1", "--resolution", "standard")
+    given = ("--curvature", "340", "--depth", "0.5", "--tissues", "trial1", "--resolution", "standard")
     assert call("export", "a/b", *given) == (0, "Open: a/b/touch.pvd\n", "")
     assert call("export", "c", "--indenter", "plate", "--format", "vtu")[0] == 0
     assert call("export", "d", "--format", "calculix", "--elastic-moduli", "long_term")[0] == 0

@@ -187,7 +187,7 @@ def test_stimuli_name_finger_tissues_and_resolution_and_options_replace_them(wri
     )
     listed = read_stimuli(path, tissues="paper", finger=None)
     asked = listed.conditions
-    assert (asked.resolution, asked.materials, asked.finger) == ("quick", "paper", Fingertip.of("child"))
+    assert (asked.resolution, asked.tissues, asked.finger) == ("quick", "paper", Fingertip.of("child"))
     touches = listed.touches(list(listed.stimuli.values()), asked)
     assert list(touches) == ["a", "b"]
     assert len({touch.grading for touch in touches.values()}) == 1

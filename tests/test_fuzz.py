@@ -142,7 +142,7 @@ VALUES = {
     GaussianResponses: {"mean": [1.0, 2.0], "covariance": [[1.0, 0.1], [0.1, 1.0]]},
     RateRecordings: {"stimuli": ("a", "b"), "dynamic_rate_hz": [1.0, 2.0], "static_rate_hz": [1.0, 2.0]},
     SurfaceProfile: {"distance_mm": [0.0, 1.0], "deflection_mm": [0.1, 0.2]},
-    Conditions: {"resolution": "quick", "seed": 3, "materials": "human"},
+    Conditions: {"resolution": "quick", "seed": 3, "tissues": "human"},
     TactileStimulus: {"indenter": fp.Sphere(287), "x_mm": 1.0, "tilt_deg": 3.0, "friction": 0.3},
     fp.ReducedRange: {
         "depth_mm": 1.0,
@@ -332,7 +332,7 @@ COMMANDS = [
     "reduce", "store",
 ]  # fmt: skip
 OPTIONS = [
-    "--out", "--resolution", "--materials", "--jobs", "--seed", "--stimulus", "--depth", "--width",
+    "--out", "--resolution", "--tissues", "--jobs", "--seed", "--stimulus", "--depth", "--width",
     "--fillet",
     "--folds", "--method", "--unit", "--static-window", "--finger", "--list", "--example", "--format",
     "--touch",

@@ -137,8 +137,8 @@ def test_stiffer_tissues_need_more_force(skin):
 
 
 def test_indent_is_the_touch_that_its_arguments_describe():
-    """The named resolution and materials, spelt out."""
-    whole = indent(FINGER, BALL, SHALLOW, materials="trial1", resolution="quick", at_mm=(16.0, 0.0))
+    """The named resolution and tissues, spelt out."""
+    whole = indent(FINGER, BALL, SHALLOW, tissues="trial1", resolution="quick", at_mm=(16.0, 0.0))
     touch = Touch(
         finger=FINGER,
         indenter=BALL,
@@ -198,9 +198,9 @@ def refused(said, **changes):
         refused(
             "trial1, trial2, trial3, trial2_wu, trial3_wu, trial3_stiffening, maeno1998, wu2007, "
             "gerling2014_fit: got 'steel'",
-            materials="steel",
+            tissues="steel",
         ),
-        refused("materials must be one of", materials=None),
+        refused("tissues must be one of", tissues=None),
         refused("resolution must be one of quick, standard, paper: got 'fine'", resolution="fine"),
         refused("depth_mm must stay below", stimulus=RampAndHold(depth_mm=6.0)),
         refused("at_mm must be a finite number", at_mm=(np.nan, 0.0)),

@@ -110,6 +110,7 @@ def test_editors_see_every_name():
         (lambda: fp.Grating(period_mm=2.0, duty=1.0), "duty must be below 1"),
         (lambda: fp.Grating(period_mm=0.0), "period_mm must be greater than 0 [mm]: got 0.0."),
         (lambda: fp.indent(fp.Fingertip(), fp.Sphere(), resolutoin="quick"), "did you mean resolution?"),
+        (lambda: fp.indent(fp.Fingertip(), fp.Sphere(), materials=""), "materials: did you mean tissues?"),
         (lambda: fp.touch_of(fp.Fingertip(), fp.Sphere(), tilt=3.0), "did you mean tilt_deg?"),
         (lambda: fp.Population.grid(dens=3), "Population.grid has no dens: did you mean density_per_cm2?"),
         (lambda: fp.Population.grid(zzz=3), "Population.grid has density_per_cm2, rows, columns"),
@@ -151,6 +152,17 @@ def test_what_a_class_or_function_does_not_have_is_refused_in_one_sentence(make,
     assert said in str(refused.value)
     assert str(refused.value)[-1] in ".?"
     assert "\n" not in str(refused.value)
+
+
+def test_a_touch_and_its_press_take_the_same_arguments():
+    described, pressed = (inspect.signature(each).parameters for each in (fp.touch_of, fp.indent))
+    assert described == pressed
+    turned = {"tilt_deg": 5.0, "spin_deg": 10.0, "friction": 0.2, "whole": True, "times_ms": [30.0]}
+    motion = fp.RampAndHold(depth_mm=0.1, ramp_ms=50, hold_ms=50)
+    settings = fp.PressSettings(1, 1)
+    skin = fp.indent(fp.Fingertip(), fp.Sphere(), motion, settings=settings, **turned)
+    assert skin.touch == fp.touch_of(fp.Fingertip(), fp.Sphere(), motion, settings=settings, **turned)
+    assert skin.deformation is not None
 
 
 @pytest.mark.parametrize("name", fp.__all__)

@@ -242,7 +242,7 @@ def test_skin_faces_look_outwards_and_lie_on_the_last_nodes(parts):
 
 @pytest.mark.parametrize("kind", ["vtu", "csv", "npz", "netcdf", "abaqus", "calculix", "febio"])
 def test_exports_take_a_mesh_of_one_s_own(parts, kind, tmp_path):
-    touch = touch_of(finger_from(parts), BALL, MOTION, materials="trial1", settings=STEPS)
+    touch = touch_of(finger_from(parts), BALL, MOTION, tissues="trial1", settings=STEPS)
     moduli = "long_term" if kind == "calculix" else None
     for file in export_touch(tmp_path, touch, kind, moduli):
         assert file.stat().st_size > 300

@@ -485,7 +485,7 @@ def test_listed_stimuli_folds_of_the_file_and_options_reach_the_fit(call, tmp_pa
         + "".join(f"bar {row},{60 - 9 * row},{row + 1}\n" for row in (0, 2, 1, 3, 4))
     )
     call_with = ("mine.csv", "--stimulus", "list.csv", "--stimulus-column", "what", "--out", "there")
-    status, _, errors = call(*call_with, "--static-window", "500", "900", "--materials", "trial1")
+    status, _, errors = call(*call_with, "--static-window", "500", "900", "--tissues", "trial1")
     assert (status, errors) == (0, "")
     results = json.loads((tmp_path / "there" / "fit.json").read_text())
     fit, manifest = results["fit"], results["manifest"]
@@ -559,7 +559,7 @@ def test_listed_stimuli_folds_of_the_file_and_options_reach_the_fit(call, tmp_pa
         (["mine.csv", "--stimulus", "bar", "--finger", "chid"], ROWS, "--finger: like must be one of adult"),
         (["mine.csv", "--stimulus", "list.csv", "--finger", "a.inp"], ROWS, "--finger: a.inp must be a file"),
         (["mine.csv", "--stimulus", "bar", "--jobs", "0"], ROWS, "jobs must be a whole number of at least 1"),
-        (["mine.csv", "--stimulus", "bar", "--materials", "wood"], ROWS, "materials must be one of"),
+        (["mine.csv", "--stimulus", "bar", "--tissues", "wood"], ROWS, "tissues must be one of"),
         (["mine.csv", "--stimulus", "bar", "--resolution", "high"], ROWS, "resolution must be one of quick"),
         (
             ["mine.csv", "--stimulus", "bar", "--dynamic-quantity", "heat"],

@@ -137,7 +137,7 @@ def studied(first, tmp_path_factory):
     folder = tmp_path_factory.mktemp("studies") / "out"
     shutil.copytree(first.folder / STORE_FOLDER, folder / STORE_FOLDER)
 
-    options = ("--out", str(folder), "--jobs", "2", "--materials", "human")
+    options = ("--out", str(folder), "--jobs", "2", "--tissues", "human")
 
     def numbers_of(study):
         subprocess.run(
@@ -280,7 +280,7 @@ def test_what_goes_beyond_the_paper_comes_on_top(second):
 
 
 def test_a_stress_in_the_dynamic_term_explains_the_dynamic_rates_better(first):
-    touches = dict(enumerate(single_unit.bar_touches(Conditions("quick", materials="human"))))
+    touches = dict(enumerate(single_unit.bar_touches(Conditions("quick", tissues="human"))))
     bars = Runner(first.folder).responses({"bar": touches})["bar"]
     found = drive_result(
         quantity_traces(list(bars.values()), ("stored", "compressive_stress")),

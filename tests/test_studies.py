@@ -88,7 +88,7 @@ def test_the_bar_is_shifted_36_times_along_the_skin_over_one_mesh(conditions):
     np.testing.assert_allclose(along_skin, bar_firing_rates().shift_mm, rtol=0, atol=1e-12)
     assert all(follows_the_protocol(touch) for touch in touches)
     assert {touch.indenter for touch in touches} == {Bar(3.0, 0.3)}
-    assert {touch.tissues for touch in touches} == {named_tissues(conditions.materials)}
+    assert {touch.tissues for touch in touches} == {named_tissues(conditions.tissues)}
     assert len({(touch.grading, touch.tilt_deg, touch.settings) for touch in touches}) == 1
     assert len(set(touches)) == 36
 
@@ -123,10 +123,10 @@ def test_seven_spheres_are_pressed_at_two_places_over_one_mesh(conditions):
     assert len(set(touches.values())) == 14
 
 
-@pytest.mark.parametrize("materials", ["trial1", "gerling2014_fit"])
-def test_materials_of_the_conditions_reach_the_later_studies_but_not_the_trials(materials):
-    conditions = Conditions("quick", materials=materials)
-    tissues = named_tissues(materials)
+@pytest.mark.parametrize("name", ["trial1", "gerling2014_fit"])
+def test_tissues_of_the_conditions_reach_the_later_studies_but_not_the_trials(name):
+    conditions = Conditions("quick", tissues=name)
+    tissues = named_tissues(name)
     assert {touch.tissues for touch in single_unit.bar_touches(conditions)} == {tissues}
     spheres = sphere_discrimination.discrimination_touches(conditions)
     assert {touch.tissues for touch in spheres.values()} == {tissues}
@@ -139,7 +139,7 @@ def test_materials_of_the_conditions_reach_the_later_studies_but_not_the_trials(
     ("wrong", "said"),
     [
         (lambda: Conditions("fine"), "resolution must be one of quick, standard, paper: got 'fine'"),
-        (lambda: Conditions(materials="humann"), "materials must be one of human, paper, .*got 'humann'"),
+        (lambda: Conditions(tissues="humann"), "tissues must be one of human, paper, .*got 'humann'"),
         (lambda: Conditions(seed=-1), "seed must be a whole number of at least 0: got -1"),
         (lambda: Conditions(seed=0.5), "seed must be a whole number: got 0.5"),
         (lambda: Reproduction("here", jobs=0), "jobs must be a whole number of at least 1"),

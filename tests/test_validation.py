@@ -288,9 +288,9 @@ def test_force_at_depth_0_is_0_and_grows_with_depth(folder):
 
 def test_quasi_static_force_is_that_of_relaxed_tissues(folder):
     """Tissues whose Prony series is left out have the long-term moduli at all times."""
-    tissues = QUICK.conditions.materials
+    tissues = QUICK.conditions.tissues
     relaxed = Tissues(*(layer.with_prony(Prony()) for layer in named_tissues(tissues).layers))
-    elastic = FingertipModel(Conditions(resolution="quick", materials=relaxed))
+    elastic = FingertipModel(Conditions(resolution="quick", tissues=relaxed))
     slow = replace(QUICK, loading="quasi_static")
     of_fast, of_elastic, of_slow = (
         result_of(folder, FORCE + "plate,0.4,0.1\n", model).predictions[0].predicted
@@ -433,7 +433,7 @@ def test_the_published_deflection_scores_as_in_the_reproduction(folder):
     found, table = read_observations(path), cylinder_deflection()
     assert found.observed.tolist() == table.deflection_mm[~table.is_artefact].tolist()
     assert [row.condition[2] for row in found.rows] == table.distance_mm[~table.is_artefact].tolist()
-    third = Conditions(resolution="quick", materials="trial3")
+    third = Conditions(resolution="quick", tissues="trial3")
     scored = validate(ValidationRequest(found, FingertipModel(third), folder))
     touch = deflection_touches(third)["trial3", "cylinder"]
     profile = Store(folder / STORE_FOLDER).load(touch).surface_profile()
@@ -521,7 +521,7 @@ def test_an_example_can_be_tried_as_it_says(call, tmp_path, kind):
         (["none.csv"], "none.csv must be a file that can be read"),
         (["."], ". must be a file that can be read"),
         (["mine.csv", "--loading", "slow"], "loading must be one of ramp_and_hold, quasi_static: got 'slow'"),
-        (["mine.csv", "--materials", "wood"], "materials must be one of"),
+        (["mine.csv", "--tissues", "wood"], "tissues must be one of"),
         (["mine.csv", "--resolution", "high"], "resolution must be one of"),
         (["mine.csv", "--jobs", "0"], "jobs must be a whole number of at least 1"),
         (["mine.csv", "--afferent", "fit.json"], "afferent: fit.json must be a file that can be read"),
@@ -558,7 +558,7 @@ def test_options_and_their_defaults_are_those_of_the_modules():
     "tissues", ["human", "paper", "trial3", "wu2007", named_tissues("human")], ids=lambda each: str(each)[:6]
 )
 def test_the_afferent_is_that_of_the_tissues_unless_one_is_given(tissues):
-    conditions, own = Conditions(materials=tissues), Afferent(static_gain=1e-6)
+    conditions, own = Conditions(tissues=tissues), Afferent(static_gain=1e-6)
     assert FingertipModel(conditions).responding == Afferent.for_tissues(tissues)
     assert FingertipModel(conditions, own).responding == own
 

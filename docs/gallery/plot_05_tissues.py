@@ -15,7 +15,7 @@ sets = {"human": "human", "paper": "paper", "maeno1998": "maeno1998", "human, ha
 
 figure, axes = plt.subplots(figsize=(6, 3.5), layout="constrained")
 for (name, tissues), line in zip(sets.items(), ("k-", "k--", "k:", "k-."), strict=True):
-    skin = fp.indent(fp.Fingertip(), ball, motion, materials=tissues)
+    skin = fp.indent(fp.Fingertip(), ball, motion, tissues=tissues)
     axes.plot(skin.depth_mm[skin.times_ms <= 50], skin.force_mn[skin.times_ms <= 50], line, label=name)
 axes.set(xlabel="depth [mm]", ylabel="force [mN]")
 axes.legend()

@@ -22,7 +22,7 @@ def bar_readings_page(result: BarReadings) -> Page:
     manifest = result.manifest
     return Page(
         "Intervals in windows, and bar or grating",
-        f"Written by `python -m studies bar-readings --materials {manifest.materials}` on "
+        f"Written by `python -m studies bar-readings --tissues {manifest.materials}` on "
         f"{manifest.started[:10]}: {edition(manifest)}, mechanical code {manifest.code_hash}. Rates of one "
         f"afferent at 36 shifts of the bar, driven by {QUANTITIES[result.quantity]}, by reading of what the "
         "paper leaves open. Conclusions are on [intervals in windows](decisions/intervals-in-windows.md) and "

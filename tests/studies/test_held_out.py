@@ -55,7 +55,7 @@ from studies.pages.held_out import held_out_page
 from studies.pages.markdown import write_markdown
 from studies.sphere_thresholds import Threshold, ThresholdRow
 
-QUICK = Conditions(resolution="quick", materials="human")
+QUICK = Conditions(resolution="quick", tissues="human")
 PEOPLE_N = np.array([0.04, 0.16, 0.40, 0.77])
 RANGES_N = np.array([[np.nan, np.nan], [0.11, 0.23], [np.nan, np.nan], [0.50, 1.04]])
 

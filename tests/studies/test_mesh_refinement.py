@@ -80,7 +80,7 @@ def test_a_refined_mesh_has_the_factor_in_every_direction(factor):
 
 
 def test_refined_keeps_the_zones_and_a_factor_of_one_keeps_the_mesh():
-    grading = Conditions("standard", materials=TISSUES).bar_grading()
+    grading = Conditions("standard", tissues=TISSUES).bar_grading()
     assert mesh_refinement.refined(grading, 1.0) == grading
     finer = mesh_refinement.refined(grading, 1.5)
     assert (finer.centre_mm, finer.half_length_mm) == (grading.centre_mm, grading.half_length_mm)
@@ -93,14 +93,14 @@ def test_refined_keeps_the_zones_and_a_factor_of_one_keeps_the_mesh():
 def test_quick_and_standard_are_the_meshes_of_the_studies():
     levels = {level.name: level for level in mesh_refinement.LEVELS}
     for name in ("quick", "standard"):
-        conditions = Conditions(name, materials=TISSUES)
+        conditions = Conditions(name, tissues=TISSUES)
         assert list(levels[name].bars().values()) == single_unit.bar_touches(conditions)
         assert levels[name].balls() == sphere_discrimination.discrimination_touches(conditions)
 
 
 def test_similar_meshes_press_the_same_at_the_same_places():
     levels = [level for level in mesh_refinement.LEVELS if level.resolution == "standard"]
-    standard = single_unit.bar_touches(Conditions("standard", materials=TISSUES))
+    standard = single_unit.bar_touches(Conditions("standard", tissues=TISSUES))
     assert [level.factor for level in levels] == sorted(level.factor for level in levels)
     for level in levels:
         for shift, touch in level.bars().items():
@@ -110,8 +110,8 @@ def test_similar_meshes_press_the_same_at_the_same_places():
 
 def test_each_single_change_moves_only_the_mesh_or_only_the_steps():
     standard = {
-        "bar": single_unit.bar_touches(Conditions("standard", materials=TISSUES))[mesh_refinement.PEAK_SHIFT],
-        "sphere": sphere_discrimination.discrimination_touches(Conditions("standard", materials=TISSUES))[
+        "bar": single_unit.bar_touches(Conditions("standard", tissues=TISSUES))[mesh_refinement.PEAK_SHIFT],
+        "sphere": sphere_discrimination.discrimination_touches(Conditions("standard", tissues=TISSUES))[
             0.0, 287.0
         ],
     }

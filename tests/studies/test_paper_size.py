@@ -35,7 +35,7 @@ def touches():
 
 @pytest.mark.parametrize("name", paper_size.MESHES)
 def test_touches_are_those_of_the_studies_on_half_of_the_finger(touches, name):
-    conditions, mine = Conditions(name, materials=TISSUES), touches[name]
+    conditions, mine = Conditions(name, tissues=TISSUES), touches[name]
     bars = single_unit.bar_touches(conditions)
     asked = [
         *(bars[shift] for shift in paper_size.CHOSEN_SHIFTS),

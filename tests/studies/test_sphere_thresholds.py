@@ -152,7 +152,7 @@ def test_rows_change_one_cause_each_before_causes_are_combined():
 
 
 def test_all_spheres_of_a_row_move_alike_on_one_mesh():
-    conditions = Conditions(resolution="quick", materials="human")
+    conditions = Conditions(resolution="quick", tissues="human")
     pressed = touches(replace(Variant(), stimulus=RampAndHold(depth_mm=2.3)), conditions)
     assert tuple(pressed) == PRESSED_PER_M
     assert {touch.stimulus.depth_mm for touch in pressed.values()} == {2.3}

@@ -635,7 +635,7 @@ def test_a_candidate_that_cannot_be_solved_is_named(tmp_path, monkeypatch):
 
 def test_conditions_take_tissues_of_ones_own():
     own = neo_hookean((40.0, 30.0, 20.0, 5.0))
-    conditions = replace(Conditions("quick"), materials=own)
+    conditions = replace(Conditions("quick"), tissues=own)
     assert conditions.touch(trial_order.Cylinder(), RECEPTOR_X_MM, conditions.bar_grading()).tissues == own
 
 

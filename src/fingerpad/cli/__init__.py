@@ -34,6 +34,7 @@ app = typer.Typer(
     help="Simulate touch: a finite-element fingertip, the spikes of SAI afferents, discrimination.",
     add_completion=False,
     pretty_exceptions_enable=False,
+    rich_markup_mode=None,  # which would take a unit, [mm], for markup
 )
 
 MISUSE: Any = typer.BadParameter.__base__

@@ -8,7 +8,7 @@ DEFAULT_TISSUES = "human"
 RESOLUTION_CHOICES = ("quick", "standard", "paper")
 INDENTER_CHOICES = ("sphere", "cylinder", "bar", "line", "punch", "plate", "edge", "gap", "grating")
 FINGER_CHOICES = ("adult", "small", "large", "child", "macaque", "aged")
-MATERIAL_CHOICES = (
+TISSUES_CHOICES = (
     "human",
     "paper",
     "trial1",

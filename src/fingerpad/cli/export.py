@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from fingerpad.cli.choices import DEFAULT_TISSUES, FINGER_CHOICES, FORMAT_CHOICES, INDENTER_CHOICES
-from fingerpad.cli.options import Materials, Resolution, number_option
+from fingerpad.cli.options import Resolution, Tissues, number_option
 from fingerpad.cli.running import interruptible, make_writable
 from fingerpad.core.errors import InputError
 
@@ -44,7 +44,7 @@ def export_command(
     finger: Annotated[
         str, typer.Option(help=f"One of {', '.join(FINGER_CHOICES)}, with measures as in adult:width_mm=18.")
     ] = ADULT,
-    materials: Materials = DEFAULT_TISSUES,
+    tissues: Tissues = DEFAULT_TISSUES,
     resolution: Resolution = QUICK,
     format_name: Annotated[
         str, typer.Option("--format", help=f"One of {', '.join(FORMAT_CHOICES)}.")
@@ -76,7 +76,7 @@ def export_command(
     if tolerance is not None and trajectory is None:
         raise InputError("--tolerance is that of a --trajectory: give both, or leave it out.")
     if described is not None:
-        given = (indenter, curvature, depth, trajectory, finger, materials, resolution)
+        given = (indenter, curvature, depth, trajectory, finger, tissues, resolution)
         if given != (SPHERE, None, None, None, ADULT, DEFAULT_TISSUES, QUICK):
             raise InputError(
                 f"--touch {described} has its own finger, object, motion, tissues and resolution: leave the "
@@ -94,7 +94,7 @@ def export_command(
                 "object": indenter if curvature is None else {"kind": SPHERE, "curvature_per_m": curvature},
                 "motion": motion,
                 "finger": finger,
-                "tissues": materials,
+                "tissues": tissues,
                 "resolution": resolution,
                 "place": {"tilt_deg": 0.0},
             },

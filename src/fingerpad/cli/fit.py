@@ -12,10 +12,10 @@ import typer
 from fingerpad.cli.choices import (
     DEFAULT_TISSUES,
     FINGER_CHOICES,
-    MATERIAL_CHOICES,
     METHOD_CHOICES,
     QUANTITY_CHOICES,
     RESOLUTION_CHOICES,
+    TISSUES_CHOICES,
 )
 from fingerpad.cli.options import Jobs, Scheduler, Seed, integer_option, number_option
 from fingerpad.cli.running import engine, interruptible, make_writable, progress, write_examples
@@ -98,10 +98,10 @@ def fit_command(
         str | None,
         typer.Option(help=f"One of {', '.join(RESOLUTION_CHOICES)}. Default: that of the stimuli, standard."),
     ] = None,
-    materials: Annotated[
+    tissues: Annotated[
         str | None,
         typer.Option(
-            help=f"One of {', '.join(MATERIAL_CHOICES)}. Default: tissues of the stimuli, {DEFAULT_TISSUES}."
+            help=f"One of {', '.join(TISSUES_CHOICES)}. Default: tissues of the stimuli, {DEFAULT_TISSUES}."
         ),
     ] = None,
     finger: Annotated[
@@ -143,12 +143,12 @@ def fit_command(
         )
     sizes = {"width": width, "fillet": fillet, "depth": depth}
     one_of("resolution", resolution or STANDARD, RESOLUTION_CHOICES)
-    one_of("materials", materials or DEFAULT_TISSUES, MATERIAL_CHOICES)
+    one_of("tissues", tissues or DEFAULT_TISSUES, TISSUES_CHOICES)
     if finger is not None:
         with at("--finger"):
             finger_of(finger)
         finger = next((str(path.absolute()) for path in named_files(finger)), finger)
-    pressed_into = {"resolution": resolution, "tissues": materials, "finger": finger}
+    pressed_into = {"resolution": resolution, "tissues": tissues, "finger": finger}
     stimuli = _stimuli(stimulus, stimulus_column, sizes, pressed_into)
     request = FitRequest(
         read_recordings(recordings, stimuli, unit),

@@ -8,14 +8,25 @@ from typing import Annotated, Any
 import typer
 import typer.core
 
-from fingerpad.cli.choices import MATERIAL_CHOICES, RESOLUTION_CHOICES
+from fingerpad.cli.choices import RESOLUTION_CHOICES, TISSUES_CHOICES
 from fingerpad.cli.running import interruptible
+from fingerpad.core.keywords import closest
 
 RESOLUTIONS_AS_OPTIONS = tuple(f"--{name}" for name in RESOLUTION_CHOICES)
 """Values of `--resolution` as they may be mistaken for options."""
 
 
-class Group(typer.core.TyperGroup):
+class _WholeSentence:
+    """In the list of commands, the whole first paragraph of a command."""
+
+    help: str | None
+
+    def get_short_help_str(self, limit: int = 0) -> str:
+        """First paragraph of the help, which click cuts at a width and at any full stop."""
+        return " ".join((self.help or "").partition("\n\n")[0].split())
+
+
+class Group(_WholeSentence, typer.core.TyperGroup):
     """A command with commands of its own, which it names where none is given."""
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
@@ -25,7 +36,7 @@ class Group(typer.core.TyperGroup):
         return super().parse_args(ctx, args)
 
 
-class Command(typer.core.TyperCommand):
+class Command(_WholeSentence, typer.core.TyperCommand):
     """A command that does not take an option's name for the value of another, and ends well by a signal."""
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
@@ -41,7 +52,12 @@ class Command(typer.core.TyperCommand):
         for word in words:
             if word not in names and word in RESOLUTIONS_AS_OPTIONS and "--resolution" in names:
                 ctx.fail(f"No such option: {word}; write --resolution {word.removeprefix('--')}")
-        for word, following in pairwise(words):
+        for word, following in pairwise(["", *words]):
+            option = following.partition("=")[0]
+            meant = closest(option[2:], [name[2:] for name in names])
+            unknown = option.startswith("--") and option not in {*names, "--help"}
+            if unknown and meant and word not in with_argument:
+                ctx.fail(f"No such option: {option}; write --{meant}")
             if word in with_argument and following in names:
                 ctx.fail(f"Option {word!r} requires an argument: got {following!r}; write its value first")
         return super().parse_args(ctx, args)
@@ -79,7 +95,7 @@ def integer_option(help_text: str) -> Any:
 
 
 Resolution = Annotated[str, typer.Option(help=f"One of {', '.join(RESOLUTION_CHOICES)}.")]
-Materials = Annotated[str, typer.Option(help=f"One of {', '.join(MATERIAL_CHOICES)}.")]
+Tissues = Annotated[str, typer.Option(help=f"One of {', '.join(TISSUES_CHOICES)}.")]
 Jobs = Annotated[int | None, integer_option("Number of processes. Default: one per core.")]
 Scheduler = Annotated[
     str | None,

@@ -10,7 +10,7 @@ from typing import Annotated
 import typer
 
 from fingerpad.cli.choices import DEFAULT_TISSUES, KIND_CHOICES, LOADING_CHOICES
-from fingerpad.cli.options import Jobs, Materials, Resolution, Scheduler
+from fingerpad.cli.options import Jobs, Resolution, Scheduler, Tissues
 from fingerpad.cli.running import engine, interruptible, make_writable, progress, write_examples
 from fingerpad.core.errors import InputError
 
@@ -26,7 +26,7 @@ def validate_command(
         Path, typer.Option(help="Folder for page, figure, results and stored indentations.")
     ] = Path("validate"),
     resolution: Resolution = "standard",
-    materials: Materials = DEFAULT_TISSUES,
+    tissues: Tissues = DEFAULT_TISSUES,
     afferent: Annotated[
         Path | None,
         typer.Option(
@@ -68,8 +68,8 @@ def validate_command(
     if observations is None:
         raise InputError("validate needs a file of observations, or --example KIND: see --help.")
     model = FingertipModel(
-        Conditions(resolution=resolution, materials=materials),
-        None if afferent is None else fitted_afferent(afferent, materials),
+        Conditions(resolution=resolution, tissues=tissues),
+        None if afferent is None else fitted_afferent(afferent, tissues),
         loading,
         static_window,
     )

@@ -22,6 +22,9 @@ _CLOSE = 0.6
 _SHORTEST_STEM = 3
 """Letters from which the beginning of a name is taken for it."""
 
+_NEW_NAMES = {"materials": "tissues"}
+"""Names that were renamed."""
+
 
 def did_you_mean(wrong: str, known: Collection[str], owner: str = "") -> str:
     """Name the known word that is closest to a wrong one, or all of them.
@@ -49,7 +52,8 @@ def closest(wrong: Any, known: Collection[str]) -> str | None:
         return None
     names = [name for name in known if isinstance(name, str)]
     # A name without its unit, such as `depth`, means the first unit that is known, not the most similar one.
-    near = [name for name in names if wrong and name.startswith(f"{wrong}_")]
+    near = [name for name in names if name == _NEW_NAMES.get(wrong)]
+    near = near or [name for name in names if wrong and name.startswith(f"{wrong}_")]
     near = near or [name for name in names if len(wrong) >= _SHORTEST_STEM and name.startswith(wrong)]
     near = near or difflib.get_close_matches(wrong, names, n=1, cutoff=_CLOSE)
     return near[0] if near else None

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from fingerpad.core.checks import instance, one_of, whole
+from fingerpad.core.keywords import KnownKeywords
 from fingerpad.core.random_streams import LARGEST_SEED
 from fingerpad.core.values import converted
 from fingerpad.data.tissues import DEFAULT_TISSUES
@@ -47,7 +48,7 @@ def straight_tilt_deg(finger: Finger, indenter: Indenter) -> float:
 
 @dataclass(frozen=True)
 @converted
-class Conditions:
+class Conditions(metaclass=KnownKeywords):
     """Finger, tissues and accuracy of a reproduction.
 
     Parameters
@@ -56,7 +57,7 @@ class Conditions:
         How fine meshes and steps are.
     seed : int
         Seed of the observer's noise.
-    materials : str or Tissues
+    tissues : str or Tissues
         Tissues of all but the paper's three trials: a name, see `mechanics.tissues`, or your own.
     finger : Fingertip or FingerMesh
         The finger.
@@ -64,21 +65,21 @@ class Conditions:
 
     resolution: str = "standard"
     seed: int = 0
-    materials: str | Tissues = DEFAULT_TISSUES
+    tissues: str | Tissues = DEFAULT_TISSUES
     finger: Finger = field(default_factory=Fingertip)
 
     def __post_init__(self) -> None:
         one_of("resolution", self.resolution, RESOLUTIONS)
         whole("seed", self.seed, 0, LARGEST_SEED)
-        if isinstance(self.materials, str):
-            one_of("materials", self.materials, tuple(TISSUES))
+        if isinstance(self.tissues, str):
+            one_of("tissues", self.tissues, tuple(TISSUES))
         else:
-            instance("materials", self.materials, Tissues)
+            instance("tissues", self.tissues, Tissues)
 
     @property
     def afferent(self) -> Afferent:
         """Afferent that was fitted with the tissues, see `Afferent.for_tissues`."""
-        return Afferent.for_tissues(self.materials)
+        return Afferent.for_tissues(self.tissues)
 
     @property
     def quantity(self) -> str:
@@ -100,14 +101,14 @@ class Conditions:
         indenter: Indenter,
         x_mm: float,
         grading: Grading,
-        materials: str | Tissues | None = None,
+        tissues: str | Tissues | None = None,
         tilt_deg: float = 0.0,
     ) -> Touch:
         """One touch of the paper's protocol, 1.0 mm in 50 ms, held for 950 ms, on the midline at x."""
         return touch_of(
             self.finger,
             indenter,
-            materials=materials or self.materials,
+            tissues=tissues or self.tissues,
             resolution=self.resolution,
             at_mm=(x_mm, 0.0),
             grading=grading,

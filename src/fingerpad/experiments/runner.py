@@ -223,11 +223,11 @@ class Runner:
         inputs : mapping of str to str, optional
             SHA-256 of the input files, by name.
         """
-        materials = conditions.materials
+        tissues = conditions.tissues
         return Manifest(
             **software(),
             resolution=conditions.resolution,
-            materials=materials if isinstance(materials, str) else repr(materials),
+            materials=tissues if isinstance(tissues, str) else repr(tissues),
             seed=conditions.seed,
             started=self._started.isoformat(timespec="seconds"),
             wall_s=round(time.perf_counter() - self._clock, 2),

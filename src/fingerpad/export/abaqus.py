@@ -38,7 +38,7 @@ def abaqus_deck(job: Job) -> str:
     --------
     >>> import fingerpad as fp
     >>> from fingerpad.export.job import job_of
-    >>> deck = abaqus_deck(job_of(fp.touch_of(fp.Fingertip(), fp.Sphere(), materials="trial1")))
+    >>> deck = abaqus_deck(job_of(fp.touch_of(fp.Fingertip(), fp.Sphere(), tissues="trial1")))
     >>> [line for line in deck.splitlines() if line.startswith("*HYPERELASTIC")][0]
     '*HYPERELASTIC, NEO HOOKE, MODULI=LONG TERM'
     """

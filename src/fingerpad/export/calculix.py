@@ -58,7 +58,7 @@ def calculix_deck(job: Job, elastic_moduli: str | None = None, element: str = "C
     --------
     >>> import fingerpad as fp
     >>> from fingerpad.export.job import job_of
-    >>> job = job_of(fp.touch_of(fp.Fingertip(), fp.Sphere(), materials="trial1"))
+    >>> job = job_of(fp.touch_of(fp.Fingertip(), fp.Sphere(), tissues="trial1"))
     >>> calculix_deck(job)
     Traceback (most recent call last):
     ...

@@ -469,7 +469,7 @@ def _json(value: Any) -> str:
 def _described(value: Any) -> Any:
     """Return a description as JSON holds it; long lists by their length."""
     if is_dataclass(value) and not isinstance(value, type):
-        parts = {part.name: _described(getattr(value, part.name)) for part in fields(value)}
+        parts = {part.name: _described(getattr(value, part.name)) for part in fields(value) if part.repr}
         return {"class": type(value).__name__, **parts}
     if isinstance(value, np.ndarray):
         return _described(value.tolist()) if value.size <= _LONGEST_LIST else {"shape": list(value.shape)}

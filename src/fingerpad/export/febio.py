@@ -59,7 +59,7 @@ def febio_deck(job: Job) -> str:
     --------
     >>> import fingerpad as fp
     >>> from fingerpad.export.job import job_of
-    >>> deck = febio_deck(job_of(fp.touch_of(fp.Fingertip(), fp.Sphere(), materials="trial1")))
+    >>> deck = febio_deck(job_of(fp.touch_of(fp.Fingertip(), fp.Sphere(), tissues="trial1")))
     >>> [line.strip() for line in deck.splitlines() if "<material " in line][0]
     '<material id="1" name="stratum_corneum" type="uncoupled viscoelastic">'
     """

@@ -138,7 +138,7 @@ def named_tissues(name: str) -> Tissues:
     >>> round(named_tissues("trial1").dermis.shear_modulus_kpa, 2)
     27.03
     """
-    return TISSUES[one_of("materials", name, tuple(TISSUES))]()
+    return TISSUES[one_of("tissues", name, tuple(TISSUES))]()
 
 
 def name_of_tissues(tissues: Tissues) -> str:

@@ -78,6 +78,10 @@ class Touch(metaclass=KnownKeywords):
     spin_deg : float
         Rotation of the indenter about its direction of pressing, after the tilt. At 0 a bar lies across the
         finger, at 90 along it; a positive spin turns the indenter's x axis from distal towards +z. [degrees]
+    whole : bool
+        Whether `solve` keeps all nodes and elements over time, unless it is told. No part of the key.
+    progress : Progress, optional
+        Shown how far `solve` is. No part of the key.
 
     Raises
     ------
@@ -102,6 +106,8 @@ class Touch(metaclass=KnownKeywords):
     tilt_deg: float = 0.0
     friction: float = 0.0
     spin_deg: float = 0.0
+    whole: bool = field(default=False, compare=False, repr=False)
+    progress: Progress | None = field(default=None, compare=False, repr=False)
 
     def __post_init__(self) -> None:
         for name, kind in (
@@ -143,6 +149,11 @@ class Touch(metaclass=KnownKeywords):
                 )
         self._check_sizes()
         check_friction(self.friction, self.indenter)
+        if self.progress is not None and not callable(getattr(self.progress, "stage", None)):
+            raise InputError(
+                "progress must have a method stage, as fp.notebook_progress() has: "
+                f"got {shown(self.progress)}."
+            )
         check_path(self.finger, self.stimulus, self.at_mm)
         self.settings.steps_ms(self.stimulus)
         warn_of_inertia(self.stimulus, self.tissues.layers, self.layers_mm)
@@ -184,16 +195,17 @@ class Touch(metaclass=KnownKeywords):
                 "grading_about(...)."
             )
 
-    def solve(self, threads: int | None = None, whole: bool = False) -> SkinResponse:
+    def solve(self, threads: int | None = None, whole: bool | None = None) -> SkinResponse:
         """Solve the indentation and return the response of the skin.
 
         Parameters
         ----------
         threads : int, optional
             Number of threads, all by default; the result has the same bits on any number of threads.
-        whole : bool
+        whole : bool, optional
             Whether to keep `SkinResponse.deformation` as well: displacement of all nodes, stress, strain and
-            energies of all elements over time. It takes about 200 bytes per element and time.
+            energies of all elements over time. It takes about 200 bytes per element and time. By default as
+            the touch was described.
 
         Raises
         ------
@@ -202,9 +214,11 @@ class Touch(metaclass=KnownKeywords):
         ConvergenceError
             If a step cannot be solved.
         """
-        mesh = self.mesh
+        mesh, whole = self.mesh, self.whole if whole is None else whole
         sheet = mesh.living_epidermis.ravel()
-        done = self._press(np.arange(len(mesh.elements)) if whole else sheet, threads)
+        with (self.progress or NoProgress()).stage("press", 1) as advance:
+            done = self._press(np.arange(len(mesh.elements)) if whole else sheet, threads)
+            advance()
         kept = replace(done, fields=done.fields.of(sheet)) if whole else done
         return self.response(
             {field.name: field.stored_values(kept, mesh) for field in stored_fields()},
@@ -284,27 +298,27 @@ def touch_of(
     finger: Finger,
     indenter: Indenter,
     stimulus: Stimulus | None = None,
-    materials: str | Tissues = DEFAULT_TISSUES,
+    tissues: str | Tissues = DEFAULT_TISSUES,
     resolution: str = "quick",
     at_mm: Sequence[float] | None = None,
-    grading: Grading | None = None,
+    *,
     tilt_deg: float = 0.0,
-    settings: PressSettings | None = None,
-    friction: float = 0.0,
     spin_deg: float = 0.0,
+    friction: float = 0.0,
+    grading: Grading | None = None,
+    settings: PressSettings | None = None,
     times_ms: Sequence[float] = (),
+    whole: bool = False,
+    progress: Progress | None = None,
 ) -> Touch:
-    """Describe a touch without solving it; arguments as in `indent`.
+    """Describe a touch without solving it: `indent` takes the same arguments and solves it.
 
     Parameters
     ----------
-    grading : Grading, optional
-        Mesh to use instead of the one that `resolution` grades about the indenter.
-    tilt_deg : float
-        Rotation of the indenter about z, see `Touch`. [degrees]
-    spin_deg : float
-        Rotation of the indenter about its direction of pressing, see `Touch`. Without a `grading` both halves
-        of the finger are meshed if the turned indenter is not its own mirror image. [degrees]
+    finger, indenter, stimulus, tissues, resolution, at_mm, tilt_deg, spin_deg, friction, grading, settings
+        See `indent`.
+    times_ms, whole, progress
+        See `indent`; `Touch.solve` uses the last two.
 
     Returns
     -------
@@ -323,7 +337,7 @@ def touch_of(
         finger=finger,
         indenter=indenter,
         stimulus=stimulus,
-        tissues=materials if isinstance(materials, Tissues) else named_tissues(materials),
+        tissues=tissues if isinstance(tissues, Tissues) else named_tissues(tissues),
         grading=grading
         or finger.own_grading(x, z)
         or grading_along(finger, indenter, resolution, (x, z), stimulus.poses, tilt_deg, spin_deg),
@@ -332,6 +346,8 @@ def touch_of(
         tilt_deg=tilt_deg,
         friction=friction,
         spin_deg=spin_deg,
+        whole=whole,
+        progress=progress,
     )
 
 
@@ -340,14 +356,18 @@ def indent(
     finger: Finger,
     indenter: Indenter,
     stimulus: Stimulus | None = None,
-    materials: str | Tissues = DEFAULT_TISSUES,
+    tissues: str | Tissues = DEFAULT_TISSUES,
     resolution: str = "quick",
     at_mm: Sequence[float] | None = None,
-    settings: PressSettings | None = None,
-    whole: bool = False,
-    times_ms: Sequence[float] = (),
-    progress: Progress | None = None,
+    *,
+    tilt_deg: float = 0.0,
+    spin_deg: float = 0.0,
     friction: float = 0.0,
+    grading: Grading | None = None,
+    settings: PressSettings | None = None,
+    times_ms: Sequence[float] = (),
+    whole: bool = False,
+    progress: Progress | None = None,
 ) -> SkinResponse:
     """Press an indenter into a finger and return the response of the skin.
 
@@ -360,7 +380,7 @@ def indent(
         own derived from `Indenter`.
     stimulus : RampAndHold, ForceRampAndHold or Trajectory, optional
         The motion, by depth or by force; the paper's by default.
-    materials : str or Tissues
+    tissues : str or Tissues
         "human" (one set for deflection, force, firing and percept), "paper" (closest to the paper's numbers),
         "trial1", "trial2", "trial3" (paper, section 2.2.1), "trial2_wu", "trial3_wu",
         "trial3_stiffening", "maeno1998", "wu2007", "gerling2014_fit", or tissues of your own. The default
@@ -370,18 +390,25 @@ def indent(
     at_mm : (float, float), optional
         x and z of the indenter's axis on the finger; by default the middle of its pad. Half of the finger is
         solved on the midline. [mm]
+    tilt_deg : float
+        Rotation of the indenter about z, see `Touch`. [degrees]
+    spin_deg : float
+        Rotation of the indenter about its direction of pressing, see `Touch`. Without a `grading` both halves
+        of the finger are meshed if the turned indenter is not its own mirror image. [degrees]
+    friction : float
+        Coulomb's coefficient between skin and indenter; the paper mentions none.
+    grading : Grading, optional
+        Mesh to use instead of the one that `resolution` grades about the indenter.
     settings : PressSettings, optional
         Steps and tolerances instead of those of `resolution`; `PressSettings(sed_tolerance=0.01)` chooses
         steps that keep the error of SED in time below 1 % of its largest value.
-    whole : bool
-        Whether to keep all nodes and elements over time as well, see `Touch.solve`.
     times_ms : sequence of float
         Times at which the response is wanted: it has them among its times, which the motion and the settings
         choose. [ms]
+    whole : bool
+        Whether to keep all nodes and elements over time as well, see `Touch.solve`.
     progress : Progress, optional
         Shown how far the press is, such as `fp.notebook_progress()`.
-    friction : float
-        Coulomb's coefficient between skin and indenter; the paper mentions none.
 
     Returns
     -------
@@ -402,18 +429,11 @@ def indent(
     >>> print(f"{skin.surface_profile().deflection_mm.max():.1f} mm deep")
     0.3 mm deep
     """
-    touch = touch_of(
-        finger, indenter, stimulus, materials, resolution, at_mm, settings=settings, friction=friction,
-        times_ms=times_ms,
-    )  # fmt: skip
-    if progress is not None and not callable(getattr(progress, "stage", None)):
-        raise InputError(
-            f"progress must have a method stage, as fp.notebook_progress() has: got {shown(progress)}."
-        )
-    with (progress or NoProgress()).stage("press", 1) as advance:
-        skin = touch.solve(whole=whole)
-        advance()
-    return skin
+    return touch_of(
+        finger, indenter, stimulus, tissues, resolution, at_mm, tilt_deg=tilt_deg, spin_deg=spin_deg,
+        friction=friction, grading=grading, settings=settings, times_ms=times_ms, whole=whole,
+        progress=progress,
+    ).solve()  # fmt: skip
 
 
 def settings_of(resolution: str) -> PressSettings:

@@ -338,7 +338,7 @@ def set_result(
         thresholds = curvature_thresholds.curvature_thresholds(
             centred | dict(others), afferent, discrimination.noise_sigma, conditions.seed
         )
-    tissues = str(conditions.materials)
+    tissues = str(conditions.tissues)
     standard = spheres[STANDARD_SPHERE]
     rows = comparison(tissues, deflection, force, unit, course, discrimination, nail, thresholds)
     made = SetResult(

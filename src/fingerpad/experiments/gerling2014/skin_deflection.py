@@ -109,7 +109,7 @@ def deflection_touches(conditions: Conditions) -> dict[tuple[str, str], Touch]:
     """Six touches: three trials, two indenters."""
     return {
         (trial, name): conditions.touch(
-            indenter, conditions.receptor_x_mm, conditions.deflection_grading(indenter), materials=trial
+            indenter, conditions.receptor_x_mm, conditions.deflection_grading(indenter), tissues=trial
         )
         for trial in TRIALS
         for name, indenter in INDENTERS.items()

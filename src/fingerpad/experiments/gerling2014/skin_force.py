@@ -57,7 +57,7 @@ def force_touches(conditions: Conditions) -> dict[str, Touch]:
             cylinder, conditions.receptor_x_mm, conditions.deflection_grading(cylinder)
         )
     } | {
-        name: touch_of(conditions.finger, body, motion, conditions.materials, conditions.resolution)
+        name: touch_of(conditions.finger, body, motion, conditions.tissues, conditions.resolution)
         for name, (body, motion) in flat.items()
     }
 

@@ -205,7 +205,7 @@ def _pressed_to(given: Mapping[str, Value], model: FingertipModel) -> Touch | No
         conditions.finger,
         indenter,
         motion,
-        conditions.materials,
+        conditions.tissues,
         conditions.resolution,
         settings=settings,
     )
@@ -261,7 +261,7 @@ def _rate(given: Mapping[str, Value], model: FingertipModel) -> Reading:
         conditions.finger,
         body,
         ForceRampAndHold(force_mn=MN_PER_N * force_n),
-        conditions.materials,
+        conditions.tissues,
         conditions.resolution,
         grading=grading,
         tilt_deg=conditions.skin_tilt_deg,

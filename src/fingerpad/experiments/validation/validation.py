@@ -174,8 +174,8 @@ class ValidationRequest:
 
     def __post_init__(self) -> None:
         engine_of(self.jobs)
-        if isinstance(self.model.conditions.materials, str):
-            named_tissues(self.model.conditions.materials)
+        if isinstance(self.model.conditions.tissues, str):
+            named_tissues(self.model.conditions.tissues)
 
 
 def validate(
