@@ -41,7 +41,11 @@ def runge_kutta_spikes(
     return SpikeTrains(
         # The kernel reads one neuron after the other: a row per neuron is contiguous in memory.
         *_runge_kutta_trains(
-            current.times_ms, np.ascontiguousarray(current.current_ma.T), *neuron.constants(), step
+            current.times_ms,
+            np.ascontiguousarray(current.current_ma.T),
+            neuron.initial_potentials_mv(current.current_ma[0]),
+            *neuron.constants()[:-1],
+            step,
         )
     )
 
@@ -65,6 +69,7 @@ def _current_at(time: float, knot: int, times: FloatArray, current: FloatArray) 
 def _runge_kutta_trains(
     times: FloatArray,
     currents: FloatArray,
+    potentials: FloatArray,
     tau: float,
     capacitance: float,
     threshold: float,
@@ -78,7 +83,7 @@ def _runge_kutta_trains(
     offsets = np.zeros(n_neurons + 1, dtype=np.int64)
     count = 0
     for neuron in range(n_neurons):
-        potential = 0.0
+        potential = potentials[neuron]
         ready = times[0]
         now, knot = _current_at(times[0], 0, times, currents[neuron])
         for index in range(n_steps):

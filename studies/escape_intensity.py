@@ -52,6 +52,7 @@ def intensity_per_ms(
     potentials = _potentials_at(
         current.times_ms,
         neuron.relative_drive(current),
+        neuron.initial_potentials(current),
         chosen,
         spikes.times_ms,
         spikes.offsets,
@@ -67,6 +68,7 @@ def intensity_per_ms(
 def _potentials_at(
     times: FloatArray,
     drives: FloatArray,
+    initial: FloatArray,
     sites: np.ndarray,
     spikes: FloatArray,
     offsets: np.ndarray,
@@ -79,7 +81,7 @@ def _potentials_at(
     for train in range(sites.size):
         drive = drives[sites[train]]
         spike, place = offsets[train], 0
-        u, ready, time = 0.0, times[0], times[0]
+        u, ready, time = initial[sites[train]], times[0], times[0]
         knot = 0
         while place < wanted.size:
             while knot < times.size - 2 and times[knot + 1] <= time:

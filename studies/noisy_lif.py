@@ -24,7 +24,7 @@ from fingerpad.core.philox import four_normals
 from fingerpad.core.random_streams import Presentations, Purpose, checked_sites
 from fingerpad.core.signals import CurrentTraces, SpikeTrains
 from fingerpad.core.threads import in_blocks
-from fingerpad.neuron.exact_spikes import potential_at, refine
+from fingerpad.neuron.exact_spikes import initial_potentials, potential_at, refine
 from fingerpad.neuron.lif import LeakyIntegrateAndFire
 from studies.membrane_noise import (
     CorrelatedCurrentNoise,
@@ -90,12 +90,7 @@ def noisy_spikes(
     gains = noise.gain.factors(seed, everyone) if noise.gain else np.ones(len(everyone))
     # The kernel reads one train after the other: a row per site is contiguous in memory.
     rows = np.ascontiguousarray(current.current_ma.T)
-    numbers = (
-        float(membrane.time_constant_ms),
-        float(membrane.capacitance_mf),
-        float(membrane.threshold_mv),
-        float(membrane.refractory_ms),
-    )
+    numbers = membrane.constants()
     disturbed = _current_numbers(noise.current, membrane.time_constant_ms)
     spread = log_spread(noise.threshold.relative_standard_deviation) if noise.threshold else 0.0
 
@@ -174,6 +169,7 @@ def _noisy_trains(
     capacitance: float,
     threshold: float,
     refractory: float,
+    initial: float,
     step: float,
     deviation: float,
     memory: float,
@@ -201,7 +197,7 @@ def _noisy_trains(
             following = memory * level + fresh * deviation * four[1]
         limits = four_normals(seed, trial, receptor, _THRESHOLD, 1)
         limit = threshold * math.exp(spread * limits[0] - 0.5 * spread * spread)
-        potential = 0.0
+        potential = initial_potentials(current[:1], tau, capacitance, threshold, initial)[0]
         while True:
             while knot < times.size - 1 and times[knot + 1] <= time:
                 knot += 1

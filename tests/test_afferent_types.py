@@ -10,7 +10,9 @@ from numpy.testing import assert_allclose, assert_array_equal
 import fingerpad as fp
 from fingerpad.core.regions import Rectangle
 from fingerpad.data import afferents as published
+from fingerpad.inference.rate_model import AfferentModel
 from fingerpad.neuron.band_pass import BandPass
+from fingerpad.neuron.escape_rate import EscapeRate
 from fingerpad.neuron.lif import LeakyIntegrateAndFire
 from fingerpad.neuron.population import sensitivities
 from fingerpad.neuron.transduction import drive
@@ -53,6 +55,74 @@ class Pressed:
         away = np.hypot(places[:, 0] - 17.0, places[:, -1])
         peak = self.heights[dynamic_quantity] * np.exp(-((away / 3.0) ** 2))
         return traces(dynamic_quantity, [0.0, 50.0, 1000.0], np.outer([0.0, 1.0, 1.0], peak), [50.0])
+
+
+RESTED = {
+    "SAI": fp.Afferent(),
+    "smoothed SAI": fp.SAI(),
+    "SAI of trial 3": fp.Afferent.for_tissues("trial3"),
+    "RA": fp.RA(),
+    "PC": fp.PC(),
+    "SAII": fp.SAII(),
+    "own": fp.OwnAfferent(
+        lambda sed: fp.CurrentTraces(sed.times_ms, 1e-6 * sed.sed_kpa - 5e-7),
+        LeakyIntegrateAndFire(60.0, 1e-6, 50.0, 1.0),
+    ),
+    "soft": fp.OwnAfferent(
+        lambda sed: EscapeRate(fp.SAII().membrane, 0.01).spikes(fp.SAII().transduction.current(sed), 3),
+        dynamic_quantity="skin_stretch",
+        static_quantity="skin_stretch",
+    ),
+}
+
+
+@pytest.mark.parametrize("name", RESTED)
+def test_the_same_touch_has_the_same_answer_after_any_rest(name: str) -> None:
+    """Uneven samples, so that the slope at first touch would notice those before it."""
+    afferent = RESTED[name]
+    quantity = afferent.static_quantity
+    height = {"deep_displacement": 1.0, "skin_stretch": 0.1}.get(quantity, 20.0)
+    times, course = np.array([0.0, 7.3, 21.1, 50.0, 300.0]), np.array([0.0, 0.1, 0.4, 1.0, 0.9])
+    population = fp.Population.grid(rows=1, columns=1, afferent=afferent)
+    once = population.respond_to(traces(quantity, times, height * course, [50.0]))
+    assert once.spikes.times_ms.size > 2
+    for rests_ms in ([500.1], [10.0, 500.1]):
+        rested = traces(
+            quantity, [0.0, *rests_ms[:-1], *(rests_ms[-1] + times)],
+            height * np.append(np.zeros(len(rests_ms)), course), [rests_ms[-1] + 50.0],
+        )  # fmt: skip
+        again = population.respond_to(rested)
+        assert rested.onset_ms == 500.1
+        assert_allclose(again.spikes.times_ms - 500.1, once.spikes.times_ms, rtol=0.0, atol=1e-9)
+        for read in ("first_spike_latency_ms", "dynamic_rate_hz", "static_rate_hz"):
+            assert_allclose(getattr(again, read), getattr(once, read), rtol=1e-9)
+
+
+def test_a_stream_starts_at_rest_and_the_membrane_of_the_set_paper_at_0() -> None:
+    human, paper = fp.Afferent(), fp.Afferent.for_tissues("paper")
+    first_ms = []
+    for rest_ms in (0.0, 500.0):
+        stream = fp.AfferentStream(human, 1)
+        if rest_ms:
+            stream.step(rest_ms, [0.0])
+        first_ms.append(stream.step(rest_ms + 50.0, [20.0])[0][0] - rest_ms)
+    assert_allclose(first_ms[1], first_ms[0], rtol=0.0, atol=1e-9)
+    at_once = human.spikes(press("compressive_stress", 20.0))[0][0]
+    assert_allclose(first_ms[0], at_once, rtol=0.0, atol=1e-9)
+    resting_mv = human.membrane.initial_potentials_mv(np.array([human.intercept_ma]))
+    assert_allclose(resting_mv, human.intercept_ma * human.time_constant_ms / human.capacitance_mf)
+    assert paper.membrane.initial_potentials_mv(np.array([paper.intercept_ma])) == 0.0
+    # A membrane that would fire at rest has just been reset, so that it fires at its rate from the start.
+    firing = replace(human, intercept_ma=2.0 * human.rheobase_ma)
+    assert firing.membrane.initial_potentials_mv(np.array([firing.intercept_ma])) == 0.0
+
+
+def test_a_fit_simulates_the_membrane_that_it_fits() -> None:
+    stress = press("compressive_stress", 20.0)
+    for initial_mv in (None, 0.0):
+        afferent = replace(fp.Afferent(), initial_mv=initial_mv)
+        model = AfferentModel.of_traces(stress, initial_mv=initial_mv)
+        assert_array_equal(model.evaluate(afferent.parameters), afferent.rates(stress))
 
 
 ENDS = np.array([[[0.0, 0.0], [1.0, 0.0]]])

@@ -70,7 +70,8 @@ def slow_log_likelihood(driven, train, end, parameters, escape_ms):
     """A general integrator for potential and integral of the hazard together, from knot to knot."""
     a, b, c, tau, width = parameters
     times = driven.times_ms
-    value, u, ready = 0.0, 0.0, times[0]
+    value, ready = 0.0, times[0]
+    u = tau * (a + b * driven.rate_kpa_per_ms[0, 0] + c * driven.sed_kpa[0, 0])
     spikes = [*train, math.inf]
     events = np.unique([*times, *train, *(train + REFRACTORY), end])
     for left, right in pairwise(events[events <= end]):

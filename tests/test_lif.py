@@ -84,7 +84,7 @@ def test_a_threshold_reached_only_between_two_knots_is_found():
 
 
 def test_negative_current_pulls_the_potential_below_zero_and_delays_the_spike():
-    current = CurrentTraces([0.0, 30.0, 30.0, 200.0], [[-1e-6], [-1e-6], [2e-6], [2e-6]])
+    current = CurrentTraces([0.0, 0.0, 30.0, 30.0, 200.0], 1e-6 * np.array([[0.0, -1.0, -1.0, 2.0, 2.0]]).T)
     below = -1e-6 * TAU / CAPACITANCE * -math.expm1(-30.0 / TAU)
     target = 2e-6 * TAU / CAPACITANCE
     expected = 30.0 + TAU * math.log((target - below) / (target - THRESHOLD))
@@ -193,7 +193,9 @@ def test_runge_kutta_approaches_the_exact_spikes_as_its_step_shrinks():
 def slow_reference(times, current, neuron, samples=4000):
     """Sample the closed form densely, bisect the first sample at or above the threshold."""
     tau, capacitance = neuron.time_constant_ms, neuron.capacitance_mf
-    spikes, potential, ready = [], 0.0, times[0]
+    spikes, ready = [], times[0]
+    potential = current[0] * tau / capacitance
+    potential = potential if potential < neuron.threshold_mv else 0.0
     for knot in range(len(times) - 1):
         start, end = times[knot], times[knot + 1]
         begin = max(start, ready)

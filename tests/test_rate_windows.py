@@ -158,7 +158,7 @@ def test_phases_of_a_trajectory_are_named_by_its_course():
 def test_phases_of_any_trajectory_follow_each_other_from_start_to_end(steps):
     lengths, depths = zip(*steps, strict=True)
     motion = Trajectory((0.0, *np.cumsum(lengths)), (0.0, *depths[:-1], 1.0))
-    assert motion.phases[0].start_ms == 0.0
+    assert motion.phases[0].start_ms == motion.onset_ms
     assert motion.phases[-1].end_ms == motion.end_ms
     for one, next_one in zip(motion.phases, motion.phases[1:], strict=False):
         assert one.end_ms == next_one.start_ms

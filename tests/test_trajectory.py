@@ -14,6 +14,7 @@ from fingerpad.geometry.indenters import Bar, FlatPunch, Sphere
 from fingerpad.geometry.mesh import block_mesh
 from fingerpad.geometry.motion import ForceRampAndHold, RampAndHold
 from fingerpad.geometry.motions import repeated, sine, stroke
+from fingerpad.geometry.sampled_motions import reduced
 from fingerpad.geometry.trajectory import Trajectory
 from fingerpad.mechanics import newton
 from fingerpad.mechanics.contact import place
@@ -50,6 +51,47 @@ def test_ramp_and_hold_as_a_trajectory_is_solved_at_the_same_times_and_gives_the
         one, two = pressed(ready), pressed(other)
         np.testing.assert_allclose(two.force_mn, one.force_mn, rtol=1e-6)
         np.testing.assert_allclose(two.depth_mm, one.depth_mm, rtol=1e-6)
+
+
+@pytest.mark.parametrize("by", ["depth_mm", "force_mn"])
+def test_a_touch_after_a_rest_or_an_approach_through_the_air_is_the_same_touch(by):
+    largest = {"depth_mm": 0.4, "force_mn": 20.0}[by]
+    touch = Trajectory((0.0, 50.0, 350.0), **{by: (0.0, largest, largest)})
+    later = [Trajectory((0.0, 500.1, 550.1, 850.1), **{by: (0.0, 0.0, largest, largest)})]
+    if by == "depth_mm":
+        later += [
+            Trajectory((0.0, 150.0, 450.0), (-2.0 * largest, largest, largest)),
+            Trajectory((0.0, 20.0, 33.3, 83.3, 383.3), (-9.0, -9.0, 0.0, largest, largest)),
+        ]
+    once = pressed(touch)
+    for motion in later:
+        onset = motion.onset_ms
+        assert motion.corners_ms == pytest.approx([onset, onset + 50.0])
+        assert [phase.name for phase in motion.phases] == ["ramp", "hold"]
+        assert motion.phases[0].window_ms == pytest.approx((onset, onset + 50.0))
+        again = pressed(motion)
+        touched = again.times_ms >= onset
+        np.testing.assert_allclose(again.times_ms[touched] - onset, once.times_ms, atol=1e-9)
+        np.testing.assert_array_equal(again.sed_kpa[touched], once.sed_kpa)
+        assert not again.sed_kpa[~touched].any()
+
+
+def test_noise_of_a_tare_and_a_lift_between_two_touches_are_not_counted_as_ramp():
+    times = np.arange(0.0, 1000.0)
+    noise = 0.003 * np.sin(7.0 * times)
+    tare = Trajectory(times, np.interp(times, [0.0, 500.0, 550.0], [0.0, 0.0, 1.0]) + noise)
+    assert tare.phases[0].window_ms == pytest.approx((500.0, 550.0), abs=2.0)
+    twice = Trajectory((0.0, 50.0, 300.0, 350.0, 500.0, 600.0), (0.0, 1.0, 1.0, -1.0, -1.0, 1.0))
+    assert [(phase.name, phase.start_ms) for phase in twice.phases] == [
+        ("ramp", 0.0), ("hold", 50.0), ("release", 300.0), ("pause", 325.0), ("ramp 2", 550.0)
+    ]  # fmt: skip
+
+
+def test_a_recording_with_few_samples_is_as_exact_from_high_above_the_skin():
+    times = np.arange(0.0, 400.0)
+    depth = np.interp(times, [0.0, 100.0, 150.0, 399.0], [-20.0, 0.0, 1.0, 1.0]) - 0.03 * (times > 300.0)
+    few = reduced(Trajectory(times, depth))
+    assert np.abs(few.prescribed_at(times) - depth).max() <= 0.005
 
 
 def test_corners_are_kept_and_a_smooth_curve_has_none_but_at_its_ends():
@@ -95,7 +137,7 @@ def test_solved_times_increase_and_hold_all_samples(steps, ramp_steps, hold_step
     times = motion.step_times_ms(ramp_steps, hold_steps)
     assert (np.diff(times) > 0.0).all()
     assert np.isin(samples, times).all()
-    way = np.abs(np.diff(motion.prescribed_at(times)))
+    way = np.abs(np.diff(motion.prescribed_at(times[times >= motion.onset_ms])))
     assert way.max() <= motion.largest / ramp_steps * (1 + 1e-5)
 
 

@@ -25,7 +25,7 @@ from studies.membrane_noise import (
 from studies.noisy_lif import noisy_spikes
 
 TAU, CAPACITANCE, THRESHOLD, REFRACTORY = 68.0, 1e-6, 50.0, 1.0
-NEURON = LeakyIntegrateAndFire(TAU, CAPACITANCE, THRESHOLD, REFRACTORY)
+NEURON = LeakyIntegrateAndFire(TAU, CAPACITANCE, THRESHOLD, REFRACTORY, initial_mv=0.0)
 SEED = 12
 
 

@@ -51,9 +51,25 @@ class Phase(metaclass=KnownKeywords):
         return self.start_ms, self.end_ms
 
 
-def ramp_and_hold_phases(ramp_end_ms: float, hold_end_ms: float) -> tuple[Phase, Phase]:
-    """Phases of a ramp from 0 and of the hold after it. [ms]"""
-    return Phase(RAMP, 0.0, ramp_end_ms), Phase(HOLD, ramp_end_ms, hold_end_ms)
+def ramp_and_hold_phases(
+    ramp_end_ms: float, hold_end_ms: float, onset_ms: float = 0.0
+) -> tuple[Phase, Phase]:
+    """Phases of a ramp from first touch and of the hold after it. [ms]"""
+    return Phase(RAMP, onset_ms, ramp_end_ms), Phase(HOLD, ramp_end_ms, hold_end_ms)
+
+
+def from_onset(phases: Sequence[Phase], onset_ms: float) -> tuple[Phase, ...]:
+    """Cut a phase that begins before first touch and ends after it: it begins there.
+
+    Examples
+    --------
+    >>> from_onset(ramp_and_hold_phases(150.0, 1100.0), 100.0)[0].window_ms
+    (100.0, 150.0)
+    """
+    return tuple(
+        Phase(phase.name, onset_ms, phase.end_ms) if phase.start_ms < onset_ms < phase.end_ms else phase
+        for phase in phases
+    )
 
 
 def phase_named(phases: Sequence[Phase], name: str, asks: str = "phase") -> Phase:

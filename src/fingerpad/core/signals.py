@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike
 from fingerpad.core.checks import FloatArray, float_array, increasing, int_array, positive
 from fingerpad.core.displayed import Result
 from fingerpad.core.errors import InputError
-from fingerpad.core.phases import Phase, ramp_and_hold_phases
+from fingerpad.core.phases import Phase, from_onset, ramp_and_hold_phases
 from fingerpad.core.values import converted
 
 MOST_SHOWN = 8
@@ -69,7 +69,7 @@ class SedTraces(Result):
     Parameters
     ----------
     times_ms : array (n_times,)
-        Strictly increasing, from the onset of the indentation. [ms]
+        Strictly increasing. [ms]
     sed_kpa : array (n_times, n_sites)
         Strain energy density, or the quantity of the static term in its place; not negative.
         [kPa = µJ/mm³]
@@ -83,8 +83,11 @@ class SedTraces(Result):
         What each term follows, by the names of `SkinResponse.sample`: "stored" is SED, as in the paper; any
         other is an extension of its model.
     phases : tuple of Phase, optional
-        Named parts of the touch; by default one kink separates "ramp" and "hold", and there are none where
-        there is not one kink.
+        Named parts of the touch; by default one kink after the onset separates "ramp" and "hold", and there
+        are none where there is not one.
+    onset_ms : float, optional
+        Time of first touch, from which phases and latencies count; interpolation does not smooth it either.
+        By default the last time until which all values are 0. [ms]
 
     Raises
     ------
@@ -105,6 +108,7 @@ class SedTraces(Result):
     dynamic_quantity: str = STORED_ENERGY
     static_quantity: str = STORED_ENERGY
     phases: tuple[Phase, ...] = ()
+    onset_ms: float = None  # type: ignore[assignment]  # a number after initialisation
 
     def __post_init__(self) -> None:
         times, sed = _traces("SedTraces", "sed_kpa", self.times_ms, self.sed_kpa)
@@ -115,8 +119,6 @@ class SedTraces(Result):
         if not np.isin(kinks, times).all():
             raise InputError(f"kinks_ms must be among times_ms: got {kinks[~np.isin(kinks, times)]}.")
         _freeze(self, times_ms=times, sed_kpa=sed, kinks_ms=kinks)
-        if not self.phases and kinks.size == 1 and 0.0 < kinks[0] < times[-1]:
-            object.__setattr__(self, "phases", ramp_and_hold_phases(float(kinks[0]), float(times[-1])))
         if (self.dynamic_kpa is None) != (self.dynamic_quantity == self.static_quantity):
             raise InputError(
                 "dynamic_kpa is needed if dynamic_quantity is not static_quantity, and only then: got "
@@ -131,6 +133,19 @@ class SedTraces(Result):
                     f"{dynamic.shape} for {sed.shape} and a smallest value of {dynamic.min():.3g}."
                 )
             _freeze(self, dynamic_kpa=dynamic)
+        onset = self._first_touch_ms() if self.onset_ms is None else float(self.onset_ms)
+        object.__setattr__(self, "onset_ms", onset)
+        phases, later = self.phases, kinks[kinks > onset]
+        if not phases and later.size == 1 and onset >= 0.0 and later[0] < times[-1]:
+            phases = ramp_and_hold_phases(float(later[0]), float(times[-1]), onset)
+        object.__setattr__(self, "phases", from_onset(phases, onset))
+
+    def _first_touch_ms(self) -> float:
+        """Last time until which all values are 0; the first time if there is none, or nothing is touched."""
+        touched = self.sed_kpa.any(axis=1)
+        if self.dynamic_kpa is not None:
+            touched |= self.dynamic_kpa.any(axis=1)
+        return float(self.times_ms[max(int(touched.argmax()) - 1, 0)])
 
     @classmethod
     def joined(cls, traces: Sequence[SedTraces]) -> SedTraces:
@@ -418,7 +433,7 @@ class ResponseMap(Result):
     dynamic_rate_hz, static_rate_hz : array (n_receptors,)
         Firing rates in the two windows, Eqs. 6-10; 0 without an interval. [spikes/s]
     first_spike_latency_ms : array (n_receptors,)
-        Time of the first spike after onset; NaN without a spike. [ms]
+        Time from first touch to the first spike after it; NaN without a spike. [ms]
     duration_ms : float, optional
         How long the touch lasted, if that is known. [ms]
     phases : tuple of Phase

@@ -74,6 +74,13 @@ HUMAN_DYNAMIC_GAIN = _HUMAN_SET("fitted dynamic gain k_d, set human", 6.552e-5, 
 HUMAN_STATIC_GAIN = _HUMAN_SET("fitted static gain k_s, set human", 5.201e-7, "mA/kPa")
 HUMAN_TIME_CONSTANT = _HUMAN_SET("fitted membrane time constant tau, set human", 82.54, "ms")
 REFRACTORY = Published("refractory period", 1.0, "ms", "Gerling et al. 2014, section 2.1.3", "paper")
+PAPER_INITIAL = Published(
+    "potential of the membrane at the start, set paper",
+    0.0,
+    "mV",
+    "Gerling et al. 2014, section 2.1.3",
+    "paper",
+)
 DIFFERENCE_STEP = Published(
     "step h of the rate of change of energy density", 0.001, "ms", "Gerling et al. 2014, Eq. 2", "paper"
 )

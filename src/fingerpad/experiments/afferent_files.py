@@ -48,6 +48,6 @@ def fitted_afferent(path: Path, tissues: str | Tissues = DEFAULT_TISSUES) -> Aff
             f"afferent: {path} must hold the parameters of a fit: {shown(error.args[0])} is missing there."
         ) from error
     try:
-        return Afferent.from_parameters(parameters, **quantities)
+        return Afferent.from_parameters(parameters, **quantities, initial_mv=named.get("initial_mv"))
     except InputError as error:
         raise InputError(f"afferent: {path}: {error}") from error

@@ -107,6 +107,11 @@ class Motion(metaclass=KnownKeywords):
         return 0.0, *self.corners_ms, self.end_ms
 
     @property
+    def onset_ms(self) -> float:
+        """Time of first touch of the undeformed skin, from which phases and latencies count. [ms]"""
+        return 0.0
+
+    @property
     def poses(self) -> tuple[Pose, ...]:
         """Poses between which the indenter moves, in order; one if it only goes up and down."""
         return (STILL,)

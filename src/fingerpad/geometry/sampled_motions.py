@@ -53,7 +53,8 @@ def sampled(
     depth_mm, force_mn, x_mm, z_mm, tilt_deg, spin_deg : callable, optional
         From the time [ms] to what `Trajectory` calls so; continuous.
     tolerance : float, optional
-        Largest error over the extent of each function, at 33 times in each linear piece. [1]
+        Largest error over the largest depth or force and over the extent of each way and rotation, at 33
+        times in each linear piece. [1]
     looks : int, optional
         Number of equal parts of the whole into which it is looked first: what lasts less than such a part
         may be missed.
@@ -95,7 +96,7 @@ def sampled(
             ]
         )
 
-    scale = _extent(values_at(np.linspace(0.0, end, looks + 1)))
+    scale = _extent(values_at(np.linspace(0.0, end, looks + 1)), tuple(courses))
 
     def deviation(times: FloatArray, start: float, stop: float) -> FloatArray:
         """Largest deviation of any column from its chord between two times, over its extent."""
@@ -161,13 +162,15 @@ def reduced(motion: Trajectory, tolerance: float = TOLERANCE) -> Trajectory:
     names = ["force_mn" if motion.by_force else "depth_mm"]
     names += [name for name in POSE_COLUMNS if getattr(motion, name) is not None]
     times, table = np.array(motion.times_ms), np.array([getattr(motion, name) for name in names]).T
-    keep = samples_of_line(times, table / _extent(table), tolerance)
+    keep = samples_of_line(times, table / _extent(table, names), tolerance)
     columns: dict[str, Any] = {name: tuple(np.array(getattr(motion, name))[keep]) for name in names}
     phases = motion.phases if motion.named_phases else ()
     return replace(motion, times_ms=tuple(times[keep]), **columns, phases=phases, cycles=None)
 
 
-def _extent(table: FloatArray) -> FloatArray:
-    """Largest absolute value of each column, 1 for one that is 0 throughout."""
+def _extent(table: FloatArray, names: Sequence[str]) -> FloatArray:
+    """Largest absolute value of each column, 1 for one that is 0 throughout; of a depth the deepest."""
     largest = np.abs(table).max(axis=0)
+    deepest = table.max(axis=0)
+    largest = np.where((np.array(names) == "depth_mm") & (deepest > 0.0), deepest, largest)
     return np.where(largest > 0.0, largest, 1.0)

@@ -64,9 +64,9 @@ class Trajectory(Motion):
         How far it has turned about its tip since first touch, from 0, as `tilt_deg` and `spin_deg` of a
         `Touch`, to which they are added; it does not turn by default. [degrees]
     phases : sequence of Phase, optional
-        Names of its parts. By default "ramp" goes deeper, "hold" stays, "move" goes aside or turns, "release"
-        comes back and "pause" stays out of contact, where changes of 2 % do not count; from the second on
-        they are numbered, as "ramp 2".
+        Names of its parts. By default they begin at first touch: "ramp" goes deeper, "hold" stays, "move"
+        goes aside or turns, "release" comes back and "pause" stays out of contact, where changes of 2 % do
+        not count; from the second on they are numbered, as "ramp 2".
     cycles : Cycles, optional
         The part that repeats itself. If it has many cycles, a press solves some of them and interpolates
         the others (`PressSettings.cycle_tolerance`).
@@ -206,6 +206,33 @@ class Trajectory(Motion):
         still = (0.0,) * len(self.times_ms)
         return tuple(Pose(*row) for row in zip(*(column or still for column in columns), strict=True))
 
+    @property
+    def onset_ms(self) -> float:
+        """Time of first touch: where depth or force last leaves 0 before it exceeds 2 % of the largest. [ms]
+
+        Examples
+        --------
+        >>> Trajectory([0.0, 150.0, 1100.0], depth_mm=[-2.0, 1.0, 1.0]).onset_ms
+        100.0
+        """
+        times, values = self.times_ms, np.array(self.prescribed)
+        pressed = int((values > SAME_VALUE * max(self.largest, 0.0)).argmax())
+        if pressed == 0:  # it only presses where skin lies higher, aside
+            return 0.0
+        last = int(np.flatnonzero(values[:pressed] <= 0.0)[-1])
+        share = -values[last] / (values[last + 1] - values[last])
+        onset = times[last] + share * (times[last + 1] - times[last])
+        nearest = min(times[last : last + 2], key=lambda sample: abs(sample - onset))
+        return float(nearest if abs(nearest - onset) <= SAME_SPEED * self.end_ms else onset)
+
+    def _with(self, also_ms: ArrayLike) -> tuple[FloatArray, FloatArray]:
+        """Return times and `course_at` of all samples and of some further times, (n,) and (n, 5)."""
+        given = np.array(self.times_ms)
+        further = np.setdiff1d(also_ms, given)
+        further = further[np.abs(further[:, None] - given).min(axis=1) > SAME_SPEED * self.end_ms]
+        times = np.union1d(given, further)
+        return times, np.column_stack([np.interp(times, given, column) for column in self._course.T])
+
     def pose_at(self, time_ms: float) -> Pose:
         """Pose of the indenter at a time [ms]."""
         columns = (getattr(self, name) for name in POSE_COLUMNS)
@@ -222,9 +249,12 @@ class Trajectory(Motion):
 
     @property
     def corners_ms(self) -> tuple[float, ...]:
-        """Samples at which the speed jumps, other than along a smooth curve; without start and end. [ms]"""
-        lengths_ms = np.diff(self.times_ms)
-        speed = np.diff(self._course, axis=0) / lengths_ms[:, None]
+        """First touch, and later samples at which the speed jumps, other than along a smooth curve. [ms]"""
+        onset = self.onset_ms
+        times, course = self._with([onset])
+        course, times = course[times >= onset], times[times >= onset]
+        lengths_ms = np.diff(times)
+        speed = np.diff(course, axis=0) / lengths_ms[:, None]
         changes = np.diff(speed, axis=0)
         change = np.linalg.norm(changes, axis=1)
         largest = np.linalg.norm(speed, axis=1).max()
@@ -232,7 +262,8 @@ class Trajectory(Motion):
         ratio = lengths_ms[1:] / lengths_ms[:-1]
         smooth &= np.maximum(ratio, 1.0 / ratio) <= EVEN_STEPS
         corners = (change > CORNER_SHARE * largest) | ((change > SAME_SPEED * largest) & ~smooth)
-        return tuple(np.array(self.times_ms)[1:-1][corners].tolist())
+        first = times[:1] if onset > 0.0 else times[:0]
+        return (*first.tolist(), *times[1:-1][corners].tolist())
 
     @staticmethod
     def _goes_on(accelerations: FloatArray) -> NDArray[np.bool_]:
@@ -254,16 +285,26 @@ class Trajectory(Motion):
         return self.phases != self._phases_of_course()
 
     def _phases_of_course(self) -> tuple[Phase, ...]:
-        """Name phases by what the indenter does, apart from changes of `SAME_VALUE`."""
-        course = self._course / np.maximum(np.ptp(self._course, axis=0), 1.0)
-        bends = np.flatnonzero(samples_of_line(np.array(self.times_ms), course, SAME_VALUE)).tolist()
+        """Name phases from first touch on by what the indenter does, apart from changes of `SAME_VALUE`."""
+        times, course = self._with([self.onset_ms, *self._crossings_ms()])
+        course, times = course[times >= self.onset_ms], times[times >= self.onset_ms]
+        course[:, 0] = np.maximum(course[:, 0], 0.0)  # how high it is lifted does not matter
+        course = course / np.maximum(np.ptp(course, axis=0), 1.0)
+        bends = np.flatnonzero(samples_of_line(times, course, SAME_VALUE)).tolist()
         phases: list[Phase] = []
         for kind, group in groupby(pairwise(bends), lambda part: self._kind(*course[list(part)])):
             same = list(group)
             count = 1 + sum(phase.name.split()[0] == kind for phase in phases)
             name = kind if count == 1 else f"{kind} {count}"
-            phases.append(Phase(name, self.times_ms[same[0][0]], self.times_ms[same[-1][1]]))
+            phases.append(Phase(name, float(times[same[0][0]]), float(times[same[-1][1]])))
         return tuple(phases)
+
+    def _crossings_ms(self) -> FloatArray:
+        """Return times between samples at which the depth passes 0. [ms]"""
+        times, values = np.array(self.times_ms), np.array(self.prescribed)
+        before = np.flatnonzero(values[1:] * values[:-1] < 0.0)
+        share = values[before] / (values[before] - values[before + 1])
+        return times[before] + share * (times[before + 1] - times[before])
 
     @staticmethod
     def _kind(start: FloatArray, end: FloatArray) -> str:
@@ -282,20 +323,27 @@ class Trajectory(Motion):
     def step_times_ms(self, ramp_steps: int, hold_steps: int) -> FloatArray:
         """List the times to solve at: all samples, and times between them where they are far apart. [ms]
 
-        A part of the way takes its share of `ramp_steps`, and a mm aside takes three times as many. The
-        first step aside is divided, because friction grows over about a tenth of a mm until skin slips. A
-        hold longer than the step before it takes `hold_steps`, which grow geometrically, because relaxation
-        is fastest at its beginning; a long part in which a recording drifts is a hold.
+        First touch is one of them, and the way through the air before it is one step. A part of the way takes
+        its share of `ramp_steps`, and a mm aside takes three times as many. The first step aside is divided,
+        because friction grows over about a tenth of a mm until skin slips. A hold longer than the step before
+        it takes `hold_steps`, which grow geometrically, because relaxation is fastest at its beginning; a
+        long part in which a recording drifts is a hold.
 
         Examples
         --------
         >>> Trajectory([0.0, 50.0, 1000.0], depth_mm=[0.0, 1.0, 1.0]).step_times_ms(2, 3).round(1).tolist()
         [0.0, 25.0, 50.0, 75.0, 204.1, 1000.0]
         """
-        times, last_ms = [0.0], np.inf
-        moved_by = np.linalg.norm(np.diff(self._course, axis=0), axis=1)
-        aside = np.linalg.norm(np.diff(self._course[:, 1:3], axis=0), axis=1)
-        for start, end, moved, way in zip(self.times_ms, self.times_ms[1:], moved_by, aside, strict=False):
+        times, last_ms, onset = [0.0], np.inf, self.onset_ms
+        samples_ms, course = self._with([onset])
+        moved_by = np.linalg.norm(np.diff(course, axis=0), axis=1)
+        aside = np.linalg.norm(np.diff(course[:, 1:3], axis=0), axis=1)
+        for start, end, moved, way in zip(
+            samples_ms[:-1].tolist(), samples_ms[1:].tolist(), moved_by, aside, strict=True
+        ):
+            if end <= onset and way <= SAME_SPEED:
+                times.append(end)
+                continue
             length_ms = end - start
             drifts = moved <= SAME_VALUE and length_ms > hold_steps * last_ms
             if moved > SAME_SPEED and not drifts:

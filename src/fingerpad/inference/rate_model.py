@@ -16,7 +16,6 @@ import numpy as np
 
 from fingerpad.core.checks import FloatArray, IntArray, not_negative
 from fingerpad.core.errors import InputError
-from fingerpad.core.phases import Phase
 from fingerpad.core.signals import SedTraces
 from fingerpad.core.threads import in_blocks
 from fingerpad.data import neuron
@@ -127,6 +126,8 @@ class AfferentModel:
         [ms]
     refractory_ms : float
         Refractory period, which is not fitted. [ms]
+    initial_mv : float, optional
+        Potential at the start, as of `Afferent`: that at rest by default. [mV]
 
     Raises
     ------
@@ -149,6 +150,7 @@ class AfferentModel:
     stimuli: tuple[IntArray, ...]
     windows_ms: Windows | None = None
     refractory_ms: float = neuron.REFRACTORY.value
+    initial_mv: float | None = None
 
     def __post_init__(self) -> None:
         not_negative("refractory_ms", self.refractory_ms, "ms")
@@ -168,6 +170,7 @@ class AfferentModel:
         driven: Drive,
         windows_ms: Windows | None = None,
         refractory_ms: float = neuron.REFRACTORY.value,
+        initial_mv: float | None = None,
     ) -> AfferentModel:
         """Make the model for stimuli that share their times.
 
@@ -175,10 +178,10 @@ class AfferentModel:
         ----------
         driven : Drive
             One column per stimulus.
-        windows_ms, refractory_ms
+        windows_ms, refractory_ms, initial_mv
             As of the class.
         """
-        return cls((driven,), (np.arange(driven.n_sites),), windows_ms, refractory_ms)
+        return cls((driven,), (np.arange(driven.n_sites),), windows_ms, refractory_ms, initial_mv)
 
     @classmethod
     def of_traces(
@@ -186,6 +189,7 @@ class AfferentModel:
         sed: SedTraces | Sequence[SedTraces],
         windows_ms: Windows | None = None,
         refractory_ms: float = neuron.REFRACTORY.value,
+        initial_mv: float | None = None,
     ) -> AfferentModel:
         """Make the model for strain energy density, stimuli grouped by their times.
 
@@ -194,7 +198,7 @@ class AfferentModel:
         sed : SedTraces or sequence of SedTraces
             Strain energy density, one column per stimulus; the columns of several traces are numbered
             consecutively.
-        windows_ms, refractory_ms
+        windows_ms, refractory_ms, initial_mv
             As of the class.
 
         Raises
@@ -209,10 +213,10 @@ class AfferentModel:
                 "sed must bring one dynamic_quantity and one static_quantity: got "
                 f"{', '.join(quantities) or 'no traces'}."
             )
-        groups: dict[tuple[bytes, bytes, tuple[Phase, ...]], list[tuple[int, SedTraces]]] = {}
+        groups: dict[tuple[object, ...], list[tuple[int, SedTraces]]] = {}
         first = 0
         for trace in traces:
-            key = trace.times_ms.tobytes(), trace.kinks_ms.tobytes(), trace.phases
+            key = trace.times_ms.tobytes(), trace.kinks_ms.tobytes(), trace.phases, trace.onset_ms
             groups.setdefault(key, []).append((first, trace))
             first += trace.n_sites
         return cls(
@@ -223,6 +227,7 @@ class AfferentModel:
             ),
             windows_ms,
             refractory_ms,
+            initial_mv,
         )
 
     @cached_property
@@ -250,7 +255,8 @@ class AfferentModel:
 
     def _evaluator(self) -> Evaluate:
         """Return a function like `evaluate` that reuses its arrays: only one thread may call it."""
-        groups = [_evaluator_of(group, self.refractory_ms, self.used_windows_ms) for group in self.drives]
+        rest = self.refractory_ms, self.initial_mv
+        groups = [_evaluator_of(group, *rest, self.used_windows_ms) for group in self.drives]
 
         def evaluate(parameters: FloatArray) -> Rates:
             dynamic, static = np.empty((2, self.n_stimuli))
@@ -325,21 +331,26 @@ def four_number_model(model: RateModel) -> Reparametrised:
     return Reparametrised(model, IDENTIFIABLE_NAMES, six_parameters)
 
 
-def _evaluator_of(driven: Drive, refractory_ms: float, windows_ms: Windows) -> Evaluate:
+def _evaluator_of(
+    driven: Drive, refractory_ms: float, initial_mv: float | None, windows_ms: Windows
+) -> Evaluate:
     """Return the rates under one drive as a function of six parameters; its arrays are allocated once."""
     current, static_part = np.empty_like(driven.sed_kpa), np.empty_like(driven.sed_kpa)
+    initial = np.nan if initial_mv is None else float(initial_mv)
 
     def evaluate(parameters: FloatArray) -> Rates:
         six = np.asarray(parameters, dtype=np.float64)
         if not (six.shape == (len(PARAMETER_NAMES),) and np.isfinite(six).all() and (six[3:] > 0.0).all()):
-            Afferent.from_parameters(six, refractory_ms)  # raises the error that names the parameter
+            Afferent.from_parameters(
+                six, refractory_ms, initial_mv=initial_mv
+            )  # raises the error that names the parameter
         intercept, dynamic_gain, static_gain, tau, capacitance, threshold = six.tolist()
         # I = beta + k_d U' + k_s U, in the order of Transduction.current.
         np.multiply(driven.rate_kpa_per_ms, dynamic_gain, out=current)
         current.__iadd__(intercept)
         current.__iadd__(np.multiply(driven.sed_kpa, static_gain, out=static_part))
         times, offsets = exact_trains(
-            driven.times_ms, current, tau, capacitance, threshold, float(refractory_ms)
+            driven.times_ms, current, tau, capacitance, threshold, float(refractory_ms), initial
         )
         dynamic, static = (window_rates_hz(times, offsets, start, end) for start, end in windows_ms)
         return dynamic, static

@@ -34,20 +34,24 @@ def cut(
     Returns
     -------
     array (n_intervals, 5)
-        Length [ms], U' at the beginning and end [kPa/ms], U at the beginning and end [kPa].
-    bool array (n_intervals, 2)
-        Whether the potential starts at 0, and whether a spike ends the interval.
+        Length [ms], U' at the beginning and end [kPa/ms], U at the beginning and end [kPa]. The first
+        interval of a train has no length: it is at rest, under the first values of the drive.
+    int array (n_intervals, 2)
+        Whether the potential is reset, and whether a spike ends the interval.
     array (n_trains + 1,)
         Index of the first interval of each train.
     """
-    most = sites.size * times.size + 2 * spikes.size
+    most = sites.size * (times.size + 1) + 2 * spikes.size
     values = np.empty((most, 5))
     flags = np.zeros((most, 2), dtype=np.bool_)
     firsts = np.zeros(sites.size + 1, dtype=np.int64)
     count = 0
     for train in range(sites.size):
         site, spike, time = sites[train], offsets[train], times[0]
-        fresh = True
+        values[count] = 0.0, rates[0, site], rates[0, site], seds[0, site], seds[0, site]
+        flags[count, 0] = True
+        fresh = False
+        count += 1
         for knot in range(times.size - 1):
             first, last = times[knot], min(times[knot + 1], ends[train])
             while time < last:
@@ -101,6 +105,11 @@ def accumulate(
         if flags[n, 0]:
             x1 = x2 = x3 = z = 0.0
         length = intervals[n, 0] / tau
+        if length == 0.0:  # at rest, as `initial_potentials` of the exact spikes
+            rest = a * tau + b * tau * intervals[n, 1] + c * tau * intervals[n, 3]
+            if rest < sharpness:
+                x1, x2, x3, z = tau, tau * intervals[n, 1], tau * intervals[n, 3], rest
+            continue
         w2, w3 = tau * intervals[n, 1], tau * intervals[n, 3]
         drift2 = (tau * intervals[n, 2] - w2) / length
         drift3 = (tau * intervals[n, 4] - w3) / length

@@ -17,7 +17,7 @@ from fingerpad.geometry.indenters import Indenter
 from fingerpad.geometry.mesh import Mesh
 from fingerpad.geometry.mesh_checks import check_mesh
 from fingerpad.geometry.mesh_quality import element_place, squeezed_most
-from fingerpad.geometry.motion import Stimulus
+from fingerpad.geometry.motion import STILL, Stimulus
 from fingerpad.mechanics.assembly import Sparsity
 from fingerpad.mechanics.balance import (
     EnergyBalance,
@@ -65,6 +65,9 @@ MOST_CONTINUED = 4.0
 
 LARGEST_DROP = 0.1
 """Largest share by which the force may fall in a step that drives the indenter deeper."""
+
+SAME_DIGITS = 9
+"""Decimals of depths [mm], forces [mN] and lengths of steps [ms]: the same touch later has the same bits."""
 
 LIFT_MM = 100.0
 """How far an indenter without force is lifted while the skin below it is solved. [mm]"""
@@ -187,6 +190,20 @@ class _Press:
             unstrained, (Entry(),), no_force,
         )  # fmt: skip
 
+    def in_the_air(self, times_ms: FloatArray) -> Iterator[_Moment]:
+        """Yield moments before first touch, in which nothing is solved because nothing happens."""
+        moment = self.unloaded()
+        skin_mm = self.contact.points_mm(self.body.mesh.nodes_mm)
+        for time_ms in times_ms.tolist():
+            depth_mm = 0.0
+            if not self.stimulus.by_force and time_ms < self.stimulus.onset_ms:
+                depth_mm = float(self.stimulus.prescribed_at(time_ms))
+            touch = self.contact.state(skin_mm, depth_mm, np.zeros(self.contact.stiffness.size))
+            entry = Entry(time_ms=time_ms, way=(depth_mm, 0.0, 0.0, 0.0, 0.0))
+            found = replace(moment.found, depth_mm=depth_mm, contact=touch)
+            moment = replace(moment, time_ms=time_ms, found=found, ledger=(*moment.ledger, entry))
+            yield moment
+
     def free_skin(self) -> Anchors | None:
         """Skin that does not yet hold on to the indenter, if there is friction."""
         if self.contact.friction == 0.0:
@@ -196,7 +213,7 @@ class _Press:
     def step(self, start: _Moment, target_ms: float, persistent: bool = False) -> _Moment:
         """Solve one step; `start` stays as it is, so a step that fails or is too long can be repeated."""
         mesh, table = self.body.mesh, self.body.table
-        step_ms = target_ms - start.time_ms
+        step_ms = length_ms(start.time_ms, target_ms)
         load = self.load(start, target_ms)
         guess = start.found.displacement_mm + self.continued(start, target_ms) * start.step_mm
         newton = replace(self.newton, persistent=True) if persistent else self.newton
@@ -292,7 +309,7 @@ class _Press:
         if before == 0.0:
             return 0.0
         further = float(self.advance(start, target_ms) @ start.advance)
-        return float(np.clip(further / before, -MOST_CONTINUED, MOST_CONTINUED))
+        return round(float(np.clip(further / before, -MOST_CONTINUED, MOST_CONTINUED)), SAME_DIGITS)
 
     def entry(
         self,
@@ -324,10 +341,10 @@ class _Press:
 
     def load(self, start: _Moment, target_ms: float) -> Load:
         """Indenter at the end of a step: at its depth, or with its force on the body as it is meshed."""
-        step_ms = target_ms - start.time_ms
+        step_ms = length_ms(start.time_ms, target_ms)
         step = StepCoefficients.of(self.body.table, step_ms)
         carried = start.history.carried(step, self.body.mesh.layer)
-        force_mn, depth_mm = None, float(self.stimulus.prescribed_at(target_ms))
+        force_mn, depth_mm = None, round(float(self.stimulus.prescribed_at(target_ms)), SAME_DIGITS)
         if self.stimulus.by_force and depth_mm == 0.0:
             depth_mm = start.found.depth_mm - LIFT_MM
         elif self.stimulus.by_force:
@@ -372,6 +389,17 @@ class _Press:
         """Whether the indenter is small or has an edge, round which skin slides."""
         body = self.contact.indenter
         return np.isfinite(self.finest_mm) or body.rim_mm is not None or body.edge_reach_mm > 0.0
+
+
+def length_ms(start_ms: float, end_ms: float) -> float:
+    """Length of a step. [ms]
+
+    Examples
+    --------
+    >>> length_ms(500.1, 500.4) == length_ms(0.0, 0.3) == 0.3
+    True
+    """
+    return round(end_ms - start_ms, SAME_DIGITS)
 
 
 def press(
@@ -533,17 +561,29 @@ def _check_bone(mesh: Mesh, indenter: Indenter, placement: Placement, stimulus: 
 
 def _moments(job: _Press, settings: PressSettings, times: FloatArray) -> Iterator[_Moment]:
     """Solved times after the unloaded one, which without a bound on the error of SED are `times`."""
-    stimulus, mesh, start = job.stimulus, job.body.mesh, job.unloaded()
+    start, waits_ms = job.unloaded(), times[times <= job.stimulus.onset_ms]
+    if all(job.stimulus.pose_at(time_ms) == STILL for time_ms in waits_ms.tolist()):
+        for start in job.in_the_air(waits_ms):
+            yield start
+        times = times[waits_ms.size :]
+    yield from _solved(job, settings, times, start)
+
+
+def _solved(job: _Press, settings: PressSettings, times: FloatArray, start: _Moment) -> Iterator[_Moment]:
+    """Solved times after a moment."""
+    stimulus, mesh = job.stimulus, job.body.mesh
     receptors = mesh.living_epidermis.ravel()
     where = receptors if receptors.size else np.arange(len(mesh.elements))
     if settings.sed_tolerance is None:
         cycle_times = _cycle_times(job, settings, times)
         if settings.cycle_tolerance is not None and cycle_times.size:
-            return _with_jumps(job, times, cycle_times, settings.cycle_tolerance, where)
+            return _with_jumps(job, start, times, cycle_times, settings.cycle_tolerance, where)
         return steps_at(start, times, job.step, job.stopped, job.parts, job.last_resort)
     relaxing = job.body.table.times_ms[job.body.table.shares > 0.0]
-    phases, begin_ms = [], 0.0
+    phases, begin_ms = [], start.time_ms
     for end_ms in settings.smooth_ends_ms(stimulus).tolist():
+        if end_ms <= start.time_ms:
+            continue
         before, after = stimulus.course_at(begin_ms), stimulus.course_at(end_ms)
         first_ms = times[np.searchsorted(times, begin_ms, side="right")] - begin_ms
         if (before == after).all():
@@ -573,12 +613,17 @@ def _cycle_times(job: _Press, settings: PressSettings, times: FloatArray) -> Flo
 
 
 def _with_jumps(
-    job: _Press, times: FloatArray, cycle_times: FloatArray, tolerance: float, where: np.ndarray
+    job: _Press,
+    moment: _Moment,
+    times: FloatArray,
+    cycle_times: FloatArray,
+    tolerance: float,
+    where: np.ndarray,
 ) -> Iterator[_Moment]:
     """Solved and interpolated times of a motion with many equal cycles."""
     # Loaded when it is asked for: most presses have no cycles.
     CycleJumps = import_module("fingerpad.mechanics.cycles").CycleJumps
-    body, moment = job.body, job.unloaded()
+    body = job.body
     first, last = np.searchsorted(times, [cycle_times[0, 0], cycle_times[-1, -1]])
     jumps = CycleJumps(cycle_times, tolerance, where, body.table, body.mesh.layer, job.step, job.stopped)
     for before in steps_at(moment, times[:first], job.step, job.stopped):

@@ -117,6 +117,9 @@ class Afferent(metaclass=KnownKeywords):
         What the two terms follow, by the names of `SkinResponse.sample`: compressive stress, unless another
         one is given. The paper's is strain energy density (SED), "stored"; any other is an extension of its
         model. The units of k_d and k_s depend on them.
+    initial_mv : float, optional
+        Potential of the membrane at the start. By default that at rest, beta tau/C, so that spikes do not
+        depend on how long nothing happened before a touch. [mV]
 
     Raises
     ------
@@ -142,6 +145,7 @@ class Afferent(metaclass=KnownKeywords):
     refractory_ms: float = neuron.REFRACTORY.value
     dynamic_quantity: str = neuron.HUMAN_QUANTITY
     static_quantity: str = neuron.HUMAN_QUANTITY
+    initial_mv: float | None = None
 
     def __post_init__(self) -> None:
         # Both stages check their parameters when they are made.
@@ -155,8 +159,9 @@ class Afferent(metaclass=KnownKeywords):
         ----------
         tissues : str or Tissues
             "human", the default afferent, driven by compressive stress; "paper" or "trial3", driven by strain
-            energy density (SED). For any other name and for tissues of your own, no afferent was fitted; the
-            one of "trial3" is returned.
+            energy density (SED). The membrane of "paper" starts at 0, as the paper prints, and not at rest.
+            For any other name and for tissues of your own, no afferent was fitted; the one of "trial3" is
+            returned.
 
         Returns
         -------
@@ -191,7 +196,10 @@ class Afferent(metaclass=KnownKeywords):
             )
         )
         return cls.from_parameters(
-            [each.value for each in fitted], dynamic_quantity=STORED_ENERGY, static_quantity=STORED_ENERGY
+            [each.value for each in fitted],
+            dynamic_quantity=STORED_ENERGY,
+            static_quantity=STORED_ENERGY,
+            initial_mv=neuron.PAPER_INITIAL.value if tissues == "paper" else None,
         )
 
     @classmethod
@@ -201,6 +209,7 @@ class Afferent(metaclass=KnownKeywords):
         refractory_ms: float = neuron.REFRACTORY.value,
         dynamic_quantity: str = neuron.HUMAN_QUANTITY,
         static_quantity: str = neuron.HUMAN_QUANTITY,
+        initial_mv: float | None = None,
     ) -> Afferent:
         """Make an afferent from the six fitted numbers.
 
@@ -213,6 +222,8 @@ class Afferent(metaclass=KnownKeywords):
             Refractory period after each spike, which is not fitted. [ms]
         dynamic_quantity, static_quantity : str, optional
             What the two terms follow; default: as of `Afferent()`.
+        initial_mv : float, optional
+            Potential at the start; default: that at rest. [mV]
 
         Returns
         -------
@@ -236,6 +247,7 @@ class Afferent(metaclass=KnownKeywords):
             refractory_ms=refractory_ms,
             dynamic_quantity=dynamic_quantity,
             static_quantity=static_quantity,
+            initial_mv=initial_mv,
             **fitted,
         )
 
@@ -253,7 +265,7 @@ class Afferent(metaclass=KnownKeywords):
     def membrane(self) -> LeakyIntegrateAndFire:
         """The second stage, Eqs. 3-5."""
         return LeakyIntegrateAndFire(
-            self.time_constant_ms, self.capacitance_mf, self.threshold_mv, self.refractory_ms
+            self.time_constant_ms, self.capacitance_mf, self.threshold_mv, self.refractory_ms, self.initial_mv
         )
 
     @property

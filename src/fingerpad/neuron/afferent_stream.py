@@ -44,9 +44,11 @@ class AfferentStream(metaclass=KnownKeywords):
 
     def __init__(self, afferent: Afferent, n_sites: int):
         self._afferent = instance("afferent", afferent, Afferent)
-        self._gains, self._constants = afferent.transduction, afferent.membrane.constants()
+        self._gains, membrane = afferent.transduction, afferent.membrane
         count = whole("n_sites", n_sites, at_least=1)
-        self._time_ms, self._potentials, self._ready = 0.0, np.zeros(count), np.zeros(count)
+        self._constants = membrane.constants()[:-1]
+        self._potentials = membrane.initial_potentials_mv(np.full(count, float(self._gains.intercept_ma)))
+        self._time_ms, self._ready = 0.0, np.zeros(count)
         self._static, self._dynamic = np.zeros(count), np.zeros(count)
 
     def step(self, time_ms: float, static: ArrayLike, dynamic: ArrayLike | None = None) -> SpikeTrains:

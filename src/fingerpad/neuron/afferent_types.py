@@ -246,7 +246,11 @@ class SAI(Afferent):
 
     def _driven(self, sed: SedTraces) -> Drive:
         """Both terms between common knots: the quantity, and its rate of change behind the low pass."""
-        followed = sed if sed.dynamic_kpa is None else SedTraces(sed.times_ms, sed.dynamic_kpa, sed.kinks_ms)
+        followed = (
+            sed
+            if sed.dynamic_kpa is None
+            else SedTraces(sed.times_ms, sed.dynamic_kpa, sed.kinks_ms, onset_ms=sed.onset_ms)
+        )
         times_ms, rate = smoothed_rate(followed, self.smoothing_ms)
         static = resampled(sed, self.smoothing_ms).sed_kpa
         return Drive(times_ms, static, np.abs(rate), sed.dynamic_quantity, sed.static_quantity, sed.phases)

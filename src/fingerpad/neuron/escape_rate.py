@@ -1,7 +1,7 @@
 """Membrane current -> spike times of a leaky integrate-and-fire neuron with a soft threshold.
 
-The potential V follows Eq. 5 and is reset to 0 after a spike. A spike does not require that V reaches the
-threshold v: at any time the neuron fires with the hazard (escape rate)
+The potential V follows Eq. 5 from where the membrane starts, and is reset to 0 after a spike. A spike does
+not require that V reaches the threshold v: at any time the neuron fires with the hazard (escape rate)
 
     h(V) = 1/tau_e exp((V - v)/delta),
 
@@ -117,7 +117,7 @@ class EscapeRate:
         """
         everyone = presentations or Presentations.of_population(current.n_sites)
         checked_sites(everyone.sites, current.n_sites)
-        drives = self.relative_drive(current)
+        drives, initial = self.relative_drive(current), self.initial_potentials(current)
         numbers = (
             float(self.membrane.time_constant_ms),
             float(self.membrane.refractory_ms),
@@ -128,9 +128,13 @@ class EscapeRate:
         def trains(some: slice) -> SpikeTrains:
             part = everyone.part(some)
             keys = part.sites, part.trials, part.receptors
-            return SpikeTrains(*_escape_trains(current.times_ms, drives, *keys, seed, *numbers))
+            return SpikeTrains(*_escape_trains(current.times_ms, drives, initial, *keys, seed, *numbers))
 
         return SpikeTrains.joined(in_blocks(trains, len(everyone), _TRAINS_PER_BLOCK))
+
+    def initial_potentials(self, current: CurrentTraces) -> FloatArray:
+        """Potentials at the first time over the threshold, (n_sites,)."""
+        return self.membrane.initial_potentials_mv(current.current_ma[0]) / self.membrane.threshold_mv
 
     def relative_drive(self, current: CurrentTraces) -> FloatArray:
         """I/(C v), a row for each site. [1/ms]"""
@@ -186,6 +190,7 @@ def _where_reached(
 def _escape_trains(
     times: FloatArray,
     drives: FloatArray,
+    initial: FloatArray,
     sites: np.ndarray,
     trials: np.ndarray,
     receptors: np.ndarray,
@@ -204,7 +209,7 @@ def _escape_trains(
         n_spikes = 0
         draws = four_uniforms(seed, trials[train], receptors[train], _ESCAPE, 1)
         wanted = -math.log1p(-draws[0]) * escape / tau  # in units of the integral over x
-        u, ready = 0.0, times[0]
+        u, ready = initial[sites[train]], times[0]
         for knot in range(times.size - 1):
             first, last = times[knot], times[knot + 1]
             begin = max(first, ready)

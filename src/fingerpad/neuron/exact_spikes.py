@@ -94,6 +94,22 @@ def refine(high: float, reached: float, start: float, steady: float, drift: floa
 
 
 @njit(cache=True, error_model="numpy", nogil=True)
+def initial_potentials(
+    current: FloatArray, tau: float, capacitance: float, threshold: float, initial: float
+) -> FloatArray:
+    """Potentials (n_neurons,) before the first current changes: `initial`, or those at rest if it is NaN.
+
+    At rest a membrane has the steady potential of its current. One whose current would make it fire has just
+    been reset.
+    """
+    potentials = np.full(current.size, initial)
+    for neuron in range(current.size if math.isnan(initial) else 0):
+        steady = tau / capacitance * current[neuron]
+        potentials[neuron] = steady if steady < threshold else 0.0
+    return potentials
+
+
+@njit(cache=True, error_model="numpy", nogil=True)
 def exact_trains(
     times: FloatArray,
     currents: FloatArray,
@@ -101,6 +117,7 @@ def exact_trains(
     capacitance: float,
     threshold: float,
     refractory: float,
+    initial: float,
 ) -> tuple[FloatArray, np.ndarray]:
     """Compute the spike times of all neurons, neuron after neuron.
 
@@ -110,8 +127,9 @@ def exact_trains(
         Knots, in order; a repeated knot is a jump. [ms]
     currents : array (n_knots, n_neurons)
         Current at the knots, linear between them. [mA]
-    tau, capacitance, threshold, refractory : float
-        Parameters of the membrane, in the units of `fingerpad.neuron.lif.LeakyIntegrateAndFire`.
+    tau, capacitance, threshold, refractory, initial : float
+        Parameters of the membrane, in the units of `fingerpad.neuron.lif.LeakyIntegrateAndFire`; an `initial`
+        of NaN is the potential at rest.
 
     Returns
     -------
@@ -127,7 +145,7 @@ def exact_trains(
     within an interval are found in rounds of one spike per neuron, stage by stage in short loops.
     """
     n_neurons = currents.shape[1]
-    potentials = np.zeros(n_neurons)
+    potentials = initial_potentials(currents[0], tau, capacitance, threshold, initial)
     ready = np.full(n_neurons, times[0])
     return continued_trains(times, currents, tau, capacitance, threshold, refractory, potentials, ready)
 

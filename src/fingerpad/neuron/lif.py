@@ -6,13 +6,15 @@ threshold is bracketed and refined to round-off (`fingerpad.neuron.exact_spikes`
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
-from fingerpad.core.checks import positive
+from fingerpad.core.checks import FloatArray, finite, positive
+from fingerpad.core.errors import InputError
 from fingerpad.core.signals import CurrentTraces, SpikeTrains
 from fingerpad.core.threads import in_blocks
 from fingerpad.core.values import converted
-from fingerpad.neuron.exact_spikes import exact_trains
+from fingerpad.neuron.exact_spikes import exact_trains, initial_potentials
 
 
 @dataclass(frozen=True)
@@ -20,8 +22,8 @@ from fingerpad.neuron.exact_spikes import exact_trains
 class LeakyIntegrateAndFire:
     """A leaky integrate-and-fire membrane with a refractory period.
 
-    The potential starts at 0. When it reaches the threshold, a spike occurs, the potential is reset to 0
-    and stays there for the refractory period.
+    When the potential reaches the threshold, a spike occurs, the potential is reset to 0 and stays there for
+    the refractory period.
 
     Parameters
     ----------
@@ -33,11 +35,14 @@ class LeakyIntegrateAndFire:
         Potential that elicits a spike, v. [mV]
     refractory_ms : float
         Refractory period after each spike. [ms]
+    initial_mv : float, optional
+        Potential at the first time. By default that at rest: the first current is taken to have flowed for
+        long, so that the spikes do not depend on how long nothing happened. The paper starts at 0. [mV]
 
     Raises
     ------
     InputError
-        If a value is not positive.
+        If a value is not positive, or the initial potential not below the threshold.
 
     Examples
     --------
@@ -53,12 +58,18 @@ class LeakyIntegrateAndFire:
     capacitance_mf: float
     threshold_mv: float
     refractory_ms: float
+    initial_mv: float | None = None
 
     def __post_init__(self) -> None:
         positive("time_constant_ms", self.time_constant_ms, "ms")
         positive("capacitance_mf", self.capacitance_mf, "mF")
         positive("threshold_mv", self.threshold_mv, "mV")
         positive("refractory_ms", self.refractory_ms, "ms")
+        if self.initial_mv is not None and finite("initial_mv", self.initial_mv, "mV") >= self.threshold_mv:
+            raise InputError(
+                f"initial_mv must be below the threshold, {self.threshold_mv:g} mV: got {self.initial_mv:g}; "
+                "leave it out to start at rest."
+            )
 
     def spikes(self, current: CurrentTraces) -> SpikeTrains:
         """Spike times of one neuron per site, exact for a piecewise linear current.
@@ -80,11 +91,17 @@ class LeakyIntegrateAndFire:
 
         return SpikeTrains.joined(in_blocks(trains, current.n_sites))
 
-    def constants(self) -> tuple[float, float, float, float]:
-        """Return time constant [ms], capacitance [mF], threshold [mV] and refractory period [ms]."""
+    def initial_potentials_mv(self, current_ma: FloatArray) -> FloatArray:
+        """Potentials (n_sites,) at the first time, under the first currents (n_sites,). [mV]"""
+        tau, capacitance, threshold, _, initial = self.constants()
+        return initial_potentials(current_ma, tau, capacitance, threshold, initial)
+
+    def constants(self) -> tuple[float, float, float, float, float]:
+        """Return the parameters in their order, NaN for an initial potential at rest."""
         return (
             float(self.time_constant_ms),
             float(self.capacitance_mf),
             float(self.threshold_mv),
             float(self.refractory_ms),
+            math.nan if self.initial_mv is None else float(self.initial_mv),
         )

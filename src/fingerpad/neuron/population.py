@@ -381,7 +381,7 @@ class Population(metaclass=KnownKeywords):
             spikes=spikes,
             dynamic_rate_hz=firing_rate_hz(spikes, dynamic),
             static_rate_hz=firing_rate_hz(spikes, static),
-            first_spike_latency_ms=first_spike_latency_ms(spikes),
+            first_spike_latency_ms=first_spike_latency_ms(spikes, sed.onset_ms),
             duration_ms=float(sed.times_ms[-1]),
             phases=sed.phases,
         )

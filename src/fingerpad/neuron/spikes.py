@@ -83,28 +83,28 @@ def window_bounds(window_ms: tuple[float, ...]) -> tuple[float, float]:
     return bounds[0], bounds[1]
 
 
-def first_spike_latency_ms(spikes: SpikeTrains) -> FloatArray:
-    """Time from the onset of the indentation to the first spike of every afferent.
+def first_spike_latency_ms(spikes: SpikeTrains, onset_ms: float = 0.0) -> FloatArray:
+    """Time from first touch to the first spike of every afferent after it.
 
     Parameters
     ----------
     spikes : SpikeTrains
-        One train per afferent; times count from the onset.
+        One train per afferent.
+    onset_ms : float, optional
+        Time of first touch. [ms]
 
     Returns
     -------
     array (n_afferents,)
-        Latency; NaN for a silent afferent. [ms]
+        Latency; NaN for an afferent without a spike after the onset. [ms]
 
     Examples
     --------
-    >>> first_spike_latency_ms(SpikeTrains.from_lists([[10.0, 35.0], []])).tolist()
-    [10.0, nan]
+    >>> first_spike_latency_ms(SpikeTrains.from_lists([[10.0, 35.0], []]), onset_ms=15.0).tolist()
+    [20.0, nan]
     """
-    latency_ms = np.full(len(spikes), np.nan)
-    fires = np.diff(spikes.offsets) > 0
-    latency_ms[fires] = spikes.times_ms[spikes.offsets[:-1][fires]]
-    return latency_ms
+    after = (train[train > onset_ms] for train in spikes)
+    return np.array([float(train[0]) - onset_ms if train.size else np.nan for train in after])
 
 
 def modulation_index(largest_hz: ArrayLike, smallest_hz: ArrayLike) -> FloatArray:

@@ -34,6 +34,10 @@ SHORTEST_PIECE_MS = 0.25
 """Shortest linear piece: shorter intervals are divided into fewer pieces. [ms]"""
 
 
+SAME_COUNT = 1e-6
+"""Share of a piece by which an interval may be too short for one more."""
+
+
 @dataclass(frozen=True)
 @converted
 class Drive:
@@ -200,8 +204,8 @@ def drive(
     Parameters
     ----------
     sed : SedTraces
-        Its `kinks_ms` separate the phases, each with its own interpolant. If it has `dynamic_kpa`, the rate
-        is that of this quantity.
+        Its `kinks_ms` and its onset separate the phases, each with its own interpolant. If it has
+        `dynamic_kpa`, the rate is that of this quantity.
     difference_step_ms : float, optional
         Step h of the backward difference printed as Eq. 2 (the paper: 0.001 ms). Before the onset SED is
         that of the onset. Default: the limit h -> 0, the derivative of the interpolant. [ms]
@@ -235,7 +239,7 @@ def drive(
     if sed.dynamic_kpa is not None:
         energy, followed = (
             drive(
-                SedTraces(sed.times_ms, values, sed.kinks_ms),
+                SedTraces(sed.times_ms, values, sed.kinks_ms, onset_ms=sed.onset_ms),
                 difference_step_ms=difference_step_ms,
                 pieces=pieces,
                 shortest_piece_ms=shortest_piece_ms,
@@ -335,8 +339,8 @@ def _end_slope(length: float, other: float, slope: float, beside: float) -> floa
 
 
 def _between_kinks(sed: SedTraces) -> list[tuple[int, int]]:
-    """First and last index of the times of each part between kinks."""
-    borders = np.searchsorted(sed.times_ms, sed.kinks_ms)
+    """First and last index of the times of each part between kinks; the onset is one of them."""
+    borders = np.flatnonzero(np.isin(sed.times_ms, np.append(sed.kinks_ms, sed.onset_ms)))
     inner = borders[(borders > 0) & (borders < sed.times_ms.size - 1)]
     return list(pairwise([0, *inner.tolist(), sed.times_ms.size - 1]))
 
@@ -344,7 +348,8 @@ def _between_kinks(sed: SedTraces) -> list[tuple[int, int]]:
 def _knots(times_ms: FloatArray, pieces: int, shortest_piece_ms: float) -> FloatArray:
     """Divide every interval of `times_ms` into equal pieces; the given times stay knots, bit-equal."""
     lengths = np.diff(times_ms)
-    counts = np.clip(np.floor(lengths / shortest_piece_ms).astype(np.int64), 1, pieces)
+    # The same touch later has lengths that differ by rounding, and must have as many pieces.
+    counts = np.clip(np.floor(lengths / shortest_piece_ms + SAME_COUNT).astype(np.int64), 1, pieces)
     within = np.arange(counts.sum()) - np.repeat(np.cumsum(counts) - counts, counts)
     knots = np.repeat(times_ms[:-1], counts) + within * np.repeat(lengths / counts, counts)
     return np.append(knots, times_ms[-1])

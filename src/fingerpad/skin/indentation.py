@@ -4,17 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import lru_cache
+from functools import cached_property, lru_cache
+from itertools import pairwise
 from typing import Any, cast
 
 import numpy as np
 from numpy.typing import ArrayLike
+from scipy.optimize import brentq
 from threadpoolctl import threadpool_limits
 
 from fingerpad.core.checks import FloatArray, finite, instance, one_of, pair
 from fingerpad.core.compilation import announce_compilation
 from fingerpad.core.errors import InputError, shown
 from fingerpad.core.keywords import KnownKeywords, known_keywords
+from fingerpad.core.phases import from_onset
 from fingerpad.core.progress import NoProgress, Progress
 from fingerpad.core.threads import compiled_threads
 from fingerpad.core.values import converted
@@ -25,7 +28,7 @@ from fingerpad.geometry.grading import RESOLUTIONS, Grading
 from fingerpad.geometry.indenter_grading import FEWEST_ACROSS_GROOVE, grading_along, sizes_across
 from fingerpad.geometry.indenters import Indenter
 from fingerpad.geometry.mesh import Mesh, finger_mesh
-from fingerpad.geometry.motion import Motion, RampAndHold, Stimulus
+from fingerpad.geometry.motion import STILL, Motion, RampAndHold, Stimulus
 from fingerpad.geometry.paths import CLEARANCE_TO_BONE, check_path
 from fingerpad.geometry.probing import check_gap
 from fingerpad.mechanics.contact import Placement, check_friction, place, rotation_of
@@ -43,6 +46,9 @@ STEPS = {"quick": (5, 5), "standard": (8, 8), "paper": (8, 8)}
 """Steps in ramp and hold of each resolution."""
 
 LARGEST_TILT_DEG = 45.0
+
+LOOKS_FOR_TOUCH = 8
+"""Times per sample of a motion aside at which first touch is looked for."""
 
 FEWEST_ACROSS_BODY = 3
 """Least number of elements across a body that is narrow along and across the finger."""
@@ -244,7 +250,8 @@ class Touch(metaclass=KnownKeywords):
         return SkinResponse(
             mesh=self.mesh,
             kinks_ms=self.stimulus.corners_ms,
-            phases=self.stimulus.phases,
+            phases=from_onset(self.stimulus.phases, self.onset_ms),
+            onset_ms=self.onset_ms,
             pose=self.stimulus.pose_at(self.stimulus.end_ms),
             axis_x_mm=self.at_mm[0],
             direction=rotation_of(self.tilt_deg, self.spin_deg)[:, 1].copy(),
@@ -252,6 +259,28 @@ class Touch(metaclass=KnownKeywords):
             touch=self,
             **solution,
         )
+
+    @cached_property
+    def onset_ms(self) -> float:
+        """Time of first touch of the undeformed skin. [ms]"""
+        onset = self.stimulus.onset_ms
+        if self.stimulus.pose_at(onset) == STILL:
+            return onset
+        # Aside or turned, the indenter meets skin that lies higher or lower.
+        body, skin_mm = self.body, self.mesh.nodes_mm[self.mesh.skin_nodes]
+
+        def gap_mm(time_ms: float) -> float:
+            there = self.placement.moved(self.stimulus.pose_at(time_ms))
+            depth_mm = 0.0 if self.stimulus.by_force else float(self.stimulus.prescribed_at(time_ms))
+            return float(body.gap(there.to_local(skin_mm, depth_mm))[0].min())
+
+        samples_ms = np.array(self.stimulus.samples_ms)
+        times = np.interp(np.arange(0.0, samples_ms.size - 1.0, 1.0 / LOOKS_FOR_TOUCH),
+                          np.arange(samples_ms.size), samples_ms)  # fmt: skip
+        for before, after in pairwise(times.tolist()):
+            if gap_mm(after) <= 0.0:
+                return before if gap_mm(before) <= 0.0 else float(brentq(gap_mm, before, after))
+        return onset
 
     def _press(self, watched: np.ndarray, threads: int | None) -> Deformation:
         # Libraries get one thread, since their sums depend on the number of threads; our loops' do not.

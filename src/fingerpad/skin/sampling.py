@@ -131,6 +131,8 @@ class SkinResponse(Result):
         How far the indenter has moved aside and turned since first touch, at the last time.
     touch : Touch, optional
         What was solved: indenter, motion, tissues.
+    onset_ms : float
+        Time of first touch. [ms]
 
     Raises
     ------
@@ -153,6 +155,7 @@ class SkinResponse(Result):
     phases: tuple[Phase, ...] = ()
     pose: Pose = STILL
     touch: Touch | None = None
+    onset_ms: float = 0.0
 
     def __post_init__(self) -> None:
         instance("fields", self.fields, Mapping)
@@ -328,6 +331,7 @@ class SkinResponse(Result):
             dynamic_quantity,
             static_quantity,
             self.phases,
+            self.onset_ms,
         )
 
     def sample(self, quantity: str, sites: ArrayLike) -> FloatArray:

@@ -319,12 +319,14 @@ def set_result(
         The paper's three trials.
     """
     bars, spheres = list(responses["bar, 36 shifts"].values()), dict(responses["spheres"])
-    quantity = conditions.quantity
+    quantity, initial_mv = conditions.quantity, conditions.afferent.initial_mv
     bar_sed = single_unit.receptor_sed(bars, quantity, quantity)
-    problem = single_unit.rate_problem(bar_sed)
+    problem = single_unit.rate_problem(bar_sed, initial_mv)
     method = _method(conditions, spheres)
     best, folds = single_unit.fit(problem, method=method)
-    afferent = Afferent.from_parameters(best.parameters, dynamic_quantity=quantity, static_quantity=quantity)
+    afferent = Afferent.from_parameters(
+        best.parameters, dynamic_quantity=quantity, static_quantity=quantity, initial_mv=initial_mv
+    )
     discrimination = sphere_discrimination.discriminate_spheres(spheres, afferent, conditions.seed)
     unit = single_unit.single_unit_result(problem, best, folds, afferent, method.name)
     course = firing_course(bar_sed, single_unit.receptor_sed(bars), afferent, responses["force"])
@@ -333,7 +335,9 @@ def set_result(
     uncertainty: UncertaintyResult | None = None
     thresholds: CurvatureThresholds | None = None
     if others := responses.get("spheres, other curvatures"):
-        uncertainty = single_unit_uncertainty.uncertainty_result(bar_sed, best.parameters, conditions.seed)
+        uncertainty = single_unit_uncertainty.uncertainty_result(
+            bar_sed, best.parameters, conditions.seed, initial_mv=initial_mv
+        )
         centred = {curvature: skin for (position, curvature), skin in spheres.items() if position == 0.0}
         thresholds = curvature_thresholds.curvature_thresholds(
             centred | dict(others), afferent, discrimination.noise_sigma, conditions.seed

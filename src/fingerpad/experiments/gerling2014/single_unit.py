@@ -77,7 +77,10 @@ def receptor_traces(responses: list[SkinResponse], quantity: str) -> SedTraces:
         By the names of `SkinResponse.sample`.
     """
     sampled = np.hstack([skin.sample(quantity, RECEPTOR) for skin in responses])
-    return SedTraces(responses[0].times_ms, sampled, np.array(responses[0].kinks_ms))
+    first = responses[0]
+    return SedTraces(
+        first.times_ms, sampled, np.array(first.kinks_ms), phases=first.phases, onset_ms=first.onset_ms
+    )
 
 
 def following(static: SedTraces, dynamic: SedTraces, quantity: str) -> SedTraces:
@@ -95,9 +98,9 @@ def following(static: SedTraces, dynamic: SedTraces, quantity: str) -> SedTraces
     return replace(static, dynamic_kpa=dynamic.sed_kpa, dynamic_quantity=quantity)
 
 
-def rate_problem(sed: SedTraces) -> RateProblem:
+def rate_problem(sed: SedTraces, initial_mv: float | None = None) -> RateProblem:
     """Observed rates at all shifts, and the paper's model of the afferent driven by `sed`."""
-    return RateProblem(AfferentModel.of_traces(sed), bar_recordings())
+    return RateProblem(AfferentModel.of_traces(sed, initial_mv=initial_mv), bar_recordings())
 
 
 def bar_recordings() -> RateRecordings:
@@ -276,6 +279,8 @@ class SingleUnitResult:
         Cross-validation.
     modulation : RateModulation
         At the edge of the bar.
+    initial_mv : float, optional
+        Potential of the membrane at the start; that at rest if there is none. [mV]
     """
 
     fss_in_sample: Number
@@ -296,6 +301,7 @@ class SingleUnitResult:
     start_points: tuple[dict[str, Number], ...]
     folds: tuple[FoldResult, ...]
     modulation: RateModulation
+    initial_mv: Number | None = None
 
 
 def single_unit_result(
@@ -331,6 +337,7 @@ def single_unit_result(
         method=method,
         dynamic_quantity=afferent.dynamic_quantity,
         static_quantity=afferent.static_quantity,
+        initial_mv=afferent.initial_mv,
         parameters=_named(best.parameters),
         units=dict(zip(PARAMETER_NAMES, PARAMETER_UNITS, strict=True)),
         shift_mm=shift_mm,

@@ -176,7 +176,12 @@ class UncertaintyResult:
 
 
 def uncertainty_result(
-    sed: SedTraces, fitted: ArrayLike, seed: int, *, quick: bool = False
+    sed: SedTraces,
+    fitted: ArrayLike,
+    seed: int,
+    *,
+    quick: bool = False,
+    initial_mv: float | None = None,
 ) -> UncertaintyResult:
     """Compute identifiability, posterior, profile likelihoods and sensitivity.
 
@@ -191,6 +196,8 @@ def uncertainty_result(
         Of the random numbers.
     quick : bool, optional
         Whether half as many effective draws are enough.
+    initial_mv : float, optional
+        As of `AfferentModel`. [mV]
 
     Returns
     -------
@@ -202,7 +209,7 @@ def uncertainty_result(
         If draws or profiles do not converge.
     """
     recordings, shift_mm = single_unit.bar_recordings(), bar_firing_rates().shift_mm
-    six_model = AfferentModel.of_drive(drive(sed, pieces=PIECES))
+    six_model = AfferentModel.of_drive(drive(sed, pieces=PIECES), initial_mv=initial_mv)
     model = four_number_model(six_model)
     six = np.asarray(fitted, dtype=np.float64)
     four = identifiable(six)

@@ -191,6 +191,7 @@ def membrane_potential(
     since = np.where(last_spike < 0, np.inf, knots[:-1] - np.append(spikes_ms, 0.0)[last_spike])
     held = since < membrane.refractory_ms - 1e-9
     potential = np.zeros(knots.size)
+    potential[:1] = membrane.initial_potentials_mv(current.current_ma[0, :1])
     for number, fixed in enumerate(held):
         start = 0.0 if since[number] == 0.0 else potential[number]
         relaxed = steady[number] + (start - steady[number]) * decay[number]
