@@ -1,5 +1,7 @@
 """Surfaces, height maps and compositions against closed forms and against bodies that are exact."""
 
+import os
+import struct
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -327,6 +329,34 @@ def test_a_file_is_read_in_its_unit_and_turned_to_the_skin(tmp_path, ending):
     assert read.front(np.array([[0.5, 0.0, 0.2]])) == pytest.approx(0.0, abs=1e-3)
 
 
+def test_every_kind_of_file_holds_the_same_triangles(tmp_path):
+    """Quads, negative numbers, both orders of bytes, and materials whose file would never end."""
+    quads = [[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]]
+    upright = CUBE[:, [0, 2, 1]] * [1.0, -1.0, 1.0]
+    rows = "".join(f"v {x} {y} {z}\n" for x, y, z in upright)
+    os.mkfifo(tmp_path / "endless.mtl")
+    named = "".join("f " + " ".join(f"{k - 8}//1" for k in quad) + "\n" for quad in quads)
+    (tmp_path / "a.obj").write_text("\ufeffmtllib endless.mtl\n" + rows + "usemtl x\n" + named, "utf-8")
+    head = (
+        "ply\r\nformat binary_{} 1.0\r\ncomment TextureFile endless.mtl\r\nelement face 6\r\nproperty list "
+        "uchar uint vertex_index\r\nelement vertex 8\r\nproperty double x\r\nproperty double y\r\nproperty "
+        "double z\r\nproperty uchar red\r\nend_header\r\n"
+    )
+    for name, order in (("little_endian", "<"), ("big_endian", ">")):
+        body = b"".join(struct.pack(f"{order}B4I", 4, *quad) for quad in quads)
+        body += b"".join(struct.pack(f"{order}3dB", *corner, 7) for corner in upright)
+        (tmp_path / f"{name}.ply").write_bytes(head.format(name).encode() + body)
+    expected = Surface(CUBE, SIDES)
+    points = np.random.default_rng(1).uniform(-3.0, 3.0, (50, 3))
+    for name in ("a.obj", "little_endian.ply", "big_endian.ply"):
+        read = read_surface(tmp_path / name)
+        assert len(read.faces) == 12
+        np.testing.assert_allclose(read.gap(points)[0], expected.gap(points)[0], rtol=0, atol=1e-12)
+    (tmp_path / "pipe.stl").symlink_to(tmp_path / "endless.mtl")
+    with pytest.raises(InputError, match="it is a device or a pipe"):
+        read_surface(tmp_path / "pipe.stl")
+
+
 def _bytes(content):
     return content if isinstance(content, bytes) else content.encode()
 
@@ -344,7 +374,6 @@ def _bytes(content):
     ],
 )
 def test_a_bad_file_of_triangles_gives_one_sentence(tmp_path, name, content, said):
-    pytest.importorskip("trimesh")
     (tmp_path / name).write_bytes(content)
     with pytest.raises(InputError, match=said) as raised:
         read_surface(tmp_path / name)
@@ -363,6 +392,30 @@ def test_height_maps_of_all_formats_agree(tmp_path):
     assert np.ptp(maps[0].vertices_mm[:, 1]) == pytest.approx(0.5)
 
 
+def test_shades_of_every_depth_are_shares_of_white_and_signed_numbers_are_numbers(tmp_path):
+    """The heights of one image in each format that a TIFF or PNG stores, against the array itself."""
+    share = np.outer(np.hanning(9), np.hanning(7))
+    grey = np.rint(share * 65535).astype(np.uint16)
+    whole = np.rint(share * 900 - 450).astype(np.int16)
+    kinds = {
+        "grey.png": (grey, {}, grey / 65535.0),
+        "grey.tif": (grey, {}, grey / 65535.0),
+        "white-is-zero.tif": (65535 - grey, {"tiffinfo": {262: 0}}, grey / 65535.0),
+        "packed.tif": (65535 - grey, {"tiffinfo": {262: 0}, "compression": "tiff_deflate"}, grey / 65535.0),
+        "byte.tif": ((grey >> 8).astype(np.uint8), {}, (grey >> 8) / 255.0),
+        # Pillow turns shades of a byte when it writes white as zero.
+        "white-is-zero-byte.tif": ((grey >> 8).astype(np.uint8), {"tiffinfo": {262: 0}}, (grey >> 8) / 255.0),
+        "signed.tif": (whole.view(np.uint16), {"tiffinfo": {339: 2}}, whole),
+        "long.tif": (whole.astype(np.int32) * 1000, {}, whole * 1000.0),
+        "float.tif": (share.astype(np.float32), {}, share),
+    }  # fmt: skip
+    for name, (pixels, options, heights) in kinds.items():
+        Image.fromarray(pixels).save(tmp_path / name, **options)
+        read = read_height_map(tmp_path / name, 0.5, 1e-3)
+        expected = height_surface(np.float64(heights) * 1e-3, 0.5)
+        np.testing.assert_allclose(read.vertices_mm, expected.vertices_mm, rtol=0, atol=1e-9, err_msg=name)
+
+
 def test_a_bad_height_map_gives_one_sentence(tmp_path):
     def said(name, content=b"", **options):
         if content is not None:
@@ -374,7 +427,7 @@ def test_a_bad_height_map_gives_one_sentence(tmp_path):
 
     assert "is empty" in said("a.png")
     assert "cannot be read" in said("a.png", b"\x89PNG\r\n\x1a\nxx")
-    assert "does not exist" in said("none.csv", None)
+    assert "No such file" in said("none.csv", None)
     assert "row 2 and column 1" in said("a.csv", b"1,2\nnan,3\n")
     assert "line 2 has 1 of them instead of 2" in said("a.csv", b"1,2\n3\n")
     assert "at least 2 rows" in said("a.csv", b"1,2\n")

@@ -99,7 +99,8 @@ def read_recordings(path: Path, stimuli: Stimuli, unit: int | None = None) -> Re
     else:
         raise InputError(f"unit belongs to NWB files ({', '.join(SUFFIXES_OF_NWB)}): {path} is none.")
     _check_columns(path, stimuli.column, lines[0])
-    presented = [_presented(line, stimuli) for line in lines]
+    known: dict[str, NamedStimulus] = {}
+    presented = [_presented(line, stimuli, known) for line in lines]
     names = [stimulus.name for stimulus in presented]
     found = {stimulus.name: stimulus for stimulus in presented}
     memberships = _memberships(path, lines, names) if FOLD in lines[0].entries else None
@@ -124,10 +125,13 @@ def _check_columns(path: Path, column: str, first: TableRow) -> None:
         raise InputError(f"{path} has {DURATION}, which belongs to {SPIKES}: leave it out.")
 
 
-def _presented(line: TableRow, stimuli: Stimuli) -> NamedStimulus:
+def _presented(line: TableRow, stimuli: Stimuli, known: dict[str, NamedStimulus]) -> NamedStimulus:
+    """Stimulus of a line; those that were presented before are `known`."""
     entry = line.text(stimuli.column)
-    with line.placed():
-        return stimuli.named(entry)
+    if entry not in known:
+        with line.placed():
+            known[entry] = stimuli.named(entry)
+    return known[entry]
 
 
 def _mean_rates(lines: Sequence[TableRow], names: Sequence[str], source: str) -> RateRecordings:

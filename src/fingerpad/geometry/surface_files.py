@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import warnings
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from fingerpad.core.checks import FloatArray, IntArray, float_array, one_of, positive
 from fingerpad.core.errors import InputError
-from fingerpad.core.files import path_of
+from fingerpad.core.files import LARGEST_TEXT_MB, check_file, path_of
 from fingerpad.core.keywords import known_keywords
 from fingerpad.geometry.surface import LARGEST_MM, SMALLEST_MM, SMOOTH_BELOW_DEG, Surface, height_surface
+from fingerpad.geometry.triangle_files import read_triangles
 
 UNITS_MM = {"mm": 1.0, "um": 1e-3, "cm": 10.0, "m": 1000.0, "inch": 25.4}
 """Units of length of a file. [mm]"""
@@ -21,8 +21,15 @@ MESHES = (".stl", ".obj", ".ply")
 IMAGES = (".png", ".tif", ".tiff")
 MAPS = (*IMAGES, ".npy", ".csv")
 
+_END_OF_PNG = b"IEND\xaeB`\x82"
+_BITS, _PHOTOMETRIC, _SAMPLE_FORMAT = 258, 262, 339
+"""Tags of a TIFF image: bits of a sample; 0 for white as zero; 2 for signed numbers."""
+
 MOST_HEIGHTS = 2_000_000
 """Largest number of heights in a map."""
+
+LEAST_POINTS = 50
+"""From this length on a table of three columns is taken for points."""
 
 _AXES = {
     sign + axis: (number, 1.0 if sign == "+" else -1.0)
@@ -43,7 +50,7 @@ def read_surface(
 ) -> Surface:
     """Read a rigid body of triangles, watertight or open.
 
-    It needs the extra `pip install 'fingerpad[surfaces]'`, which is trimesh.
+    Only the file itself is opened, not what it names, such as materials.
 
     Parameters
     ----------
@@ -78,28 +85,9 @@ def read_surface(
         raise InputError(f"at_mm must be two numbers, along and across the finger in mm: got {at_mm!r}.")
     _check_file(file, MESHES)
     try:
-        import trimesh
-    except ImportError as error:
-        raise InputError("Reading surfaces needs trimesh: pip install 'fingerpad[surfaces]'.") from error
-    _check_length(file)
-    try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")
-            mesh: Any = trimesh.load(file, force="mesh", process=False)
-            vertices, faces = np.array(mesh.vertices, dtype=np.float64), np.array(mesh.faces, dtype=np.int64)
-    except Exception as error:  # a file of unknown content may fail in any way
-        raise InputError(
-            f"{file.name} cannot be read as {file.suffix[1:].upper()}: {_said(error)}."
-        ) from error
-    if not len(faces):
-        raise InputError(f"{file.name} must hold at least one triangle: got none.")
-    if vertices.shape[1:] != (3,):
-        raise InputError(f"{file.name} must have vertices with x, y and z: got shape {vertices.shape}.")
-    if faces.min() < 0 or faces.max() >= len(vertices):
-        raise InputError(
-            f"{file.name} must have triangles of its vertices, 0 to {len(vertices) - 1}: got numbers "
-            f"{faces.min()} to {faces.max()}."
-        )
+        vertices, faces = read_triangles(file)
+    except InputError as error:
+        raise InputError(f"{file.name}: {error}") from error
     wrong = np.flatnonzero(~np.isfinite(vertices).all(axis=1))
     if wrong.size:
         raise InputError(
@@ -148,11 +136,13 @@ def read_height_map(
     Parameters
     ----------
     path : str or Path
-        PNG or TIFF, 8 or 16 bit or float, in shades of grey; NPY or CSV with numbers.
+        PNG or TIFF of one page in shades of grey of up to 16 bits, or of signed or float numbers; NPY or CSV
+        with numbers.
     pitch_mm : float
         Distance between neighbouring heights. [mm]
     height_mm : float
-        Height of one unit of NPY, CSV and float TIFF; of white above black in the other images. [mm]
+        Height of one unit of NPY, CSV, and TIFF of signed or float numbers; of white above black in the other
+        images, whichever of them is stored as 0. [mm]
     smooth_below_deg : float
         Hollow creases between triangles of a smaller angle are rounded; see `Surface`. [degrees]
 
@@ -164,8 +154,8 @@ def read_height_map(
     Raises
     ------
     InputError
-        If the file cannot be read, is no plane of finite numbers, has more than 2,000,000 heights, or is an
-        image of one shade.
+        If the file cannot be read, is no plane of finite numbers, holds points x, y, z, has more than
+        2,000,000 heights, or all are equal.
     """
     file = path_of("path", path)
     positive("pitch_mm", pitch_mm, "mm")
@@ -194,11 +184,12 @@ def read_height_map(
             f"{file.name} must hold finite heights: {len(wrong)} are not, first in row {wrong[0][0] + 1} and "
             f"column {wrong[0][1] + 1}."
         )
-    if heights.size > 1 and file.suffix.lower() in IMAGES and not np.ptp(heights):
+    if heights.size > 1 and not np.ptp(heights):
         raise InputError(
-            f"{file.name} must have shades that differ, which are heights: all are equal; for a flat body "
-            "take a FlatPunch or a Bar."
+            f"{file.name} must have heights that differ: all are equal; for a flat body take a FlatPunch or "
+            "a Bar."
         )
+    _check_no_points(file, heights)
     if np.abs(heights).max(initial=0.0) * height_mm > LARGEST_MM:
         raise InputError(
             f"{file.name} must have heights within {LARGEST_MM:g} mm: the largest is "
@@ -230,10 +221,15 @@ def _heights(file: Path) -> FloatArray:
             raise InputError(
                 f"{file.name} must hold rows of numbers with commas between: {_fault(file)}."
             ) from error
-    from PIL import Image, UnidentifiedImageError
+    return _image(file)
+
+
+def _image(file: Path) -> FloatArray:
+    """Heights of an image: shades from 0 to 1 for white; signed whole numbers and floats as they are."""
+    from PIL import Image, ImageOps, UnidentifiedImageError
 
     try:
-        opened = Image.open(file)
+        opened = Image.open(file, formats=("PNG", "TIFF"))
     except UnidentifiedImageError as error:
         raise InputError(
             f"{file.name} cannot be read as a PNG or TIFF image: its content is of no known kind."
@@ -244,11 +240,31 @@ def _heights(file: Path) -> FloatArray:
         ) from error
     with opened as image:
         _check_size(file, image.width * image.height)
-        if image.mode == "F":
-            return np.array(image, dtype=np.float64)
-        if image.mode.startswith("I"):
-            return np.array(image, dtype=np.float64) / 65535.0
-        return _shades(file, np.array(image.convert("RGBA"), dtype=np.float64)) / 255.0
+        pages = getattr(image, "n_frames", 1)
+        if pages > 1:
+            raise InputError(f"{file.name} must have one page: got {pages}; save the one with the heights.")
+        if image.format == "PNG" and _END_OF_PNG not in file.read_bytes():
+            raise InputError(f"{file.name} must end as a PNG image does: it is cut off, save it again.")
+        layout = image.tile[0].args
+        stored = layout if isinstance(layout, str) else str((layout or ("",))[0])
+        if "16" in stored and image.mode[0] != "I":
+            raise InputError(
+                f"{file.name} must be grey without opacity to have 16 bits: it is {stored.split(';')[0]}, of "
+                "which 8 bits would be lost; save it as grey of 16 bits."
+            )
+        tags = getattr(image, "tag_v2", {})
+        signed, bits = 2 in tags.get(_SAMPLE_FORMAT, ()), tags.get(_BITS, (16,))[0]
+        turned = ImageOps.exif_transpose(image)
+        pixels = np.array(turned)
+        if signed and turned.mode == "L":
+            pixels = pixels.view(np.int8)
+        if signed or turned.mode == "F":
+            return pixels.astype(np.float64)
+        if turned.mode[0] != "I":
+            return _shades(file, np.array(turned.convert("RGBA"), dtype=np.float64)) / 255.0
+        shares = (pixels.astype(np.uint32) if bits == 32 else pixels) / (2.0**bits - 1.0)
+        # Pillow turns white as zero only where a pixel has 8 bits or less.
+        return 1.0 - shares if tags.get(_PHOTOMETRIC) == 0 else shares
 
 
 def _shades(file: Path, pixels: FloatArray) -> FloatArray:
@@ -282,31 +298,25 @@ def _fault(file: Path) -> str:
     return "it does not"
 
 
-def _check_length(file: Path) -> None:
-    """Raise an error if a binary STL file is not as long as its number of triangles says."""
-    size = file.stat().st_size
-    with file.open("rb") as opened:
-        begin = opened.read(84)
-    if file.suffix.lower() != ".stl" or begin.lstrip()[:5].lower() == b"solid":
-        return
-    if size < 84:
-        raise InputError(
-            f"{file.name} is no STL file: one of text begins with 'solid', any other has 84 bytes or more; "
-            f"got {size} bytes, save it again as STL."
-        )
-    count = int.from_bytes(begin[80:84], "little")
-    if size != 84 + 50 * count:
-        raise InputError(
-            f"{file.name} must be an STL file of text that begins with 'solid', or have "
-            f"{84 + 50 * count:,} bytes for {count:,} triangles: got {size:,} bytes."
-        )
+def _check_no_points(file: Path, heights: FloatArray) -> None:
+    """Raise an error if the rows, or the columns, look like points x, y, z instead of heights on a grid."""
+    for table in (heights, heights.T):
+        if table.shape[1] != 3:
+            continue
+        x, y = (len(np.unique(table[:, axis])) for axis in (0, 1))
+        is_grid = x * y == len(table) == len(np.unique(table[:, :2], axis=0)) and min(x, y) > 1
+        if is_grid or len(table) >= LEAST_POINTS:
+            raise InputError(
+                f"{file.name} must hold heights on a grid, row by row: {len(table):,} times 3 numbers look "
+                "like points x, y, z; write their z as rows and columns (a map that is so narrow can be given "
+                "to fp.height_surface)."
+            )
 
 
 def _check_file(file: Path, endings: tuple[str, ...]) -> None:
     if file.suffix.lower() not in endings:
         raise InputError(f"The file must end in {', '.join(endings)}: got {file.name}.")
-    if not file.is_file():
-        raise InputError(f"The file {file} does not exist.")
+    check_file(file, LARGEST_TEXT_MB)
     if not file.stat().st_size:
         raise InputError(f"{file.name} is empty.")
 

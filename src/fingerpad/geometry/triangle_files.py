@@ -1,0 +1,280 @@
+"""Vertices and triangles of STL, OBJ and PLY files, as they are written; polygons become fans of triangles.
+
+What does not hold together is refused: a file that is cut off, counts that do not fit, vertices that do not
+exist. Other files that a file names, such as materials, are never opened.
+"""
+
+from __future__ import annotations
+
+import re
+import struct
+from collections.abc import Sequence
+from itertools import islice
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from fingerpad.core.checks import FloatArray, IntArray
+from fingerpad.core.errors import InputError, shown
+
+Mesh = tuple[FloatArray, IntArray]
+
+_FACET = "facet normal . . . outer loop vertex . . . vertex . . . vertex . . . endloop endfacet"
+"""Words of a facet in an STL file of text; a point stands for a number."""
+
+_PLY_NUMBERS = {
+    **{"char": "i1", "uchar": "u1", "short": "i2", "ushort": "u2", "int": "i4", "uint": "u4"},
+    **{"int8": "i1", "uint8": "u1", "int16": "i2", "uint16": "u2", "int32": "i4", "uint32": "u4"},
+    **{"float": "f4", "double": "f8", "float32": "f4", "float64": "f8"},
+}
+"""Types of numbers in a PLY file."""
+
+_CODES = {"i1": "b", "u1": "B", "i2": "h", "u2": "H", "i4": "i", "u4": "I", "f4": "f", "f8": "d"}
+"""The same for `struct`."""
+
+
+def read_triangles(file: Path) -> Mesh:
+    """Vertices (n, 3) and corners of triangles (m, 3) of a file that ends in .stl, .obj or .ply."""
+    content = file.read_bytes()
+    vertices, faces = {".stl": _stl, ".obj": _obj, ".ply": _ply}[file.suffix.lower()](content)
+    if not len(faces):
+        raise InputError("it must hold at least one triangle: got none.")
+    if faces.min() < 0 or faces.max() >= len(vertices):
+        raise InputError(
+            f"it must have triangles of its vertices, 0 to {len(vertices) - 1}: got numbers {faces.min()} to "
+            f"{faces.max()}."
+        )
+    return vertices, faces
+
+
+def _text(content: bytes) -> str:
+    if b"\0" in content:
+        raise InputError("it must be text in UTF-8: it has zero bytes, as in UTF-16; save it as UTF-8.")
+    return content.decode("utf-8-sig", errors="replace")
+
+
+def _numbers(words: Any, place: str) -> FloatArray:
+    """Rows of words as rows of numbers."""
+    try:
+        return np.array(words, dtype=np.float64)
+    except ValueError as error:
+        raise InputError(f"{place} must have three numbers each: {error}.") from error
+
+
+def _stl(content: bytes) -> Mesh:
+    """Triangles of an STL file, each with vertices of its own."""
+    # Any binary file has a zero byte up to its count, unless it has 16 million triangles.
+    if content.lstrip()[:5].lower() == b"solid" and b"\0" not in content[:84]:
+        vertices = _text_stl(_text(content))
+    else:
+        size, count = len(content), int.from_bytes(content[80:84], "little")
+        if size < 84:
+            raise InputError(
+                "it is no STL file: one of text begins with 'solid', any other has 84 bytes or more; got "
+                f"{size} bytes, save it again as STL."
+            )
+        if size != 84 + 50 * count:
+            fault = "it is cut off" if size < 84 + 50 * count else "its count is wrong"
+            raise InputError(
+                f"an STL file that is no text must have {84 + 50 * count:,} bytes for {count:,} triangles: "
+                f"got {size:,} bytes; {fault}, save it again as STL."
+            )
+        facets = np.frombuffer(content, np.dtype([("numbers", "<f4", (4, 3)), ("_", "<u2")]), offset=84)
+        vertices = facets["numbers"][:, 1:].astype(np.float64)
+    return vertices.reshape(-1, 3), np.arange(3 * len(vertices)).reshape(-1, 3)
+
+
+def _text_stl(text: str) -> FloatArray:
+    solids = re.findall(r"(?im)^[ \t]*(end)?solid\b.*$", text)
+    words = re.sub(r"(?im)^[ \t]*(end)?solid\b.*$", "", text).split()
+    pattern = _FACET.split()
+    whole = len(words) // len(pattern)
+    table = np.array(words[: whole * len(pattern)], dtype=object).reshape(whole, len(pattern))
+    for column, expected in enumerate(pattern):
+        wrong = (
+            [] if expected == "." else [row for row in range(whole) if table[row, column].lower() != expected]
+        )
+        if wrong:
+            raise InputError(
+                f"facet {wrong[0] + 1} must have a normal and three vertices of three numbers: got "
+                f"{shown(table[wrong[0], column])} instead of {expected!r}."
+            )
+    if len(words) % len(pattern) or solids.count("end") != len(solids) - solids.count("end"):
+        raise InputError(
+            f"it must end with 'endsolid' after a whole facet: it is cut off after {whole:,} facets; save it "
+            "again as STL."
+        )
+    return _numbers(table[:, [8, 9, 10, 12, 13, 14, 16, 17, 18]], "vertices").reshape(-1, 3, 3)
+
+
+def _obj(content: bytes) -> Mesh:
+    """Vertices and faces of an OBJ file; textures, normals, materials and lines are passed over."""
+    vertices: list[list[str]] = []
+    polygons: list[list[int]] = []
+    for number, line in enumerate(re.sub(r"\\\r?\n", " ", _text(content)).split("\n"), 1):
+        words = line.split()
+        if not words or words[0] not in ("v", "f"):
+            continue
+        if words[0] == "v":
+            if len(words) < 4:
+                raise InputError(f"line {number}: a vertex must have three numbers: got {shown(line)}.")
+            vertices.append(words[1:4])
+            continue
+        try:
+            named = [int(word.partition("/")[0]) for word in line.partition("#")[0].split()[1:]]
+        except ValueError as error:
+            raise InputError(f"line {number}: a face must name its vertices: got {shown(line)}.") from error
+        if 0 in named or len(named) < 3:
+            raise InputError(
+                f"line {number}: a face must name three vertices or more, the first vertex as 1: got "
+                f"{shown(line)}."
+            )
+        polygons.append([each - 1 if each > 0 else len(vertices) + each for each in named])
+    points = _numbers(vertices, "vertices").reshape(-1, 3)
+    return points, _fans(polygons, points)
+
+
+def _fans(polygons: list[list[int]], vertices: FloatArray) -> IntArray:
+    """Triangles of polygons, as fans from their first corner whose triangles all turn the same side out."""
+    faces = [np.zeros((0, 3), dtype=np.int64)]
+    for size in sorted(set(map(len, polygons))):
+        corners = np.array([polygon for polygon in polygons if len(polygon) == size], dtype=np.int64)
+        if size < 3:
+            raise InputError(f"a face must have three vertices or more: one has {size}.")
+        if size > 3 and corners.min() >= 0 and corners.max() < len(vertices):
+            todo = np.arange(len(corners))
+            for _ in range(size):
+                at = vertices[corners[todo]]
+                normal = np.cross(at[:, 1:-1] - at[:, :1], at[:, 2:] - at[:, :1])
+                total = normal.sum(axis=1, keepdims=True)
+                folded = ((normal * total).sum(axis=2) < -1e-9 * (total * total).sum(axis=2)).any(axis=1)
+                todo = todo[folded]
+                corners[todo] = np.roll(corners[todo], 1, axis=1)
+            if todo.size:
+                raise InputError(
+                    f"faces must be triangles, or polygons that a fan of triangles fills: {todo.size:,} of "
+                    f"{size} vertices are not; divide them into triangles."
+                )
+        faces.extend(corners[:, [0, k, k + 1]] for k in range(1, size - 1))
+    return np.concatenate(faces)
+
+
+def _ply(content: bytes) -> Mesh:
+    """Vertices and faces of a PLY file, text or binary of either order."""
+    end = re.search(rb"end_header[ \t]*(\r\n|\n|\r)", content)
+    if not content.startswith(b"ply") or end is None:
+        raise InputError("a PLY file must begin with 'ply' and have an end_header: it does not.")
+    order, elements = _ply_header(_text(content[: end.start()]))
+    body = content[end.end() :]
+    read = _ply_text(_text(body), elements) if order is None else _ply_binary(body, elements, order)
+    vertices, faces = read.get("vertex", {}), read.get("face", {})
+    if not {"x", "y", "z"} <= set(vertices):
+        raise InputError("a PLY file must have vertices with x, y and z: it has none.")
+    points = _numbers([vertices[axis] for axis in "xyz"], "vertices").T
+    polygons = faces.get("vertex_indices", faces.get("vertex_index", []))
+    try:
+        numbers = [[int(corner) for corner in polygon] for polygon in polygons]
+    except (TypeError, ValueError) as error:
+        raise InputError(f"faces must be lists of whole numbers, their vertices: {error}.") from error
+    return points, _fans(numbers, points)
+
+
+_Element = tuple[str, int, list[tuple[str, str, str]]]
+"""Name, count and properties of an element: name, type of the count of a list or "", type."""
+
+
+def _ply_header(text: str) -> tuple[str | None, list[_Element]]:
+    """Order of the bytes, None for text, and the elements."""
+    orders = {"ascii": None, "binary_little_endian": "<", "binary_big_endian": ">"}
+    order: str | None = ""
+    elements: list[_Element] = []
+    for line in text.splitlines()[1:]:
+        match line.split():
+            case ["format", kind, _] if kind in orders:
+                order = orders[kind]
+            case ["element", name, count] if count.isdecimal():
+                elements.append((name, int(count), []))
+            case ["property", "list", size, kind, name] if (
+                size in _PLY_NUMBERS and kind in _PLY_NUMBERS and elements
+            ):
+                elements[-1][2].append((name, _PLY_NUMBERS[size], _PLY_NUMBERS[kind]))
+            case ["property", kind, name] if kind in _PLY_NUMBERS and elements:
+                elements[-1][2].append((name, "", _PLY_NUMBERS[kind]))
+            case [] | ["comment" | "obj_info", *_]:
+                pass
+            case _:
+                raise InputError(f"the header of a PLY file must not have the line {shown(line)}.")
+    if order == "":
+        raise InputError(f"a PLY file must have a format, {', '.join(orders)}: it has none.")
+    return order, elements
+
+
+def _counts(elements: Sequence[_Element]) -> str:
+    return " and ".join(f"{count:,} of {name}" for name, count, _ in elements)
+
+
+def _ply_text(text: str, elements: Sequence[_Element]) -> dict[str, dict[str, Any]]:
+    """Columns of each element of a PLY file of text, one row a line."""
+    lines = [line for line in text.splitlines() if line.strip()]
+    expected = sum(count for _, count, _ in elements)
+    if len(lines) != expected:
+        raise InputError(
+            f"it must have {expected:,} lines after its header, which promises {_counts(elements)}: got "
+            f"{len(lines):,}; save it again as PLY."
+        )
+    read, rows = {}, iter(lines)
+    for name, count, properties in elements:
+        columns: dict[str, Any] = {column: [] for column, _, _ in properties}
+        for line in islice(rows, count):
+            words = line.split()
+            used = 0
+            for column, size, _ in properties:
+                length = 1
+                if size:
+                    length = int(words[used]) if used < len(words) and words[used].isdecimal() else len(words)
+                    used += 1
+                entry = words[used : used + length]
+                columns[column].append(entry if size else "".join(entry))
+                used += length
+            # MeshLab writes more numbers behind the vertices of a face than its header says.
+            if used > len(words) or (used < len(words) and not (name == "face" and not properties[-1][1])):
+                raise InputError(f"a {name} must have as many numbers as the header says: got {shown(line)}.")
+        read[name] = columns
+    return read
+
+
+def _ply_binary(body: bytes, elements: Sequence[_Element], order: str) -> dict[str, dict[str, Any]]:
+    """Columns of each element of a binary PLY file, which must be as long as its counts say."""
+    read, used = {}, 0
+    try:
+        for name, count, properties in elements:
+            columns: dict[str, Any] = {column: [] for column, _, _ in properties}
+            if not any(size for _, size, _ in properties):
+                row = np.dtype([(column, order + kind) for column, _, kind in properties])
+                table = np.frombuffer(body, row, count, used)
+                columns = {column: table[column] for column in columns}
+                used += count * row.itemsize
+                read[name] = columns
+                continue
+            for _ in range(count):
+                for column, size, kind in properties:
+                    length = 1
+                    if size:
+                        (length,) = struct.unpack_from(order + _CODES[size], body, used)
+                        used += int(size[1])
+                    entry = struct.unpack_from(f"{order}{length}{_CODES[kind]}", body, used)
+                    used += length * int(kind[1])
+                    columns[column].append(entry if size else entry[0])
+            read[name] = columns
+    except (struct.error, ValueError) as error:
+        raise InputError(
+            f"it must hold {_counts(elements)}, as its header says: it is cut off or its counts are wrong; "
+            "save it again as PLY."
+        ) from error
+    if body[used:].strip():
+        raise InputError(
+            f"it must have {used:,} bytes after its header, which promises {_counts(elements)}: got "
+            f"{len(body):,}; save it again as PLY."
+        )
+    return read
