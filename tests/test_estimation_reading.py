@@ -342,7 +342,7 @@ def nwb(tmp_path_factory):
     """Write an NWB file with these trials and units."""
     folder = tmp_path_factory.mktemp("nwb")
 
-    def write(name, trials, units, columns=("stimulus",)):
+    def write(name, trials, units, columns=("stimulus",), options=None, invalid=()):
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # what the library says of itself
             from pynwb import NWBHDF5IO, NWBFile
@@ -353,7 +353,9 @@ def nwb(tmp_path_factory):
             for start, stop, *values in trials:
                 file.add_trial(start_time=start, stop_time=stop, **dict(zip(columns, values, strict=True)))
             for number, spikes in units.items():
-                file.add_unit(id=number, spike_times=spikes)
+                file.add_unit(id=number, spike_times=spikes, **(options or {}).get(number, {}))
+            for start, stop in invalid:
+                file.add_invalid_time_interval(start_time=start, stop_time=stop)
             path = folder / f"{name}.nwb"
             with NWBHDF5IO(str(path), mode="w") as opened:
                 opened.write(file)
@@ -379,6 +381,28 @@ def test_nwb_units_become_trains_that_count_from_the_onset_of_their_trial(nwb):
     assert recorded.spikes_after_hold == 1
 
 
+def test_trials_without_observation_are_left_out_and_not_silent(nwb, caplog):
+    """One before, one that observation ends in, one after; one in a time that is not valid."""
+    trials = [(start, start + 0.9, "edge") for start in (1.0, 10.0, 20.0, 30.0, 40.0)]
+    seen = {"obs_intervals": [[25.0, 60.0], [9.0, 15.0], [15.0, 20.4]]}
+    path = nwb("seen", trials, {3: [10.1, 20.2, 30.3]}, options={3: seen}, invalid=[(30.5, 30.6)])
+    recorded = read_recordings(path, TWO)
+    assert [train.round(6).tolist() for train in recorded.recordings.trains] == [[100.0], [200.0], []]
+    np.testing.assert_allclose(recorded.recordings.duration_ms, [900.0, 400.0, 900.0], rtol=0, atol=1e-6)
+    assert "2 of 5 trials are left out" in caplog.text
+
+
+@pytest.mark.parametrize("first", [0.0, 10.0])
+def test_spikes_that_count_from_their_trial_are_refused_unless_observation_says_they_do_not(nwb, first):
+    trials = [(first + 10.0 * number, first + 10.0 * number + 0.9, "edge") for number in range(3)]
+    spikes = {3: [0.04, 0.25, 0.5]}
+    with pytest.raises(InputError, match="as if they counted from that of their trial; add start_time"):
+        read_recordings(nwb(f"relative-{first:g}", trials, spikes), TWO)
+    seen = {3: {"obs_intervals": [[0.0, 60.0]]}}
+    trains = read_recordings(nwb(f"seen-{first:g}", trials, spikes, options=seen), TWO).recordings.trains
+    assert [len(train) for train in trains] == [0 if first else 3, 0, 0]
+
+
 def test_nwb_files_that_cannot_be_are_named(nwb, tmp_path):
     trials, two = [(0.0, 1.0, "edge")], {3: [0.1], 4: [0.2]}
     cases = [
@@ -393,6 +417,11 @@ def test_nwb_files_that_cannot_be_are_named(nwb, tmp_path):
             "trial 0: stimulus must be one of two.csv, edge, flat",
         ),
         (nwb("unsorted", trials, {3: [0.3, 0.2]}), 3, "spike_times of unit 3 must be finite and increase"),
+        (
+            nwb("unseen", trials, {3: [0.1]}, options={3: {"obs_intervals": [[5.0, 6.0]]}}),
+            3,
+            "a trial must start while the unit is observed: none does",
+        ),
         (nwb("endless", [(0.0, np.nan, "edge")], two), 3, "trial 0: duration_ms must be a finite number"),
     ]
     damaged = tmp_path / "damaged.nwb"

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import re
 import warnings
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 from typing import Any, TypeGuard, TypeVar
 
 import numpy as np
@@ -57,6 +57,15 @@ def number_in(name: str, text: str, unit: str = "") -> float:
     if not _DIGITS.fullmatch(text):
         raise InputError(f"{name} must be a finite number{_in(unit)}: got {shown(text)}.")
     return finite(name, float(text), unit)
+
+
+def numbers_in(name: str, texts: Sequence[str], unit: str = "") -> FloatArray:
+    """Return the finite numbers that texts write, as `number_in` does for one; much faster for many."""
+    if all(map(_DIGITS.fullmatch, texts)):
+        values = np.array(list(map(float, texts)), dtype=np.float64)
+        if np.isfinite(values).all():
+            return values
+    return np.array([number_in(name, text, unit) for text in texts], dtype=np.float64)
 
 
 # Python also reads `1_0`, digits of other scripts, `inf` and `nan`.

@@ -6,12 +6,14 @@ import csv
 import io
 from collections import Counter
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from fingerpad.core.checks import finite, number_in
+import numpy as np
+
+from fingerpad.core.checks import FloatArray, finite, number_in, numbers_in
 from fingerpad.core.errors import InputError
 from fingerpad.core.files import read_text
 from fingerpad.core.keywords import did_you_mean
@@ -76,6 +78,18 @@ class TableRow:
             yield
         except InputError as error:
             raise InputError(f"{self.place}: {error}") from error
+
+
+def column_of(rows: Sequence[TableRow], column: str, unit: str = "", check: Check = finite) -> FloatArray:
+    """Entries of a column as numbers that pass `check`, as `TableRow.number`; much faster for many rows."""
+    entries: list[Any] = [row.entries.get(column) for row in rows]
+    if all(isinstance(entry, str) for entry in entries):
+        with suppress(InputError):  # which row it is is told below
+            values = numbers_in(column, entries, unit)
+            for end in (values.min(), values.max()):
+                check(column, end, unit)
+            return values
+    return np.array([row.number(column, unit, check) for row in rows])
 
 
 def read_csv(path: Path, known: Sequence[str], prefixes: tuple[str, ...] = ()) -> list[TableRow]:

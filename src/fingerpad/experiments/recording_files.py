@@ -12,11 +12,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fingerpad.core.checks import FloatArray, not_negative, number_in, positive
+from fingerpad.core.checks import FloatArray, not_negative, numbers_in, positive
 from fingerpad.core.errors import InputError
 from fingerpad.core.files import check_file
+from fingerpad.core.logger import LOGGER
 from fingerpad.core.signals import SpikeTrains
-from fingerpad.core.tables import TableRow, read_csv
+from fingerpad.core.tables import TableRow, column_of, read_csv
 from fingerpad.core.units import MS_PER_S
 from fingerpad.experiments.descriptions.stimuli import NamedStimulus
 from fingerpad.experiments.stimuli import Stimuli
@@ -27,6 +28,9 @@ SPIKES = "spike_times_ms"
 DURATION = "duration_ms"
 FOLD = "fold"
 LARGEST_NWB_MB = 20_000
+_SAME_S = 1e-6
+"""Times that differ by less are the same: they are sums of rounded ones. [s]"""
+
 SUFFIXES_OF_NWB = (".nwb", ".h5", ".hdf5")
 
 
@@ -141,7 +145,7 @@ def _mean_rates(lines: Sequence[TableRow], names: Sequence[str], source: str) ->
     means: dict[str, FloatArray | None] = dict.fromkeys(RATES)
     for column in RATES:
         if column in lines[0].entries:
-            rates = np.array([line.number(column, "spikes/s", not_negative) for line in lines])
+            rates = column_of(lines, column, "spikes/s", not_negative)
             means[column] = np.array([rates[numbers].mean() for numbers in presented.values()])
     return RateRecordings(tuple(presented), **means, source=source)
 
@@ -176,11 +180,12 @@ def _spike_times(line: TableRow) -> FloatArray:
     entry = line.entries[SPIKES]
     with line.placed():
         if isinstance(entry, str):
-            entry = [not_negative(SPIKES, number_in(SPIKES, time, "ms"), "ms") for time in entry.split()]
+            entry = numbers_in(SPIKES, entry.split(), "ms")
+            not_negative(SPIKES, entry.min(initial=0.0), "ms")
         times = np.asarray(entry, dtype=np.float64)
-        backwards = np.flatnonzero(np.diff(times) <= 0.0)
-        if backwards.size:
-            before, behind = times[backwards[0] : backwards[0] + 2]
+        backwards = times[1:] <= times[:-1]
+        if backwards.any():
+            before, behind = times[backwards.argmax() :][:2]
             raise InputError(f"{SPIKES} must increase: {behind:g} ms follows {before:g} ms, sort them.")
     return times
 
@@ -223,7 +228,7 @@ def _nwb_lines(path: Path, column: str, unit: int | None) -> list[TableRow]:
             warnings.simplefilter("ignore")
             with NWBHDF5IO(str(path), mode="r") as file:
                 content = file.read()
-                return _trials(path, content.trials, content.units, column, unit)
+                return _trials(path, content, column, unit)
     except InputError:
         raise
     except Exception as error:  # a file of any other kind may fail in any way
@@ -231,29 +236,75 @@ def _nwb_lines(path: Path, column: str, unit: int | None) -> list[TableRow]:
         raise InputError(f"{path} cannot be read as NWB ({said}): check it with nwbinspector.") from error
 
 
-def _trials(path: Path, trials: Any, units: Any, column: str, unit: int | None) -> list[TableRow]:
+def _trials(path: Path, content: Any, column: str, unit: int | None) -> list[TableRow]:
+    trials = content.trials
     if trials is None or not len(trials):
         raise InputError(f"{path} must have a table of trials with start_time and {column}: it has none.")
     if column not in trials.colnames:
         raise InputError(f"{path}: trials must have the column {column}: got {', '.join(trials.colnames)}.")
-    spikes_s = _unit_spikes(path, units, unit)
+    row = _row_of_unit(path, content.units, unit)
+    spikes_s, observed_s = _spikes_of_unit(path, content.units, row), _observed(content.units, row)
     starts, stops = (np.asarray(trials[name][:], dtype=np.float64) for name in ("start_time", "stop_time"))
+    _check_clock(path, spikes_s, starts, stops, observed_s is not None)
+    invalid = content.invalid_times
     lines = []
     for trial, (start, stop) in enumerate(zip(starts, stops, strict=True)):
-        within = spikes_s[(spikes_s >= start) & (spikes_s <= stop)]
+        end = stop
+        if observed_s is not None:
+            during = (observed_s[:, 0] <= start + _SAME_S) & (observed_s[:, 1] > start + _SAME_S)
+            if not during.any():
+                continue
+            end = min(stop, observed_s[during, 1].max())
+        if (
+            invalid is not None
+            and ((invalid["start_time"][:] < end) & (invalid["stop_time"][:] > start)).any()
+        ):
+            continue
+        within = spikes_s[(spikes_s >= start) & (spikes_s <= end)]
         entries = {
             column: trials[column][trial],
             SPIKES: (within - start) * MS_PER_S,
-            DURATION: (stop - start) * MS_PER_S,
+            DURATION: (end - start) * MS_PER_S,
         }
         if FOLD in trials.colnames:
             entries[FOLD] = trials[FOLD][trial]
         lines.append(TableRow(f"{path}, trial {trials.id[trial]}", entries))
+    if not lines:
+        raise InputError(
+            f"{path}: a trial must start while the unit is observed: none does, see obs_intervals and "
+            "invalid_times."
+        )
+    if len(lines) < len(starts):
+        LOGGER.warning(
+            "%s: %d of %d trials are left out, since the unit was not observed then.",
+            path, len(starts) - len(lines), len(starts),
+        )  # fmt: skip
     return lines
 
 
-def _unit_spikes(path: Path, units: Any, unit: int | None) -> FloatArray:
-    """Spike times of one unit. [s]"""
+def _check_clock(
+    path: Path, spikes_s: FloatArray, starts_s: FloatArray, stops_s: FloatArray, observed: bool
+) -> None:
+    """Raise an error if spikes seem to count from the onset of their trials, not from that of the session.
+
+    They all come within one duration of a trial, and no trial has any, or the first alone, which starts then.
+    """
+    if observed or not spikes_s.size or len(starts_s) < 2:
+        return
+    answered = [
+        ((spikes_s >= start) & (spikes_s <= stop)).any()
+        for start, stop in zip(starts_s, stops_s, strict=True)
+    ]
+    if sum(answered) <= 1 and spikes_s[-1] <= np.max(stops_s - starts_s):
+        raise InputError(
+            f"{path}: spike_times must count from the start of the session, as start_time does: all "
+            f"{spikes_s.size} lie within {spikes_s[-1]:g} s, as if they counted from that of their trial; "
+            "add start_time to them, or give the unit obs_intervals if it fired then alone."
+        )
+
+
+def _row_of_unit(path: Path, units: Any, unit: int | None) -> int:
+    """Row of the unit that was chosen, or of the only one."""
     ids = [] if units is None else [int(number) for number in units.id[:]]
     if not ids or "spike_times" not in units.colnames:
         raise InputError(f"{path} must have a table of units with spike_times: it has none.")
@@ -262,7 +313,27 @@ def _unit_spikes(path: Path, units: Any, unit: int | None) -> FloatArray:
     chosen = ids[0] if unit is None else unit
     if chosen not in ids:
         raise InputError(f"{path}: unit must be one of {', '.join(map(str, ids))}: got {chosen}.")
-    times = np.asarray(units["spike_times"][ids.index(chosen)], dtype=np.float64)
+    return ids.index(chosen)
+
+
+def _spikes_of_unit(path: Path, units: Any, row: int) -> FloatArray:
+    """Spike times of a unit. [s]"""
+    times = np.asarray(units["spike_times"][row], dtype=np.float64)
     if not np.isfinite(times).all() or (np.diff(times) <= 0.0).any():
-        raise InputError(f"{path}: spike_times of unit {chosen} must be finite and increase, sort them.")
+        raise InputError(
+            f"{path}: spike_times of unit {units.id[row]} must be finite and increase from the start of the "
+            "session: sort them, or add start_time if they begin anew in each trial."
+        )
     return times
+
+
+def _observed(units: Any, row: int) -> FloatArray | None:
+    """Intervals (n, 2) in which a unit was observed, joined where they touch; None if none are given. [s]"""
+    given = units["obs_intervals"][row] if "obs_intervals" in units.colnames else ()
+    intervals = np.asarray(given, dtype=np.float64).reshape(-1, 2)
+    if not len(intervals):
+        return None
+    begin, end = intervals[np.argsort(intervals[:, 0])].T
+    end = np.maximum.accumulate(end)
+    apart = begin[1:] > end[:-1] + _SAME_S
+    return np.column_stack([begin[np.r_[True, apart]], end[np.r_[apart, True]]])

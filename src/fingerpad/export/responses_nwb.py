@@ -122,6 +122,7 @@ def write_responses_nwb(
             session.add_unit(
                 id=receptor,
                 spike_times=np.concatenate(times_ms) / MS_PER_S,
+                obs_intervals=[[0.0, (onsets_ms[-1] + durations_ms[-1]) / MS_PER_S]],
                 **dict(zip(columns, place, strict=True)),
             )
         unfinished = Path(folder) / "session.nwb"

@@ -308,7 +308,7 @@ def _check_no_points(file: Path, heights: FloatArray) -> None:
         if is_grid or len(table) >= LEAST_POINTS:
             raise InputError(
                 f"{file.name} must hold heights on a grid, row by row: {len(table):,} times 3 numbers look "
-                "like points x, y, z; write their z as rows and columns (a map that is so narrow can be given "
+                "like points x, y, z; write their z as rows and columns (a map that is so narrow can go "
                 "to fp.height_surface)."
             )
 

@@ -13,7 +13,7 @@ from fingerpad.core.errors import InputError
 from fingerpad.core.files import path_of
 from fingerpad.core.keywords import known_keywords
 from fingerpad.core.phases import Phase
-from fingerpad.core.tables import TableRow, read_csv
+from fingerpad.core.tables import TableRow, column_of, read_csv
 from fingerpad.core.units import MN_PER_N, MS_PER_S
 from fingerpad.geometry.sampled_motions import TOLERANCE, reduced
 from fingerpad.geometry.trajectory import SAME_VALUE, Trajectory, check_speed
@@ -134,7 +134,7 @@ def _columns(rows: Sequence[TableRow], path: str) -> dict[str, FloatArray]:
             raise InputError(
                 f"{path} must have one column for {name}: {column} is another one, leave it out."
             )
-        columns[name] = factor * np.array([row.number(column) for row in rows])
+        columns[name] = factor * column_of(rows, column)
     if "times_ms" not in columns:
         raise InputError(
             f"{path} must have the column time_ms or time_s: it has {', '.join(rows[0].entries)}."
