@@ -64,11 +64,12 @@ release: .venv/installed-for-tests
 	$(bin)/python -m tests.release
 
 results: .venv/installed
-	$(bin)/fingerpad reproduce --extended $(ARGS)
+	$(bin)/fingerpad reproduce $(ARGS)
 	$(bin)/python -m studies methods --resolution standard --out reproduction
 	$(bin)/python -m studies drives --resolution standard --out reproduction
+	$(bin)/python -m studies sed-readings --out reproduction
 	$(bin)/python -m studies results reproduction/results.json --methods reproduction/methods.json \
-		--drives reproduction/drives.json
+		--drives reproduction/drives.json --readings reproduction/sed-readings.json
 
 verification: .venv/installed-for-tests
 	$(bin)/python -m tests.verification $(ARGS)

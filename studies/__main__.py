@@ -16,6 +16,7 @@ from studies import (
     mesh_refinement,
     paper_size,
     population_timing,
+    sed_readings,
     spike_fit,
     tissue_posterior,
     tissue_search,
@@ -61,6 +62,13 @@ STUDIES = (
         tissue_posterior.run,
         tissue_posterior_page,
         tissues="human",
+    ),
+    Study(
+        "sed-readings",
+        "Compare readings of the energy density at the epidermal-dermal border, with both sets.",
+        sed_readings.run,
+        sed_readings.readings_page,
+        resolution="standard",
     ),
     Study(
         "drives",

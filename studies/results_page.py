@@ -38,6 +38,7 @@ from studies.fit_methods import FitMethods, MethodsStudy
 from studies.pages.drive_quantities import QUANTITIES
 from studies.pages.markdown import markdown_blocks
 from studies.pages.markdown import markdown_table as table
+from studies.sed_readings import Reading, ReadingsStudy, readings_table
 
 COMMAND = "python -m studies results"
 Kind = TypeVar("Kind")
@@ -137,6 +138,7 @@ class Excerpt:
     methods: tuple[Method, ...]
     models: tuple[Model, ...]
     drives: tuple[Drive, ...]
+    readings: tuple[Reading, ...]
     percept: dict[str, Percept]
     criterion: dict[str, CriterionErrorBars]
 
@@ -145,6 +147,7 @@ def read_excerpt(
     path: Path,
     methods: Path | None = None,
     drives: Path | None = None,
+    readings: Path | None = None,
     before: Excerpt | None = None,
 ) -> Excerpt:
     """Take from the results of `fingerpad reproduce --extended` what the pages show.
@@ -157,6 +160,8 @@ def read_excerpt(
         The methods.json of `python -m studies methods`.
     drives : Path, optional
         The drives.json of `python -m studies drives`.
+    readings : Path, optional
+        The sed-readings.json of `python -m studies sed-readings`.
     before : Excerpt, optional
         What the pages show now; they keep those of its rows that no file replaces.
 
@@ -173,7 +178,9 @@ def read_excerpt(
         shown = replace(shown, methods=before.methods, models=before.models)
     if before is not None and driven is None:
         shown = replace(shown, drives=before.drives)
-    return shown
+    if readings is not None:
+        return replace(shown, readings=_studied(readings, ReadingsStudy, "sed-readings").readings)
+    return shown if before is None else replace(shown, readings=before.readings)
 
 
 def _studied(path: Path, kind: type[Kind], study: str) -> Kind:
@@ -231,6 +238,7 @@ def excerpt(
             )
             for candidate in (drives.candidates if drives else ())
         ),
+        readings=(),
         percept={name: _percept(found.discrimination) for name, found in sets.items()},
         criterion={name: found.discrimination.reasons.criterion for name, found in sets.items()},
     )
@@ -306,6 +314,7 @@ def results_page(shown: Excerpt) -> str:
         "All fitted by least squares, with `python -m studies drives` "
         "([discussion](single-unit.md#quantities-that-drive-the-afferent)).",
         _drives(shown.drives),
+        *markdown_blocks(Chapter("Readings of the border", [readings_table(shown.readings)])),
         "## Hit rates",
         "Hit rate of each sphere against one of 287 /m. The noise is fitted to the two observed hit rates "
         "with the static Gradient Sum ([decision](decisions/noise-fitted.md)); all codes use it.",

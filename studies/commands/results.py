@@ -30,6 +30,10 @@ def results_command(
         Path | None,
         typer.Option(help="drives.json of `python -m studies drives`. Default: keep the rows shown now."),
     ] = None,
+    readings: Annotated[
+        Path | None,
+        typer.Option(help="sed-readings.json of `python -m studies sed-readings`. Default: keep the rows."),
+    ] = None,
     picture: Annotated[
         bool, typer.Option(help="Also press the standard sphere and draw the README's picture.")
     ] = True,
@@ -40,7 +44,7 @@ def results_command(
 
     shown = from_json(results_page.Excerpt, NUMBERS.read_bytes())
     if results is not None:
-        shown = results_page.read_excerpt(results, methods, drives, shown)
+        shown = results_page.read_excerpt(results, methods, drives, readings, shown)
     readme = results_page.with_table(README.read_text(encoding="utf-8"), shown)
     write_atomically(NUMBERS, to_json(shown) + b"\n")
     write_atomically(PAGE, results_page.results_page(shown).encode())
