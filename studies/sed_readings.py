@@ -15,7 +15,9 @@ from fingerpad.core.checks import FloatArray
 from fingerpad.core.errors import ConvergenceError
 from fingerpad.core.random_streams import Purpose, normals
 from fingerpad.core.results import Number, result_class
+from fingerpad.core.signals import STORED_ENERGY
 from fingerpad.data import psychophysics
+from fingerpad.data.neuron import PAPER_INITIAL
 from fingerpad.experiments.conditions import RECEPTOR_X_MM, Conditions
 from fingerpad.experiments.gerling2014 import single_unit, sphere_discrimination
 from fingerpad.experiments.gerling2014.discrepancy import expected_of_measure
@@ -104,7 +106,7 @@ def run(runner: Runner, conditions: Conditions) -> ReadingsStudy:
     """
     found = []
     for tissues in SETS:
-        of_set = replace(conditions, materials=tissues)
+        of_set = replace(conditions, tissues=tissues)
         responses = runner.responses(
             {
                 "bars": dict(enumerate(single_unit.bar_touches(of_set))),
@@ -127,9 +129,14 @@ def _reading(
     seed: int,
 ) -> Reading:
     sed = single_unit.receptor_sed([read_as(skin, reading) for skin in bars.values()])
-    problem = single_unit.rate_problem(sed)
+    problem = single_unit.rate_problem(sed, PAPER_INITIAL.value)
     best, folds = single_unit.fit(problem)
-    afferent = Afferent.from_parameters(best.parameters)
+    afferent = Afferent.from_parameters(
+        best.parameters,
+        dynamic_quantity=STORED_ENERGY,
+        static_quantity=STORED_ENERGY,
+        initial_mv=PAPER_INITIAL.value,
+    )
     unit = single_unit.single_unit_result(problem, best, folds, afferent, "response surface")
     sigma, rates = _noise(afferent, {key: read_as(skin, reading) for key, skin in spheres.items()}, seed)
     dynamic, static = unit.modulation.dynamic.ours, unit.modulation.static.ours

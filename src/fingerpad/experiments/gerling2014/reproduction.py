@@ -14,6 +14,7 @@ from fingerpad.core.progress import Progress
 from fingerpad.core.results import result_class
 from fingerpad.core.signals import STORED_ENERGY
 from fingerpad.data import all_published
+from fingerpad.data.neuron import PAPER_INITIAL
 from fingerpad.experiments.conditions import RECEPTOR_X_MM, Conditions, Touch
 from fingerpad.experiments.gerling2014 import (
     curvature_thresholds,
@@ -319,7 +320,9 @@ def set_result(
         The paper's three trials.
     """
     bars, spheres = list(responses["bar, 36 shifts"].values()), dict(responses["spheres"])
-    quantity, initial_mv = conditions.quantity, conditions.afferent.initial_mv
+    quantity = conditions.quantity
+    # A membrane of the paper's own system starts at 0, as it prints, whatever its tissues.
+    initial_mv = PAPER_INITIAL.value if quantity == STORED_ENERGY else None
     bar_sed = single_unit.receptor_sed(bars, quantity, quantity)
     problem = single_unit.rate_problem(bar_sed, initial_mv)
     method = _method(conditions, spheres)
