@@ -15,6 +15,7 @@ from fingerpad.neuron.band_pass import BandPass
 from fingerpad.neuron.escape_rate import EscapeRate
 from fingerpad.neuron.lif import LeakyIntegrateAndFire
 from fingerpad.neuron.population import sensitivities
+from fingerpad.neuron.spikes import firing_rate_hz
 from fingerpad.neuron.transduction import drive
 from fingerpad.neuron.tuning import impulses_per_cycle, tuning_curve, vibration
 
@@ -123,6 +124,26 @@ def test_a_fit_simulates_the_membrane_that_it_fits() -> None:
         afferent = replace(fp.Afferent(), initial_mv=initial_mv)
         model = AfferentModel.of_traces(stress, initial_mv=initial_mv)
         assert_array_equal(model.evaluate(afferent.parameters), afferent.rates(stress))
+
+
+@pytest.mark.parametrize("afferent", [fp.PC(), fp.RA()])
+def test_afferents_that_fire_once_in_a_ramp_have_a_rate_and_sai_keeps_that_of_the_paper(afferent) -> None:
+    places = [[17.0 + 0.02 * number, 0.0] for number in range(700)]
+    found = fp.Population(places, 1.0, afferent).respond(FINGER)
+    in_ramp = [np.count_nonzero(train <= 50.0) for train in found.spikes]
+    assert in_ramp[-1] == 0
+    assert 1 in in_ramp
+    assert_allclose(found.dynamic_rate_hz, 20.0 * np.array(in_ramp))
+    assert_array_equal(found.dynamic_count_hz, found.dynamic_rate_hz)
+    assert_array_equal(found.spike_count, [train.size for train in found.spikes])
+    columns = found.to_pandas()
+    for name in ("dynamic_rate_hz", "dynamic_count_hz", "static_count_hz"):
+        assert_array_equal(columns[name], getattr(found, name))
+        assert_array_equal(found.to_xarray()[name], getattr(found, name))
+    sai = fp.Population(places, 1.0).respond(FINGER)
+    assert_array_equal(sai.dynamic_rate_hz, firing_rate_hz(sai.spikes, (30.0, 50.0)))
+    counts = [np.count_nonzero((train > 30.0) & (train <= 50.0)) for train in sai.spikes]
+    assert_allclose(sai.dynamic_count_hz, 50.0 * np.array(counts))
 
 
 ENDS = np.array([[[0.0, 0.0], [1.0, 0.0]]])

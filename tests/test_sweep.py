@@ -272,7 +272,8 @@ def test_a_table_of_rates_is_read_back_bit_by_bit(folder, tmp_path, ending):
     assert table.attrs["inputs_sha256"] == data.attrs["inputs_sha256"]
     assert list(table.columns) == [
         "motion_depth_mm", "afferents_columns", "receptor", "x_mm", "z_mm",
-        "dynamic_rate_hz", "static_rate_hz", "first_spike_latency_ms", "spike_count",
+        "dynamic_rate_hz", "static_rate_hz", "dynamic_count_hz", "static_count_hz",
+        "first_spike_latency_ms", "spike_count",
     ]  # fmt: skip
     assert len(table) == 2 + 3 + 3
     some = table[(table.motion_depth_mm == 0.5) & (table.afferents_columns == 3)]

@@ -14,14 +14,18 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import ArrayLike
 
-from fingerpad.core.checks import FloatArray, float_array, increasing, int_array, positive
+from fingerpad.core.checks import FloatArray, float_array, increasing, int_array, one_of, positive
 from fingerpad.core.displayed import Result
 from fingerpad.core.errors import InputError
 from fingerpad.core.phases import Phase, from_onset, ramp_and_hold_phases
+from fingerpad.core.units import MS_PER_S
 from fingerpad.core.values import converted
 
 MOST_SHOWN = 8
 """Numbers of a list that `repr` shows."""
+
+INTERVAL, COUNT = "interval", "count"
+"""What a firing rate is: one over the mean interval, or spikes over the length of the window."""
 
 STORED_ENERGY = "stored"
 """Name of the quantity that drives both terms of the current in the paper: strain energy density."""
@@ -392,6 +396,25 @@ class SpikeTrains(Result):
         offsets = np.concatenate([[0], np.cumsum(np.concatenate(counts))]) if parts else np.zeros(1)
         return cls(np.concatenate([part.times_ms for part in parts]) if parts else np.empty(0), offsets)
 
+    @property
+    def counts(self) -> np.ndarray:
+        """Number of spikes of each afferent, (n_afferents,)."""
+        return np.diff(self.offsets)
+
+    def counted_hz(self, window_ms: Sequence[float]) -> FloatArray:
+        """Spikes of each afferent in a window over its length, (n_afferents,). [spikes/s]
+
+        The window excludes its start and includes its end.
+
+        Examples
+        --------
+        >>> SpikeTrains.from_lists([[10.0, 35.0, 50.0], [45.0], []]).counted_hz((30.0, 50.0)).tolist()
+        [100.0, 50.0, 0.0]
+        """
+        start, end = window_ms
+        inside = np.cumsum(np.append(0, (self.times_ms > start) & (self.times_ms <= end)))
+        return MS_PER_S * np.diff(inside[self.offsets]) / (end - start)
+
     def spread(self, sites: np.ndarray) -> SpikeTrains:
         """Trains of all sites, if these are those where a mask is true and the others are silent.
 
@@ -431,13 +454,18 @@ class ResponseMap(Result):
     spikes : SpikeTrains
         One train per receptor.
     dynamic_rate_hz, static_rate_hz : array (n_receptors,)
-        Firing rates in the two windows, Eqs. 6-10; 0 without an interval. [spikes/s]
+        Firing rates in the two windows, as `rate_measure` says. [spikes/s]
     first_spike_latency_ms : array (n_receptors,)
         Time from first touch to the first spike after it; NaN without a spike. [ms]
     duration_ms : float, optional
         How long the touch lasted, if that is known. [ms]
     phases : tuple of Phase
         Named parts of the touch.
+    windows_ms : ((float, float), (float, float)), optional
+        Windows of the two rates, if they are known. [ms]
+    rate_measure : {"interval", "count"}
+        What the rates of this type of afferents are: one over the mean interval between spikes, Eqs. 6-10,
+        which is 0 without an interval; or spikes over the length of the window.
     """
 
     positions_mm: FloatArray
@@ -448,16 +476,39 @@ class ResponseMap(Result):
     first_spike_latency_ms: FloatArray
     duration_ms: float | None = None
     phases: tuple[Phase, ...] = ()
+    windows_ms: tuple[tuple[float, ...], tuple[float, ...]] | None = None
+    rate_measure: str = INTERVAL
 
     def __repr__(self) -> str:
-        firing = np.count_nonzero(np.diff(self.spikes.offsets))
+        firing = np.count_nonzero(self.spike_count)
         return (
             f"ResponseMap({firing} of {len(self.spikes)} afferents fire {self.spikes.times_ms.size} spikes, "
             f"at most {self.dynamic_rate_hz.max(initial=0.0):.3g} spikes/s in the ramp and "
             f"{self.static_rate_hz.max(initial=0.0):.3g} spikes/s in the hold)"
         )
 
+    @property
+    def spike_count(self) -> np.ndarray:
+        """Spikes of each afferent in the whole touch, (n_receptors,)."""
+        return self.spikes.counts
+
+    @property
+    def dynamic_count_hz(self) -> FloatArray:
+        """Spikes in the dynamic window over its length, (n_receptors,); NaN if it is not known. [spikes/s]"""
+        return self._counted_hz(0)
+
+    @property
+    def static_count_hz(self) -> FloatArray:
+        """Spikes in the static window over its length, (n_receptors,); NaN if it is not known. [spikes/s]"""
+        return self._counted_hz(1)
+
+    def _counted_hz(self, number: int) -> FloatArray:
+        if self.windows_ms is None:
+            return np.full(len(self.spikes), np.nan)
+        return self.spikes.counted_hz(self.windows_ms[number])
+
     def __post_init__(self) -> None:
+        one_of("rate_measure", self.rate_measure, (INTERVAL, COUNT))
         if self.duration_ms is not None:
             positive("duration_ms", self.duration_ms, "ms")
         positions = float_array("positions_mm", self.positions_mm, 2)

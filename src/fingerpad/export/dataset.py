@@ -128,7 +128,11 @@ RESPONSE_PARTS = {
     "receptor_mm": Variable("mm", ("receptor", "coordinate"), "place of each end organ"),
     "dynamic_rate_hz": Variable("s-1", ("receptor",), "firing rate in the ramp"),
     "static_rate_hz": Variable("s-1", ("receptor",), "firing rate in the hold"),
-    "first_spike_latency_ms": Variable("ms", ("receptor",), "time of the first spike", holes=True),
+    "dynamic_count_hz": Variable("s-1", ("receptor",), "spikes in the ramp over its window", holes=True),
+    "static_count_hz": Variable("s-1", ("receptor",), "spikes in the hold over its window", holes=True),
+    "first_spike_latency_ms": Variable(
+        "ms", ("receptor",), "time from first touch to the first spike", holes=True
+    ),
     "spike_count": Variable("1", ("receptor",), "number of spikes of each receptor"),
     "spike_time_ms": Variable("ms", ("spike",), "spike times, receptor by receptor"),
 }
@@ -421,8 +425,10 @@ def response_values(response: ResponseMap) -> dict[str, np.ndarray]:
         "receptor_mm": response.positions_mm,
         "dynamic_rate_hz": response.dynamic_rate_hz,
         "static_rate_hz": response.static_rate_hz,
+        "dynamic_count_hz": response.dynamic_count_hz,
+        "static_count_hz": response.static_count_hz,
         "first_spike_latency_ms": response.first_spike_latency_ms,
-        "spike_count": np.diff(response.spikes.offsets).astype(np.int32),
+        "spike_count": response.spike_count.astype(np.int32),
         "spike_time_ms": response.spikes.times_ms,
     }
 

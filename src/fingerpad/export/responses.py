@@ -20,6 +20,9 @@ PLACES = {2: ("x_mm", "z_mm"), 3: ("x_mm", "y_mm", "z_mm")}
 ANSWERS = (
     "dynamic_rate_hz",
     "static_rate_hz",
+    "dynamic_count_hz",
+    "static_count_hz",
+    "spike_count",
     "first_spike_latency_ms",
     "recruitment_rank",
     "spike_times_ms",
@@ -61,9 +64,9 @@ def write_response_csv(path: Path, response: ResponseMap) -> Path:
     >>> response = ResponseMap([[17.0, 0.5], [17.0, 1.5]], 1.0, trains, [36.4, 0], [0, 0], [12.5, np.nan])
     >>> with TemporaryDirectory() as folder:
     ...     print(write_response_csv(Path(folder) / "response.csv", response).read_text(encoding="utf-8"))
-    receptor,x_mm,z_mm,dynamic_rate_hz,static_rate_hz,first_spike_latency_ms,recruitment_rank,spike_times_ms
-    0,17.0,0.5,36.4,0.0,12.5,1.0,12.5 40.0
-    1,17.0,1.5,0.0,0.0,,,
+    receptor,x_mm,z_mm,dynamic_rate_hz,static_rate_hz,dynamic_count_hz,static_count_hz,spike_count,...
+    0,17.0,0.5,36.4,0.0,,,2,12.5,1.0,12.5 40.0
+    1,17.0,1.5,0.0,0.0,,,0,,,
     """
     instance("response", response, ResponseMap)
     text = io.StringIO()
@@ -75,15 +78,9 @@ def write_response_csv(path: Path, response: ResponseMap) -> Path:
 
 
 def _rows(response: ResponseMap) -> Iterator[list[object]]:
-    numbers = np.column_stack(
-        [
-            response.positions_mm,
-            response.dynamic_rate_hz,
-            response.static_rate_hz,
-            response.first_spike_latency_ms,
-            recruitment_rank(response.first_spike_latency_ms),
-        ]
-    )
-    for receptor, row in enumerate(numbers.tolist()):
+    ranked = {"recruitment_rank": recruitment_rank(response.first_spike_latency_ms)}
+    columns = [ranked[name] if name in ranked else getattr(response, name) for name in ANSWERS[:-1]]
+    places = zip(response.positions_mm.tolist(), *(column.tolist() for column in columns), strict=True)
+    for receptor, (place, *row) in enumerate(places):
         times = " ".join(map(repr, response.spikes[receptor].tolist()))
-        yield [receptor, *("" if np.isnan(number) else number for number in row), times]
+        yield [receptor, *("" if np.isnan(number) else number for number in (*place, *row)), times]

@@ -69,16 +69,22 @@ def response_columns(response: ResponseMap) -> Columns:
     >>> places, latency = [[17.0, 0.0], [18.0, 0.0]], np.array([12.0, np.nan])
     >>> columns = response_columns(ResponseMap(places, 1.0, spikes, rates, rates, latency))
     >>> list(columns), columns["spikes"].tolist()  # doctest: +NORMALIZE_WHITESPACE
-    (['afferent', 'x_mm', 'z_mm', 'dynamic_rate_hz', 'static_rate_hz', 'first_spike_latency_ms', 'spikes'],
-     [2, 0])
+    (['afferent', 'x_mm', 'z_mm', 'dynamic_rate_hz', 'static_rate_hz', 'dynamic_count_hz', 'static_count_hz',
+      'first_spike_latency_ms', 'spikes'], [2, 0])
     """
     axes = ("x_mm", "z_mm") if response.positions_mm.shape[1] == 2 else ("x_mm", "y_mm", "z_mm")
-    rates = ("dynamic_rate_hz", "static_rate_hz", "first_spike_latency_ms")
+    rates = (
+        "dynamic_rate_hz",
+        "static_rate_hz",
+        "dynamic_count_hz",
+        "static_count_hz",
+        "first_spike_latency_ms",
+    )
     return {
         "afferent": np.arange(len(response.spikes)),
         **dict(zip(axes, response.positions_mm.T, strict=True)),
         **{name: getattr(response, name) for name in rates},
-        "spikes": np.diff(response.spikes.offsets),
+        "spikes": response.spike_count,
     }
 
 

@@ -25,6 +25,7 @@ from fingerpad.export.sweep_dataset import (
     setting_spikes,
     sweep_settings,
 )
+from fingerpad.neuron.rate_windows import rate_windows_ms
 
 if TYPE_CHECKING:
     import pandas
@@ -33,7 +34,14 @@ if TYPE_CHECKING:
 TABLE, TABLE_VERSION = "fingerpad sweep table", 1
 """What the header of a table says: `format` and `format_version`."""
 
-_RATES = ("dynamic_rate_hz", "static_rate_hz", "first_spike_latency_ms", "spike_count")
+_RATES = (
+    "dynamic_rate_hz",
+    "static_rate_hz",
+    "dynamic_count_hz",
+    "static_count_hz",
+    "first_spike_latency_ms",
+    "spike_count",
+)
 
 
 @known_keywords
@@ -153,6 +161,7 @@ def setting_response(data: xarray.Dataset, **where: int) -> ResponseMap:
     if int(one["status"]) != DONE:
         raise InputError(f"The setting {where} must be done: {str(one['reason'].values) or 'it is not'}")
     described = sweep.described(setting)
+    phases, asked = described.touch.stimulus.phases, described.description.afferents.windows_ms
     count = len(described.population)
     return ResponseMap(
         positions_mm=one["receptor_mm"].values[:count],
@@ -162,7 +171,8 @@ def setting_response(data: xarray.Dataset, **where: int) -> ResponseMap:
         static_rate_hz=one["static_rate_hz"].values[:count],
         first_spike_latency_ms=one["first_spike_latency_ms"].values[:count],
         duration_ms=float(np.nanmax(one["time_ms"].values)),
-        phases=described.touch.stimulus.phases,
+        phases=phases,
+        windows_ms=rate_windows_ms(phases, asked.dynamic, asked.static),
     )
 
 

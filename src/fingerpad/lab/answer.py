@@ -269,7 +269,7 @@ def compared(one: Answer, other: Answer, seed: int = 1) -> Comparison:
 
     Numbers of spikes have the multiplicative noise of the paper and a further spread of one spike.
     """
-    counts = [np.diff(each.response.spikes.offsets).astype(float) for each in (one, other)]
+    counts = [each.response.spike_count.astype(float) for each in (one, other)]
     if (counts[0] == counts[1]).all():
         return Comparison(0.5, 0.5)
     # Whoever is silent for both tells nothing.

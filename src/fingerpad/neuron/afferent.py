@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Protocol
+from typing import ClassVar, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from fingerpad.core.checks import FloatArray, float_array, not_negative
 from fingerpad.core.errors import InputError, shown
 from fingerpad.core.keywords import KnownKeywords
-from fingerpad.core.signals import STORED_ENERGY, SedTraces, SpikeTrains
+from fingerpad.core.signals import INTERVAL, STORED_ENERGY, SedTraces, SpikeTrains
 from fingerpad.core.threads import in_blocks
 from fingerpad.core.values import converted
 from fingerpad.data import neuron
@@ -135,6 +135,9 @@ class Afferent(metaclass=KnownKeywords):
     >>> dynamic_hz.round().tolist(), static_hz.round().tolist()
     ([217.0], [63.0])
     """
+
+    rate_measure: ClassVar[str] = INTERVAL
+    """What its rates are, as of `ResponseMap`: those of Eqs. 6-10."""
 
     intercept_ma: float = neuron.HUMAN_INTERCEPT.value
     dynamic_gain: float = neuron.HUMAN_DYNAMIC_GAIN.value

@@ -18,10 +18,10 @@ from typing import ClassVar
 
 import numpy as np
 
-from fingerpad.core.checks import FloatArray, instance, not_negative, positive
+from fingerpad.core.checks import FloatArray, instance, not_negative, one_of, positive
 from fingerpad.core.errors import InputError, shown
 from fingerpad.core.keywords import KnownKeywords
-from fingerpad.core.signals import STORED_ENERGY, CurrentTraces, SedTraces, SpikeTrains
+from fingerpad.core.signals import COUNT, INTERVAL, STORED_ENERGY, CurrentTraces, SedTraces, SpikeTrains
 from fingerpad.core.values import converted
 from fingerpad.data import afferents
 from fingerpad.neuron.afferent import Afferent, check_quantities, spikes_where
@@ -58,6 +58,9 @@ class RapidlyAdapting(metaclass=KnownKeywords):
     InputError
         If a number is not positive, or the share of retraction not within 0 ... 1.
     """
+
+    rate_measure: ClassVar[str] = COUNT
+    """Many of these afferents fire once or twice in a ramp, without an interval to measure."""
 
     threshold: float
     corner_hz: float
@@ -315,6 +318,8 @@ class OwnAfferent(metaclass=KnownKeywords):
         Membrane that a current charges; needed if `respond` returns a current.
     dynamic_quantity, static_quantity : str, optional
         What the traces hold, by the names of `SkinResponse.sample`; SED, unless another one is given.
+    rate_measure : {"interval", "count"}
+        What its rates are, as of `ResponseMap`: one over the mean interval, unless counts are wanted.
 
     Raises
     ------
@@ -346,6 +351,7 @@ class OwnAfferent(metaclass=KnownKeywords):
     membrane: LeakyIntegrateAndFire | None = None
     dynamic_quantity: str = STORED_ENERGY
     static_quantity: str = STORED_ENERGY
+    rate_measure: str = INTERVAL
 
     MUST_RETURN: ClassVar[str] = "respond must return CurrentTraces or SpikeTrains, an entry per site"
 
@@ -354,6 +360,7 @@ class OwnAfferent(metaclass=KnownKeywords):
             raise InputError(f"respond must be a function of SedTraces: got {shown(self.respond)}.")
         if self.membrane is not None:
             instance("membrane", self.membrane, LeakyIntegrateAndFire)
+        one_of("rate_measure", self.rate_measure, (INTERVAL, COUNT))
 
     def spikes(self, sed: SedTraces) -> SpikeTrains:
         """Spikes at every site."""

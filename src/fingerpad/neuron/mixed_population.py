@@ -57,7 +57,7 @@ class MixedResponse(Result):
     maps: Mapping[str, ResponseMap]
 
     def __repr__(self) -> str:
-        counts = {name: np.diff(each.spikes.offsets) for name, each in self.maps.items()}
+        counts = {name: each.spike_count for name, each in self.maps.items()}
         parts = (f"{np.count_nonzero(n)} of {n.size} {name} fire {n.sum()}" for name, n in counts.items())
         return f"MixedResponse({', '.join(parts)} spikes)"
 

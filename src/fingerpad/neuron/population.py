@@ -15,14 +15,14 @@ from fingerpad.core.errors import InputError, TissuesWarning, level_of_caller, s
 from fingerpad.core.keywords import KnownKeywords, known_keywords
 from fingerpad.core.layouts import MOST_RECEPTORS, Layout, Place, around_zero
 from fingerpad.core.random_streams import Purpose, normals
-from fingerpad.core.signals import ResponseMap, SedTraces, Skin, traces_below
+from fingerpad.core.signals import INTERVAL, ResponseMap, SedTraces, Skin, traces_below
 from fingerpad.core.values import converted
 from fingerpad.data import fingertip, psychophysics
 from fingerpad.data.tissues import DEFAULT_TISSUES
 from fingerpad.neuron.afferent import Afferent, AnyAfferent, checked_afferent
 from fingerpad.neuron.end_organs import EndOrgans
 from fingerpad.neuron.rate_windows import Window, rate_windows_ms
-from fingerpad.neuron.spikes import firing_rate_hz, first_spike_latency_ms
+from fingerpad.neuron.spikes import RATE_OF, first_spike_latency_ms
 
 MM_PER_CM = 10.0
 LARGEST_SPREAD = 9.0
@@ -372,16 +372,21 @@ class Population(metaclass=KnownKeywords):
             )
         if self.ends is not None:
             sed = self.ends.combined(sed)
-        dynamic, static = rate_windows_ms(sed.phases, dynamic_window_ms, static_window_ms, sed.times_ms[-1])
+        measure = getattr(self.afferent, "rate_measure", INTERVAL)
+        windows_ms = rate_windows_ms(
+            sed.phases, dynamic_window_ms, static_window_ms, sed.times_ms[-1], measure
+        )
         # What an afferent follows and its gains enter as a product: scaling the one scales the others.
         spikes = self.afferent.spikes(sed if self.sensitivity is None else sed.scaled(self.sensitivity))
         return ResponseMap(
             positions_mm=self.positions_mm,
             pitch_mm=self.pitch_mm,
             spikes=spikes,
-            dynamic_rate_hz=firing_rate_hz(spikes, dynamic),
-            static_rate_hz=firing_rate_hz(spikes, static),
+            dynamic_rate_hz=RATE_OF[measure](spikes, windows_ms[0]),
+            static_rate_hz=RATE_OF[measure](spikes, windows_ms[1]),
             first_spike_latency_ms=first_spike_latency_ms(spikes, sed.onset_ms),
             duration_ms=float(sed.times_ms[-1]),
             phases=sed.phases,
+            windows_ms=windows_ms,
+            rate_measure=measure,
         )

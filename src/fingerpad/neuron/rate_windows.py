@@ -8,7 +8,8 @@ import numpy as np
 
 from fingerpad.core.checks import float_array
 from fingerpad.core.errors import InputError
-from fingerpad.core.phases import HOLD, Phase, phase_named, ramp_and_hold_phases
+from fingerpad.core.phases import HOLD, RAMP, Phase, phase_named, ramp_and_hold_phases
+from fingerpad.core.signals import COUNT, INTERVAL
 from fingerpad.data import protocol
 
 Window = tuple[float, ...]
@@ -29,12 +30,13 @@ def rate_windows_ms(
     dynamic_ms: Window | None = None,
     static_ms: Window | None = None,
     end_ms: float | None = None,
+    measure: str = INTERVAL,
 ) -> Windows:
     """Return the windows of the dynamic and of the static rate of a touch.
 
     A window that is not given has the place of the paper's window in its phase: the last 40 % of the ramp,
     and 550 to 900 ms from the start of the hold, or 58 to 95 % of a hold shorter than the paper's 950 ms
-    (docs/decisions/rate-windows.md).
+    (docs/decisions/rate-windows.md). Afferents that fire once or twice in a ramp are counted in all of it.
 
     Parameters
     ----------
@@ -44,6 +46,8 @@ def rate_windows_ms(
         Windows that are returned as they are. [ms]
     end_ms : float, optional
         End of what was recorded, if windows are checked. [ms]
+    measure : {"interval", "count"}
+        What the rates of the afferents are, as of `ResponseMap`.
 
     Returns
     -------
@@ -71,6 +75,8 @@ def rate_windows_ms(
             (dynamic_ms, static_ms), _PAPER_PHASES, PAPER_WINDOWS_MS, _NAMES, strict=True
         )
     )
+    if measure == COUNT and dynamic_ms is None:
+        dynamic = phase_named(phases, RAMP, _NAMES[0]).window_ms
     if end_ms is not None:
         return check_windows((dynamic, static), float(end_ms))
     return dynamic, static

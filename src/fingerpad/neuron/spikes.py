@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
+from types import MappingProxyType
+
 import numpy as np
 from numba import njit
 from numpy.typing import ArrayLike
 
 from fingerpad.core.checks import FloatArray, finite
 from fingerpad.core.errors import InputError
-from fingerpad.core.signals import SpikeTrains
+from fingerpad.core.signals import COUNT, INTERVAL, SpikeTrains
 from fingerpad.core.units import MS_PER_S
 
 
@@ -81,6 +84,12 @@ def window_bounds(window_ms: tuple[float, ...]) -> tuple[float, float]:
     if len(bounds) != 2 or bounds[1] <= bounds[0]:
         raise InputError(f"window_ms must be a start and a later end: got {window_ms!r}.")
     return bounds[0], bounds[1]
+
+
+RATE_OF: Mapping[str, Callable[[SpikeTrains, tuple[float, ...]], FloatArray]] = MappingProxyType(
+    {INTERVAL: firing_rate_hz, COUNT: SpikeTrains.counted_hz}
+)
+"""Rate of every afferent in a window, by the `rate_measure` of its type."""
 
 
 def first_spike_latency_ms(spikes: SpikeTrains, onset_ms: float = 0.0) -> FloatArray:

@@ -10,12 +10,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 
 from fingerpad.core.checks import FloatArray, one_of
 from fingerpad.core.displayed import Displayed
 from fingerpad.core.errors import InputError
-from fingerpad.core.signals import CurrentTraces, HitRates, ResponseMap, SedTraces, SpikeTrains
+from fingerpad.core.signals import COUNT, CurrentTraces, HitRates, ResponseMap, SedTraces, SpikeTrains
 from fingerpad.experiments.discrimination.analysis import TaskResult
 from fingerpad.experiments.fit.results import FitResult
 from fingerpad.report.discrimination_task_figures import draw_curves_of_measure, main_decoding
@@ -120,7 +121,7 @@ def draw_raster(axes: Axes, spikes: SpikeTrains | ResponseMap) -> None:
     axes.set(xlabel="time [ms]", ylabel=f"{len(firing)} of {len(trains)} afferents fire", yticks=[])
 
 
-def draw_map(axes: Axes, response: ResponseMap, quantity: str = "static_rate_hz") -> None:
+def draw_map(axes: Axes, response: ResponseMap, quantity: str | None = None) -> None:
     """Draw a quantity of every afferent at its place, seen onto the pad.
 
     Parameters
@@ -129,11 +130,12 @@ def draw_map(axes: Axes, response: ResponseMap, quantity: str = "static_rate_hz"
         Where.
     response : ResponseMap
         Of a population.
-    quantity : {"static_rate_hz", "dynamic_rate_hz", "first_spike_latency_ms"}
-        Which.
+    quantity : {"static_rate_hz", "dynamic_rate_hz", "first_spike_latency_ms", "spike_count"}, optional
+        Which; by default the static rate, or the number of spikes of afferents whose spikes are counted.
     """
-    one_of("quantity", quantity, tuple(QUANTITIES))
-    phase, label, colours, _ = QUANTITIES[quantity]
+    quantity = quantity or ("spike_count" if response.rate_measure == COUNT else "static_rate_hz")
+    mapped = {**QUANTITIES, "spike_count": ("whole touch", "spikes", "viridis", Normalize)}
+    phase, label, colours, _ = mapped[one_of("quantity", quantity, tuple(mapped))]
     place = response.positions_mm[:, [-1, 0]]
     drawn = axes.scatter(
         place[:, 0], place[:, 1], c=getattr(response, quantity), cmap=colours, s=60.0, edgecolors=GREY,

@@ -63,7 +63,7 @@ def draw_raster_by_type(axes: Axes, maps: Mapping[str, ResponseMap]) -> None:
     for band, ((name, response), (colour, _)) in enumerate(
         zip(maps.items(), _styles(len(maps)), strict=True)
     ):
-        counts = np.diff(response.spikes.offsets)
+        counts = response.spike_count
         middle = response.positions_mm.mean(axis=0)
         order = np.argsort(np.linalg.norm(response.positions_mm - middle, axis=1))
         firing = order[counts[order] > 0]
@@ -84,7 +84,7 @@ def draw_raster_by_type(axes: Axes, maps: Mapping[str, ResponseMap]) -> None:
 def draw_map_by_type(axes: Axes, maps: Mapping[str, ResponseMap]) -> None:
     """Draw where the afferents lie, with larger marks for more spikes."""
     for (name, response), (colour, marker) in zip(maps.items(), _styles(len(maps)), strict=True):
-        counts = np.diff(response.spikes.offsets)
+        counts = response.spike_count
         x, z = response.positions_mm[:, 0], response.positions_mm[:, -1]
         axes.scatter(x[counts == 0], z[counts == 0], SILENT_MARK, color=colour, marker=".", linewidths=0.0)
         fires = counts > 0
