@@ -203,6 +203,9 @@ def test_touch_warns_of_inertia_before_anything_is_pressed():
         warnings.simplefilter("error")
         touch_of(finger, Plate(), RampAndHold())
         touch_of(finger, Plate(), sine(0.8, 0.1, 30.0, cycles=2))
+        # Little is accelerated beside what the hold compresses, and air has no mass.
+        touch_of(finger, Plate(), sine(0.8, 0.01, 200.0, cycles=2))
+        touch_of(finger, Plate(), Trajectory((0.0, 2.0, 52.0, 100.0), (-9.0, 0.0, 0.8, 0.8)))
     for motion in (sine(0.8, 0.1, 200.0, cycles=2), RampAndHold(ramp_ms=2.0)):
         with pytest.warns(
             InertiaWarning, match=r"as fast as a vibration of .* Hz, at which the inertia"

@@ -10,7 +10,8 @@ is to the force that deforms it as (f / f_0)². This share is compared with that
 the moved mass m and stiffness k, in docs/decisions/inertia.md.
 
 Another motion counts as the sine that has its way D from reversal to reversal and its largest speed v,
-f = v / (pi D).
+f = v / (pi D). Its amplitude is D / 2: of the whole elastic force at the largest depth d of this way, inertia
+takes about (f / f_0)² D / (2 d).
 """
 
 from __future__ import annotations
@@ -31,7 +32,7 @@ from fingerpad.mechanics.materials import Material, MaterialTable
 from fingerpad.mechanics.viscoelastic import instantaneous_state
 
 LARGEST_SHARE = 0.1
-"""Force that accelerates the tissue, over the force of the indenter, above which a touch warns."""
+"""Force that accelerates the tissue over the elastic force, above which a touch warns or has a caveat."""
 
 LEAST_WAY = 1e-3
 """Way over the largest depth or force of a motion below which it counts as noise."""
@@ -75,22 +76,34 @@ def fastest_hz(motion: Motion) -> float:
     >>> round(fastest_hz(RampAndHold(ramp_ms=50.0)), 2)  # 1 / (pi 50 ms)
     6.37
     """
-    times_ms = np.array(motion.samples_ms)
-    steps, lengths_ms = np.diff(motion.prescribed_at(times_ms)), np.diff(times_ms)
+    return float(_strokes(motion)[0].max(initial=0.0))
+
+
+def _strokes(motion: Motion) -> tuple[FloatArray, FloatArray]:
+    """Frequency of each part from reversal to reversal [Hz], and half of its way over the deepest there.
+
+    Air has no inertia: what comes before first touch, and above the skin, does not count.
+    """
+    times_ms = np.union1d(motion.samples_ms, motion.onset_ms)
+    prescribed = np.maximum(motion.prescribed_at(times_ms), 0.0)
+    steps, lengths_ms = np.diff(prescribed), np.diff(times_ms)
     run = np.cumsum(np.diff(np.sign(steps), prepend=np.sign(steps[:1])) != 0.0)
-    way, fastest = np.zeros(run[-1] + 1), np.zeros(run[-1] + 1)
+    way, fastest, deepest = np.zeros((3, run[-1] + 1))
     np.add.at(way, run, np.abs(steps))
     np.maximum.at(fastest, run, np.abs(steps) / lengths_ms)
+    np.maximum.at(deepest, run, np.maximum(prescribed[1:], prescribed[:-1]))
     counts = way > LEAST_WAY * motion.largest
+    amplitude = 0.5 * way
     # A vibration that begins or ends in its middle has half of its way there: the next part tells the whole.
     way = np.maximum(way, np.maximum(np.append(way[1:], 0.0), np.append(0.0, way[:-1])))
-    return float(MS_PER_S * (fastest[counts] / (np.pi * way[counts])).max(initial=0.0))
+    frequency_hz = MS_PER_S * fastest[counts] / (np.pi * way[counts])
+    return frequency_hz, amplitude[counts] / deepest[counts]
 
 
 def inertial_share(
     motion: Motion, materials: Sequence[Material], thickness_mm: ArrayLike
 ) -> tuple[float, float, float]:
-    """Force that accelerates the tissue over its elastic force, (f / f_0)², with f and f_0. [1, Hz, Hz]
+    """Force that accelerates the tissue over what the motion adds to its elastic force; also f and f_0.
 
     Parameters
     ----------
@@ -103,8 +116,32 @@ def inertial_share(
     return (fastest / resonance) ** 2, fastest, resonance
 
 
+def share_of_force(motion: Motion, materials: Sequence[Material], thickness_mm: ArrayLike) -> float:
+    """Force that accelerates the tissue over the whole elastic force of the press at that time. [1]
+
+    Parameters
+    ----------
+    motion : Motion
+        Motion of the indenter.
+    materials, thickness_mm
+        As in `resonance_hz`.
+
+    Examples
+    --------
+    A vibration of 0.01 mm about 0.5 mm accelerates little tissue beside what the hold compresses:
+
+    >>> from fingerpad.geometry.motions import sine
+    >>> soft = [Material.neo_hooke(shear_kpa=5.0, poisson=0.48)]
+    >>> [round(share_of_force(sine(0.5, mm, 183.0, cycles=4), soft, [5.0]), 2) for mm in (0.01, 0.1)]
+    [0.02, 0.16]
+    """
+    frequency_hz, amplitude = _strokes(motion)
+    resonance = resonance_hz(materials, thickness_mm)
+    return float(((frequency_hz / resonance) ** 2 * amplitude).max(initial=0.0))
+
+
 def warn_of_inertia(motion: Motion, materials: Sequence[Material], thickness_mm: ArrayLike) -> None:
-    """Warn if a motion is so fast that the inertia of the tissue matters.
+    """Warn if a motion is so fast that the inertia of the tissue changes the force of the press.
 
     Parameters
     ----------
@@ -118,13 +155,13 @@ def warn_of_inertia(motion: Motion, materials: Sequence[Material], thickness_mm:
     InertiaWarning
         If the share of the force that accelerates the tissue is above `LARGEST_SHARE`.
     """
-    share, fastest, resonance = inertial_share(motion, materials, thickness_mm)
+    share, fastest = share_of_force(motion, materials, thickness_mm), fastest_hz(motion)
     if share > LARGEST_SHARE:
         warnings.warn(
             f"The fastest part of the motion is as fast as a vibration of {fastest:.3g} Hz, at which the "
-            f"inertia of the tissue, which is neglected, is about {share:.2g} times its elastic force: stay "
-            f"below {np.sqrt(LARGEST_SHARE) * resonance:.2g} Hz, or read the results as those of tissue "
-            "without mass.",
+            "inertia of the tissue, which is neglected, takes a force of about "
+            f"{share:.2g} times the elastic force: stay below {np.sqrt(LARGEST_SHARE / share) * fastest:.2g} "
+            "Hz or vibrate less, or read the results as those of tissue without mass.",
             InertiaWarning,
             stacklevel=level_of_caller(),
         )
