@@ -9,10 +9,9 @@ afferent; no SAII afferent fires here. The page for users of TouchSim compares t
 import matplotlib.pyplot as plt
 
 import fingerpad as fp
-from fingerpad.skin.unrolled_skin import UnrolledSkin
 
 finger = fp.Fingertip()
-pad = UnrolledSkin(finger)
+pad = fp.UnrolledSkin(finger)
 population = fp.MixedPopulation.at_densities(pad.pad(), place=pad.points, seed=1)
 pin = fp.FlatPunch(diameter_mm=1.0, edge_radius_mm=0.3)
 skin = fp.indent(finger, pin, fp.RampAndHold(depth_mm=0.5, hold_ms=200))

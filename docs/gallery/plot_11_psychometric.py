@@ -11,7 +11,6 @@ import numpy as np
 import fingerpad as fp
 from fingerpad.psychophysics.discrimination import discriminate_gradient_sum
 from fingerpad.psychophysics.encoding import neighbour_pairs
-from fingerpad.psychophysics.psychometric import fit_psychometric
 
 curvatures = np.array([287.0, 300.0, 320.0, 360.0])
 motion = fp.RampAndHold(depth_mm=0.8, hold_ms=200)
@@ -25,7 +24,7 @@ rates = [
 pairs = neighbour_pairs(population.positions_mm, population.pitch_mm)
 hits = discriminate_gradient_sum(rates, pairs, 0.1, seed=1).hit_rate
 differences, trials = curvatures[1:] - curvatures[0], np.full(3, 100)
-fit = fit_psychometric(differences, np.round(hits * trials), trials)
+fit = fp.fit_psychometric(differences, np.round(hits * trials), trials)
 
 figure, axes = plt.subplots(figsize=(5, 3.5), layout="constrained")
 at = np.linspace(1.0, 90.0, 90)

@@ -50,9 +50,11 @@ IMPORTED = re.compile(r"^[ \"]*from fingerpad\.([\w.]+) import (\([^)]*\)|[\w, ]
 
 def public_names() -> dict[str, dict[str, object]]:
     """Names and values of each package, in the order of the alphabet."""
-    modules = {home: set(names) for home, names in fingerpad._HOMES.items()}
+    modules: dict[str, set[str]] = defaultdict(set)
+    for name, home in fingerpad._HOME.items():
+        modules[home.removeprefix("fingerpad.")].add(name)
     for home, names in (*FURTHER.items(), *_imported_by_pages()):
-        modules.setdefault(home, set()).update(names)
+        modules[home].update(names)
     found: dict[str, dict[str, object]] = defaultdict(dict)
     for home, names in modules.items():
         package, module = home.partition(".")[0], import_module(f"fingerpad.{home}")

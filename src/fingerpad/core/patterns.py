@@ -14,6 +14,7 @@ from scipy.spatial import cKDTree
 
 from fingerpad.core.checks import FloatArray, not_negative, positive
 from fingerpad.core.errors import ConvergenceError, InputError
+from fingerpad.core.keywords import known_keywords
 from fingerpad.core.layouts import MM2_PER_CM2, MOST_RECEPTORS, Layout, Place, around_zero, mean_spacing_mm
 from fingerpad.core.random_streams import Purpose, normals, uniforms
 from fingerpad.core.regions import Region
@@ -28,6 +29,7 @@ MOST_APART = 100_000
 _MOST_ATTEMPTS = 1000
 
 
+@known_keywords
 def rectangular(region: Region, density_per_cm2: float) -> Layout:
     """Square lattice, the pitch being 1/sqrt(density).
 
@@ -66,6 +68,7 @@ def rectangular(region: Region, density_per_cm2: float) -> Layout:
     return _lattice(region, np.stack(np.meshgrid(*columns, indexing="ij"), axis=-1), pitch, "rectangular")
 
 
+@known_keywords
 def hexagonal(region: Region, density_per_cm2: float) -> Layout:
     """Triangular lattice with six neighbours per receptor: pitch^2 = 2/(sqrt(3) density).
 
@@ -103,6 +106,7 @@ def hexagonal(region: Region, density_per_cm2: float) -> Layout:
     return _lattice(region, np.stack([step * row, across], axis=-1) + middle, pitch, "hexagonal")
 
 
+@known_keywords
 def uniform(region: Region, density_per_cm2: float, seed: int) -> Layout:
     """Independent positions with uniform probability.
 
@@ -136,6 +140,7 @@ def uniform(region: Region, density_per_cm2: float, seed: int) -> Layout:
     return Layout(places, mean_spacing_mm(density_per_cm2), "uniform", seed)
 
 
+@known_keywords
 def jittered(region: Region, density_per_cm2: float, seed: int, jitter: float = 0.2) -> Layout:
     """Square lattice with random displacements: each coordinate by Normal(0, jitter times the pitch).
 
@@ -178,6 +183,7 @@ def jittered(region: Region, density_per_cm2: float, seed: int, jitter: float = 
     return Layout(places, lattice.pitch_mm, "jittered", seed)
 
 
+@known_keywords
 def poisson_disc(
     region: Region,
     density_per_cm2: float,

@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike
 
 from fingerpad.core.checks import FloatArray, float_array, positive
 from fingerpad.core.errors import InputError
+from fingerpad.core.keywords import KnownKeywords
 from fingerpad.core.values import converted
 
 Point = tuple[float, float]
@@ -43,7 +44,7 @@ class Region(Protocol):
 
 @dataclass(frozen=True)
 @converted
-class Rectangle:
+class Rectangle(metaclass=KnownKeywords):
     """Rectangle with sides parallel to the axes.
 
     Parameters
@@ -91,7 +92,7 @@ class Rectangle:
 
 @dataclass(frozen=True)
 @converted
-class Ellipse:
+class Ellipse(metaclass=KnownKeywords):
     """Ellipse with axes parallel to the coordinate axes; a disc if both semi-axes are equal.
 
     Parameters
@@ -139,7 +140,7 @@ class Ellipse:
 
 @dataclass(frozen=True)
 @converted
-class Polygon:
+class Polygon(metaclass=KnownKeywords):
     """Region inside a closed line of straight edges that does not cross itself.
 
     Parameters

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from fingerpad.core.checks import FloatArray, not_negative, numbers_in, positive
 from fingerpad.core.errors import InputError
 from fingerpad.core.files import check_file
+from fingerpad.core.keywords import known_keywords
 from fingerpad.core.logger import LOGGER
 from fingerpad.core.signals import SpikeTrains
 from fingerpad.core.tables import TableRow, column_of, read_csv
@@ -59,6 +60,7 @@ class Recorded:
     spikes_after_hold: int = 0
 
 
+@known_keywords
 def read_recordings(path: Path, stimuli: Stimuli, unit: int | None = None) -> Recorded:
     r"""Read what an afferent answered to known stimuli.
 

@@ -12,6 +12,7 @@ import numpy as np
 from fingerpad.core.checks import number_in
 from fingerpad.core.errors import InputError
 from fingerpad.core.files import read_text
+from fingerpad.core.keywords import known_keywords
 from fingerpad.core.plain_yaml import read_yaml
 from fingerpad.core.tables import TableRow, read_csv
 from fingerpad.experiments.conditions import Conditions
@@ -180,6 +181,7 @@ def along_skin(conditions: Conditions) -> float:
     return float(np.cos(np.deg2rad(conditions.skin_tilt_deg)))
 
 
+@known_keywords
 def read_stimuli(path: Path, **replacing: str | None) -> ListedStimuli:
     r"""Read a list of stimuli, CSV or YAML.
 

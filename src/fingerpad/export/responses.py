@@ -11,6 +11,7 @@ import numpy as np
 
 from fingerpad.core.checks import instance
 from fingerpad.core.files import path_of, write_atomically
+from fingerpad.core.keywords import known_keywords
 from fingerpad.core.signals import ResponseMap
 from fingerpad.neuron.response_maps import recruitment_rank
 
@@ -30,6 +31,7 @@ ANSWERS = (
 """Columns of the response of a receptor."""
 
 
+@known_keywords
 def write_response_csv(path: Path, response: ResponseMap) -> Path:
     """Write one row per receptor: position, rates, latency of the first spike, and all spike times.
 

@@ -15,6 +15,7 @@ from fingerpad import __version__
 from fingerpad.core.checks import instance, not_negative, positive
 from fingerpad.core.errors import InputError
 from fingerpad.core.files import path_of, write_atomically
+from fingerpad.core.keywords import known_keywords
 from fingerpad.core.signals import ResponseMap
 from fingerpad.core.units import MS_PER_S
 from fingerpad.experiments.recording_files import SUFFIXES_OF_NWB
@@ -24,6 +25,7 @@ _RESOLUTION_S = 1e-9
 """Spike times are roots of a closed form; those of two processors differ by less. [s]"""
 
 
+@known_keywords
 def write_responses_nwb(
     path: Path,
     responses: Mapping[str, ResponseMap],

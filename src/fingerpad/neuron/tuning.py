@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 
 from fingerpad.core.checks import FloatArray, float_array, not_negative, positive
 from fingerpad.core.errors import InputError
+from fingerpad.core.keywords import known_keywords
 from fingerpad.core.signals import SedTraces
 from fingerpad.core.units import MS_PER_S
 from fingerpad.neuron.afferent import AnyAfferent, checked_afferent
@@ -77,6 +78,7 @@ def impulses_per_cycle(afferent: AnyAfferent, traces: SedTraces) -> FloatArray:
     return np.array(counts) / COUNTED_CYCLES
 
 
+@known_keywords
 def tuning_curve(
     afferent: AnyAfferent, frequencies_hz: ArrayLike, per_um: float, hold: float = 0.0, impulses: float = 1.0
 ) -> FloatArray:

@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 from fingerpad.core.checks import FloatArray, finite, one_of
 from fingerpad.core.displayed import Result
 from fingerpad.core.errors import ConvergenceError, InputError
+from fingerpad.core.keywords import known_keywords
 from fingerpad.psychophysics.counts import SMALLEST_OVERDISPERSION, JudgementCounts, log_probability
 from fingerpad.psychophysics.functions import SIGMOIDS, PsychometricFunction, checked_levels
 from fingerpad.psychophysics.maximum_likelihood import (
@@ -117,6 +118,7 @@ class PsychometricFit(Result):
         return self.function.slope(proportion_correct)
 
 
+@known_keywords
 def fit_psychometric(
     levels: ArrayLike,
     n_correct: ArrayLike,

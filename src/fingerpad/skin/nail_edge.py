@@ -21,6 +21,7 @@ from numpy.typing import ArrayLike
 
 from fingerpad.core.checks import FloatArray, float_array, instance, positive, whole
 from fingerpad.core.errors import InputError
+from fingerpad.core.keywords import KnownKeywords
 from fingerpad.core.layouts import Layout, mean_spacing_mm
 from fingerpad.core.regions import Polygon
 from fingerpad.core.values import converted
@@ -36,7 +37,7 @@ _ROUND_OFF_MM = 1e-6
 
 @dataclass(frozen=True)
 @converted
-class NailEdge:
+class NailEdge(metaclass=KnownKeywords):
     """The plane of the skin around a finger's nail.
 
     Parameters

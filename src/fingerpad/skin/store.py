@@ -26,6 +26,7 @@ import numpy as np
 from fingerpad.core.engine import Engine, engine_of
 from fingerpad.core.errors import ConvergenceError, InputError, StoreError
 from fingerpad.core.files import check_file, path_of, write_atomically
+from fingerpad.core.keywords import KnownKeywords, known_keywords
 from fingerpad.core.logger import LOGGER
 from fingerpad.mechanics.kernels import KERNELS
 from fingerpad.skin.behaviour import code_hash
@@ -112,7 +113,7 @@ def _holds_floats(field: Field[Any]) -> bool:
     return "float" in str(field.type)
 
 
-class Store:
+class Store(metaclass=KnownKeywords):
     """Folder of stored indentations.
 
     Parameters
@@ -333,6 +334,7 @@ def _compute(item: tuple[Path, Touch], threads: int | None = None) -> float:
     return time.perf_counter() - started
 
 
+@known_keywords
 def solve_missing(
     missing: Mapping[Path, Touch],
     jobs: int | Engine,

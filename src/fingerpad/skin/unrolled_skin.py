@@ -25,6 +25,7 @@ from scipy.interpolate import CubicSpline
 
 from fingerpad.core.checks import FloatArray, finite, float_array, increasing, instance
 from fingerpad.core.errors import InputError
+from fingerpad.core.keywords import KnownKeywords
 from fingerpad.core.regions import Polygon
 from fingerpad.core.values import converted
 from fingerpad.data import fingertip as published
@@ -98,7 +99,7 @@ class _Quarter:
 
 @dataclass(frozen=True)
 @converted
-class UnrolledSkin:
+class UnrolledSkin(metaclass=KnownKeywords):
     """The plane of a finger's skin.
 
     Parameters

@@ -10,7 +10,7 @@ from typing import Any
 
 from fingerpad.core.errors import InputError
 from fingerpad.core.files import path_of, read_text
-from fingerpad.core.keywords import closest
+from fingerpad.core.keywords import closest, known_keywords
 from fingerpad.core.plain_yaml import read_yaml
 from fingerpad.experiments.descriptions.parts import DEFAULT
 from fingerpad.experiments.descriptions.pressing import named_files
@@ -81,6 +81,7 @@ def input_hashes(
     return hashes | {str(path): sha256(path) for path in named}
 
 
+@known_keywords
 def read_task(source: str | Path, **replacing: Any) -> DiscriminationTask:
     """Read a task from a file, or one that comes with the package.
 
@@ -128,6 +129,7 @@ def task_text(source: str | Path) -> str:
     )
 
 
+@known_keywords
 def parse_task(content: Any, source: str = "task", text: str = "") -> DiscriminationTask:
     """Build a task from plain values.
 
