@@ -83,8 +83,12 @@ def test_skin_that_slides_round_an_edge_is_followed(indenter):
 
 
 def test_a_shifted_tangent_leads_to_the_same_equilibrium(monkeypatch):
-    """Every indefinite tangent is shifted, and none is taken without the curvature of the body."""
-    steps = 16  # with 3 to 12 the snap loses up to 1.4 % of the work, with 16 0.6 %
+    """Every indefinite tangent is shifted, and none is taken without the curvature of the body.
+
+    At which of the last steps the skin snaps round an edge, and round which one, hangs on the last bits; the
+    states before and the force at the end do not.
+    """
+    steps = 16
     usual = pressed(block(), Bar(1.7, 0.1), NewtonSettings(), ramp_steps=steps)
     shifted = []
     found = _Search.found
@@ -96,8 +100,12 @@ def test_a_shifted_tangent_leads_to_the_same_equilibrium(monkeypatch):
     )
     done = pressed(block(), Bar(1.7, 0.1), NewtonSettings(persistent=True), ramp_steps=steps)
     assert any(shifted)
+    stands = done.depth_mm < 0.17
+    np.testing.assert_allclose(done.force_mn[stands], usual.force_mn[stands], rtol=1e-4)
     np.testing.assert_allclose(done.force_mn[-1], usual.force_mn[-1], rtol=1e-3)
-    assert done.energy.relative_imbalance <= 0.01
+    lost_uj = done.energy.imbalance_uj
+    assert np.abs(lost_uj[stands]).max() <= 5e-4 * done.energy.external_uj.max()
+    assert lost_uj[-1] > 0.0  # a snap sets energy free
 
 
 @pytest.mark.parametrize("ramp_steps", [3, 4, 5, 6, 8, 12])
@@ -181,6 +189,39 @@ def test_node_that_only_just_left_comes_back_by_a_short_step(persistent, monkeyp
     assert found.x_mm > gap_mm  # pressed again: the next tangent knows of the contact
 
 
+@pytest.mark.parametrize("persistent", [True, False])
+def test_a_step_that_is_far_too_long_is_solved_again_with_a_larger_shift(persistent, monkeypatch):
+    """Skin about to snap had no stiffness along (1, 1), and 1/64 of the step was tried as the shortest."""
+
+    def at(place_mm):
+        search.blocks = np.array([[[1.0, 1e-12 - 1.0, 0.0], [1e-12 - 1.0, 1.0, 0.0], [0.0, 0.0, 1.0]]])
+        way_mm = place_mm[:2].mean()
+        rest_mn = np.array([1.0 - way_mm**3, 1.0 - way_mm**3, 0.0])
+        return SimpleNamespace(
+            place_mm=place_mm, residual_mn=rest_mn, residual_norm_mn=np.linalg.norm(rest_mn), whole=True,
+            relative_residual=1.0, potential_uj=0.5 * way_mm**4 - 2.0 * way_mm, is_curved=True,
+        )  # fmt: skip
+
+    search = object.__new__(_Search)
+    search.persistent, search.shift, search.was_shifted, search.history = persistent, 0.0, False, []
+    search.load = SimpleNamespace(pressed_before=None, anchors=object())
+    search.body = SimpleNamespace(sparsity=SimpleNamespace(diagonal=np.array([0])))
+    search.solver = SimpleNamespace(solve=lambda blocks, rest_mn, _: np.linalg.solve(blocks[0], rest_mn))
+    monkeypatch.setattr(_Search, "moved", lambda search, start, step: at(start.place_mm + step))
+    monkeypatch.setattr(_Search, "with_tangent", lambda search, now, *curved: at(now.place_mm))
+    monkeypatch.setattr(_Search, "contact_direction", lambda search, now, direction, forcing: direction)
+    start = at(np.zeros(3))
+    if not persistent:
+        with pytest.raises(ConvergenceError, match="found no better configuration"):
+            search.better(start, 1e-3, [start.potential_uj])
+        return
+    found = search.better(start, 1e-3, [start.potential_uj])
+    assert found.potential_uj < start.potential_uj
+    # A sixty-fourth of the step with a shift of 0.01.
+    np.testing.assert_allclose(found.place_mm, [100.0 / 64, 100.0 / 64, 0.0], rtol=1e-6)
+    assert search.was_shifted
+
+
 class PiecewiseQuadratic:
     """Potential about a configuration to second order, with dense matrices: the points press or do not.
 
@@ -215,14 +256,16 @@ class PiecewiseQuadratic:
         return 0.5 * step @ self.tissue @ step - self.tissue_mn @ step + contact
 
     def minimum(self):
-        step = np.zeros(self.free.size)
+        step, start = np.zeros(self.free.size), self.value(np.zeros(self.free.size))
         for _ in range(200):
             slope = self.tissue @ step - self.tissue_mn - self.closing.T @ self.pressed_mn(step)
-            if np.linalg.norm(slope) <= 1e-9 * np.linalg.norm(self.tissue_mn):
-                return step
             newton = np.linalg.solve(self.tissue + self.contact_tangent(self.pressed_mn(step) > 0.0), -slope)
+            value = self.value(step)
+            # A further fall would be lost in the rounding of the values.
+            if -(slope @ newton) <= 1e-9 * (start - value):
+                return step
             length = 1.0
-            while self.value(step + length * newton) > self.value(step) + 1e-4 * length * (slope @ newton):
+            while self.value(step + length * newton) > value + 1e-4 * length * (slope @ newton):
                 length /= 2
             step = step + length * newton
         raise AssertionError("No minimum was found.")

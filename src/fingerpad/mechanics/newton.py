@@ -276,12 +276,7 @@ class _Search:
                 potentials, renewed_at = [now.potential_uj], now.relative_residual
             enough = ENOUGH * settings.residual_tolerance / now.relative_residual
             forcing = float(np.clip(max(FORCING * now.relative_residual, enough), *FORCING_RANGE))
-            try:
-                now = self.line_search(*self.direction_from(now, forcing), potentials)
-            except ConvergenceError:
-                if not self.is_set_free(now):
-                    raise
-                now = self.line_search(*self.closed_direction(now, forcing), potentials)
+            now = self.better(now, forcing, potentials)
             potentials.append(now.potential_uj)
             settled = not rubs
         raise ConvergenceError(f"No equilibrium after {settings.most_iterations} Newton steps.")
@@ -302,6 +297,25 @@ class _Search:
             return now
         where = now.displacement_mm, now.depth_mm
         return evaluate(self.body, self.load, *where, self.lagging, self.blocks, curved=curved is not False)
+
+    def better(self, now: Configuration, forcing: float, potentials: list[float]) -> Configuration:
+        """Take a Newton step, and where no part of it helps, one that is solved for in another way.
+
+        Skin at the brink of a snap has next to no stiffness, and the step is far too long for the quadratic
+        model behind it. A larger shift of the tangent makes it shorter and turns it downhill, as in a trust
+        region (Nocedal & Wright 2006, section 4.1).
+        """
+        while True:
+            try:
+                return self.line_search(*self.direction_from(now, forcing), potentials)
+            except NotPositiveDefiniteError:  # even with the largest shift
+                raise
+            except ConvergenceError:
+                if self.is_set_free(now):
+                    return self.line_search(*self.closed_direction(now, forcing), potentials)
+                if not self.persistent:
+                    raise
+                self.shift = CHANGE_SHIFT * max(CHANGE_SHIFT * self.shift, FIRST_SHIFT)
 
     def direction_from(self, now: Configuration, forcing: float) -> tuple[Configuration, FloatArray]:
         """Solve for a Newton step, and of a persistent search for the points that are in contact after it."""
