@@ -9,6 +9,7 @@
 # make results       reproduce at standard resolution, and write the numbers and the picture of README and docs
 # make verification  run every verification case, slow ones too, and write docs/verification.md
 # make benchmarks    run benchmarks, some by ARGS="sphere growth", and write benchmarks/README.md (no part of the tests)
+# make perturbed     press with other roundings, twenty times; perturbed-7 is one of them (no part of the tests)
 # make fuzz          random odd inputs for an hour; SEED=... repeats a run, FUZZ=... sets its length
 # make lock          pin every package of the development, with hashes, in requirements-dev.txt
 # make audit         ask for known vulnerabilities of what is pinned there
@@ -21,6 +22,9 @@ PYTHON ?= python3
 ARGS ?=
 # One file per process: the tests of a file may share one long run. The longest come first (tests/conftest.py).
 PYTEST_ARGS ?= -n 2 --dist loadfile --no-loadscope-reorder
+# Tests that press bodies.
+PRESSES := $(addprefix tests/test_,$(addsuffix .py,mechanics_balance mechanics_contact mechanics_friction mechanics_linear \
+	mechanics_middles mechanics_mixed mechanics_newton mechanics_press small_bodies skin_contact force_control))
 # Tests of all that README and docs show.
 PAGES := tests/test_readme.py
 
@@ -31,7 +35,7 @@ install := $(bin)/python -m pip install --quiet --disable-pip-version-check --no
 export PYTHONNOUSERSITE := 1
 unexport PYTHONPATH
 
-.PHONY: reproduce test checks pages kernels site wheel release results verification benchmarks fuzz lock audit sbom clean
+.PHONY: reproduce test checks pages kernels site wheel release results verification benchmarks perturbed fuzz lock audit sbom clean
 .DEFAULT_GOAL := test
 
 reproduce: .venv/installed
@@ -76,6 +80,15 @@ verification: .venv/installed-for-tests
 
 benchmarks: .venv/installed-for-tests
 	$(bin)/python -m benchmarks $(ARGS)
+
+# No test may hang on the last bits: other moduli by 1e-9 or less, numbers of threads, and kernels of OpenBLAS.
+perturbed:
+	$(MAKE) --keep-going $(addprefix perturbed-,$(shell seq 20))
+
+perturbed-%: .venv/installed-for-tests
+	PERTURBED=$* NUMBA_NUM_THREADS=$$(($* % 2 + 1)) \
+		OPENBLAS_CORETYPE=$$(set -- Prescott Nehalem Haswell; shift $$(($* % 3)); echo $$1) \
+		$(bin)/pytest --quiet $(PYTEST_ARGS) $(PRESSES)
 
 SEED ?= $(shell date +%s)
 FUZZ ?= 100

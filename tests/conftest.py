@@ -1,12 +1,15 @@
-"""Order of the test files, and the fixture that runs a command line in this process.
+"""Order of the test files, the perturbation of presses, and the fixture that runs a command line.
 
 The longest files come first, so that no process works alone at the end.
 """
 
+import os
 import sys
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 from hypothesis import settings
 
@@ -40,6 +43,30 @@ LONGEST = (
 """Files by their processor time, the longest first; all others follow in the order of their names."""
 
 HERE = Path(__file__).parent
+
+PERTURBED = int(os.environ.get("PERTURBED", "0"))
+"""Seed of `make perturbed`; 0 for none."""
+
+
+@pytest.fixture(autouse=PERTURBED > 0, scope="session")
+def perturbed() -> None:
+    """Change the moduli of every pressed body by 1e-12 to 1e-9 of themselves, and its nodes by 1e-14.
+
+    Tests take integrals over the mesh that they made, some of them to 1e-12.
+    """
+    from fingerpad.mechanics import press  # only here: most runs need no mechanics
+
+    body = press.Body
+
+    def other_body(mesh, table, *others, **named):
+        generator = np.random.default_rng(PERTURBED)
+        size = 10.0 ** generator.uniform(-12.0, -9.0)
+        law = table.law.copy()
+        law[:, :7] *= 1.0 + size * generator.standard_normal((len(law), 1))
+        nodes_mm = mesh.nodes_mm * (1.0 + 1e-14 * generator.standard_normal(mesh.nodes_mm.shape))
+        return body(replace(mesh, nodes_mm=nodes_mm), replace(table, law=law), *others, **named)
+
+    press.Body = other_body
 
 
 @pytest.fixture
