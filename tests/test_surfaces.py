@@ -19,6 +19,7 @@ from fingerpad.geometry.indenter_grading import grading_about
 from fingerpad.geometry.indenters import Bar, Indenter, Plate, Sphere
 from fingerpad.geometry.motion import RampAndHold
 from fingerpad.geometry.probing import check_gap
+from fingerpad.geometry.relief import narrowest_relief
 from fingerpad.geometry.surface import Surface, height_surface
 from fingerpad.geometry.surface_files import MOST_HEIGHTS, read_height_map, read_surface
 from fingerpad.mechanics.press_settings import PressSettings
@@ -285,6 +286,46 @@ def test_fine_relief_asks_for_a_mesh_that_resolves_it():
     assert height_surface(map_of(Sphere(curvature_per_m=287.0), 2.0), 0.1).relief_mm > 1.5
     assert cup(8.0).relief_mm == 2.0  # its borders are slopes, not ridges
     assert [Surface(CUBE * [half, 1.0, 1.0], SIDES).relief_mm for half in (0.05, 0.3)] == [0.1, 0.6]
+
+
+@pytest.mark.parametrize("apart_mm", [2.0, 4.0])
+def test_two_balls_are_meshed_for_what_touches_and_not_for_the_seam(apart_mm):
+    """They needed 700,000 to 980,000 nodes: between them their gap becomes as narrow as one likes."""
+    at = [(-apart_mm / 2, 0.0, 0.0), (apart_mm / 2, 0.0, 0.0)]
+    pair = Union([Sphere(radius_mm=2.0), Sphere(radius_mm=2.0)], at)
+    from_file = height_surface(map_of(pair, 4.0, 0.1), 0.1)
+    for body in (pair, from_file):
+        assert body.relief_mm > 1.0
+        assert len(touch_of(Fingertip(), body).mesh.nodes_mm) < 30_000
+
+
+def face(height, half_mm=3.0, step_mm=0.025):
+    """Width of the narrowest relief of a face, given by its heights over x and z."""
+    line = np.arange(-half_mm, half_mm, step_mm)
+    x, z = np.meshgrid(line, line, indexing="ij")
+    return narrowest_relief(height(x, z), step_mm, -3.0)
+
+
+@pytest.mark.parametrize(
+    ("height", "width_mm"),
+    [
+        (lambda x, z: np.where((x > 0.4) & (x < 0.43), -1.0, 0.0), 2.0),
+        (lambda x, z: np.where((x > 0.4) & (x < 0.7), -1.0, 0.0), 0.3),
+        (lambda x, z: np.where((x > 0.0) & (np.abs(z) < 0.6 * x), -3.0, 0.0), 2.0),
+        (lambda x, z: np.where(np.abs(x) < 0.1, -1.2, np.where(x > 0, -1.5, 0.0)), 2.0),
+        (lambda x, z: 0.02 * np.sign(np.sin(40.0 * x)), 2.0),
+        (lambda x, z: 0.06 * np.sign(np.sin(31.5 * x)), 0.1),
+    ],
+    ids=["crack", "groove", "corner in plan", "deep ledge", "noise", "ripples"],
+)
+def test_only_what_skin_touches_is_measured(height, width_mm):
+    assert face(height) == width_mm
+
+
+def test_a_body_that_is_too_fine_is_refused_by_what_it_has():
+    """It was refused in terms of a grading that nobody gave, or took hours."""
+    with pytest.raises(InputError, match=r"^Surface has a .* dot 0\.2 mm wide, .* enlarge the body"):
+        touch_of(Fingertip(), Surface(CUBE * [4.0, 1.0, 0.05], SIDES))
 
 
 def test_a_mesh_must_resolve_the_parts_of_a_union():

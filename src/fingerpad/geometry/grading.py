@@ -104,15 +104,15 @@ class Grading(metaclass=KnownKeywords):
                         f"{name} needs strips of from, to and size in mm, to above from and size above 0: "
                         f"got {(begin, end, size)!r}."
                     )
-        if self._elements_about > MOST_ELEMENTS:
+        if self.elements_about > MOST_ELEMENTS:
             raise InputError(
                 f"A grading may have about {MOST_ELEMENTS:,} elements in its fine zone: those of "
-                f"{self.size_x_mm:g} by {self.size_z_mm:g} mm, and strips, are {self._elements_about:.3g}; "
+                f"{self.size_x_mm:g} by {self.size_z_mm:g} mm, and strips, are {self.elements_about:.3g}; "
                 "take larger ones."
             )
 
     @property
-    def _elements_about(self) -> float:
+    def elements_about(self) -> float:
         """Number of elements of the fine zone and of the strips, roughly."""
         along = min(2 * self.half_length_mm, FINGER_MM) / self.size_x_mm
         if self.core_size_mm:

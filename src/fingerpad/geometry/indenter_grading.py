@@ -29,6 +29,12 @@ OBLIQUE_SIZE_MM = {"quick": 0.3, "standard": 0.2, "paper": 0.1}
 ACROSS_GROOVE, FEWEST_ACROSS_GROOVE = 4, 2
 """Number of elements across the narrowest groove or ridge: in a mesh graded for it, and the least in any."""
 
+MOST_RELIEF_ELEMENTS = {"quick": 25_000, "standard": 100_000, "paper": 500_000}
+"""Most elements of the fine zone below a relief: the whole mesh has about 60,000 nodes at quick then."""
+
+WIDER_ZONE = 1.7
+"""How much longer the fine zone below a wide body may be: it reaches to where that first touches the pad."""
+
 TIP_SHARE, LARGEST_TIP_MM = 1 / 4, 0.3
 """Size of elements under a round tip over its radius, and the size from which those of the fine zone will do:
 they are at most 1.5 times as large. [mm]"""
@@ -114,9 +120,7 @@ def grading_about(
     if z_mm != 0.0 or not indenter.mirrors(spin_deg):
         grading = replace(grading, full=True)
     if np.isfinite(indenter.relief_mm):
-        size = min(OBLIQUE_SIZE_MM[resolution], indenter.relief_mm / ACROSS_GROOVE)
-        along, across = min(size, grading.size_x_mm), min(size, grading.size_z_mm)
-        return replace(grading, size_x_mm=along, size_z_mm=across)
+        return _about_relief(grading, resolution, indenter)
     if indenter.rim_mm is not None:
         return _about_rim(grading, resolution, *indenter.rim_mm, z_mm)
     size = max(TIP_SHARE * indenter.tip_radius_mm, THIN_SIZE_MM)
@@ -159,6 +163,25 @@ def grading_about(
     if few and any(size <= BENT_MM for _, _, size in sharp):
         grading = _fine_where_bent(grading)
     return _with_strips(grading, sharp, along, across, z_mm)
+
+
+def _about_relief(grading: Grading, resolution: str, indenter: Indenter) -> Grading:
+    """Grading that resolves the narrowest part of a relief, with fewer elements across it where it must."""
+    elements = MOST_RELIEF_ELEMENTS[resolution] + 1.0
+    for count in range(ACROSS_GROOVE, FEWEST_ACROSS_GROOVE - 1, -1):
+        size = min(OBLIQUE_SIZE_MM[resolution], indenter.relief_mm / count)
+        along, across = min(size, grading.size_x_mm), min(size, grading.size_z_mm)
+        elements = grading.elements_about * (grading.size_x_mm / along) * (grading.size_z_mm / across)
+        if indenter.half_width_mm + 1.0 > LONGEST_REACH_MM:
+            elements *= WIDER_ZONE
+        if elements <= MOST_RELIEF_ELEMENTS[resolution]:
+            return replace(grading, size_x_mm=along, size_z_mm=across)
+    raise InputError(
+        f"{type(indenter).__name__} has a ridge, groove or dot {indenter.relief_mm:.3g} mm wide, and must be "
+        f"pressed with at most {MOST_RELIEF_ELEMENTS[resolution]:,} elements below it at {resolution}: to "
+        f"resolve that takes {elements:,.0f}; smooth or enlarge the body, cut off what does not touch the "
+        "skin, or give a grading."
+    )
 
 
 def _about_rim(grading: Grading, resolution: str, radius_mm: float, rim_mm: float, z_mm: float) -> Grading:

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
-from scipy.ndimage import grey_closing, grey_dilation, grey_erosion, grey_opening
+from scipy.ndimage import grey_closing, grey_dilation, grey_erosion, grey_opening, label, map_coordinates
 
 from fingerpad.core.checks import FloatArray
 
@@ -26,13 +28,34 @@ RELIEF_MM = 2.0
 RELIEF_SHARE = 0.2
 """A ridge or dot is as high, over its width, or more; a ball's cap of the same width is lower."""
 
+TOUCHED_MM = 1.0
+"""Depth below the highest point down to which tops of ridges and dots, and rims of grooves, count. [mm]"""
+
+LEAST_MM = 0.05
+"""Height of a ridge or dot, and depth of a groove, at least: what is lower is the noise of a scan. [mm]"""
+
+REACHED_SHARE = 0.4
+"""How deep skin goes into a groove at most, over its width: what is narrower below that is not touched."""
+
+TIP_MM, TIP_SHARE = 0.5, 0.25
+"""A ridge with slanted flanks is as wide as this far below its top [mm], or this share of its height; a
+groove so far above its bottom."""
+
+
+CORNER_SHARE = 0.4
+"""A ridge, groove or dot covers this share of the disc; the tip of a corner between walls does not."""
+
+CRACK_MM = 0.05
+"""Width of a crack, which skin does not enter. [mm]"""
+
 
 def narrowest_relief(height_mm: FloatArray, spacing_mm: float, beside_mm: float) -> float:
-    """Width of the narrowest ridge, groove or dot, 2 mm if all are wider. [mm]
+    """Width of the narrowest ridge, groove or dot that skin touches, 2 mm if all are wider. [mm]
 
     It is the smallest width of a disc whose opening or closing of the face changes a height by more than
     0.2 of that width, apart from the outermost heights along walls and from slopes above 45 degrees,
-    where triangles are ragged.
+    where triangles are ragged. What is sharp is measured a little beside its tip, and a groove as far down
+    as skin reaches.
 
     Parameters
     ----------
@@ -42,29 +65,69 @@ def narrowest_relief(height_mm: FloatArray, spacing_mm: float, beside_mm: float)
         Of the grid. [mm]
     beside_mm : float
         Height beside the grid. [mm]
+
+    Examples
+    --------
+    A sharp wedge of 90 degrees is as wide as below its tip:
+
+    >>> x = np.arange(-3.0, 3.0, 0.025)[:, None] * np.ones(240)
+    >>> narrowest_relief(-np.abs(x), 0.025, -3.0)
+    0.6
     """
     lowest = max(beside_mm, height_mm.max() - RELIEF_MM)
-    height = np.maximum(height_mm, lowest)
-    for width in WIDTHS_MM:
-        thin = max(1, round(width / spacing_mm) // PIXELS_PER_FEATURE**2)
-        radius = round(width / spacing_mm / thin) // 2
-        if 2 * radius < PIXELS_PER_FEATURE:
-            continue
-        disc = np.hypot(*np.indices((2 * radius + 1,) * 2) - radius) <= radius + 0.5
+    crack = max(1, round(CRACK_MM / spacing_mm))
+    height = np.pad(np.maximum(height_mm, lowest), crack, constant_values=lowest)
+    height = grey_closing(height, crack, mode="nearest")[crack:-crack, crack:-crack]
+    scales = list(_scales(spacing_mm))
+    closings = []
+    reached = np.full(height.shape, lowest)
+    for width, thin, disc in scales:
+        pad = 3 * (len(disc) // 2)
+        part = np.pad(height[::thin, ::thin], pad, constant_values=lowest)
+        closings.append((part, grey_closing(part, footprint=disc, mode="nearest")))
+        filled = closings[-1][1][pad:-pad, pad:-pad]
+        reached = np.maximum(reached, _refined(filled, thin, height.shape) - REACHED_SHARE * width)
+    found = WIDTHS_MM[-1]
+    ridge_mm, groove_mm = np.zeros((2, *height.shape))
+    for (width, thin, disc), (part, closed) in zip(scales, closings, strict=True):
+        radius = len(disc) // 2
+        pad = 3 * radius
         # The opening of a square is rounder at its corners by 0.41 of the disc's radius.
         around = 2 * int(np.ceil(0.5 * radius)) + 1
-        part = np.pad(height[::thin, ::thin], 3 * radius, constant_values=lowest)
         opened = grey_opening(part, footprint=disc, mode="nearest")
-        closed = grey_closing(part, footprint=disc, mode="nearest")
+        floor = np.maximum(part, np.pad(reached[::thin, ::thin], pad, constant_values=lowest))
         ridges = part - grey_dilation(opened, around, mode="nearest")
-        grooves = grey_erosion(closed, around, mode="nearest") - part
+        grooves = grey_erosion(closed, around, mode="nearest") - floor
         ridges[_is_steep(opened, thin * spacing_mm)] = 0.0
         grooves[_is_steep(closed, thin * spacing_mm)] = 0.0
         # On a slope that ends at the border the disc lies lower by the slope over its width.
-        ridges -= 2 * radius * _slope_at_border(part, 3 * radius, 2 * radius)
-        if max(ridges.max(), grooves.max()) > RELIEF_SHARE * width:
-            return width
-    return WIDTHS_MM[-1]
+        ridges -= 2 * radius * _slope_at_border(part, pad, 2 * radius)
+        inner = slice(pad, -pad), slice(pad, -pad)
+        for size, top, whole, tallest in (
+            (ridges, part, part - opened, ridge_mm),
+            (grooves, closed, closed - floor, groove_mm),
+        ):
+            np.maximum(tallest, _refined(whole[inner], thin, height.shape), out=tallest)
+            tip = np.minimum(TIP_MM, TIP_SHARE * tallest[::thin, ::thin])
+            counts = (size > max(RELIEF_SHARE * width, LEAST_MM)) & (top >= height.max() - TOUCHED_MM)
+            large = label(counts[inner] & (size[inner] > tip))[0]
+            if np.bincount(large.ravel())[1:].max(initial=0) >= CORNER_SHARE * disc.sum():
+                found = width
+    return found
+
+
+def _scales(spacing_mm: float) -> Iterator[tuple[float, int, np.ndarray]]:
+    """Widths that a grid resolves, the widest first, each with a step through the grid and a disc so wide."""
+    for width in reversed(WIDTHS_MM):
+        thin = max(1, round(width / spacing_mm) // PIXELS_PER_FEATURE**2)
+        radius = round(width / spacing_mm / thin) // 2
+        if 2 * radius >= PIXELS_PER_FEATURE:
+            yield width, thin, np.hypot(*np.indices((2 * radius + 1,) * 2) - radius) <= radius + 0.5
+
+
+def _refined(values: FloatArray, thin: int, shape: tuple[int, ...]) -> FloatArray:
+    """Interpolate every `thin`-th value to a whole grid."""
+    return np.asarray(map_coordinates(values, np.indices(shape) / thin, order=1, mode="nearest"))
 
 
 def _is_steep(height: FloatArray, spacing: float) -> np.ndarray:
