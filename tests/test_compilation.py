@@ -8,7 +8,7 @@ import textwrap
 import pytest
 
 import fingerpad as fp
-from fingerpad.core.compilation import NOTICE, SUBJECT, announce_compilation
+from fingerpad.core.compilation import NOTICE, SHORT_NOTICE, SUBJECT, announce_compilation
 from fingerpad.mechanics.kernels import KERNELS
 
 KERNEL = """
@@ -76,8 +76,8 @@ PRESS = """
         raise Pressed
 
     indentation.press = no_press
-    touch = fp.touch_of(fp.Fingertip(), fp.Sphere())
     {set_up}
+    touch = fp.touch_of(fp.Fingertip(), fp.Sphere())
     for _ in range(2):
         try:
             touch.solve()
@@ -89,7 +89,7 @@ PRESS = """
 @pytest.mark.parametrize(
     ("set_up", "said"),
     [
-        ("", NOTICE + "\n"),
+        ("", f"{SHORT_NOTICE}\n{NOTICE}\n"),  # of the description, then of the press
         ("import logging; logging.getLogger('fingerpad').setLevel('ERROR')", ""),
     ],
     ids=["as it comes", "silenced"],
@@ -126,6 +126,22 @@ def test_messages_count_the_kernels_that_are_done(say):
     assert said.splitlines()[0] == NOTICE
     counts = [line.removeprefix(f"{SUBJECT}: ").split(" after")[0] for line in said.splitlines()[1:]]
     assert counts == ["0 of 2 done", "1 of 2 done", "2 of 2 done"]
+
+
+RESPOND = """
+    import numpy as np
+    import fingerpad as fp
+    from fingerpad.core.signals import SedTraces
+    traces = SedTraces(np.array([0.0, 50.0, 100.0]), np.array([[0.0], [40.0], [40.0]]), np.array([50.0]))
+    for _ in range(2):
+        print(len(fp.Afferent.for_tissues("paper").spikes(traces)[0]) > 0)
+"""
+
+
+def test_a_first_response_reports_compilation_once_and_none_that_is_stored(say):
+    """It took seconds without a line."""
+    assert say(RESPOND) == (["True", "True"], SHORT_NOTICE + "\n")
+    assert say(RESPOND) == (["True", "True"], "")
 
 
 def test_a_press_calls_every_kernel_that_is_counted():

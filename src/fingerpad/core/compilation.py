@@ -1,4 +1,4 @@
-"""Messages while the first indentation compiles its kernels, which takes about half a minute."""
+"""Messages while functions are compiled: half a minute for the first press, some seconds for other calls."""
 
 from __future__ import annotations
 
@@ -14,10 +14,21 @@ from fingerpad.core.numba_internals import is_compiled
 SUBJECT = "fingerpad compiles its kernels"
 NOTICE = f"{SUBJECT}, once: about half a minute."
 
+SHORT_NOTICE = "fingerpad compiles what this call needs, once: some seconds."
+
 INTERVAL_S = 5.0
 """Time between two messages. [s]"""
 
 _announced = False
+_told = False
+
+
+def tell_once() -> None:
+    """Say once that a call compiles its functions, unless a press has said so."""
+    global _told
+    if not (_told or _announced):
+        _told = True
+        LOGGER.warning(SHORT_NOTICE)
 
 
 @contextmanager

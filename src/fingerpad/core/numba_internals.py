@@ -11,6 +11,7 @@ eight nodes. The size of an array on the stack is known, and nothing overlaps it
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from math import prod
 from typing import Any
 
@@ -18,6 +19,7 @@ from llvmlite import ir
 from numba import types
 from numba.core import cgutils
 from numba.core.errors import TypingError
+from numba.core.event import Listener, register
 from numba.extending import intrinsic
 from numba.np.arrayobj import make_array, populate_array
 
@@ -49,6 +51,26 @@ def is_compiled(kernel: Any) -> bool:
         return bool(kernel._cache._cache_file._load_index())
     except AttributeError:
         return True
+
+
+class _Compilations(Listener):
+    """Tells of functions of this package that Numba begins to compile; what its cache has is not compiled."""
+
+    def __init__(self, tell: Callable[[], None]):
+        self._tell = tell
+
+    def on_start(self, event: Any) -> None:
+        home = event.data["dispatcher"].py_func.__module__ or ""
+        if home.partition(".")[0] == __package__.partition(".")[0]:
+            self._tell()
+
+    def on_end(self, event: Any) -> None:
+        pass
+
+
+def tell_compilations(tell: Callable[[], None]) -> None:
+    """Call a function before each compilation of a function of this package, whoever calls it."""
+    register("numba:compile", _Compilations(tell))
 
 
 @intrinsic(prefer_literal=True)

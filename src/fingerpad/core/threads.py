@@ -19,7 +19,9 @@ from typing import Any, TypeVar
 import numba
 
 from fingerpad.core.checks import whole
+from fingerpad.core.compilation import tell_once
 from fingerpad.core.errors import InputError
+from fingerpad.core.numba_internals import tell_compilations
 
 Result = TypeVar("Result")
 
@@ -42,6 +44,8 @@ def _pool(threads: int) -> ThreadPoolExecutor:
     """Threads that work beside the calling thread. They block, without using the processor, until called."""
     return ThreadPoolExecutor(threads - 1, thread_name_prefix="fingerpad")
 
+
+tell_compilations(tell_once)  # here, because all that compiles uses these threads
 
 if hasattr(os, "register_at_fork"):  # not on Windows, which cannot fork
     # A forked child has none of its parent's threads, so it makes its own.
