@@ -13,7 +13,7 @@ from fingerpad.geometry.fingertip import Fingertip
 from fingerpad.geometry.indenters import Plate, Sphere
 from fingerpad.geometry.mesh import block_mesh
 from fingerpad.geometry.motion import Cycles, RampAndHold
-from fingerpad.geometry.motions import SAMPLES_PER_CYCLE, sine
+from fingerpad.geometry.motions import SAMPLES_PER_CYCLE, chirp, sine
 from fingerpad.geometry.trajectory import Trajectory
 from fingerpad.mechanics import cycles
 from fingerpad.mechanics.contact import place
@@ -189,6 +189,24 @@ def test_a_motion_is_as_fast_as_its_fastest_part():
     assert fastest_hz(late) == pytest.approx(1e3 * 0.9 / np.pi)
     noisy = Trajectory((0.0, 50.0, 51.0, 52.0, 53.0), (0.0, 1.0, 1.0005, 1.0, 1.0005))
     assert fastest_hz(noisy) < 10.0
+
+
+def test_a_vibration_by_force_has_its_forces_and_its_skipped_cycles_those_of_all():
+    motion = sine(force_mn=20.0, amplitude_mn=5.0, frequency_hz=20.0, cycles=14, ramp_ms=50.0, hold_ms=100.0)
+    assert motion.by_force
+    assert [phase.name for phase in motion.phases] == ["ramp", "hold", "vibration"]
+    assert motion.prescribed_at([25.0, 150.0, 162.5, 187.5]) == pytest.approx([10.0, 20.0, 25.0, 15.0])
+    swept = chirp(force_mn=20.0, amplitude_mn=5.0, frequencies_hz=(5.0, 50.0), sweep_ms=400.0)
+    assert swept.by_force
+    assert swept.largest == pytest.approx(25.0, rel=1e-3)
+    for wrong in ({"depth_mm": 1.0}, {"amplitude_mn": 5.0}, {"amplitude_mm": 0.1, "force_mn": 20.0}):
+        with pytest.raises(InputError, match="either depth_mm and amplitude_mm or force_mn and amplitude_mn"):
+            sine(**wrong, frequency_hz=20.0, cycles=2)
+    with pytest.raises(InputError, match="amplitude_mn must be at most force_mn"):
+        sine(force_mn=5.0, amplitude_mn=6.0, frequency_hz=20.0, cycles=2)
+    some, every = vibrated(motion), vibrated(motion, cycle_tolerance=None)
+    np.testing.assert_allclose(some.force_mn[1:], motion.prescribed_at(some.times_ms[1:]), rtol=1e-3)
+    np.testing.assert_allclose(some.depth_mm, every.depth_mm, atol=0.01 * every.depth_mm.max())
 
 
 def test_moved_mass_of_a_body_that_moves_as_a_whole_is_its_mass():

@@ -23,27 +23,31 @@ SAMPLES_PER_CYCLE = 20
 
 @known_keywords
 def sine(
-    depth_mm: float,
-    amplitude_mm: float,
-    frequency_hz: float,
-    cycles: int,
+    depth_mm: float | None = None,
+    amplitude_mm: float | None = None,
+    frequency_hz: float | None = None,
+    cycles: int | None = None,
     ramp_ms: float = protocol.RAMP.value,
     hold_ms: float = protocol.HOLD.value,
+    *,
+    force_mn: float | None = None,
+    amplitude_mn: float | None = None,
 ) -> Trajectory:
-    """Indent to a depth, hold it, then vibrate about it.
+    """Press to a depth or a force, hold it, then vibrate about it.
 
     Parameters
     ----------
-    depth_mm : float
-        Depth of the hold. [mm]
-    amplitude_mm : float
-        Half of the way from peak to peak. [mm]
+    depth_mm, amplitude_mm : float, optional
+        Depth of the hold, and half of the way from peak to peak. [mm]
     frequency_hz : float
         Frequency. [Hz]
     cycles : int
         Number of whole cycles.
     ramp_ms, hold_ms : float, optional
         Durations of the ramp and of the hold before the vibration. [ms]
+    force_mn, amplitude_mn : float, optional
+        Instead of depths, force of the hold on the whole finger, and half of its change from peak to peak.
+        [mN]
 
     Returns
     -------
@@ -51,33 +55,47 @@ def sine(
         With 20 samples per cycle and the phases "ramp", "hold" and "vibration". A press solves some of more
         than 10 cycles and interpolates the others within a tolerance (`PressSettings.cycle_tolerance`).
 
+    Raises
+    ------
+    InputError
+        If not exactly one of depth and force is given with its amplitude, a value is not above 0, or a force
+        would fall below 0.
+
     Examples
     --------
     >>> motion = sine(0.8, 0.1, 20.0, cycles=2, hold_ms=100.0)
     >>> round(motion.largest, 6), motion.end_ms
     (0.9, 250.0)
+    >>> sine(force_mn=100.0, amplitude_mn=20.0, frequency_hz=20.0, cycles=2).by_force
+    True
     """
-    period_ms = MS_PER_S / positive("frequency_hz", frequency_hz, "Hz")
-    turns = np.arange(1, SAMPLES_PER_CYCLE * whole("cycles", cycles, at_least=1) + 1) / SAMPLES_PER_CYCLE
-    motion = _on_a_hold(depth_mm, amplitude_mm, period_ms * turns, turns, ramp_ms, hold_ms, "vibration")
-    return replace(motion, cycles=Cycles(ramp_ms + hold_ms, period_ms, cycles))
+    _check_given("sine", frequency_hz=frequency_hz, cycles=cycles)
+    hold = _hold(depth_mm, amplitude_mm, force_mn, amplitude_mn)
+    period_ms = MS_PER_S / positive("frequency_hz", frequency_hz, "Hz")  # type: ignore[arg-type]
+    count = whole("cycles", cycles, at_least=1)  # type: ignore[arg-type]
+    turns = np.arange(1, SAMPLES_PER_CYCLE * count + 1) / SAMPLES_PER_CYCLE
+    motion = _on_a_hold(hold, period_ms * turns, turns, ramp_ms, hold_ms, "vibration")
+    return replace(motion, cycles=Cycles(ramp_ms + hold_ms, period_ms, count))
 
 
 @known_keywords
 def chirp(
-    depth_mm: float,
-    amplitude_mm: float,
-    frequencies_hz: Sequence[float],
-    sweep_ms: float,
+    depth_mm: float | None = None,
+    amplitude_mm: float | None = None,
+    frequencies_hz: Sequence[float] | None = None,
+    sweep_ms: float | None = None,
     ramp_ms: float = protocol.RAMP.value,
     hold_ms: float = protocol.HOLD.value,
+    *,
+    force_mn: float | None = None,
+    amplitude_mn: float | None = None,
 ) -> Trajectory:
-    """Indent to a depth, hold it, then vibrate about it with a frequency that changes at a constant rate.
+    """Press to a depth or a force, hold it, then vibrate with a frequency that changes at a constant rate.
 
     Parameters
     ----------
-    depth_mm, amplitude_mm, ramp_ms, hold_ms : float
-        As of `sine`. [mm], [ms]
+    depth_mm, amplitude_mm, ramp_ms, hold_ms, force_mn, amplitude_mn : float, optional
+        As of `sine`. [mm], [ms], [mN]
     frequencies_hz : (float, float)
         First and last frequency, upwards or downwards. [Hz]
     sweep_ms : float
@@ -91,7 +109,7 @@ def chirp(
     Raises
     ------
     InputError
-        If a value is not above 0, or the sweep is shorter than one cycle.
+        As of `sine`, or if the sweep is shorter than one cycle.
 
     Examples
     --------
@@ -99,22 +117,25 @@ def chirp(
     >>> len(motion.times_ms), round(motion.end_ms, 1)
     (543, 1490.0)
     """
-    pair = float_array("frequencies_hz", frequencies_hz, 1)
+    _check_given("chirp", frequencies_hz=frequencies_hz, sweep_ms=sweep_ms)
+    hold = _hold(depth_mm, amplitude_mm, force_mn, amplitude_mn)
+    pair = float_array("frequencies_hz", frequencies_hz, 1)  # type: ignore[arg-type]
     if pair.size != 2:
         raise InputError(f"frequencies_hz must be a pair, first and last: got {pair.size}.")
     first, last = (positive("frequencies_hz", each, "Hz") for each in pair.tolist())
-    seconds = positive("sweep_ms", sweep_ms, "ms") / MS_PER_S
+    duration_ms = positive("sweep_ms", sweep_ms, "ms")  # type: ignore[arg-type]
+    seconds = duration_ms / MS_PER_S
     cycles = int((first + last) / 2.0 * seconds)
     if cycles < 1:
         raise InputError(
-            f"sweep_ms must leave time for a cycle of {first:g} to {last:g} Hz: got {sweep_ms:g} ms."
+            f"sweep_ms must leave time for a cycle of {first:g} to {last:g} Hz: got {duration_ms:g} ms."
         )
     turns = np.arange(1, SAMPLES_PER_CYCLE * cycles + 1) / SAMPLES_PER_CYCLE
     # turns = first t + rate t^2 / 2, solved for t in the form that also holds for a rate of 0.
     rate = (last - first) / seconds
     now_hz = np.sqrt(np.maximum(first**2 + 2.0 * rate * turns, 0.0))
-    times_ms = np.minimum(MS_PER_S * 2.0 * turns / (first + now_hz), sweep_ms)
-    return _on_a_hold(depth_mm, amplitude_mm, times_ms, turns, ramp_ms, hold_ms, "sweep")
+    times_ms = np.minimum(MS_PER_S * 2.0 * turns / (first + now_hz), duration_ms)
+    return _on_a_hold(hold, times_ms, turns, ramp_ms, hold_ms, "sweep")
 
 
 @known_keywords
@@ -267,9 +288,41 @@ def stroke(
     )
 
 
+def _check_given(name: str, **needed: object) -> None:
+    """Raise `InputError` if a parameter is missing that has a default only for the order of the others."""
+    missing = [parameter for parameter, value in needed.items() if value is None]
+    if missing:
+        those = "they are" if len(missing) > 1 else "it is"
+        raise InputError(f"{name} needs {', '.join(missing)}: {those} not given.")
+
+
+def _hold(
+    depth_mm: float | None, amplitude_mm: float | None, force_mn: float | None, amplitude_mn: float | None
+) -> tuple[str, float, float]:
+    """Return the column of a trajectory that vibrates, its value in the hold and the amplitude."""
+    given = {
+        name: value
+        for name, value in (
+            ("depth_mm", depth_mm), ("amplitude_mm", amplitude_mm),
+            ("force_mn", force_mn), ("amplitude_mn", amplitude_mn),
+        )
+        if value is not None
+    }  # fmt: skip
+    if tuple(given) not in (("depth_mm", "amplitude_mm"), ("force_mn", "amplitude_mn")):
+        raise InputError(
+            "A vibration needs either depth_mm and amplitude_mm or force_mn and amplitude_mn: got "
+            f"{', '.join(given) or 'none of them'}."
+        )
+    (column, level), (name, amplitude) = (
+        (name, positive(name, value, "mN" if force_mn is not None else "mm")) for name, value in given.items()
+    )
+    if column == "force_mn" and amplitude > level:
+        raise InputError(f"{name} must be at most force_mn, {level:g} mN: got {amplitude:g}.")
+    return column, level, amplitude
+
+
 def _on_a_hold(
-    depth_mm: float,
-    amplitude_mm: float,
+    hold: tuple[str, float, float],
     since_ms: FloatArray,
     turns: FloatArray,
     ramp_ms: float,
@@ -277,13 +330,14 @@ def _on_a_hold(
     name: str,
 ) -> Trajectory:
     """Make a ramp and hold, then a vibration that has made `turns` at times `since_ms` after the hold."""
-    positive("depth_mm", depth_mm, "mm")
-    positive("amplitude_mm", amplitude_mm, "mm")
-    before_ms = _before(ramp_ms, hold_ms)
+    (column, level, amplitude), before_ms = hold, _before(ramp_ms, hold_ms)
     times_ms = (*before_ms, *(before_ms[-1] + since_ms).tolist())
+    vibrated = level + amplitude * np.sin(2.0 * np.pi * turns)
+    values = 0.0, *[level] * (len(before_ms) - 1), *vibrated.tolist()
     return Trajectory(
         times_ms,
-        (0.0, *[depth_mm] * (len(before_ms) - 1), *(depth_mm + amplitude_mm * np.sin(2.0 * np.pi * turns))),
+        values if column == "depth_mm" else None,
+        values if column == "force_mn" else None,
         phases=_named((name,), before_ms, (before_ms[-1], times_ms[-1])),
     )
 
