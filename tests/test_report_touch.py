@@ -1,11 +1,13 @@
 """The picture of one touch shows the pressed finger, the body that presses it, and the spikes."""
 
+import warnings
 from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from matplotlib.collections import EventCollection, PolyCollection
+from matplotlib.colors import to_hex
 from matplotlib.patches import Polygon
 from numpy.testing import assert_allclose, assert_array_equal
 
@@ -61,12 +63,25 @@ def test_skin_and_nail_go_once_around_the_section_and_lie_on_the_mesh(skin):
     assert {tuple(end) for end in ends} <= {tuple(node) for node in moved[:, :2].round(9)}
 
 
-def test_faces_have_the_colour_of_the_energy_density_at_the_end(skin):
-    axes = new_figure(4.0, 3.0).subplots()
-    touch_figure.draw_section(axes, skin)
-    faces = next(drawn for drawn in axes.collections if isinstance(drawn, PolyCollection))
-    assert_array_equal(faces.get_array(), skin.sed_kpa[-1][skin.section().elements])
-    assert not axes.patches
+@pytest.mark.parametrize(
+    ("quantity", "field", "name"),
+    [
+        ("stored", "sed_kpa", "strain energy density"),
+        ("compressive_stress", "compressive_stress_kpa", "compressive stress"),
+    ],
+)
+def test_faces_have_the_colour_of_what_the_afferents_follow(skin, quantity, field, name):
+    afferent = fp.Afferent(dynamic_quantity=quantity, static_quantity=quantity)
+    with warnings.catch_warnings(action="ignore"):
+        response = fp.Population.grid(density_per_cm2=20, afferent=afferent).respond(skin)
+    figure = touch_figure.draw(skin, response)
+    faces, bone = (part for part in figure.axes[0].collections if isinstance(part, PolyCollection))
+    assert_array_equal(faces.get_array(), np.atleast_2d(skin.fields[field])[-1][skin.section().elements])
+    assert any(axes.get_ylabel() == f"{name} [kPa]" for axes in figure.axes)
+    # The bone differs from the paper, and lies within the section.
+    assert to_hex(bone.get_facecolor()[0]) == touch_figure.BONE_INSIDE
+    (outline,) = bone.get_paths()
+    assert area(outline.vertices[:-1]) == pytest.approx(4.3 * 25.0, rel=0.1)
 
 
 def test_the_colours_grow_darker_all_the_way():

@@ -58,7 +58,7 @@ SINGLE = {
     "shear_kpa": "ts3",
     "displacement_mm": "n3",
     "sed_kpa": "te",
-    "von_mises_kpa": "e",
+    **dict.fromkeys(("von_mises_kpa", "compressive_stress_kpa"), "e"),
     **dict.fromkeys(("instantaneous", "work", "von_mises", "compressive_strain", "compressive_stress"), "tr"),
 }
 """Arrays of a stored file: of times, skin nodes, nodes, elements, receptors' elements, components."""

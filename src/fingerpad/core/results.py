@@ -93,6 +93,8 @@ WholeVector = Annotated[NDArray[np.int64], _array(np.int64, 1, _WHOLE)]
 """Integer array (n,)."""
 TruthVector = Annotated[NDArray[np.bool_], _array(np.bool_, 1, _TRUTH)]
 """Boolean array (n,)."""
+TruthMatrix = Annotated[NDArray[np.bool_], _array(np.bool_, 2, _TRUTH)]
+"""Boolean array (n, m)."""
 Number = Annotated[
     float,
     BeforeValidator(lambda value: np.nan if value is None else value),

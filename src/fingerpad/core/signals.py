@@ -466,6 +466,8 @@ class ResponseMap(Result):
     rate_measure : {"interval", "count"}
         What the rates of this type of afferents are: one over the mean interval between spikes, Eqs. 6-10,
         which is 0 without an interval; or spikes over the length of the window.
+    quantity : str, optional
+        What the static term of the afferents follows, a name of `SkinResponse.sample`. Default: SED.
     """
 
     positions_mm: FloatArray
@@ -478,6 +480,7 @@ class ResponseMap(Result):
     phases: tuple[Phase, ...] = ()
     windows_ms: tuple[tuple[float, ...], tuple[float, ...]] | None = None
     rate_measure: str = INTERVAL
+    quantity: str = STORED_ENERGY
 
     def __repr__(self) -> str:
         firing = np.count_nonzero(self.spike_count)

@@ -126,7 +126,18 @@ class ElementFields:
     @property
     def compressive_stress_kpa(self) -> FloatArray:
         """Largest compressive stress; 0 where there is none, (n_times, n_elements). [kPa]"""
-        return np.maximum(-self.principal_stress_kpa[..., 0], 0.0)
+        return largest_compression(self.stress_kpa)
+
+
+def largest_compression(stress_kpa: FloatArray) -> FloatArray:
+    """Largest compressive stress of tensors (..., 6); 0 where there is none. [kPa]
+
+    Examples
+    --------
+    >>> largest_compression(np.array([1.0, -3.0, 0.0, 0.0, 0.0, 0.0])).item()
+    3.0
+    """
+    return np.maximum(-np.linalg.eigvalsh(stress_kpa[..., INDEX])[..., 0].astype(np.float64), 0.0)
 
 
 def von_mises(stress_kpa: FloatArray) -> FloatArray:

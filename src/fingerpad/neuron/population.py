@@ -389,4 +389,5 @@ class Population(metaclass=KnownKeywords):
             phases=sed.phases,
             windows_ms=windows_ms,
             rate_measure=measure,
+            quantity=self.afferent.static_quantity,
         )

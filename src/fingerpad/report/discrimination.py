@@ -16,6 +16,7 @@ from fingerpad.report.parts import Row, Table
 from fingerpad.report.style import (
     BLACK,
     BLUE,
+    COLUMN_IN,
     GREEN,
     GREY,
     ORANGE,
@@ -47,23 +48,23 @@ Panel = tuple[str, ObserverHitRates | None]
 
 def draw_observers(section: SphereDiscrimination) -> Figure:
     """Draw Figure 7: codes, noise levels and repetitions, one panel each."""
-    return _draw(section, observer_panels(section), columns=4)
+    return _draw(section, observer_panels(section))
 
 
 def draw_criterion(section: SphereDiscrimination) -> Figure:
     """Draw Figure 8: the decision criterion varies from trial to trial."""
-    return _draw(section, criterion_panels(section), columns=2)
+    return _draw(section, criterion_panels(section))
 
 
 def draw_noise(section: SphereDiscrimination) -> Figure:
     """Draw the distance of each code from people over the noise, and the sweep of the paper's range."""
-    figure = new_figure(11.0, 5.0)
+    figure = new_figure(COLUMN_IN, 4.4)
     codes, sweep = figure.subplots(1, 2, sharey=True)
     curve = section.reasons.misfit_curve
     for (name, label), style in zip(CODES.items(), CODE_STYLES, strict=True):
         if name in curve.misfit:
             codes.plot(curve.noise_sigma, curve.misfit[name], label=label, **style)
-    codes.set_title("(a) each code, both positions together, expected")
+    codes.set_title("(a) each code, expected")
     swept = section.statistics.sweep
     for misfit, (style, label) in zip(swept.misfit, POSITION_STYLES, strict=True):
         sweep.errorbar(
@@ -75,16 +76,16 @@ def draw_noise(section: SphereDiscrimination) -> Figure:
             label=label.removeprefix("predicted, "),
             **style,
         )
-    sweep.set_title("(b) static Gradient Sum, whole protocol")
+    sweep.set_title("(b) static Gradient Sum")
     marked = {"paper's best": section.noise_sigma_paper, "our fit": section.noise_sigma}
     for axes in (codes, sweep):
         for (label, sigma), dashes in zip(marked.items(), ((6, 3), (1, 1)), strict=True):
             axes.axvline(sigma, color=GREY, linewidth=1.4, linestyle=(0, dashes), label=label)
-        axes.set_xlabel("noise σ₁ [fraction of the response]")
+        axes.set_xlabel("noise σ₁ [fraction]")
         axes.set_ylim(bottom=0.0)
     codes.set_ylabel("distance to observed hit rates, rms [fraction]")
     sweep.set_xlim(left=0.0)
-    shared_legend(figure, (codes, sweep), columns=4)
+    shared_legend(figure, (codes, sweep), columns=2)
     return figure
 
 
@@ -141,10 +142,10 @@ def criterion_panels(section: SphereDiscrimination) -> list[Panel]:
     return [(f"β varies by {name.removeprefix('criterion_')}", section.variants[name]) for name in names]
 
 
-def _draw(section: SphereDiscrimination, panels: list[Panel], columns: int) -> Figure:
-    rows = max(1, -(-len(panels) // columns))
-    figure = new_figure(11.0 if columns > 2 else 10.0, 3.1 * rows + 0.5)
-    grid = figure.subplots(rows, columns, sharex=True, sharey=True, squeeze=False)
+def _draw(section: SphereDiscrimination, panels: list[Panel]) -> Figure:
+    rows = max(1, -(-len(panels) // 2))
+    figure = new_figure(COLUMN_IN, 2.2 * rows + 0.9)
+    grid = figure.subplots(rows, 2, sharex=True, sharey=True, squeeze=False)
     for index, axes in enumerate(grid.flat):
         if index >= len(panels):
             axes.set_axis_off()
@@ -169,15 +170,17 @@ def draw_hit_rates(axes: Axes, section: SphereDiscrimination, rates: ObserverHit
 def _curves(axes: Axes, comparison: FloatArray, rates: ObserverHitRates) -> None:
     both = (rates.hit_rate, rates.hit_rate_sd), (rates.hit_rate_shifted, rates.hit_rate_shifted_sd)
     for (means, spreads), (style, label) in zip(both, POSITION_STYLES, strict=True):
+        bars = np.nan_to_num(np.minimum(spreads, [means, 1.0 - means]))  # a hit rate lies within 0 and 1
         axes.errorbar(
             comparison,
             means,
-            yerr=np.nan_to_num(spreads),
+            yerr=bars,
             markersize=4.0,
             linewidth=1.5,
             elinewidth=1.0,
             capsize=3.0,
             label=label,
+            clip_on=False,
             **style,
         )
 
@@ -211,9 +214,9 @@ def _label(figure: Figure, grid: np.ndarray, n_panels: int) -> None:
         if n_panels - grid.shape[1] <= index < n_panels:
             axes.set_xlabel("comparison curvature [1/m]")
             axes.tick_params(labelbottom=True)
-    lowest, highest = grid[0, 0].get_ylim()
-    grid[0, 0].set_ylim(min(lowest, 0.4), max(highest, 1.05))
-    shared_legend(figure, grid.flat)
+    lowest, _ = grid[0, 0].get_ylim()
+    grid[0, 0].set_ylim(max(min(lowest, 0.4), 0.0), 1.0)
+    shared_legend(figure, grid.flat, columns=2)
 
 
 def caption_observers(section: SphereDiscrimination) -> str:

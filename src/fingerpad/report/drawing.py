@@ -25,7 +25,7 @@ from fingerpad.report.population import QUANTITIES
 from fingerpad.report.recording_fit import draw_phase, recorded_phases
 from fingerpad.report.style import BLACK, BLUE, GREEN, GREY, ORANGE, new_figure, png, say_nothing_to_draw
 from fingerpad.report.three_levels import NANOAMPERE_PER_MA
-from fingerpad.report.touch import BONE, draw_section
+from fingerpad.report.touch import BONE, BONE_INSIDE, draw_section
 
 if TYPE_CHECKING:
     from fingerpad.geometry.fingertip import Fingertip
@@ -262,7 +262,7 @@ def draw_finger(axes: Axes, finger: Fingertip) -> None:
     way = np.linspace(0.0, np.pi, CURVE_POINTS)
     bone_x = np.concatenate([[0.0], start + (tip - start) * np.sin(way), [0.0]])
     bone_y = finger.spine_y_mm + finger.bone_height_mm * np.concatenate([[1.0], np.cos(way), [-1.0]])
-    axes.fill(bone_x, bone_y, facecolor="white", edgecolor=BONE, linewidth=1.2)
+    axes.fill(bone_x, bone_y, facecolor=BONE_INSIDE, edgecolor=BONE, linewidth=1.2)
     nail = np.linspace(finger.nail_x_mm[0], finger.nail_x_mm[1], CURVE_POINTS)
     axes.plot(nail, finger.section(nail)[1], color=BONE, linewidth=4.0)
     for depth in finger.layer_depths_mm:

@@ -1,81 +1,139 @@
-"""Figure 1: the mesh of the finger in two planes, its layers, bone, nail and the depth of the receptors."""
+"""Figure 1: the mesh of the finger in three dimensions and in two planes, its layers, bone and nail."""
 
 from __future__ import annotations
+
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection, PolyCollection
+from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
-from matplotlib.patches import Patch, Rectangle
+from matplotlib.patches import Patch
+from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 
 from fingerpad.core.checks import FloatArray
 from fingerpad.experiments.gerling2014.mesh_picture import MeshPicture, MeshPlane
-from fingerpad.report.formatting import joined, number
+from fingerpad.report.formatting import number
 from fingerpad.report.style import BLACK, new_figure
 
 LAYER_COLOURS = ("#2b1a3d", "#d9650a", "#f2b183", "#fbeee2")
 """From the skin inwards; the lightness increases, so that the layers differ in greyscale."""
 
-BONE, NAIL = "#a9b4bd", "#0a5c99"
+BONE, NAIL, SKIN = "#a9b4bd", "#0a5c99", "#f0d9c4"
 NAIL_WIDTH = 4.0
+EDGES = "#00000080"
 
-ENLARGED_MM = (1.3, 2.2)
-"""Half the width and the height of the enlarged part. [mm]"""
+LIGHT = np.array([0.35, -0.75, 0.56])
+"""Where the light comes from, in the order x, z, y."""
+
+ENLARGED_MM, THIN_MM = (1.3, 2.0), 0.2
+"""Half the width and the height of the enlarged part; what is thinner is named beside it. [mm]"""
 
 
 def faces_of(right_mm: FloatArray, up_mm: FloatArray) -> FloatArray:
     """Corners of the faces between the nodes of a grid, (n_faces, 4, 2). [mm]"""
-    points = np.stack([right_mm, up_mm], axis=-1)
-    return np.stack([points[:-1, :-1], points[1:, :-1], points[1:, 1:], points[:-1, 1:]], axis=2).reshape(
-        -1, 4, 2
-    )
+    return _corners(np.stack([right_mm, up_mm], axis=-1))
+
+
+def _corners(points: np.ndarray) -> np.ndarray:
+    """Return the four corners of each face of a grid of points, (n_faces, 4, ...)."""
+    around = (points[:-1, :-1], points[1:, :-1], points[1:, 1:], points[:-1, 1:])
+    return np.stack(around, axis=2).reshape(-1, 4, *points.shape[2:])
 
 
 def draw_mesh(section: MeshPicture) -> Figure:
-    """Draw Figure 1: the section along the finger, the one across it, and the layers below the contact."""
-    figure = new_figure(13.0, 4.6)
-    grid = figure.add_gridspec(1, 3, width_ratios=(2.0, 1.25, 1.0))
-    along, across, near = (figure.add_subplot(grid[0, column]) for column in range(3))
-    x, y = section.contact_mm
+    """Draw Figure 1 with the letters of the paper."""
+    figure = new_figure(11.0, 6.4)
+    grid = figure.add_gridspec(2, 6)
+    whole = figure.add_subplot(grid[0, :3], projection="3d")
+    cut = figure.add_subplot(grid[0, 3:], projection="3d")
+    across, along, near = (figure.add_subplot(grid[1, first : first + 2]) for first in (0, 2, 4))
+    _draw_solid(whole, section, halves=(1.0, -1.0) if section.half else (1.0,))
+    _draw_solid(cut, section, halves=(1.0,), plane=section.along)
+    for sign in (1.0, -1.0) if section.half else (1.0,):
+        _draw_plane(across, section.across, section, lines=0.15, sign=sign)
     _draw_plane(along, section.along, section, lines=0.15)
-    _draw_plane(across, section.across, section, lines=0.15)
-    if section.half:
-        _draw_plane(across, section.across, section, lines=0.15, sign=-1.0)
     _draw_plane(near, section.along, section, lines=0.4)
-    _name_fixed_parts(along, section.along, mirrored=False)
     _name_fixed_parts(across, section.across, mirrored=section.half)
-    width, height = ENLARGED_MM
-    corner = (x - width, y - 0.15)
-    along.add_patch(
-        Rectangle(corner, 2.0 * width, height, fill=False, edgecolor=BLACK, linewidth=1.2, zorder=5)
-    )
-    near.set(xlim=(corner[0], corner[0] + 2.0 * width), ylim=(corner[1], corner[1] + height))
-    epidermis = int((section.layer < section.layers.index("dermis")).sum())
-    receptor = _below_contact(section)[epidermis]
-    near.plot(*receptor, "o", markersize=8.0, color="white", markeredgecolor=BLACK, zorder=6)
-    near.annotate(
-        f"receptor, {number(section.receptor_depth_mm)} mm deep",
-        receptor,
-        xytext=(x, y + 1.0),
-        arrowprops={"arrowstyle": "-", "color": BLACK},
-        ha="center",
-        fontsize=9.0,
-        bbox={"facecolor": "white", "edgecolor": "none", "alpha": 0.9, "pad": 1.5},
-        zorder=6,
-    )
-    for axes, title, label in (
-        (along, "(a) along the finger, z = 0", "x, distal [mm]"),
-        (across, f"(b) across, x = {number(x)} mm", "z, lateral [mm]"),
-        (near, "(c) frame of (a)", "x, distal [mm]"),
+    _name_fixed_parts(along, section.along, mirrored=False)
+    _enlarge(near, section)
+    for axes, title in (
+        (whole, "(a) overall mesh"),
+        (across, "(b) proximal end, x = 0"),
+        (cut, "(c) cut along the middle: surface and inside"),
+        (along, "(d) inner mesh, z = 0"),
+        (near, "(e) four layers below the contact"),
     ):
-        axes.set(title=title, xlabel=label, ylabel="y, dorsal [mm]", aspect="equal")
+        axes.set_title(title, fontsize=10.0)
+    for axes, label in ((across, "z, lateral [mm]"), (along, "x, distal [mm]"), (near, "x, distal [mm]")):
+        axes.set(xlabel=label, ylabel="y, dorsal [mm]", aspect="equal")
         axes.grid(visible=False)
-    patches = [
-        Patch(facecolor=colour, edgecolor=BLACK, linewidth=0.5, label=name)
-        for name, colour in zip(section.layers, LAYER_COLOURS, strict=True)
-    ]
+    named = [*zip(section.layers, LAYER_COLOURS, strict=True), ("bone", BONE), ("nail", NAIL)]
+    patches = [Patch(facecolor=colour, edgecolor=BLACK, linewidth=0.5, label=name) for name, colour in named]
     figure.legend(handles=patches, loc="outside lower center", ncols=len(patches))
     return figure
+
+
+def _draw_solid(
+    axes: Any, section: MeshPicture, halves: tuple[float, ...], plane: MeshPlane | None = None
+) -> None:
+    """Draw the skin and the nail in light, and a cut through the layers where one is given."""
+    skin = np.stack([section.x_mm, section.z_mm, section.y_mm], axis=-1)
+    colours = np.where(_corners(section.under_nail).all(axis=1)[:, None], to_rgb(NAIL), to_rgb(SKIN))
+    solid = [_corners(skin * [1.0, sign, 1.0]) for sign in halves]
+    paint = [colours * _brightness(faces, sign)[:, None] for faces, sign in zip(solid, halves, strict=True)]
+    if plane is not None:
+        # A hair before the middle, so that it covers what lies behind.
+        flat = faces_of(plane.right_mm, plane.up_mm)
+        solid.append(np.stack([flat[..., 0], np.full(flat.shape[:2], -0.01), flat[..., 1]], axis=-1))
+        layers = np.array([to_rgb(colour) for colour in LAYER_COLOURS])[section.layer]
+        paint.append(np.tile(layers, (plane.right_mm.shape[0] - 1, 1)))
+    faces = list(np.concatenate(solid))
+    if plane is not None:
+        bone = plane.right_mm[:, -1], np.full(len(plane.up_mm), -0.01), plane.up_mm[:, -1]
+        faces.append(np.stack(bone, axis=-1))
+        paint.append(np.array([to_rgb(BONE)]))
+    drawn: Any = {"edgecolors": "#00000060", "linewidths": 0.2}
+    axes.add_collection3d(Poly3DCollection(faces, facecolors=np.concatenate(paint), **drawn))
+    low, high = skin.min(axis=(0, 1)), skin.max(axis=(0, 1))
+    across = (-high[1], high[1])
+    axes.set(xlim=(low[0], high[0]), ylim=across, zlim=(low[2], high[2]))
+    axes.set_box_aspect((high[0] - low[0], 2.0 * high[1], high[2] - low[2]), zoom=1.3)
+    axes.view_init(elev=18.0, azim=-62.0)
+    axes.set_xlabel("x, distal [mm]", labelpad=8.0)
+    axes.set_ylabel("z, lateral [mm]", labelpad=2.0)
+    axes.set_zlabel("y, dorsal [mm]", labelpad=0.0)
+    axes.locator_params(nbins=4)
+
+
+def _brightness(faces: FloatArray, sign: float) -> FloatArray:
+    """How light a face is, from 0.6 to 1, by the angle of its outward normal to the light."""
+    normal = np.cross(faces[:, 2] - faces[:, 0], faces[:, 3] - faces[:, 1])
+    normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-12)
+    outward = faces.mean(axis=1) * [0.0, 1.0, 1.0]
+    normal *= np.sign((normal * outward).sum(axis=1, keepdims=True) + 1e-12 * sign)
+    return np.asarray(0.6 + 0.4 * np.clip(normal @ LIGHT, 0.0, 1.0))
+
+
+def _enlarge(axes: Axes, section: MeshPicture) -> None:
+    """Show the layers below the contact with their thicknesses, and an end organ."""
+    x, y = section.contact_mm
+    width, height = ENLARGED_MM
+    axes.set(xlim=(x - width, x + width), ylim=(y - 0.15, y - 0.15 + height))
+    edges = np.concatenate([[0.0], np.cumsum(_thicknesses(section))])
+    text: Any = {"ha": "center", "va": "center", "fontsize": 8.5, "zorder": 6}
+    box = {"facecolor": "white", "edgecolor": "none", "alpha": 0.9, "pad": 1.5}
+    for name, low, high in zip(section.layers[:-1], edges, edges[1:], strict=False):
+        label, middle = f"{name} {number(high - low, 4)} mm", y + 0.5 * (low + high)
+        thin = high - low < THIN_MM
+        arrow = {"arrowstyle": "-", "color": BLACK, "shrinkB": 0.0} if thin else None
+        place = (x, middle + 2.0 * THIN_MM) if thin else (x, middle + THIN_MM * (low > 0.0))
+        axes.annotate(label, (x, middle), xytext=place, arrowprops=arrow, bbox=box, **text)
+    organ = _below_contact(section)[int((section.layer < section.layers.index("dermis")).sum())]
+    depth = f"end organ, {number(section.receptor_depth_mm)} mm deep"
+    axes.plot(*organ, "o", markersize=7.0, color="white", markeredgecolor=BLACK, zorder=7, label=depth)
+    axes.legend(loc="lower right", fontsize=8.5, frameon=True, edgecolor="none", framealpha=1.0)
 
 
 def _draw_plane(axes: Axes, plane: MeshPlane, section: MeshPicture, lines: float, sign: float = 1.0) -> None:
@@ -115,16 +173,13 @@ def _name_fixed_parts(axes: Axes, plane: MeshPlane, mirrored: bool) -> None:
 
 def caption_mesh(section: MeshPicture) -> str:
     """Describe Figure 1."""
-    depths = _thicknesses(section)
-    named = [f"{name} {number(depth)} mm" for name, depth in zip(section.layers, depths, strict=True)]
     return (
         "Finite-element mesh of the fingertip that the standard sphere presses, without load: "
         f"{number(section.nodes)} nodes and {number(section.elements)} elements"
-        f"{' in one half of the finger; the other half in (b) is its mirror image' if section.half else ''}. "
-        "(a) Plane of symmetry, (b) section through the point of contact, (c) the layers below this point. "
-        f"Thickness there: {joined(named)}. Circle: an end organ, on the border of epidermis and dermis. "
-        "Bone and nail are rigid and have no elements. The outline is that of the model which the authors' "
-        "laboratory published later; the thicknesses of epidermis and dermis are the paper's."
+        f"{' in one half of the finger; the other half is its mirror image' if section.half else ''}. "
+        "Letters as in the paper. Bone and nail are rigid and have no elements. The outline is that of the "
+        "model which the authors' laboratory published later; the thicknesses of epidermis and dermis are "
+        "the paper's."
     )
 
 

@@ -12,17 +12,19 @@ from matplotlib.figure import Figure
 from fingerpad.core.checks import FloatArray
 from fingerpad.experiments.gerling2014.nail_border import NailBorder, StressProfile
 from fingerpad.report.formatting import number
-from fingerpad.report.style import BLACK, BLUE, GREY, ORANGE, PALE, new_figure
+from fingerpad.report.style import BLACK, BLUE, COLUMN_IN, GREY, ORANGE, PALE, new_figure
 
 DECADES = 4.0
 LABEL = "von Mises stress [kPa]"
-NEAR_NAIL = "von Mises stress about the nail [kPa]"
+NEAR_NAIL = "the same near the nail [kPa]"
 
 
 def draw_nail(section: NailBorder) -> Figure:
     """Draw Figure 9: the pressed finger on a logarithmic scale, the border of the nail on a linear one."""
-    figure = new_figure(13.0, 7.0)
-    panels = figure.subplots(2, 3)
+    figure = new_figure(COLUMN_IN, 7.4)
+    grid = figure.add_gridspec(3, 2, height_ratios=(1.0, 1.0, 1.1))
+    below, cut, above, beside = (figure.add_subplot(grid[panel // 2, panel % 2]) for panel in range(4))
+    profile = figure.add_subplot(grid[2, :])
     middle, across, nail = section.middle, section.across, section.nail_mm
     stress = section.von_mises_kpa.ravel()
     wide = _logarithmic(np.concatenate([stress, middle.von_mises_kpa]))
@@ -30,35 +32,31 @@ def draw_nail(section: NailBorder) -> Figure:
     outlines = {"x": _corners(section.x_mm), "y": _corners(section.y_mm), "z": _corners(section.z_mm)}
     both = [{**outlines, "z": sign * outlines["z"]} for sign in (1.0, -1.0)]
 
-    _seen(panels[0, 0], both, ("x", "z"), -outlines["y"], stress, wide)
-    _seen(panels[0, 1], both[:1], ("x", "y"), outlines["z"], stress, wide)
-    _paint(panels[0, 2], np.stack([middle.x_mm, middle.y_mm], axis=-1), middle.von_mises_kpa, wide)
-    _seen(panels[1, 0], both, ("x", "z"), outlines["y"], stress, near)
+    _seen(below, both, ("x", "z"), -outlines["y"], stress, wide)
+    _paint(cut, np.stack([middle.x_mm, middle.y_mm], axis=-1), middle.von_mises_kpa, wide)
+    _seen(above, both, ("x", "z"), outlines["y"], stress, near)
     for sign in (1.0, -1.0):
-        _border(panels[1, 0], nail[..., [0, 2]] * [1.0, sign])
-    _border(panels[0, 1], nail[..., [0, 1]])
-    cut = np.stack([across.z_mm, across.y_mm], axis=-1)
-    _paint(panels[1, 1], np.concatenate([cut, cut * [-1.0, 1.0]]), np.tile(across.von_mises_kpa, 2), near)
-    _profiles(panels[1, 2], section.profile)
-
-    titles = (
-        ("(a) skin from below: the pad", "x, distal [mm]", "z, lateral [mm]"),
-        ("(b) skin from the side", "x, distal [mm]", "y, dorsal [mm]"),
-        ("(c) middle section, z = 0", "x, distal [mm]", "y, dorsal [mm]"),
-        ("(d) skin from above: the nail", "x, distal [mm]", "z, lateral [mm]"),
-        (f"(e) section across, x = {number(across.x_mm)} mm", "z, lateral [mm]", "y, dorsal [mm]"),
-        ("(f) across the border of the nail", "distance from the nail [mm]", LABEL),
-    )
-    for axes, (title, right, up) in zip(panels.flat, titles, strict=True):
-        axes.set_title(title)
-        axes.set_xlabel(right)
-        axes.set_ylabel(up)
-    figure.colorbar(
-        panels[0, 0].collections[0], ax=panels[0, :], label=LABEL, extend="min", pad=0.02, aspect=25
-    )
-    figure.colorbar(
-        panels[1, 0].collections[0], ax=panels[1, :2], label=NEAR_NAIL, extend="max", pad=0.02, aspect=25
-    )
+        _border(above, nail[..., [0, 2]] * [1.0, sign])
+    half = np.stack([across.z_mm, across.y_mm], axis=-1)
+    _paint(beside, np.concatenate([half, half * [-1.0, 1.0]]), np.tile(across.von_mises_kpa, 2), near)
+    _profiles(profile, section.profile)
+    for axes, title, right, up in (
+        (below, "(a) from below: the pad", "x, distal [mm]", "z, lateral [mm]"),
+        (cut, "(b) middle section, z = 0", "x, distal [mm]", "y, dorsal [mm]"),
+        (above, "(c) from above: the nail", "x, distal [mm]", "z, lateral [mm]"),
+        (beside, f"(d) across, x = {number(across.x_mm)} mm", "z, lateral [mm]", "y, dorsal [mm]"),
+        (
+            profile,
+            f"(e) border of the nail: {number(section.ratio)} times the stress of skin 2 to 3 mm away",
+            "distance from the nail [mm]",
+            LABEL,
+        ),
+    ):
+        axes.set_title(title, fontsize=10.0)
+        axes.set(xlabel=right, ylabel=up)
+    for row, text, ends in (((below, cut), LABEL, "min"), ((above, beside), NEAR_NAIL, "max")):
+        bar = figure.colorbar(row[0].collections[0], ax=row, extend=ends, pad=0.02, aspect=15)
+        bar.set_label(text, fontsize=9.0)
     return figure
 
 
@@ -139,11 +137,9 @@ def caption_nail(section: NailBorder) -> str:
     """Caption of Figure 9."""
     return (
         "Predicted von Mises stress at the end of the hold, on the finger that the standard sphere deforms; "
-        "nothing here was observed: (a, b) "
-        "in the outermost elements of the skin and (c) in the middle section, on a logarithmic scale of "
-        f"{number(DECADES)} decades; (d) the back of the finger and (e) the section with the highest ratio, "
-        "on a linear scale up to the highest stress at the border of the nail (its outline in white); (f) "
-        "median and middle 80 % of all sections that cross that border. One half is computed; the other is "
-        "its mirror image. The paper shows high stresses at the border of the nail. "
-        f"{section.text}"
+        "nothing here was observed: (a) in the outermost elements of the skin and (b) in the middle section, "
+        f"on a logarithmic scale of {number(DECADES)} decades; (c) the back of the finger and (d) the section "
+        "with the highest ratio, on a linear scale up to the highest stress at the border of the nail (its "
+        "outline in white); (e) median and middle 80 % of all sections that cross that border. The paper "
+        "shows high stresses at the border of the nail."
     )

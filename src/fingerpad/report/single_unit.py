@@ -18,11 +18,14 @@ from fingerpad.experiments.gerling2014.single_unit import (
 )
 from fingerpad.report.formatting import PARAMETER_SYMBOLS, fixed, number, spelled
 from fingerpad.report.parts import Row, Table
-from fingerpad.report.style import BLACK, ORANGE, draw_rates, new_figure, shared_legend
+from fingerpad.report.style import BLACK, COLUMN_IN, ORANGE, draw_rates, new_figure, shared_legend
 
 BAR_HALF_WIDTH_MM = protocol.BAR_WIDTH.value / 2.0
 STATIC_MARK_MM = 2.9
 """Position at which the paper's static difference is drawn, where no rates are. [mm]"""
+
+ALONG = "place of the bar, distal [mm]"
+"""Results count shifts proximal positive; all figures have the distal side on the right."""
 
 FITTED = "model (fitted)"
 """Name of the line of the model, whose afferent was fitted to what was observed."""
@@ -33,7 +36,7 @@ PAPER_FOLD, PAPER_START = 3, 2
 
 def draw_single_unit(section: SingleUnitResult) -> Figure:
     """Draw Figure 5: dynamic rates on the left, static rates on the right."""
-    figure = new_figure(10.0, 4.5)
+    figure = new_figure(COLUMN_IN, 4.0)
     phases = (
         (
             "(a) dynamic ramp",
@@ -50,13 +53,13 @@ def draw_single_unit(section: SingleUnitResult) -> Figure:
     )
     for axes, (title, predicted_hz, observed_hz, fss) in zip(figure.subplots(1, 2), phases, strict=True):
         axes.axvspan(-BAR_HALF_WIDTH_MM, BAR_HALF_WIDTH_MM, color="#f3f1ea", zorder=0)
-        draw_rates(axes, section.shift_mm, predicted_hz, observed_hz, FITTED)
-        axes.set_title(f"{title}, FSS = {fixed(fss, 2)}")
-        axes.set_xlabel("position of the bar, proximal positive [mm]")
+        draw_rates(axes, -section.shift_mm, predicted_hz, observed_hz, FITTED)
+        axes.set_title(f"{title}, FSS = {fixed(fss, 2)}", fontsize=10.0)
+        axes.set_xlabel(ALONG)
     dynamic, static = figure.axes
     _mark_dynamic_rates(dynamic, section.modulation.dynamic.observed)
     _mark_static_difference(static, section.modulation.static.ours.minimum_hz)
-    shared_legend(figure, figure.axes, columns=3)
+    shared_legend(figure, figure.axes, columns=2)
     return figure
 
 

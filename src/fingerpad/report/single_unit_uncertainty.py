@@ -20,7 +20,8 @@ from fingerpad.report.formatting import (
 )
 from fingerpad.report.parts import Row, Table
 from fingerpad.report.rate_uncertainty import draw_profile, profile_ends, sensitivity_table
-from fingerpad.report.style import BLUE, PALE, draw_rates, new_figure
+from fingerpad.report.single_unit import ALONG
+from fingerpad.report.style import BLUE, COLUMN_IN, PALE, draw_rates, new_figure
 
 GAINS = {
     "intercept_ma": ("β", "mA"),
@@ -31,28 +32,28 @@ GAINS = {
 
 def draw_uncertainty(section: UncertaintyResult) -> Figure:
     """Draw the bands of predicted rates and of new recordings, and the profile of each parameter."""
-    figure = new_figure(10.0, 7.5)
-    grid = figure.add_gridspec(2, 4)
+    figure = new_figure(COLUMN_IN, 7.5)
+    grid = figure.add_gridspec(3, 2)
     for column, (phase, rates) in enumerate(section.rates.items()):
-        axes = figure.add_subplot(grid[0, 2 * column : 2 * column + 2])
+        axes = figure.add_subplot(grid[0, column])
         for label, low, high, colour, alpha in (
             ("new recording", rates.new_low_hz, rates.new_high_hz, PALE, 1.0),
             ("prediction", rates.low_hz, rates.high_hz, BLUE, 0.45),
         ):
             axes.fill_between(
-                section.shift_mm, low, high, color=colour, alpha=alpha, linewidth=0.0, label=label
+                -section.shift_mm, low, high, color=colour, alpha=alpha, linewidth=0.0, label=label
             )
-        draw_rates(axes, section.shift_mm, rates.median_hz, rates.observed_hz, "median")
+        draw_rates(axes, -section.shift_mm, rates.median_hz, rates.observed_hz, "median")
         axes.set_title(f"({'ab'[column]}) {PHASE_LABELS[phase]}")
-        axes.set_xlabel("position of the bar, proximal positive [mm]")
+        axes.set_xlabel(ALONG)
         if column == 0:
             figure.legend(*axes.get_legend_handles_labels(), loc="outside upper center", ncols=4)
     for column, profile in enumerate(section.profiles):
-        axes, name = figure.add_subplot(grid[1, column]), profile.name
+        axes, name = figure.add_subplot(grid[1 + column // 2, column % 2]), profile.name
         found = section.posterior[name]
         draw_profile(axes, profile, section.units[name], section.fit[name], (found.low, found.high))
         axes.set_title(f"({'cdef'[column]}) {IDENTIFIABLE_SYMBOLS[name]}")
-        if column == 0:
+        if column % 2 == 0:
             axes.set_ylabel("loss of log likelihood")
     return figure
 

@@ -24,7 +24,8 @@ TRIAL_STYLES = {
 }
 LINE = f"{protocol.LINE_DIAMETER.value * UM_PER_MM:.0f} µm line"
 CYLINDER = f"{protocol.CYLINDER_DIAMETER.value} mm cylinder"
-NEAR_MM = 2.5
+ALONG = "distance from the indenter's axis, distal [mm]"
+"""Results count distances proximal positive; all figures have the distal side on the right."""
 
 
 def _trials(section: SkinDeflectionResult) -> dict[str, dict[str, IndenterDeflection]]:
@@ -37,23 +38,16 @@ def _trials(section: SkinDeflectionResult) -> dict[str, dict[str, IndenterDeflec
 
 
 def draw_skin_deflection(section: SkinDeflectionResult) -> Figure:
-    """Draw Figure 4: one row per indenter, the whole profile on the left and its middle on the right."""
-    figure = new_figure(10.0, 7.0)
-    panels = figure.subplots(2, 2, width_ratios=(1.7, 1.0), sharey="row")
-    for row, indenter in enumerate((LINE, CYLINDER)):
-        whole, near = panels[row]
-        for axes in (whole, near):
-            draw_profiles(axes, section, indenter)
-        whole.set_title(f"({'ab'[row]}) {indenter}, {protocol.DEPTH.value} mm deep")
-        whole.margins(x=0.01)
-        whole.set_ylabel("deflection towards the bone [mm]")
-        near.set_title("the middle, enlarged")
-        near.set_xlim(-NEAR_MM, NEAR_MM)
-        whole.legend(loc="lower left")
-        whole.invert_yaxis()  # Deflection is drawn downwards; the row shares this axis.
-    for axes in panels[-1]:
-        axes.set_xlabel("distance from the indenter's axis along the finger, proximal positive [mm]")
-    panels[-1, 1].set_xlabel("distance [mm]")
+    """Draw Figure 4: a panel per indenter."""
+    figure = new_figure(11.0, 4.2)
+    panels = figure.subplots(1, 2, sharey=True)
+    for letter, axes, indenter in zip("ab", panels, (LINE, CYLINDER), strict=True):
+        draw_profiles(axes, section, indenter)
+        axes.set_title(f"({letter}) {indenter}, {protocol.DEPTH.value} mm deep")
+        axes.set_xlabel(ALONG)
+        axes.legend(loc="lower left")
+    panels[0].set_ylabel("deflection towards the bone [mm]")
+    panels[0].invert_yaxis()  # Deflection is drawn downwards; the panels share this axis.
     return figure
 
 
@@ -63,16 +57,17 @@ def draw_profiles(axes: Axes, section: SkinDeflectionResult, indenter: str) -> N
         _draw_profile(axes, name, trial[indenter])
     if indenter == CYLINDER:
         _draw_observed(axes, section.observed)
+    axes.margins(x=0.01)
 
 
 def _draw_profile(axes: Axes, name: str, profile: IndenterDeflection) -> None:
     colour, style = TRIAL_STYLES[name]
     fit = f", R² = {fixed(profile.r2, 2)}" if isinstance(profile, CylinderDeflection) else ""
-    axes.plot(profile.distance_mm, profile.deflection_mm, color=colour, linestyle=style, label=name + fit)
+    axes.plot(-profile.distance_mm, profile.deflection_mm, color=colour, linestyle=style, label=name + fit)
 
 
 def _draw_observed(axes: Axes, observed: ObservedDeflection) -> None:
-    distance, deflection, artefact = observed.distance_mm, observed.deflection_mm, observed.is_artefact
+    distance, deflection, artefact = -observed.distance_mm, observed.deflection_mm, observed.is_artefact
     axes.plot(
         distance[~artefact],
         deflection[~artefact],

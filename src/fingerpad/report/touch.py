@@ -1,4 +1,4 @@
-"""One touch in one picture: strain energy density in the pressed finger, and the spikes of a population."""
+"""One touch in one picture: what afferents follow in the pressed finger, and the spikes of a population."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from fingerpad.core.checks import FloatArray, instance
 from fingerpad.core.errors import InputError
 from fingerpad.core.files import path_of
 from fingerpad.core.keywords import known_keywords
-from fingerpad.core.signals import ResponseMap
+from fingerpad.core.signals import STORED_ENERGY, ResponseMap
 from fingerpad.core.units import cosine_and_sine
 from fingerpad.report.style import BLACK, BLUE, ORANGE, new_figure, say_nothing_to_draw, write_png
 
@@ -31,7 +31,7 @@ SKIN = LinearSegmentedColormap.from_list(
 """From pale skin to dark violet; the lightness falls all the way, so that the order survives greyscale."""
 
 DECADES = 2.5
-"""Energy densities that are further below the largest share the palest colour."""
+"""Values that are further below the largest share the palest colour."""
 
 REACH_MM, ROOM_BELOW_MM, MARGIN_MM = 16.0, 2.0, 0.5
 """Skin to either side of the indenter's axis, room below and beside the finger that is shown. [mm]"""
@@ -39,15 +39,15 @@ REACH_MM, ROOM_BELOW_MM, MARGIN_MM = 16.0, 2.0, 0.5
 BODY_MM = 40.0
 """Farther than this from its face no body is drawn. [mm]"""
 
-BONE = "#9a9488"
-"""Colour of bone and nail."""
+BONE, BONE_INSIDE = "#9a9488", "#d9dde0"
+"""Colours of the outline of bone and nail, and of the bone itself, unlike any of `SKIN` and the paper."""
 
 
 @known_keywords
 def save_figure(
     path: str | Path, skin: SkinResponse, response: ResponseMap, indenter: Indenter | None = None
 ) -> Path:
-    """Draw a touch and save the picture: the pressed finger with its energy density, and the spikes.
+    """Draw a touch and save the picture: the finger, coloured by what the afferents follow, and the spikes.
 
     Parameters
     ----------
@@ -100,7 +100,7 @@ def draw(skin: SkinResponse, response: ResponseMap, indenter: Indenter | None = 
     """Draw a touch as `save_figure` saves it."""
     figure = new_figure(9.5, 4.0)
     grid = figure.add_gridspec(2, 2, width_ratios=(1.6, 1.0), height_ratios=(1.0, 4.0))
-    draw_section(figure.add_subplot(grid[:, 0]), skin, indenter)
+    draw_section(figure.add_subplot(grid[:, 0]), skin, indenter, response.quantity)
     motion = figure.add_subplot(grid[0, 1])
     draw_motion(motion, skin)
     draw_spikes(figure.add_subplot(grid[1, 1], sharex=motion), skin, response)
@@ -110,8 +110,10 @@ def draw(skin: SkinResponse, response: ResponseMap, indenter: Indenter | None = 
     return figure
 
 
-def draw_section(axes: Axes, skin: SkinResponse, indenter: Indenter | None = None) -> None:
-    """Draw the middle plane of the pressed finger at the end of the touch, coloured by energy density.
+def draw_section(
+    axes: Axes, skin: SkinResponse, indenter: Indenter | None = None, quantity: str = STORED_ENERGY
+) -> None:
+    """Draw the middle plane of the pressed finger at the end of the touch.
 
     Parameters
     ----------
@@ -121,19 +123,22 @@ def draw_section(axes: Axes, skin: SkinResponse, indenter: Indenter | None = Non
         What is drawn.
     indenter : Indenter, optional
         The body that pressed.
+    quantity : str, optional
+        What colours it, as of `SkinResponse.at_end`. Default: strain energy density.
     """
-    section = skin.section()
-    sed = skin.sed_kpa[-1][section.elements]
-    largest = float(sed.max())
+    section, (name, values) = skin.section(), skin.at_end(quantity)
+    shown = values[section.elements]
+    largest = float(shown.max()) or 1.0
     faces = PolyCollection(
         list(section.corners_mm),
-        array=sed,
+        array=shown,
         cmap=SKIN,
         norm=LogNorm(largest / 10.0**DECADES, largest, clip=True),
         edgecolors="face",
         linewidths=0.3,
     )
     axes.add_collection(faces)
+    _fill_bone(axes, section)
     for edges, colour, width in (
         (section.skin_mm, BLACK, 1.0),
         (section.bone_mm, BONE, 1.2),
@@ -153,8 +158,18 @@ def draw_section(axes: Axes, skin: SkinResponse, indenter: Indenter | None = Non
         _draw_indenter(axes, skin, section, indenter)
     axes.grid(visible=False)
     bar = axes.figure.colorbar(faces, ax=axes, shrink=0.75, aspect=18, pad=0.02, extend="min")
-    bar.set_label("strain energy density [kPa]")
+    bar.set_label(f"{name} [kPa]")
     bar.ax.yaxis.set_major_formatter("{x:g}")
+
+
+def _fill_bone(axes: Axes, section: Section) -> None:
+    """Fill what the edges of the bone enclose: its nodes by their angle about the middle of its end."""
+    points = section.bone_mm.reshape(-1, 2)
+    if points.size:
+        foot = np.array([points[:, 0].min(), 0.5 * (points[:, 1].min() + points[:, 1].max())])
+        right, up = (points - foot).T
+        around = points[np.argsort(np.arctan2(up, right))]
+        axes.add_collection(PolyCollection([around], facecolors=BONE_INSIDE, edgecolors="none", zorder=0))
 
 
 def _draw_indenter(axes: Axes, skin: SkinResponse, section: Section, indenter: Indenter) -> None:

@@ -40,7 +40,7 @@ def write_touch_page(result: TouchFile, draw: Callable[[], Figure], folder: Path
         If the folder cannot be written.
     """
     caption = (
-        "Left: strain energy density in the middle plane of the finger at the end of the touch. Right: depth "
+        "Left: the middle plane of the finger at the end of the touch. Right: depth "
         "over time, and the spikes of the afferents that fire."
     )
     numbers = asdict(result.summary).items()

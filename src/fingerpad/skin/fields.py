@@ -104,6 +104,12 @@ def _von_mises_at_last_time(deformation: Deformation, _: Mesh) -> FloatArray:
     return von_mises(deformation.stress_kpa)[None]
 
 
+def _compression_at_last_time(deformation: Deformation, _: Mesh) -> FloatArray:
+    from fingerpad.mechanics.fields import largest_compression
+
+    return largest_compression(deformation.stress_kpa)[None]
+
+
 def _of_press(
     name: str,
     unit: str,
@@ -248,6 +254,14 @@ FIELDS: dict[str, Field] = {
             "von Mises stress at the last time",
             Place.ELEMENT,
             _von_mises_at_last_time,
+            stored=Times.LAST,
+        ),
+        Field(
+            "compressive_stress_kpa",
+            "kPa",
+            "largest compressive stress at the last time",
+            Place.ELEMENT,
+            _compression_at_last_time,
             stored=Times.LAST,
         ),
         _watched(

@@ -269,6 +269,24 @@ class SkinResponse(Result):
         """Equivalent stress after von Mises at the last time, (n_elements,). [kPa]"""
         return self.fields["von_mises_kpa"]
 
+    def at_end(self, quantity: str) -> tuple[str, FloatArray]:
+        """Return a quantity that drives afferents in all elements at the last time, and its name.
+
+        Parameters
+        ----------
+        quantity : str
+            As of `sample`. Strain energy density stands for quantities that are not kept in all elements.
+
+        Returns
+        -------
+        str, array (n_elements,)
+            In words, and values. [kPa]
+        """
+        last = {"von_mises": "von_mises_kpa", "compressive_stress": "compressive_stress_kpa"}.get(quantity)
+        if last in self.fields:
+            return quantity.replace("_", " ").replace("mises", "Mises stress"), self.fields[last]
+        return "strain energy density", self.sed_kpa[-1]
+
     def surface_profile(self, time_index: int = -1) -> SurfaceProfile:
         """Deflection along the midline of the volar skin (paper, section 2.2.1).
 

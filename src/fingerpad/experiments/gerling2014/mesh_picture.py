@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from fingerpad.core.checks import FloatArray, IntArray
-from fingerpad.core.results import Matrix, TruthVector, WholeVector, result_class
+from fingerpad.core.results import Matrix, TruthMatrix, TruthVector, WholeVector, result_class
 from fingerpad.data import fingertip
 from fingerpad.geometry.mesh import LAYERS, Mesh
 
@@ -36,10 +36,14 @@ class MeshPicture:
 
     Parameters
     ----------
+    x_mm, y_mm, z_mm : array (n_along + 1, n_around + 1)
+        Nodes of the skin. [mm]
+    under_nail : bool array (n_along + 1, n_around + 1)
+        Whether they lie under the nail.
     along : MeshPlane
         Plane z = 0; right is x, up is y. The outline runs from the volar side over the tip to the back.
     across : MeshPlane
-        Section through the point of contact; right is z, up is y.
+        Proximal end, beside the middle phalanx; right is z, up is y.
     half : bool
         Whether `across` is one half, whose other half is its mirror image.
     contact_mm : (float, float)
@@ -54,6 +58,10 @@ class MeshPicture:
         Of the whole mesh.
     """
 
+    x_mm: Matrix
+    y_mm: Matrix
+    z_mm: Matrix
+    under_nail: TruthMatrix
     along: MeshPlane
     across: MeshPlane
     half: bool
@@ -66,7 +74,7 @@ class MeshPicture:
 
 
 def mesh_picture(mesh: Mesh, contact_x_mm: float) -> MeshPicture:
-    """Cut a mesh along the finger, and across it through the point of contact.
+    """Cut a mesh along the finger, and across it at its proximal end.
 
     Parameters
     ----------
@@ -91,9 +99,14 @@ def mesh_picture(mesh: Mesh, contact_x_mm: float) -> MeshPicture:
     midline = mesh.nodes_mm[mesh.midline_nodes]
     nearest = int(np.abs(midline[:, 0] - contact_x_mm).argmin())
     x, y, _ = midline[nearest].round(DECIMALS).tolist()
+    skin = mesh.nodes_mm[mesh.skin_grid].round(DECIMALS)
     return MeshPicture(
+        x_mm=skin[..., 0],
+        y_mm=skin[..., 1],
+        z_mm=skin[..., 2],
+        under_nail=np.isin(mesh.skin_grid, mesh.nail_nodes),
         along=_plane(mesh, outline_nodes(mesh), 0),
-        across=_plane(mesh, mesh.grid[nearest], 2),
+        across=_plane(mesh, mesh.grid[0], 2),
         half=not mesh.full,
         contact_mm=(x, y),
         layers=LAYERS,

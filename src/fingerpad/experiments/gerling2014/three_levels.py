@@ -18,9 +18,6 @@ from fingerpad.skin.sampling import SkinResponse
 OFFSETS_MM = (0.0, 1.0, 2.0)
 """Distances of the three afferents from the axis of the sphere, distal. [mm]"""
 
-REACH_MM, STEP_MM = 5.0, 0.1
-"""Range about the contact, and spacing, at which the drive along the finger is read. [mm]"""
-
 UNTIL_MS, POTENTIAL_STEP_MS = 200.0, 0.5
 """Current and potential are given from the onset up to this time, at this spacing and about spikes. [ms]"""
 
@@ -39,16 +36,12 @@ class ThreeLevels:
         Duration of the ramp. [ms]
     x_mm, y_mm : array (n_outline + 1, n_through + 1)
         Nodes of the plane z = 0 at the end of the hold, through from the skin to the bone. [mm]
-    sed_kpa : array (n_outline, n_through)
-        Stored strain energy density of the elements beside that plane. [kPa]
+    pressed : str
+        Name of what the afferent follows, as it is known in all elements.
+    pressed_kpa : array (n_outline, n_through)
+        Its values in the elements beside that plane. [kPa]
     end_ms : float
         End of the hold. [ms]
-    quantity : str
-        What drives the afferent, a name of `SkinResponse.sample`.
-    distance_mm : array (n_sites,)
-        Positions along the finger relative to the contact, distal positive. [mm]
-    drive_at_ramp_end, drive_at_hold_end : array (n_sites,)
-        The quantity at the depth of the receptors there. [kPa; strains have no unit]
     offset_mm : array (3,)
         Positions of the afferents relative to the contact. [mm]
     spikes_ms : tuple of arrays
@@ -68,12 +61,9 @@ class ThreeLevels:
     ramp_ms: float
     x_mm: Matrix
     y_mm: Matrix
-    sed_kpa: Matrix
+    pressed: str
+    pressed_kpa: Matrix
     end_ms: float
-    quantity: str
-    distance_mm: Vector
-    drive_at_ramp_end: Vector
-    drive_at_hold_end: Vector
     offset_mm: Vector
     spikes_ms: tuple[Vector, ...]
     dynamic_rate_hz: Vector
@@ -103,9 +93,8 @@ def three_levels(standard: SkinResponse, afferent: Afferent) -> ThreeLevels:
     mesh, curvature = standard.mesh, protocol.STANDARD_CURVATURE.value
     nodes = outline_nodes(mesh)
     moved = (mesh.nodes_mm + standard.displacement_mm)[nodes].round(DECIMALS)
-    distance = np.arange(-REACH_MM, REACH_MM + 0.5 * STEP_MM, STEP_MM).round(6)
     quantity = afferent.static_quantity
-    drive = standard.sample(quantity, np.stack([RECEPTOR_X_MM + distance, 0.0 * distance], axis=-1))
+    pressed, values = standard.at_end(quantity)
     ramp_ms = protocol.RAMP.value
     offset = np.array(OFFSETS_MM)
     sed = standard.sed(
@@ -126,12 +115,9 @@ def three_levels(standard: SkinResponse, afferent: Afferent) -> ThreeLevels:
         ramp_ms=ramp_ms,
         x_mm=moved[..., 0],
         y_mm=moved[..., 1],
-        sed_kpa=standard.sed_kpa[-1][outline_elements(mesh)],
+        pressed=pressed,
+        pressed_kpa=values[outline_elements(mesh)],
         end_ms=float(sed.times_ms[-1]),
-        quantity=quantity,
-        distance_mm=distance,
-        drive_at_ramp_end=drive[np.abs(standard.times_ms - ramp_ms).argmin()],
-        drive_at_hold_end=drive[-1],
         offset_mm=offset,
         spikes_ms=trains,
         dynamic_rate_hz=dynamic_hz,
