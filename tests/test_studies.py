@@ -462,42 +462,6 @@ def test_at_rest_an_afferent_fires_where_its_current_alone_reaches_the_threshold
     assert response_maps.resting_response(extended) == resting
 
 
-def test_untouched_skin_is_left_open_on_the_finger(tiny_skin):
-    untouched = tiny_skin.with_fields(sed_kpa=np.zeros_like(tiny_skin.sed_kpa))
-    finger = response_maps.finger_map(untouched, RESTLESS)
-    assert np.isnan(finger.static_rate_hz).all()
-    assert np.isnan(finger.dynamic_rate_hz).all()
-    assert np.isnan(finger.first_spike_latency_ms).all()
-
-
-def test_the_finger_carries_the_answers_of_the_afferents_below_its_faces(tiny_skin):
-    """Energy that grows with x: below each face answers what a lone afferent answers there."""
-    mesh = tiny_skin.mesh
-    x = mesh.nodes_mm[mesh.elements, 0].mean(axis=1)
-    sed = np.outer(tiny_skin.times_ms / tiny_skin.times_ms[-1], 3.0 * np.exp(-np.square(x - 18.0)))
-    skin = tiny_skin.with_fields(sed_kpa=sed)
-    found = response_maps.finger_map(skin, SENSITIVE)
-    grid = mesh.nodes_mm[mesh.skin_grid]
-    np.testing.assert_array_equal(found.y_mm, (grid + skin.displacement_mm[mesh.skin_grid])[..., 1])
-    assert found.half
-    middle = 0.25 * (grid[:-1, :-1] + grid[1:, :-1] + grid[1:, 1:] + grid[:-1, 1:])
-    rates = found.static_rate_hz
-    assert rates.shape == middle.shape[:2]
-    dorsal = middle[..., 1] > 0.0
-    for side in (dorsal, ~dorsal):
-        answers = np.argwhere(side & np.isfinite(rates))
-        assert len(answers) > 5
-        for along, around in answers[::5]:
-            dynamic_hz, static_hz = SENSITIVE.rates(skin.sed([middle[along, around]]))
-            np.testing.assert_allclose(rates[along, around], static_hz[0], rtol=1e-9)
-            dynamic = found.dynamic_rate_hz[along, around]
-            np.testing.assert_allclose(dynamic, dynamic_hz[0] or np.nan, rtol=1e-9)
-            first_ms = SENSITIVE.spikes(skin.sed([middle[along, around]]))[0][0]
-            np.testing.assert_allclose(found.first_spike_latency_ms[along, around], first_ms, rtol=1e-9)
-    assert np.nanmax(rates[np.abs(middle[..., 0] - 18.0) < 0.8]) == np.nanmax(rates)
-    assert np.isnan(found.first_spike_latency_ms[np.abs(middle[..., 0] - 18.0) > 5.0]).all()
-
-
 # The nail
 
 

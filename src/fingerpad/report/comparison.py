@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from fingerpad.experiments.gerling2014.claim_row import ClaimRow, Group, Verdict
 from fingerpad.experiments.gerling2014.statements import ABSENT, Statement
 from fingerpad.report.formatting import joined
-from fingerpad.report.parts import Kind, Row, Table
+from fingerpad.report.parts import COLUMNS, Row, Table
 
 SIGNS = {
     Verdict.MET: "✓",
@@ -17,15 +17,6 @@ SIGNS = {
     Verdict.NOT_APPLICABLE: "–",
 }
 """Sign of each verdict; they differ without colour."""
-
-KINDS: dict[Verdict, Kind] = {
-    Verdict.MET: "met",
-    Verdict.MISSED: "missed",
-    Verdict.NOT_JUDGED: "open",
-    Verdict.NOT_DECIDABLE: "open",
-    Verdict.NOT_APPLICABLE: "open",
-}
-"""How a row is marked by its verdict."""
 
 TITLES = {
     Group.STATEMENT: "Statements of the paper that can fail",
@@ -43,6 +34,12 @@ MEANINGS = {
     Group.ADDITION: "The paper says nothing about these that could be judged. The bounds are ours or those "
     "of other publications.",
 }
+
+
+SETS = (
+    "`paper` is the paper's own system: Trial 3 with a Poisson's ratio of 0.40, strain energy density in "
+    "both terms, response surfaces. `human` serves all three levels."
+)
 
 
 def side_by_side(paper: Sequence[ClaimRow], human: Sequence[ClaimRow]) -> list[tuple[ClaimRow, Row]]:
@@ -67,16 +64,16 @@ def _side_by_side(both: Sequence[ClaimRow | None]) -> tuple[ClaimRow, Row]:
     told = dict.fromkeys("; ".join(text for text in (row.fitted_to, row.note) if text) for row in known)
     # A number that one set was fitted to is shown as fitted.
     first = min(known, key=lambda row: row.group is not Group.FITTED)
-    return first, Row((*cells, " | ".join(told)), KINDS[known[0].verdict])
+    return first, Row((*cells, " | ".join(told)))
 
 
 def comparison_tables(paper: Sequence[ClaimRow], human: Sequence[ClaimRow]) -> list[Table]:
     """Return one table per group of rows that are no statement, both sets side by side."""
     rows = side_by_side(paper, human)
+    found = {group: [row for first, row in rows if first.group is group] for group in TITLES}
     columns = ("quantity", "the paper", "`paper`", "", "`human`", "", "what was fitted, and how it is judged")
     return [
-        Table(TITLES[group], columns, [row for first, row in rows if first.group is group], MEANINGS[group])
-        for group in (Group.FITTED, Group.DEFINITION, Group.ADDITION)
+        Table(TITLES[group], columns, listed, MEANINGS[group]) for group, listed in found.items() if listed
     ]
 
 
@@ -118,10 +115,20 @@ def statement_table(statements: Sequence[Statement]) -> Table:
     return Table(
         TITLES[Group.STATEMENT],
         ("section", "statement", "the paper", "`paper`", "", "`human`", ""),
-        [Row((each.section, *statement_cells(each)), KINDS[each.verdict_paper]) for each in statements],
-        "`paper` is the paper's own system: Trial 3 with a Poisson's ratio of 0.40, strain energy density in "
-        "both terms, response surfaces. `human` serves all three levels.",
+        [Row((each.section, *statement_cells(each))) for each in statements],
+        SETS,
     )
+
+
+def verdict_table(statements: Sequence[Statement]) -> Table:
+    """Return the verdict of every statement that can fail with both sets, and how many are met."""
+    rows = []
+    for each in statements:
+        paper, human = statement_cells(each)[3::2]
+        rows.append(Row((f"{each.section} {each.statement}", paper, human)))
+    met = (sum(getattr(each, f"verdict_{name}") is Verdict.MET for each in statements) for name in COLUMNS)
+    rows.append(Row(("met", *(f"{count} of {len(statements)}" for count in met)), "final"))
+    return Table("", ("section and statement of the paper", *(f"`{name}`" for name in COLUMNS)), rows, SETS)
 
 
 def statement_cells(each: Statement) -> tuple[str, ...]:

@@ -12,6 +12,7 @@ from fingerpad.report.parts import Row, Table
 from fingerpad.report.style import (
     BLACK,
     BLUE,
+    COLUMN_IN,
     GREEN,
     GREY,
     ORANGE,
@@ -36,8 +37,8 @@ STYLES: tuple[LineStyle, ...] = (
 
 def draw_thresholds(section: CurvatureThresholds) -> Figure:
     """Draw Weber fractions by standard, and the curves behind them."""
-    figure = new_figure(11.0, 4.6)
-    fractions, curves = figure.subplots(1, 2)
+    figure = new_figure(COLUMN_IN, 8.0)
+    fractions, curves = figure.subplots(2, 1)
     _fractions(fractions, section)
     _curves(curves, section)
     return figure
@@ -117,14 +118,7 @@ def _cycled(count: int) -> list[LineStyle]:
 
 
 def caption_thresholds(section: CurvatureThresholds) -> str:
-    """Caption of the figure, with the error of interpolation."""
-    errors = np.abs([entry.error_per_m for entry in section.interpolation])
-    predicted = (
-        " The interpolation predicts the paper's spheres, each left out, within "
-        f"{number(float(errors.max()), 2)} 1/m."
-        if errors.size
-        else ""
-    )
+    """Caption of the figure."""
     return (
         "(a) Difference in curvature that is discriminated from a standard in 75 % of trials, as a share of "
         "the standard: Gradient Sum of static rates of two populations, each with the noise fitted to the "
@@ -132,7 +126,7 @@ def caption_thresholds(section: CurvatureThresholds) -> str:
         "recalled, not read in the original). Bars: 95 % interval of an experiment with "
         f"{number(section.judgements)} judgements of each comparison. (b) Hit rates of that experiment and "
         "fitted psychometric functions, first population. Rates are interpolated between "
-        f"{len(section.pressed_per_m)} spheres.{predicted}"
+        f"{len(section.pressed_per_m)} spheres."
     )
 
 

@@ -11,7 +11,7 @@ from fingerpad.data import psychophysics
 from fingerpad.experiments.gerling2014.discrepancy import CriterionErrorBars
 from fingerpad.experiments.gerling2014.goodwin import GoodwinHitRates
 from fingerpad.experiments.gerling2014.sphere_discrimination import ObserverHitRates, SphereDiscrimination
-from fingerpad.report.formatting import fixed, number, whole_percent, with_error
+from fingerpad.report.formatting import fixed, number, with_error
 from fingerpad.report.parts import Row, Table
 from fingerpad.report.style import (
     BLACK,
@@ -91,19 +91,12 @@ def draw_noise(section: SphereDiscrimination) -> Figure:
 
 def caption_noise(section: SphereDiscrimination) -> str:
     """Caption of the noise figure."""
-    reasons = section.reasons
-    rise, needed = (rises["static"][0] for rises in (reasons.rise, reasons.rise_for_paper_noise))
-    people = (
-        f"; σ₁ = {number(section.noise_sigma_paper)} with {whole_percent(needed)} gives the observed 0.95"
-        if np.isfinite(needed)
-        else ""
-    )
     return (
         "Root mean square distance of predicted hit rates from those of people (Goodwin et al. 1991) at 296 "
         "and 365 1/m, against the noise. (a) Each code has its own best noise. (b) The range of the paper, "
         f"in {number(section.sessions)} sessions of the whole protocol; bars are Monte-Carlo errors. The "
-        "best noise compensates for the slope of a code: our static Gradient Sum increases by "
-        f"{whole_percent(rise)} from 287 to 365 1/m{people}."
+        "best noise compensates for the slope of a code: the steeper a sum rises with curvature, the more "
+        "noise brings its hit rates down to those of people."
     )
 
 
@@ -164,7 +157,7 @@ def draw_hit_rates(axes: Axes, section: SphereDiscrimination, rates: ObserverHit
     """Draw the hit rates of one observer at both positions, those of people, and chance."""
     axes.axhline(CHANCE, color=GREY, linewidth=1.0, linestyle=(0, (6, 3)), label="chance")
     _curves(axes, section.curvature_per_m[1:], rates)
-    _people(axes, section.goodwin)
+    draw_people(axes, section.goodwin)
 
 
 def _curves(axes: Axes, comparison: FloatArray, rates: ObserverHitRates) -> None:
@@ -185,7 +178,8 @@ def _curves(axes: Axes, comparison: FloatArray, rates: ObserverHitRates) -> None
         )
 
 
-def _people(axes: Axes, observed: GoodwinHitRates) -> None:
+def draw_people(axes: Axes, observed: GoodwinHitRates) -> None:
+    """Draw the hit rates of people with their intervals."""
     axes.errorbar(
         observed.curvature_per_m,
         observed.hit_rate,
@@ -223,28 +217,26 @@ def caption_observers(section: SphereDiscrimination) -> str:
     """Caption of Figure 7."""
     return (
         "Fraction of trials in which a sphere is discriminated from the standard of "
-        f"{number(section.curvature_per_m[0])} 1/m; bars are one standard deviation over hit rates. Blue, "
-        "solid: predicted for a sphere over the middle of the receptors; orange, dotted: for one 0.2 mm "
-        f"away. Diamonds: observed in people (Goodwin et al. 1991), with {_interval(section.goodwin)}. (a-c) "
-        "Gradient Sum of static rates, dynamic rates and first-spike latencies, (d) Euclidean Distance of "
-        f"static rates, all with noise σ₁ = {number(section.noise_sigma)}, which was fitted to the diamonds "
-        f"with the code of (a); the paper's best noise is {number(section.noise_sigma_paper)}. (e, f) The "
-        "paper's noise on either side of its best; (g) 10 noise matrices in place of 100; (h) the paper's "
-        "best noise. In the paper the static Gradient Sum "
-        "fits best and hardly depends on the shift, dynamic rates and latencies depend on it, more noise "
-        "lowers the curve, and fewer matrices widen the bars."
+        f"{number(section.curvature_per_m[0])} 1/m; bars are one standard deviation over hit rates, within "
+        "0 and 1. Blue, solid: predicted for a sphere over the middle of the receptors; orange, dotted: for "
+        "one 0.2 mm away. Diamonds: observed in people (Goodwin et al. 1991), with "
+        f"{_interval(section.goodwin)}. (a-c) Gradient Sum of static rates, dynamic rates and first-spike "
+        "latencies, (d) Euclidean Distance of static rates, all with the noise that was fitted to "
+        "the diamonds with the code of (a). (e, f) "
+        "The paper's noise on either side of its best; (g) 10 noise matrices in place of 100; (h) the "
+        "paper's best noise. In the paper the static Gradient Sum fits best and hardly depends on the shift, "
+        "dynamic rates and latencies depend on it, more noise lowers the curve, and fewer matrices widen the "
+        "bars."
     )
 
 
-def caption_criterion(section: SphereDiscrimination) -> str:
+def caption_criterion(_: SphereDiscrimination) -> str:
     """Caption of Figure 8."""
     return (
         "Gradient Sum of static rates with a varied criterion: for each hit rate the decision point is "
-        "multiplied by a new normal variable with mean 1 and the standard deviation in the title. In the "
-        "paper the wider distribution increases the error bars and does not change the means. Noise σ₁ = "
-        f"{number(section.noise_sigma)}, fitted without a varied criterion. Blue, solid: sphere over the "
-        "middle of the receptors; orange, dotted: 0.2 mm away; bars are one standard deviation. Diamonds: "
-        f"observed in people (Goodwin et al. 1991), with {_interval(section.goodwin)}."
+        "multiplied by a new normal variable with mean 1 and the standard deviation in the title. Marks, "
+        "bars and noise as in Figure 7 (a). In the paper the wider distribution increases the error bars and "
+        "does not change the means."
     )
 
 

@@ -95,7 +95,8 @@ def _draw_solid(
         faces.append(np.stack(bone, axis=-1))
         paint.append(np.array([to_rgb(BONE)]))
     drawn: Any = {"edgecolors": "#00000060", "linewidths": 0.2}
-    axes.add_collection3d(Poly3DCollection(faces, facecolors=np.concatenate(paint), **drawn))
+    # Polygons of unequal lengths are padded with what lies in memory, which must not set the limits.
+    axes.add_collection3d(Poly3DCollection(faces, facecolors=np.concatenate(paint), **drawn), autolim=False)
     low, high = skin.min(axis=(0, 1)), skin.max(axis=(0, 1))
     across = (-high[1], high[1])
     axes.set(xlim=(low[0], high[0]), ylim=across, zlim=(low[2], high[2]))

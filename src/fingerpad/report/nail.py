@@ -138,8 +138,9 @@ def caption_nail(section: NailBorder) -> str:
     return (
         "Predicted von Mises stress at the end of the hold, on the finger that the standard sphere deforms; "
         "nothing here was observed: (a) in the outermost elements of the skin and (b) in the middle section, "
-        f"on a logarithmic scale of {number(DECADES)} decades; (c) the back of the finger and (d) the section "
-        "with the highest ratio, on a linear scale up to the highest stress at the border of the nail (its "
-        "outline in white); (e) median and middle 80 % of all sections that cross that border. The paper "
+        f"on a logarithmic scale of {number(DECADES)} decades; (c) the back of the finger and (d) the "
+        "section with the highest ratio, on a linear scale up to the highest stress at the border of the "
+        "nail (its outline in white); (e) median and middle 80 % of all sections that cross that "
+        "border. The paper "
         "shows high stresses at the border of the nail."
     )

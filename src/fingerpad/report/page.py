@@ -11,8 +11,11 @@ from pathlib import Path
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from fingerpad.core.files import write_atomically
-from fingerpad.report.parts import Drawing, Page, Table
+from fingerpad.report.parts import COLUMNS, Drawing, Page, Table
 from fingerpad.report.style import png
+
+VERDICTS = {"✓": "met", "✗": "missed", "○": "open", "?": "open"}
+"""How a cell is marked by the sign that it begins with."""
 
 
 def write_html(page: Page, path: Path) -> Path:
@@ -53,16 +56,17 @@ def write_html(page: Page, path: Path) -> Path:
         lstrip_blocks=True,
     )
     environment.filters["base64"] = lambda content: base64.b64encode(content).decode("ascii")
-    environment.filters["inline"] = _inline
+    environment.filters |= {"inline": _inline, "code": _code}
+    environment.filters["verdict"] = lambda cell: VERDICTS.get(cell.partition(" ")[0], "")
     environment.tests |= {"table": lambda part: isinstance(part, Table)}
     environment.tests |= {"drawing": lambda part: isinstance(part, Drawing)}
-    content = environment.get_template("template.html").render(page=page, images=images)
+    content = environment.get_template("template.html").render(page=page, images=images, columns=COLUMNS)
     return write_beside(path, content, images, "figures")
 
 
 def images_of(page: Page) -> dict[str, bytes]:
     """Draw all figures of a page, as PNG by their names."""
-    return {drawing.name: png(drawing.draw) for drawing in page.drawings}
+    return {name: png(draw) for drawing in page.drawings for name, draw in drawing.images.items()}
 
 
 def write_beside(path: Path, content: str, images: Mapping[str, bytes], folder: str) -> Path:
@@ -76,5 +80,9 @@ def write_beside(path: Path, content: str, images: Mapping[str, bytes], folder: 
 
 def _inline(text: str) -> str:
     """Return a paragraph as HTML: escaped, with its links and code."""
-    linked = re.sub(r"\[([^\]]+)\]\(([^)\s]+)\)", r'<a href="\2">\1</a>', html.escape(text))
-    return re.sub(r"`([^`]+)`", r"<code>\1</code>", linked)
+    return re.sub(r"\[([^\]]+)\]\(([^)\s]+)\)", r'<a href="\2">\1</a>', _code(text))
+
+
+def _code(text: str) -> str:
+    """Return a text as HTML: escaped, with its code."""
+    return re.sub(r"`([^`]+)`", r"<code>\1</code>", html.escape(text))

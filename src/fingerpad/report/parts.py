@@ -9,8 +9,11 @@ from typing import Literal, TypeVar
 
 from matplotlib.figure import Figure
 
-Kind = Literal["", "met", "missed", "open", "assumed", "final"]
-"""How a row is marked in HTML: a verdict, an assumed input, or the row that is the result."""
+Kind = Literal["", "assumed", "final"]
+"""How a row is marked in HTML: an assumed input, or the row that is the result."""
+
+COLUMNS = ("paper", "human")
+"""The two sets of tissues of a reproduction, in the order of their columns in tables and figures."""
 
 
 @dataclass(frozen=True)
@@ -80,6 +83,8 @@ class Drawing:
         What it shows.
     number : int, optional
         Figures up to 9 of a reproduction have the paper's numbers; others go on from 10.
+    human : callable, optional
+        Makes the same figure of the set `human`, to stand on the right; `draw` is then that of `paper`.
     """
 
     name: str
@@ -87,6 +92,15 @@ class Drawing:
     draw: Callable[[], Figure]
     caption: str
     number: int | None = None
+    human: Callable[[], Figure] | None = None
+
+    @property
+    def images(self) -> dict[str, Callable[[], Figure]]:
+        """Drawing functions by the names of the image files."""
+        if self.human is None:
+            return {self.name: self.draw}
+        draws = zip(COLUMNS, (self.draw, self.human), strict=True)
+        return {f"{self.name}_{column}": draw for column, draw in draws}
 
     @property
     def label(self) -> str:
@@ -143,10 +157,13 @@ class Chapter:
         The heading; empty for parts that follow the introduction directly.
     parts : sequence of Paragraph, Table or Drawing
         In order.
+    folded : sequence of Paragraph, Table or Drawing, optional
+        What stands below them behind a fold.
     """
 
     title: str
     parts: Sequence[Part]
+    folded: Sequence[Part] = ()
 
     @property
     def anchor(self) -> str:
@@ -161,14 +178,22 @@ class Chapter:
         return "-".join(kept.split())
 
     @property
+    def contents(self) -> str:
+        """Titles of what is folded, each once."""
+        titles = [getattr(part, "title", "") for part in self.folded]
+        return "; ".join(
+            dict.fromkeys(title.removesuffix(", human").removesuffix(", paper") for title in titles)
+        )
+
+    @property
     def drawings(self) -> list[Drawing]:
         """Figures of the chapter."""
-        return [part for part in self.parts if isinstance(part, Drawing)]
+        return [part for part in (*self.parts, *self.folded) if isinstance(part, Drawing)]
 
     @property
     def tables(self) -> list[Table]:
         """Tables of the chapter."""
-        return [part for part in self.parts if isinstance(part, Table)]
+        return [part for part in (*self.parts, *self.folded) if isinstance(part, Table)]
 
 
 @dataclass(frozen=True)
@@ -184,7 +209,9 @@ class Page:
     chapters : sequence of Chapter
         In order.
     opening : sequence of Drawing, optional
-        Small figures side by side after the summary, each with one sentence as its caption.
+        Small figures after the summary, each with one sentence as its caption.
+    verdicts : Table, optional
+        What stands beside them.
     """
 
     heading: str
@@ -192,6 +219,7 @@ class Page:
     paragraphs: Sequence[str]
     chapters: Sequence[Chapter]
     opening: Sequence[Drawing] = ()
+    verdicts: Table | None = None
 
     @property
     def drawings(self) -> list[Drawing]:

@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import partial
+from inspect import signature
 from pathlib import Path
+from typing import Any
+
+from matplotlib.figure import Figure
 
 from fingerpad.data import STATUSES
-from fingerpad.experiments.gerling2014.reproduction import PublishedNumber, ReproductionResult, SetResult
-from fingerpad.report.comparison import comparison_tables, count_sentence, notes_table, statement_table
+from fingerpad.experiments.gerling2014.reproduction import PublishedNumber, ReproductionResult
+from fingerpad.report.comparison import comparison_tables, notes_table, statement_table, verdict_table
 from fingerpad.report.curvature_thresholds import caption_thresholds, draw_thresholds, threshold_tables
 from fingerpad.report.discrimination import (
     caption_criterion,
@@ -26,7 +31,7 @@ from fingerpad.report.manifest import edition, manifest_chapter
 from fingerpad.report.mesh_picture import caption_mesh, draw_mesh
 from fingerpad.report.nail import caption_nail, draw_nail
 from fingerpad.report.page import write_html
-from fingerpad.report.parts import Chapter, Drawing, Page, Part, Row, Table, illustrated
+from fingerpad.report.parts import COLUMNS, Chapter, Drawing, Page, Paragraph, Part, Row, Table
 from fingerpad.report.population import caption_population, draw_population
 from fingerpad.report.single_unit import caption_single_unit, draw_single_unit, single_unit_tables
 from fingerpad.report.single_unit_uncertainty import (
@@ -70,119 +75,165 @@ def write_report(result: ReproductionResult, folder: Path) -> Path:
 
 
 def reproduction_page(result: ReproductionResult) -> Page:
-    """Return the page of a reproduction; parts beyond the paper are left out where they were not run."""
+    """Return the page of a reproduction: `paper` in the first column of figures, `human` in the second."""
+    paper, human = result.paper, result.human
+
+    def pair(
+        number: int,
+        name: str,
+        title: str,
+        part: str,
+        draw: Callable[..., Figure],
+        caption: Callable[..., str],
+    ) -> Drawing:
+        first, second = getattr(paper, part), getattr(human, part)
+        text = caption(first, second) if len(signature(caption).parameters) > 1 else caption(first)
+        name = f"figure_{number}_{name}"
+        return Drawing(name, title, partial(draw, first), text, number, partial(draw, second))
+
+    def tables(part: str, of: Callable[[Any], Sequence[Table]]) -> list[Table]:
+        return [
+            replace(table, title=f"{table.title}, {name}")
+            for name in COLUMNS
+            for table in of(getattr(getattr(result, name), part))
+        ]
+
+    def single(
+        number: int, name: str, title: str, draw: Callable[..., Figure], part: Any, text: str
+    ) -> Drawing:
+        return Drawing(f"figure_{number}_{name}", title, partial(draw, part), text, number)
+
+    deflection, mesh = result.skin_deflection, paper.mesh
+    sets = {name: getattr(result, name).discrimination for name in COLUMNS}
+    more: list[Part] = []
+    beyond: list[Part] = [pair(10, "noise", "Amount of noise", "discrimination", draw_noise, caption_noise)]
+    if paper.single_unit_uncertainty is None:
+        text = "uncertainty of the fit and curvature thresholds (`fingerpad reproduce --extended`)"
+        more.append(Paragraph(f"Not run: {text}."))
+    else:
+        beyond += [
+            pair(
+                11,
+                "uncertainty",
+                "Uncertainty of the fit",
+                "single_unit_uncertainty",
+                draw_uncertainty,
+                caption_uncertainty,
+            ),
+            *tables("single_unit_uncertainty", uncertainty_tables),
+            pair(
+                12,
+                "curvature_thresholds",
+                "Thresholds of curvature",
+                "curvature_thresholds",
+                draw_thresholds,
+                caption_thresholds,
+            ),
+            *tables("curvature_thresholds", threshold_tables),
+        ]
+    chapters = [
+        Chapter(
+            "The finger",
+            [single(1, "mesh", "Mesh of the finger", draw_mesh, mesh, caption_mesh(mesh))],
+            [tissue_table(result.tissues)],
+        ),
+        Chapter(
+            "Three levels",
+            [pair(2, "three_levels", "One sphere on three levels", "levels", draw_levels, caption_levels)],
+        ),
+        Chapter(
+            "From rates to a percept",
+            [single(3, "steps", "Steps to a hit rate", draw_steps, sets, caption_steps(sets))],
+        ),
+        Chapter(
+            "Level 1: skin",
+            [
+                single(
+                    4,
+                    "skin_deflection",
+                    "Deflection of the skin",
+                    draw_skin_deflection,
+                    deflection,
+                    caption_skin_deflection(deflection),
+                )
+            ],
+            skin_deflection_tables(deflection),
+        ),
+        Chapter(
+            "Level 2: afferent",
+            [
+                pair(
+                    5,
+                    "single_unit",
+                    "Rates under a bar",
+                    "single_unit",
+                    draw_single_unit,
+                    caption_single_unit,
+                )
+            ],
+            tables("single_unit", single_unit_tables),
+        ),
+        Chapter(
+            "Level 3: population",
+            [
+                pair(
+                    6,
+                    "population",
+                    "Rates and latencies under a sphere",
+                    "population",
+                    draw_population,
+                    caption_population,
+                )
+            ],
+        ),
+        Chapter(
+            "Level 3: discrimination",
+            [
+                pair(
+                    7,
+                    "discrimination",
+                    "Discrimination of spheres",
+                    "discrimination",
+                    draw_observers,
+                    caption_observers,
+                ),
+                pair(
+                    8,
+                    "varied_criterion",
+                    "The same with a varied criterion",
+                    "discrimination",
+                    draw_criterion,
+                    caption_criterion,
+                ),
+            ],
+            tables("discrimination", discrimination_tables),
+        ),
+        Chapter(
+            "The border of the nail",
+            [pair(9, "nail", "Stress at the border of the nail", "nail", draw_nail, caption_nail)],
+        ),
+        Chapter("Beyond the paper", more, beyond),
+        Chapter(
+            "All numbers",
+            [],
+            [
+                statement_table(result.statements),
+                notes_table(paper.comparison, human.comparison),
+                *comparison_tables(paper.comparison, human.comparison),
+            ],
+        ),
+        Chapter("Published numbers used", [], input_tables(result.inputs)),
+        Chapter("Provenance", [], manifest_chapter(result.manifest).parts),
+    ]
     return Page(
         "From a touch to a percept",
         "A finite-element fingertip, slowly adapting afferents and an observer, after Gerling et al. 2014. "
         f"{edition(result.manifest)}",
-        reproduction_summary(result),
-        [
-            Chapter("The paper, statement by statement", [statement_table(result.statements)]),
-            Chapter("Tissues", [tissue_table(result.tissues)]),
-            Chapter(
-                "Level 1: skin",
-                illustrated(
-                    result.skin_deflection,
-                    skin_deflection_tables,
-                    (
-                        4,
-                        "skin_deflection",
-                        "Deflection of the skin",
-                        draw_skin_deflection,
-                        caption_skin_deflection,
-                    ),
-                ),
-            ),
-            *_levels("paper", result.paper),
-            *_levels("human", result.human),
-            Chapter(
-                "Further numbers beside the paper",
-                [
-                    notes_table(result.paper.comparison, result.human.comparison),
-                    *comparison_tables(result.paper.comparison, result.human.comparison),
-                ],
-            ),
-            Chapter("Published numbers used", input_tables(result.inputs)),
-            manifest_chapter(result.manifest),
-        ],
+        [],
+        chapters,
         first_screen(result),
+        verdict_table(result.statements),
     )
-
-
-def _levels(name: str, result: SetResult) -> list[Chapter]:
-    """Return the chapters of one set in the paper's order of figures, then what goes beyond the paper."""
-    chapters: dict[str, Sequence[Part]] = {
-        "The finger": illustrated(
-            result.mesh,
-            None,
-            (1, "mesh", "Mesh of the finger and its four layers", draw_mesh, caption_mesh),
-        ),
-        "Three levels": illustrated(
-            result.levels,
-            None,
-            (2, "three_levels", "One sphere on three levels", draw_levels, caption_levels),
-        ),
-        "From rates to a percept": illustrated(
-            result.discrimination, None, (3, "steps", "Steps to a hit rate", draw_steps, caption_steps)
-        ),
-        "Level 2: single afferent": illustrated(
-            result.single_unit,
-            single_unit_tables,
-            (5, "single_unit", "Rates under a bar", draw_single_unit, caption_single_unit),
-        ),
-        "Level 3: population": illustrated(
-            result.population,
-            None,
-            (6, "population", "Rates and latencies under a sphere", draw_population, caption_population),
-        ),
-        "Level 3: discrimination": illustrated(
-            result.discrimination,
-            discrimination_tables,
-            (7, "discrimination", "Discrimination of spheres", draw_observers, caption_observers),
-            (8, "varied_criterion", "The same with a varied criterion", draw_criterion, caption_criterion),
-        ),
-        "The border of the nail": illustrated(
-            result.nail,
-            None,
-            (9, "nail", "Stress at the border of the nail", draw_nail, caption_nail),
-        ),
-        "Beyond the paper: noise": illustrated(
-            result.discrimination, None, (10, "noise", "Amount of noise", draw_noise, caption_noise)
-        ),
-        "Beyond the paper: uncertainty of the fit": illustrated(
-            result.single_unit_uncertainty,
-            uncertainty_tables,
-            (11, "uncertainty", "Uncertainty of the fit", draw_uncertainty, caption_uncertainty),
-        ),
-        "Beyond the paper: curvature thresholds": illustrated(
-            result.curvature_thresholds,
-            threshold_tables,
-            (12, "curvature_thresholds", "Thresholds of curvature", draw_thresholds, caption_thresholds),
-        ),
-    }
-    return [
-        Chapter(f"{name}: {title}", [_of_set(part, name) for part in parts])
-        for title, parts in chapters.items()
-        if parts
-    ]
-
-
-def _of_set(part: Part, name: str) -> Part:
-    """Put the number of a figure and the set before the name of its file."""
-    if not isinstance(part, Drawing):
-        return part
-    return replace(part, name=f"figure_{part.number}_{part.name}_{name}", title=f"{part.title}, {name}")
-
-
-def reproduction_summary(result: ReproductionResult) -> list[str]:
-    """Return the paragraphs above the pictures of the levels: what was met and missed."""
-    paragraphs = [count_sentence(result.statements, name) for name in ("paper", "human")]
-    if result.paper.single_unit_uncertainty is None:
-        paragraphs.append(
-            "Parts beyond the paper were not run: uncertainty of the fit and curvature thresholds "
-            "(`fingerpad reproduce --extended`)."
-        )
-    return paragraphs
 
 
 def input_tables(inputs: Sequence[PublishedNumber]) -> list[Table]:

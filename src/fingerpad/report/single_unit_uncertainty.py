@@ -61,16 +61,12 @@ def draw_uncertainty(section: UncertaintyResult) -> Figure:
 def caption_uncertainty(section: UncertaintyResult) -> str:
     """Describe the bands, the profiles and their marks."""
     level = whole_percent(section.level)
-    within = ", ".join(
-        f"{whole_percent(rates.share_within_new)} of the {phase} ones"
-        for phase, rates in section.rates.items()
-    )
     return (
         f"Uncertainty of one afferent given its rates under a bar {protocol.BAR_WIDTH.value} mm wide at "
         f"{section.shift_mm.size} positions, observed in one afferent of a monkey (Phillips & Johnson 1981; "
         f"circles). (a, b) {level} bands: blue, of the rates that the posterior "
-        "predicts; pale, of a new recording with residuals like those observed. Of the observed "
-        f"rates {within} lie within. (c-f) Loss of log likelihood with one parameter held and the others "
+        "predicts; pale, of a new recording with residuals like those observed. "
+        "(c-f) Loss of log likelihood with one parameter held and the others "
         f"fitted again; points below the dashed line are within the {level} interval, the bar below is that "
         "of the posterior, and the orange line is the response-surface fit, with other weights of phases. "
         "Profiles are not smooth, because rates are discontinuous where a spike enters a window."

@@ -130,10 +130,15 @@ def draw_rates(
         {} if line else {"linestyle": "none", "marker": "_", "markersize": 12.0, "markeredgewidth": 2.0}
     )
     axes.plot(where, predicted_hz, color=BLUE, label=label, **style)
-    open_circles: Any = {"color": BLACK, "markerfacecolor": "white", "markersize": 5.0}
-    axes.plot(where, observed_hz, "o", label="observed", **open_circles)
+    draw_observed_rates(axes, where, observed_hz)
     axes.set_ylabel("firing rate [spikes/s]")
     axes.set_ylim(bottom=0.0)
+
+
+def draw_observed_rates(axes: Axes, where: FloatArray, observed_hz: FloatArray) -> None:
+    """Draw observed firing rates as open circles."""
+    open_circles: Any = {"color": BLACK, "markerfacecolor": "white", "markersize": 5.0}
+    axes.plot(where, observed_hz, "o", label="observed", **open_circles)
 
 
 def shared_legend(figure: Figure, panels: Iterable[Axes], columns: int | None = None) -> None:

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from fingerpad.core.checks import FloatArray
 from fingerpad.core.results import Matrix, Number, Vector, result_class
 from fingerpad.core.signals import ResponseMap, SedTraces
 from fingerpad.data import protocol
@@ -16,7 +15,6 @@ from fingerpad.experiments.conditions import RECEPTOR_X_MM
 from fingerpad.neuron.afferent import Afferent
 from fingerpad.neuron.population import Population
 from fingerpad.neuron.rate_windows import PAPER_WINDOWS_MS
-from fingerpad.neuron.response_maps import evoked_latency_ms
 from fingerpad.neuron.spikes import first_spike_latency_ms
 from fingerpad.skin.sampling import SkinResponse
 
@@ -63,32 +61,6 @@ class ResponseSheet:
 
 
 @result_class
-class FingerMap:
-    """Responses below every face of the skin, on the deformed finger at the end of the hold.
-
-    Parameters
-    ----------
-    x_mm, y_mm, z_mm : array (n_along + 1, n_around + 1)
-        Deformed corners of the faces. [mm]
-    dynamic_rate_hz, static_rate_hz : array (n_along, n_around)
-        Rates of the afferent below the middle of each face; NaN where they are 0 or less than twice those
-        at rest. [spikes/s]
-    first_spike_latency_ms : array (n_along, n_around)
-        NaN without an evoked spike. [ms]
-    half : bool
-        Whether the faces are one half of the finger.
-    """
-
-    x_mm: Matrix
-    y_mm: Matrix
-    z_mm: Matrix
-    dynamic_rate_hz: Matrix
-    static_rate_hz: Matrix
-    first_spike_latency_ms: Matrix
-    half: bool
-
-
-@result_class
 class PopulationMaps(ResponseSheet):
     """Responses of a dense sheet of afferents under the standard sphere (Figure 6).
 
@@ -100,14 +72,11 @@ class PopulationMaps(ResponseSheet):
         Of the same afferent.
     receptors_mm : array (18, 2)
         Places of the paper's receptors. [mm]
-    finger : FingerMap
-        The same three maps on the deformed finger.
     """
 
     curvature_per_m: float
     at_rest: RestingResponse
     receptors_mm: Matrix
-    finger: FingerMap
 
 
 def population_maps(standard: SkinResponse, afferent: Afferent) -> PopulationMaps:
@@ -129,7 +98,6 @@ def population_maps(standard: SkinResponse, afferent: Afferent) -> PopulationMap
         at_rest=resting_response(afferent),
         **vars(response_sheet(sheet(afferent).respond(standard))),
         receptors_mm=Population.grid(afferent=afferent, centre_mm=(RECEPTOR_X_MM, 0.0)).positions_mm,
-        finger=finger_map(standard, afferent),
     )
 
 
@@ -185,39 +153,4 @@ def response_sheet(response: ResponseMap) -> ResponseSheet:
         dynamic_rate_hz=response.dynamic_rate_hz.reshape(shape),
         static_rate_hz=response.static_rate_hz.reshape(shape),
         first_spike_latency_ms=response.first_spike_latency_ms.reshape(shape),
-    )
-
-
-def finger_map(skin: SkinResponse, afferent: Afferent) -> FingerMap:
-    """Simulate an afferent below every face of the skin.
-
-    Parameters
-    ----------
-    skin : SkinResponse
-        To one touch.
-    afferent : Afferent
-        Model of every afferent.
-
-    Returns
-    -------
-    FingerMap
-    """
-    rest, mesh = resting_response(afferent), skin.mesh
-    still, pressed = mesh.nodes_mm[mesh.skin_grid], (mesh.nodes_mm + skin.displacement_mm)[mesh.skin_grid]
-    middle = 0.25 * (still[:-1, :-1] + still[1:, :-1] + still[1:, 1:] + still[:-1, 1:])
-    response = Population(middle.reshape(-1, 3), STEP_MM, afferent).respond(skin)
-
-    def evoked(rate_hz: FloatArray, resting_hz: float) -> FloatArray:
-        kept = np.where((rate_hz > 0.0) & (rate_hz >= 2.0 * resting_hz), rate_hz, np.nan)
-        return kept.reshape(middle.shape[:2])
-
-    latency_ms = evoked_latency_ms(response.first_spike_latency_ms, rest.first_spike_latency_ms)
-    return FingerMap(
-        x_mm=pressed[..., 0],
-        y_mm=pressed[..., 1],
-        z_mm=pressed[..., 2],
-        dynamic_rate_hz=evoked(response.dynamic_rate_hz, rest.dynamic_rate_hz),
-        static_rate_hz=evoked(response.static_rate_hz, rest.static_rate_hz),
-        first_spike_latency_ms=latency_ms.reshape(middle.shape[:2]),
-        half=bool(mesh.symmetry_nodes.size),
     )
