@@ -62,9 +62,9 @@ def draw_task_responses(found: TaskResult) -> Figure:
     what, unit = MEASURE_LABELS[measure]
     responses, places = found.responses[measure], found.population.positions_mm
     shown = _shown(len(responses))
-    low, high = places[:, [-1, 0]].min(axis=0) - MARGIN_MM, places[:, [-1, 0]].max(axis=0) + MARGIN_MM
-    across, along = high - low
-    height = float(np.clip(8.0 / len(shown) * along / across, 0.5, 4.0))
+    low, high = places[:, [0, -1]].min(axis=0) - MARGIN_MM, places[:, [0, -1]].max(axis=0) + MARGIN_MM
+    along, across = high - low
+    height = float(np.clip(8.0 / len(shown) * across / along, 0.5, 4.0))
     figure = new_figure(10.0, 2.0 * height + 1.4)
     grid = figure.subplots(2, len(shown), sharex=True, sharey=True, squeeze=False)
     largest = float(np.nanmax(np.abs(responses[shown] - responses[0])))
@@ -87,10 +87,11 @@ def draw_task_responses(found: TaskResult) -> Figure:
         axes.set_aspect("equal")
         axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]))
         axes.set_facecolor(PALE)
-    grid[0, 0].set_ylabel("along, x [mm]")
-    grid[1, 1].set_ylabel("along, x [mm]")
+    for axes in (grid[0, 0], grid[1, 1]):
+        axes.set_ylabel("z, lateral [mm]")
+        axes.tick_params(labelleft=True)
     for axes in (grid[0, 0], *grid[1, 1:]):
-        axes.set_xlabel("across, z [mm]")
+        axes.set_xlabel("x, distal [mm]")
         axes.tick_params(labelbottom=True)
     figure.colorbar(picture, ax=grid, label=f"{what} [{unit}]", shrink=0.8)
     return figure
@@ -99,8 +100,8 @@ def draw_task_responses(found: TaskResult) -> Figure:
 def _responses(axes: Axes, places: FloatArray, responses: FloatArray, of_all: FloatArray) -> PathCollection:
     """Draw every afferent where it ends, coloured by its response."""
     return axes.scatter(
-        places[:, -1],
         places[:, 0],
+        places[:, -1],
         c=responses,
         s=_marker_size(len(places)),
         cmap="viridis",
@@ -116,7 +117,7 @@ def _differences(axes: Axes, places: FloatArray, difference: FloatArray, largest
     size = _marker_size(len(places)) * np.abs(np.nan_to_num(difference)) / (largest or 1.0)
     for sign, marker, colour in ((1.0, "^", ORANGE), (-1.0, "v", BLUE)):
         there = sign * difference > 0.0
-        axes.scatter(places[there, -1], places[there, 0], s=size[there], marker=marker, color=colour)
+        axes.scatter(places[there, 0], places[there, -1], s=size[there], marker=marker, color=colour)
 
 
 def draw_task_statistics(found: TaskResult) -> Figure:
@@ -250,7 +251,7 @@ def caption_task_responses(found: TaskResult) -> str:
     left_out = n_stimuli - len(_shown(n_stimuli))
     return (
         f"{MEASURE_LABELS[main.measure][0].capitalize()} of {found.population.n_receptors} afferents "
-        "without noise, the distal end above; below, the difference from the standard, "
+        "without noise, the distal end on the right; below, the difference from the standard, "
         "by the area of triangles."
         + (f" {left_out} of the comparisons are left out here." if left_out else "")
     )

@@ -104,9 +104,9 @@ def draw_pad(axes: Axes, skin: SkinResponse, quantity: str = "stored", reach_mm:
     z = np.linspace(low, high, 61)
     sites = np.stack(np.meshgrid(x, z, indexing="ij"), axis=-1).reshape(-1, 2)
     values = skin.sample(quantity, sites)[-1].reshape(x.size, z.size)
-    drawn = axes.pcolormesh(z, x, values, cmap="viridis", shading="gouraud")
+    drawn = axes.pcolormesh(x, z, values.T, cmap="viridis", shading="gouraud")
     axes.figure.colorbar(drawn, ax=axes, label=_label(quantity))
-    axes.set(xlabel="across, z [mm]", ylabel="along, x [mm]", aspect="equal")
+    axes.set(xlabel="x, distal [mm]", ylabel="z, lateral [mm]", aspect="equal")
     axes.grid(visible=False)
 
 
@@ -136,13 +136,13 @@ def draw_map(axes: Axes, response: ResponseMap, quantity: str | None = None) -> 
     quantity = quantity or ("spike_count" if response.rate_measure == COUNT else "static_rate_hz")
     mapped = {**QUANTITIES, "spike_count": ("whole touch", "spikes", "viridis", Normalize)}
     phase, label, colours, _ = mapped[one_of("quantity", quantity, tuple(mapped))]
-    place = response.positions_mm[:, [-1, 0]]
+    place = response.positions_mm[:, [0, -1]]
     drawn = axes.scatter(
         place[:, 0], place[:, 1], c=getattr(response, quantity), cmap=colours, s=60.0, edgecolors=GREY,
         clip_on=False,
     )  # fmt: skip
     axes.figure.colorbar(drawn, ax=axes, label=f"{phase}: {label}")
-    axes.set(xlabel="across, z [mm]", ylabel="along, x [mm]", aspect="equal")
+    axes.set(xlabel="x, distal [mm]", ylabel="z, lateral [mm]", aspect="equal")
 
 
 def draw_traces(axes: Axes, traces: SedTraces) -> None:

@@ -80,7 +80,8 @@ def _draw_solid(
 ) -> None:
     """Draw the skin and the nail in light, and a cut through the layers where one is given."""
     skin = np.stack([section.x_mm, section.z_mm, section.y_mm], axis=-1)
-    colours = np.where(_corners(section.under_nail).all(axis=1)[:, None], to_rgb(NAIL), to_rgb(SKIN))
+    nailed = np.all(_corners(section.under_nail), axis=1, keepdims=True)
+    colours = np.where(nailed, to_rgb(NAIL), to_rgb(SKIN))
     solid = [_corners(skin * [1.0, sign, 1.0]) for sign in halves]
     paint = [colours * _brightness(faces, sign)[:, None] for faces, sign in zip(solid, halves, strict=True)]
     if plane is not None:

@@ -93,7 +93,7 @@ def draw_map_by_type(axes: Axes, maps: Mapping[str, ResponseMap]) -> None:
             x[fires], z[fires], area, facecolors="none", edgecolors=colour, marker=marker, linewidths=0.9,
             label=name,
         )  # fmt: skip
-    axes.set(xlabel="x, distal [mm]", ylabel="z [mm]", aspect="equal")
+    axes.set(xlabel="x, distal [mm]", ylabel="z, lateral [mm]", aspect="equal")
 
 
 def _styles(count: int) -> list[tuple[str, Any]]:

@@ -239,14 +239,14 @@ def _recorded(found: FitResult) -> list[tuple[str, PhaseRates, FloatArray]]:
 
 def _places(found: FitResult) -> tuple[FloatArray, np.ndarray]:
     """Where each stimulus stands along an axis, and the order of the stimuli from left to right."""
-    places = np.arange(len(found.stimulus), dtype=np.float64) if found.shift_mm is None else found.shift_mm
+    places = np.arange(len(found.stimulus), dtype=np.float64) if found.shift_mm is None else -found.shift_mm
     order = np.argsort(places, kind="stable")
     return places[order], order
 
 
 def _name_places(axes: Axes, found: FitResult) -> None:
     if found.shift_mm is not None:
-        axes.set_xlabel("shift, proximal positive [mm]")
+        axes.set_xlabel("shift, distal [mm]")
         return
     names = [name[:LONGEST_LABEL] for name in found.stimulus]
     axes.set_xticks(range(len(names)), names, rotation=90)

@@ -91,6 +91,6 @@ def _dots(axes: Any, response: ResponseMap, values: FloatArray, colours: str, sc
         )
     axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), aspect="equal")
     axes.grid(visible=False)
-    axes.set_xlabel("along, x [mm]")
-    axes.set_ylabel("across, z [mm]")
+    axes.set_xlabel("x, distal [mm]")
+    axes.set_ylabel("z, lateral [mm]")
     return dots

@@ -28,7 +28,7 @@ def draw_levels(section: ThreeLevels) -> Figure:
     """Draw Figure 2 for one set: skin above, one afferent in the middle, three afferents below."""
     figure = new_figure(COLUMN_IN, 7.4)
     grid = figure.add_gridspec(5, 1, height_ratios=(3.2, 1.0, 1.0, 0.5, 1.5))
-    skin, current, potential, train, spikes = (figure.add_subplot(row) for row in grid)
+    skin, current, potential, train, spikes = (figure.add_subplot(grid[row]) for row in range(5))
     for axes in (current, potential):
         axes.sharex(train)
     _draw_skin(skin, section)
