@@ -282,9 +282,8 @@ class SkinResponse(Result):
         str, array (n_elements,)
             In words, and values. [kPa]
         """
-        last = {"von_mises": "von_mises_kpa", "compressive_stress": "compressive_stress_kpa"}.get(
-            quantity, ""
-        )
+        kept = {"von_mises": "von_mises_kpa", "compressive_stress": "compressive_stress_kpa"}
+        last = kept.get(quantity, "")
         if last in self.fields:
             return quantity.replace("_", " ").replace("mises", "Mises stress"), self.fields[last]
         return "strain energy density", self.sed_kpa[-1]
