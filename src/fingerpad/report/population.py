@@ -98,7 +98,7 @@ def _surface(
         linewidth=0.3,
         shade=False,
     )
-    axes.locator_params(nbins=5)
+    axes.locator_params(nbins=3)
     if logarithmic:
         shown = round_ticks(scale)
         axes.set_zticks(np.log10(shown), labels=[f"{tick:g}" for tick in shown])
