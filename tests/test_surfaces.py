@@ -340,9 +340,71 @@ def test_a_mesh_must_resolve_the_parts_of_a_union():
     assert Union([Sphere(100.0), Plate()], [(0, 0, 0), (0, -1, 0)]).narrowest_mm == np.inf
 
 
+def _together(*parts):
+    """Vertices and faces of parts, each a box of these low and high corners, its sides turned or left out."""
+    vertices, faces = [], []
+    for low, high, sides in parts:
+        faces.append(np.asarray(sides) + 8 * len(vertices))
+        vertices.append(np.where(CUBE > [0.0, -1.0, 0.0], high, low))
+    return np.concatenate(vertices), np.concatenate(faces)
+
+
+def _shaken(by_mm):
+    """Every triangle of the block with corners of its own, moved at random."""
+    corners = CUBE[SIDES].reshape(-1, 3)
+    return corners + np.random.default_rng(7).uniform(-by_mm, by_mm, (36, 3)), np.arange(36).reshape(12, 3)
+
+
+LOW, HIGH = [-1.0, -2.0, -1.5], [1.0, 0.0, 1.5]
+TOP, BOTTOM = [6, 7], [4, 5]
+
+
+@pytest.mark.parametrize(
+    ("parts", "told"),
+    [
+        (_shaken(0.0), ""),
+        (_shaken(1e-6), "vertices joined within 0.01 mm: 28, moved by up to"),
+        ((CUBE, SIDES[:, ::-1]), "normals pointed inwards, turned: 1"),
+        (
+            _together((LOW, [-5e-5, 0, 1.5], SIDES), ([5e-5, -2, -1.5], HIGH, SIDES)),
+            "0.0001 mm apart, left out: 4",
+        ),
+        (_together((LOW, [0.3, 0, 1.5], SIDES), ([-0.3, -2, -1.5], HIGH, SIDES)), ""),
+        (_together((LOW, HIGH, SIDES), ([-0.5] * 3, [0.5, -0.2, 0.5], SIDES)), "within others, left out: 1"),
+        (_together((LOW, HIGH, SIDES), ([-0.5] * 3, [0.5, -0.2, 0.5], SIDES[:, ::-1])), "left out: 1"),
+    ],
+    ids=["soup", "shaken", "inwards", "halves", "overlap", "nested", "cavity"],
+)  # fmt: skip
+def test_parts_of_a_block_are_one_block_and_what_was_done_is_told(parts, told, caplog):
+    points = np.random.default_rng(1).uniform(-3.0, 1.5, (2000, 3))
+    gap, expected = Surface(*parts).gap(points)[0], Surface(CUBE, SIDES).gap(points)[0]
+    # Within a body of parts that overlap the gap is that of the deepest one.
+    shallow = expected > -0.25
+    np.testing.assert_allclose(gap[shallow], expected[shallow], rtol=0, atol=3e-6)
+    assert ((gap < 0.0) == (expected < 0.0))[np.abs(expected) > 1e-5].all()
+    assert (told in caplog.text and told in repr(Surface(*parts))) if told else not caplog.text
+
+
+@pytest.mark.parametrize("turned", [False, True], ids=["outwards", "inwards"])
+@pytest.mark.parametrize("side", [TOP, BOTTOM], ids=["top", "bottom"])
+def test_an_open_box_is_refused_where_its_opening_faces_the_skin(side, turned):
+    faces = np.delete(SIDES, side, axis=0)
+    faces = faces[:, ::-1] if turned else faces
+    box = CUBE, faces
+    if side == BOTTOM and not turned:
+        assert Surface(*box).front(np.zeros((1, 3))) == pytest.approx(0.0, abs=1e-9)
+    else:
+        with pytest.raises(InputError, match="is open there or its sides are reversed"):
+            Surface(*box)
+
+
 @pytest.mark.parametrize(
     ("vertices", "faces", "said"),
     [
+        (
+            *_together((LOW, [-5e-5, 0, 1.5], SIDES), ([5e-5, -1.5, -1.5], HIGH, SIDES)),
+            "must overlap or stand apart by more than 0.01 mm",
+        ),
         (CUBE * np.nan, SIDES, "finite numbers"),
         (CUBE, np.zeros((0, 3), int), "at least one triangle"),
         (CUBE * [1.0, 0.0, 0.0], SIDES, "triangles with an area"),

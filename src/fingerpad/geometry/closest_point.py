@@ -347,8 +347,9 @@ def _blunt(
         sharp, sharp_slope = 1.0, np.zeros(3)
         total, mean_normal = np.zeros(16), np.zeros(3)
         n_turns = 0
-        for search in range(2):
-            reach = radius if search == 0 else SHARP_SHARE * radius
+        # Hollow creases, then sharp ones, then the surface: the last costs most, and a rough one has sharp ones.
+        for search in range(3):
+            reach = SHARP_SHARE * radius if search == 1 else radius
             stack[0], top = 1, 1
             while top:
                 top -= 1
@@ -368,9 +369,14 @@ def _blunt(
                         continue
                     if kinds[slot, 0] == _COPY:
                         continue
-                    sharp *= share_of_edges(
-                        p, corners[slot], kinds[slot], SHARP, radius, SHARP_SHARE * radius, sharp_slope
-                    )
+                    if search == 1:
+                        sharp *= share_of_edges(
+                            p, corners[slot], kinds[slot], SHARP, radius, SHARP_SHARE * radius, sharp_slope
+                        )
+                        if sharp == 0.0:
+                            top = 0
+                            break
+                        continue
                     face = normals[slot, 6]
                     facing = (
                         face[0] * normal[number, 0]
@@ -389,7 +395,7 @@ def _blunt(
                         turns = longer
                     turns[n_turns, :3], turns[n_turns, 3:] = face, found[4:7]
                     n_turns += 1
-            if away == 1.0 or (search == 1 and sharp == 0.0) or (search == 1 and total[0] <= 0.0):
+            if away == 1.0 or (search == 1 and sharp == 0.0) or (search == 2 and total[0] <= 0.0):
                 break
         else:
             length = np.sqrt((mean_normal**2).sum())

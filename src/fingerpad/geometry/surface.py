@@ -15,12 +15,14 @@ from numba import njit
 from fingerpad.core.checks import FloatArray, IntArray, finite, float_array, int_array, not_negative, positive
 from fingerpad.core.errors import InputError
 from fingerpad.core.keywords import known_keywords
+from fingerpad.core.logger import LOGGER
 from fingerpad.core.values import converted
 from fingerpad.geometry.closest_point import Triangles
 from fingerpad.geometry.indenters import Indenter
 from fingerpad.geometry.probing import traced_front
 from fingerpad.geometry.relief import PIXELS, REACH_MM, narrowest_relief
 from fingerpad.geometry.rounded_edges import check_edge_radius, with_rounded_edges
+from fingerpad.geometry.surface_repair import border_of, is_crack, layers_of, repaired
 
 SMALLEST_MM, LARGEST_MM = 0.1, 1000.0
 """Extents beyond which a surface is refused: its unit must be wrong. [mm]"""
@@ -53,7 +55,8 @@ class Surface(Indenter):
         until its highest point is at y = 0. [mm]
     faces : int array (m, 3)
         Three corners each, counter-clockwise seen from outside. From the border of an open surface walls go
-        down.
+        down. Edges and walls within 0.01 mm of each other are joined, closed parts that are inside out are
+        turned, and parts that overlap count as one body; `repairs` says what was done.
     smooth_below_deg : float
         Hollow creases at which the normals of two triangles differ by less are rounded over 0.1 mm to either
         side at most; 0 keeps all. Edges of a larger angle, and all ridges, stay as they are. [degrees]
@@ -65,7 +68,8 @@ class Surface(Indenter):
     InputError
         If vertices are not finite, faces name no vertex, no triangle has an area, the surface is larger than
         1000 mm or smaller than 0.1 mm (a wrong unit), neighbouring triangles turn different sides out, more
-        than two share an edge, it shows the skin its inner side, the angle is not from 0 to 90 degrees, or
+        than two share an edge, it shows the skin its inner side, parts touch along walls that do not match,
+        the angle is not from 0 to 90 degrees, or
         the radius does not fit.
 
     Examples
@@ -108,15 +112,9 @@ class Surface(Indenter):
                 f"A surface must be {SMALLEST_MM:g} to {LARGEST_MM:g} mm large: got {extent:.4g} mm; check "
                 "the unit of its file."
             )
-        kept = area > 1e-12 * extent**2
-        if normal[kept, 1].max() <= 0.0:
-            raise InputError(
-                "A surface must show its outer side to the skin, towards +y: no triangle does; turn it over "
-                "or reverse the order of the corners."
-            )
-        faces = faces[kept]
-        _check_sides(faces, vertices)
-        vertices = vertices - [0.0, corners[kept, :, 1].max(), 0.0]
+        vertices, faces, told = repaired(vertices, faces[area > 1e-12 * extent**2])
+        vertices = vertices - [0.0, vertices[faces, 1].max(), 0.0]
+        self.__dict__["repairs"] = told
         if not 0.0 <= finite("smooth_below_deg", self.smooth_below_deg, "degrees") <= LARGEST_SMOOTH_DEG:
             raise InputError(
                 f"smooth_below_deg must be from 0 to {LARGEST_SMOOTH_DEG:g} degrees: got "
@@ -125,16 +123,29 @@ class Surface(Indenter):
         for name, value in (("vertices_mm", vertices), ("faces", faces)):
             value.setflags(write=False)
             object.__setattr__(self, name, value)
+        if len(self._border) and self._shows_inner_side():
+            raise InputError(
+                "A surface must show its outer side to the skin, towards +y: it is open there or its sides "
+                "are reversed; close it, turn it over, or reverse the order of the corners."
+            )
+        if told:
+            LOGGER.warning("%r was repaired: %s.", self, "; ".join(told))
         if not_negative("edge_radius_mm", self.edge_radius_mm, "mm"):
             check_edge_radius(self.edge_radius_mm, self.relief_mm)
 
     def __repr__(self) -> str:
         extents = " x ".join(f"{extent:.4g}" for extent in np.ptp(self.vertices_mm[self.faces], axis=(0, 1)))
-        return f"Surface({len(self.faces)} triangles, {extents} mm)"
+        told = "".join(f"; {each}" for each in self.repairs)
+        return f"Surface({len(self.faces)} triangles, {extents} mm{told})"
 
     def __getstate__(self) -> dict[str, np.ndarray]:
         # The tree is large and is made anew where it is needed.
-        return {part.name: getattr(self, part.name) for part in fields(self)}
+        return {name: getattr(self, name) for name in (*(part.name for part in fields(self)), "repairs")}
+
+    @cached_property
+    def repairs(self) -> tuple[str, ...]:
+        """What was done to the triangles to make them one body."""
+        return ()
 
     @property
     def half_width_mm(self) -> float:
@@ -161,24 +172,55 @@ class Surface(Indenter):
         return narrowest_relief(*self._face, beside_mm=float(self.vertices_mm[self.faces, 1].min()))
 
     @cached_property
-    def _triangles(self) -> Triangles:
-        """Triangles and the walls below the border."""
-        faces, n_vertices = self.faces, len(self.vertices_mm)
-        sides = faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)
-        keys = sides.min(axis=1) * n_vertices + sides.max(axis=1)
-        _, first, count = np.unique(keys, return_index=True, return_counts=True)
-        a, b = sides[first[count == 1]].T
+    def _border(self) -> IntArray:
+        """Edges of one triangle alone: the triangle and its two corners, (n, 3)."""
+        return border_of(self.faces)
+
+    @cached_property
+    def _layers(self) -> tuple[Triangles, ...]:
+        """Triangles and the walls below the border; parts that overlap are in different ones."""
+        layers = layers_of(self.vertices_mm, self.faces, self._border)
+        _, a, b = self._border[~is_crack(self.vertices_mm, self.faces, self._border)].T
+        n_vertices = len(self.vertices_mm)
         walls = np.concatenate([
             np.stack([b, a, a + n_vertices], axis=1),
             np.stack([b, a + n_vertices, b + n_vertices], axis=1),
         ])  # fmt: skip
         below = self.vertices_mm - [0.0, SKIRT_MM, 0.0]
-        vertices, faces = np.concatenate([self.vertices_mm, below]), np.concatenate([faces, walls])
-        return Triangles.of(vertices, faces, self.smooth_below_deg, HOLLOW_MM, FAR_MM)
+        vertices = np.concatenate([self.vertices_mm, below])
+        found = []
+        for layer in range(int(layers.max()) + 1):
+            faces = self.faces[layers == layer]
+            corners = vertices[faces := np.concatenate([faces, walls]) if layer == 0 else faces]
+            normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+            faces = faces[(normal != 0.0).any(axis=1)]
+            found.append(Triangles.of(vertices, faces, self.smooth_below_deg, HOLLOW_MM, FAR_MM))
+        return tuple(found)
+
+    def _shows_inner_side(self) -> bool:
+        """Whether the skin sees an inner side over more than a line's width, or the rim of a thin wall."""
+        corners = self.vertices_mm[self.faces]
+        normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        own, a, b = self._border.T
+        lowest = corners[own, :, 1].min(axis=1)
+        hangs = lowest < np.minimum(self.vertices_mm[a, 1], self.vertices_mm[b, 1])
+        upright = np.abs(normals[own, 1]) <= 1e-6 * np.linalg.norm(normals[own], axis=1)
+        if (hangs & upright & ~is_crack(self.vertices_mm, self.faces, self._border)).any():
+            return True  # walls below the border would be its other side
+        normal = normals[:, 1]
+        outer, inner = (self._heights_of(corners[side])[0] for side in (normal > 0.0, normal < 0.0))
+        seen = inner > outer + 1e-6
+        return bool((seen[1:, 1:] & seen[1:, :-1] & seen[:-1, 1:] & seen[:-1, :-1]).any())
 
     @property
     def _face(self) -> tuple[FloatArray, float]:
         """Heights of the face over a grid of x and z, the lowest beside it, and their spacing. [mm]"""
+        corners = self.vertices_mm[self.faces]
+        height, spacing = self._heights_of(corners)
+        return np.maximum(height, corners[..., 1].min()), spacing
+
+    def _heights_of(self, triangles: FloatArray) -> tuple[FloatArray, float]:
+        """Heights of some triangles over a grid of x and z below the whole body, -inf beside them. [mm]"""
         corners = self.vertices_mm[self.faces]
         low = np.maximum(corners.min(axis=(0, 1))[[0, 2]], -REACH_MM)
         high = np.minimum(corners.max(axis=(0, 1))[[0, 2]], REACH_MM)
@@ -188,34 +230,29 @@ class Surface(Indenter):
             )
         spacing = float((high - low).max()) / (PIXELS - 1)
         counts = np.floor((high - low) / spacing).astype(int) + 1
-        height = np.full(tuple(counts), corners[..., 1].min())
-        _raise_to_triangles(corners, low, spacing, height)
+        height = np.full(tuple(counts), -np.inf)
+        _raise_to_triangles(triangles, low, spacing, height)
         return height, spacing
 
     def front(self, points_mm: FloatArray) -> FloatArray:
         """Height y of the face above the x and z of points (n, 3), -inf beside it. [mm]"""
-        height = self._triangles.heights(points_mm)
+        height = np.max([layer.heights(points_mm) for layer in self._layers], axis=0)
         return traced_front(self.gap, points_mm, np.where(np.isfinite(height), height + HOLLOW_MM, -np.inf))
 
     def gap(self, points_mm: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Signed gap (n,) and outward normal (n, 3) at points (n, 3) of the indenter's frame. [mm]"""
         if self.edge_radius_mm == 0.0:
-            return self._triangles.gap(points_mm)
-        return with_rounded_edges(self._triangles.gap, points_mm, self.edge_radius_mm)
+            return self._sharp_gap(points_mm)
+        return with_rounded_edges(self._sharp_gap, points_mm, self.edge_radius_mm)
 
-
-def _check_sides(faces: IntArray, vertices_mm: FloatArray) -> None:
-    """Raise an error unless neighbours turn the same side out and at most two triangles share an edge."""
-    begin, end = faces.T, faces[:, [1, 2, 0]].T
-    ways, count = np.unique(begin * len(vertices_mm) + end, return_counts=True)
-    twice = ways[count > 1]
-    if twice.size:
-        x, y, z = 0.5 * (vertices_mm[twice[0] // len(vertices_mm)] + vertices_mm[twice[0] % len(vertices_mm)])
-        raise InputError(
-            "A surface must have two triangles at most along each edge, with their outer sides on one side: "
-            f"{twice.size:,} edges do not, one at ({x:.4g}, {y:.4g}, {z:.4g}) mm; repair it, for example "
-            "with trimesh.repair."
-        )
+    def _sharp_gap(self, points_mm: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Gap and normal before edges are rounded: of the nearest layer, or the one that reaches deepest."""
+        gap, normal = self._layers[0].gap(points_mm)
+        for layer in self._layers[1:]:
+            other, direction = layer.gap(points_mm)
+            normal = np.where((other < gap)[:, None], direction, normal)
+            gap = np.minimum(gap, other)
+        return gap, normal
 
 
 @njit(cache=True, nogil=True)
