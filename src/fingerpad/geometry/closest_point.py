@@ -347,7 +347,7 @@ def _blunt(
         sharp, sharp_slope = 1.0, np.zeros(3)
         total, mean_normal = np.zeros(16), np.zeros(3)
         n_turns = 0
-        # Hollow creases, then sharp ones, then the surface: it costs most, and is not needed beside sharp ones.
+        # Hollow creases, then sharp ones, then the surface: it costs most, and is not needed near sharp ones.
         for search in range(3):
             reach = SHARP_SHARE * radius if search == 1 else radius
             stack[0], top = 1, 1
