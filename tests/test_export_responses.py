@@ -12,11 +12,12 @@ from numpy.testing import assert_array_equal
 
 import fingerpad as fp
 from fingerpad.core.errors import InputError, StoreError
+from fingerpad.core.phases import ramp_and_hold_phases
 from fingerpad.core.signals import ResponseMap, SpikeTrains
 from fingerpad.experiments.recording_files import read_recordings
 from fingerpad.experiments.stimuli import read_stimuli
-from fingerpad.export.responses import write_response_csv
-from fingerpad.export.responses_nwb import write_responses_nwb
+from fingerpad.export.responses import read_response_csv, write_response_csv
+from fingerpad.export.responses_nwb import read_responses_nwb, write_responses_nwb
 from fingerpad.neuron.response_maps import recruitment_rank
 
 TOUCH = fp.Touch(
@@ -60,6 +61,48 @@ def test_every_number_comes_back_to_the_last_bit(tmp_path, columns, places):
     for receptor, row in enumerate(rows):
         assert_array_equal([float(time) for time in row["spike_times_ms"].split()], response.spikes[receptor])
     assert np.isnan(column("first_spike_latency_ms")).any()
+
+
+def mixed_response() -> fp.MixedResponse:
+    one = replace(random_response(3), phases=ramp_and_hold_phases(50.0, 1000.0))
+    later = SpikeTrains.from_lists([one.spikes[39 - receptor] + 0.25 for receptor in range(40)])
+    return fp.MixedResponse({"RA": one, "own": replace(one, spikes=later, pitch_mm=2.5)})
+
+
+def alike(read: fp.MixedResponse, written: fp.MixedResponse, within_ms: float) -> None:
+    assert list(read) == list(written)
+    assert read.types.tolist() == ["RA"] * 40 + ["own"] * 40
+    for name in written:
+        assert read[name].pitch_mm == written[name].pitch_mm
+        assert_array_equal(read[name].positions_mm, written[name].positions_mm)
+        for measure, values in written[name].measures.items():
+            assert_array_equal(read[name].measures[measure], values, measure)
+        assert_array_equal(read[name].spikes.offsets, written[name].spikes.offsets)
+        np.testing.assert_allclose(read[name].spikes.times_ms, written[name].spikes.times_ms, 0, within_ms)
+
+
+def test_mixed_responses_come_back_with_the_type_of_every_unit(tmp_path):
+    written = mixed_response()
+    alike(read_response_csv(write_response_csv(tmp_path / "mixed.csv", written)), written, 0.0)
+    touches = {"edge": written, "flat": fp.MixedResponse({"RA": written["RA"], "own": written["own"]})}
+    read = read_responses_nwb(write_responses_nwb(tmp_path / "mixed.nwb", touches, pause_ms=250.0))
+    assert list(read) == ["edge", "flat"]
+    for name, response in read.items():
+        alike(response, touches[name], 1e-6)
+        assert response["own"].phases == written["own"].phases
+        assert response["RA"].duration_ms == pytest.approx(1000.0, rel=1e-12)
+    one = read_response_csv(write_response_csv(tmp_path / "one.csv", written["RA"]))
+    assert not one.types
+    assert one.pitch_mm == 1.0
+
+
+def test_a_table_that_is_no_response_is_refused(tmp_path):
+    (tmp_path / "other.csv").write_text("receptor,x_mm\n0,1.0\n", encoding="utf-8")
+    with pytest.raises(InputError, match="must have the column z_mm"):
+        read_response_csv(tmp_path / "other.csv")
+    (tmp_path / "other.nwb").write_text("no session", encoding="utf-8")
+    with pytest.raises(InputError, match="must be a session of write_responses_nwb"):
+        read_responses_nwb(tmp_path / "other.nwb")
 
 
 def test_what_is_no_response_is_refused_and_nothing_is_written(tmp_path):

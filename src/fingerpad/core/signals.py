@@ -7,7 +7,7 @@ Skin -> `SedTraces` -> `CurrentTraces` -> `SpikeTrains` -> `ResponseMap` -> `Hit
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from inspect import signature
 from typing import Protocol
 
@@ -468,6 +468,8 @@ class ResponseMap(Result):
         which is 0 without an interval; or spikes over the length of the window.
     quantity : str, optional
         What the static term of the afferents follows, a name of `SkinResponse.sample`. Default: SED.
+    types : tuple of str
+        Type of each receptor, in a mixed population; empty where all have one.
     """
 
     positions_mm: FloatArray
@@ -481,6 +483,15 @@ class ResponseMap(Result):
     windows_ms: tuple[tuple[float, ...], tuple[float, ...]] | None = None
     rate_measure: str = INTERVAL
     quantity: str = STORED_ENERGY
+    types: tuple[str, ...] = ()
+
+    @property
+    def measures(self) -> dict[str, FloatArray]:
+        """What was measured of each receptor, by name: every array (n_receptors,)."""
+        values = {each.name: getattr(self, each.name) for each in fields(self)}
+        return {
+            name: value for name, value in values.items() if isinstance(value, np.ndarray) and value.ndim == 1
+        }
 
     def __repr__(self) -> str:
         firing = np.count_nonzero(self.spike_count)
@@ -530,6 +541,7 @@ class ResponseMap(Result):
             ("dynamic_rate_hz", dynamic.size),
             ("static_rate_hz", static.size),
             ("first_spike_latency_ms", latency.size),
+            ("types", len(self.types) or n),
         ):
             if size != n:
                 raise InputError(f"ResponseMap needs one entry of {name} per receptor: got {size} for {n}.")

@@ -16,10 +16,12 @@ from fingerpad.core.checks import instance, not_negative, positive
 from fingerpad.core.errors import InputError
 from fingerpad.core.files import path_of, write_atomically
 from fingerpad.core.keywords import known_keywords
-from fingerpad.core.signals import ResponseMap
+from fingerpad.core.phases import Phase
+from fingerpad.core.signals import ResponseMap, SpikeTrains
 from fingerpad.core.units import MS_PER_S
 from fingerpad.experiments.recording_files import SUFFIXES_OF_NWB
-from fingerpad.export.responses import PLACES
+from fingerpad.export.responses import PITCH, PLACES, TYPE, by_type, pitches_mm
+from fingerpad.neuron.mixed_population import MixedResponse, one_map
 
 _RESOLUTION_S = 1e-9
 """Spike times are roots of a closed form; those of two processors differ by less. [s]"""
@@ -28,7 +30,7 @@ _RESOLUTION_S = 1e-9
 @known_keywords
 def write_responses_nwb(
     path: Path,
-    responses: Mapping[str, ResponseMap],
+    responses: Mapping[str, ResponseMap | MixedResponse],
     duration_ms: float | None = None,
     pause_ms: float = 1000.0,
     started: datetime | None = None,
@@ -36,14 +38,15 @@ def write_responses_nwb(
     """Write a session: one trial per touch, one epoch per phase of its motion, one unit per receptor.
 
     The column `stimulus` of the trials holds the name of the touch, the tags of an epoch are the names of the
-    phase and of the touch; a unit has its position and all its spike times. `fingerpad fit` reads the file
-    like recordings, one unit at a time. The extra `fingerpad[nwb]` is required.
+    phase and of the touch; a unit has its position, all its spike times, its rates and latency in each trial
+    and, in a mixed population, its type. `fingerpad fit` reads the file like recordings, one unit at a time,
+    and `read_responses_nwb` as responses. The extra `fingerpad[nwb]` is required.
 
     Parameters
     ----------
     path : Path
         The file, .nwb, .h5 or .hdf5, written as a whole; folders are created if needed.
-    responses : mapping of str to ResponseMap
+    responses : mapping of str to ResponseMap or MixedResponse
         Responses of the same receptors, by the names of the touches. Each lasts as long as its motion.
     duration_ms : float, optional
         Duration of all touches, for responses that do not know their own. [ms]
@@ -83,7 +86,9 @@ def write_responses_nwb(
     began = started or datetime.now(UTC)
     if began.tzinfo is None:
         raise InputError(f"started must have a time zone, such as datetime.UTC: got {began.isoformat()}.")
-    positions_mm, durations_ms = _places(responses), _durations(responses, duration_ms)
+    touches = {name: one_map(response) for name, response in responses.items()}
+    positions_mm, durations_ms = _places(touches), _durations(touches, duration_ms)
+    first = next(iter(touches.values()))
     onsets_ms = np.cumsum(durations_ms + pause_ms) - durations_ms - pause_ms
     # Warnings of the library do not concern the content of the file.
     with warnings.catch_warnings(), TemporaryDirectory() as folder:
@@ -105,9 +110,7 @@ def write_responses_nwb(
             ),
         )
         session.add_trial_column("stimulus", "name of the touch")
-        for (name, answer), onset_ms, lasts_ms in zip(
-            responses.items(), onsets_ms, durations_ms, strict=True
-        ):
+        for (name, answer), onset_ms, lasts_ms in zip(touches.items(), onsets_ms, durations_ms, strict=True):
             session.add_trial(onset_ms / MS_PER_S, (onset_ms + lasts_ms) / MS_PER_S, stimulus=name)
             for phase in answer.phases:
                 start, end = ((onset_ms + time_ms) / MS_PER_S for time_ms in phase.window_ms)
@@ -118,20 +121,101 @@ def write_responses_nwb(
         columns = PLACES[positions_mm.shape[1]]
         for column in columns:
             session.add_unit_column(column, f"{column[0]} of the receptor on the undeformed skin, in mm")
+        session.add_unit_column(PITCH, "distance between neighbours of the same type, in mm")
+        if first.types:
+            session.add_unit_column(TYPE, "type of the afferent")
+        for name in first.measures:
+            session.add_unit_column(
+                name, "in each trial, in the unit at the end of the name; NaN if there is none"
+            )
+        pitches = pitches_mm(next(iter(responses.values())))
         for receptor, place in enumerate(positions_mm.tolist()):
-            trains = [answer.spikes[receptor] for answer in responses.values()]
+            trains = [answer.spikes[receptor] for answer in touches.values()]
             times_ms = [onset + train for onset, train in zip(onsets_ms, trains, strict=True)]
             session.add_unit(
                 id=receptor,
                 spike_times=np.concatenate(times_ms) / MS_PER_S,
                 obs_intervals=[[0.0, (onsets_ms[-1] + durations_ms[-1]) / MS_PER_S]],
+                pitch_mm=float(pitches[receptor]),
                 **dict(zip(columns, place, strict=True)),
+                **({TYPE: first.types[receptor]} if first.types else {}),
+                **{
+                    name: [answer.measures[name][receptor] for answer in touches.values()]
+                    for name in first.measures
+                },
             )
         unfinished = Path(folder) / "session.nwb"
         with pynwb.NWBHDF5IO(str(unfinished), mode="w") as opened:
             opened.write(session)
         write_atomically(file, unfinished.read_bytes())
     return file
+
+
+@known_keywords
+def read_responses_nwb(path: Path) -> dict[str, ResponseMap | MixedResponse]:
+    """Read what `write_responses_nwb` wrote.
+
+    Parameters
+    ----------
+    path : Path
+        The file.
+
+    Returns
+    -------
+    dict of str to ResponseMap or MixedResponse
+        By the names of the touches; mixed where the units have types.
+
+    Raises
+    ------
+    InputError
+        If the file cannot be read, lacks a column of `write_responses_nwb`, or pynwb is not installed.
+    """
+    pynwb = require_pynwb()
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            with pynwb.NWBHDF5IO(str(path_of("path", path)), mode="r") as opened:
+                return _responses(opened.read())
+    except InputError:
+        raise
+    except Exception as error:  # a file of any other kind may fail in any way
+        said = " ".join(str(error).split()).rstrip(".")
+        raise InputError(
+            f"{path} must be a session of write_responses_nwb: it cannot be read as one ({said})."
+        ) from error
+
+
+def _responses(session: Any) -> dict[str, ResponseMap | MixedResponse]:
+    """Responses to all trials of a session."""
+    units, trials = session.units, session.trials
+    places = PLACES[3 if "y_mm" in units.colnames else 2]
+    known = {"spike_times", "obs_intervals", TYPE, PITCH, *places}
+    measured = {name: np.asarray(units[name][:]) for name in units.colnames if name not in known}
+    trains_s = [np.asarray(units["spike_times"][row]) for row in range(len(units))]
+    epochs = [] if session.epochs is None else session.epochs[:].itertuples(index=False)
+    phases: dict[str, list[Phase]] = {}
+    onsets_s = dict(zip(trials["stimulus"][:], trials["start_time"][:], strict=True))
+    for epoch in epochs:
+        phase, touch = list(epoch.tags)
+        window = [round(MS_PER_S * (at - onsets_s[touch]), 6) for at in (epoch.start_time, epoch.stop_time)]
+        phases.setdefault(touch, []).append(Phase(phase, *window))
+    found = {}
+    for number, (name, start, stop) in enumerate(
+        zip(*(trials[key][:] for key in ("stimulus", "start_time", "stop_time")), strict=True)
+    ):
+        response = ResponseMap(
+            positions_mm=np.column_stack([units[place][:] for place in places]),
+            pitch_mm=float(units[PITCH][:].min()),
+            spikes=SpikeTrains.from_lists(
+                [MS_PER_S * (train[(train >= start) & (train <= stop)] - start) for train in trains_s]
+            ),
+            duration_ms=MS_PER_S * (stop - start),
+            phases=tuple(phases.get(name, ())),
+            types=tuple(units[TYPE][:]) if TYPE in units.colnames else (),
+            **{key: values[:, number] for key, values in measured.items()},
+        )
+        found[str(name)] = by_type(response, np.asarray(units[PITCH][:]))
+    return found
 
 
 def _places(responses: Mapping[str, ResponseMap]) -> np.ndarray:
@@ -141,7 +225,7 @@ def _places(responses: Mapping[str, ResponseMap]) -> np.ndarray:
     first = next(iter(responses.values()))
     for name, response in responses.items():
         instance(f"responses[{name!r}]", response, ResponseMap)
-        if not np.array_equal(response.positions_mm, first.positions_mm):
+        if not np.array_equal(response.positions_mm, first.positions_mm) or response.types != first.types:
             raise InputError(f"responses must come from the same receptors: those of {name!r} lie elsewhere.")
     return first.positions_mm
 

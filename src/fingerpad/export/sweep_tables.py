@@ -173,6 +173,7 @@ def setting_response(data: xarray.Dataset, **where: int) -> ResponseMap:
         duration_ms=float(np.nanmax(one["time_ms"].values)),
         phases=phases,
         windows_ms=rate_windows_ms(phases, asked.dynamic, asked.static),
+        types=described.population.types,
     )
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from types import MappingProxyType
 
 import numpy as np
@@ -18,6 +18,7 @@ from fingerpad.core.regions import Region
 from fingerpad.core.signals import ResponseMap, Skin, SpikeTrains, traces_below
 from fingerpad.core.values import converted
 from fingerpad.data import afferents as published
+from fingerpad.data.tissues import DEFAULT_TISSUES
 from fingerpad.neuron.afferent import AnyAfferent, checked_afferent
 from fingerpad.neuron.afferent_types import PC, RA, SAI, SAII
 from fingerpad.neuron.population import Population, sensitivities
@@ -29,15 +30,30 @@ PUBLISHED_DENSITIES: Mapping[str, float] = MappingProxyType(
 """Densities in the human fingertip. [1/cm2]"""
 
 
-def types_of_afferents() -> dict[str, AnyAfferent]:
-    """Return the four types with their default parameters, by their names.
+def types_of_afferents(tissues: object = DEFAULT_TISSUES) -> dict[str, AnyAfferent]:
+    """Return the four types with their default parameters, by their names: the one table of types.
+
+    Parameters
+    ----------
+    tissues : str or Tissues, optional
+        SAI is that of these, as in `Afferent.for_tissues`; the others were held against people with the
+        default ones.
 
     Examples
     --------
     >>> list(types_of_afferents())
     ['SAI', 'RA', 'PC', 'SAII']
     """
-    return dict(zip(published.TYPES, (SAI(), RA(), PC(), SAII()), strict=True))
+    return dict(zip(published.TYPES, (SAI.for_tissues(tissues), RA(), PC(), SAII()), strict=True))
+
+
+def one_map(response: ResponseMap | MixedResponse) -> ResponseMap:
+    """Return responses as one map, with the types of a mixed population."""
+    return (
+        response.joined
+        if isinstance(response, MixedResponse)
+        else instance("response", response, ResponseMap)
+    )
 
 
 @dataclass(frozen=True)
@@ -87,6 +103,44 @@ class MixedResponse(Result):
         """Position of each of these afferents, (n_afferents, 2 or 3). [mm]"""
         return np.concatenate([each.positions_mm for each in self.maps.values()])
 
+    @property
+    def joined(self) -> ResponseMap:
+        """One map of all afferents, type after type, with the type of each; its pitch is the smallest."""
+        maps = list(self.maps.values())
+        return replace(
+            maps[0],
+            positions_mm=self.positions_mm,
+            pitch_mm=min(each.pitch_mm for each in maps),
+            spikes=self.spikes,
+            types=tuple(self.types.tolist()),
+            **{name: np.concatenate([each.measures[name] for each in maps]) for name in maps[0].measures},
+        )
+
+    @classmethod
+    def of(cls, response: ResponseMap) -> MixedResponse:
+        """Part a map by the types of its afferents, as `joined` made it."""
+        if not response.types:
+            raise InputError("MixedResponse needs the type of each afferent: got a response without types.")
+        known = types_of_afferents()
+        of_type = {
+            name: np.flatnonzero(np.array(response.types) == name) for name in dict.fromkeys(response.types)
+        }
+        return cls(
+            MappingProxyType(
+                {
+                    name: replace(
+                        response,
+                        positions_mm=response.positions_mm[rows],
+                        spikes=SpikeTrains.from_lists([response.spikes[row] for row in rows.tolist()]),
+                        types=(),
+                        rate_measure=getattr(known.get(name), "rate_measure", response.rate_measure),
+                        **{key: values[rows] for key, values in response.measures.items()},
+                    )
+                    for name, rows in of_type.items()
+                }
+            )
+        )
+
 
 @dataclass(frozen=True)
 @converted
@@ -131,6 +185,35 @@ class MixedPopulation(metaclass=KnownKeywords):
 
     def __len__(self) -> int:
         return sum(len(part) for part in self.parts.values())
+
+    @property
+    def types(self) -> tuple[str, ...]:
+        """Type of each afferent, type after type."""
+        return tuple(name for name, part in self.parts.items() for _ in range(len(part)))
+
+    @property
+    def pitch_mm(self) -> float:
+        """Smallest pitch of the types. [mm]"""
+        return min(part.pitch_mm for part in self.parts.values())
+
+    @property
+    def positions_mm(self) -> FloatArray:
+        """Position of each afferent, type after type, (n_afferents, 2 or 3). [mm]"""
+        return np.concatenate([part.positions_mm for part in self.parts.values()])
+
+    @property
+    def sites_mm(self) -> FloatArray:
+        """Where the skin is sampled, type after type, (n_sites, 2 or 3). [mm]"""
+        return np.concatenate([part.sites_mm for part in self.parts.values()])
+
+    @property
+    def sensitivity(self) -> FloatArray | None:
+        """Factor of each afferent on what it follows; None if all are equal. [1]"""
+        given = [part.sensitivity for part in self.parts.values()]
+        if all(factors is None for factors in given):
+            return None
+        parts = zip(given, self.parts.values(), strict=True)
+        return np.concatenate([np.ones(len(part)) if some is None else some for some, part in parts])
 
     @classmethod
     def at_densities(
@@ -194,8 +277,8 @@ class MixedPopulation(metaclass=KnownKeywords):
                 )
             positive(f"densities_per_cm2[{name!r}] of a type that is not left out", density, "1/cm2")
             afferent = checked_afferent(known[name])
-            layout = poisson_disc(region, density, seed=_seed_of(seed, number))
-            unequal = sensitivities(len(layout), spread, _seed_of(seed, number)) if spread else None
+            layout = poisson_disc(region, density, seed=seed_of(seed, number))
+            unequal = sensitivities(len(layout), spread, seed_of(seed, number)) if spread else None
             parts[name] = Population.of_layout(layout, place, afferent, unequal)
         return cls(parts)
 
@@ -235,6 +318,6 @@ class MixedPopulation(metaclass=KnownKeywords):
         return MixedResponse(MappingProxyType({name: maps[name] for name in self.parts}))
 
 
-def _seed_of(seed: int, number: int) -> int:
+def seed_of(seed: int, number: int) -> int:
     """Seed of one type, so that one more type leaves the others where they are."""
     return int(np.random.SeedSequence([seed, number]).generate_state(1)[0])

@@ -332,6 +332,11 @@ class Population(metaclass=KnownKeywords):
             )
 
     @property
+    def types(self) -> tuple[str, ...]:
+        """Types of the afferents of a mixed population: none here."""
+        return ()
+
+    @property
     def sites_mm(self) -> FloatArray:
         """Where the skin is sampled, (n_sites, 2 or 3): the end organs, afferent by afferent. [mm]"""
         return self.positions_mm if self.ends is None else self.ends.sites_mm

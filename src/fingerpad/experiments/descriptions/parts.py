@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from typing import Annotated
 
-from pydantic import Discriminator, Strict, Tag
+from pydantic import Discriminator, Field, Strict, Tag
 
 from fingerpad.core.layouts import PATTERNS
 from fingerpad.data import psychophysics
+from fingerpad.data.afferents import TYPES
 from fingerpad.experiments.descriptions.values import (
     NAMED,
     SPELLED,
@@ -20,6 +21,7 @@ from fingerpad.experiments.descriptions.values import (
     Seed,
     Text,
     choice_of,
+    with_message,
 )
 from fingerpad.skin.fields import sampled_fields
 
@@ -74,12 +76,22 @@ class PopulationSettings(Part):
         Least distance in a Poisson-disc layout over 1/sqrt(density).
     seed : int
         Of random places and sensitivities; another one is another finger.
+    densities_per_cm2 : dict of str to float
+        Instead of one density, that of each type of a mixed population, which all have this layout. [1/cm2]
     sensitivity_spread : float
         How much afferents differ in their gains, as of `fingerpad.neuron.population.sensitivities`.
     """
 
     layout: Annotated[str, choice_of(LAYOUT_NAMES)] = GRID
     density_per_cm2: Positive = psychophysics.RECEPTOR_DENSITY.value
+    densities_per_cm2: (
+        Annotated[
+            dict[Annotated[str, choice_of(TYPES)], Positive],
+            Field(min_length=1),
+            with_message(f"a density above 0 of each type, {', '.join(TYPES)}"),
+        ]
+        | None
+    ) = None
     rows: Count | None = None
     columns: Count | None = None
     region: RegionSettings | None = None
@@ -118,4 +130,9 @@ AfferentChoice = Annotated[
     Annotated[Text, Tag(NAMED)] | Annotated[AfferentSettings, Tag(SPELLED)],
     Discriminator(lambda value: NAMED if isinstance(value, str) else SPELLED),
 ]
-"""The default, a file of results, or numbers."""
+"""The default, a type of afferents by its name, a file of results, or numbers."""
+
+
+def file_of(chosen: AfferentSettings | str) -> str | None:
+    """Name of the file of results that an afferent is read from; None if it is from none."""
+    return chosen if isinstance(chosen, str) and chosen not in (DEFAULT, *TYPES) else None

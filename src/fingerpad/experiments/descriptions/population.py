@@ -11,6 +11,7 @@ import numpy as np
 from fingerpad.core.checks import IntArray
 from fingerpad.core.errors import InputError
 from fingerpad.core.layouts import PATTERNS
+from fingerpad.data.afferents import TYPES
 from fingerpad.experiments.afferent_files import fitted_afferent
 from fingerpad.experiments.descriptions.parts import (
     DEFAULT,
@@ -18,14 +19,13 @@ from fingerpad.experiments.descriptions.parts import (
     NAIL_ROWS,
     AfferentSettings,
     PopulationSettings,
+    file_of,
 )
 from fingerpad.geometry.fingertip import Finger, Fingertip
-from fingerpad.neuron.afferent import Afferent
+from fingerpad.neuron.afferent import Afferent, AnyAfferent
+from fingerpad.neuron.mixed_population import MixedPopulation, seed_of, types_of_afferents
 from fingerpad.neuron.population import Population, sensitivities
 from fingerpad.psychophysics.encoding import neighbours_of
-
-ELSEWHERE = ("RA", "PC", "SAII")
-"""Types of afferents that no file describes."""
 
 _OF_LAYOUT = {
     "rows": (GRID, NAIL_ROWS),
@@ -37,13 +37,13 @@ _OF_LAYOUT = {
 }
 
 
-def afferent_of(chosen: AfferentSettings | str, tissues: str, beside: Path = Path()) -> Afferent:
+def afferent_of(chosen: AfferentSettings | str, tissues: str, beside: Path = Path()) -> AnyAfferent:
     """Make the afferent of a file.
 
     Parameters
     ----------
     chosen : AfferentSettings or str
-        Numbers, "default", or a file of results.
+        Numbers, "default", a type by its name, or a file of results.
     tissues : str
         Tissues by name: the default afferent was fitted with them.
     beside : Path, optional
@@ -51,38 +51,37 @@ def afferent_of(chosen: AfferentSettings | str, tissues: str, beside: Path = Pat
 
     Returns
     -------
-    Afferent
+    AnyAfferent
 
     Raises
     ------
     InputError
         If the file cannot be read or holds no fitted parameters.
     """
-    if chosen in ELSEWHERE:
-        raise InputError(
-            f"afferent must be SAI's, as default, numbers or a file of a fit: got {chosen}, which is "
-            "simulated in Python, by fingerpad.MixedPopulation."
-        )
     fitted = Afferent.for_tissues(tissues)
     if isinstance(chosen, AfferentSettings):
         return replace(fitted, **chosen.given)
-    return fitted if chosen == DEFAULT else fitted_afferent(Path(beside) / chosen, tissues)
+    if file := file_of(chosen):
+        return fitted_afferent(Path(beside) / file, tissues)
+    return fitted if chosen == DEFAULT else types_of_afferents(tissues)[chosen]
 
 
 def population_of(
     settings: PopulationSettings,
-    afferent: Afferent,
+    chosen: AfferentSettings | str,
+    tissues: str,
+    beside: Path = Path(),
     place: str = "population",
     finger: Finger | None = None,
-) -> Population:
+) -> Population | MixedPopulation:
     """Lay out the afferents of a file.
 
     Parameters
     ----------
     settings : PopulationSettings
-        Layout, density, region.
-    afferent : Afferent
-        Each of them.
+        Layout, density or densities, region.
+    chosen, tissues, beside
+        Each of them, as of `afferent_of`; in a mixed population those of type SAI, unless it is the default.
     place : str, optional
         Key of the settings in the file, for errors.
     finger : Fingertip or FingerMesh, optional
@@ -90,7 +89,8 @@ def population_of(
 
     Returns
     -------
-    Population
+    Population or MixedPopulation
+        The latter with `densities_per_cm2`.
 
     Raises
     ------
@@ -104,6 +104,26 @@ def population_of(
                 f"{place}.{key} must not be given: it belongs to the layout {' or '.join(layouts)}, and "
                 f"this one is {settings.layout}."
             )
+    afferent = afferent_of(chosen, tissues, beside)
+    if settings.densities_per_cm2 is None:
+        return _laid(settings, afferent, place, finger)
+    if "density_per_cm2" in settings.given or chosen in TYPES:
+        raise InputError(
+            f"{place} must have density_per_cm2 and the type of one afferent, or densities_per_cm2 of "
+            "several: got both; leave one out."
+        )
+    types = types_of_afferents(tissues) | ({} if chosen == DEFAULT else {TYPES[0]: afferent})
+    parts = {}
+    for number, (name, density) in enumerate(settings.densities_per_cm2.items()):
+        one = {"density_per_cm2": density, "seed": seed_of(settings.seed, number)}
+        parts[name] = _laid(settings.model_copy(update=one), types[name], place, finger)
+    return MixedPopulation(parts)
+
+
+def _laid(
+    settings: PopulationSettings, afferent: AnyAfferent, place: str, finger: Finger | None
+) -> Population:
+    """Lay out the afferents of one type."""
     # Only what needs them loads the modules that unroll the skin.
     lay = _grid if settings.layout == GRID else resolve_name(f"{__package__}.skin_layouts:lay")
     laid: Population = lay(settings, afferent, place, finger or Fingertip())
@@ -112,13 +132,25 @@ def population_of(
     return replace(laid, sensitivity=sensitivities(len(laid), settings.sensitivity_spread, settings.seed))
 
 
-def population_neighbours(settings: PopulationSettings, population: Population) -> IntArray:
-    """Return who is whose neighbour in a population that was laid out by `settings`, (n_pairs, 2)."""
+def population_neighbours(settings: PopulationSettings, population: Population | MixedPopulation) -> IntArray:
+    """Return who is whose neighbour in a population that was laid out by `settings`, (n_pairs, 2).
+
+    Afferents of a mixed population have neighbours of their own type.
+    """
+    if isinstance(population, MixedPopulation):
+        parts = list(population.parts.values())
+        starts = np.cumsum([0, *map(len, parts)])
+        return np.concatenate(
+            [
+                start + population_neighbours(settings, part)
+                for start, part in zip(starts, parts, strict=False)
+            ]
+        )
     pattern = "rectangular" if settings.layout in (GRID, NAIL_ROWS) else settings.layout
     return neighbours_of(np.asarray(population.places_mm), population.pitch_mm, pattern)
 
 
-def _grid(settings: PopulationSettings, afferent: Afferent, place: str, finger: Finger) -> Population:
+def _grid(settings: PopulationSettings, afferent: AnyAfferent, place: str, finger: Finger) -> Population:
     """Lay the paper's rows and columns."""
     (x, z), (along, across) = finger.contact_mm, settings.offset_mm
     return Population.grid(

@@ -11,7 +11,7 @@ from fingerpad.core.patterns import hexagonal, jittered, poisson_disc, rectangul
 from fingerpad.core.regions import Ellipse, Polygon, Rectangle, Region
 from fingerpad.experiments.descriptions.parts import NAIL_ROWS, PAD, PopulationSettings, RegionSettings
 from fingerpad.geometry.fingertip import Finger, Fingertip
-from fingerpad.neuron.afferent import Afferent
+from fingerpad.neuron.afferent import AnyAfferent
 from fingerpad.neuron.population import Population
 from fingerpad.skin.nail_edge import NailEdge
 from fingerpad.skin.unrolled_skin import UnrolledSkin
@@ -24,14 +24,14 @@ _OF_SHAPE = {
 }
 
 
-def lay(settings: PopulationSettings, afferent: Afferent, place: str, finger: Finger) -> Population:
+def lay(settings: PopulationSettings, afferent: AnyAfferent, place: str, finger: Finger) -> Population:
     """Lay out afferents by any layout but the paper's grid.
 
     Parameters
     ----------
     settings : PopulationSettings
         Of a file.
-    afferent : Afferent
+    afferent : AnyAfferent
         Each of them.
     place : str
         Key of the settings in the file, for errors.
@@ -55,7 +55,7 @@ def lay(settings: PopulationSettings, afferent: Afferent, place: str, finger: Fi
 
 
 def _along_nail(
-    settings: PopulationSettings, afferent: Afferent, place: str, finger: Fingertip
+    settings: PopulationSettings, afferent: AnyAfferent, place: str, finger: Fingertip
 ) -> Population:
     """Lay rows along the edge of the nail."""
     nail = NailEdge(finger)
@@ -64,7 +64,9 @@ def _along_nail(
     return Population.of_layout(rows, nail.points, afferent)
 
 
-def _in_region(settings: PopulationSettings, afferent: Afferent, place: str, finger: Fingertip) -> Population:
+def _in_region(
+    settings: PopulationSettings, afferent: AnyAfferent, place: str, finger: Fingertip
+) -> Population:
     """Fill a region of the unrolled skin."""
     if settings.region is None:
         raise InputError(f"{place}.region must be given for the layout {settings.layout}: it is missing.")

@@ -17,8 +17,8 @@ from fingerpad.core.errors import InputError
 from fingerpad.core.files import path_of, read_text
 from fingerpad.core.keywords import known_keywords
 from fingerpad.core.plain_yaml import read_yaml
-from fingerpad.experiments.descriptions.parts import DEFAULT, AfferentChoice, PopulationSettings
-from fingerpad.experiments.descriptions.population import afferent_of, population_of
+from fingerpad.experiments.descriptions.parts import DEFAULT, AfferentChoice, PopulationSettings, file_of
+from fingerpad.experiments.descriptions.population import population_of
 from fingerpad.experiments.descriptions.pressing import finger_of, named_files
 from fingerpad.experiments.descriptions.reading import Origin, at, part_from
 from fingerpad.experiments.descriptions.stimulus import FingerDescription, StimulusDescription
@@ -35,6 +35,8 @@ from fingerpad.experiments.descriptions.values import (
 )
 from fingerpad.geometry.fingertip import Finger
 from fingerpad.mechanics.tissues import named_tissues
+from fingerpad.neuron.afferent import Afferent
+from fingerpad.neuron.mixed_population import MixedPopulation
 from fingerpad.neuron.population import Population
 from fingerpad.neuron.rate_windows import rate_windows_ms
 from fingerpad.neuron.spikes import window_bounds
@@ -75,8 +77,8 @@ class AfferentsSettings(PopulationSettings):
     Parameters
     ----------
     afferent : AfferentSettings or str
-        "default", the one that was fitted with the tissues; a file of results (`fit.json` of `fingerpad fit`,
-        `results.json` of `fingerpad reproduce`); or numbers.
+        "default", the one that was fitted with the tissues; a type by its name, SAI, RA, PC or SAII; a file
+        of results (`fit.json` of `fingerpad fit`, `results.json` of `fingerpad reproduce`); or numbers.
     noise : float
         Width of a soft threshold over the threshold: spikes are random, drawn with `seed`. 0 is a sharp
         threshold without randomness.
@@ -180,7 +182,7 @@ class DescribedTouch:
             return made.touch(self.finger, tissues, asked.resolution, times_ms=asked.times_ms)
 
     @cached_property
-    def population(self) -> Population:
+    def population(self) -> Population | MixedPopulation:
         """The afferents.
 
         Raises
@@ -190,8 +192,13 @@ class DescribedTouch:
         """
         asked = self.description.afferents
         with self.origin.located():
-            afferent = afferent_of(asked.afferent, self.description.tissues, self.origin.beside)
-            laid = population_of(asked, afferent, "afferents", self.finger)
+            tissues, beside = self.description.tissues, self.origin.beside
+            laid = population_of(asked, asked.afferent, tissues, beside, "afferents", self.finger)
+            if asked.noise > 0.0 and type(getattr(laid, "afferent", None)) is not Afferent:
+                raise InputError(
+                    "afferents.noise must be 0 for other types and mixed populations, because a soft "
+                    f"threshold is that of the default afferent alone: got {asked.noise:g}."
+                )
         with self.origin.located(), at("afferents", "windows_ms"):
             phases = self.touch.stimulus.phases
             for window in rate_windows_ms(phases, asked.windows_ms.dynamic, asked.windows_ms.static):
@@ -209,8 +216,8 @@ class DescribedTouch:
         asked = self.description
         beside = self.origin.beside
         named = [*named_files(asked.finger, beside), *asked.files(beside)]
-        if isinstance(asked.afferents.afferent, str) and asked.afferents.afferent != DEFAULT:
-            named.append(beside / asked.afferents.afferent)
+        if file := file_of(asked.afferents.afferent):
+            named.append(beside / file)
         contents = {self.source: self.text.encode()} | {str(path): path.read_bytes() for path in named}
         return {name: hashlib.sha256(content).hexdigest() for name, content in contents.items()}
 

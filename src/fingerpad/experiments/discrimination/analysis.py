@@ -34,6 +34,7 @@ from fingerpad.experiments.discrimination.task import (
     ObservedPoint,
 )
 from fingerpad.experiments.discrimination.task_stimuli import stimulus_index
+from fingerpad.neuron.mixed_population import MixedPopulation, one_map
 from fingerpad.neuron.population import Population
 from fingerpad.neuron.rate_windows import Windows, rate_windows_ms
 from fingerpad.psychophysics.code_efficiency import (
@@ -307,8 +308,8 @@ class PreparedTask:
         As it was read.
     stimuli : tuple of NamedStimulus
         From `task_stimuli`, the standard first.
-    population : Population
-        From `task_population`.
+    population : Population or MixedPopulation
+        From `task_population`, or one's own.
 
     Raises
     ------
@@ -319,7 +320,7 @@ class PreparedTask:
 
     task: DiscriminationTask
     stimuli: tuple[NamedStimulus, ...]
-    population: Population
+    population: Population | MixedPopulation
 
     def __post_init__(self) -> None:
         task = self.task
@@ -398,7 +399,7 @@ class PreparedTask:
     def responses(self, skins: Mapping[str, Skin]) -> list[ResponseMap]:
         """Responses of the population to every stimulus."""
         return [
-            self.population.respond(skins[stimulus.name], *self._windows_ms(stimulus))
+            one_map(self.population.respond(skins[stimulus.name], *self._windows_ms(stimulus)))
             for stimulus in self.stimuli
         ]
 
@@ -466,7 +467,7 @@ def _population(prepared: PreparedTask) -> TaskPopulation:
         layout=settings.layout,
         n_receptors=len(population),
         pitch_mm=population.pitch_mm,
-        density_per_cm2=settings.density_per_cm2,
+        density_per_cm2=sum((settings.densities_per_cm2 or {"": settings.density_per_cm2}).values()),
         positions_mm=population.positions_mm,
         sensitivity=population.sensitivity,
     )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass, fields, is_dataclass
 from functools import cached_property
 from pathlib import Path
 from typing import Literal
@@ -23,7 +23,8 @@ from fingerpad.experiments.discrimination.task_stimuli import (
 )
 from fingerpad.experiments.manifest import Manifest
 from fingerpad.experiments.runner import Runner
-from fingerpad.neuron.afferent import as_sai
+from fingerpad.neuron.mixed_population import MixedPopulation
+from fingerpad.neuron.population import Population
 from fingerpad.skin.indentation import Touch
 
 
@@ -40,7 +41,7 @@ class DiscriminationFile:
     task : DiscriminationTask
         What was asked, defaults included.
     afferent : dict of str to float or str
-        Parameters of the afferent.
+        Parameters of the afferent; those of a mixed population begin with their type, as in "RA.threshold".
     manifest : Manifest
         What ran.
     """
@@ -65,6 +66,8 @@ class DiscriminationRun:
         Where finished indentations are stored.
     jobs : int or Engine
         Processes, or the engine that solves the indentations; the numbers do not depend on it.
+    population : Population or MixedPopulation, optional
+        Afferents in the place of those of the task: of types of one's own, for example.
     source : str
         File of the task: files that it names are searched beside it, and errors begin with it.
     text : str
@@ -81,6 +84,7 @@ class DiscriminationRun:
     jobs: int | Engine = 1
     source: str = "task"
     text: str = ""
+    population: Population | MixedPopulation | None = None
 
     def __post_init__(self) -> None:
         engine_of(self.jobs)
@@ -92,7 +96,7 @@ class DiscriminationRun:
     def prepared(self) -> PreparedTask:
         """The task with its stimuli and its population."""
         beside = Path(self.source).parent
-        population = task_population(self.task, beside, self.conditions.finger)
+        population = self.population or task_population(self.task, beside, self.conditions.finger)
         return PreparedTask(self.task, task_stimuli(self.task, beside), population)
 
     @cached_property
@@ -152,6 +156,23 @@ def discriminate(
     return DiscriminationFile(
         discrimination=found,
         task=task,
-        afferent=asdict(as_sai(run.prepared.population.afferent)),
+        afferent=_parameters(run.prepared.population),
         manifest=runner.manifest(run.conditions, meshes, command=command, inputs=inputs),
     )
+
+
+def _parameters(population: Population | MixedPopulation) -> dict[str, float | str]:
+    """Parameters of the afferents by name; a function by its own."""
+    parts = population.parts.items() if isinstance(population, MixedPopulation) else [("", population)]
+    found: dict[str, float | str] = {}
+    for kind, part in parts:
+        for each in fields(part.afferent) if is_dataclass(part.afferent) else ():
+            value = getattr(part.afferent, each.name)
+            if value is not None:
+                plain = (
+                    value
+                    if isinstance(value, float | int | str)
+                    else getattr(value, "__qualname__", repr(value))
+                )
+                found[f"{kind}.{each.name}" if kind else each.name] = plain
+    return found

@@ -169,8 +169,8 @@ class DiscriminationTask(StimulusSet):
     population : PopulationSettings
         The afferents.
     afferent : AfferentSettings or str
-        "default", a file of results (`fit.json` of `fingerpad fit`, `results.json` of
-        `fingerpad reproduce`), or numbers.
+        "default", a type by its name (SAI, RA, PC, SAII), a file of results (`fit.json` of `fingerpad fit`,
+        `results.json` of `fingerpad reproduce`), or numbers.
     code : str or list of str
         How the population is decoded, by the names of `CODES`; the first is the main one.
     measure : str or list of str

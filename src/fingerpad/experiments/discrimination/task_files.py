@@ -12,7 +12,7 @@ from fingerpad.core.errors import InputError
 from fingerpad.core.files import path_of, read_text
 from fingerpad.core.keywords import closest, known_keywords
 from fingerpad.core.plain_yaml import read_yaml
-from fingerpad.experiments.descriptions.parts import DEFAULT
+from fingerpad.experiments.descriptions.parts import file_of
 from fingerpad.experiments.descriptions.pressing import named_files
 from fingerpad.experiments.descriptions.reading import Origin, part_from
 from fingerpad.experiments.descriptions.stimuli import NamedStimulus
@@ -76,8 +76,8 @@ def input_hashes(
     hashes = {str(source): hashlib.sha256(task_text(source).encode()).hexdigest()}
     beside = path_of("source", source).parent
     named = [*named_files(task.finger, beside), *(path for stimulus in stimuli for path in stimulus.files)]
-    if isinstance(task.afferent, str) and task.afferent != DEFAULT:
-        named.append(beside / task.afferent)
+    if file := file_of(task.afferent):
+        named.append(beside / file)
     return hashes | {str(path): sha256(path) for path in named}
 
 

@@ -7,10 +7,11 @@ from pathlib import Path
 
 from fingerpad.core.errors import InputError
 from fingerpad.experiments.conditions import Conditions
-from fingerpad.experiments.descriptions.population import afferent_of, population_of
+from fingerpad.experiments.descriptions.population import population_of
 from fingerpad.experiments.descriptions.stimuli import NamedStimulus, named_stimuli, touches_of
 from fingerpad.experiments.discrimination.task import DiscriminationTask
 from fingerpad.geometry.fingertip import Finger
+from fingerpad.neuron.mixed_population import MixedPopulation
 from fingerpad.neuron.population import Population
 from fingerpad.skin.indentation import Touch
 
@@ -67,11 +68,10 @@ def stimulus_index(stimuli: Sequence[NamedStimulus], place: float | str, key: st
 
 def task_population(
     task: DiscriminationTask, beside: Path = Path(), finger: Finger | None = None
-) -> Population:
+) -> Population | MixedPopulation:
     """Lay out the afferents of a task; files that it names are searched in `beside`."""
-    afferent = afferent_of(task.afferent, task.tissues, beside)
     finger = task_conditions(task, beside).finger if finger is None else finger
-    return population_of(task.population, afferent, finger=finger)
+    return population_of(task.population, task.afferent, task.tissues, beside, finger=finger)
 
 
 def task_conditions(task: DiscriminationTask, beside: Path = Path()) -> Conditions:
