@@ -12,6 +12,7 @@ import fingerpad as fp
 from fingerpad.cli import main
 from fingerpad.core.signals import SedTraces
 from fingerpad.geometry.motion import Pose
+from fingerpad.neuron.mixed_population import types_of_afferents
 from fingerpad.reduction.building import joint_bounds, largest_errors
 from fingerpad.reduction.interpolation import Axis, chebyshev_points, lagrange
 from fingerpad.reduction.model import AT_ONCE
@@ -320,16 +321,28 @@ def test_a_wire_meets_the_skin_at_its_place() -> None:
     assert [pose.meets_mm for pose in ReducedTraining(touch, ReducedRange(0.5)).poses()] == [0.0]
 
 
-def test_streamed_spikes_are_those_of_one_go() -> None:
+OWN = fp.OwnAfferent(
+    lambda sed: fp.SpikeTrains.from_lists(
+        [sed.times_ms[1:][np.diff(course) > 0.5] for course in sed.sed_kpa.T]
+    )
+)
+
+
+@pytest.mark.parametrize(
+    "afferent",
+    [fp.Afferent(), *types_of_afferents().values(), fp.Afferent(static_quantity="stored"), OWN],
+    ids=lambda afferent: type(afferent).__name__,
+)
+def test_streamed_spikes_are_those_of_one_go(afferent: fp.Afferent) -> None:
     random = np.random.default_rng(3)
     times = np.cumsum(np.append(0.0, random.uniform(0.5, 2.0, 400)))
     sed = np.vstack([np.zeros(5), np.abs(np.cumsum(random.normal(0.0, 0.4, (400, 5)), axis=0))])
-    afferent = fp.Afferent()
-    quantity = afferent.static_quantity
-    traces = SedTraces(times, sed, times[1:-1], dynamic_quantity=quantity, static_quantity=quantity)
-    whole = afferent.spikes(traces)
+    quantities = afferent.dynamic_quantity, afferent.static_quantity
+    other = None if quantities[0] == quantities[1] else sed[:, ::-1]
+    whole = afferent.spikes(SedTraces(times, sed, times[1:-1], other, *quantities))
     stream = fp.AfferentStream(afferent, 5)
-    parts = [stream.step(float(time), row) for time, row in zip(times[1:], sed[1:], strict=True)]
+    rows = enumerate(times[1:].tolist(), start=1)
+    parts = [stream.step(time, sed[row], None if other is None else other[row]) for row, time in rows]
     for site in range(5):
         streamed = np.concatenate([part[site] for part in parts])
         assert streamed.size > 10

@@ -1,20 +1,24 @@
-"""Spikes of afferents sample by sample: the state is carried from one sample to the next.
+"""Spikes of afferents of any type sample by sample: the state is carried from one sample to the next.
 
-Between two samples what drives the afferents is linear in time, so the rate of Eq. 2 is constant and the
-current of Eq. 1 linear, and it jumps at each sample. Spikes are those of `Afferent.spikes` for the same
-trace with a kink at each sample.
+Between two samples what drives the afferents is linear in time. Spikes are those that the afferent has for
+the same trace with a kink at each sample. The filters and the membrane of SAI, SAII, RA and PC carry their
+state; an afferent of one's own has none that is known, and is given the whole trace each time.
 """
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from numpy.typing import ArrayLike
 
-from fingerpad.core.checks import FloatArray, finite, float_array, instance, whole
+from fingerpad.core.checks import FloatArray, finite, float_array, whole
 from fingerpad.core.errors import InputError
 from fingerpad.core.keywords import KnownKeywords
-from fingerpad.core.signals import SpikeTrains
-from fingerpad.neuron.afferent import Afferent
+from fingerpad.core.signals import SedTraces, SpikeTrains
+from fingerpad.neuron.afferent import Afferent, AnyAfferent, checked_afferent
+from fingerpad.neuron.afferent_types import SAI, RapidlyAdapting
+from fingerpad.neuron.band_pass import continued_stage, knots_between
 from fingerpad.neuron.exact_spikes import continued_trains
 
 
@@ -23,8 +27,8 @@ class AfferentStream(metaclass=KnownKeywords):
 
     Parameters
     ----------
-    afferent : Afferent
-        The afferent.
+    afferent : AnyAfferent
+        Of any type, or one's own.
     n_sites : int
         Number of them.
 
@@ -42,14 +46,18 @@ class AfferentStream(metaclass=KnownKeywords):
     True
     """
 
-    def __init__(self, afferent: Afferent, n_sites: int):
-        self._afferent = instance("afferent", afferent, Afferent)
-        self._gains, membrane = afferent.transduction, afferent.membrane
+    def __init__(self, afferent: AnyAfferent, n_sites: int):
+        self._afferent = checked_afferent(afferent)
         count = whole("n_sites", n_sites, at_least=1)
-        self._constants = membrane.constants()[:-1]
-        self._potentials = membrane.initial_potentials_mv(np.full(count, float(self._gains.intercept_ma)))
         self._time_ms, self._ready = 0.0, np.zeros(count)
         self._static, self._dynamic = np.zeros(count), np.zeros(count)
+        self._trace = [(self._time_ms, self._static, self._dynamic)]
+        if isinstance(afferent, Afferent | RapidlyAdapting):
+            rest_ma = afferent.intercept_ma if isinstance(afferent, Afferent) else 0.0
+            self._constants = afferent.membrane.constants()[:-1]
+            self._potentials = afferent.membrane.initial_potentials_mv(np.full(count, float(rest_ma)))
+        stages = afferent.rise + afferent.fall if isinstance(afferent, RapidlyAdapting) else 1
+        self._filtered = np.zeros((stages, count))
 
     def step(self, time_ms: float, static: ArrayLike, dynamic: ArrayLike | None = None) -> SpikeTrains:
         """Go to a later time, and return the spikes since the last one.
@@ -59,9 +67,9 @@ class AfferentStream(metaclass=KnownKeywords):
         time_ms : float
             After that of the last step. [ms]
         static : array (n_sites,)
-            What the static term follows, now; 0 at the time 0. [kPa]
+            What the static term follows, now; 0 at the time 0. [kPa, or the unit of the quantity]
         dynamic : array (n_sites,), optional
-            What the dynamic term follows, if it is another quantity. [kPa]
+            What the dynamic term follows, if it is another quantity. [as above]
 
         Returns
         -------
@@ -81,21 +89,57 @@ class AfferentStream(metaclass=KnownKeywords):
             raise InputError(f"This afferent follows {wanted}: got {1 if dynamic is None else 2}.")
         later = self._values("static", static)
         followed = later if dynamic is None else self._values("dynamic", dynamic)
-        gains, step_ms = self._gains, time_ms - self._time_ms
-        driven = gains.intercept_ma + gains.dynamic_gain * np.abs(followed - self._dynamic) / step_ms
-        current_ma = np.stack([driven + gains.static_gain * value for value in (self._static, later)])
-        found = continued_trains(
-            np.array([self._time_ms, time_ms]), current_ma, *self._constants, self._potentials, self._ready
-        )
+        if isinstance(self._afferent, Afferent | RapidlyAdapting):
+            knots_ms, current_ma = self._current(self._afferent, float(time_ms), later, followed)
+            spikes = SpikeTrains(
+                *continued_trains(knots_ms, current_ma, *self._constants, self._potentials, self._ready)
+            )
+        else:
+            spikes = self._replayed(float(time_ms), later, followed)
         self._time_ms, self._static, self._dynamic = float(time_ms), later, followed
-        return SpikeTrains(*found)
+        return spikes
+
+    def _current(
+        self, afferent: Afferent | RapidlyAdapting, time_ms: float, static: FloatArray, dynamic: FloatArray
+    ) -> tuple[FloatArray, FloatArray]:
+        """Knots since the last sample, and the current there, linear between them; filters go on."""
+
+        def between(before: FloatArray, now: FloatArray) -> FloatArray:
+            return before + share[:, None] * (now - before)
+
+        filters = isinstance(afferent, SAI | RapidlyAdapting)
+        tau_ms = afferent.smoothing_ms if isinstance(afferent, SAI) else math.inf
+        tau_ms = afferent.band_pass.time_constant_ms if isinstance(afferent, RapidlyAdapting) else tau_ms
+        ends = np.array([self._time_ms, time_ms])
+        knots_ms = knots_between(self._time_ms, time_ms, tau_ms) if filters else ends
+        share = (knots_ms - self._time_ms) / (time_ms - self._time_ms)
+        values = between(self._dynamic, dynamic)
+        if isinstance(afferent, RapidlyAdapting):
+            for stage, state in enumerate(self._filtered):
+                continued_stage(knots_ms, values, tau_ms, stage < afferent.rise, state)
+            return knots_ms, afferent.rectified(values)
+        rate = (dynamic - self._dynamic) / (time_ms - self._time_ms)
+        if filters:
+            continued_stage(knots_ms, values, tau_ms, True, self._filtered[0])
+            rate = values / tau_ms
+        gains = afferent.transduction
+        driven = gains.intercept_ma + gains.dynamic_gain * np.abs(rate)
+        return knots_ms, driven + gains.static_gain * between(self._static, static)
+
+    def _replayed(self, time_ms: float, static: FloatArray, dynamic: FloatArray) -> SpikeTrains:
+        """Spikes since the last sample of an afferent that is given the whole trace."""
+        self._trace.append((time_ms, static, dynamic))
+        times, values, followed = (np.array(part) for part in zip(*self._trace, strict=True))
+        quantities = self._afferent.dynamic_quantity, self._afferent.static_quantity
+        same = quantities[0] == quantities[1]
+        traces = SedTraces(times, values, times[1:-1], None if same else followed, *quantities)
+        trains = self._afferent.spikes(traces)
+        return SpikeTrains.from_lists([train[train > self._time_ms] for train in trains])
 
     def _values(self, name: str, values: ArrayLike) -> FloatArray:
         found = float_array(name, values, 1)
-        if found.size != self._potentials.size:
-            raise InputError(
-                f"{name} must have one value per site, {self._potentials.size}: got {found.size}."
-            )
+        if found.size != self._ready.size:
+            raise InputError(f"{name} must have one value per site, {self._ready.size}: got {found.size}.")
         if (found < 0.0).any():
             raise InputError(f"{name} must not be negative: the smallest value is {found.min():.3g}.")
         return found

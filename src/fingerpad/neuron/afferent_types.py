@@ -101,8 +101,11 @@ class RapidlyAdapting(metaclass=KnownKeywords):
     def current(self, sed: SedTraces) -> CurrentTraces:
         """Band-passed and rectified quantity over the threshold at every site, in place of a current."""
         times_ms, passed = self.band_pass.of(sed)
-        rectified = np.maximum(passed, 0.0) + self.retraction * np.maximum(-passed, 0.0)
-        return CurrentTraces(times_ms, rectified / self.threshold)
+        return CurrentTraces(times_ms, self.rectified(passed))
+
+    def rectified(self, passed: FloatArray) -> FloatArray:
+        """Rectify what the band pass transmits, over the threshold. [1]"""
+        return (np.maximum(passed, 0.0) + self.retraction * np.maximum(-passed, 0.0)) / self.threshold
 
     def spikes(self, sed: SedTraces) -> SpikeTrains:
         """Simulate the spikes of this afferent at every site.

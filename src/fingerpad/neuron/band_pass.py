@@ -23,7 +23,7 @@ from fingerpad.core.signals import SedTraces
 from fingerpad.core.threads import in_blocks
 from fingerpad.core.units import MS_PER_S
 from fingerpad.core.values import converted
-from fingerpad.neuron.transduction import Drive, drive
+from fingerpad.neuron.transduction import Drive, drive, knots_of
 
 _KNOTS_PER_TIME_CONSTANT = 4.0
 """Knots in the time constant of a stage; the output is linear between them, within 0.3 % of its peak."""
@@ -133,6 +133,11 @@ def _largest_share(rise: int, fall: int) -> float:
     return 0.5 * float(np.abs(np.diff(response[:, 0])).sum())
 
 
+def knots_between(start_ms: float, end_ms: float, time_constant_ms: float) -> FloatArray:
+    """Knots of `resampled` between two times, both included. [ms]"""
+    return knots_of(np.array([start_ms, end_ms]), _MOST_PIECES, time_constant_ms / _KNOTS_PER_TIME_CONSTANT)
+
+
 def resampled(traces: SedTraces, time_constant_ms: float) -> Drive:
     """Resample traces so finely that a first-order stage with this time constant follows them. [ms]"""
     step_ms = time_constant_ms / _KNOTS_PER_TIME_CONSTANT
@@ -176,10 +181,16 @@ def smoothed_rate(traces: SedTraces, time_constant_ms: float) -> tuple[FloatArra
 @njit(cache=True, error_model="numpy", nogil=True)
 def _stage(times: FloatArray, values: FloatArray, tau: float, high: bool) -> None:
     """Replace values by those behind one stage, 1/(1 + tau s), or what it holds back if `high`."""
+    continued_stage(times, values, tau, high, values[0].copy())
+
+
+@njit(cache=True, error_model="numpy", nogil=True)
+def continued_stage(times: FloatArray, values: FloatArray, tau: float, high: bool, state: FloatArray) -> None:
+    """Do as `_stage` from a state (n_sites,) of the low pass, which is overwritten with the last one."""
     n_sites = values.shape[1]
-    state, before = values[0].copy(), values[0].copy()
+    before = values[0].copy()
     for site in range(n_sites):
-        values[0, site] = 0.0 if high else values[0, site]
+        values[0, site] = values[0, site] - state[site] if high else state[site]
     for knot in range(1, times.size):
         x = (times[knot] - times[knot - 1]) / tau
         left = math.exp(-x)

@@ -254,7 +254,7 @@ def drive(
             phases=sed.phases,
         )
     spans = _between_kinks(sed)
-    knots = [_knots(sed.times_ms[first : last + 1], pieces, shortest_piece_ms) for first, last in spans]
+    knots = [knots_of(sed.times_ms[first : last + 1], pieces, shortest_piece_ms) for first, last in spans]
     if difference_step_ms is not None:
         driven = _difference(sed, spans, knots, positive("difference_step_ms", difference_step_ms, "ms"))
         return replace(
@@ -345,7 +345,7 @@ def _between_kinks(sed: SedTraces) -> list[tuple[int, int]]:
     return list(pairwise([0, *inner.tolist(), sed.times_ms.size - 1]))
 
 
-def _knots(times_ms: FloatArray, pieces: int, shortest_piece_ms: float) -> FloatArray:
+def knots_of(times_ms: FloatArray, pieces: int, shortest_piece_ms: float) -> FloatArray:
     """Divide every interval of `times_ms` into equal pieces; the given times stay knots, bit-equal."""
     lengths = np.diff(times_ms)
     # The same touch later has lengths that differ by rounding, and must have as many pieces.
