@@ -3,6 +3,7 @@
 import matplotlib
 import numpy as np
 import pytest
+from matplotlib.collections import QuadMesh
 from matplotlib.figure import Figure
 
 import fingerpad as fp
@@ -15,7 +16,10 @@ from fingerpad.export.result_tables import TABLES
 from fingerpad.inference.recordings import RateRecordings
 from fingerpad.inference.spike_fit import SpikeFit
 from fingerpad.psychophysics.psychometric import fit_psychometric
+from fingerpad.report.discrimination_task_figures import draw_task_responses
 from fingerpad.report.drawing import DRAWINGS
+from fingerpad.report.responses import draw_responses
+from fingerpad.report.touch import draw_spikes
 
 TASK = {
     "question": "How strong?",
@@ -106,6 +110,34 @@ def test_every_drawing_fills_axes_that_say_what_they_show(results, kind, what):
     assert axes.has_data()
     assert axes.get_xlabel()
     assert axes.get_ylabel()
+
+
+def test_rasters_begin_on_top_and_maps_have_distal_to_the_right(results):
+    response = results["ResponseMap"]
+    by_touch, task = Figure(), draw_task_responses(results["TaskResult"])
+    draw_spikes(by_touch.add_subplot(), results["SkinResponse"], response)
+    rasters, maps = list(by_touch.axes), [*draw_responses({"pad": response}).axes[:3], task.axes[0]]
+    for kind, drawings in DRAWINGS.items():
+        for what, into in (("raster", rasters), ("map", maps), ("pad", maps)):
+            if what in drawings:
+                into.append(results[kind].plot(Figure().add_subplot(), what))
+    assert (len(rasters), len(maps)) == (4, 7)
+    for axes in rasters:
+        bottom, top = axes.get_ylim()
+        assert bottom > top
+        assert axes.get_xlabel() == "time [ms]"
+    first = rasters[1].collections[0]  # of the first afferent that fires
+    assert first.get_lineoffset() == 1
+    for axes in maps:
+        assert (axes.get_xlabel(), axes.get_ylabel()) == ("x, distal [mm]", "z, lateral [mm]")
+        assert np.diff(axes.get_xlim()) > 0.0
+        distal = max(offsets[:, 0].max() for dots in axes.collections if len(offsets := _places(dots)))
+        assert distal == pytest.approx(response.positions_mm[:, 0].max(), abs=7.0)
+
+
+def _places(drawn):
+    """Places of dots, or the corners of a mesh."""
+    return drawn.get_coordinates().reshape(-1, 2) if isinstance(drawn, QuadMesh) else drawn.get_offsets()
 
 
 def test_drawings_show_the_numbers_of_the_result(results):

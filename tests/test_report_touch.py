@@ -138,6 +138,7 @@ def test_a_hole_through_a_body_is_drawn_as_a_hole(skin):
 def test_trains_stand_in_the_order_of_their_distance_and_silent_ones_are_counted(skin):
     trains = {2.0: [3.0, 9.0], 0.5: [1.0], 9.0: [], 4.0: [7.0]}
     response = SimpleNamespace(
+        types=(),
         positions_mm=np.array([[skin.axis_x_mm, -z] for z in trains]),
         spikes=[np.array(train) for train in trains.values()],
     )

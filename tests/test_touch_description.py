@@ -25,15 +25,19 @@ from fingerpad.experiments.descriptions.estimate import (
     estimate_press,
 )
 from fingerpad.experiments.descriptions.example import EXAMPLE
+from fingerpad.experiments.descriptions.population import population_neighbours
 from fingerpad.experiments.descriptions.pressed import TouchFile, respond
 from fingerpad.experiments.descriptions.pressing import MOTIONS, OBJECTS
 from fingerpad.experiments.descriptions.reading import part_from
 from fingerpad.experiments.descriptions.stimuli import StimulusSet, named_stimuli
 from fingerpad.experiments.descriptions.touch import OUTPUTS, described_touch
+from fingerpad.experiments.discrimination.task_files import parse_task
+from fingerpad.experiments.discrimination.task_stimuli import task_population
 from fingerpad.export.formats import export_touch
 from fingerpad.export.touch_outputs import WRITERS, as_described, check_described, run_touch
 from fingerpad.geometry import surface_files
 from fingerpad.geometry.motion import ForceRampAndHold, RampAndHold
+from fingerpad.neuron.mixed_population import types_of_afferents
 from fingerpad.skin.indentation import touch_of
 from tests.mutations import CHANGES, VALUES, changed, places
 
@@ -556,3 +560,32 @@ def test_an_error_of_a_part_names_the_file_once(run_program, tmp_path, line, sai
     assert status == 2
     assert said in errors
     assert errors.count("touch.yaml") <= 1
+
+
+def test_types_of_afferents_by_name_and_mixed_in_files():
+    """One type by its name, several by their densities, and the same names in a task."""
+    one = described_touch({"object": "sphere", "afferents": {"afferent": "RA"}}).population
+    assert one.afferent == fp.RA()
+    densities = {"SAI": 70, "RA": 140, "PC": 21, "SAII": 9}
+    asked = {"layout": "poisson-disc", "region": {"shape": "pad"}, "densities_per_cm2": densities}
+    mixed = described_touch({"object": "sphere", "afferents": asked}).population
+    assert {name: part.afferent for name, part in mixed.parts.items()} == types_of_afferents()
+    counts = np.array([len(part) for part in mixed.parts.values()])
+    assert counts / counts[0] == pytest.approx([1.0, 2.0, 0.3, 9.0 / 70.0], rel=0.1)
+    spheres = {"vary": "object.curvature_per_m", "values": [287, 340]}
+    task = parse_task(
+        {"question": "Which?", "stimuli": spheres, "standard": 287, "noise": 0.1, "population": asked}
+    )
+    laid = task_population(task)
+    np.testing.assert_array_equal(laid.positions_mm, mixed.positions_mm)
+    of_type = np.array(laid.types)
+    pairs = population_neighbours(task.population, laid)
+    assert (of_type[pairs[:, 0]] == of_type[pairs[:, 1]]).all()
+    assert set(of_type[pairs[:, 0]]) == set(densities)
+    for wrong, said in (
+        ({"afferent": "RA", "densities_per_cm2": densities, "layout": "grid"}, "got both; leave one out"),
+        ({"afferent": "PC", "noise": 0.1}, "noise must be 0 for other types"),
+        ({"densities_per_cm2": {"RB": 1.0}}, "a density above 0 of each type, SAI, RA, PC, SAII"),
+    ):
+        with pytest.raises(fp.InputError, match=said):
+            check_described(described_touch({"object": "sphere", "afferents": wrong}))

@@ -141,7 +141,7 @@ export function start(root, spec, ask) {
   const traces = document.createElement("div");
   for (const [name, text] of [
     ["skin", "Strain energy density and contact"], ["full", "The same, solved exactly"],
-    ["map", "Spikes so far"], ["force", "Force"], ["raster", "Spikes of the population, nearest to the contact first"]]) {
+    ["map", "Spikes so far"], ["force", "Force"], ["raster", "Spikes of the population, nearest to the contact on top"]]) {
     const figure = make("figure", name === "force" || name === "raster" ? traces : pictures), caption = make("figcaption", figure, { textContent: text });
     canvases[name] = Object.assign(make("canvas", figure), { caption, figure });
     canvases[name].setAttribute("role", "img");
@@ -336,11 +336,11 @@ export function start(root, spec, ask) {
   }
   function drawRaster() {
     const order = view.order.filter(site => view.answer.spikes[site].length);
-    const y = { low: 0, high: Math.max(order.length, 1), label: "afferent that fires" };
+    const y = { low: 0, high: Math.max(order.length, 1), label: "afferents that fire" };
     plot(canvases.raster, { low: 0, high: view.answer.times_ms.at(-1), label: "time [ms]" }, y, 240, (pen, toX, toY) => {
       const tall = Math.max(0.8 * (toY(0) - toY(1)), 1);
       pen.fillStyle = "#000";
-      order.forEach((site, n) => view.answer.spikes[site].forEach(at => pen.fillRect(toX(at) - 0.6, toY(n + 0.9), 1.2, tall)));
+      order.forEach((site, n) => view.answer.spikes[site].forEach(at => pen.fillRect(toX(at) - 0.6, toY(y.high - n - 0.1), 1.2, tall)));
       now(pen, toX, toY, y);
     });
   }

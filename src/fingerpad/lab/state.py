@@ -95,7 +95,10 @@ def state_of(asked: Mapping[str, Any] | Any) -> LabState:
     if not values.get("object"):
         raise InputError("object must be given: the name of what is pressed in.")
     if values.get("afferent", AFFERENTS[0]) not in AFFERENTS:
-        raise InputError(f"afferent must be {' or '.join(AFFERENTS)}: got {values['afferent'][:40]!r}.")
+        raise InputError(
+            f"afferent must be {' or '.join(AFFERENTS)}, because a reduced touch keeps what these two follow "
+            f"alone: got {values['afferent'][:40]!r}; fp.AfferentStream takes all types."
+        )
     return LabState(**values)
 
 

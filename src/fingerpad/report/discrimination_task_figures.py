@@ -13,6 +13,7 @@ from matplotlib.figure import Figure
 from fingerpad.core.checks import FloatArray
 from fingerpad.experiments.discrimination.analysis import Decoding, TaskResult
 from fingerpad.report.formatting import number, whole_percent
+from fingerpad.report.mixed_responses import MAP_AXES
 from fingerpad.report.style import (
     BLACK,
     BLUE,
@@ -88,10 +89,10 @@ def draw_task_responses(found: TaskResult) -> Figure:
         axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]))
         axes.set_facecolor(PALE)
     for axes in (grid[0, 0], grid[1, 1]):
-        axes.set_ylabel("z, lateral [mm]")
+        axes.set_ylabel(MAP_AXES["ylabel"])
         axes.tick_params(labelleft=True)
     for axes in (grid[0, 0], *grid[1, 1:]):
-        axes.set_xlabel("x, distal [mm]")
+        axes.set_xlabel(MAP_AXES["xlabel"])
         axes.tick_params(labelbottom=True)
     figure.colorbar(picture, ax=grid, label=f"{what} [{unit}]", shrink=0.8)
     return figure

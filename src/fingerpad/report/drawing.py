@@ -20,7 +20,12 @@ from fingerpad.core.signals import COUNT, CurrentTraces, HitRates, ResponseMap, 
 from fingerpad.experiments.discrimination.analysis import TaskResult
 from fingerpad.experiments.fit.results import FitResult
 from fingerpad.report.discrimination_task_figures import draw_curves_of_measure, main_decoding
-from fingerpad.report.mixed_responses import draw_map_by_type, draw_raster_by_type
+from fingerpad.report.mixed_responses import (
+    MAP_AXES,
+    draw_map_by_type,
+    draw_raster_by_type,
+    draw_trains,
+)
 from fingerpad.report.population import QUANTITIES
 from fingerpad.report.recording_fit import draw_phase, recorded_phases
 from fingerpad.report.style import BLACK, BLUE, GREEN, GREY, ORANGE, new_figure, png, say_nothing_to_draw
@@ -106,19 +111,19 @@ def draw_pad(axes: Axes, skin: SkinResponse, quantity: str = "stored", reach_mm:
     values = skin.sample(quantity, sites)[-1].reshape(x.size, z.size)
     drawn = axes.pcolormesh(x, z, values.T, cmap="viridis", shading="gouraud")
     axes.figure.colorbar(drawn, ax=axes, label=_label(quantity))
-    axes.set(xlabel="x, distal [mm]", ylabel="z, lateral [mm]", aspect="equal")
+    axes.set(**MAP_AXES)
     axes.grid(visible=False)
 
 
 def draw_raster(axes: Axes, spikes: SpikeTrains | ResponseMap) -> None:
-    """Draw the spikes of the afferents that fire, in their order."""
+    """Draw the spikes of the afferents that fire, in their order from the top."""
     trains = spikes.spikes if isinstance(spikes, ResponseMap) else spikes
     firing = [train for train in trains if train.size]
     if not firing:
         say_nothing_to_draw(axes, "no afferent fires a spike")
         return
-    axes.eventplot(firing, lineoffsets=list(range(1, len(firing) + 1)), linelengths=0.8, colors=BLACK)
-    axes.set(xlabel="time [ms]", ylabel=f"{len(firing)} of {len(trains)} afferents fire", yticks=[])
+    draw_trains(axes, firing)
+    axes.set(ylabel=f"{len(firing)} of {len(trains)} afferents fire,\nfirst on top")
 
 
 def draw_map(axes: Axes, response: ResponseMap, quantity: str | None = None) -> None:
@@ -142,7 +147,7 @@ def draw_map(axes: Axes, response: ResponseMap, quantity: str | None = None) -> 
         clip_on=False,
     )  # fmt: skip
     axes.figure.colorbar(drawn, ax=axes, label=f"{phase}: {label}")
-    axes.set(xlabel="x, distal [mm]", ylabel="z, lateral [mm]", aspect="equal")
+    axes.set(**MAP_AXES)
 
 
 def draw_traces(axes: Axes, traces: SedTraces) -> None:

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from fingerpad.core.checks import FloatArray
 from fingerpad.core.errors import InputError
 from fingerpad.core.signals import ResponseMap
 from fingerpad.report.style import BLACK, BLUE, GREEN, GREY, ORANGE, new_figure
@@ -16,6 +17,9 @@ from fingerpad.report.style import BLACK, BLUE, GREEN, GREY, ORANGE, new_figure
 ROW_IN = (9.5, 3.4)
 STYLES = ((BLUE, "o"), (ORANGE, "^"), (BLACK, "s"), (GREEN, "D"), (GREY, "v"))
 """Colour and marker of the types, in their order."""
+
+MAP_AXES: Any = {"xlabel": "x, distal [mm]", "ylabel": "z, lateral [mm]", "aspect": "equal"}
+"""Axes of a map of the pad: distal is to the right."""
 
 LARGEST_MARK, SILENT_MARK = 60.0, 4.0
 """Area of the mark of the most active afferent of a type, and of a silent one. [points²]"""
@@ -93,7 +97,14 @@ def draw_map_by_type(axes: Axes, maps: Mapping[str, ResponseMap]) -> None:
             x[fires], z[fires], area, facecolors="none", edgecolors=colour, marker=marker, linewidths=0.9,
             label=name,
         )  # fmt: skip
-    axes.set(xlabel="x, distal [mm]", ylabel="z, lateral [mm]", aspect="equal")
+    axes.set(**MAP_AXES)
+
+
+def draw_trains(axes: Axes, trains: Sequence[FloatArray]) -> None:
+    """Draw spike trains over time, a row each, the first on top."""
+    rows = list(range(1, len(trains) + 1))
+    axes.eventplot(trains, lineoffsets=rows, linelengths=0.75, linewidths=1.0, colors=BLACK)
+    axes.set(xlabel="time [ms]", ylim=(len(trains) + 0.75, 0.25), yticks=[])
 
 
 def _styles(count: int) -> list[tuple[str, Any]]:

@@ -12,6 +12,7 @@ from matplotlib.figure import Figure
 from fingerpad.core.checks import FloatArray
 from fingerpad.core.errors import InputError
 from fingerpad.core.signals import ResponseMap
+from fingerpad.report.mixed_responses import MAP_AXES
 from fingerpad.report.population import QUANTITIES, with_round_ticks
 from fingerpad.report.style import GREY, new_figure
 
@@ -89,8 +90,6 @@ def _dots(axes: Any, response: ResponseMap, values: FloatArray, colours: str, sc
             edgecolors=GREY,
             linewidths=0.6,
         )
-    axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), aspect="equal")
+    axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), **MAP_AXES)
     axes.grid(visible=False)
-    axes.set_xlabel("x, distal [mm]")
-    axes.set_ylabel("z, lateral [mm]")
     return dots

@@ -18,6 +18,8 @@ from fingerpad.core.files import path_of
 from fingerpad.core.keywords import known_keywords
 from fingerpad.core.signals import STORED_ENERGY, ResponseMap
 from fingerpad.core.units import cosine_and_sine
+from fingerpad.neuron.mixed_population import MixedResponse, one_map
+from fingerpad.report.mixed_responses import draw_raster_by_type, draw_trains
 from fingerpad.report.style import BLACK, BLUE, ORANGE, new_figure, say_nothing_to_draw, write_png
 
 if TYPE_CHECKING:
@@ -45,7 +47,10 @@ BONE, BONE_INSIDE = "#9a9488", "#d9dde0"
 
 @known_keywords
 def save_figure(
-    path: str | Path, skin: SkinResponse, response: ResponseMap, indenter: Indenter | None = None
+    path: str | Path,
+    skin: SkinResponse,
+    response: ResponseMap | MixedResponse,
+    indenter: Indenter | None = None,
 ) -> Path:
     """Draw a touch and save the picture: the finger, coloured by what the afferents follow, and the spikes.
 
@@ -55,7 +60,7 @@ def save_figure(
         The PNG file; folders are made as needed.
     skin : SkinResponse
         From `indent`.
-    response : ResponseMap
+    response : ResponseMap or MixedResponse
         Response of a population to it.
     indenter : Indenter, optional
         The body that pressed, to be drawn as well; as it stands when it is not spun.
@@ -90,10 +95,10 @@ def save_figure(
     if file.suffix.lower() != ".png":
         raise InputError(f"A figure is written as .png: got {file.name}.")
     instance("skin", skin, SkinResponse)
-    instance("response", response, ResponseMap)
+    answer = one_map(response)
     if indenter is not None:
         instance("indenter", indenter, Indenter)
-    return write_png(lambda parts: draw(*parts), (skin, response, indenter), file)
+    return write_png(lambda parts: draw(*parts), (skin, answer, indenter), file)
 
 
 def draw(skin: SkinResponse, response: ResponseMap, indenter: Indenter | None = None) -> Figure:
@@ -208,25 +213,23 @@ def draw_motion(axes: Axes, skin: SkinResponse) -> None:
 
 
 def draw_spikes(axes: Axes, skin: SkinResponse, response: ResponseMap) -> None:
-    """Draw the spike trains of the afferents that fire, the nearest to the indenter's axis at the bottom."""
+    """Draw the spike trains of the afferents that fire, the nearest to the indenter's axis on top.
+
+    Afferents of a mixed population have a band per type.
+    """
+    if response.types:
+        draw_raster_by_type(axes, MixedResponse.of(response).maps)
+        axes.set_xlim(0.0, skin.times_ms[-1])
+        return
     plane = response.positions_mm[:, [0, -1]] - [skin.axis_x_mm, 0.0]
     trains = [response.spikes[afferent] for afferent in np.argsort(np.hypot(*plane.T), kind="stable")]
     firing = [train for train in trains if train.size]
     if not firing:
         say_nothing_to_draw(axes, "no afferent fires a spike")
         return
-    axes.eventplot(
-        firing,
-        lineoffsets=list(range(1, len(firing) + 1)),
-        linelengths=0.75,
-        linewidths=1.0,
-        colors=BLACK,
-    )
+    draw_trains(axes, firing)
     axes.set(
-        xlabel="time [ms]",
-        ylabel=f"{len(firing)} of {len(trains)} afferents fire,\nnearest at the bottom",
+        ylabel=f"{len(firing)} of {len(trains)} afferents fire,\nnearest on top",
         xlim=(0.0, skin.times_ms[-1]),
-        ylim=(0.25, len(firing) + 0.75),
-        yticks=[],
     )
     axes.grid(visible=False)

@@ -47,8 +47,7 @@ def write_touch_page(result: TouchFile, draw: Callable[[], Figure], folder: Path
     facts = {"number of times" if name == "times" else name: value for name, value in numbers}
     page = Page(
         result.touch.title,
-        "A finite-element fingertip and a population of slowly adapting afferents. "
-        f"{edition(result.manifest)}",
+        f"A finite-element fingertip and a population of afferents. {edition(result.manifest)}",
         touch_summary(result),
         [
             Chapter(
