@@ -154,7 +154,7 @@ def test_trains_stand_in_the_order_of_their_distance_and_silent_ones_are_counted
 
 
 def test_a_silent_population_is_reported_silent(skin):
-    response = SimpleNamespace(positions_mm=np.zeros((1, 2)), spikes=[np.empty(0)])
+    response = SimpleNamespace(types=(), positions_mm=np.zeros((1, 2)), spikes=[np.empty(0)])
     axes = new_figure(4.0, 3.0).subplots()
     touch_figure.draw_spikes(axes, skin, response)
     assert [text.get_text() for text in axes.texts] == ["no afferent fires a spike"]
