@@ -486,6 +486,21 @@ class ResponseMap(Result):
     types: tuple[str, ...] = ()
 
     @property
+    def by_type(self) -> dict[str, ResponseMap]:
+        """Maps of the afferents of each type, by name; empty where there are no types."""
+        parts = {}
+        for name in dict.fromkeys(self.types):
+            rows = np.flatnonzero(np.array(self.types) == name)
+            parts[name] = replace(
+                self,
+                positions_mm=self.positions_mm[rows],
+                spikes=SpikeTrains.from_lists([self.spikes[row] for row in rows.tolist()]),
+                types=(),
+                **{key: values[rows] for key, values in self.measures.items()},
+            )
+        return parts
+
+    @property
     def measures(self) -> dict[str, FloatArray]:
         """What was measured of each receptor, by name: every array (n_receptors,)."""
         values = {each.name: getattr(self, each.name) for each in fields(self)}

@@ -122,24 +122,11 @@ class MixedResponse(Result):
         if not response.types:
             raise InputError("MixedResponse needs the type of each afferent: got a response without types.")
         known = types_of_afferents()
-        of_type = {
-            name: np.flatnonzero(np.array(response.types) == name) for name in dict.fromkeys(response.types)
+        parts = {
+            name: replace(part, rate_measure=getattr(known.get(name), "rate_measure", part.rate_measure))
+            for name, part in response.by_type.items()
         }
-        return cls(
-            MappingProxyType(
-                {
-                    name: replace(
-                        response,
-                        positions_mm=response.positions_mm[rows],
-                        spikes=SpikeTrains.from_lists([response.spikes[row] for row in rows.tolist()]),
-                        types=(),
-                        rate_measure=getattr(known.get(name), "rate_measure", response.rate_measure),
-                        **{key: values[rows] for key, values in response.measures.items()},
-                    )
-                    for name, rows in of_type.items()
-                }
-            )
-        )
+        return cls(MappingProxyType(parts))
 
 
 @dataclass(frozen=True)

@@ -18,12 +18,12 @@ from fingerpad.core.files import path_of
 from fingerpad.core.keywords import known_keywords
 from fingerpad.core.signals import STORED_ENERGY, ResponseMap
 from fingerpad.core.units import cosine_and_sine
-from fingerpad.neuron.mixed_population import MixedResponse, one_map
 from fingerpad.report.mixed_responses import draw_raster_by_type, draw_trains
 from fingerpad.report.style import BLACK, BLUE, ORANGE, new_figure, say_nothing_to_draw, write_png
 
 if TYPE_CHECKING:
     from fingerpad.geometry.indenters import Indenter
+    from fingerpad.neuron.mixed_population import MixedResponse
     from fingerpad.skin.sampling import SkinResponse
     from fingerpad.skin.section import Section
 
@@ -95,7 +95,7 @@ def save_figure(
     if file.suffix.lower() != ".png":
         raise InputError(f"A figure is written as .png: got {file.name}.")
     instance("skin", skin, SkinResponse)
-    answer = one_map(response)
+    answer = instance("response", getattr(response, "joined", response), ResponseMap)
     if indenter is not None:
         instance("indenter", indenter, Indenter)
     return write_png(lambda parts: draw(*parts), (skin, answer, indenter), file)
@@ -218,7 +218,7 @@ def draw_spikes(axes: Axes, skin: SkinResponse, response: ResponseMap) -> None:
     Afferents of a mixed population have a band per type.
     """
     if response.types:
-        draw_raster_by_type(axes, MixedResponse.of(response).maps)
+        draw_raster_by_type(axes, response.by_type)
         axes.set_xlim(0.0, skin.times_ms[-1])
         return
     plane = response.positions_mm[:, [0, -1]] - [skin.axis_x_mm, 0.0]
