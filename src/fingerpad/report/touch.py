@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 from textwrap import fill
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -23,7 +23,6 @@ from fingerpad.report.style import BLACK, BLUE, ORANGE, new_figure, say_nothing_
 
 if TYPE_CHECKING:
     from fingerpad.geometry.indenters import Indenter
-    from fingerpad.neuron.mixed_population import MixedResponse
     from fingerpad.skin.sampling import SkinResponse
     from fingerpad.skin.section import Section
 
@@ -45,11 +44,20 @@ BONE, BONE_INSIDE = "#9a9488", "#d9dde0"
 """Colours of the outline of bone and nail, and of the bone itself, unlike any of `SKIN` and the paper."""
 
 
+class Joinable(Protocol):
+    """A response of several types of afferents, such as a `MixedResponse`."""
+
+    @property
+    def joined(self) -> ResponseMap:
+        """One map of all afferents."""
+        ...
+
+
 @known_keywords
 def save_figure(
     path: str | Path,
     skin: SkinResponse,
-    response: ResponseMap | MixedResponse,
+    response: ResponseMap | Joinable,
     indenter: Indenter | None = None,
 ) -> Path:
     """Draw a touch and save the picture: the finger, coloured by what the afferents follow, and the spikes.
