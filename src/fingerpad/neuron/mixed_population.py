@@ -123,7 +123,11 @@ class MixedResponse(Result):
             raise InputError("MixedResponse needs the type of each afferent: got a response without types.")
         known = types_of_afferents()
         parts = {
-            name: replace(part, rate_measure=getattr(known.get(name), "rate_measure", part.rate_measure))
+            name: replace(
+                part,
+                rate_measure=getattr(known.get(name), "rate_measure", part.rate_measure),
+                quantity=getattr(known.get(name), "static_quantity", part.quantity),
+            )
             for name, part in response.by_type.items()
         }
         return cls(MappingProxyType(parts))
