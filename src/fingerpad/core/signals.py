@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, fields, replace
 from inspect import signature
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -491,12 +491,13 @@ class ResponseMap(Result):
         parts = {}
         for name in dict.fromkeys(self.types):
             rows = np.flatnonzero(np.array(self.types) == name)
+            measures: dict[str, Any] = {key: values[rows] for key, values in self.measures.items()}
             parts[name] = replace(
                 self,
                 positions_mm=self.positions_mm[rows],
                 spikes=SpikeTrains.from_lists([self.spikes[row] for row in rows.tolist()]),
                 types=(),
-                **{key: values[rows] for key, values in self.measures.items()},
+                **measures,
             )
         return parts
 

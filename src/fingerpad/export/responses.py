@@ -7,6 +7,7 @@ import io
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -158,11 +159,12 @@ def read_response_csv(path: Path) -> ResponseMap | MixedResponse:
         spikes = SpikeTrains.from_lists([[float(time) for time in row[SPIKES].split()] for row in rows])
     except (AttributeError, ValueError) as error:
         raise InputError(f"{path}: {SPIKES} must hold times that spaces separate: {error}.") from error
+    measured: dict[str, Any] = {column: numbers(column) for column in MEASURED}
     response = ResponseMap(
         positions_mm=np.column_stack([numbers(column) for column in places]),
         pitch_mm=float(pitches.min()),
         spikes=spikes,
         types=tuple(row[TYPE] for row in rows) if TYPE in have else (),
-        **{column: numbers(column) for column in MEASURED},
+        **measured,
     )
     return by_type(response, pitches)

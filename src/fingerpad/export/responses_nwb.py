@@ -203,6 +203,7 @@ def _responses(session: Any) -> dict[str, ResponseMap | MixedResponse]:
     for number, (name, start, stop) in enumerate(
         zip(*(trials[key][:] for key in ("stimulus", "start_time", "stop_time")), strict=True)
     ):
+        measures: dict[str, Any] = {key: values[:, number] for key, values in measured.items()}
         response = ResponseMap(
             positions_mm=np.column_stack([units[place][:] for place in places]),
             pitch_mm=float(units[PITCH][:].min()),
@@ -212,7 +213,7 @@ def _responses(session: Any) -> dict[str, ResponseMap | MixedResponse]:
             duration_ms=MS_PER_S * (stop - start),
             phases=tuple(phases.get(name, ())),
             types=tuple(units[TYPE][:]) if TYPE in units.colnames else (),
-            **{key: values[:, number] for key, values in measured.items()},
+            **measures,
         )
         found[str(name)] = by_type(response, np.asarray(units[PITCH][:]))
     return found

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from types import MappingProxyType
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -13,8 +14,6 @@ from fingerpad.core.displayed import Result
 from fingerpad.core.errors import InputError
 from fingerpad.core.keywords import KnownKeywords
 from fingerpad.core.layouts import Place
-from fingerpad.core.patterns import poisson_disc
-from fingerpad.core.regions import Region
 from fingerpad.core.signals import ResponseMap, Skin, SpikeTrains, traces_below
 from fingerpad.core.values import converted
 from fingerpad.data import afferents as published
@@ -23,6 +22,9 @@ from fingerpad.neuron.afferent import AnyAfferent, checked_afferent
 from fingerpad.neuron.afferent_types import PC, RA, SAI, SAII
 from fingerpad.neuron.population import Population, sensitivities
 from fingerpad.neuron.rate_windows import Window
+
+if TYPE_CHECKING:
+    from fingerpad.core.regions import Region
 
 PUBLISHED_DENSITIES: Mapping[str, float] = MappingProxyType(
     dict(zip(published.TYPES, published.DENSITIES.value, strict=True))
@@ -107,13 +109,16 @@ class MixedResponse(Result):
     def joined(self) -> ResponseMap:
         """One map of all afferents, type after type, with the type of each; its pitch is the smallest."""
         maps = list(self.maps.values())
+        measures: dict[str, Any] = {
+            name: np.concatenate([each.measures[name] for each in maps]) for name in maps[0].measures
+        }
         return replace(
             maps[0],
             positions_mm=self.positions_mm,
             pitch_mm=min(each.pitch_mm for each in maps),
             spikes=self.spikes,
             types=tuple(self.types.tolist()),
-            **{name: np.concatenate([each.measures[name] for each in maps]) for name in maps[0].measures},
+            **measures,
         )
 
     @classmethod
@@ -251,6 +256,9 @@ class MixedPopulation(metaclass=KnownKeywords):
         >>> len(MixedPopulation.at_densities(square, {"RA": 140.0, "PC": 20.0}))
         160
         """
+        # Files of touches load this module, and only a layout at random needs that one.
+        from fingerpad.core.patterns import poisson_disc
+
         for argument, given in (("densities_per_cm2", densities_per_cm2), ("afferents", afferents or {})):
             instance(f"{argument}, with a type as each key,", given, Mapping)
         if not hasattr(region, "area_mm2"):

@@ -166,13 +166,14 @@ def _parameters(population: Population | MixedPopulation) -> dict[str, float | s
     parts = population.parts.items() if isinstance(population, MixedPopulation) else [("", population)]
     found: dict[str, float | str] = {}
     for kind, part in parts:
-        for each in fields(part.afferent) if is_dataclass(part.afferent) else ():
-            value = getattr(part.afferent, each.name)
+        names = [each.name for each in fields(part.afferent)] if is_dataclass(part.afferent) else []
+        for name in names:
+            value = getattr(part.afferent, name)
             if value is not None:
                 plain = (
                     value
                     if isinstance(value, float | int | str)
                     else getattr(value, "__qualname__", repr(value))
                 )
-                found[f"{kind}.{each.name}" if kind else each.name] = plain
+                found[f"{kind}.{name}" if kind else name] = plain
     return found
