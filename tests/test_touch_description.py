@@ -548,10 +548,7 @@ def test_the_estimate_grows_with_mesh_steps_force_and_friction():
     [
         ("finger: baby", "touch.yaml, line 2, finger: like must be one of adult, "),
         ("finger: nope.msh", "touch.yaml, line 2, finger: nope.msh must be a file that can be read: "),
-        (
-            "afferents: {afferent: RA}",
-            "afferent must be SAI's, as default, numbers or a file of a fit: got RA",
-        ),
+        ("afferents: {afferent: RB}", "RB"),
     ],
 )
 def test_an_error_of_a_part_names_the_file_once(run_program, tmp_path, line, said):

@@ -166,7 +166,9 @@ def _parameters(population: Population | MixedPopulation) -> dict[str, float | s
     parts = population.parts.items() if isinstance(population, MixedPopulation) else [("", population)]
     found: dict[str, float | str] = {}
     for kind, part in parts:
-        names = [each.name for each in fields(part.afferent)] if is_dataclass(part.afferent) else []
+        names: list[str] = (
+            [each.name for each in fields(part.afferent)] if is_dataclass(part.afferent) else []
+        )
         for name in names:
             value = getattr(part.afferent, name)
             if value is not None:
