@@ -14,7 +14,7 @@ from fingerpad.geometry.indenters import Bar, FlatPunch, Sphere
 from fingerpad.geometry.mesh import block_mesh
 from fingerpad.geometry.motion import ForceRampAndHold, RampAndHold
 from fingerpad.geometry.motions import repeated, sine, stroke
-from fingerpad.geometry.sampled_motions import reduced
+from fingerpad.geometry.sampled_motions import reduced, sampled
 from fingerpad.geometry.trajectory import Trajectory
 from fingerpad.mechanics import newton
 from fingerpad.mechanics.contact import place
@@ -282,3 +282,23 @@ def test_punch_that_goes_between_two_nodes_is_refused_instead_of_pressing_with_n
     monkeypatch.setattr("fingerpad.skin.indentation.FEWEST_ACROSS_BODY", 1)
     with pytest.raises(ConvergenceError, match=r"The skin slips past the indenter: its force falls from"):
         touch_of(Fingertip(), tiny, RampAndHold(depth_mm=0.3)).solve()
+
+
+def test_a_vibration_of_ones_own_is_one_phase_and_taps_stay_apart():
+    """0.8 mm, then 0.1 mm at 20 Hz, recorded in steps of 0.1 µm; taps leave the skin or stop between them."""
+
+    def depth(time_ms):
+        wave = 0.1 * np.sin(2 * np.pi * 0.02 * (time_ms - 50.0))
+        return 0.8 * min(time_ms / 50.0, 1.0) + (wave if time_ms > 50.0 else 0.0)
+
+    times = np.arange(0.0, 500.5, 0.5)
+    recorded = Trajectory(times, [round(depth(time), 4) for time in times])
+    for motion in (recorded, sampled(500.0, depth)):
+        assert [phase.name for phase in motion.phases] == ["ramp", "vibration"]
+        assert motion.phases[1].end_ms == 500.0
+        assert 50.0 <= motion.phases[1].start_ms < 65.0
+    assert repr(recorded) == "Trajectory(1001 samples to 500 ms, depth_mm at most 0.9 mm, ramp, vibration)"
+    saw = Trajectory(50.0 * np.arange(9.0), [0.0, 1.0] * 4 + [0.0])
+    assert [phase.name for phase in saw.phases][:4] == ["ramp", "release", "ramp 2", "release 2"]
+    stairs = Trajectory(50.0 * np.arange(9.0), [0.0, 1.0, 1.0, 0.5, 0.5, 1.0, 1.0, 0.5, 0.5])
+    assert [phase.name for phase in stairs.phases][-2:] == ["release 2", "hold 4"]

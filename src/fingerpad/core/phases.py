@@ -13,6 +13,9 @@ from fingerpad.core.values import converted
 RAMP, HOLD = "ramp", "hold"
 """Names of the phases in which the two rates of the paper are counted."""
 
+RELEASE, VIBRATION = "release", "vibration"
+"""Names of phases in which an indenter goes back, and in which it goes to and fro while it touches."""
+
 
 @dataclass(frozen=True)
 @converted
@@ -44,6 +47,11 @@ class Phase(metaclass=KnownKeywords):
                 f"A phase needs a name, a start from 0 on and a later end: got {self.name!r}, {start:g} and "
                 f"{end:g} ms."
             )
+
+    @property
+    def length_ms(self) -> float:
+        """How long it lasts. [ms]"""
+        return self.end_ms - self.start_ms
 
     @property
     def window_ms(self) -> tuple[float, float]:

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass, field
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
 from itertools import groupby, pairwise
 
 import numpy as np
@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from fingerpad.core.checks import FloatArray, float_array, increasing
 from fingerpad.core.errors import InputError
-from fingerpad.core.phases import HOLD, RAMP, Phase
+from fingerpad.core.phases import HOLD, RAMP, RELEASE, VIBRATION, Phase
 from fingerpad.core.values import converted
 from fingerpad.data import protocol
 from fingerpad.geometry.motion import STILL, Cycles, Motion, Pose, hold_ends_ms
@@ -37,6 +37,33 @@ ONSET_SHARES = (0.25, 0.5)
 
 SAME_VALUE = 0.02
 """Change over the largest depth, force or way of a trajectory below which it holds; recordings have noise."""
+
+
+FEWEST_TURNS = 4
+"""Turns from down to up and back, without a lift or a stop between them, from which on a motion vibrates."""
+
+
+def _with_vibrations(runs: Sequence[Phase], lifted_ms: FloatArray) -> list[Phase]:
+    """Join what goes up and down again and again while it touches; a crest lasts less than its neighbours."""
+    found: list[Phase] = []
+    waiting = list(runs)
+    while waiting:
+        first, *rest = waiting
+        joined, turns, last = [], 0, first
+        for number, run in enumerate(rest):
+            following = rest[number + 1].length_ms if number + 1 < len(rest) else last.length_ms
+            crest = run.name == HOLD and run.length_ms < min(last.length_ms, following)
+            lifted = ((lifted_ms > run.start_ms) & (lifted_ms <= run.end_ms)).any()
+            if not crest and (run.name not in (RAMP, RELEASE) or lifted):
+                break
+            joined.append(run)
+            turns, last = (turns, last) if crest else (turns + 1, run)
+        found.append(first)
+        if first.name in (RAMP, RELEASE, HOLD) and turns >= FEWEST_TURNS:
+            found.append(Phase(VIBRATION, joined[0].start_ms, joined[-1].end_ms))
+            rest = rest[len(joined) :]
+        waiting = rest
+    return found
 
 
 @dataclass(frozen=True)
@@ -279,6 +306,13 @@ class Trajectory(Motion):
         goes_on[1:-1] |= np.linalg.norm(accelerations[1:-1] - mean, axis=1) <= MOST_JUMP * size[1:-1]
         return goes_on
 
+    def __repr__(self) -> str:
+        what, unit = ("force_mn", "mN") if self.by_force else ("depth_mm", "mm")
+        return (
+            f"Trajectory({len(self.times_ms)} samples to {self.end_ms:g} ms, {what} at most "
+            f"{max(self.prescribed):.4g} {unit}, {', '.join(phase.name for phase in self.phases)})"
+        )
+
     @property
     def named_phases(self) -> bool:
         """Whether its phases were given, and not named by its course."""
@@ -291,12 +325,15 @@ class Trajectory(Motion):
         course[:, 0] = np.maximum(course[:, 0], 0.0)  # how high it is lifted does not matter
         course = course / np.maximum(np.ptp(course, axis=0), 1.0)
         bends = np.flatnonzero(samples_of_line(times, course, SAME_VALUE)).tolist()
-        phases: list[Phase] = []
+        runs = []
         for kind, group in groupby(pairwise(bends), lambda part: self._kind(*course[list(part)])):
             same = list(group)
-            count = 1 + sum(phase.name.split()[0] == kind for phase in phases)
-            name = kind if count == 1 else f"{kind} {count}"
-            phases.append(Phase(name, float(times[same[0][0]]), float(times[same[-1][1]])))
+            runs.append(Phase(kind, float(times[same[0][0]]), float(times[same[-1][1]])))
+        lifted_ms = times[course[:, 0] <= SAME_VALUE]
+        phases: list[Phase] = []
+        for run in _with_vibrations(runs, lifted_ms):
+            count = 1 + sum(phase.name.split()[0] == run.name for phase in phases)
+            phases.append(run if count == 1 else replace(run, name=f"{run.name} {count}"))
         return tuple(phases)
 
     def _crossings_ms(self) -> FloatArray:
@@ -311,7 +348,7 @@ class Trajectory(Motion):
         """Say what the indenter does between two states of its `_course`."""
         change = end - start
         if abs(change[0]) > SAME_VALUE:
-            return RAMP if change[0] > 0.0 else "release"
+            return RAMP if change[0] > 0.0 else RELEASE
         if np.abs(change[1:]).max() > SAME_VALUE:
             return "move"
         return HOLD if max(start[0], end[0]) > SAME_VALUE else "pause"
