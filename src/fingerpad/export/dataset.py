@@ -20,6 +20,7 @@ import shutil
 from collections.abc import Hashable, Iterator, Sequence
 from dataclasses import dataclass, fields, is_dataclass
 from importlib import import_module
+from importlib.metadata import version
 from pathlib import Path
 from secrets import token_hex
 from tempfile import TemporaryDirectory
@@ -27,7 +28,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from fingerpad import __version__
 from fingerpad.core.checks import instance, one_of
 from fingerpad.core.errors import InputError, StoreError
 from fingerpad.core.files import path_of, write_atomically
@@ -438,7 +438,7 @@ def _attributes(skin: SkinResponse, response: ResponseMap | None, seed: int | No
     attributes: Attributes = {
         "Conventions": "CF-1.11",
         "title": "Touch of a fingertip",
-        "source": f"fingerpad {__version__}",
+        "source": f"fingerpad {version('fingerpad')}",
         "format": FORMAT,
         "format_version": FORMAT_VERSION,
         "axes": "x distal, y towards the back of the finger, z lateral",

@@ -5,13 +5,13 @@ from __future__ import annotations
 import warnings
 from collections.abc import Mapping
 from datetime import UTC, datetime
+from importlib.metadata import version
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
 
-from fingerpad import __version__
 from fingerpad.core.checks import instance, not_negative, positive
 from fingerpad.core.errors import InputError
 from fingerpad.core.files import path_of, write_atomically
@@ -95,7 +95,7 @@ def write_responses_nwb(
         warnings.simplefilter("ignore")
         pynwb = require_pynwb()
         session = pynwb.NWBFile(
-            f"simulated by fingerpad {__version__}",
+            f"simulated by fingerpad {version('fingerpad')}",
             file.stem,
             began,
             experiment_description="Simulated touch of a fingertip: finite elements and afferents.",
