@@ -250,6 +250,7 @@ def served(laboratory: Laboratory) -> Iterator[tuple[str, subprocess.Popen[str]]
         yield line.split()[1], process
         process.send_signal(signal.SIGINT)
         assert process.wait(10) == 130
+        assert "Traceback" not in process.stdout.read()
 
 
 def test_the_server_listens_on_loopback_alone_and_survives_users(
@@ -293,6 +294,31 @@ def test_a_page_of_another_origin_is_refused(served: tuple[str, subprocess.Popen
     })  # fmt: skip
     with connection.getresponse() as answer:
         assert answer.status == 403
+    connection.close()
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        {},
+        {"Sec-WebSocket-Protocol": "bokeh"},
+        {"Sec-WebSocket-Protocol": "bokeh, a.b"},
+        {"Sec-WebSocket-Protocol": "bokeh, eyJzZXNzaW9uX2lkIjogIngiLCAic2Vzc2lvbl9leHBpcnkiOiAxfQ"},
+        {"Origin": "http://[::1"},
+    ],
+    ids=["none", "no token", "no JSON", "expired", "broken origin"],
+)
+def test_a_wrong_header_of_a_websocket_is_answered_by_400(
+    served: tuple[str, subprocess.Popen[str]], wrong: dict[str, str]
+) -> None:
+    """It was a traceback of the server."""
+    connection = http.client.HTTPConnection(served[0][len("http://") : -1])
+    connection.request("GET", "/ws", headers={
+        "Origin": served[0][:-1], "Connection": "Upgrade", "Upgrade": "websocket",
+        "Sec-WebSocket-Version": "13", "Sec-WebSocket-Key": "x" * 22 + "==",
+    } | wrong)  # fmt: skip
+    with connection.getresponse() as answer:
+        assert answer.status == 400
     connection.close()
 
 

@@ -6,10 +6,12 @@ import json
 import logging
 import signal
 import socket
+import time
 from collections.abc import Callable
 from dataclasses import asdict
 from importlib import resources
 from typing import Any
+from urllib.parse import urlsplit
 
 from fingerpad.core.errors import FingerpadError, InputError
 from fingerpad.geometry.fingertip import FINGERS
@@ -122,6 +124,7 @@ def serve(laboratory: Laboratory, port: int = 0, ready: Callable[[str], None] = 
     from panel.custom import JSComponent
     from panel.io.server import get_server
     from param import String
+    from tornado.websocket import WebSocketHandler
 
     class Page(JSComponent):
         spec = String(json.dumps(spec_of(laboratory)))
@@ -140,6 +143,9 @@ def serve(laboratory: Laboratory, port: int = 0, ready: Callable[[str], None] = 
         check_unused_sessions_milliseconds=5000,
         unused_session_lifetime_milliseconds=15000,
     )
+    for rule in server._tornado.wildcard_router.rules:
+        if issubclass(rule.target, WebSocketHandler):
+            rule.target = _refusing(rule.target)
     # Panel would end without a word after Ctrl-C.
     signal.signal(signal.SIGINT, interrupted)
     ready(f"http://{HOST}:{port}/")
@@ -147,6 +153,32 @@ def serve(laboratory: Laboratory, port: int = 0, ready: Callable[[str], None] = 
         server.io_loop.start()
     finally:
         laboratory.close()
+
+
+def _refusing(handler: type[Any]) -> type[Any]:
+    """Make a handler of websockets that answers 400 to headers from which the given one opens no session."""
+    from bokeh.util.token import get_token_payload
+    from tornado.web import HTTPError
+
+    class Refusing(handler):  # type: ignore[misc]  # of Panel, which has no types
+        async def prepare(self) -> None:
+            try:
+                urlsplit(self.request.headers.get("Origin", ""))
+            except ValueError as error:
+                raise HTTPError(400) from error
+            await super().prepare()
+
+        def select_subprotocol(self, offered: list[str]) -> str:
+            try:
+                name, token = offered
+                opens = name == "bokeh" and get_token_payload(token)["session_expiry"] > time.time()
+            except Exception as error:  # whatever a token that the page did not get makes its decoder raise
+                raise HTTPError(400) from error
+            if not opens:
+                raise HTTPError(400)
+            return str(super().select_subprotocol(offered))
+
+    return Refusing
 
 
 def _free_port(port: int) -> int:
