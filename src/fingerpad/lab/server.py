@@ -160,7 +160,7 @@ def _refusing(handler: type[Any]) -> type[Any]:
     from bokeh.util.token import get_token_payload
     from tornado.web import HTTPError
 
-    class Refusing(handler):  # type: ignore[misc]  # of Panel, which has no types
+    class Refusing(handler):
         async def prepare(self) -> None:
             try:
                 urlsplit(self.request.headers.get("Origin", ""))

@@ -92,7 +92,7 @@ def _strokes(motion: Motion) -> tuple[FloatArray, FloatArray]:
     np.add.at(way, run, np.abs(steps))
     np.maximum.at(fastest, run, np.abs(steps) / lengths_ms)
     np.maximum.at(deepest, run, np.maximum(prescribed[1:], prescribed[:-1]))
-    counts = way > LEAST_WAY * motion.largest
+    counts = way > LEAST_WAY * max(motion.largest, 0.0)  # a tilted body may touch above the depth of 0
     amplitude = 0.5 * way
     # A vibration that begins or ends in its middle has half of its way there: the next part tells the whole.
     way = np.maximum(way, np.maximum(np.append(way[1:], 0.0), np.append(0.0, way[:-1])))
