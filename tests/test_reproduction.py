@@ -18,7 +18,7 @@ import numpy as np
 import pytest
 
 from fingerpad import __version__
-from fingerpad.core.compilation import SUBJECT
+from fingerpad.core.compilation import SHORT_NOTICE, SUBJECT
 from fingerpad.core.results import read_results, to_json
 from fingerpad.data import all_published
 from fingerpad.experiments.conditions import Conditions
@@ -84,7 +84,7 @@ PROGRESS = re.compile(r"[a-z ]+: (\d+ % of number )?\d+ of \d+(, \d+ s left| aft
 
 def told(run):
     """Lines on standard error, without those on compiled kernels."""
-    return [line for line in run.errors.splitlines() if not line.startswith(SUBJECT)]
+    return [line for line in run.errors.splitlines() if not line.startswith((SUBJECT, SHORT_NOTICE))]
 
 
 @pytest.fixture(scope="session")

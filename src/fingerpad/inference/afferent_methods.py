@@ -39,8 +39,9 @@ three times the largest static rate."""
 OFFSET_SCALE_MM = 0.1
 """Scale of the offset of the receptor. [mm]"""
 
-N_STARTS, N_REFINED = 32, 2
-"""Starts that are scored, and starts from which least squares continues."""
+N_STARTS, N_REFINED = 32, 8
+"""Starts that are scored, and starts from which least squares continues: two of them end up to 0.003 of FSS
+below the best, since intercept and time constant of a membrane at rest trade off along a valley."""
 
 MOST_EVALUATIONS = 600
 """Most evaluations of CMA-ES."""
