@@ -96,7 +96,7 @@ def test_without_a_command_the_help_is_shown(call):
         (["reproduce", "--resolution", "qick"], "resolution must be one of quick, standard, paper", "'qick'"),
         (["reproduce", "--resolution", "nan"], "resolution must be one of quick, standard, paper", "'nan'"),
         (["reproduce", "--resolution", ""], "resolution must be one of quick, standard, paper", "''"),
-        (["reproduce", "--tissues", "humann"], "tissues must be one of human, paper", "'humann'"),
+        (["reproduce", "--tissues", "humann"], "tissues must be one of paper, trial1", "'humann'"),
         (["reproduce", "--jobs", "0"], "jobs must be a whole number of at least 1", "0"),
         (["reproduce", "--jobs", "-2"], "jobs must be a whole number of at least 1", "-2"),
         (["reproduce", "--jobs", "nan"], "'--jobs': must be a whole number", "'nan'"),
@@ -214,9 +214,9 @@ def test_options_reach_the_run(call, monkeypatch, tmp_path):
     call("reproduce", "--resolution", "paper", "--out", "a/b", "--jobs", "3", "--seed", "7")
     call("reproduce")
     given, default = runs
-    assert (given.conditions.resolution, given.conditions.seed, given.jobs) == ("paper", 7, 3)
+    assert (given.resolution, given.seed, given.jobs) == ("paper", 7, 3)
     assert given.folder.resolve() == tmp_path / "a" / "b"
-    assert (default.conditions.resolution, default.conditions.seed) == ("standard", 0)
+    assert (default.resolution, default.seed, default.tissues) == ("standard", 0, "paper")
     assert default.jobs >= 1
     assert default.folder.resolve() == tmp_path / "reproduction"
 

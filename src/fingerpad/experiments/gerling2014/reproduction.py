@@ -94,6 +94,7 @@ class Reproduction:
     def __post_init__(self) -> None:
         engine_of(self.jobs)
         one_of("tissues", self.tissues, tuple(name for name in TISSUES if name != HUMAN))
+        _ = self.conditions  # checks resolution and seed
 
     @property
     def goes_beyond(self) -> bool:
