@@ -410,7 +410,7 @@ def test_one_noise_serves_both_positions_and_lies_between_those_of_each_alone(di
 
 def test_a_measure_that_stays_silent_is_left_out_and_named():
     """An afferent without a dynamic gain, so slow that it fires no second spike within the ramp."""
-    slow = replace(SED_DRIVEN, dynamic_gain=0.0, static_gain=3.5e-7)
+    slow = replace(SED_DRIVEN, dynamic_gain=0.0, static_gain=3.5e-7, initial_mv=0.0)
     found = sphere_discrimination.discriminate_spheres(SKINS, slow, seed=0, sessions=2)
     assert found.silent == ("dynamic",)
     assert set(found.gradient_sum) == {"static", "latency"} == set(found.statistics.shift) - {"euclidean"}

@@ -69,10 +69,10 @@ _HUMAN_SET = Source(
     "in both terms, standard resolution",
     "assumed",
 )
-HUMAN_INTERCEPT = _HUMAN_SET("fitted intercept beta, set human", -8.772e-7, "mA")
-HUMAN_DYNAMIC_GAIN = _HUMAN_SET("fitted dynamic gain k_d, set human", 7.004e-5, "mA ms/kPa")
-HUMAN_STATIC_GAIN = _HUMAN_SET("fitted static gain k_s, set human", 5.003e-7, "mA/kPa")
-HUMAN_TIME_CONSTANT = _HUMAN_SET("fitted membrane time constant tau, set human", 83.51, "ms")
+HUMAN_INTERCEPT = _HUMAN_SET("fitted intercept beta, set human", -9.067e-7, "mA")
+HUMAN_DYNAMIC_GAIN = _HUMAN_SET("fitted dynamic gain k_d, set human", 6.552e-5, "mA ms/kPa")
+HUMAN_STATIC_GAIN = _HUMAN_SET("fitted static gain k_s, set human", 5.201e-7, "mA/kPa")
+HUMAN_TIME_CONSTANT = _HUMAN_SET("fitted membrane time constant tau, set human", 82.54, "ms")
 REFRACTORY = Published("refractory period", 1.0, "ms", "Gerling et al. 2014, section 2.1.3", "paper")
 PAPER_INITIAL = Published(
     "potential of the membrane at the start, set paper",
