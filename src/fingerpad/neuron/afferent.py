@@ -162,7 +162,7 @@ class Afferent(metaclass=KnownKeywords):
         ----------
         tissues : str or Tissues
             "human", the default afferent, driven by compressive stress; "paper" or "trial3", driven by strain
-            energy density (SED). The membrane of "paper" starts at 0, as the paper prints, and not at rest.
+            energy density (SED). Its membrane starts at 0, as the paper prints, and not at rest.
             For any other name and for tissues of your own, no afferent was fitted; the one of "trial3" is
             returned.
 
@@ -202,7 +202,7 @@ class Afferent(metaclass=KnownKeywords):
             [each.value for each in fitted],
             dynamic_quantity=STORED_ENERGY,
             static_quantity=STORED_ENERGY,
-            initial_mv=neuron.PAPER_INITIAL.value if tissues == "paper" else None,
+            initial_mv=neuron.PAPER_INITIAL.value,
         )
 
     @classmethod
