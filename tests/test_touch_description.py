@@ -169,7 +169,7 @@ def test_hashes_name_every_file_of_a_description(tmp_path):
 
 
 def test_a_surface_of_several_stimuli_is_read_once(tmp_path, monkeypatch):
-    np.savetxt(tmp_path / "map.csv", np.zeros((4, 4)), delimiter=",")
+    np.savetxt(tmp_path / "map.csv", np.eye(4), delimiter=",")
     read = []
     original = surface_files.height_surface
     monkeypatch.setattr(surface_files, "height_surface", lambda *sizes: read.append(1) or original(*sizes))
@@ -324,7 +324,7 @@ WRONG = [
     (BALL + "motion: {depth_mm: 1, ramp_ms: 0}\n", "motion: ramp_ms must be greater than 0"),
     (BALL + "motion: {depth_mm: 9}\n", "touch.yaml, line 2, motion: depth_mm must stay below"),
     (BALL + "motion: {depth_mm: 1 mm}\n", "motion.depth_mm must be a finite number: got '1 mm'"),
-    (BALL + "motion: {kind: sine, depth_mm: 0.5}\n", "motion.amplitude_mm must be given: it is missing"),
+    (BALL + "motion: {kind: sine, depth_mm: 0.5}\n", "line 2, motion: sine needs frequency_hz, cycles"),
     (
         BALL + "motion: {kind: sine, depth_mm: 0.5, amplitude_mm: 0.1, frequency_hz: 20, cycles: 2.5}\n",
         "motion.cycles must be a whole number: got 2.5",
