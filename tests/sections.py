@@ -52,14 +52,15 @@ SKINS = {
     for position in (0.0, 0.2)
     for curvature in CURVATURE_PER_M
 }
-SED_DRIVEN = Afferent.for_tissues("trial3")
-"""It follows SED in both terms, the only quantity of the skins given by a formula."""
 
 
 def sed_driven(parameters, refractory_ms=1.0):
     """An afferent of six numbers that follows SED in both terms."""
     return Afferent.from_parameters(parameters, refractory_ms, STORED_ENERGY, STORED_ENERGY)
 
+
+SED_DRIVEN = sed_driven(Afferent.for_tissues("trial3").parameters)
+"""It starts at rest and follows SED in both terms, the only quantity of the skins given by a formula."""
 
 SENSITIVE = replace(SED_DRIVEN, static_gain=1.2e-6)
 RESTLESS = replace(SENSITIVE, intercept_ma=8e-7)

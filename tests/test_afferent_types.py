@@ -18,6 +18,7 @@ from fingerpad.neuron.population import sensitivities
 from fingerpad.neuron.spikes import firing_rate_hz
 from fingerpad.neuron.transduction import drive
 from fingerpad.neuron.tuning import impulses_per_cycle, tuning_curve, vibration
+from sections import SED_DRIVEN
 
 PUNCH_KPA_PER_UM, PUNCH_HOLD_KPA = 0.0200, 10.4
 """Compressive stress below a 1 mm punch on a hold of 0.5 mm (docs/afferents.md, table of the probe)."""
@@ -61,7 +62,7 @@ class Pressed:
 RESTED = {
     "SAI": fp.Afferent(),
     "smoothed SAI": fp.SAI(),
-    "SAI of trial 3": fp.Afferent.for_tissues("trial3"),
+    "SAI by SED": SED_DRIVEN,
     "RA": fp.RA(),
     "PC": fp.PC(),
     "SAII": fp.SAII(),

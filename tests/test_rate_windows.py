@@ -17,12 +17,10 @@ from fingerpad.geometry.motions import repeated, sine
 from fingerpad.geometry.trajectory import Trajectory
 from fingerpad.inference.rate_model import AfferentModel
 from fingerpad.inference.receptor_offset import ReceptorOffset
-from fingerpad.neuron.afferent import Afferent
 from fingerpad.neuron.population import Population
 from fingerpad.neuron.rate_windows import PAPER_WINDOWS_MS, common_rate_windows_ms, rate_windows_ms
 from fingerpad.neuron.transduction import drive
-
-ENERGY = Afferent.for_tissues("trial3")
+from sections import SED_DRIVEN
 
 
 def traces(ramp_ms, end_ms=1150.0):
@@ -53,14 +51,14 @@ def test_windows_lie_in_their_phases(ramp_ms, hold_ms):
 def test_a_slow_ramp_is_not_read_in_the_papers_window():
     """The rate at the end of a ramp of 200 ms is higher than in its first quarter."""
     slow = traces(200.0)
-    (followed,), _ = ENERGY.rates(slow)
-    (early,), _ = ENERGY.rates(slow, *PAPER_WINDOWS_MS)
+    (followed,), _ = SED_DRIVEN.rates(slow)
+    (early,), _ = SED_DRIVEN.rates(slow, *PAPER_WINDOWS_MS)
     assert followed > 1.4 * early
-    assert ENERGY.rates(drive(slow))[0] == followed
-    assert ENERGY.rates(slow, (120.0, 200.0))[0] == followed
-    assert AfferentModel.of_traces(slow).evaluate(ENERGY.parameters)[0] == followed
+    assert SED_DRIVEN.rates(drive(slow))[0] == followed
+    assert SED_DRIVEN.rates(slow, (120.0, 200.0))[0] == followed
+    assert AfferentModel.of_traces(slow).evaluate(SED_DRIVEN.parameters)[0] == followed
     roving = ReceptorOffset.of_traces({-0.1: slow, 0.1: slow})
-    assert roving.evaluate(np.append(ENERGY.parameters, 0.0))[0] == followed
+    assert roving.evaluate(np.append(SED_DRIVEN.parameters, 0.0))[0] == followed
 
 
 def test_a_population_follows_the_phases_of_its_skin():
@@ -68,22 +66,22 @@ def test_a_population_follows_the_phases_of_its_skin():
         def sed(self, sites):
             return traces(200.0)
 
-    lone = Population(np.array([[17.0, 0.0]]), 1.0, ENERGY)
-    assert lone.respond(Pressed()).dynamic_rate_hz == ENERGY.rates(traces(200.0))[0]
+    lone = Population(np.array([[17.0, 0.0]]), 1.0, SED_DRIVEN)
+    assert lone.respond(Pressed()).dynamic_rate_hz == SED_DRIVEN.rates(traces(200.0))[0]
     given_too = lone.respond(Pressed(), dynamic_window_ms=(30.0, 50.0))
-    assert given_too.dynamic_rate_hz == ENERGY.rates(traces(200.0), (30.0, 50.0))[0]
+    assert given_too.dynamic_rate_hz == SED_DRIVEN.rates(traces(200.0), (30.0, 50.0))[0]
 
 
 def test_without_phases_windows_must_be_given():
     unnamed = SedTraces([0.0, 50.0, 100.0, 1000.0], [[0.0], [2.0], [1.0], [1.0]], [50.0, 100.0])
     with pytest.raises(InputError, match="dynamic_window_ms must be given where no phase is called 'ramp'"):
-        ENERGY.rates(unnamed)
+        SED_DRIVEN.rates(unnamed)
     with pytest.raises(InputError, match="static_window_ms must be given where no phase is called 'hold'"):
-        ENERGY.rates(unnamed, dynamic_window_ms=(30.0, 50.0))
-    assert ENERGY.rates(unnamed, *PAPER_WINDOWS_MS)[1] > 0.0
+        SED_DRIVEN.rates(unnamed, dynamic_window_ms=(30.0, 50.0))
+    assert SED_DRIVEN.rates(unnamed, *PAPER_WINDOWS_MS)[1] > 0.0
     course = SedTraces([0.0, 9.0], [[0.0], [2.0]], phases=(Phase("press", 0.0, 9.0),))
     with pytest.raises(InputError, match="the phases are press"):
-        ENERGY.rates(course)
+        SED_DRIVEN.rates(course)
 
 
 def test_stimuli_of_a_fit_share_their_windows():

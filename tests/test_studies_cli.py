@@ -66,7 +66,7 @@ def test_every_study_has_a_command_and_a_line_of_help(call):
         patch.setenv("COLUMNS", "200")
         _, said, _ = call("--help")
     names = [study.name for study in command.STUDIES]
-    assert len(names) == len(set(names)) == 12
+    assert len(names) == len(set(names)) == 13
     assert all(f" {name} " in said for name in (*names, "results"))
     assert all(f"`{name}`" in studies.__doc__ for name in (*names, "results"))
 
