@@ -57,7 +57,7 @@ def measure(resolution: str = RESOLUTION) -> Report:
         ),
         tables=[
             Table(
-                f"`touch_of(Fingertip(), Sphere(287), resolution='{resolution}').solve()`:",
+                f"`touch_of(Fingertip(), Sphere(curvature_per_m=287), resolution='{resolution}').solve()`:",
                 [
                     "threads",
                     *COLUMNS,

@@ -29,7 +29,7 @@ def measure() -> Report:
         ),
         tables=[
             Table(
-                "`touch_of(Fingertip(), Sphere(287), resolution='standard').solve()`:",
+                "`touch_of(Fingertip(), Sphere(curvature_per_m=287), resolution='standard').solve()`:",
                 [
                     "nodes",
                     "elements",

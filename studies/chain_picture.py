@@ -28,7 +28,7 @@ SEED = 1
 
 def touched(curvature_per_m: float, resolution: str) -> tuple[SkinResponse, ResponseMap]:
     """Press a sphere, and let a population at random places respond."""
-    skin = indent(Fingertip(), Sphere(curvature_per_m), resolution=resolution)
+    skin = indent(Fingertip(), Sphere(curvature_per_m=curvature_per_m), resolution=resolution)
     disc = Ellipse(PAD_MM, PAD_MM, centre_mm=CONTACT_POINT_MM)
     layout = poisson_disc(disc, psychophysics.RECEPTOR_DENSITY.value, seed=SEED)
     return skin, Population.of_layout(layout).respond(skin)
@@ -55,7 +55,7 @@ def draw(skin: SkinResponse, response: ResponseMap, percept: Percept) -> Figure:
     section, curve = figure.add_subplot(grid[:, 0]), figure.add_subplot(grid[:, 2])
     motion = figure.add_subplot(grid[0, 1])
     spikes = figure.add_subplot(grid[1, 1], sharex=motion)
-    touch_figure.draw_section(section, skin, Sphere(percept.standard_per_m))
+    touch_figure.draw_section(section, skin, Sphere(curvature_per_m=percept.standard_per_m))
     touch_figure.draw_motion(motion, skin)
     touch_figure.draw_spikes(spikes, skin, response)
     draw_hit_rates(curve, percept)

@@ -83,9 +83,11 @@ def pressed(name: str, resolution: str = "quick") -> Pressed:
     finger, motion = Fingertip.of(name), ForceRampAndHold(force_mn=FORCE_MN)
     disc = Ellipse(RADIUS_MM, RADIUS_MM, centre_mm=finger.contact_mm)
     population = Population.of_layout(hexagonal(disc, psychophysics.RECEPTOR_DENSITY.value))
-    grading = touch_of(finger, Sphere(CURVATURES_PER_M[0]), motion, resolution=resolution).grading
+    grading = touch_of(
+        finger, Sphere(curvature_per_m=CURVATURES_PER_M[0]), motion, resolution=resolution
+    ).grading
     skins = tuple(
-        touch_of(finger, Sphere(k), motion, resolution=resolution, grading=grading).solve()
+        touch_of(finger, Sphere(curvature_per_m=k), motion, resolution=resolution, grading=grading).solve()
         for k in CURVATURES_PER_M
     )
     responses = tuple(population.respond(skin) for skin in skins)

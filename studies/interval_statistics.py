@@ -7,8 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fingerpad.core.checks import FloatArray
-from fingerpad.core.signals import SpikeTrains
-from fingerpad.neuron.spikes import window_bounds
+from fingerpad.core.signals import SpikeTrains, window_bounds
 
 
 @dataclass(frozen=True)

@@ -20,7 +20,7 @@ from fingerpad.skin.sampling import SkinResponse
 
 @pytest.fixture(scope="module")
 def skin() -> SkinResponse:
-    sphere = touch_of(Fingertip(), Sphere(287), RampAndHold(0.3), resolution="quick")
+    sphere = touch_of(Fingertip(), Sphere(curvature_per_m=287), RampAndHold(0.3), resolution="quick")
     coarse = replace(sphere.grading, largest_mm=4.0, dermis=1, subcutis=1, stratum_corneum=1)
     return replace(sphere, grading=coarse).solve(threads=1)
 

@@ -246,7 +246,9 @@ def test_options_reach_the_export(call, monkeypatch, tmp_path):
     assert same == default
     assert played.stimulus == Trajectory((0.0, 50.0, 100.0), (0.0, 0.5, 0.0))
     assert (relaxing, elastic) == (None, "long_term")
-    assert touch == touch_of(Fingertip(), Sphere(340), RampAndHold(depth_mm=0.5), "trial1", "standard")
+    assert touch == touch_of(
+        Fingertip(), Sphere(curvature_per_m=340), RampAndHold(depth_mm=0.5), "trial1", "standard"
+    )
     assert (folder.resolve(), format_name) == (tmp_path / "a" / "b", "vtu")
     assert default == touch_of(Fingertip(), Plate(), RampAndHold(depth_mm=1.0), "human", "quick")
 

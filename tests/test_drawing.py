@@ -205,7 +205,7 @@ def test_unknown_drawings_and_quantities_are_refused(results):
     with pytest.raises(
         InputError, match=r"progress must have a method stage, as fp.notebook_progress\(\) has"
     ):
-        fp.indent(fp.Fingertip(), fp.Sphere(287.0), progress=True)
+        fp.indent(fp.Fingertip(), fp.Sphere(curvature_per_m=287.0), progress=True)
 
 
 @pytest.mark.parametrize("kind", TABLES)

@@ -167,7 +167,9 @@ def test_stimuli_are_the_same_from_csv_and_yaml(written, name, content):
     written("course.csv", "time_ms,depth_mm\n0,0\n50,0.4\n900,0.4\n")
     listed = read_stimuli(written(name, content))
     found = {
-        "ball": NamedStimulus(Sphere(340.0), RampAndHold(depth_mm=0.5), -0.5, 1.0, 0.0, name="ball"),
+        "ball": NamedStimulus(
+            Sphere(curvature_per_m=340.0), RampAndHold(depth_mm=0.5), -0.5, 1.0, 0.0, name="ball"
+        ),
         "probe": NamedStimulus(
             FlatPunch(1.0), ForceRampAndHold(200.0, hold_ms=500.0), friction=0.2, name="probe"
         ),

@@ -103,13 +103,13 @@ def test_the_object_lies_where_the_press_had_it(skin, file):
     data = read_touch(file)
     skin_mm = data.node_mm.values[data.skin_node] + data.skin_displacement_mm.values
     mapped = data.object_front_mm.interp(object_x=0.0, object_z=[0.0, 1.0, 2.0]).values
-    radius = Sphere(287).radius_mm
+    radius = Sphere(curvature_per_m=287).radius_mm
     np.testing.assert_allclose(
         mapped, np.sqrt(radius**2 - np.array([0.0, 1.0, 2.0]) ** 2) - radius, atol=1e-3
     )
     for step in range(1, data.time.size):
         local = (skin_mm[step] - data.object_tip_mm.values[step]) @ data.object_axes.values[step]
-        gap = Sphere(287).gap(local)[0]
+        gap = Sphere(curvature_per_m=287).gap(local)[0]
         assert -1.1 * skin.penetration_mm <= gap.min() <= 1e-5
 
 

@@ -517,7 +517,7 @@ def test_facets_reach_as_far_as_the_skin(tilt_deg):
     """At the tip the skin slopes, and a sphere is touched on its side; facets cover what the skin passes."""
     touch = fp.touch_of(
         Fingertip(),
-        Sphere(200.0),
+        Sphere(curvature_per_m=200.0),
         fp.RampAndHold(depth_mm=0.4),
         grading=COARSE,
         at_mm=(26.5, 0.0),

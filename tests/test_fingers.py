@@ -31,9 +31,9 @@ def test_the_paper_s_finger_is_unchanged():
     assert Fingertip.of() == Fingertip.of("adult") == PAPER.scaled(1.0) == PAPER
     assert PAPER.contact_mm == (17.37, 0.0)
     assert PAPER.relative_size == 1.0
-    touch = touch_of(PAPER, Sphere(287.0))
+    touch = touch_of(PAPER, Sphere(curvature_per_m=287.0))
     assert touch.at_mm == (17.37, 0.0)
-    assert touch.grading == grading_about(Sphere(287.0), "quick", 17.37)
+    assert touch.grading == grading_about(Sphere(curvature_per_m=287.0), "quick", 17.37)
     assert (touch.grading.size_x_mm, touch.grading.largest_mm) == (0.45, 3.0)
     skin = UnrolledSkin()
     assert skin.origin_x_mm == 17.37
@@ -55,7 +55,7 @@ def test_measures_are_those_that_were_asked_for():
 @pytest.mark.parametrize("name", FINGERS)
 def test_every_preset_makes_a_sound_mesh(name):
     finger = Fingertip.of(name)
-    touch = touch_of(finger, Sphere(287.0), RampAndHold(depth_mm=0.3))
+    touch = touch_of(finger, Sphere(curvature_per_m=287.0), RampAndHold(depth_mm=0.3))
     check_mesh(touch.mesh)
     assert scaled_jacobian(touch.mesh).min() > 0.3
     assert touch.at_mm == finger.contact_mm

@@ -73,7 +73,11 @@ VALUES = {
         "height_mm": 0.5,
         "edge_radius_mm": 0.1,
     },
-    fp.Union: {"parts": (fp.Sphere(287), fp.Sphere(400)), "at_mm": ((0, 0, 0), (3, 0, 0)), "seam_mm": 0.0},
+    fp.Union: {
+        "parts": (fp.Sphere(curvature_per_m=287), fp.Sphere(curvature_per_m=400)),
+        "at_mm": ((0, 0, 0), (3, 0, 0)),
+        "seam_mm": 0.0,
+    },
     fp.Surface: {
         "vertices_mm": [[-1.0, 0, -1], [1.0, 0, -1], [0.0, 0, 1]],
         "faces": [[0, 2, 1]],
@@ -143,7 +147,12 @@ VALUES = {
     RateRecordings: {"stimuli": ("a", "b"), "dynamic_rate_hz": [1.0, 2.0], "static_rate_hz": [1.0, 2.0]},
     SurfaceProfile: {"distance_mm": [0.0, 1.0], "deflection_mm": [0.1, 0.2]},
     Conditions: {"resolution": "quick", "seed": 3, "tissues": "human"},
-    TactileStimulus: {"indenter": fp.Sphere(287), "x_mm": 1.0, "tilt_deg": 3.0, "friction": 0.3},
+    TactileStimulus: {
+        "indenter": fp.Sphere(curvature_per_m=287),
+        "x_mm": 1.0,
+        "tilt_deg": 3.0,
+        "friction": 0.3,
+    },
     fp.ReducedRange: {
         "depth_mm": 1.0,
         "x_mm": (-1.0, 1.0),
@@ -171,7 +180,7 @@ oddities = st.one_of(
             np.ma.array([1.0, 2.0], mask=[0, 1]), [], (), {}, set(), object(), float, range(3), iter(()),
             np.array(["2001-01-01", "2001-01-02"], dtype="datetime64[D]"), np.empty((0, 2)), np.ones((2, 2,
             2)),
-            fp.Sphere(1.0), fp.Tissues, [[1.0], [1.0, 2.0]], np.array([object()]), memoryview(b"12"),
+            fp.Sphere(), fp.Tissues, [[1.0], [1.0, 2.0]], np.array([object()]), memoryview(b"12"),
         ]
     ),
     st.lists(numbers, max_size=4),

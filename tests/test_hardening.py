@@ -6,6 +6,7 @@ import subprocess
 import sys
 import time
 import warnings
+from dataclasses import replace
 from decimal import Decimal
 from fractions import Fraction
 from types import SimpleNamespace
@@ -15,9 +16,8 @@ import pytest
 
 import fingerpad as fp
 from fingerpad.cli import main, run
-from fingerpad.core.errors import LONGEST_MESSAGE, FingerpadError, InputError
+from fingerpad.core.errors import LONGEST_MESSAGE, FingerpadError, InputError, closest
 from fingerpad.core.files import read_text
-from fingerpad.core.keywords import closest
 from fingerpad.core.layouts import Layout
 from fingerpad.core.patterns import hexagonal, poisson_disc, rectangular
 from fingerpad.core.plain_yaml import DEEPEST, LARGEST_TEXT, read_yaml
@@ -37,7 +37,8 @@ from fingerpad.experiments.stimuli import ShiftedBar
 from fingerpad.inference.rate_model import AfferentModel
 from fingerpad.inference.recordings import RateRecordings
 from fingerpad.neuron.population import sensitivities
-from fingerpad.psychophysics.discrimination import Experiment
+from fingerpad.psychophysics.discrimination import Experiment, discriminate_gradient_sum
+from fingerpad.psychophysics.encoding import gradient_sum
 from fingerpad.psychophysics.psychometric import fit_psychometric
 from fingerpad.psychophysics.response_models import GaussianResponses
 from fingerpad.report.style import new_figure, png
@@ -45,8 +46,17 @@ from fingerpad.skin.sampling import SurfaceProfile
 from fingerpad.skin.store import Store
 
 HUGE = 10**400
+PAIRS = np.array([[0, 1], [1, 2]])
+TRAINS = fp.SpikeTrains.from_lists([[12.0, 40.0], []])
 TRACES = fp.SedTraces(
     [0.0, 50.0, 1000.0], [[0.0] * 4, [3.0, 5.0, 7.0, 9.0], [3.0, 5.0, 7.0, 9.0]], kinks_ms=[50.0]
+)
+MANY = fp.SedTraces(
+    [0.0, 50.0, 1000.0],
+    np.outer([0.0, 20.0, 20.0], np.ones(18)),
+    kinks_ms=[50.0],
+    dynamic_quantity="compressive_stress",
+    static_quantity="compressive_stress",
 )
 TASK = """
 question: Which spheres?
@@ -69,11 +79,9 @@ def task_run(tmp_path, more: str) -> DiscriminationRun:
     "body",
     [
         fp.FlatPunch(0.1, 0.0),
-        fp.Sphere(1e300),
-        fp.Sphere(1e6),
-        fp.Cylinder(1e-6),
-        fp.Bar(1e-9, 0.0),
-        fp.Line(1e-6),
+        fp.Sphere(radius_mm=0.02),
+        fp.Cylinder(0.02),
+        fp.Bar(0.02, 0.0),
     ],
 )
 def test_a_body_between_the_nodes_is_refused_before_it_is_pressed(body):
@@ -84,7 +92,6 @@ def test_a_body_between_the_nodes_is_refused_before_it_is_pressed(body):
 @pytest.mark.parametrize(
     "make",
     [
-        lambda: fp.touch_of(fp.Fingertip(), fp.Grating(1e-4, 1e-4, 0.0)).mesh,
         lambda: fp.Grading(17.37, 5.0, 1.0, 1e-4, 1e-4),
         lambda: poisson_disc(Rectangle(30.0, 30.0), 1e5, 0, 0.8),
         lambda: rectangular(Rectangle(1e9, 1e-6), 100.0),
@@ -274,7 +281,7 @@ NO_NUMBERS = [
         lambda odd: fp.Material.neo_hooke(odd, 0.4),
         lambda odd: Rectangle(odd, 6.0),
         lambda odd: fp.Hencky(odd, 100.0),
-        lambda odd: TactileStimulus(fp.Sphere(287), friction=odd),
+        lambda odd: TactileStimulus(fp.Sphere(curvature_per_m=287), friction=odd),
         lambda odd: fp.Trajectory((0.0, 1.0), odd),
         lambda odd: fp.SedTraces([0.0, 1.0], odd),
         lambda odd: Experiment(criterion=odd),
@@ -313,7 +320,11 @@ def test_an_integer_a_numpy_number_and_a_float_have_one_key():
     from fingerpad.skin.store import touch_key
 
     keys = {
-        touch_key(fp.touch_of(fp.Fingertip(), fp.Sphere(curvature), fp.RampAndHold(half), tilt_deg=zero))
+        touch_key(
+            fp.touch_of(
+                fp.Fingertip(), fp.Sphere(curvature_per_m=curvature), fp.RampAndHold(half), tilt_deg=zero
+            )
+        )
         for curvature, half, zero in (
             (287.0, 0.5, 0.0),
             (287, np.float32(0.5), 0),
@@ -322,7 +333,7 @@ def test_an_integer_a_numpy_number_and_a_float_have_one_key():
     }
     assert len(keys) == 1
     with pytest.raises(InputError, match="friction must be a finite number"):
-        fp.touch_of(fp.Fingertip(), fp.Sphere(287), friction="0.3")
+        fp.touch_of(fp.Fingertip(), fp.Sphere(curvature_per_m=287), friction="0.3")
 
 
 # D13, D14
@@ -333,7 +344,7 @@ def test_sequences_become_tuples_so_that_values_hash():
     finger = fp.Fingertip(nail_x_mm=[16.5, 29.25], volar_readings_mm=readings)
     assert finger == fp.Fingertip()
     assert hash(finger) == hash(fp.Fingertip())
-    assert fp.touch_of(finger, fp.Sphere(287)).mesh.nodes_mm.shape[1] == 3
+    assert fp.touch_of(finger, fp.Sphere(curvature_per_m=287)).mesh.nodes_mm.shape[1] == 3
 
 
 @pytest.mark.parametrize(
@@ -344,7 +355,16 @@ def test_sequences_become_tuples_so_that_values_hash():
         lambda: fp.Population.grid(afferent="x"),
         lambda: TactileStimulus(None),
         lambda: fp.Afferent(dynamic_quantity=3),
-        lambda: fp.Afferent(dynamic_quantity="x").rates(TRACES),
+        lambda: fp.Afferent(dynamic_quantity="x"),
+        lambda: fp.OwnAfferent(len, static_quantity="sed"),
+        lambda: fp.Fingertip(bone_width_mm=9.0),
+        lambda: fp.Union([fp.Sphere()], at_mm=None),
+        lambda: gradient_sum([1.0, np.nan, 2.0], PAIRS),
+        lambda: gradient_sum([1.0, 2.0], [[1, 1]]),
+        lambda: discriminate_gradient_sum([[1, 2, 3], [3, 4, 2]], PAIRS, 0.1, 1, silent_value=np.nan),
+        lambda: discriminate_gradient_sum([[1, 2, 3], [3, 4, 2]], np.empty((0, 2), int), 0.1, 1),
+        lambda: TRAINS.counted_hz((50.0, 30.0)),
+        lambda: replace(fp.Population.grid().respond_to(MANY), windows_ms=((50.0, 30.0), (600.0, 950.0))),
         lambda: Layout([[1, 2]], 1, "nonsense", None),
         lambda: Layout([[1, 2]], 1, "uniform", -5),
         lambda: SurfaceProfile([2, 1], [np.nan]),
@@ -446,7 +466,7 @@ def test_a_number_of_folds_is_named_as_the_option(run_program):
 def test_no_message_has_a_value_at_full_length(tmp_path):
     long = "x" * 100_000
     for make in (
-        lambda: fp.Sphere(long),
+        lambda: fp.Sphere(curvature_per_m=long),
         lambda: fp.Energy(long),
         lambda: fp.Grading(17.0, 1.0, 1.0, 0.5, 0.5, dermis=long),
         lambda: Conditions(resolution=long),
@@ -505,7 +525,7 @@ def test_a_formula_that_is_none_is_refused(formula, coefficients):
 
 
 def test_times_and_levels_beyond_use_are_refused():
-    with pytest.raises(InputError, match="ramp_ms must be at most"):
+    with pytest.raises(InputError, match="ramp_ms must lie within"):
         fp.RampAndHold(0.2, 1e300, 1e300)
     with pytest.raises(InputError, match="levels must lie within"):
         fit_psychometric([1e300, 2e300], [5, 9], [10, 10])

@@ -255,7 +255,7 @@ def test_bodies_of_the_paper_keep_their_meshes(resolution):
 @pytest.mark.parametrize(
     ("body", "size_mm"),
     [
-        (Sphere(4000.0), 0.25 / 4), (Cylinder(0.5), 0.25 / 4), (FlatPunch(1.0, 0.1), 0.1),
+        (Sphere(curvature_per_m=4000.0), 0.25 / 4), (Cylinder(0.5), 0.25 / 4), (FlatPunch(1.0, 0.1), 0.1),
         (FlatPunch(10.0, 0.05), 0.2), (Bar(3.0, 0.05), 0.05), (Edge(0.0), 0.05),
         (Grating(1.0, 1.0, 0.05), 0.05),
     ],
@@ -328,7 +328,7 @@ def test_ridges_that_slide_meet_no_coarse_elements_near_the_place_of_contact():
 
 
 def test_a_body_narrower_than_an_element_is_refused_before_it_is_pressed():
-    coarse = grading_about(Sphere(287.0), "quick", 17.37)
+    coarse = grading_about(Sphere(curvature_per_m=287.0), "quick", 17.37)
     with pytest.raises(InputError, match=r"at most 0.0333333 mm, .*: got 0.45 mm"):
         touch_of(Fingertip(), FlatPunch(0.1, 0.01), grading=coarse)
     with pytest.raises(InputError, match=r"got 0.05 mm; give a finer grading or a wider body than 0.1 mm\."):

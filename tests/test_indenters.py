@@ -177,7 +177,7 @@ def test_line_presses_only_the_nodes_below_it():
     [
         (lambda: Cylinder(0.0), "diameter_mm"),
         (lambda: Line(-0.05), "diameter_mm"),
-        (lambda: Sphere(np.nan), "curvature_per_m"),
+        (lambda: Sphere(curvature_per_m=np.nan), "curvature_per_m"),
         (lambda: Bar(width_mm=np.inf), "width_mm"),
         (lambda: Bar(width_mm=1.0, fillet_mm=0.6), "half of width_mm, 0.5 mm: got 0.6 mm"),
         (lambda: FlatPunch(diameter_mm=1.0, fillet_mm=-0.1), "fillet_mm"),

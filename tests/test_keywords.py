@@ -1,13 +1,17 @@
 """Other names of sizes, and keywords that a class or a function does not have."""
 
+import contextlib
 import inspect
+import math
 import pickle
 from dataclasses import dataclass, fields, replace
 
+import numpy as np
 import pytest
 from pydantic import BaseModel
 
 import fingerpad as fp
+from docs.site.reference import public_names
 from fingerpad.core.displayed import Result
 from fingerpad.core.keywords import KnownKeywords, OtherName, other_names
 from fingerpad.experiments.indenter_text import indenter_named
@@ -16,8 +20,8 @@ from fingerpad.geometry.names import INDENTERS, SIZE_UNITS, sizes_of
 from fingerpad.skin.store import touch_key
 
 SAME = [
-    (fp.Sphere(radius_mm=4.0), fp.Sphere(250.0), "sphere:radius_mm=4"),
-    (fp.Sphere(diameter_mm=8.0), fp.Sphere(250.0), "sphere:diameter_mm=8.0"),
+    (fp.Sphere(radius_mm=4.0), fp.Sphere(curvature_per_m=250.0), "sphere:radius_mm=4"),
+    (fp.Sphere(diameter_mm=8.0), fp.Sphere(curvature_per_m=250.0), "sphere:diameter_mm=8.0"),
     (fp.Cylinder(radius_mm=1.5), fp.Cylinder(3.0), "cylinder: radius_mm = 1.5"),
     (fp.Bar(4.0, edge_radius_mm=0.2), fp.Bar(4.0, 0.2), "bar:4:edge_radius_mm=0.2"),
     (
@@ -53,7 +57,8 @@ def test_a_body_is_the_same_by_either_name_in_python_and_in_text(friendly, store
 
 def test_the_store_finds_a_body_by_either_name():
     keys = {
-        touch_key(fp.touch_of(fp.Fingertip(), body)) for body in (fp.Sphere(radius_mm=4.0), fp.Sphere(250.0))
+        touch_key(fp.touch_of(fp.Fingertip(), body))
+        for body in (fp.Sphere(radius_mm=4.0), fp.Sphere(curvature_per_m=250.0))
     }
     assert len(keys) == 1
 
@@ -92,7 +97,7 @@ def test_editors_see_every_name():
             "Sphere has no colour: Sphere has curvature_per_m, radius_mm, diameter_mm.",
         ),
         (
-            lambda: fp.Sphere(250.0, radius_mm=4.0),
+            lambda: fp.Sphere(curvature_per_m=250.0, radius_mm=4.0),
             "radius_mm and curvature_per_m exclude each other: give one.",
         ),
         (lambda: fp.Sphere(radius_mm=4.0, diameter_mm=8.0), "diameter_mm and radius_mm exclude each other"),
@@ -142,7 +147,24 @@ def test_editors_see_every_name():
             lambda: fp.Fingertip.of("child", like="adult"),
             "dermis_mm: got multiple values for argument 'like'.",
         ),
-        (lambda: fp.Sphere(287.0, 2.0), "Sphere takes curvature_per_m: got too many positional arguments."),
+        (lambda: fp.Sphere(3.5), "Sphere takes curvature_per_m=, radius_mm=, diameter_mm=: got too many"),
+        (
+            lambda: fp.Sphere(curvature_per_m=3.5),
+            "has a radius of 286 mm, outside 0.005 to 200 mm: write",
+        ),
+        (
+            lambda: indenter_named("sphere:3.5"),
+            "has a radius of 286 mm, outside 0.005 to 200 mm: write",
+        ),
+        (lambda: fp.Sphere(curvature_per_m=1e6), "a radius of 0.001 mm, outside 0.005 to 200 mm"),
+        (lambda: fp.Cylinder(1e-6), "diameter_mm must lie within 0.01 to 400 mm: got 1e-06; check its unit."),
+        (lambda: fp.Bar(3000.0), "width_mm must lie within 0.01 to 400 mm: got 3000; check its unit."),
+        (lambda: fp.RampAndHold(0.0005), "depth_mm must lie within 0.001 to 20 mm: got 0.0005; check its"),
+        (
+            lambda: fp.ForceRampAndHold(0.5),
+            "force_mn must lie within 1 to 100000 mN: got 0.5; check its unit",
+        ),
+        (lambda: fp.Trajectory([0, 50], [0, 5e-4]), "the largest depth_mm must lie within 0.001 to 20 mm"),
         (lambda: fp.notebook_progress(1), "notebook_progress takes no argument: got too many"),
     ],
 )
@@ -174,6 +196,62 @@ def test_what_a_user_calls_answers_wrong_arguments_in_one_sentence(name):
         assert checked or made_by_fingerpad
     else:
         assert inspect.unwrap(found) is not found
+
+
+ODD = (None, "x", -1, 0, math.nan, True, [], {}, object(), [1, 2, 3], np.zeros((2, 2)), b"x", 3.5)
+
+PUBLIC = {
+    name: found
+    for names in public_names().values()
+    for name, found in names.items()
+    if not isinstance(found, type) or isinstance(found, KnownKeywords)
+}
+"""Functions and classes of the reference, without results, which users do not make."""
+
+MADE = (
+    fp.Fingertip(),
+    fp.Bar(),
+    fp.Sphere(),
+    fp.sine(0.8, 0.1, 20.0, cycles=3),
+    fp.Afferent(),
+    fp.PC(),
+    fp.Population.grid(rows=1, columns=2),
+    fp.SedTraces([0.0, 50.0, 1000.0], [[0.0], [2.0], [1.8]]),
+    fp.SpikeTrains.from_lists([[12.0, 40.0], []]),
+)
+
+
+def methods_of(made):
+    """Public methods of a value that take an argument."""
+    found = {name: getattr(made, name) for name in dir(type(made)) if not name.startswith("_")}
+    return [
+        method
+        for method in found.values()
+        if inspect.ismethod(method) and inspect.signature(method).parameters
+    ]
+
+
+@pytest.mark.parametrize("name", sorted(PUBLIC.keys() - {"Indenter"}))
+def test_odd_arguments_of_a_public_name_end_in_one_sentence(name, monkeypatch, tmp_path):
+    monkeypatch.chdir(tmp_path)
+    ends_in_one_sentence(PUBLIC[name])
+
+
+@pytest.mark.parametrize("made", MADE, ids=lambda made: type(made).__name__)
+def test_odd_arguments_of_a_method_end_in_one_sentence(made):
+    for method in methods_of(made):
+        if method.__name__ != "step_times_ms":  # of the solver
+            ends_in_one_sentence(method)
+
+
+def ends_in_one_sentence(function):
+    """Call it with each odd value in the place of all arguments that it needs, or of its first one."""
+    parts = inspect.signature(function).parameters.values()
+    taken = [part for part in parts if part.kind is part.POSITIONAL_OR_KEYWORD]
+    count = max(sum(part.default is part.empty for part in taken), min(1, len(taken)))
+    for odd in ODD:
+        with contextlib.suppress(fp.FingerpadError, ImportError):  # a package of an extra may be missing
+            function(*[odd] * count)
 
 
 def test_a_type_error_of_the_function_itself_stays():
@@ -215,5 +293,5 @@ def test_files_of_stimuli_take_either_name(tmp_path, suffix):
         encoding="utf-8",
     )
     stimuli = read_stimuli(path).stimuli
-    assert stimuli["ball"].indenter == fp.Sphere(250.0)
+    assert stimuli["ball"].indenter == fp.Sphere(curvature_per_m=250.0)
     assert stimuli["rows"].indenter == fp.Grating(0.5, 1.5)

@@ -25,7 +25,7 @@ from fingerpad.skin.store import touch_key
 PRONY = Prony(shares=(0.2, 0.3), times_ms=(30.0, 400.0))
 RELAXING = tuple(Material.neo_hooke(shear, 0.45, PRONY) for shear in (40.0, 40.0, 20.0, 8.0))
 ELASTIC = tuple(material.with_prony(Prony()) for material in RELAXING)
-FIVE = [Cylinder(3.0), Bar(2.0, 0.3), Sphere(500.0), FlatPunch(2.0, 0.3), Plate()]
+FIVE = [Cylinder(3.0), Bar(2.0, 0.3), Sphere(curvature_per_m=500.0), FlatPunch(2.0, 0.3), Plate()]
 MOTION = RampAndHold(depth_mm=0.2, ramp_ms=50.0, hold_ms=500.0)
 STEPS = PressSettings(3, 2)
 
@@ -171,7 +171,7 @@ def test_node_that_slides_round_an_edge_goes_along_its_arc():
 
 def test_node_is_anchored_where_it_met_the_indenter():
     """A ball of 2 mm radius comes down on three nodes: touched at once, touched half way, not reached."""
-    ball = Sphere(500.0)
+    ball = Sphere(curvature_per_m=500.0)
     x = np.array([0.0, 0.4, 1.2])
     rise = 2.0 - np.sqrt(4.0 - x**2)  # how far the ball must advance to reach a node at y = 0
     nodes = np.column_stack([x, np.zeros(3), np.zeros(3)])
@@ -360,7 +360,7 @@ def test_force_that_a_depth_needs_gives_that_depth_back_with_friction():
 @pytest.mark.parametrize("coefficient", [-0.1, np.nan, np.inf, "rough", True])
 def test_impossible_friction_is_refused_in_one_sentence(coefficient):
     with pytest.raises(InputError, match="friction must") as refusal:
-        touch_of(Fingertip(), Sphere(287.0), friction=coefficient)
+        touch_of(Fingertip(), Sphere(curvature_per_m=287.0), friction=coefficient)
     assert str(refusal.value).endswith(".")
 
 
@@ -372,5 +372,8 @@ def test_wire_has_no_friction_to_choose():
 
 
 def test_touches_of_other_friction_are_other_touches():
-    touches = [touch_of(Fingertip(), Sphere(287.0), friction=coefficient) for coefficient in (0.0, 0.3)]
+    touches = [
+        touch_of(Fingertip(), Sphere(curvature_per_m=287.0), friction=coefficient)
+        for coefficient in (0.0, 0.3)
+    ]
     assert touch_key(touches[0]) != touch_key(touches[1])

@@ -36,7 +36,7 @@ def touching(indenter, mesh):
 @pytest.mark.parametrize(
     ("indenter", "pose"),
     [
-        (Sphere(500.0), Pose(x_mm=0.4, z_mm=-0.8)),
+        (Sphere(curvature_per_m=500.0), Pose(x_mm=0.4, z_mm=-0.8)),
         (Cylinder(2.0), Pose(tilt_deg=20.0)),
         (Bar(1.6, 0.4), Pose(x_mm=0.4, tilt_deg=-10.0, spin_deg=30.0)),
     ],
@@ -62,7 +62,7 @@ def test_indenter_that_moves_and_turns_before_it_touches_presses_as_if_placed_th
 def sliding(way_mm, mu, depth_mm=0.3, materials=RELAXING, **aside):
     """Press, then slide the sphere along x at constant depth."""
     mesh = block()
-    indenter = Sphere(500.0)
+    indenter = Sphere(curvature_per_m=500.0)
     motion = Trajectory(
         (0.0, 50.0, 100.0, 300.0), (0.0, depth_mm, depth_mm, depth_mm), x_mm=(0.0, 0.0, 0.0, way_mm), **aside
     )
@@ -103,7 +103,7 @@ def test_skin_sticks_until_the_force_aside_reaches_the_limit():
 
 def test_sphere_that_slides_by_one_element_without_friction_presses_as_before():
     mesh = block(half_length=4.8)
-    indenter = Sphere(500.0)
+    indenter = Sphere(curvature_per_m=500.0)
     motion = Trajectory((0.0, 50.0, 100.0), (0.0, 0.3, 0.3), x_mm=(0.0, 0.0, 2 * PITCH_MM))
     done = press(mesh, ELASTIC, indenter, touching(indenter, mesh), motion, PressSettings(6, 2))
     before, after = done.force_mn[done.times_ms == 50.0][0], done.force_mn[-1]
@@ -146,7 +146,7 @@ def test_bone_on_the_way_is_named_before_anything_is_pressed():
 def test_force_slides_a_sphere_whose_first_touch_is_off_its_axis():
     """The node that touches first may lie in the sphere by round-off, which is no contact."""
     mesh = block()
-    indenter = Sphere(500.0)
+    indenter = Sphere(curvature_per_m=500.0)
     placement = place(indenter, mesh.nodes_mm[mesh.skin_nodes], np.array([0.15, 0.0, 0.07]), np.eye(3))
     inside = Placement(placement.origin_mm + np.array([0.0, 4e-16, 0.0]), placement.rotation)
     motion = Trajectory(

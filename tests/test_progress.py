@@ -70,7 +70,10 @@ def test_a_press_tells_how_far_it_is(monkeypatch, caplog):
     caplog.set_level(logging.DEBUG, "fingerpad.mechanics.press")
     progress = Lines(told.append, every_s=0.0)
     skin = fp.indent(
-        fp.Fingertip(), fp.Sphere(287.0), fp.RampAndHold(depth_mm=0.2, hold_ms=60), progress=progress
+        fp.Fingertip(),
+        fp.Sphere(curvature_per_m=287.0),
+        fp.RampAndHold(depth_mm=0.2, hold_ms=60),
+        progress=progress,
     )
     shares = [int(line.removeprefix("press: ").partition(" %")[0]) for line in told if "%" in line]
     assert shares == sorted(shares)

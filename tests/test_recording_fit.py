@@ -338,7 +338,9 @@ def test_the_stimuli_of_the_bar_are_the_touches_of_the_reproduction(tmp_path):
 def test_stimuli_are_indented_at_their_position_with_their_motion():
     conditions = Conditions("quick")
     stimuli = [
-        NamedStimulus(Sphere(340.0), RampAndHold(0.4), x_mm=1.0, z_mm=0.5, tilt_deg=3.0, name="beside"),
+        NamedStimulus(
+            Sphere(curvature_per_m=340.0), RampAndHold(0.4), x_mm=1.0, z_mm=0.5, tilt_deg=3.0, name="beside"
+        ),
         NamedStimulus(Line(), ForceRampAndHold(50.0), name="wire"),
         NamedStimulus(Gap(gap_mm=0.5), x_mm=0.2, friction=0.3, name="gap"),
         NamedStimulus(Bar(), spin_deg=30.0, name="turned"),

@@ -18,11 +18,11 @@ from fingerpad.skin.indentation import touch_of
     ("body", "tissues", "depth_mm", "force_mn"),
     [
         # Forces on meshes with elements half as long: 0.063 mm under the ball, 0.05 mm at the rim.
-        (Sphere(2000.0), "human", 2.0, 69.1),
+        (Sphere(curvature_per_m=2000.0), "human", 2.0, 69.1),
         (FlatPunch(1.0, 0.1), "human", 1.0, 36.9),
         # Forces at standard resolution. With contact at nodes alone the ball went through a facet at 1.13 mm,
         # and half of the skin under the punch left it at standard resolution, which gave 130.6 mN.
-        (Sphere(2000.0), "trial1", 2.0, 220.0),
+        (Sphere(curvature_per_m=2000.0), "trial1", 2.0, 220.0),
         (FlatPunch(1.0, 0.1), "paper", 2.0, 178.1),
     ],
     ids=["ball of 0.5 mm radius", "punch of 1 mm", "ball on stiff skin", "punch on stiff skin"],

@@ -116,7 +116,7 @@ def test_seven_spheres_are_pressed_at_two_places_over_one_mesh(conditions):
     assert sorted(touches) == [(position, curvature) for position in (0.0, 0.2) for curvature in CURVATURES]
     for (position, curvature), touch in touches.items():
         assert follows_the_protocol(touch)
-        assert touch.indenter == Sphere(curvature)
+        assert touch.indenter == Sphere(curvature_per_m=curvature)
         assert touch.at_mm[0] == pytest.approx(17.37 + position, abs=1e-12)
         assert touch.tilt_deg == conditions.skin_tilt_deg
     assert len({touch.grading for touch in touches.values()}) == 1
@@ -207,7 +207,7 @@ def tiny_skin():
     )
     touch = Touch(
         finger=Fingertip(),
-        indenter=Sphere(287.0),
+        indenter=Sphere(curvature_per_m=287.0),
         stimulus=RampAndHold(depth_mm=0.2),
         tissues=named_tissues("trial3"),
         grading=grading,
@@ -529,7 +529,7 @@ def test_the_nail_is_pressed_on_a_mesh_that_is_fine_all_over():
     touch = nail_border.nail_touch(Conditions(resolution="quick"))
     edges = np.linalg.norm(np.diff(touch.mesh.nodes_mm[touch.mesh.skin_grid], axis=0), axis=2)
     assert edges.max() < 1.2
-    assert touch.indenter == Sphere(287.0)
+    assert touch.indenter == Sphere(curvature_per_m=287.0)
 
 
 def test_the_outline_of_the_nail_goes_around_its_footprint(scattered_skin):
@@ -920,4 +920,4 @@ def test_both_numbers_are_written():
 def test_a_wire_presses_straight_and_every_other_body_along_the_normal_of_the_skin():
     conditions = Conditions("quick")
     assert conditions.tilt_deg(Line()) == 0.0
-    assert conditions.tilt_deg(Sphere(287.0)) == conditions.skin_tilt_deg != 0.0
+    assert conditions.tilt_deg(Sphere(curvature_per_m=287.0)) == conditions.skin_tilt_deg != 0.0

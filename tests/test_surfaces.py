@@ -178,7 +178,9 @@ def profile_surface(body, fillet_mm, step_deg, path):
 
 def ball_surface(subdivisions, path):
     trimesh = pytest.importorskip("trimesh")
-    trimesh.creation.icosphere(subdivisions=subdivisions, radius=Sphere(287.0).radius_mm).export(path)
+    trimesh.creation.icosphere(
+        subdivisions=subdivisions, radius=Sphere(curvature_per_m=287.0).radius_mm
+    ).export(path)
     return read_surface(path)
 
 
@@ -188,7 +190,7 @@ RIDGES = {Bar: ((0.0, 3.0),), Union: ((-2.5, 1.5), (0.0, 1.5), (2.5, 1.5))}
 
 @pytest.mark.parametrize(
     ("body", "size_mm"),
-    [(Sphere(287.0), 0.3), (Bar(), 0.27), (GRATING, 0.3)],
+    [(Sphere(curvature_per_m=287.0), 0.3), (Bar(), 0.27), (GRATING, 0.3)],
     ids=["sphere", "bar", "grating"],
 )
 def test_a_body_from_triangles_presses_as_its_analytic_twin(body, size_mm, tmp_path):
@@ -337,7 +339,7 @@ def test_a_mesh_must_resolve_the_parts_of_a_union():
         touch_of(Fingertip(), across, grading=COARSE)
     cross = Union([Bar(0.6, 0.1), Dots([(0.0, 0.0)], 1.6, 0.4)], [(0, 0, 0), (0, 0, 0)])
     assert cross.relief_mm == 0.6
-    assert Union([Sphere(100.0), Plate()], [(0, 0, 0), (0, -1, 0)]).narrowest_mm == np.inf
+    assert Union([Sphere(curvature_per_m=100.0), Plate()], [(0, 0, 0), (0, -1, 0)]).narrowest_mm == np.inf
 
 
 def _together(*parts):
@@ -544,7 +546,7 @@ def test_a_bad_height_map_gives_one_sentence(tmp_path):
     "body",
     [
         ridges([-2.0, 0.0, 1.4], [1.0, 0.6, 0.8]),
-        Union([Sphere(1000.0), Plate()], [(0.2, 0.0, 0.0), (0.0, -0.6, 0.0)], seam_mm=0.4),
+        Union([Sphere(curvature_per_m=1000.0), Plate()], [(0.2, 0.0, 0.0), (0.0, -0.6, 0.0)], seam_mm=0.4),
     ],
     ids=lambda body: type(body).__name__,
 )

@@ -81,7 +81,11 @@ def test_what_varies_makes_one_stimulus_per_value_and_the_standard_comes_first()
     stimuli = task_stimuli(parse_task(changed(SPHERES, standard=296)))
     assert [stimulus.name for stimulus in stimuli] == ["296", "287", "365"]
     assert [stimulus.level for stimulus in stimuli] == [296.0, 287.0, 365.0]
-    assert [stimulus.indenter for stimulus in stimuli] == [Sphere(296.0), Sphere(287.0), Sphere(365.0)]
+    assert [stimulus.indenter for stimulus in stimuli] == [
+        Sphere(curvature_per_m=296.0),
+        Sphere(curvature_per_m=287.0),
+        Sphere(curvature_per_m=365.0),
+    ]
     assert {stimulus.motion for stimulus in stimuli} == {RampAndHold()}
 
 

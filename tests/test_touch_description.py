@@ -92,7 +92,7 @@ def test_what_is_left_out_is_the_papers_perpendicular_to_the_skin():
 @pytest.mark.parametrize(
     ("content", "body"),
     [
-        ("sphere:radius_mm=4", fp.Sphere(250.0)),
+        ("sphere:radius_mm=4", fp.Sphere(curvature_per_m=250.0)),
         ({"kind": "bar", "width_mm": 4, "edge_radius_mm": 0.2}, fp.Bar(4.0, 0.2)),
         ({"kind": "grating", "period_mm": 2, "duty": 0.25}, fp.Grating(0.5, 1.5)),
         (

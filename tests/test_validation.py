@@ -66,7 +66,7 @@ def written(folder, content, name="mine.csv"):
         ("punch:6.35", FlatPunch(6.35)),
         ("punch", FlatPunch()),
         ("cylinder:3.17", Cylinder(3.17)),
-        (" sphere : 287 ", Sphere(287.0)),
+        (" sphere : 287 ", Sphere(curvature_per_m=287.0)),
         ("bar:3:0.2", Bar(3.0, 0.2)),
         ("gap:1.2", Gap(1.2)),
         ("grating:1.5:0.75", Grating(1.5, 0.75)),
@@ -359,7 +359,11 @@ def test_curvature_0_is_a_plate_on_the_mesh_of_all_spheres(pressed, tmp_path):
     touches, sites = pressed
     found = read_observations(written(tmp_path, RATE + "0.2,0,3\n0.2,900,3\n0.8,80,3\n0.2,900,4\n"))
     predict(found, QUICK, Runner(tmp_path))
-    assert [touch.indenter for touch in touches] == [Plate(), Sphere(900.0), Sphere(80.0)]
+    assert [touch.indenter for touch in touches] == [
+        Plate(),
+        Sphere(curvature_per_m=900.0),
+        Sphere(curvature_per_m=80.0),
+    ]
     assert [touch.stimulus.force_mn for touch in touches] == [200.0, 200.0, 800.0]
     assert len({touch.grading for touch in touches}) == 1
     assert {touch.tilt_deg for touch in touches} == {QUICK.conditions.skin_tilt_deg}

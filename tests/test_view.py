@@ -142,7 +142,7 @@ def test_a_touch_without_afferents_and_object_is_drawn(data, tmp_path):
 
 
 def test_a_response_of_the_skin_is_drawn_without_afferents(tmp_path):
-    skin = fp.indent(fp.Fingertip(), fp.Sphere(287), fp.RampAndHold(depth_mm=0.3))
+    skin = fp.indent(fp.Fingertip(), fp.Sphere(curvature_per_m=287), fp.RampAndHold(depth_mm=0.3))
     (picture,) = save_view(tmp_path / "a.png", skin, field="pressure")
     assert picture.stat().st_size > 10_000
 

@@ -56,7 +56,7 @@ def reading(sed_kpa, touches=None, rate_hz=None):
 @pytest.fixture(scope="module")
 def pressed():
     """A real answer of a very coarse finger, for its shape: tests put their own energies into it."""
-    touch = touch_of(Fingertip(), Sphere(287.0), RampAndHold(depth_mm=0.2), grading=COARSE)
+    touch = touch_of(Fingertip(), Sphere(curvature_per_m=287.0), RampAndHold(depth_mm=0.2), grading=COARSE)
     return replace(touch, settings=PressSettings(1, 1)).solve()
 
 

@@ -99,7 +99,7 @@ def test_edges_of_the_pad_are_those_of_a_block():
 @pytest.fixture(scope="module")
 def results(tmp_path_factory):
     """Results of a run whose skin is a formula with a known error; nothing but a tiny finger is pressed."""
-    touch = touch_of(Fingertip(), Sphere(287.0), RampAndHold(depth_mm=0.2), grading=COARSE)
+    touch = touch_of(Fingertip(), Sphere(curvature_per_m=287.0), RampAndHold(depth_mm=0.2), grading=COARSE)
     pressed = replace(touch, settings=PressSettings(1, 1)).solve()
     mesh = finger_mesh(Fingertip(), COARSE)
     x, _, z = mesh.nodes_mm[mesh.elements].mean(axis=1)[np.repeat(mesh.living_epidermis.ravel(), 4)].T

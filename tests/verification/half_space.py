@@ -228,7 +228,7 @@ def hertz_sphere(poisson, fine=0.125, sectors=8):
     """Sphere of 50 mm pressed until the contact radius should be 1 mm."""
     edges = lines(fine, 1.5, 100.0, 1.4)
     mesh = round_mesh(edges, edges, sectors)
-    return pressed(mesh, Sphere(1000.0 / RADIUS_MM), CONTACT_MM**2 / RADIUS_MM, poisson)
+    return pressed(mesh, Sphere(curvature_per_m=1000.0 / RADIUS_MM), CONTACT_MM**2 / RADIUS_MM, poisson)
 
 
 def sphere_rows(poisson):
@@ -272,7 +272,9 @@ def sphere_by_force():
     """The same sphere pressed by the force that Hertz expects for a contact radius of 1 mm, nu = 0.3."""
     edges = lines(0.125, 1.5, 100.0, 1.4)
     force = 4 / 3 * reduced_modulus(0.3) * CONTACT_MM**3 / RADIUS_MM
-    return pressed(round_mesh(edges, edges, 8), Sphere(1000.0 / RADIUS_MM), None, 0.3, force_mn=force)
+    return pressed(
+        round_mesh(edges, edges, 8), Sphere(curvature_per_m=1000.0 / RADIUS_MM), None, 0.3, force_mn=force
+    )
 
 
 @lru_cache(maxsize=2)

@@ -50,7 +50,7 @@ WIDE_MM = 1.5
 
 SHARP_MM = 0.05
 BODIES: tuple[Indenter, ...] = (
-    *(Sphere(1000.0 / radius_mm) for radius_mm in (0.25, 0.5, 1.0, 1.5, 3.5, 20.0)),
+    *(Sphere(curvature_per_m=1000.0 / radius_mm) for radius_mm in (0.25, 0.5, 1.0, 1.5, 3.5, 20.0)),
     *(FlatPunch(diameter, SHARP_MM) for diameter in (0.5, 1.0, 3.0, 10.0)),
     FlatPunch(1.0, 0.1),
     FlatPunch(3.0, 0.3),
@@ -66,7 +66,7 @@ BODIES: tuple[Indenter, ...] = (
     Line(),
     Line(0.3),
 )
-HARD = (Sphere(2000.0), FlatPunch(1.0, 0.1), Bar(3.0, SHARP_MM))
+HARD = (Sphere(curvature_per_m=2000.0), FlatPunch(1.0, 0.1), Bar(3.0, SHARP_MM))
 TISSUES = (
     "paper", "trial1", "trial2", "trial3", "trial2_wu", "trial3_wu", "trial3_stiffening", "maeno1998",
     "wu2007", "gerling2014_fit",
@@ -115,8 +115,8 @@ BY_MOTION: tuple[tuple[Indenter, str, tuple[float, float]], ...] = (
     (Gap(1.0), "0.6 mm", CONTACT_POINT_MM),
     (Grating(1.0, 1.0), "0.6 mm", CONTACT_POINT_MM),
     (Grating(1.0, 1.0), "0.6 mm", (25.0, 0.0)),
-    (Sphere(287.0), "60 mN, slides 5 mm along", (12.0, 0.0)),
-    (Sphere(287.0), "60 mN, slides 5 mm across", (17.37, -2.5)),
+    (Sphere(curvature_per_m=287.0), "60 mN, slides 5 mm along", (12.0, 0.0)),
+    (Sphere(curvature_per_m=287.0), "60 mN, slides 5 mm across", (17.37, -2.5)),
     (Bar(), "0.6 mm, slides 2 mm along", (14.0, 0.0)),
     (Grating(1.0, 1.0), "0.6 mm, slides 2 mm along", (15.0, 0.0)),
     (Cylinder(ROLLER_MM), "0.8 mm, rolls by 20 degrees", (17.37, 0.0)),

@@ -196,7 +196,7 @@ def ball_in_and_out() -> Deformation:
     edges = lines(0.125, 1.25, 100.0, 1.5)
     mesh = round_mesh(edges, edges, 6)
     tissue = (Material.linear_elastic(YOUNG_KPA, POISSON, MAXWELL),) * 4
-    ball = Sphere(1000.0 / RADIUS_MM)
+    ball = Sphere(curvature_per_m=1000.0 / RADIUS_MM)
     placement = place(ball, mesh.nodes_mm[mesh.skin_nodes], np.zeros(3), np.eye(3))
     motion = Trajectory((0.0, TURN_MS, 2 * TURN_MS), (0.0, DEEP_MM, 0.0))
     # Round-off of the large far elements is 1e-5 of the small forces before contact is lost.

@@ -58,7 +58,7 @@ def partial_slip(fine=0.2, sectors=6) -> tuple[Deformation, np.ndarray]:
     """
     edges = lines(fine, 1.4, 100.0, 1.5)
     mesh = round_mesh(edges, edges, sectors)
-    indenter = Sphere(1000.0 / RADIUS_MM)
+    indenter = Sphere(curvature_per_m=1000.0 / RADIUS_MM)
     placement = place(indenter, mesh.nodes_mm[mesh.skin_nodes], np.zeros(3), np.eye(3))
     depths = [0.0, *DEPTHS, *(1.0 for _ in WAYS)]
     motion = Trajectory(
@@ -143,7 +143,7 @@ def frictionless_slide() -> list[Row]:
     """
     across = np.arange(-2.0, 2.01, 0.4)
     mesh = block_mesh(np.arange(-6.0, 6.01, 0.4), [0.0, 0.3, 0.6, 1.2, 2.0], across, layers=[0, 1, 2, 3])
-    indenter = Sphere(500.0)
+    indenter = Sphere(curvature_per_m=500.0)
     placement = place(indenter, mesh.nodes_mm[mesh.skin_nodes], np.array([-1.2, 0.0, 0.0]), np.eye(3))
     motion = Trajectory((0.0, 50.0, 100.0), (0.0, 0.3, 0.3), x_mm=(0.0, 0.0, 2.4))
     materials = (Material.neo_hooke(20.0, 0.45),) * 4

@@ -9,7 +9,7 @@ from .press_table import Press, solved
 
 THEME = "Small bodies"
 PRESSES = (
-    ("sphere of 0.5 mm radius", Press(Sphere(2000.0)), 2.0),
+    ("sphere of 0.5 mm radius", Press(Sphere(curvature_per_m=2000.0)), 2.0),
     ("punch of 1 mm, fillet 0.1 mm", Press(FlatPunch(1.0, 0.1)), 1.0),
     ("punch of 1 mm, fillet 0.1 mm, friction 0.5", Press(FlatPunch(1.0, 0.1), friction=0.5), 1.0),
 )

@@ -10,7 +10,7 @@ import typer.core
 
 from fingerpad.cli.choices import RESOLUTION_CHOICES, TISSUES_CHOICES
 from fingerpad.cli.running import interruptible
-from fingerpad.core.keywords import closest
+from fingerpad.core.errors import closest
 
 RESOLUTIONS_AS_OPTIONS = tuple(f"--{name}" for name in RESOLUTION_CHOICES)
 """Values of `--resolution` as they may be mistaken for options."""

@@ -11,8 +11,7 @@ from typing import Any, TypeGuard, TypeVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from fingerpad.core.errors import InputError, shown
-from fingerpad.core.keywords import got
+from fingerpad.core.errors import InputError, got, shown
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -77,6 +76,23 @@ def positive(name: str, value: float, unit: str = "") -> float:
     number = finite(name, value, unit)
     if number <= 0.0:
         raise InputError(f"{name} must be greater than 0{_in(unit)}: got {shown(value)}.")
+    return number
+
+
+def plausible(name: str, value: float, unit: str, between: tuple[float, float]) -> float:
+    """Return `value` as float if it is a size that a laboratory has, else raise `InputError`.
+
+    Examples
+    --------
+    >>> plausible("depth_mm", 0.0005, "mm", (0.001, 20.0))
+    Traceback (most recent call last):
+    fingerpad.core.errors.InputError: depth_mm must lie within 0.001 to 20 mm: got 0.0005; check its unit.
+    """
+    number = positive(name, value, unit)
+    if not between[0] <= number <= between[1]:
+        raise InputError(
+            f"{name} must lie within {between[0]:g} to {between[1]:g} {unit}: got {number:g}; check its unit."
+        )
     return number
 
 
@@ -145,10 +161,10 @@ def float_array(name: str, values: ArrayLike, ndim: int | None) -> FloatArray:
         total = array.sum()
     if not np.isfinite(total) and not np.isfinite(array).all():
         bad = np.argwhere(~np.isfinite(array)) + 1
-        first = " in row and column " if ndim == 2 else " number "
+        first = " in row and column " if array.ndim == 2 else " number "
         raise InputError(
             f"{name} must hold finite numbers only: {len(bad)} are not, first"
-            f"{first if ndim else ''}{', '.join(map(str, bad[0]))}."
+            f"{first if array.ndim else ' '}{', '.join(map(str, bad[0]))}."
         )
     array.setflags(write=False)
     return array

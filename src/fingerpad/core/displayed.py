@@ -9,6 +9,8 @@ from __future__ import annotations
 from pkgutil import resolve_name
 from typing import TYPE_CHECKING, Any
 
+from fingerpad.core.keywords import check_methods
+
 if TYPE_CHECKING:
     import pandas
     import xarray
@@ -22,7 +24,11 @@ TABLES = "fingerpad.export.result_tables"
 
 
 class Displayed:
-    """Base of values that draw themselves."""
+    """Base of values that draw themselves; their methods refuse wrong arguments in one sentence."""
+
+    def __init_subclass__(cls, **options: Any) -> None:
+        super().__init_subclass__(**options)
+        check_methods(cls)
 
     def plot(self, axes: Axes | None = None, what: str | None = None, **options: Any) -> Axes:
         """Draw this result.

@@ -1,12 +1,23 @@
 """Errors of the package: one sentence with the expected value, the actual value and the remedy."""
 
+import difflib
 import reprlib
 import sys
+from collections.abc import Collection
 from itertools import count
 from typing import Any
 
 LONGEST_MESSAGE = 2000
 """Characters of an error's text; what is between its begin and its end is left out beyond that."""
+
+_CLOSE = 0.6
+"""Similarity of two names from which one is taken for the other, of `difflib`."""
+
+_SHORTEST_STEM = 3
+"""Letters from which the beginning of a name is taken for it."""
+
+_NEW_NAMES = {"materials": "tissues"}
+"""Names that were renamed."""
 
 
 class FingerpadError(Exception):
@@ -45,6 +56,53 @@ def shown(value: Any) -> str:
 
 
 _SHOWN = _Shown()
+
+
+def did_you_mean(wrong: str, known: Collection[str], owner: str = "") -> str:
+    """Name the known word that is closest to a wrong one, or all of them.
+
+    Examples
+    --------
+    >>> did_you_mean("radius", ["curvature_per_m", "radius_mm"], "Sphere")
+    'did you mean radius_mm?'
+    >>> did_you_mean("colour", ["curvature_per_m", "radius_mm"], "Sphere")
+    'Sphere has curvature_per_m, radius_mm.'
+    """
+    near = closest(wrong, known)
+    return f"did you mean {near}?" if near else f"{owner or 'it'} has {', '.join(known) or 'no keyword'}."
+
+
+def closest(wrong: Any, known: Collection[str]) -> str | None:
+    """Known word that a wrong one may be meant for; None if none is close.
+
+    Examples
+    --------
+    >>> closest("shpere", ["sphere", "bar"])
+    'sphere'
+    """
+    if not isinstance(wrong, str):
+        return None
+    names = [name for name in known if isinstance(name, str)]
+    # A name without its unit, such as `depth`, means the first unit that is known, not the most similar one.
+    near = [name for name in names if name == _NEW_NAMES.get(wrong)]
+    near = near or [name for name in names if wrong and name.startswith(f"{wrong}_")]
+    near = near or [name for name in names if len(wrong) >= _SHORTEST_STEM and name.startswith(wrong)]
+    near = near or difflib.get_close_matches(wrong, names, n=1, cutoff=_CLOSE)
+    return near[0] if near else None
+
+
+def got(value: Any, known: Collection[str], shown: str | None = None) -> str:
+    """End of an error about a value that is none of several names.
+
+    Examples
+    --------
+    >>> got("humn", ["human", "paper"])
+    "got 'humn' (did you mean human?)."
+    >>> got("wood", ["human", "paper"])
+    "got 'wood'."
+    """
+    near, said = closest(value, known), f"got {shown or repr(value)}"
+    return f"{said} (did you mean {near}?)." if near else f"{said}."
 
 
 class InputError(FingerpadError, ValueError):

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import inspect
 import re
 from abc import ABCMeta
@@ -11,70 +10,23 @@ from functools import wraps
 from typing import Any, ParamSpec, TypeVar
 from weakref import WeakKeyDictionary
 
-from fingerpad.core.errors import InputError
+from fingerpad.core.errors import InputError, did_you_mean
+from fingerpad.core.values import refuse_mistyped
 
 _Given = ParamSpec("_Given")
 _Made = TypeVar("_Made")
 
-_CLOSE = 0.6
-"""Similarity of two names from which one is taken for the other, of `difflib`."""
+_RECEIVERS = ("cls", "self")
+"""Parameters that no caller gives."""
 
-_SHORTEST_STEM = 3
-"""Letters from which the beginning of a name is taken for it."""
-
-_NEW_NAMES = {"materials": "tissues"}
-"""Names that were renamed."""
-
-
-def did_you_mean(wrong: str, known: Collection[str], owner: str = "") -> str:
-    """Name the known word that is closest to a wrong one, or all of them.
-
-    Examples
-    --------
-    >>> did_you_mean("radius", ["curvature_per_m", "radius_mm"], "Sphere")
-    'did you mean radius_mm?'
-    >>> did_you_mean("colour", ["curvature_per_m", "radius_mm"], "Sphere")
-    'Sphere has curvature_per_m, radius_mm.'
-    """
-    near = closest(wrong, known)
-    return f"did you mean {near}?" if near else f"{owner or 'it'} has {', '.join(known) or 'no keyword'}."
-
-
-def closest(wrong: Any, known: Collection[str]) -> str | None:
-    """Known word that a wrong one may be meant for; None if none is close.
-
-    Examples
-    --------
-    >>> closest("shpere", ["sphere", "bar"])
-    'sphere'
-    """
-    if not isinstance(wrong, str):
-        return None
-    names = [name for name in known if isinstance(name, str)]
-    # A name without its unit, such as `depth`, means the first unit that is known, not the most similar one.
-    near = [name for name in names if name == _NEW_NAMES.get(wrong)]
-    near = near or [name for name in names if wrong and name.startswith(f"{wrong}_")]
-    near = near or [name for name in names if len(wrong) >= _SHORTEST_STEM and name.startswith(wrong)]
-    near = near or difflib.get_close_matches(wrong, names, n=1, cutoff=_CLOSE)
-    return near[0] if near else None
-
-
-def got(value: Any, known: Collection[str], shown: str | None = None) -> str:
-    """End of an error about a value that is none of several names.
-
-    Examples
-    --------
-    >>> got("humn", ["human", "paper"])
-    "got 'humn' (did you mean human?)."
-    >>> got("wood", ["human", "paper"])
-    "got 'wood'."
-    """
-    near, said = closest(value, known), f"got {shown or repr(value)}"
-    return f"{said} (did you mean {near}?)." if near else f"{said}."
+_OF_PYTHON = (TypeError, AttributeError, LookupError, ValueError)
+"""Errors in which an argument of a wrong type ends where nothing checks it."""
 
 
 def known_keywords(function: Callable[_Given, _Made]) -> Callable[_Given, _Made]:
     """Make a function raise `InputError` for a keyword that it does not have, and for an argument too few.
+
+    Arguments of other types than annotated are named where the call fails by one of Python's own errors.
 
     Examples
     --------
@@ -89,7 +41,7 @@ def known_keywords(function: Callable[_Given, _Made]) -> Callable[_Given, _Made]
     fingerpad.core.errors.InputError: area_mm2 needs height_mm: it is not given.
     """
     signature = inspect.signature(function)
-    names = tuple(name for name in signature.parameters if name != "cls")
+    names = tuple(name for name in signature.parameters if name not in _RECEIVERS)
     takes_any = any(part.kind is part.VAR_KEYWORD for part in signature.parameters.values())
     owner = function.__qualname__.rpartition("<locals>.")[2]
 
@@ -99,11 +51,28 @@ def known_keywords(function: Callable[_Given, _Made]) -> Callable[_Given, _Made]
             _refuse_unknown(given, names, owner)
         try:
             return function(*args, **given)
-        except TypeError:
+        except InputError:
+            raise
+        except _OF_PYTHON:
             _refuse_misfit(signature, args, given, owner)
+            refuse_mistyped(function, signature.bind(*args, **given).arguments)
             raise
 
     return checked
+
+
+def check_methods(kind: type) -> None:
+    """Make the public methods of a class of this package refuse wrong arguments, as `known_keywords` does."""
+    if not kind.__module__.startswith("fingerpad."):
+        return
+    for name, member in list(vars(kind).items()):
+        function = getattr(member, "__func__", member)
+        if name.startswith("_") or not inspect.isfunction(function) or hasattr(function, "__wrapped__"):
+            continue
+        if isinstance(member, classmethod):
+            setattr(kind, name, classmethod(known_keywords(function)))
+        elif not isinstance(member, staticmethod):
+            setattr(kind, name, known_keywords(function))
 
 
 def _refuse_unknown(
@@ -120,11 +89,12 @@ def _refuse_misfit(
     signature: inspect.Signature, args: tuple[Any, ...], given: Mapping[str, Any], owner: str
 ) -> None:
     """Raise `InputError` if a call gives too few arguments, too many, or one of them twice."""
-    parts = {name: part for name, part in signature.parameters.items() if name != "cls"}
+    parts = {name: part for name, part in signature.parameters.items() if name not in _RECEIVERS}
     try:
         taken = signature.bind_partial(*args, **given).arguments
     except TypeError as error:
-        raise InputError(f"{owner} takes {', '.join(parts) or 'no argument'}: got {error}.") from None
+        named = (name + "=" * (part.kind is part.KEYWORD_ONLY) for name, part in parts.items())
+        raise InputError(f"{owner} takes {', '.join(named) or 'no argument'}: got {error}.") from None
     needed = [
         name
         for name, part in parts.items()
@@ -188,6 +158,10 @@ class KnownKeywords(ABCMeta):
     keywords_of_others: Mapping[str, str] = {}
     """Classes that have a keyword which this one may be given, by the keyword."""
 
+    def __init__(cls, *args: Any) -> None:
+        super().__init__(*args)
+        check_methods(cls)
+
     def __call__(cls, *args: Any, **given: Any) -> Any:
         """Make an instance from fields and other names."""
         if not given:
@@ -218,8 +192,12 @@ class KnownKeywords(ABCMeta):
         """Make an instance from its fields alone."""
         try:
             return super().__call__(*args, **given)
-        except TypeError:
-            _refuse_misfit(inspect.Signature(_fields(cls)), args, given, cls.__name__)
+        except InputError:
+            raise
+        except _OF_PYTHON:
+            signature = inspect.Signature(_fields(cls))
+            _refuse_misfit(cls.__signature__, args, given, cls.__name__)
+            refuse_mistyped(cls.__init__, signature.bind(*args, **given).arguments)  # type: ignore[misc]
             raise
 
     @property

@@ -14,11 +14,11 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import ArrayLike
 
-from fingerpad.core.checks import FloatArray, float_array, increasing, int_array, one_of, positive
+from fingerpad.core.checks import FloatArray, finite, float_array, increasing, int_array, one_of, positive
 from fingerpad.core.displayed import Result
 from fingerpad.core.errors import InputError
 from fingerpad.core.phases import Phase, from_onset, ramp_and_hold_phases
-from fingerpad.core.units import MS_PER_S
+from fingerpad.core.units import MS_PER_S, with_unit
 from fingerpad.core.values import converted
 
 MOST_SHOWN = 8
@@ -76,13 +76,13 @@ class SedTraces(Result):
         Strictly increasing. [ms]
     sed_kpa : array (n_times, n_sites)
         Strain energy density, or the quantity of the static term in its place; not negative.
-        [kPa = µJ/mm³]
+        [kPa = µJ/mm³, or the unit of that quantity in `fingerpad.core.units.QUANTITY_UNITS`]
     kinks_ms : array (n_kinks,), optional
         Those of `times_ms` at which the motion changes abruptly, as from ramp to hold: there the
         rate of change of SED is discontinuous, and interpolation must not smooth it. [ms]
     dynamic_kpa : array (n_times, n_sites), optional
         Quantity that drives the dynamic term, if it is not that of the static term; not negative.
-        [kPa, a strain in mm/mm]
+        [its unit in `fingerpad.core.units.QUANTITY_UNITS`]
     dynamic_quantity, static_quantity : str, optional
         What each term follows, by the names of `SkinResponse.sample`: "stored" is SED, as in the paper; any
         other is an extension of its model.
@@ -189,9 +189,11 @@ class SedTraces(Result):
         )
 
     def __repr__(self) -> str:
+        highest = self.sed_kpa.max(initial=0.0)
         return (
             f"SedTraces({self.times_ms.size} times to {self.times_ms[-1]:g} ms, {self.n_sites} sites, "
-            f"{self.static_quantity} at most {self.sed_kpa.max(initial=0.0):.3g} kPa)"
+            + with_unit(f"{self.static_quantity} at most {highest:.3g}", self.static_quantity, " {}")
+            + ")"
         )
 
     @property
@@ -281,6 +283,14 @@ def traces_below(skin: Skin, sites: ArrayLike, dynamic_quantity: str, static_qua
             "Afferent.for_tissues('paper')."
         ) from error
     return skin.sed(sites, dynamic_quantity, static_quantity)
+
+
+def window_bounds(window_ms: Sequence[float]) -> tuple[float, float]:
+    """Return start and end of a window, or raise `InputError`."""
+    bounds = [finite("window_ms", bound, "ms") for bound in window_ms]
+    if len(bounds) != 2 or bounds[1] <= bounds[0]:
+        raise InputError(f"window_ms must be a start and a later end: got {window_ms!r}.")
+    return bounds[0], bounds[1]
 
 
 @dataclass(frozen=True)
@@ -411,7 +421,7 @@ class SpikeTrains(Result):
         >>> SpikeTrains.from_lists([[10.0, 35.0, 50.0], [45.0], []]).counted_hz((30.0, 50.0)).tolist()
         [100.0, 50.0, 0.0]
         """
-        start, end = window_ms
+        start, end = window_bounds(window_ms)
         inside = np.cumsum(np.append(0, (self.times_ms > start) & (self.times_ms <= end)))
         return MS_PER_S * np.diff(inside[self.offsets]) / (end - start)
 
@@ -541,6 +551,8 @@ class ResponseMap(Result):
         one_of("rate_measure", self.rate_measure, (INTERVAL, COUNT))
         if self.duration_ms is not None:
             positive("duration_ms", self.duration_ms, "ms")
+        for window in self.windows_ms or ():
+            window_bounds(window)
         positions = float_array("positions_mm", self.positions_mm, 2)
         if positions.shape[1] not in (2, 3):
             raise InputError(

@@ -14,9 +14,8 @@ from typing import Any
 import numpy as np
 
 from fingerpad.core.checks import FloatArray, finite, number_in, numbers_in
-from fingerpad.core.errors import InputError
+from fingerpad.core.errors import InputError, did_you_mean
 from fingerpad.core.files import read_text
-from fingerpad.core.keywords import did_you_mean
 
 Check = Callable[[str, Any, str], float]
 

@@ -10,6 +10,31 @@ MS_PER_S = 1000.0
 MM_PER_M = 1000.0
 MN_PER_N = 1000.0
 
+QUANTITY_UNITS = {
+    "stored": "kPa",
+    "instantaneous": "kPa",
+    "work": "kPa",
+    "von_mises": "kPa",
+    "compressive_stress": "kPa",
+    "compressive_strain": "",
+    "skin_displacement": "mm",
+    "deep_displacement": "mm",
+    "skin_stretch": "",
+}
+"""Unit of each quantity that an afferent can follow, by its name; empty for a strain."""
+
+
+def with_unit(said: str, quantity: str, brackets: str = " [{}]") -> str:
+    """Text about a quantity, with its unit where it has one.
+
+    Examples
+    --------
+    >>> with_unit("displacement", "deep_displacement"), with_unit("0.1", "skin_stretch", " {}")
+    ('displacement [mm]', '0.1')
+    """
+    unit = QUANTITY_UNITS.get(quantity, "")
+    return said + brackets.format(unit) if unit else said
+
 
 def radius_mm(curvature_per_m: float) -> float:
     """Radius of a sphere from its curvature. [mm]

@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable, Sequence
+import inspect
+import os
+from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import fields
 from functools import cache, lru_cache
+from pathlib import Path
 from types import NoneType, UnionType
 from typing import Any, TypeVar, Union, cast, get_args, get_origin, get_type_hints
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from fingerpad.core.checks import finite, float_array, instance
 from fingerpad.core.errors import InputError, shown
@@ -91,6 +95,62 @@ def _conversions(cls: Any) -> list[tuple[str, Any, _Convert | None]]:
             hints |= get_type_hints(home)
     wanted = ((part, _conversion(hints.get(part.name))) for part in fields(cls) if part.init)
     return [(part.name, part.default, convert) for part, convert in wanted]
+
+
+def refuse_mistyped(function: Callable[..., Any], given: Mapping[str, Any]) -> None:
+    """Raise `InputError` for an argument that is not of the annotated type; called where a call failed.
+
+    Examples
+    --------
+    >>> def area_mm2(width_mm: float, height_mm: float) -> float:
+    ...     return width_mm * height_mm
+    >>> refuse_mistyped(area_mm2, {"width_mm": [2.0], "height_mm": 3.0})
+    Traceback (most recent call last):
+    fingerpad.core.errors.InputError: width_mm must be a finite number [mm]: got [2.0].
+    """
+    known = getattr(function, "__globals__", {})
+    for name, part in inspect.signature(function).parameters.items():
+        if name not in given or given[name] is part.default:
+            continue
+        with suppress(NameError):  # a type that only type checkers import
+            hint = eval(part.annotation, known) if isinstance(part.annotation, str) else part.annotation
+            _refuse_other_type(name, given[name], hint)
+
+
+def _refuse_other_type(name: str, value: Any, hint: Any) -> None:
+    kind, inner = get_origin(hint) or hint, get_args(hint)
+    wanted = ""
+    if convert := _conversion(hint):
+        convert(name, value)
+    elif hint == ArrayLike:
+        float_array(name, value, None)
+    elif kind in (Union, UnionType) and Path not in inner:
+        refused = [each for each in inner if _is_refused(name, value, each)]
+        if refused == list(inner):
+            _refuse_other_type(name, value, inner[0])
+    elif Path in (hint, *inner):
+        wanted = "" if isinstance(value, str | os.PathLike) else "a path"
+    elif kind is np.ndarray:
+        wanted = "" if isinstance(value, np.ndarray) and value.ndim else "an array"
+    elif getattr(hint, "_is_protocol", False):
+        members = [part for part in (vars(hint) | hint.__annotations__) if not part.startswith("_")]
+        lacking = [part for part in members if not hasattr(value, part)]
+        wanted = f"a {hint.__name__}, with {', '.join(lacking)}" if lacking else ""
+    elif kind is Sequence and not isinstance(value, str):
+        for number, entry in enumerate(value if isinstance(value, Iterable) else [value]):
+            _refuse_other_type(f"{name}[{number}]", entry, inner[0])
+    elif isinstance(kind, type) and not isinstance(value, kind):
+        wanted = f"a {kind.__name__.lower()}"
+    if wanted:
+        raise InputError(f"{name} must be {wanted}: got {shown(value)}.")
+
+
+def _is_refused(name: str, value: Any, hint: Any) -> bool:
+    try:
+        _refuse_other_type(name, value, hint)
+    except InputError:
+        return True
+    return False
 
 
 def _conversion(hint: Any) -> _Convert | None:

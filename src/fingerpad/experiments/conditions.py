@@ -134,7 +134,7 @@ class Conditions(metaclass=KnownKeywords):
         Touch
         """
         return self.touch(
-            Sphere(curvature_per_m),
+            Sphere(curvature_per_m=curvature_per_m),
             self.receptor_x_mm + position_mm,
             grading or self.sphere_grading(),
             tilt_deg=self.skin_tilt_deg,

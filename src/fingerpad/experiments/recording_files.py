@@ -61,12 +61,12 @@ class Recorded:
 
 
 @known_keywords
-def read_recordings(path: Path, stimuli: Stimuli, unit: int | None = None) -> Recorded:
+def read_recordings(path: str | Path, stimuli: Stimuli, unit: int | None = None) -> Recorded:
     r"""Read what an afferent answered to known stimuli.
 
     Parameters
     ----------
-    path : Path
+    path : str or Path
         A CSV file with one row per presentation: the column of `stimuli`, then `dynamic_rate_hz`,
         `static_rate_hz` or both, or `spike_times_ms` (times from the onset, separated by spaces); optionally
         `duration_ms` (of the recording of spikes, by default until the end of the motion) and `fold`
@@ -98,6 +98,7 @@ def read_recordings(path: Path, stimuli: Stimuli, unit: int | None = None) -> Re
     >>> recorded.recordings.stimuli, recorded.recordings.static_rate_hz.tolist()
     (('-1.5', '0'), [61.0, 10.0])
     """
+    path = Path(path)
     if path.suffix in SUFFIXES_OF_NWB:
         lines = _nwb_lines(path, stimuli.column, unit)
     elif unit is None:
@@ -168,6 +169,12 @@ def _spikes(
         trains.append(times[times <= end])
         durations.append(min(end, recorded))
         after += int((times > end).sum())
+    last = max((float(train[-1]) for train in trains if train.size), default=np.inf)
+    if last <= min(durations) / MS_PER_S and sum(map(len, trains)) > len(trains):
+        raise InputError(
+            f"{SPIKES} of {source} must be in ms: the last of all spikes came {last:g} ms after the start of "
+            f"a touch of {min(durations):g} ms, as if they were in s; multiply them by 1000."
+        )
     recordings = SpikeRecordings(
         tuple(stimulus.name for stimulus in presented),
         SpikeTrains.from_lists(trains),

@@ -182,12 +182,12 @@ def along_skin(conditions: Conditions) -> float:
 
 
 @known_keywords
-def read_stimuli(path: Path, **replacing: str | None) -> ListedStimuli:
+def read_stimuli(path: str | Path, **replacing: str | None) -> ListedStimuli:
     r"""Read a list of stimuli, CSV or YAML.
 
     Parameters
     ----------
-    path : Path
+    path : str or Path
         A YAML file with the keys of `StimulusSet`, those of a touch with a list of `stimuli`; or a CSV file
         with one row per stimulus, whose columns are `name` and the same keys, such as `object`,
         `object.width_mm`, `motion.depth_mm`, `place.x_mm`.
@@ -213,6 +213,7 @@ def read_stimuli(path: Path, **replacing: str | None) -> ListedStimuli:
     ...     read_stimuli(path).stimuli["probe"].indenter
     FlatPunch(diameter_mm=1.0, fillet_mm=0.3)
     """
+    path = Path(path)
     given = {key: value for key, value in replacing.items() if value is not None}
     if path.suffix in (".yaml", ".yml"):
         text = read_text(path)

@@ -175,7 +175,7 @@ def touch_dataset(
     Examples
     --------
     >>> import fingerpad as fp
-    >>> skin = fp.indent(fp.Fingertip(), fp.Sphere(287), fp.RampAndHold(depth_mm=0.3))
+    >>> skin = fp.indent(fp.Fingertip(), fp.Sphere(curvature_per_m=287), fp.RampAndHold(depth_mm=0.3))
     >>> touch = touch_dataset(skin)
     >>> touch.contact_pressure_kpa.dims, touch.contact_pressure_kpa.units
     (('time', 'skin_node'), 'kPa')
@@ -243,7 +243,7 @@ def write_touch(
     --------
     >>> from tempfile import TemporaryDirectory
     >>> import fingerpad as fp
-    >>> skin = fp.indent(fp.Fingertip(), fp.Sphere(287), fp.RampAndHold(depth_mm=0.3))
+    >>> skin = fp.indent(fp.Fingertip(), fp.Sphere(curvature_per_m=287), fp.RampAndHold(depth_mm=0.3))
     >>> with TemporaryDirectory() as folder:
     ...     write_touch(Path(folder) / "touch.nc", skin)[0].name
     ...     read_touch(folder).depth_mm.values[-1].item()

@@ -13,6 +13,7 @@ import numpy as np
 
 from fingerpad.core.displayed import Result
 from fingerpad.core.signals import CurrentTraces, HitRates, ResponseMap, SedTraces, SpikeTrains
+from fingerpad.core.units import QUANTITY_UNITS
 from fingerpad.export.dataset import library, part_variable, response_values, touch_dataset, unit_of_name
 from fingerpad.inference.spike_parameters import SPIKE_PARAMETER_UNITS
 from fingerpad.skin.fields import Place, stored_fields
@@ -201,7 +202,7 @@ def traces_dataset(traces: SedTraces) -> xarray.Dataset:
     values = {traces.static_quantity: traces.sed_kpa}
     if traces.dynamic_kpa is not None:
         values[traces.dynamic_quantity] = traces.dynamic_kpa
-    units = {name: "1" if name == "compressive_strain" else "kPa" for name in values}
+    units = {name: QUANTITY_UNITS.get(name) or "1" for name in values}
     return _by_time_and_site(traces.times_ms, values, units)
 
 

@@ -45,7 +45,7 @@ def write_touch_csv(path: Path, skin: SkinResponse) -> tuple[Path, ...]:
     --------
     >>> from tempfile import TemporaryDirectory
     >>> import fingerpad as fp
-    >>> skin = fp.indent(fp.Fingertip(), fp.Sphere(287), fp.RampAndHold(depth_mm=0.3))
+    >>> skin = fp.indent(fp.Fingertip(), fp.Sphere(curvature_per_m=287), fp.RampAndHold(depth_mm=0.3))
     >>> with TemporaryDirectory() as folder:
     ...     (file,) = write_touch_csv(Path(folder) / "touch.csv", skin)
     ...     print(file.read_text().split("contact_force")[0])

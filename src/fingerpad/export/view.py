@@ -122,7 +122,7 @@ def save_view(
     >>> from pathlib import Path
     >>> from tempfile import mkdtemp
     >>> import fingerpad as fp
-    >>> skin = fp.indent(fp.Fingertip(), fp.Sphere(287), fp.RampAndHold(depth_mm=0.5), whole=True)
+    >>> skin = fp.indent(fp.Fingertip(), fp.Sphere(), fp.RampAndHold(depth_mm=0.5), whole=True)
     >>> (picture,) = save_view(Path(mkdtemp()) / "touch.png", fp.touch_dataset(skin), time_ms=50.0)
     >>> picture.name
     'touch.png'

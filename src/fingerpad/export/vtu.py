@@ -68,7 +68,7 @@ def write_vtu_series(path: Path, skin: SkinResponse) -> tuple[Path, ...]:
     >>> from fingerpad.mechanics.press_settings import PressSettings
     >>> coarse = Grading(17.37, 2.0, 2.0, 1.0, 1.0, 5.0, stratum_corneum=1, living_epidermis=1, dermis=1)
     >>> motion, steps = RampAndHold(depth_mm=0.2), PressSettings(ramp_steps=1, hold_steps=1)
-    >>> touch = Touch(Fingertip(), Sphere(287), motion, named_tissues("trial3"), coarse, steps)
+    >>> touch = Touch(Fingertip(), Sphere(), motion, named_tissues("trial3"), coarse, steps)
     >>> with TemporaryDirectory() as folder:
     ...     written = write_vtu_series(Path(folder) / "touch.pvd", touch.solve(whole=True))
     ...     [file.name for file in written]

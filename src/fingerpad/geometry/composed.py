@@ -42,7 +42,8 @@ class Union(Indenter):
     Examples
     --------
     >>> from fingerpad.geometry.indenters import Sphere
-    >>> pair = Union([Sphere(1000.0), Sphere(1000.0)], [(-1.5, 0.0, 0.0), (1.5, 0.0, 0.0)])
+    >>> ball = Sphere(radius_mm=1.0)
+    >>> pair = Union([ball, ball], [(-1.5, 0.0, 0.0), (1.5, 0.0, 0.0)])
     >>> pair.front(np.array([[1.5, 0.0, 0.0], [0.7, 0.0, 0.0]])).round(3).tolist()
     [0.0, -0.4]
     """

@@ -6,11 +6,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fingerpad.core.checks import FloatArray, float_array, instance, positive
+from fingerpad.core.checks import FloatArray, float_array, instance, plausible, positive
 from fingerpad.core.errors import InputError
 from fingerpad.core.keywords import known_keywords
 from fingerpad.core.values import converted
-from fingerpad.geometry.indenters import Indenter
+from fingerpad.geometry.indenters import SIZES_MM, Indenter
 
 BRAILLE_DOT_MM, BRAILLE_HEIGHT_MM, BRAILLE_PITCH_MM, BRAILLE_CELL_MM = 1.44, 0.48, 2.34, 6.2
 """Base diameter and height of a dot, distance of dots in a cell, distance of cells: US Library of Congress,
@@ -53,7 +53,7 @@ class Dots(Indenter):
         at = float_array("at_mm", self.at_mm, 2)
         if not len(at) or at.shape[1] != 2:
             raise InputError(f"at_mm must hold a pair x, z for each dot: got shape {at.shape}.")
-        positive("diameter_mm", self.diameter_mm, "mm")
+        plausible("diameter_mm", self.diameter_mm, "mm", SIZES_MM)
         if positive("height_mm", self.height_mm, "mm") > self.diameter_mm / 2:
             raise InputError(
                 f"height_mm must not exceed half of diameter_mm, {self.diameter_mm / 2:g} mm: got "

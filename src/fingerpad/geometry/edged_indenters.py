@@ -12,12 +12,20 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from fingerpad.core.checks import FloatArray, not_negative, positive
+from fingerpad.core.checks import FloatArray, not_negative, plausible, positive
 from fingerpad.core.errors import InputError
 from fingerpad.core.keywords import OtherName
 from fingerpad.core.values import converted
 from fingerpad.data import protocol
-from fingerpad.geometry.indenters import BESIDE_EDGE_MM, Bar, Indenter, fillet_within, round_front, rounded
+from fingerpad.geometry.indenters import (
+    BESIDE_EDGE_MM,
+    SIZES_MM,
+    Bar,
+    Indenter,
+    fillet_within,
+    round_front,
+    rounded,
+)
 
 
 def _corner(
@@ -143,7 +151,7 @@ class Gap(Indenter):
 
     def __post_init__(self) -> None:
         not_negative("gap_mm", self.gap_mm, "mm")
-        positive("width_mm", self.width_mm, "mm")
+        plausible("width_mm", self.width_mm, "mm", SIZES_MM)
         fillet_within(self.fillet_mm, self.width_mm, "width_mm")
         not_negative("lip_mm", self.lip_mm, "mm")
         widest = self.width_mm - 2 * self.fillet_mm - 2 * self.lip_radius_mm
@@ -249,8 +257,8 @@ class Grating(Indenter):
         ) -> None: ...
 
     def __post_init__(self) -> None:
-        positive("ridge_mm", self.ridge_mm, "mm")
-        positive("groove_mm", self.groove_mm, "mm")
+        plausible("ridge_mm", self.ridge_mm, "mm", SIZES_MM)
+        plausible("groove_mm", self.groove_mm, "mm", SIZES_MM)
         if not_negative("lip_mm", self.lip_mm, "mm") > self.ridge_mm / 2:
             raise InputError(
                 f"lip_mm must not exceed half of ridge_mm, {self.ridge_mm / 2:g} mm: got {self.lip_mm:g} mm."

@@ -259,6 +259,15 @@ class Fingertip(Displayed, Finger):
                 f"Bone and skin layers of {layers:.3f} mm must fit into the outline: "
                 f"only {room.min():.3f} mm are left at x = {x[room.argmin()]:.1f} mm."
             )
+        angle = np.linspace(0.0, 2.0 * np.pi, 73)
+        y = self.spine_y_mm + (self.bone_height_mm + layers) * np.sin(angle)
+        z = (self.bone_width_mm + layers) * np.cos(angle)
+        around = np.stack(np.broadcast_arrays(x[:, None], y, z), axis=-1)
+        if (self.level(around) >= 0.0).any():
+            raise InputError(
+                f"Bone and skin layers of {layers:.3f} mm must fit into the outline: a bone with half axes "
+                f"of {self.bone_width_mm:g} mm across and {self.bone_height_mm:g} mm in height does not."
+            )
 
     @classmethod
     @known_keywords

@@ -10,18 +10,21 @@ direction of the contact force without friction. Edge, bar with a gap and gratin
 from __future__ import annotations
 
 from abc import abstractmethod
-from dataclasses import dataclass, fields, is_dataclass, replace
+from dataclasses import dataclass, field, fields, is_dataclass, replace
 from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
-from fingerpad.core.checks import FloatArray, not_negative, positive
+from fingerpad.core.checks import FloatArray, not_negative, plausible, positive
 from fingerpad.core.errors import InputError
 from fingerpad.core.keywords import KnownKeywords, OtherName
 from fingerpad.core.units import curvature_per_m, radius_mm
 from fingerpad.core.values import converted
 from fingerpad.data import protocol
 from fingerpad.geometry.probing import mirrored, traced_front
+
+SIZES_MM = (0.01, 400.0)
+"""Smallest and largest width or diameter of a body that is pressed into a fingertip. [mm]"""
 
 BESIDE_EDGE_MM = 0.4
 """Distance from the wall of an edge within which the skin bends sharply. [mm]"""
@@ -239,7 +242,7 @@ class Cylinder(Indenter):
         def __init__(self, diameter_mm: float = ..., *, radius_mm: float = ...) -> None: ...
 
     def __post_init__(self) -> None:
-        positive("diameter_mm", self.diameter_mm, "mm")
+        plausible("diameter_mm", self.diameter_mm, "mm", SIZES_MM)
 
     @property
     def half_width_mm(self) -> float:
@@ -286,7 +289,7 @@ class Line(Indenter):
     diameter_mm: float = protocol.LINE_DIAMETER.value
 
     def __post_init__(self) -> None:
-        positive("diameter_mm", self.diameter_mm, "mm")
+        plausible("diameter_mm", self.diameter_mm, "mm", SIZES_MM)
 
     @property
     def grips(self) -> bool:
@@ -314,11 +317,11 @@ class Line(Indenter):
 @dataclass(frozen=True)
 @converted
 class Sphere(Indenter):
-    """Sphere given by its curvature, as in the psychophysics literature.
+    """Sphere given by its curvature, as in the psychophysics literature, or by its radius; by name only.
 
     Parameters
     ----------
-    curvature_per_m : float
+    curvature_per_m : float, keyword
         1/radius; the paper writes "RC ... 1/m" and means this. [1/m]
     radius_mm, diameter_mm : float, keywords
         Instead of the curvature. [mm]
@@ -330,7 +333,8 @@ class Sphere(Indenter):
     """
 
     symmetry_deg = None
-    curvature_per_m: float = protocol.STANDARD_CURVATURE.value
+    # A bare number could be either: 3.5 mm of radius is 286 1/m.
+    curvature_per_m: float = field(default=protocol.STANDARD_CURVATURE.value, kw_only=True)
     radius_mm = OtherName(
         lambda radius_mm: {"curvature_per_m": curvature_per_m(positive("radius_mm", radius_mm, "mm"))},
         lambda body: radius_mm(body.curvature_per_m),
@@ -345,11 +349,16 @@ class Sphere(Indenter):
     if TYPE_CHECKING:
 
         def __init__(
-            self, curvature_per_m: float = ..., *, radius_mm: float = ..., diameter_mm: float = ...
+            self, *, curvature_per_m: float = ..., radius_mm: float = ..., diameter_mm: float = ...
         ) -> None: ...
 
     def __post_init__(self) -> None:
-        positive("curvature_per_m", self.curvature_per_m, "1/m")
+        radius = radius_mm(positive("curvature_per_m", self.curvature_per_m, "1/m"))
+        if not SIZES_MM[0] <= 2.0 * radius <= SIZES_MM[1]:
+            raise InputError(
+                f"A sphere of {self.curvature_per_m:g} 1/m has a radius of {radius:.3g} mm, outside "
+                f"{SIZES_MM[0] / 2:g} to {SIZES_MM[1] / 2:g} mm: write radius_mm if you meant a radius."
+            )
 
     def __repr__(self) -> str:
         # By curvature or by radius: one of the two is usually a short number.
@@ -407,7 +416,7 @@ class Bar(Indenter):
         ) -> None: ...
 
     def __post_init__(self) -> None:
-        positive("width_mm", self.width_mm, "mm")
+        plausible("width_mm", self.width_mm, "mm", SIZES_MM)
         fillet_within(self.fillet_mm, self.width_mm, "width_mm")
 
     @property
@@ -479,7 +488,7 @@ class FlatPunch(Indenter):
         ) -> None: ...
 
     def __post_init__(self) -> None:
-        positive("diameter_mm", self.diameter_mm, "mm")
+        plausible("diameter_mm", self.diameter_mm, "mm", SIZES_MM)
         fillet_within(self.fillet_mm, self.diameter_mm, "diameter_mm")
 
     @property

@@ -8,8 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from fingerpad.core.checks import FloatArray, not_negative, positive, whole
-from fingerpad.core.errors import InputError
+from fingerpad.core.checks import FloatArray, not_negative, plausible, positive, whole
 from fingerpad.core.keywords import KnownKeywords
 from fingerpad.core.phases import Phase, ramp_and_hold_phases
 from fingerpad.core.values import converted
@@ -17,6 +16,10 @@ from fingerpad.data import protocol
 
 LONGEST_MS = 1e13
 """Longest ramp or hold; a quasi-static ramp of a validation takes 1e12 ms. [ms]"""
+
+PLAUSIBLE = {"depth_mm": (1e-3, 20.0), "force_mn": (1.0, 1e5), "ramp_ms": (0.1, LONGEST_MS)}
+PLAUSIBLE["hold_ms"] = PLAUSIBLE["ramp_ms"]
+"""Smallest and largest peaks and times of a touch: an afferent answers to 1 mN, and pads are 10 mm thick."""
 
 MOTION_UNITS = {"depth_mm": "mm", "force_mn": "mN", "ramp_ms": "ms", "hold_ms": "ms"}
 """Units of the parameters of motions."""
@@ -182,9 +185,7 @@ class _OneRamp(Motion):
     def __post_init__(self) -> None:
         for name, unit in MOTION_UNITS.items():
             if hasattr(self, name):
-                size = positive(name, getattr(self, name), unit)
-                if unit == "ms" and size > LONGEST_MS:
-                    raise InputError(f"{name} must be at most {LONGEST_MS:g} ms: got {size:g}.")
+                plausible(name, getattr(self, name), unit, PLAUSIBLE[name])
 
     @property
     def end_ms(self) -> float:

@@ -9,12 +9,12 @@ from itertools import groupby, pairwise
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from fingerpad.core.checks import FloatArray, float_array, increasing
+from fingerpad.core.checks import FloatArray, float_array, increasing, plausible
 from fingerpad.core.errors import InputError
 from fingerpad.core.phases import HOLD, RAMP, RELEASE, VIBRATION, Phase
 from fingerpad.core.values import converted
 from fingerpad.data import protocol
-from fingerpad.geometry.motion import STILL, Cycles, Motion, Pose, hold_ends_ms
+from fingerpad.geometry.motion import MOTION_UNITS, PLAUSIBLE, STILL, Cycles, Motion, Pose, hold_ends_ms
 
 POSE_COLUMNS = ("x_mm", "z_mm", "tilt_deg", "spin_deg")
 """Columns of a trajectory that say where the indenter stands, beside its depth or force."""
@@ -166,6 +166,8 @@ class Trajectory(Motion):
         aside = name == "depth_mm" and any(getattr(self, column) for column in POSE_COLUMNS)
         if values.max() <= 0.0 and not aside:
             raise InputError(f"{name} must be above 0 at some time: the indenter would never press.")
+        if values.max() > 0.0 and not aside:
+            plausible(f"the largest {name}", values.max(), MOTION_UNITS[name], PLAUSIBLE[name])
         object.__setattr__(self, "times_ms", tuple(times.tolist()))
         object.__setattr__(self, "phases", tuple(self.phases) or self._phases_of_course())
         for phase in self.phases:

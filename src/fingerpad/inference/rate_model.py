@@ -16,6 +16,7 @@ import numpy as np
 
 from fingerpad.core.checks import FloatArray, IntArray, not_negative
 from fingerpad.core.errors import InputError
+from fingerpad.core.keywords import KnownKeywords
 from fingerpad.core.signals import SedTraces
 from fingerpad.core.threads import in_blocks
 from fingerpad.data import neuron
@@ -112,7 +113,7 @@ def checked_rows(model: RateModel, points: FloatArray) -> FloatArray:
 
 
 @dataclass(frozen=True)
-class AfferentModel:
+class AfferentModel(metaclass=KnownKeywords):
     """The paper's model of one afferent in its six parameters.
 
     Parameters

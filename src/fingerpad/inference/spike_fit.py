@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike
 from fingerpad.core.checks import FloatArray, whole
 from fingerpad.core.displayed import Result
 from fingerpad.core.errors import ConvergenceError, InputError
+from fingerpad.core.keywords import known_keywords
 from fingerpad.inference.spike_likelihood import SpikeLikelihood
 from fingerpad.inference.spike_parameters import (
     N_PARAMETERS,
@@ -77,6 +78,7 @@ class SpikeFit(Result):
         return np.sqrt(np.diag(self.covariance))
 
 
+@known_keywords
 def fit_spikes(recorded: SpikeLikelihood, start: ArrayLike, most_steps: int = 100) -> SpikeFit:
     """Fit parameters to recorded spikes by maximum likelihood.
 

@@ -29,6 +29,7 @@ from scipy.stats import kstest
 
 from fingerpad.core.checks import FloatArray, float_array, instance, positive
 from fingerpad.core.errors import InputError
+from fingerpad.core.keywords import known_keywords
 from fingerpad.core.signals import SpikeTrains
 from fingerpad.core.threads import in_blocks
 from fingerpad.data import neuron
@@ -236,6 +237,7 @@ class TimeRescaling:
     p_value: float
 
 
+@known_keywords
 def time_rescaling(recorded: SpikeLikelihood, parameters: ArrayLike) -> TimeRescaling:
     """Test a model on spike trains.
 

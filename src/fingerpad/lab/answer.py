@@ -12,6 +12,7 @@ from threadpoolctl import ThreadpoolController
 
 from fingerpad.core.checks import FloatArray
 from fingerpad.core.errors import InputError
+from fingerpad.core.keywords import known_keywords
 from fingerpad.core.signals import STORED_ENERGY, ResponseMap, SedTraces
 from fingerpad.data import psychophysics
 from fingerpad.experiments.descriptions.reduction import DescribedReduction
@@ -264,6 +265,7 @@ class Comparison:
     summed: float
 
 
+@known_keywords
 def compared(one: Answer, other: Answer, seed: int = 1) -> Comparison:
     """Compare two touches by the spikes that each afferent fires.
 

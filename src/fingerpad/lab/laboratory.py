@@ -20,6 +20,7 @@ import numpy as np
 from fingerpad.core.engine import Engine
 from fingerpad.core.errors import InputError
 from fingerpad.core.files import path_of, read_text
+from fingerpad.core.keywords import KnownKeywords
 from fingerpad.core.plain_yaml import read_yaml
 from fingerpad.core.progress import Progress
 from fingerpad.experiments.descriptions.reduction import (
@@ -57,7 +58,7 @@ class Making:
     total: int = 0
 
 
-class Laboratory:
+class Laboratory(metaclass=KnownKeywords):
     """Objects to press, and what was made of them so far.
 
     Parameters

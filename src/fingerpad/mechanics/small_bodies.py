@@ -77,7 +77,7 @@ def sag_mm(indenter: Indenter, finest_mm: float) -> float:
     Examples
     --------
     >>> from fingerpad.geometry.indenters import Bar, Sphere
-    >>> sag_mm(Sphere(4000.0), finest_mm=0.08), sag_mm(Bar(3.0, 0.05), finest_mm=0.05)
+    >>> sag_mm(Sphere(curvature_per_m=4000.0), finest_mm=0.08), sag_mm(Bar(3.0, 0.05), finest_mm=0.05)
     (0.01, 0.025)
     """
     narrowest_mm = min(indenter.half_width_mm, indenter.narrowest_mm / 2)

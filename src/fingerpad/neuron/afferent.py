@@ -9,11 +9,12 @@ from typing import ClassVar, Protocol
 import numpy as np
 from numpy.typing import ArrayLike
 
-from fingerpad.core.checks import FloatArray, float_array, not_negative
+from fingerpad.core.checks import FloatArray, float_array, not_negative, one_of
 from fingerpad.core.errors import InputError, shown
 from fingerpad.core.keywords import KnownKeywords
 from fingerpad.core.signals import INTERVAL, STORED_ENERGY, SedTraces, SpikeTrains
 from fingerpad.core.threads import in_blocks
+from fingerpad.core.units import QUANTITY_UNITS
 from fingerpad.core.values import converted
 from fingerpad.data import neuron
 from fingerpad.neuron.lif import LeakyIntegrateAndFire
@@ -85,6 +86,12 @@ def check_quantities(afferent: Follows, traces: Follows) -> None:
             )
 
 
+def check_known_quantities(afferent: Follows) -> None:
+    """Raise `InputError` if an afferent follows a quantity without a unit in `QUANTITY_UNITS`."""
+    for name in ("dynamic_quantity", "static_quantity"):
+        one_of(name, getattr(afferent, name), tuple(QUANTITY_UNITS))
+
+
 _NEEDED = ("dynamic_quantity", "static_quantity", "spikes")
 
 
@@ -124,7 +131,7 @@ class Afferent(metaclass=KnownKeywords):
     Raises
     ------
     InputError
-        If a number is not finite, or one of the membrane's four is not positive.
+        If a number is not finite, one of the membrane's four is not positive, or a quantity is unknown.
 
     Examples
     --------
@@ -151,6 +158,7 @@ class Afferent(metaclass=KnownKeywords):
     initial_mv: float | None = None
 
     def __post_init__(self) -> None:
+        check_known_quantities(self)
         # Both stages check their parameters when they are made.
         self.transduction, self.membrane  # noqa: B018
 

@@ -24,7 +24,7 @@ from fingerpad.core.keywords import KnownKeywords
 from fingerpad.core.signals import COUNT, INTERVAL, STORED_ENERGY, CurrentTraces, SedTraces, SpikeTrains
 from fingerpad.core.values import converted
 from fingerpad.data import afferents
-from fingerpad.neuron.afferent import Afferent, check_quantities, spikes_where
+from fingerpad.neuron.afferent import Afferent, check_known_quantities, check_quantities, spikes_where
 from fingerpad.neuron.band_pass import BandPass, resampled, smoothed_rate
 from fingerpad.neuron.lif import LeakyIntegrateAndFire
 from fingerpad.neuron.transduction import Drive
@@ -364,6 +364,7 @@ class OwnAfferent(metaclass=KnownKeywords):
         if self.membrane is not None:
             instance("membrane", self.membrane, LeakyIntegrateAndFire)
         one_of("rate_measure", self.rate_measure, (INTERVAL, COUNT))
+        check_known_quantities(self)
 
     def spikes(self, sed: SedTraces) -> SpikeTrains:
         """Spikes at every site."""

@@ -15,6 +15,7 @@ from scipy.stats import rankdata
 
 from fingerpad.core.checks import FloatArray, float_array, increasing, not_negative, positive
 from fingerpad.core.errors import InputError
+from fingerpad.core.keywords import known_keywords
 from fingerpad.core.signals import SpikeTrains
 from fingerpad.core.units import MS_PER_S
 
@@ -55,6 +56,7 @@ def recruitment_rank(latency_ms: ArrayLike) -> FloatArray:
     return rank
 
 
+@known_keywords
 def recruited(latency_ms: ArrayLike, times_ms: ArrayLike) -> np.ndarray:
     """Count the afferents that have fired their first spike by each time.
 
@@ -141,6 +143,7 @@ class OrderChange:
     swapped: float
 
 
+@known_keywords
 def order_change(latency_ms: ArrayLike, other_latency_ms: ArrayLike) -> OrderChange:
     """Compare the order of recruitment under two stimuli.
 
@@ -277,6 +280,7 @@ class PopulationRate:
         return counts / sizes[:, np.newaxis]
 
 
+@known_keywords
 def population_rate(
     spikes: SpikeTrains, edges_ms: ArrayLike, groups: ArrayLike | None = None, smoothing_ms: float = 0.0
 ) -> PopulationRate:

@@ -9,9 +9,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import ArrayLike
 
-from fingerpad.core.checks import FloatArray, finite
-from fingerpad.core.errors import InputError
-from fingerpad.core.signals import COUNT, INTERVAL, SpikeTrains
+from fingerpad.core.checks import FloatArray
+from fingerpad.core.signals import COUNT, INTERVAL, SpikeTrains, window_bounds
 from fingerpad.core.units import MS_PER_S
 
 
@@ -76,14 +75,6 @@ def window_rates_hz(times_ms: FloatArray, offsets: np.ndarray, start: float, end
         if count > 0:
             rates[train] = MS_PER_S * (count / total)
     return rates
-
-
-def window_bounds(window_ms: tuple[float, ...]) -> tuple[float, float]:
-    """Return start and end of a window, or raise `InputError`."""
-    bounds = [finite("window_ms", bound, "ms") for bound in window_ms]
-    if len(bounds) != 2 or bounds[1] <= bounds[0]:
-        raise InputError(f"window_ms must be a start and a later end: got {window_ms!r}.")
-    return bounds[0], bounds[1]
 
 
 RATE_OF: Mapping[str, Callable[[SpikeTrains, tuple[float, ...]], FloatArray]] = MappingProxyType(

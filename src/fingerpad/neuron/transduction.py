@@ -23,6 +23,7 @@ from scipy.interpolate import PchipInterpolator, PPoly
 
 from fingerpad.core.checks import FloatArray, finite, float_array, positive, whole
 from fingerpad.core.errors import InputError
+from fingerpad.core.keywords import known_keywords
 from fingerpad.core.phases import Phase
 from fingerpad.core.signals import STORED_ENERGY, CurrentTraces, SedTraces
 from fingerpad.core.values import converted
@@ -185,6 +186,7 @@ def _largest_sum(lengths, dynamic, static, of_slope, of_value):  # type: ignore[
     return found
 
 
+@known_keywords
 def drive(
     sed: SedTraces,
     *,

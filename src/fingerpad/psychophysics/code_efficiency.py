@@ -16,6 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fingerpad.core.checks import FloatArray, one_of
+from fingerpad.core.keywords import known_keywords
 from fingerpad.psychophysics.encoding import distance, gradient_sum
 from fingerpad.psychophysics.ideal_observer import (
     Discriminability,
@@ -57,6 +58,7 @@ class CodeEfficiency:
     efficiency_error: float
 
 
+@known_keywords
 def noisy_presentations(
     table: FloatArray, noise_sigma: float, seed: int, session: int = 0
 ) -> list[Presentation]:
@@ -106,6 +108,7 @@ def code_statistic(
     return lambda responses: distance(responses, memory)
 
 
+@known_keywords
 def code_efficiency(shown: Presentation, statistic: Statistic) -> CodeEfficiency:
     """Compare a code with the ideal observer.
 

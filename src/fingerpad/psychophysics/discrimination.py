@@ -24,6 +24,7 @@ from numpy.typing import ArrayLike
 
 from fingerpad.core.checks import FloatArray, IntArray, finite, float_array, not_negative, one_of, whole
 from fingerpad.core.errors import InputError
+from fingerpad.core.keywords import known_keywords
 from fingerpad.core.random_streams import Purpose, normals, uniforms
 from fingerpad.core.signals import HitRates
 from fingerpad.core.values import converted
@@ -124,6 +125,7 @@ class Experiment:
         return self.distributions, self.presentations
 
 
+@known_keywords
 def discriminate_gradient_sum(
     responses: ArrayLike,
     neighbours: np.ndarray,
@@ -421,6 +423,8 @@ def checked_responses(responses: ArrayLike, silent_value: float | None = None) -
     except (TypeError, ValueError) as error:
         raise InputError(f"responses must be numbers: got {type(responses).__name__}.") from error
     silent = np.isnan(table)
+    if silent_value is not None:
+        finite("silent_value", silent_value)
     if table.size and (silent | (table == 0.0)).all():
         raise InputError(
             "responses must not all be silent: the population stays silent under every sphere, so there is "
@@ -432,7 +436,7 @@ def checked_responses(responses: ArrayLike, silent_value: float | None = None) -
                 f"responses must be finite: {np.count_nonzero(silent)} are NaN, as of silent receptors; "
                 "give silent_value to replace them."
             )
-        table[silent] = finite("silent_value", silent_value)
+        table[silent] = silent_value
     table = float_array("responses", table, 2)
     if table.shape[0] < 2 or table.shape[1] == 0:
         raise InputError(

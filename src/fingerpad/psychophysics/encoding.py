@@ -15,6 +15,7 @@ from scipy.spatial import Delaunay, QhullError, cKDTree
 
 from fingerpad.core.checks import FloatArray, float_array, one_of, positive
 from fingerpad.core.errors import InputError
+from fingerpad.core.keywords import known_keywords
 from fingerpad.core.layouts import PATTERNS
 from fingerpad.core.signals import ResponseMap
 
@@ -32,6 +33,7 @@ _LONGEST_PITCHES = 3.0
 _LATTICE_NEIGHBOURS = {"rectangular": 8, "hexagonal": 6}
 
 
+@known_keywords
 def neighbour_pairs(positions_mm: ArrayLike, pitch_mm: float, count: int = 8) -> np.ndarray:
     """Find the pairs of neighbours in a lattice.
 
@@ -204,6 +206,7 @@ def taking_part(responses: ArrayLike, neighbours: np.ndarray) -> tuple[FloatArra
     return np.where(silent, 0.0, table), pairs[~silent[pairs].any(axis=1)]
 
 
+@known_keywords
 def gradient_sum(values: ArrayLike, neighbours: np.ndarray) -> FloatArray:
     """Gradient Sum: sum of the differences between neighbours, steps (b) and (c) of Figure 3.
 
@@ -225,7 +228,7 @@ def gradient_sum(values: ArrayLike, neighbours: np.ndarray) -> FloatArray:
     Raises
     ------
     InputError
-        If a pair contains an index outside the population.
+        If there is no pair, one contains an index outside the population, or a value is not finite.
 
     Examples
     --------
@@ -238,7 +241,10 @@ def gradient_sum(values: ArrayLike, neighbours: np.ndarray) -> FloatArray:
     # Receptors first: whole rows are gathered and subtracted, which is several times faster.
     by_receptor = np.ascontiguousarray(np.moveaxis(responses, -1, 0))
     differences = np.abs(by_receptor[pairs[:, 0]] - by_receptor[pairs[:, 1]])
-    return 2.0 * differences.sum(axis=0)
+    sums = 2.0 * differences.sum(axis=0)
+    if not np.isfinite(sums).all():
+        float_array("values", responses, None)  # says which is not finite
+    return sums
 
 
 def distance(values_a: ArrayLike, values_b: ArrayLike, norm: str = "city-block") -> FloatArray:
@@ -295,7 +301,7 @@ def check_neighbours(neighbours: np.ndarray, n_receptors: int) -> np.ndarray:
     Raises
     ------
     InputError
-        If they are not pairs of indices within 0 ... n_receptors - 1.
+        If they are not one pair or more of two indices within 0 ... n_receptors - 1.
 
     Examples
     --------
@@ -303,12 +309,16 @@ def check_neighbours(neighbours: np.ndarray, n_receptors: int) -> np.ndarray:
     [[0, 1]]
     """
     pairs = np.asarray(neighbours)
+    if not pairs.size:
+        raise InputError("neighbours must hold at least one pair of receptors: got none.")
     if pairs.ndim != 2 or pairs.shape[1] != 2 or not np.issubdtype(pairs.dtype, np.integer):
         raise InputError(
             f"neighbours must be rows of two receptor indices: got {pairs.dtype} of shape {pairs.shape}."
         )
-    if pairs.size and (pairs.min() < 0 or pairs.max() >= n_receptors):
+    if pairs.min() < 0 or pairs.max() >= n_receptors:
         raise InputError(
             f"neighbours must be within 0 ... {n_receptors - 1}: got {pairs.min()} ... {pairs.max()}."
         )
+    if (pairs[:, 0] == pairs[:, 1]).any():
+        raise InputError("neighbours must be pairs of two receptors: got a receptor with itself.")
     return pairs

@@ -25,6 +25,7 @@ from scipy.stats import rankdata
 
 from fingerpad.core.checks import FloatArray, float_array, not_negative, whole
 from fingerpad.core.errors import InputError
+from fingerpad.core.keywords import known_keywords
 from fingerpad.psychophysics.noise import checked_noise
 from fingerpad.psychophysics.noisy_responses import session_trials
 from fingerpad.psychophysics.response_models import ResponseModel
@@ -55,6 +56,7 @@ class Discriminability:
     d_prime_error: float
 
 
+@known_keywords
 def discriminability(standard: ArrayLike, comparison: ArrayLike) -> Discriminability:
     """Compare the values of an observer's statistic for two stimuli, all pairs.
 
@@ -131,6 +133,7 @@ class Presentation:
         return discriminability(sign * first, sign * second)
 
 
+@known_keywords
 def present(
     standard: ResponseModel, comparison: ResponseModel, seed: int, n_trials: int = 4000, session: int = 0
 ) -> Presentation:
@@ -180,6 +183,7 @@ def _log_ratio(standard: ResponseModel, comparison: ResponseModel, responses: Fl
     return comparison.log_likelihood(responses) - standard.log_likelihood(responses)
 
 
+@known_keywords
 def efficiency(code: Discriminability, ideal: Discriminability) -> tuple[float, float]:
     """Return (d'_code / d'_ideal)^2 and its standard error.
 

@@ -23,6 +23,7 @@ from scipy.special import ndtr, ndtri
 
 from fingerpad.core.checks import finite, not_negative, whole
 from fingerpad.core.errors import InputError
+from fingerpad.core.keywords import known_keywords
 
 LARGEST_D_PRIME = 20.0
 """Above it the proportion correct is 1 in double precision."""
@@ -196,6 +197,7 @@ TASKS: dict[str, Callable[[float], float]] = {
 """Proportion correct of d', by the name of the task."""
 
 
+@known_keywords
 def d_prime_of_proportion(proportion_correct: float, task: Callable[[float], float] = forced_choice) -> float:
     """Return the d' for which a task has a proportion correct.
 

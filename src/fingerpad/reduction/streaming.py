@@ -19,6 +19,7 @@ from fingerpad.core.checks import FloatArray, finite, float_array, instance, not
 from fingerpad.core.displayed import Result
 from fingerpad.core.errors import InputError
 from fingerpad.core.keywords import KnownKeywords
+from fingerpad.core.units import with_unit
 from fingerpad.reduction.interpolation import weighted
 from fingerpad.reduction.model import GRID_POINTS, ReducedModel
 from fingerpad.reduction.relaxation import amplitudes, depth_scale, filter_step, lost
@@ -75,7 +76,8 @@ class ReducedSample(Result):
 
     def __repr__(self) -> str:
         highest = (
-            f"{name} at most {values.max(initial=0.0):.3g} kPa" for name, values in self.fields.items()
+            with_unit(f"{name} at most {values.max(initial=0.0):.3g}", name, " {}")
+            for name, values in self.fields.items()
         )
         return (
             f"ReducedSample({self.time_ms:g} ms, {self.depth_mm:.3g} mm, {self.force_mn:.3g} ± "

@@ -17,6 +17,7 @@ from fingerpad.core.checks import FloatArray, one_of
 from fingerpad.core.displayed import Displayed
 from fingerpad.core.errors import InputError
 from fingerpad.core.signals import COUNT, CurrentTraces, HitRates, ResponseMap, SedTraces, SpikeTrains
+from fingerpad.core.units import with_unit
 from fingerpad.experiments.discrimination.analysis import TaskResult
 from fingerpad.experiments.fit.results import FitResult
 from fingerpad.report.discrimination_task_figures import draw_curves_of_measure, main_decoding
@@ -63,8 +64,7 @@ QUANTITY_LABELS = {"stored": "strain energy density", "work": "work of the stres
 
 def _label(quantity: str) -> str:
     """Name a quantity at an end organ in words, with its unit."""
-    unit = "" if quantity == "compressive_strain" else " [kPa]"
-    return QUANTITY_LABELS.get(quantity, quantity.replace("_", " ")) + unit
+    return with_unit(QUANTITY_LABELS.get(quantity, quantity.replace("_", " ")), quantity)
 
 
 def draw_force(axes: Axes, skin: SkinResponse) -> None:
@@ -309,7 +309,7 @@ IN_NOTEBOOKS = {"SkinResponse": "section"}
 def plot(result: Displayed, axes: Axes | None = None, what: str | None = None, **options: Any) -> Axes:
     """Draw a result; see `Displayed.plot`."""
     drawings = DRAWINGS[type(result).__name__]
-    name = one_of("what", what or next(iter(drawings)), tuple(drawings))
+    name = one_of("what", next(iter(drawings)) if what is None else what, tuple(drawings))
     draw = drawings[name]
     for option in options.keys() - list(signature(draw).parameters)[2:]:
         allowed = ", ".join(list(signature(draw).parameters)[2:]) or "none"

@@ -11,6 +11,7 @@ from matplotlib.figure import Figure
 
 from fingerpad.core.checks import FloatArray
 from fingerpad.core.errors import InputError
+from fingerpad.core.keywords import known_keywords
 from fingerpad.core.signals import ResponseMap
 from fingerpad.report.style import BLACK, BLUE, GREEN, GREY, ORANGE, new_figure
 
@@ -28,6 +29,7 @@ ROW_DRAWN = 0.85
 """Length of the mark of a spike, over the height of the row of its afferent."""
 
 
+@known_keywords
 def draw_mixed_responses(touches: Mapping[str, Mapping[str, ResponseMap]]) -> Figure:
     """Draw the responses to touches, one per row: all spikes over time, and where the afferents lie.
 

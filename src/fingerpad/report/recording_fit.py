@@ -9,6 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from fingerpad.core.checks import FloatArray
+from fingerpad.core.keywords import known_keywords
 from fingerpad.core.signals import STORED_ENERGY
 from fingerpad.experiments.fit.results import FitResult, PhaseRates, SpikeFitSummary
 from fingerpad.experiments.fit.session import FitFile
@@ -183,6 +184,7 @@ def _chapters(found: FitResult) -> list[Chapter]:
     return [Chapter(title, parts) for title, parts in chapters.items() if parts]
 
 
+@known_keywords
 def write_fit_page(results: FitFile, folder: Path) -> Path:
     """Write the page of a fit, `fit.html`, and its figures.
 

@@ -17,6 +17,7 @@ from matplotlib.text import Text
 
 from fingerpad.core.checks import FloatArray
 from fingerpad.core.files import path_of, write_atomically
+from fingerpad.core.keywords import known_keywords
 
 RESOLUTION_DPI = 150
 COLUMN_IN = 6.4
@@ -91,6 +92,7 @@ def png(draw: Callable[..., Figure], *parts: Any) -> bytes:
     return buffer.getvalue()
 
 
+@known_keywords
 def write_png(draw: Callable[[Any], Figure], section: Any, path: Path) -> Path:
     """Write what `draw` makes of a section of the results, or of results of your own, as PNG.
 

@@ -50,7 +50,7 @@ class Caveat:
     >>> from fingerpad.geometry.indenters import Sphere
     >>> from fingerpad.geometry.motion import RampAndHold
     >>> from fingerpad.skin.indentation import indent
-    >>> indent(Fingertip(), Sphere(287), RampAndHold(0.5)).caveats
+    >>> indent(Fingertip(), Sphere(curvature_per_m=287), RampAndHold(0.5)).caveats
     ()
     """
 

@@ -77,7 +77,8 @@ def value_digest(value: Any) -> str:
     Examples
     --------
     >>> import fingerpad as fp
-    >>> value_digest(fp.Sphere(287)) == value_digest(fp.Sphere(287.0)) != value_digest(fp.Sphere(288))
+    >>> one, same, other = (value_digest(fp.Cylinder(size)) for size in (3, 3.0, 4))
+    >>> one == same != other
     True
     """
     return hashlib.sha256(json.dumps(_plain(value), sort_keys=True).encode()).hexdigest()[:16]

@@ -12,8 +12,7 @@ from typing import Any, TypeVar, get_args
 
 from pydantic import BaseModel, ValidationError
 
-from fingerpad.core.errors import InputError
-from fingerpad.core.keywords import did_you_mean, got
+from fingerpad.core.errors import InputError, did_you_mean, got
 from fingerpad.core.plain_yaml import line_at
 from fingerpad.experiments.descriptions.signatures import LateKind
 from fingerpad.experiments.descriptions.values import Part, kind_of

@@ -9,8 +9,7 @@ from typing import Annotated
 
 from pydantic import Discriminator, Strict, Tag
 
-from fingerpad.core.errors import InputError
-from fingerpad.core.keywords import closest
+from fingerpad.core.errors import InputError, closest
 from fingerpad.data import protocol
 from fingerpad.experiments.conditions import Conditions
 from fingerpad.experiments.descriptions.pressing import RAMP_AND_HOLD

@@ -17,6 +17,7 @@ from fingerpad.core.errors import InputError
 from fingerpad.core.files import path_of, read_text
 from fingerpad.core.keywords import known_keywords
 from fingerpad.core.plain_yaml import read_yaml
+from fingerpad.core.signals import window_bounds
 from fingerpad.experiments.descriptions.parts import DEFAULT, AfferentChoice, PopulationSettings, file_of
 from fingerpad.experiments.descriptions.population import population_of
 from fingerpad.experiments.descriptions.pressing import finger_of, named_files
@@ -39,7 +40,6 @@ from fingerpad.neuron.afferent import Afferent
 from fingerpad.neuron.mixed_population import MixedPopulation
 from fingerpad.neuron.population import Population
 from fingerpad.neuron.rate_windows import rate_windows_ms
-from fingerpad.neuron.spikes import window_bounds
 from fingerpad.skin.indentation import Touch
 
 OUTPUTS = (

@@ -13,6 +13,7 @@ from scipy.special import ndtr, ndtri
 from fingerpad.core.checks import FloatArray, IntArray
 from fingerpad.core.displayed import Result
 from fingerpad.core.errors import InputError
+from fingerpad.core.keywords import KnownKeywords, known_keywords
 from fingerpad.core.results import Matrix, Vector, result_class
 from fingerpad.core.signals import ResponseMap, Skin
 from fingerpad.experiments.descriptions.population import population_neighbours
@@ -299,7 +300,7 @@ class TaskResult(Result):
 
 
 @dataclass(frozen=True)
-class PreparedTask:
+class PreparedTask(metaclass=KnownKeywords):
     """A task with its stimuli and its population.
 
     Parameters
@@ -404,6 +405,7 @@ class PreparedTask:
         ]
 
 
+@known_keywords
 def analyse(prepared: PreparedTask, skins: Mapping[str, Skin]) -> TaskResult:
     """Compute the responses to indented stimuli, and decode them by every code and measure.
 

@@ -8,9 +8,9 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
-from fingerpad.core.errors import InputError
+from fingerpad.core.errors import InputError, closest
 from fingerpad.core.files import path_of, read_text
-from fingerpad.core.keywords import closest, known_keywords
+from fingerpad.core.keywords import known_keywords
 from fingerpad.core.plain_yaml import read_yaml
 from fingerpad.experiments.descriptions.parts import file_of
 from fingerpad.experiments.descriptions.pressing import named_files

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from fingerpad.core.errors import InputError
+from fingerpad.core.keywords import known_keywords
 from fingerpad.experiments.conditions import Conditions
 from fingerpad.experiments.descriptions.population import population_of
 from fingerpad.experiments.descriptions.stimuli import NamedStimulus, named_stimuli, touches_of
@@ -16,6 +17,7 @@ from fingerpad.neuron.population import Population
 from fingerpad.skin.indentation import Touch
 
 
+@known_keywords
 def task_stimuli(task: DiscriminationTask, beside: Path = Path()) -> tuple[NamedStimulus, ...]:
     """List the stimuli of a task, the standard first.
 
@@ -66,6 +68,7 @@ def stimulus_index(stimuli: Sequence[NamedStimulus], place: float | str, key: st
     raise InputError(f"{key} must be one of the stimuli, {names}: got {place!r}.")
 
 
+@known_keywords
 def task_population(
     task: DiscriminationTask, beside: Path = Path(), finger: Finger | None = None
 ) -> Population | MixedPopulation:

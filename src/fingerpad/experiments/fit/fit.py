@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 
 from fingerpad.core.checks import FloatArray, IntArray, whole
 from fingerpad.core.errors import InputError
+from fingerpad.core.keywords import known_keywords
 from fingerpad.core.signals import SedTraces
 from fingerpad.data import protocol
 from fingerpad.experiments.fit.methods import Prepared, prepare
@@ -43,6 +44,7 @@ def _part(name: str) -> Callable[..., Any]:
     return found
 
 
+@known_keywords
 def fit_recordings(
     sed: SedTraces | Sequence[SedTraces],
     recordings: RateRecordings | SpikeRecordings,

@@ -13,6 +13,7 @@ import numpy as np
 from fingerpad.core.checks import IntArray, one_of
 from fingerpad.core.engine import Engine, engine_of
 from fingerpad.core.errors import InputError
+from fingerpad.core.keywords import KnownKeywords, known_keywords
 from fingerpad.core.progress import Progress
 from fingerpad.core.results import result_class
 from fingerpad.data.observations import bar_firing_rates
@@ -65,7 +66,7 @@ class FitFile:
 
 
 @dataclass(frozen=True)
-class FitRequest:
+class FitRequest(metaclass=KnownKeywords):
     """A fit to recordings with all that it takes to run it.
 
     Parameters
@@ -184,6 +185,7 @@ class FitRequest:
         return self.dynamic_quantity or default, self.static_quantity or default
 
 
+@known_keywords
 def run_fit(
     request: FitRequest,
     progress: Progress | None = None,

@@ -7,8 +7,11 @@ from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 
+import numpy as np
+
 from fingerpad.core.checks import FloatArray, finite, float_array, not_negative, one_of, positive
 from fingerpad.core.errors import InputError
+from fingerpad.core.keywords import known_keywords
 from fingerpad.core.tables import TableRow, read_csv
 from fingerpad.experiments.indenter_text import indenter_named
 
@@ -16,6 +19,9 @@ LARGEST_FILE_MB = 1.0
 """Larger files are refused: they hold no published table but, for example, a recording over time. [MB]"""
 
 _BYTES_PER_MB = 1e6
+
+STIFFEST_N_PER_MM = 10.0
+"""Force over depth that no fingertip has; plates have 0.05 to 0.5 (Dandekar 1995, as quoted). [N/mm]"""
 
 Value = float | str
 
@@ -183,12 +189,13 @@ class Observations:
         ]
 
 
-def read_observations(path: Path) -> Observations:
+@known_keywords
+def read_observations(path: str | Path) -> Observations:
     r"""Read a file of observations.
 
     Parameters
     ----------
-    path : Path
+    path : str or Path
         A CSV file in UTF-8, of at most `LARGEST_FILE_MB`. Its header decides the kind; columns may stand in
         any order, and lines that begin with # are comments.
 
@@ -212,6 +219,7 @@ def read_observations(path: Path) -> Observations:
     >>> found.kind.name, found.rows[1].condition, found.observed.tolist()
     ('force', ('plate', 1.0), [0.11, 0.23])
     """
+    path = Path(path)
     size_mb = path.stat().st_size / _BYTES_PER_MB if path.is_file() else 0.0
     if size_mb > LARGEST_FILE_MB:
         raise InputError(
@@ -243,6 +251,12 @@ def _kind(path: Path, columns: tuple[str, ...]) -> Kind:
 def _observation(line: TableRow, kind: Kind) -> Observation:
     observed = _value(line, kind.observed)
     assert isinstance(observed, float)
+    stiffest = STIFFEST_N_PER_MM * line.number("depth_mm", "mm") if kind.observed == "force_n" else np.inf
+    if observed > stiffest:
+        raise InputError(
+            f"{line.place}: force_n must be at most {STIFFEST_N_PER_MM:g} N for each mm of depth_mm: got "
+            f"{observed:g} N at {line.text('depth_mm')} mm; check its unit."
+        )
     return Observation(line.line, tuple(_value(line, column) for column in kind.conditions), observed)
 
 

@@ -9,6 +9,7 @@ import numpy as np
 
 from fingerpad.core.checks import FloatArray, one_of
 from fingerpad.core.errors import ConvergenceError, InputError
+from fingerpad.core.keywords import KnownKeywords
 from fingerpad.core.signals import SedTraces
 from fingerpad.core.units import MN_PER_N
 from fingerpad.data import protocol
@@ -35,7 +36,7 @@ QUASI_STATIC_MS = 1e12
 
 
 @dataclass(frozen=True)
-class FingertipModel:
+class FingertipModel(metaclass=KnownKeywords):
     """The fingertip, its afferent and the loading whose predictions are scored.
 
     Parameters
@@ -249,7 +250,7 @@ def _rate(given: Mapping[str, Value], model: FingertipModel) -> Reading:
         grading = None
     else:
         curvature = _number(given["curvature_per_m"])
-        body = Sphere(curvature) if curvature > 0.0 else Plate()
+        body = Sphere(curvature_per_m=curvature) if curvature > 0.0 else Plate()
         # One mesh for all curvatures, so that no difference between them is one between meshes.
         grading = grading_about(Plate(), conditions.resolution, conditions.receptor_x_mm)
     along = np.cos(np.deg2rad(conditions.skin_tilt_deg))

@@ -10,6 +10,7 @@ from typing import Literal
 import numpy as np
 
 from fingerpad.core.engine import Engine, engine_of
+from fingerpad.core.keywords import KnownKeywords, known_keywords
 from fingerpad.core.progress import Progress
 from fingerpad.core.results import Number, result_class
 from fingerpad.data import fingertip
@@ -147,7 +148,7 @@ class ValidationFile:
 
 
 @dataclass(frozen=True)
-class ValidationRequest:
+class ValidationRequest(metaclass=KnownKeywords):
     """Observations with all that it takes to score them.
 
     Parameters
@@ -178,6 +179,7 @@ class ValidationRequest:
             named_tissues(self.model.conditions.tissues)
 
 
+@known_keywords
 def validate(
     request: ValidationRequest,
     progress: Progress | None = None,
