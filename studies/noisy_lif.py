@@ -198,6 +198,8 @@ def _noisy_trains(
         limits = four_normals(seed, trial, receptor, _THRESHOLD, 1)
         limit = threshold * math.exp(spread * limits[0] - 0.5 * spread * spread)
         potential = initial_potentials(current[:1], tau, capacitance, threshold, initial)[0]
+        if potential >= limit:  # it fired before the recording began
+            potential = 0.0
         while True:
             while knot < times.size - 1 and times[knot + 1] <= time:
                 knot += 1

@@ -70,7 +70,7 @@ def test_creep_in_uniaxial_strain_follows_the_closed_form(monkeypatch):
     """
     shear, bulk, share, tau = 10.0, 20.0, 0.5, 60.0
     material = Material.neo_hooke(shear, 2 / 7, Prony((share,), (tau,)))  # K = 2 G (1 + nu) / (3 (1 - 2 nu))
-    column = block_mesh([0.0, 1.0], [0.0, 1.0], [0.0, 1.0], layers=[0])
+    column = block_mesh([0.0, 10.0], [0.0, 1.0], [0.0, 10.0], layers=[0])  # 100 mm²
 
     def only_up_and_down(*sets):
         free = free_degrees_of_freedom(*sets)
@@ -79,7 +79,7 @@ def test_creep_in_uniaxial_strain_follows_the_closed_form(monkeypatch):
     monkeypatch.setattr(press_module, "free_degrees_of_freedom", only_up_and_down)
     ramp, hold, force_per_area = 50.0, 400.0, 0.02
     settings = PressSettings(20, 20, NewtonSettings(1e-7, 1e-5))
-    motion = ForceRampAndHold(force_per_area, ramp, hold)
+    motion = ForceRampAndHold(100.0 * force_per_area, ramp, hold)
     done = pressed(column, motion, Plate(), (material,) * 4, settings)
     at_once, in_the_end = bulk + 4 / 3 * shear / (1 - share), bulk + 4 / 3 * shear
     slow = tau * at_once / in_the_end
@@ -146,7 +146,7 @@ def test_a_force_far_too_large_is_refused_within_a_step_that_was_cut():
 
 def test_force_beyond_the_limit_of_the_mesh_is_an_error_that_advises_less_force():
     with pytest.raises(ConvergenceError, match="try a smaller force") as failure:
-        pressed(block(), ForceRampAndHold(1e6, 50.0, 100.0), settings=PressSettings(1, 1))
+        pressed(block(), ForceRampAndHold(1e5, 50.0, 100.0), settings=PressSettings(1, 1))
     assert len(failure.value.history) >= 6
 
 

@@ -45,14 +45,16 @@ def touching(indenter, mesh):
 def test_indenter_that_moves_and_turns_before_it_touches_presses_as_if_placed_there(indenter, pose):
     mesh = block()
     first = touching(indenter, mesh)
-    way = {name: (0.0, getattr(pose, name), getattr(pose, name)) for name in vars(pose)}
-    motion = Trajectory((0.0, 50.0, 100.0), depth_mm=(-0.6, -0.6, 0.3), **way)
+    # A turned body touches above the depth 0, which is counted from the first touch of the unturned one.
+    times_ms, depth_mm = (0.0, *np.linspace(50.0, 100.0, 13)), (-0.6, *np.linspace(-0.6, 0.3, 13))
+    way = {name: (0.0, *[getattr(pose, name)] * 13) for name in vars(pose)}
+    motion = Trajectory(times_ms, depth_mm=depth_mm, **way)
     moved = press(mesh, ELASTIC, indenter, first, motion, STEPS, friction=0.3)
     rotation = rotation_of(pose.tilt_deg, pose.spin_deg)
     there = Placement(
         first.origin_mm + np.array([pose.x_mm, 0.0, pose.z_mm]), rotation, np.array([0.0, 1.0, 0.0])
     )
-    down = Trajectory((0.0, 50.0, 100.0), depth_mm=(-0.6, -0.6, 0.3))
+    down = Trajectory(times_ms, depth_mm=depth_mm)
     placed = press(mesh, ELASTIC, indenter, there, down, STEPS, friction=0.3)
     assert placed.force_mn[-1] > 1.0
     np.testing.assert_allclose(moved.force_mn[-4:], placed.force_mn[-4:], rtol=1e-6)

@@ -1,5 +1,7 @@
 """Efficiencies of codes against the ideal observer of the same responses."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -11,7 +13,8 @@ from studies import code_efficiency
 from studies.pages import code_efficiency as page
 
 CURVATURES = (287.0, 316.0)
-POPULATION = Population.grid(centre_mm=(RECEPTOR_X_MM, 0.0), afferent=SENSITIVE)
+FROM_0 = replace(SENSITIVE, initial_mv=0.0)  # latencies under two spheres differ more than from rest
+POPULATION = Population.grid(centre_mm=(RECEPTOR_X_MM, 0.0), afferent=FROM_0)
 PAIRS = neighbour_pairs(POPULATION.positions_mm, POPULATION.pitch_mm)
 
 

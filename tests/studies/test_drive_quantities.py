@@ -11,6 +11,7 @@ from scipy.integrate import solve_ivp
 from scipy.stats import norm
 
 from fingerpad.core.errors import InputError
+from fingerpad.core.phases import ramp_and_hold_phases
 from fingerpad.core.results import from_json, to_json
 from fingerpad.core.signals import SedTraces
 from fingerpad.experiments.conditions import RECEPTOR_X_MM, Conditions
@@ -127,7 +128,8 @@ def test_drives_put_each_quantity_where_its_term_looks():
 class Skin:
     """Skin that is flat along x and knows where it was asked."""
 
-    times_ms, kinks_ms = TIMES_MS, (50.0,)
+    times_ms, kinks_ms, onset_ms = TIMES_MS, (50.0,), 0.0
+    phases = ramp_and_hold_phases(50.0, TIMES_MS[-1])
 
     def __init__(self, shift_mm):
         self.shift_mm, self.asked = shift_mm, []

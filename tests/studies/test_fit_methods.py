@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from fingerpad.core.phases import ramp_and_hold_phases
 from fingerpad.core.results import from_json, to_json
 from fingerpad.core.signals import SedTraces
 from fingerpad.data import neuron, paper, protocol
@@ -190,7 +191,8 @@ def test_rates_that_rise_with_energy_can_be_predicted_by_a_rising_rate():
 
 def test_the_skin_is_sampled_beside_the_receptor_and_for_the_other_quantity():
     class Skin:
-        times_ms, kinks_ms = np.array([0.0, 50.0, 1000.0]), (50.0,)
+        times_ms, kinks_ms, onset_ms = np.array([0.0, 50.0, 1000.0]), (50.0,), 0.0
+        phases = ramp_and_hold_phases(50.0, 1000.0)
 
         def __init__(self, peak_kpa):
             self.peak_kpa = peak_kpa

@@ -362,9 +362,9 @@ class Trajectory(Motion):
     def step_times_ms(self, ramp_steps: int, hold_steps: int) -> FloatArray:
         """List the times to solve at: all samples, and times between them where they are far apart. [ms]
 
-        First touch is one of them, and the way through the air before it is one step. A part of the way takes
-        its share of `ramp_steps`, and a mm aside takes three times as many. The first step aside is divided,
-        because friction grows over about a tenth of a mm until skin slips. A hold longer than the step before
+        First touch is one of them, and the way straight through the air before it is one step. A part of the
+        way takes its share of `ramp_steps`, and a mm aside three times as many. The first step aside is
+        divided, because friction grows over about a tenth of a mm until skin slips. A hold longer than the step before
         it takes `hold_steps`, which grow geometrically, because relaxation is fastest at its beginning; a
         long part in which a recording drifts is a hold.
 
@@ -380,7 +380,7 @@ class Trajectory(Motion):
         for start, end, moved, way in zip(
             samples_ms[:-1].tolist(), samples_ms[1:].tolist(), moved_by, aside, strict=True
         ):
-            if end <= onset and way <= SAME_SPEED:
+            if end <= onset and self.stays:
                 times.append(end)
                 continue
             length_ms = end - start

@@ -69,6 +69,9 @@ LARGEST_DROP = 0.1
 SAME_DIGITS = 9
 """Decimals of depths [mm], forces [mN] and lengths of steps [ms]: the same touch later has the same bits."""
 
+AIR_TOLERANCE_MM = 1e-6
+"""Overlap at first touch from which skin counts as touched; a placement has rounding errors. [mm]"""
+
 LIFT_MM = 100.0
 """How far an indenter without force is lifted while the skin below it is solved. [mm]"""
 
@@ -191,7 +194,7 @@ class _Press:
         )  # fmt: skip
 
     def in_the_air(self, times_ms: FloatArray) -> Iterator[_Moment]:
-        """Yield moments before first touch, in which nothing is solved because nothing happens."""
+        """Yield moments until skin is touched, in which nothing is solved because nothing happens."""
         moment = self.unloaded()
         skin_mm = self.contact.points_mm(self.body.mesh.nodes_mm)
         for time_ms in times_ms.tolist():
@@ -199,6 +202,8 @@ class _Press:
             if not self.stimulus.by_force and time_ms < self.stimulus.onset_ms:
                 depth_mm = float(self.stimulus.prescribed_at(time_ms))
             touch = self.contact.state(skin_mm, depth_mm, np.zeros(self.contact.stiffness.size))
+            if touch.gap_mm.min() < -AIR_TOLERANCE_MM:
+                return
             entry = Entry(time_ms=time_ms, way=(depth_mm, 0.0, 0.0, 0.0, 0.0))
             found = replace(moment.found, depth_mm=depth_mm, contact=touch)
             moment = replace(moment, time_ms=time_ms, found=found, ledger=(*moment.ledger, entry))
@@ -565,7 +570,7 @@ def _moments(job: _Press, settings: PressSettings, times: FloatArray) -> Iterato
     if all(job.stimulus.pose_at(time_ms) == STILL for time_ms in waits_ms.tolist()):
         for start in job.in_the_air(waits_ms):
             yield start
-        times = times[waits_ms.size :]
+        times = times[times > start.time_ms]
     yield from _solved(job, settings, times, start)
 
 

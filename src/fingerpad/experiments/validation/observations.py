@@ -249,6 +249,7 @@ def _kind(path: Path, columns: tuple[str, ...]) -> Kind:
 
 
 def _observation(line: TableRow, kind: Kind) -> Observation:
+    condition = tuple(_value(line, column) for column in kind.conditions)
     observed = _value(line, kind.observed)
     assert isinstance(observed, float)
     stiffest = STIFFEST_N_PER_MM * line.number("depth_mm", "mm") if kind.observed == "force_n" else np.inf
@@ -257,7 +258,7 @@ def _observation(line: TableRow, kind: Kind) -> Observation:
             f"{line.place}: force_n must be at most {STIFFEST_N_PER_MM:g} N for each mm of depth_mm: got "
             f"{observed:g} N at {line.text('depth_mm')} mm; check its unit."
         )
-    return Observation(line.line, tuple(_value(line, column) for column in kind.conditions), observed)
+    return Observation(line.line, condition, observed)
 
 
 def _value(line: TableRow, column: str) -> Value:

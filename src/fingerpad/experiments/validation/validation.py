@@ -128,7 +128,7 @@ class ValidationFile:
     resolution: str
     tissues: str
     loading: str | None = None
-    afferent: dict[str, float | str] | None = None
+    afferent: dict[str, float | str | None] | None = None
     ramp_ms: float | None = None
     hold_ms: float | None = None
     static_window_ms: tuple[float, ...] | None = None
