@@ -364,9 +364,9 @@ class Trajectory(Motion):
 
         First touch is one of them, and the way straight through the air before it is one step. A part of the
         way takes its share of `ramp_steps`, and a mm aside three times as many. The first step aside is
-        divided, because friction grows over about a tenth of a mm until skin slips. A hold longer than the step before
-        it takes `hold_steps`, which grow geometrically, because relaxation is fastest at its beginning; a
-        long part in which a recording drifts is a hold.
+        divided, because friction grows over about a tenth of a mm until skin slips. A hold longer than the
+        step before it takes `hold_steps`, which grow geometrically, because relaxation is fastest at its
+        beginning; a long part in which a recording drifts is a hold.
 
         Examples
         --------

@@ -568,9 +568,10 @@ def _moments(job: _Press, settings: PressSettings, times: FloatArray) -> Iterato
     """Solved times after the unloaded one, which without a bound on the error of SED are `times`."""
     start, waits_ms = job.unloaded(), times[times <= job.stimulus.onset_ms]
     if all(job.stimulus.pose_at(time_ms) == STILL for time_ms in waits_ms.tolist()):
-        for start in job.in_the_air(waits_ms):
-            yield start
-        times = times[times > start.time_ms]
+        waits = list(job.in_the_air(waits_ms))
+        if len(waits) == waits_ms.size:
+            yield from waits
+            start, times = (waits or [start])[-1], times[waits_ms.size :]
     yield from _solved(job, settings, times, start)
 
 
