@@ -13,6 +13,7 @@ import signal
 import socket
 import subprocess
 import sys
+import threading
 import time
 import urllib.request
 from collections.abc import Callable, Iterator
@@ -149,6 +150,28 @@ def test_the_full_solution_stands_beside_the_reduced_one(laboratory: Laboratory)
     assert "Largest differences from the full solution: force" in view.difference
     forces = np.interp(view.exact.times_ms, view.answer.times_ms, view.answer.force_mn)
     assert np.abs(forces - view.exact.force_mn).max() < 0.02 * max(view.exact.force_mn)
+
+
+def test_the_full_solution_is_shown_until_there_is_a_reduced_touch(
+    laboratory: Laboratory, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    exact, model, go_on = laboratory.answer(PRESS, exact=True), laboratory.model(PRESS), threading.Event()
+    monkeypatch.setattr("fingerpad.lab.laboratory.run_reduction", lambda *_: go_on.wait(60.0) and model)
+    source = laboratory.source(PRESS).with_name("first.yaml")
+    source.write_text(RANGE % 287.0, encoding="utf-8")
+    begun, state = Laboratory(laboratory.folder, [source]), replace(PRESS, object="first")
+    view = waited(begun, state)
+    assert view.making is not None
+    assert view.making.what == "a reduced touch of first"
+    np.testing.assert_allclose(view.answer.force_mn, exact.force_mn, atol=1e-3)
+    go_on.set()
+    end = time.monotonic() + 60.0
+    while begun.making(state) is not None:
+        assert time.monotonic() < end
+        time.sleep(0.02)
+    assert waited(begun, state).making is None
+    with pytest.raises(fp.InputError, match="x_mm must lie within -1 to 1"):
+        Laboratory(laboratory.folder / "none", [source]).answer(replace(state, x_mm=2.0), exact=True)
 
 
 def test_observers_tell_what_differs(laboratory: Laboratory) -> None:

@@ -17,6 +17,7 @@ from fingerpad.core.signals import STORED_ENERGY, ResponseMap, SedTraces
 from fingerpad.data import psychophysics
 from fingerpad.experiments.descriptions.reduction import DescribedReduction
 from fingerpad.geometry.fingertip import Fingertip
+from fingerpad.geometry.motion import Pose
 from fingerpad.geometry.trajectory import Trajectory
 from fingerpad.lab.state import LabState
 from fingerpad.neuron.afferent import Afferent
@@ -26,6 +27,7 @@ from fingerpad.psychophysics.ideal_observer import present
 from fingerpad.psychophysics.response_models import multiplied_responses
 from fingerpad.reduction.model import ON_THE_PAD, ReducedModel
 from fingerpad.reduction.streaming import ReducedTouch
+from fingerpad.reduction.training import first_touch_mm
 from fingerpad.skin.sampling import SkinResponse
 
 ABOVE_MS = 10.0
@@ -92,27 +94,37 @@ def shape_of(described: DescribedReduction, size: float) -> tuple[float, ...]:
 
 
 def motion_of(
-    described: DescribedReduction, model: ReducedModel, state: LabState
+    described: DescribedReduction, model: ReducedModel | None, state: LabState
 ) -> tuple[Trajectory, tuple[float, ...]]:
     """Press, hold and perhaps slide, lift; and the shape of the object.
+
+    Without a reduced touch, first touches are found from the shapes of object and finger.
 
     Raises
     ------
     InputError
         If a pose lies out of the range.
     """
-    if state.depth_mm > model.depth_mm:
+    training = described.training
+    if state.depth_mm > training.range.depth_mm:
         raise InputError(
-            f"depth_mm must be at most {model.depth_mm:g}, the depth of this reduced touch: got "
+            f"depth_mm must be at most {training.range.depth_mm:g}, the depth of this reduced touch: got "
             f"{state.depth_mm:g}."
         )
     shape = shape_of(described, state.size)
     ways = (state.x_mm, state.x_mm + state.slide_mm)
-    meets = [
-        float(model.pose_weights((x, state.z_mm, state.tilt_deg, *shape)) @ model.first_touch_mm)
-        for x in ways
-    ]
-    above = min(0.0, *meets, float(model.first_touch_mm.min())) - CLEARANCE_MM
+    poses = [(x, state.z_mm, state.tilt_deg, *shape) for x in ways]
+    if model is not None:
+        meets = [float(model.pose_weights(pose) @ model.first_touch_mm) for pose in poses]
+        highest = float(model.first_touch_mm.min())
+    else:
+        for pose in poses:
+            for axis, value in zip(training.range.axes, pose, strict=True):
+                axis.weights(value)  # refuses what lies out of the range
+        touch = training.touch_with(shape)
+        meets = [first_touch_mm(touch, Pose(*pose[:3])) for pose in poses]
+        highest = min(meets)
+    above = min(0.0, *meets, highest) - CLEARANCE_MM
     times = np.cumsum([0.0, ABOVE_MS, ABOVE_MS, state.ramp_ms, state.hold_ms, state.ramp_ms])
     depth = [above, above, meets[0], meets[0] + state.depth_mm, meets[1] + state.depth_mm, meets[1]]
     return Trajectory(
@@ -184,6 +196,10 @@ def reduced_answer(described: DescribedReduction, model: ReducedModel, state: La
         If a pose lies out of the range.
     """
     motion, shape = motion_of(described, model, state)
+    weights = [
+        model.pose_weights((pose.x_mm, pose.z_mm, pose.tilt_deg, *shape))
+        for pose in map(motion.pose_at, sample_times_ms(motion).tolist())
+    ]
     population = population_of(described, state)
     stream = ReducedTouch(model, _sites(described, population), *shape)
     samples = []
@@ -193,22 +209,26 @@ def reduced_answer(described: DescribedReduction, model: ReducedModel, state: La
             samples.append(stream.step(time, depth, None, pose.x_mm, pose.z_mm, pose.tilt_deg))
     fields = {name: np.stack([sample.fields[name] for sample in samples]) for name in samples[0].fields}
     return _answer(
-        described, model, state, population, fields,
+        described, motion, population, fields, np.array(weights) @ model.middle_mm,
         *(np.array([getattr(sample, name) for sample in samples]) for name in
           ("time_ms", "depth_mm", "force_mn", "force_error_mn", "contact_area_mm2")),
     )  # fmt: skip
 
 
-def in_full(
-    described: DescribedReduction, model: ReducedModel, state: LabState, skin: SkinResponse
-) -> Answer:
+def in_full(described: DescribedReduction, motion: Trajectory, state: LabState, skin: SkinResponse) -> Answer:
     """Answer by a full solution of the same motion."""
     population = population_of(described, state)
     sites = _sites(described, population)
-    fields = {name: skin.sample(name, sites) for name in model.quantities}
+    fields = {name: skin.sample(name, sites) for name in {STORED_ENERGY, *population.quantities}}
     none = np.zeros(skin.times_ms.size)
     totals = skin.times_ms, skin.depth_mm, skin.force_mn, none, skin.contact_area_mm2
-    return _answer(described, model, state, population, fields, *totals)
+    nodes_mm = skin.mesh.nodes_mm[skin.mesh.skin_nodes]
+    weight = skin.contact_pressure_kpa * skin.mesh.skin_area_mm2
+    total = weight.sum(axis=1, keepdims=True)
+    middles_mm = (weight @ nodes_mm[:, [0, 2]]) / np.where(total > 0.0, total, 1.0)
+    if skin.touch is not None and not skin.touch.grading.full:
+        middles_mm[:, 1] = 0.0
+    return _answer(described, motion, population, fields, middles_mm, *totals)
 
 
 def _sites(described: DescribedReduction, population: Population) -> FloatArray:
@@ -220,17 +240,17 @@ def _sites(described: DescribedReduction, population: Population) -> FloatArray:
 
 def _answer(
     described: DescribedReduction,
-    model: ReducedModel,
-    state: LabState,
+    motion: Trajectory,
     population: Population,
     fields: dict[str, FloatArray],
+    middles_mm: FloatArray,
     times: FloatArray,
     depth: FloatArray,
     force: FloatArray,
     error: FloatArray,
     area: FloatArray,
 ) -> Answer:
-    (motion, shape), (x, z) = motion_of(described, model, state), map_axes(described)
+    x, z = map_axes(described)
     on_skin = _on_pad(finger_of(described), *np.meshgrid(x, z, indexing="ij"))
     sed = np.full((times.size, x.size, z.size), np.nan)
     n_map = np.count_nonzero(on_skin)
@@ -242,10 +262,8 @@ def _answer(
         None if same else dynamic, *population.quantities,
     )  # fmt: skip
     start, held, ends = motion.times_ms[2:5]
-    ways = [motion.pose_at(time) for time in times.tolist()]
-    weights = [model.pose_weights((pose.x_mm, pose.z_mm, pose.tilt_deg, *shape)) for pose in ways]
     return Answer(
-        times, depth, force, error, area, np.array(weights) @ model.middle_mm, x, z, sed,
+        times, depth, force, error, area, middles_mm, x, z, sed,
         population.respond_to(traces, (start, held), (held, ends)),
     )  # fmt: skip
 

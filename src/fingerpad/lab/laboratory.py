@@ -87,8 +87,8 @@ class Laboratory(metaclass=KnownKeywords):
         self._answers: OrderedDict[tuple[LabState, bool], Answer] = OrderedDict()
         self._making: dict[object, tuple[Future[Any], _Told]] = {}
         self._lock = threading.RLock()
-        # What somebody waits for, one after the other, and errors, which nobody waits for.
-        self._worker, self._later = _Worker(), _Worker()
+        # Reduced touches, full solutions, and errors, which nobody waits for: each one after the other.
+        self._worker, self._full, self._later = _Worker(), _Worker(), _Worker()
         for name in self._contents:
             self.described(LabState(name))
 
@@ -199,46 +199,70 @@ class Laboratory(metaclass=KnownKeywords):
         described, key = self.described(state), (_alone(state), exact)
         if (kept := self._kept(key)) is not None:
             return kept
-        model = self.model(state) or self.make(state, told=told)
-        motion, shape = motion_of(described, model, state)
+        model = self.model(state)
         if exact:
+            motion, shape = motion_of(described, model, state)
             touch = described.training.touch_with(shape, motion)
             runner = Runner(self.folder, self._engine, told)
             skin = runner.responses({"exact": {0: touch}})["exact"][0]
-            answer = in_full(described, model, state, skin)
+            answer = in_full(described, motion, state, skin)
         else:
+            model = model or self.make(state, told=told)
             answer = reduced_answer(described, model, state)
         with self._lock:
             # Meanwhile the reduced touch may have got its error.
-            if self._models.get(self.path(state)) is model:
+            if exact or self._models.get(self.path(state)) is model:
                 self._answers[key] = answer
             if len(self._answers) > KEPT_ANSWERS:
                 self._answers.popitem(last=False)
         return answer
 
     def poll(self, state: LabState, exact: bool = False) -> Answer | Making:
-        """Answer at once: what needs a press goes on in the background, and the answer is how far it is."""
+        """Answer at once: what needs a press goes on in the background, and the answer is how far it is.
+
+        Until there is a reduced touch, the full solution of the same touch is the answer.
+        """
         ready = self.model(state) is not None
         # Before an answer that is kept: it may be kept before the first poll that finds a model.
         if ready and not self.measured(state) and (later := ("error", self.path(state))) not in self._making:
             told = _Told("errors")
             self._making[later] = self._later.submit(lambda: self.make(state, True)), told
-        if (kept := self._kept((_alone(state), exact))) is not None:
-            return kept
         if ready and not exact:
-            return self.answer(state)
-        # A reduced touch serves many states: they wait for one computation.
-        key: object = (_alone(state), exact) if ready else self.path(state)
+            return self._kept((_alone(state), False)) or self.answer(state)
+        making = None if ready else self.making(state)
+        if not ready and making is None:
+            return self.poll(state, exact)
+        full = _alone(state), True
+        if (kept := self._kept(full)) is not None:
+            return kept
+        # While somebody moves an object about, only one of the places is solved at a time.
+        if making is not None and full not in self._making and self._full.busy:
+            return making
+        told = _Told(f"the full solution of {state.object}")
+        solving = self._under_way(full, self._full, lambda: self.answer(state, True, told), told)
+        return self.poll(state, exact) if solving is None else making or solving
+
+    def making(self, state: LabState) -> Making | None:
+        """Start or go on with the reduced touch of a state, and tell how far it is; None if it is there."""
+        if self.model(state) is not None:
+            return None
+        told = _Told(f"a reduced touch of {state.object}")
+        # It serves many states, which wait for one computation.
+        return self._under_way(self.path(state), self._worker, lambda: self.make(state, told=told), told)
+
+    def _under_way(
+        self, key: object, worker: _Worker, work: Callable[[], object], told: _Told
+    ) -> Making | None:
+        """Start a computation, or tell how far it is; None once it has ended well."""
         with self._lock:
             if key not in self._making:
-                told = _Told(f"{'the full solution' if ready else 'a reduced touch'} of {state.object}")
-                self._making[key] = self._worker.submit(lambda: self.answer(state, exact, told)), told
+                self._making[key] = worker.submit(work), told
             future, told = self._making[key]
             if not future.done():
                 return told.making
             del self._making[key]
         future.result()
-        return self.poll(state, exact)
+        return None
 
     def _kept(self, key: tuple[LabState, bool]) -> Answer | None:
         with self._lock:
@@ -263,13 +287,20 @@ class _Worker:
 
     def __init__(self) -> None:
         self._queue: queue.SimpleQueue[tuple[Future[Any], Callable[[], Any]]] = queue.SimpleQueue()
+        self._last: Future[Any] | None = None
         threading.Thread(target=self._run, daemon=True).start()
 
     def submit(self, work: Callable[[], Any]) -> Future[Any]:
         """Do something later."""
         future: Future[Any] = Future()
+        self._last = future
         self._queue.put((future, work))
         return future
+
+    @property
+    def busy(self) -> bool:
+        """Whether something is not done."""
+        return self._last is not None and not self._last.done()
 
     def _run(self) -> None:
         while True:

@@ -229,9 +229,11 @@ export function start(root, spec, ask) {
       clearTimeout(late);
       if (reply.error) tell(reply.error, true);
       if (reply.view) { view = reply.view; tell(view.said); python.textContent = view.python; draw(); }
-      if (reply.making && !wanted) {
-        tell(progressOf(reply.making));
-        await new Promise(resolve => setTimeout(resolve, 400));
+      const making = reply.making ?? reply.view?.making;
+      if (making && !wanted) {
+        // Until there is a reduced touch, each place is solved in full.
+        tell(progressOf(making) + (reply.view ? " Meanwhile you see the full solution." : ""));
+        await new Promise(resolve => setTimeout(resolve, reply.view ? 1500 : 400));
         wanted = true;
       }
     }

@@ -54,10 +54,9 @@ exact = training.touch_with(shape, motion)
 
 
 def python_lines(laboratory: Laboratory, state: LabState, path: str = "") -> str:
-    """Write the lines; the reduced touch must be there, its `path` is that of its file by default."""
-    described, model = laboratory.described(state), laboratory.model(state)
-    assert model is not None
-    motion, shape = motion_of(described, model, state)
+    """Write the lines; they read the file of the reduced touch, or `path`."""
+    described = laboratory.described(state)
+    motion, shape = motion_of(described, laboratory.model(state), state)
     return TEMPLATE.format(
         title=str(state),
         content=described.description.model_dump(mode="json", exclude_unset=True),

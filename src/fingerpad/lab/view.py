@@ -83,6 +83,8 @@ class View:
         The full solution.
     difference : str
         How far the reduced answer is from it.
+    making : Making, optional
+        How far the reduced touch is, if the answer is the full solution because there is none yet.
     """
 
     answer: Shown
@@ -99,6 +101,7 @@ class View:
     compared: str = ""
     exact: Shown | None = None
     difference: str = ""
+    making: Making | None = None
 
 
 def view_of(laboratory: Laboratory, state: LabState, exact: bool = False) -> View | Making:
@@ -112,7 +115,7 @@ def view_of(laboratory: Laboratory, state: LabState, exact: bool = False) -> Vie
     answer = laboratory.poll(state)
     if isinstance(answer, Making):
         return answer
-    view = view_of_answer(laboratory, state, answer)
+    view = replace(view_of_answer(laboratory, state, answer), making=laboratory.making(state))
     if state.other:
         second = laboratory.poll(replace(state, object=state.other, size=state.other_size))
         if isinstance(second, Making):
@@ -148,7 +151,7 @@ def view_of_answer(
     x = np.linspace(0.3, finger.length_mm - 0.3, OUTLINE_POINTS)
     positions = answer.response.positions_mm
     nearest = np.linalg.norm(positions - answer.middle_mm[answer.force_mn.argmax()], axis=1)
-    asked = described.description
+    asked, there = described.description, laboratory.model(state) is not None
     body = described.training.touch_with(shape_of(described, state.size)).indenter
     return View(
         answer=_shown(answer, frames),
@@ -160,7 +163,7 @@ def view_of_answer(
         order=np.argsort(nearest, kind="stable").tolist(),
         shown_ms=float(answer.times_ms[-1] - state.ramp_ms),
         said=f"{body}, tissues {asked.tissues}, {asked.resolution} mesh."
-        + ("" if laboratory.measured(state) else " Its error is being measured."),
+        + (" Its error is being measured." if there and not laboratory.measured(state) else ""),
         python=python_lines(laboratory, state, path),
     )
 
