@@ -18,7 +18,7 @@ import pytest
 import fingerpad as fp
 from cluster import real_cluster, slow, wait_until
 from fingerpad.cli import main
-from fingerpad.core.engine import Processes, engine_of
+from fingerpad.core.engine import Processes, _signals_later, engine_of
 from fingerpad.core.errors import InputError, StoreError
 from fingerpad.experiments import cluster as module
 from fingerpad.experiments.cluster import Cluster
@@ -69,6 +69,20 @@ def test_a_number_of_processes_is_a_whole_number(jobs):
 
 def end_this_process(item, threads):
     os.kill(os.getpid(), signal.SIGKILL)
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="it needs signals")
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_waits_until_a_process_has_started(number):
+    came = []
+    before = signal.signal(number, lambda *_: came.append(number))
+    try:
+        with _signals_later():
+            os.kill(os.getpid(), number)
+            assert came == []
+        assert came == [number]
+    finally:
+        signal.signal(number, before)
 
 
 def test_a_lost_process_is_told_in_a_sentence():

@@ -110,7 +110,7 @@ class Processes:
             while True:
                 # A few wait in line, so that no process is idle, and not all: there may be a million.
                 for _, number in zip(range(4 * processes - len(under_way)), numbers, strict=False):
-                    with _ctrl_c_later():
+                    with _signals_later():
                         under_way[pool.submit(work, items[number], threads)] = number
                 if not under_way:
                     break
@@ -139,16 +139,29 @@ def _workers(processes: int) -> Iterator[ProcessPoolExecutor]:
 
 
 @contextmanager
-def _ctrl_c_later() -> Iterator[None]:
-    """Let Ctrl-C wait for the end of the block: a process that starts within it never receives it."""
-    if sys.platform == "win32":
+def _signals_later() -> Iterator[None]:
+    """Let Ctrl-C and SIGTERM wait for the end of the block, so that no process is left half started.
+
+    A process that starts within it inherits that it receives no Ctrl-C.
+    """
+    if sys.platform == "win32" or threading.current_thread() is not threading.main_thread():
         yield
         return
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    came: list[int] = []
+    # A mask is one thread's, and a signal may come to another, whose handler still runs here.
+    before = {
+        number: signal.signal(number, lambda each, _: came.append(each))
+        for number in (signal.SIGINT, signal.SIGTERM)
+    }
+    mask = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     try:
         yield
     finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+        signal.pthread_sigmask(signal.SIG_SETMASK, mask)
+        for number, handler in before.items():
+            signal.signal(number, handler)
+        for each in came:
+            signal.raise_signal(each)
 
 
 def _result(future: Future[Any]) -> Any:
