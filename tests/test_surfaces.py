@@ -540,6 +540,8 @@ def test_a_bad_height_map_gives_one_sentence(tmp_path):
     assert "rows and columns" in said("cube.npy", None)
     Image.new("1", (30_000, 30_000)).save(tmp_path / "huge.png")
     assert f"at most {MOST_HEIGHTS:,} heights" in said("huge.png", None)
+    with pytest.raises(InputError, match=f"heights_mm must have at most {MOST_HEIGHTS:,} heights"):
+        height_surface(np.zeros((1500, 1500)), 0.01)
 
 
 @pytest.mark.parametrize(

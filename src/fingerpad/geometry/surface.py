@@ -24,6 +24,9 @@ from fingerpad.geometry.relief import PIXELS, REACH_MM, narrowest_relief
 from fingerpad.geometry.rounded_edges import check_edge_radius, with_rounded_edges
 from fingerpad.geometry.surface_repair import border_of, is_crack, layers_of, repaired
 
+MOST_HEIGHTS = 2_000_000
+"""Heights of a map that become a body within about 20 s."""
+
 SMALLEST_MM, LARGEST_MM = 0.1, 1000.0
 """Extents beyond which a surface is refused: its unit must be wrong. [mm]"""
 
@@ -278,6 +281,15 @@ def _raise_to_triangles(
                     height[i, k] = max(height[i, k], y)
 
 
+def check_heights(name: str, heights: int) -> None:
+    """Raise `InputError` if a map has more heights than become a body in reasonable time."""
+    if heights > MOST_HEIGHTS:
+        raise InputError(
+            f"{name} must have at most {MOST_HEIGHTS:,} heights: got {heights:,}; crop it or take every "
+            "second row and column with twice the pitch."
+        )
+
+
 @known_keywords
 def height_surface(
     heights_mm: FloatArray,
@@ -304,7 +316,7 @@ def height_surface(
     Raises
     ------
     InputError
-        If there are fewer than 2 by 2 heights, or one is not finite.
+        If there are fewer than 2 by 2 heights or more than 2,000,000, or one is not finite.
 
     Examples
     --------
@@ -318,6 +330,7 @@ def height_surface(
     rows, columns = heights.shape
     if min(rows, columns) < 2:
         raise InputError(f"heights_mm must have at least 2 rows and 2 columns: got {rows} and {columns}.")
+    check_heights("heights_mm", heights.size)
     z, x = ((np.arange(count) - (count - 1) / 2) * pitch_mm for count in (rows, columns))
     vertices = np.stack([*np.broadcast_arrays(x[None, :], heights, z[:, None])], axis=-1).reshape(-1, 3)
     corner = np.arange(rows * columns).reshape(rows, columns)

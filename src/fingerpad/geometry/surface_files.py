@@ -11,7 +11,15 @@ from fingerpad.core.checks import FloatArray, IntArray, float_array, one_of, pos
 from fingerpad.core.errors import InputError
 from fingerpad.core.files import LARGEST_TEXT_MB, check_file, path_of
 from fingerpad.core.keywords import known_keywords
-from fingerpad.geometry.surface import LARGEST_MM, SMALLEST_MM, SMOOTH_BELOW_DEG, Surface, height_surface
+from fingerpad.geometry.surface import (
+    LARGEST_MM,
+    MOST_HEIGHTS,
+    SMALLEST_MM,
+    SMOOTH_BELOW_DEG,
+    Surface,
+    check_heights,
+    height_surface,
+)
 from fingerpad.geometry.triangle_files import read_triangles
 
 UNITS_MM = {"mm": 1.0, "um": 1e-3, "cm": 10.0, "m": 1000.0, "inch": 25.4}
@@ -24,9 +32,6 @@ MAPS = (*IMAGES, ".npy", ".csv")
 _END_OF_PNG = b"IEND\xaeB`\x82"
 _BITS, _PHOTOMETRIC, _SAMPLE_FORMAT = 258, 262, 339
 """Tags of a TIFF image: bits of a sample; 0 for white as zero; 2 for signed numbers."""
-
-MOST_HEIGHTS = 2_000_000
-"""Largest number of heights in a map."""
 
 LEAST_POINTS = 50
 """From this length on a table of three columns is taken for points."""
@@ -171,7 +176,7 @@ def read_height_map(
         raise InputError(f"{file.name} cannot be read as a height map: {_said(error)}.") from error
     if heights.ndim != 2:
         raise InputError(f"{file.name} must hold rows and columns of heights: got shape {heights.shape}.")
-    _check_size(file, heights.size)
+    check_heights(file.name, heights.size)
     side_mm = pitch_mm * (max(heights.shape) - 1)
     if side_mm and not SMALLEST_MM <= side_mm <= LARGEST_MM:
         raise InputError(
@@ -208,7 +213,7 @@ def _heights(file: Path) -> FloatArray:
             if content.read(6) != b"\x93NUMPY":
                 raise InputError(f"{file.name} must be an array that numpy.save wrote: it is not.")
         stored = np.load(file, mmap_mode="r", allow_pickle=False)
-        _check_size(file, stored.size)
+        check_heights(file.name, stored.size)
         if stored.dtype.kind not in "buif":
             raise InputError(f"{file.name} must hold real numbers: got {stored.dtype}.")
         return np.array(stored, dtype=np.float64)
@@ -239,7 +244,7 @@ def _image(file: Path) -> FloatArray:
             f"{file.name} must have at most {MOST_HEIGHTS:,} heights: got far more; crop it."
         ) from error
     with opened as image:
-        _check_size(file, image.width * image.height)
+        check_heights(file.name, image.width * image.height)
         pages = getattr(image, "n_frames", 1)
         if pages > 1:
             raise InputError(f"{file.name} must have one page: got {pages}; save the one with the heights.")
@@ -319,14 +324,6 @@ def _check_file(file: Path, endings: tuple[str, ...]) -> None:
     check_file(file, LARGEST_TEXT_MB)
     if not file.stat().st_size:
         raise InputError(f"{file.name} is empty.")
-
-
-def _check_size(file: Path, heights: int) -> None:
-    if heights > MOST_HEIGHTS:
-        raise InputError(
-            f"{file.name} must have at most {MOST_HEIGHTS:,} heights: got {heights:,}; crop it or take every "
-            "second row and column with twice the pitch."
-        )
 
 
 def _said(error: Exception) -> str:
