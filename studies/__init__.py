@@ -13,6 +13,7 @@
 | `mesh-noise` | meshes of one resolution with shifted element boundaries |
 | `population-timing` | order of first spikes and population rate about the contact |
 | `code-efficiency` | codes of a population against the ideal observer |
+| `sed-readings` | readings of SED at the epidermal-dermal border: FSS, rates and noise of each |
 | `results` | the pages that show the numbers of a reproduction |
 
 The uncertainty of the fit and curvature thresholds are part of `fingerpad reproduce --extended`. A command

@@ -161,7 +161,7 @@ def test_indenters_of_equal_numbers_have_different_keys():
         Cylinder(3.5),
         Bar(3.5),
         FlatPunch(3.5),
-        Sphere(curvature_per_m=3.5),
+        Sphere(radius_mm=3.5),
         Plate(),
         Bar(3.5, 0.1),
         Edge(3.5),
