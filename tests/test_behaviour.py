@@ -143,7 +143,7 @@ def test_which_function_is_imported_counts():
 def test_the_key_of_an_indentation_does_not_depend_on_the_names_of_its_classes(monkeypatch):
     def key(name):
         body = type(name, (Sphere,), {"__module__": Sphere.__module__})
-        return touch_key(touch_of(Fingertip(), body(287.0)))
+        return touch_key(touch_of(Fingertip(), body(curvature_per_m=287.0)))
 
     before, tag = key("Sphere"), class_tag(Sphere)
     tags = behaviour_of(list(everywhere(r"\bSphere\b", "Ball").values()), MODULES)
