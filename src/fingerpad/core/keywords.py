@@ -11,7 +11,6 @@ from typing import Any, ParamSpec, TypeVar
 from weakref import WeakKeyDictionary
 
 from fingerpad.core.errors import InputError, did_you_mean
-from fingerpad.core.values import refuse_mistyped
 
 _Given = ParamSpec("_Given")
 _Made = TypeVar("_Made")
@@ -55,7 +54,7 @@ def known_keywords(function: Callable[_Given, _Made]) -> Callable[_Given, _Made]
             raise
         except _OF_PYTHON:
             _refuse_misfit(signature, args, given, owner)
-            refuse_mistyped(function, signature.bind(*args, **given).arguments)
+            _refuse_mistyped(function, signature, args, given)
             raise
 
     return checked
@@ -104,6 +103,17 @@ def _refuse_misfit(
     if missing:
         are = "it is" if len(missing) == 1 else "they are"
         raise InputError(f"{owner} needs {', '.join(missing)}: {are} not given.") from None
+
+
+def _refuse_mistyped(
+    function: Callable[..., Any],
+    signature: inspect.Signature,
+    args: tuple[Any, ...],
+    given: Mapping[str, Any],
+) -> None:
+    from fingerpad.core.values import refuse_mistyped  # only here: the command line starts without NumPy
+
+    refuse_mistyped(function, signature.bind(*args, **given).arguments)
 
 
 class OtherName:
@@ -195,9 +205,8 @@ class KnownKeywords(ABCMeta):
         except InputError:
             raise
         except _OF_PYTHON:
-            signature = inspect.Signature(_fields(cls))
             _refuse_misfit(cls.__signature__, args, given, cls.__name__)
-            refuse_mistyped(cls.__init__, signature.bind(*args, **given).arguments)  # type: ignore[misc]
+            _refuse_mistyped(cls.__init__, inspect.Signature(_fields(cls)), args, given)  # type: ignore[misc]
             raise
 
     @property

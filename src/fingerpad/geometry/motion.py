@@ -17,7 +17,7 @@ from fingerpad.data import protocol
 LONGEST_MS = 1e13
 """Longest ramp or hold; a quasi-static ramp of a validation takes 1e12 ms. [ms]"""
 
-PLAUSIBLE = {"depth_mm": (1e-3, 20.0), "force_mn": (1.0, 1e5), "ramp_ms": (1e-3, LONGEST_MS)}
+PLAUSIBLE = {"depth_mm": (1e-3, 20.0), "force_mn": (1.0, 1e5), "ramp_ms": (1e-6, LONGEST_MS)}
 PLAUSIBLE["hold_ms"] = PLAUSIBLE["ramp_ms"]
 """Smallest and largest peaks and times of a touch: an afferent answers to 1 mN, and pads are 10 mm thick."""
 

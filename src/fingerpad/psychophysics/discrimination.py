@@ -218,6 +218,8 @@ def compare_gradient_sum_observers(
     """
     values = checked_responses(responses, silent_value)
     pairs = check_neighbours(neighbours, values.shape[1])
+    if not len(pairs):
+        raise InputError("neighbours must hold at least one pair of receptors: got none.")
     whole("seed", seed, 0)
     alike: dict[tuple[int, int], dict[float, list[int]]] = {}
     for number, (noise_sigma, plan) in enumerate(observers):

@@ -228,7 +228,7 @@ def gradient_sum(values: ArrayLike, neighbours: np.ndarray) -> FloatArray:
     Raises
     ------
     InputError
-        If there is no pair, one contains an index outside the population, or a value is not finite.
+        If a pair contains an index outside the population, or a value is not finite.
 
     Examples
     --------
@@ -301,7 +301,7 @@ def check_neighbours(neighbours: np.ndarray, n_receptors: int) -> np.ndarray:
     Raises
     ------
     InputError
-        If they are not one pair or more of two indices within 0 ... n_receptors - 1.
+        If they are not pairs of two indices within 0 ... n_receptors - 1.
 
     Examples
     --------
@@ -309,13 +309,11 @@ def check_neighbours(neighbours: np.ndarray, n_receptors: int) -> np.ndarray:
     [[0, 1]]
     """
     pairs = np.asarray(neighbours)
-    if not pairs.size:
-        raise InputError("neighbours must hold at least one pair of receptors: got none.")
     if pairs.ndim != 2 or pairs.shape[1] != 2 or not np.issubdtype(pairs.dtype, np.integer):
         raise InputError(
             f"neighbours must be rows of two receptor indices: got {pairs.dtype} of shape {pairs.shape}."
         )
-    if pairs.min() < 0 or pairs.max() >= n_receptors:
+    if pairs.size and (pairs.min() < 0 or pairs.max() >= n_receptors):
         raise InputError(
             f"neighbours must be within 0 ... {n_receptors - 1}: got {pairs.min()} ... {pairs.max()}."
         )
