@@ -211,7 +211,7 @@ def refused(said, **changes):
         refused("x = 50", at_mm=(50.0, 0.0)),
         refused("z = 12", at_mm=(17.37, 12.0)),
         refused("x = -1", at_mm=(-1.0, 0.0)),
-        refused("go between the nodes", indenter=Sphere(curvature_per_m=1e6), at_mm=(17.0, 3.3)),
+        refused("go between the nodes", indenter=Sphere(radius_mm=0.02), at_mm=(17.0, 3.3)),
     ],
 )
 def test_unusable_arguments_are_refused_in_one_sentence(arguments, said):

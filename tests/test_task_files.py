@@ -342,7 +342,7 @@ stimuli: {vary: object, values: [1, 2]}
     stimuli.vary must be friction
 stimuli: {vary: object.width_mm, values: [1, 2]}
     stimuli.values[1], object.width_mm is unknown: object has kind, curvature_per_m
-{stimuli: {vary: motion.depth_mm, values: [1, 50]}, standard: 1}
+{stimuli: {vary: motion.depth_mm, values: [1, 15]}, standard: 1}
     stimuli.values[2], motion: depth_mm must stay below
 stimuli: {vary: object.curvature_per_m}
     stimuli.values must be given
