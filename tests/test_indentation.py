@@ -246,7 +246,8 @@ def test_tilt_has_a_limit(tilt_deg):
 
 @pytest.mark.parametrize("resolution", ["quick", "standard"])
 def test_bodies_of_the_paper_keep_their_meshes(resolution):
-    for body in (Line(), Cylinder(), Bar(), Plate(), *map(Sphere, (144.0, 287.0, 694.0))):
+    spheres = (Sphere(curvature_per_m=curvature) for curvature in (144.0, 287.0, 694.0))
+    for body in (Line(), Cylinder(), Bar(), Plate(), *spheres):
         grading = grading_about(body, resolution, 17.37)
         assert grading.finer_along == grading.finer_across == ()
         assert touch_of(Fingertip(), body, resolution=resolution).body is body
