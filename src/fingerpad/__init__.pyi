@@ -80,6 +80,8 @@ from fingerpad.geometry.surface_files import read_height_map as read_height_map
 from fingerpad.geometry.surface_files import read_surface as read_surface
 from fingerpad.geometry.trajectory import Trajectory as Trajectory
 from fingerpad.geometry.trajectory_files import read_trajectory as read_trajectory
+from fingerpad.inference.recordings import RateRecordings as RateRecordings
+from fingerpad.inference.typed_fit import fit_afferent as fit_afferent
 from fingerpad.mechanics.materials import Energy as Energy
 from fingerpad.mechanics.materials import Hencky as Hencky
 from fingerpad.mechanics.materials import Hyperfoam as Hyperfoam

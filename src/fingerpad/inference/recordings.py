@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 
 from fingerpad.core.checks import FloatArray, float_array, instance
 from fingerpad.core.errors import InputError
+from fingerpad.core.keywords import KnownKeywords
 from fingerpad.core.signals import SpikeTrains
 from fingerpad.core.values import converted
 from fingerpad.neuron.rate_windows import Windows
@@ -24,7 +25,7 @@ ROUNDING_MS = 1e-6
 
 @dataclass(frozen=True)
 @converted
-class RateRecordings:
+class RateRecordings(metaclass=KnownKeywords):
     """Firing rates of one afferent, one row per stimulus.
 
     Parameters
@@ -96,7 +97,7 @@ class RateRecordings:
 
 @dataclass(frozen=True)
 @converted
-class SpikeRecordings:
+class SpikeRecordings(metaclass=KnownKeywords):
     """Spike trains of one afferent, one per presentation of a stimulus.
 
     Parameters

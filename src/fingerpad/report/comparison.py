@@ -102,7 +102,11 @@ def count_sentence(statements: Sequence[Statement], name: str) -> str:
         for verdict in Verdict
         if verdict in found or verdict in (Verdict.MET, Verdict.MISSED)
     ]
-    missed = [statement for statement, verdict in verdicts.items() if verdict is Verdict.MISSED]
+    missed = [
+        f"{statement} (fitted)" if statement in fitted else statement
+        for statement, verdict in verdicts.items()
+        if verdict is Verdict.MISSED
+    ]
     return (
         f"{name}: of {len(statements)} statements of the paper that can fail, {joined(counted)}"
         + (f", {len(fitted)} fitted" if fitted else "")
