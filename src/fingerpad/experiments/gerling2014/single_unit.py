@@ -19,7 +19,7 @@ from fingerpad.inference.fitting.cross_validation import (
     cross_validate,
     interleaved_folds,
 )
-from fingerpad.inference.fitting.methods import Fit, Method
+from fingerpad.inference.fitting.methods import Fit, FitStep, Method
 from fingerpad.inference.rate_model import AfferentModel
 from fingerpad.inference.rate_problem import RateProblem
 from fingerpad.inference.recordings import RateRecordings
@@ -111,7 +111,10 @@ def bar_recordings() -> RateRecordings:
 
 
 def fit(
-    problem: RateProblem, memberships: ArrayLike | None = None, method: Method | None = None
+    problem: RateProblem,
+    memberships: ArrayLike | None = None,
+    method: Method | None = None,
+    known: FloatArray | None = None,
 ) -> tuple[Fit, CrossValidation]:
     """Best fit to all shifts, and the six folds.
 
@@ -123,10 +126,17 @@ def fit(
         Fold of each shift; default: assigned in turn.
     method : Method, optional
         Fits the paper's six parameters; default: the paper's method from both of its start points.
+    known : array (6,), optional
+        Parameters of a fit to all shifts that was made before; only the folds are fitted then.
     """
     method, everything = method or response_surface(), np.arange(problem.n_observations)
     folds = interleaved_folds(everything.size) if memberships is None else memberships
-    return method.fit(problem, everything), cross_validate(problem, method, folds)
+    if known is None:
+        best = method.fit(problem, everything)
+    else:
+        score = problem.score(known, everything)
+        best = Fit(known, score, n_evaluations=0, seconds=0.0, history=(FitStep(known, score),))
+    return best, cross_validate(problem, method, folds)
 
 
 @result_class
