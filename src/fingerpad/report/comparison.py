@@ -12,7 +12,6 @@ from fingerpad.report.parts import COLUMNS, Row, Table
 SIGNS = {
     Verdict.MET: "✓",
     Verdict.MISSED: "✗",
-    Verdict.NOT_JUDGED: "○",
     Verdict.NOT_DECIDABLE: "?",
     Verdict.NOT_APPLICABLE: "–",
 }

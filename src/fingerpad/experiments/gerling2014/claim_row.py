@@ -31,8 +31,6 @@ class Verdict(StrEnum):
 
     MET = "met"
     MISSED = "missed"
-    NOT_JUDGED = "not judged"
-    """It cannot be compared: the paper gives no number, or not the inputs behind its number."""
     NOT_DECIDABLE = "not decidable"
     """The outcome depends on a reading that the paper leaves open, or lies within the Monte-Carlo error."""
     NOT_APPLICABLE = "does not apply"
