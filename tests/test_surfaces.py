@@ -407,6 +407,10 @@ def test_an_open_box_is_refused_where_its_opening_faces_the_skin(side, turned):
             *_together((LOW, [-5e-5, 0, 1.5], SIDES), ([5e-5, -1.5, -1.5], HIGH, SIDES)),
             "must overlap or stand apart by more than 0.01 mm",
         ),
+        (
+            *_together((LOW, [-5e-5, 0, 1.5], SIDES), ([5e-5, -1, -0.5], [1, 1, 2.5], SIDES)),
+            "walls of two are 0.0001 mm apart",
+        ),
         (CUBE * np.nan, SIDES, "finite numbers"),
         (CUBE, np.zeros((0, 3), int), "at least one triangle"),
         (CUBE * [1.0, 0.0, 0.0], SIDES, "triangles with an area"),

@@ -48,7 +48,7 @@ def repaired(vertices_mm: FloatArray, faces: IntArray) -> tuple[FloatArray, IntA
         inner, place, apart_mm = walls
         kept = faces[~inner]
         vertices_mm, kept, *_ = _joined(vertices_mm, kept, border_of(kept))
-        if len(border_of(kept)) > len(border):
+        if not inner.any() or len(border_of(kept)) > len(border):
             raise InputError(
                 f"Parts of a surface must overlap or stand apart by more than {JOIN_MM:g} mm: walls of two "
                 f"are {apart_mm:.2g} mm apart at ({', '.join(f'{at:.4g}' for at in place)}) mm; unite them, "
@@ -121,6 +121,8 @@ def _joined(
     vertices: FloatArray, faces: IntArray, border: IntArray
 ) -> tuple[FloatArray, IntArray, int, float]:
     """Join the ends of edges that run back to back; also how many vertices are gone, and the largest move."""
+    if not len(border):
+        return vertices, faces, 0, 0.0
     _, a, b = border.T
     way = vertices[b] - vertices[a]
     within = min(JOIN_MM, 0.1 * float(np.median(np.linalg.norm(way, axis=1))))
