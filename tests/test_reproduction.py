@@ -308,18 +308,6 @@ def test_the_nearest_step_is_the_skins_and_not_the_meshs(studied):
     assert found["largest_difference"] < found["limit"] == 0.1
 
 
-def test_spike_trains_are_complete(studied):
-    found = studied("spike-fit")["spike_fit"]
-    assert len(found["variability"]["sources"]) == 5
-    recovery = found["recovery"]
-    for name in ("start", "truth", "estimate", "standard_error", "low", "high"):
-        assert len(recovery[name]) == len(found["names"]) == 5
-    assert recovery["n_held"] >= 3
-    assert recovery["rescaled"]["distance"] < 2.0 * recovery["rescaled"]["limit"]
-    assert len(found["raster"]["spikes_ms"]) == 36
-    assert len(found["other_noise"]) == 3
-
-
 def test_discrimination_is_complete(of_set):
     found = of_set["discrimination"]
     assert len(found["curvature_per_m"]) == 7
