@@ -98,7 +98,7 @@ def synthetic_set(tissues: str = "paper") -> dict:
             ),
             _compared("statement", "latency", "diverge", "0.0", "not decidable"),
             _compared("fitted", "hit rate at 296 /m", "0.58", "0.71", "missed", fitted_to="noise"),
-            _compared("addition", "force under the cylinder", "–", "210 mN", "not judged"),
+            _compared("addition", "force under the cylinder", "–", "210 mN", "not decidable"),
         ],
     }
 
@@ -588,7 +588,6 @@ def test_a_miss_is_marked_in_words_and_by_its_cell(report):
         ("met", "✓ met"),
         ("missed", "✗ missed"),
         ("missed", "✗ missed (fitted)"),
-        ("open", "○ not judged"),
         ("open", "? not decidable"),
     }
 
