@@ -22,6 +22,7 @@ from fingerpad.core.results import to_json
 from fingerpad.core.signals import SedTraces, SpikeTrains
 from fingerpad.data import bar_firing_rates
 from fingerpad.experiments import runner
+from fingerpad.experiments.afferent_files import fitted_afferent
 from fingerpad.experiments.conditions import RECEPTOR_X_MM, Conditions
 from fingerpad.experiments.descriptions.stimuli import NamedStimulus
 from fingerpad.experiments.fit import fit as study
@@ -46,6 +47,7 @@ from fingerpad.inference.recordings import RateRecordings, SpikeRecordings
 from fingerpad.inference.soft_afferent import soft_spikes
 from fingerpad.inference.start_points import start_points
 from fingerpad.neuron.afferent import Afferent
+from fingerpad.neuron.afferent_types import RA
 from fingerpad.neuron.rate_windows import PAPER_WINDOWS_MS
 from fingerpad.neuron.transduction import drive
 from fingerpad.report import recording_fit as report
@@ -482,6 +484,20 @@ def test_what_is_asked_for_beside_the_fit_is_on_its_page(call, tmp_path, monkeyp
         assert words in page
 
 
+def test_chosen_numbers_of_another_type_are_fitted_and_read_by_a_touch(call, tmp_path):
+    (tmp_path / "mine.csv").write_text(
+        "shift_mm,dynamic_rate_hz\n" + "".join(f"{shift},{100 + 20 * shift}\n" for shift in SHIFTS_MM)
+    )
+    status, said, errors = call("mine.csv", "--stimulus", "bar", "--afferent", "RA", "--free", "threshold")
+    assert (status, errors) == (0, "")
+    assert said.startswith("RA fitted to 6 stimuli: threshold ")
+    results = json.loads((tmp_path / "fit" / "fit.json").read_text())
+    afferent = fitted_afferent(tmp_path / "fit" / "fit.json")
+    assert isinstance(afferent, RA)
+    assert results["fitted"] == {"threshold": afferent.threshold}
+    assert results["windows_ms"][0] == [0.0, 50.0]  # RA are counted in all of the ramp
+
+
 def test_listed_stimuli_folds_of_the_file_and_options_reach_the_fit(call, tmp_path):
     (tmp_path / "list.csv").write_text(
         "name,object,object.width_mm,motion.depth_mm,place.x_mm,motion.hold_ms\n"
@@ -505,6 +521,12 @@ def test_listed_stimuli_folds_of_the_file_and_options_reach_the_fit(call, tmp_pa
 @pytest.mark.parametrize(
     ("arguments", "content", "said"),
     [
+        (
+            ["mine.csv", "--stimulus", "bar", "--afferent", "RA"],
+            ROWS,
+            "--free must name at least one number of RA",
+        ),
+        (["mine.csv", "--stimulus", "bar", "--free", "x"], ROWS, "--free must be one of"),
         ([], ROWS, "fit needs recordings and --stimulus, or --example"),
         (["mine.csv"], ROWS, "--stimulus is missing: write --stimulus bar"),
         (["none.csv", "--stimulus", "bar"], ROWS, "none.csv must be a file that can be read"),

@@ -44,7 +44,7 @@ def ramps(quantity, heights):
 def test_numbers_of_any_type_are_found_again(afferent, free, factor, heights):
     traces = ramps(afferent.static_quantity, heights)
     known = replace(afferent, **{name: factor * getattr(afferent, name) for name in free})
-    dynamic, static = TypedModel(known, (), traces).evaluate(np.empty(0))
+    dynamic, static = TypedModel(known, (), [traces]).evaluate(np.empty(0))
     assert dynamic.all()
     recorded = fp.RateRecordings(NAMES, dynamic, static if static.all() else None)
     found = fp.fit_afferent(afferent, free, traces, recorded)
@@ -52,7 +52,7 @@ def test_numbers_of_any_type_are_found_again(afferent, free, factor, heights):
     assert found.fss_out_of_sample > 0.9
     for name in free:  # one to three spikes of a PC determine its threshold within a fifth
         assert getattr(found.afferent, name) == pytest.approx(getattr(known, name), rel=0.25)
-    again, _ = TypedModel(found.afferent, (), traces).evaluate(np.empty(0))
+    again, _ = TypedModel(found.afferent, (), [traces]).evaluate(np.empty(0))
     np.testing.assert_array_equal(found.dynamic_rate_hz, again)
 
 

@@ -86,6 +86,16 @@ def fit_command(
     offset: Annotated[
         bool, typer.Option("--offset", help="Also fit the position of the receptor along the finger.")
     ] = False,
+    afferent: Annotated[
+        str | None, typer.Option(help="Type of the afferent for --free: SAI, RA, PC or SAII. Default: SAI.")
+    ] = None,
+    free: Annotated[
+        str,
+        typer.Option(
+            help="Fit these numbers of the type alone, separated by commas, as in --afferent RA "
+            "--free threshold. Default: the four that spikes of an SAI determine."
+        ),
+    ] = "",
     folds: Annotated[
         int | None,
         integer_option("Number of interleaved folds. Default: 6, or the column fold of the recordings."),
@@ -123,9 +133,11 @@ def fit_command(
     from fingerpad.experiments import schemas
     from fingerpad.experiments.descriptions.pressing import finger_of, named_files
     from fingerpad.experiments.descriptions.reading import at
+    from fingerpad.experiments.fit.chosen_numbers import fit_chosen_numbers
     from fingerpad.experiments.fit.session import EXAMPLE, FitRequest, example_recordings, run_fit
     from fingerpad.experiments.manifest import sha256
     from fingerpad.experiments.recording_files import read_recordings
+    from fingerpad.experiments.runner import Runner
     from fingerpad.report.recording_fit import fit_summary, write_fit_page
 
     if example is not None:
@@ -165,17 +177,21 @@ def fit_command(
         with_profiles=profiles,
         with_sensitivity=sensitivity,
         with_offset=offset,
+        afferent_type=afferent,
+        free=tuple(name.strip() for name in free.split(",") if name.strip()),
     )
     make_writable(out)
     named = [file for each in request.recorded.stimuli.values() for file in each.files]
     inputs = [recordings, *([] if stimulus == BAR else [Path(stimulus)]), *stimuli.finger_files, *named]
+    command = shlex.join(["fingerpad", *sys.argv[1:]])
+    hashes = {str(path): sha256(path) for path in inputs}
     with interruptible():
-        results = run_fit(
-            request,
-            progress(),
-            command=shlex.join(["fingerpad", *sys.argv[1:]]),
-            inputs={str(path): sha256(path) for path in inputs},
-        )
+        if request.free:
+            chosen = fit_chosen_numbers(request, Runner(out, request.jobs, progress()), command, hashes)
+            schemas.write(out / "fit.json", chosen)
+            typer.echo("\n".join([*chosen.summary(), f"Results: {out / 'fit.json'}"]))
+            return
+        results = run_fit(request, progress(), command, hashes)
         page = write_fit_page(results, out)
         schemas.write(out / "fit.json", results)
     for paragraph in fit_summary(results.fit):

@@ -59,6 +59,7 @@ def validate_command(
     from fingerpad.experiments.validation.observations import example_file, read_observations
     from fingerpad.experiments.validation.predictions import FingertipModel
     from fingerpad.experiments.validation.validation import ValidationRequest, validate
+    from fingerpad.neuron.afferent import Afferent
     from fingerpad.report.validation import validation_summary, write_validation_page
 
     if example is not None:
@@ -67,12 +68,10 @@ def validate_command(
         return
     if observations is None:
         raise InputError("validate needs a file of observations, or --example KIND: see --help.")
-    model = FingertipModel(
-        Conditions(resolution=resolution, tissues=tissues),
-        None if afferent is None else fitted_afferent(afferent, tissues),
-        loading,
-        static_window,
-    )
+    fitted = None if afferent is None else fitted_afferent(afferent, tissues)
+    if not isinstance(fitted, Afferent | None):
+        raise InputError(f"--afferent must hold an SAI afferent: {afferent} holds another type.")
+    model = FingertipModel(Conditions(resolution=resolution, tissues=tissues), fitted, loading, static_window)
     request = ValidationRequest(read_observations(observations), model, out, engine(jobs, scheduler))
     make_writable(out)
     inputs = [observations, *([] if afferent is None else [afferent])]

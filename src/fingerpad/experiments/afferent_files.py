@@ -2,17 +2,23 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
+from typing import Any, cast
 
 from fingerpad.core.errors import InputError, StoreError, shown
 from fingerpad.core.files import read_text
 from fingerpad.data.tissues import DEFAULT_TISSUES
 from fingerpad.experiments import schemas
 from fingerpad.mechanics.materials import Tissues
-from fingerpad.neuron.afferent import PARAMETER_NAMES, Afferent
+from fingerpad.neuron.afferent import PARAMETER_NAMES, Afferent, AnyAfferent
+from fingerpad.neuron.mixed_population import types_of_afferents
+
+CHOSEN = "fingerpad fit of chosen numbers"
+"""Format of a fit of some numbers of one type."""
 
 
-def fitted_afferent(path: Path, tissues: str | Tissues = DEFAULT_TISSUES) -> Afferent:
+def fitted_afferent(path: Path, tissues: str | Tissues = DEFAULT_TISSUES) -> AnyAfferent:
     """Afferent of a file of results: `fit.json`, or `results.json` of a reproduction.
 
     Parameters
@@ -25,7 +31,7 @@ def fitted_afferent(path: Path, tissues: str | Tissues = DEFAULT_TISSUES) -> Aff
 
     Returns
     -------
-    Afferent
+    Afferent or another type
 
     Raises
     ------
@@ -34,10 +40,13 @@ def fitted_afferent(path: Path, tissues: str | Tissues = DEFAULT_TISSUES) -> Aff
     """
     try:
         read_text(path)  # names a file that cannot be read
-        values = schemas.read(path, "fingerpad fit", "fingerpad reproduction")
+        values = schemas.read(path, "fingerpad fit", CHOSEN, "fingerpad reproduction")
     except (InputError, StoreError) as error:
         raise InputError(f"afferent: {error}") from error
     try:
+        if "fitted" in values:
+            kind: Any = types_of_afferents(tissues)[values["type"]]
+            return cast(AnyAfferent, replace(kind, **values["fitted"]))
         column = "human" if tissues == "human" else "paper"
         fitted = values["fit"] if "fit" in values else values[column]["single_unit"]
         named = values if "fit" in values else fitted

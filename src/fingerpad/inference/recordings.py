@@ -11,10 +11,10 @@ from numpy.typing import ArrayLike
 from fingerpad.core.checks import FloatArray, float_array, instance
 from fingerpad.core.errors import InputError
 from fingerpad.core.keywords import KnownKeywords
-from fingerpad.core.signals import SpikeTrains
+from fingerpad.core.signals import INTERVAL, SpikeTrains
 from fingerpad.core.values import converted
 from fingerpad.neuron.rate_windows import Windows
-from fingerpad.neuron.spikes import firing_rate_hz
+from fingerpad.neuron.spikes import RATE_OF
 
 PHASES = ("dynamic", "static")
 """The ramp and the hold."""
@@ -154,7 +154,7 @@ class SpikeRecordings(metaclass=KnownKeywords):
                     f"{outside:g} ms."
                 )
 
-    def rates(self, windows_ms: Windows) -> RateRecordings:
+    def rates(self, windows_ms: Windows, measure: str = INTERVAL) -> RateRecordings:
         """Compute the rates of each stimulus in the ramp and in the hold, Eqs. 6-10, mean over presentations.
 
         Parameters
@@ -162,6 +162,8 @@ class SpikeRecordings(metaclass=KnownKeywords):
         windows_ms : ((float, float), (float, float))
             Start and end of the dynamic and of the static window, such as `rate_windows_ms` of the phases of
             the motion. [ms]
+        measure : {"interval", "count"}
+            What a rate is: one over the mean interval, or spikes over the length of the window.
 
         Returns
         -------
@@ -183,7 +185,7 @@ class SpikeRecordings(metaclass=KnownKeywords):
         owner = np.array([names.index(name) for name in self.stimuli], dtype=np.int64)
         n_presentations = np.bincount(owner, minlength=len(names))
         dynamic, static = (
-            np.bincount(owner, firing_rate_hz(self.trains, window), len(names)) / n_presentations
+            np.bincount(owner, RATE_OF[measure](self.trains, window), len(names)) / n_presentations
             for window in windows_ms
         )
         return RateRecordings(names, dynamic, static, self.source)

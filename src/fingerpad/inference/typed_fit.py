@@ -21,7 +21,7 @@ from fingerpad.inference.rate_model import Rates, evaluate_rows
 from fingerpad.inference.rate_problem import RateProblem
 from fingerpad.inference.recordings import RateRecordings
 from fingerpad.neuron.afferent import AnyAfferent
-from fingerpad.neuron.rate_windows import rate_windows_ms
+from fingerpad.neuron.rate_windows import Windows, rate_windows_ms
 from fingerpad.neuron.spikes import RATE_OF
 
 LARGEST_FACTOR = 30.0
@@ -37,12 +37,13 @@ class TypedModel:
 
     afferent: AnyAfferent
     names: tuple[str, ...]
-    traces: SedTraces
+    traces: Sequence[SedTraces]
+    windows_ms: Windows | None = None
 
     @property
     def n_stimuli(self) -> int:
         """Number of stimuli, one per column of the traces."""
-        return self.traces.n_sites
+        return sum(traces.n_sites for traces in self.traces)
 
     def at(self, parameters: FloatArray) -> AnyAfferent:
         """Return the afferent with other numbers."""
@@ -53,9 +54,13 @@ class TypedModel:
     def evaluate(self, parameters: FloatArray) -> Rates:
         """Dynamic and static rate under each stimulus, as the type measures them. [spikes/s]"""
         measure = getattr(self.afferent, "rate_measure", INTERVAL)
-        windows = rate_windows_ms(self.traces.phases, None, None, self.traces.times_ms[-1], measure)
-        spikes = self.at(parameters).spikes(self.traces)
-        dynamic, static = (RATE_OF[measure](spikes, window) for window in windows)
+        given, afferent = self.windows_ms or (None, None), self.at(parameters)
+        rates = []
+        for traces in self.traces:
+            spikes = afferent.spikes(traces)
+            windows = rate_windows_ms(traces.phases, given[0], given[1], traces.times_ms[-1], measure)
+            rates.append([RATE_OF[measure](spikes, window) for window in windows])
+        dynamic, static = (np.concatenate(phase) for phase in zip(*rates, strict=True))
         return dynamic, static
 
     def evaluate_batch(self, points: FloatArray) -> Rates:
@@ -87,13 +92,23 @@ class TypedFit:
     static_rate_hz: FloatArray
 
 
+def _largest_factor(afferent: AnyAfferent, name: str) -> float:
+    """Return by how much a number can grow: a share of the response only to 1."""
+    try:
+        replace(cast(Any, afferent), **{name: getattr(afferent, name) * LARGEST_FACTOR})
+    except InputError:
+        return max(1.0 / float(getattr(afferent, name)), 1.0 + 1e-9)
+    return LARGEST_FACTOR
+
+
 @known_keywords
 def fit_afferent(
     afferent: AnyAfferent,
     free: Sequence[str],
-    traces: SedTraces,
+    traces: SedTraces | Sequence[SedTraces],
     recordings: RateRecordings,
     memberships: ArrayLike | None = None,
+    windows_ms: Windows | None = None,
 ) -> TypedFit:
     """Fit chosen numbers of an RA, PC, SAII or SAI afferent, or of one's own, to recorded rates.
 
@@ -106,12 +121,14 @@ def fit_afferent(
         Its type, and about which numbers is searched; a dataclass.
     free : sequence of str
         Names of the numbers that are fitted, such as "threshold" and "retraction"; each above 0.
-    traces : SedTraces
-        What the afferent follows, one column per stimulus of `recordings` (`SedTraces.joined`).
+    traces : SedTraces or sequence of SedTraces
+        What the afferent follows, one column per stimulus of `recordings`.
     recordings : RateRecordings
         Observed rates; a phase that is silent in all stimuli is left out as None.
     memberships : int array (n_stimuli,), optional
         Fold of each stimulus from 0; by default in turn to six, or one per stimulus where there are fewer.
+    windows_ms : ((float, float), (float, float)), optional
+        Windows of the dynamic and of the static rate; by default those of `rate_windows_ms`. [ms]
 
     Returns
     -------
@@ -130,7 +147,7 @@ def fit_afferent(
     >>> course, heights = np.array([0.0, 1.0, 1.0]), np.array([4.0, 6.0, 9.0, 13.0, 18.0])
     >>> stress = fp.SedTraces([0.0, 50.0, 1000.0], np.outer(course, heights), kinks_ms=[50.0],
     ...     dynamic_quantity="compressive_stress", static_quantity="compressive_stress")
-    >>> known = TypedModel(fp.RA(threshold=0.2), (), stress).evaluate(np.empty(0))
+    >>> known = TypedModel(fp.RA(threshold=0.2), (), [stress]).evaluate(np.empty(0))
     >>> recordings = RateRecordings(("a", "b", "c", "d", "e"), known[0], None)
     >>> found = fit_afferent(fp.RA(), ["threshold"], stress, recordings)
     >>> 0.15 < found.afferent.threshold < 0.25, found.fss_in_sample > 0.95
@@ -139,12 +156,15 @@ def fit_afferent(
     known = tuple(getattr(afferent, "__dataclass_fields__", ()))
     for name in free:
         positive(one_of("free", name, known), getattr(afferent, name))
-    model = TypedModel(afferent, tuple(free), traces)
+    model = TypedModel(
+        afferent, tuple(free), (traces,) if isinstance(traces, SedTraces) else tuple(traces), windows_ms
+    )
     if not model.names:
         raise InputError(f"free must name at least one number of {type(afferent).__name__}: got none.")
     problem = RateProblem(model, recordings)
-    bound = np.full(len(model.names), np.log(LARGEST_FACTOR))
-    bounds = Bounds(np.full(bound.size, np.log(2.0)), -bound, bound)
+    low = np.full(len(model.names), -np.log(LARGEST_FACTOR))
+    high = np.log([_largest_factor(afferent, name) for name in model.names])
+    bounds = Bounds(np.minimum(np.log(2.0), 0.5 * high), low, high)
     method = LeastSquares(bounds.spread(N_STARTS), bounds, n_refined=N_REFINED)
     everything = np.arange(problem.n_observations)
     folds = interleaved_folds(len(everything), min(int(protocol.FOLDS.value), len(everything)))

@@ -103,7 +103,10 @@ def check_windows(windows_ms: Windows, end_ms: float) -> Windows:
 
 
 def common_rate_windows_ms(
-    touches: Sequence[Sequence[Phase]], dynamic_ms: Window | None = None, static_ms: Window | None = None
+    touches: Sequence[Sequence[Phase]],
+    dynamic_ms: Window | None = None,
+    static_ms: Window | None = None,
+    measure: str = INTERVAL,
 ) -> Windows:
     """Return the windows that several touches share, each given by its phases, as `rate_windows_ms`.
 
@@ -118,7 +121,8 @@ def common_rate_windows_ms(
     Traceback (most recent call last):
     fingerpad.core.errors.InputError: Windows of the rates must be given where the phases differ: ...
     """
-    found = list(dict.fromkeys(rate_windows_ms(phases, dynamic_ms, static_ms) for phases in touches))
+    asked = (rate_windows_ms(phases, dynamic_ms, static_ms, measure=measure) for phases in touches)
+    found = list(dict.fromkeys(asked))
     if len(found) != 1:
         shown = " or ".join(", ".join(f"{start:g}-{end:g} ms" for start, end in windows) for windows in found)
         raise InputError(f"Windows of the rates must be given where the phases differ: got {shown}.")

@@ -10,12 +10,14 @@ from typing import Literal
 
 import numpy as np
 
-from fingerpad.core.checks import IntArray, one_of
+from fingerpad.core.checks import IntArray, one_of, positive
 from fingerpad.core.engine import Engine, engine_of
 from fingerpad.core.errors import InputError
 from fingerpad.core.keywords import KnownKeywords, known_keywords
 from fingerpad.core.progress import Progress
 from fingerpad.core.results import result_class
+from fingerpad.core.signals import INTERVAL
+from fingerpad.data.afferents import TYPES
 from fingerpad.data.observations import bar_firing_rates
 from fingerpad.experiments.conditions import Conditions
 from fingerpad.experiments.descriptions.stimuli import NamedStimulus
@@ -30,6 +32,8 @@ from fingerpad.experiments.stimuli import Stimuli, along_skin
 from fingerpad.inference.afferent_methods import OFFSETS_MM
 from fingerpad.inference.identifiable import IDENTIFIABLE_NAMES
 from fingerpad.inference.recordings import RateRecordings
+from fingerpad.neuron.afferent import AnyAfferent
+from fingerpad.neuron.mixed_population import types_of_afferents
 from fingerpad.neuron.rate_windows import Window, Windows, common_rate_windows_ms
 from fingerpad.skin.fields import sampled_fields
 from fingerpad.skin.indentation import Touch
@@ -99,6 +103,10 @@ class FitRequest(metaclass=KnownKeywords):
         Whether Sobol indices of FSS are computed.
     with_offset : bool
         Whether the receptor's offset along the finger is fitted as well.
+    afferent_type : str, optional
+        Type of the afferent, such as "RA", for a fit of chosen numbers by `fit_chosen_numbers`.
+    free : tuple of str
+        Names of these numbers.
 
     Raises
     ------
@@ -121,9 +129,13 @@ class FitRequest(metaclass=KnownKeywords):
     with_profiles: bool = False
     with_sensitivity: bool = False
     with_offset: bool = False
+    afferent_type: str | None = None
+    free: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         one_of("method", self.method, METHODS)
+        if self.afferent_type is not None or self.free:
+            self._check_chosen()
         for name, quantity in zip(("dynamic_quantity", "static_quantity"), self.quantities, strict=True):
             one_of(name, quantity, tuple(sampled_fields()))
         engine_of(self.jobs)
@@ -141,24 +153,58 @@ class FitRequest(metaclass=KnownKeywords):
                 )
         if self.with_offset:
             check_offset(self.method, [stimulus.x_mm for stimulus in self.recorded.stimuli.values()])
-        check_enough(self.rates, self.memberships, len(IDENTIFIABLE_NAMES) + self.with_offset)
+        n_free = len(self.free) or len(IDENTIFIABLE_NAMES) + self.with_offset
+        check_enough(self.rates, self.memberships, n_free)
         if self.method == "likelihood":
             motions = {stimulus.motion for stimulus in self.recorded.stimuli.values()}
             check_spikes(self.recorded.recordings, len(motions))
         # Built here, so that an error comes before anything is solved.
         self.touches  # noqa: B018
 
+    def _check_chosen(self) -> None:
+        """Refuse a fit of chosen numbers that names none, or asks for what only the four numbers have."""
+        numbers = tuple(getattr(self.afferent, "__dataclass_fields__", ()))
+        if not self.free:
+            raise InputError(
+                f"--free must name at least one number of {self.kind}, one of {', '.join(numbers)}: got none."
+            )
+        for name in self.free:
+            positive(one_of("--free", name, numbers), getattr(self.afferent, name))
+        for option in ("with_posterior", "with_profiles", "with_sensitivity", "with_offset"):
+            if getattr(self, option):
+                raise InputError(
+                    f"--{option.removeprefix('with_')} belongs to the fit of all numbers of SAI: leave it "
+                    "out with --free."
+                )
+        if self.method != "least_squares":
+            raise InputError(f"--free needs the method least_squares: got {self.method}.")
+
+    @property
+    def kind(self) -> str:
+        """Type of the afferent, SAI unless another is named."""
+        return one_of("--afferent", self.afferent_type or TYPES[0], TYPES)
+
+    @cached_property
+    def afferent(self) -> AnyAfferent:
+        """Afferent about whose numbers is searched: that of its type with the tissues pressed."""
+        return types_of_afferents(self.conditions.tissues)[self.kind]
+
+    @cached_property
+    def measure(self) -> str:
+        """What a rate of the afferent is, "interval" or "count"."""
+        return getattr(self.afferent, "rate_measure", INTERVAL)
+
     @cached_property
     def used_windows_ms(self) -> Windows:
         """Windows of the two rates, the same for all stimuli. [ms]"""
         touches = [stimulus.motion.phases for stimulus in self.recorded.stimuli.values()]
-        return common_rate_windows_ms(touches, *self.windows_ms)
+        return common_rate_windows_ms(touches, *self.windows_ms, self.measure)
 
     @cached_property
     def rates(self) -> RateRecordings:
         """What is fitted."""
         given = self.recorded.recordings
-        return given if isinstance(given, RateRecordings) else given.rates(self.used_windows_ms)
+        return given if isinstance(given, RateRecordings) else given.rates(self.used_windows_ms, self.measure)
 
     @cached_property
     def memberships(self) -> IntArray:
@@ -182,6 +228,8 @@ class FitRequest(metaclass=KnownKeywords):
     def quantities(self) -> tuple[str, str]:
         """Quantities of the dynamic and of the static term."""
         default = self.conditions.quantity
+        if self.free:
+            return self.afferent.dynamic_quantity, self.afferent.static_quantity
         return self.dynamic_quantity or default, self.static_quantity or default
 
 

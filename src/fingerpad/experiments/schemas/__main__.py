@@ -12,12 +12,20 @@ from fingerpad.experiments.descriptions.explained import explained_schema
 from fingerpad.experiments.descriptions.pressed import TouchFile
 from fingerpad.experiments.descriptions.touch import TouchDescription
 from fingerpad.experiments.discrimination.run import DiscriminationFile
+from fingerpad.experiments.fit.chosen_numbers import ChosenNumbersFile
 from fingerpad.experiments.fit.session import FitFile
 from fingerpad.experiments.gerling2014.reproduction import ReproductionResult
 from fingerpad.experiments.schemas import TOUCH_SCHEMA, file_name
 from fingerpad.experiments.validation.validation import ValidationFile
 
-RESULT_FILES: tuple[type, ...] = (ReproductionResult, FitFile, DiscriminationFile, ValidationFile, TouchFile)
+RESULT_FILES: tuple[type, ...] = (
+    ReproductionResult,
+    FitFile,
+    ChosenNumbersFile,
+    DiscriminationFile,
+    ValidationFile,
+    TouchFile,
+)
 """Classes of results that are written to a file of their own."""
 
 
