@@ -36,6 +36,8 @@ FURTHER = {
     "core.progress": ("Lines", "NoProgress", "Progress", "share_done"),
     "experiments.discrimination.analysis": ("TaskResult",),
     "experiments.fit.results": ("FitResult",),
+    "experiments.descriptions.pressing": ("ramp_and_hold",),
+    "geometry.trajectory_files": ("recorded",),
     "inference.rate_model": ("AfferentModel",),
     "inference.recordings": ("SpikeRecordings",),
     "inference.spike_fit": ("SpikeFit", "fit_spikes"),

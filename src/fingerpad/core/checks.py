@@ -19,13 +19,7 @@ _Kind = TypeVar("_Kind")
 
 
 def finite(name: str, value: float, unit: str = "") -> float:
-    """Return `value` as float if it is one finite number, else raise `InputError`.
-
-    Examples
-    --------
-    >>> finite("depth_mm", 1, "mm")
-    1.0
-    """
+    """Return `value` as float if it is one finite number, else raise `InputError`."""
     number = _real(value)
     if not math.isfinite(number):
         raise InputError(f"{name} must be a finite number{_in(unit)}: got {shown(value)}.")
@@ -46,13 +40,7 @@ def _real(value: Any) -> float:
 
 
 def number_in(name: str, text: str, unit: str = "") -> float:
-    """Return the finite number that a text writes in plain digits, else raise `InputError`.
-
-    Examples
-    --------
-    >>> number_in("depth_mm", " 1e-1 ", "mm")
-    0.1
-    """
+    """Return the finite number that a text writes in plain digits, else raise `InputError`."""
     if not _DIGITS.fullmatch(text):
         raise InputError(f"{name} must be a finite number{_in(unit)}: got {shown(text)}.")
     return finite(name, float(text), unit)
@@ -80,14 +68,7 @@ def positive(name: str, value: float, unit: str = "") -> float:
 
 
 def plausible(name: str, value: float, unit: str, between: tuple[float, float]) -> float:
-    """Return `value` as float if it is a size that a laboratory has, else raise `InputError`.
-
-    Examples
-    --------
-    >>> plausible("depth_mm", 0.0005, "mm", (0.001, 20.0))
-    Traceback (most recent call last):
-    fingerpad.core.errors.InputError: depth_mm must lie within 0.001 to 20 mm: got 0.0005; check its unit.
-    """
+    """Return `value` as float if it is a size that a laboratory has, else raise `InputError`."""
     number = positive(name, value, unit)
     if not between[0] <= number <= between[1]:
         raise InputError(
@@ -105,13 +86,7 @@ def not_negative(name: str, value: float, unit: str = "") -> float:
 
 
 def pair(name: str, value: Any, unit: str = "mm") -> tuple[float, float]:
-    """Return x and z as floats if `value` is a pair of finite numbers, else raise `InputError`.
-
-    Examples
-    --------
-    >>> pair("at_mm", [17, 0])
-    (17.0, 0.0)
-    """
+    """Return x and z as floats if `value` is a pair of finite numbers, else raise `InputError`."""
     try:
         x, z = value
     except (TypeError, ValueError) as error:

@@ -38,16 +38,6 @@ def announce_compilation(kernels: Sequence[Any]) -> Iterator[None]:
     Nothing is logged if the first kernel is compiled already, and in one process only one block logs. The
     level is WARNING: without configuration Python writes WARNING to standard error and drops INFO.
     `logging.getLogger("fingerpad").setLevel("ERROR")` turns the messages off.
-
-    Parameters
-    ----------
-    kernels : sequence of Numba dispatchers
-        The kernels that the block calls, here or in other processes, the slowest to compile first.
-
-    Examples
-    --------
-    >>> with announce_compilation([len]):  # not compiled by Numba, so there is nothing to log
-    ...     pass
     """
     global _announced
     if _announced or not kernels or is_compiled(kernels[0]):

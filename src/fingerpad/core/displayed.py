@@ -42,10 +42,6 @@ class Displayed:
         **options
             Of the drawing, such as the `quantity` of a map.
 
-        Returns
-        -------
-        matplotlib.axes.Axes
-
         Raises
         ------
         InputError
@@ -81,10 +77,6 @@ class Result(Displayed):
 
     def to_xarray(self) -> xarray.Dataset:
         """Return this result as a labelled data set; every variable has an attribute `units`.
-
-        Returns
-        -------
-        xarray.Dataset
 
         Raises
         ------

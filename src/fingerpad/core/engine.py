@@ -56,28 +56,12 @@ class Engine(Protocol):
 
 @dataclass(frozen=True)
 class Processes:
-    """Engine of this computer: one process per job, or this process alone.
-
-    Parameters
-    ----------
-    jobs : int
-        Number of processes. With one, or for one item, the work is done here with all threads.
-    kernels : sequence of Numba dispatchers, optional
-        Those that the work calls: their compilation is announced.
-
-    Raises
-    ------
-    InputError
-        If `jobs` is not a whole number of at least 1.
-
-    Examples
-    --------
-    >>> [(number, outcome()) for number, outcome in Processes(1).map(lambda item, threads: 2 * item, [3, 4])]
-    [(0, 6), (1, 8)]
-    """
+    """Engine of this computer: one process per job, or this process alone."""
 
     jobs: int = 1
+    """Number of processes. With one, or for one item, the work is done here with all threads."""
     kernels: Sequence[Any] = ()
+    """Those that the work calls: their compilation is announced."""
 
     def __post_init__(self) -> None:
         whole("jobs", self.jobs, at_least=1)
@@ -88,13 +72,7 @@ class Processes:
         return self.jobs
 
     def map(self, work: Work, items: Sequence[Any]) -> Outcomes:
-        """Do the work; as of `Engine`.
-
-        Raises
-        ------
-        StoreError
-            If a process was ended from outside.
-        """
+        """Do the work; as of `Engine`."""
         if self.jobs > 1 and len(items) > 1:
             yield from self._in_processes(work, items)
         else:
@@ -140,10 +118,8 @@ def _workers(processes: int) -> Iterator[ProcessPoolExecutor]:
 
 @contextmanager
 def _signals_later() -> Iterator[None]:
-    """Let Ctrl-C and SIGTERM wait for the end of the block, so that no process is left half started.
-
-    A process that starts within it inherits that it receives no Ctrl-C.
-    """
+    """Let Ctrl-C and SIGTERM wait for the end of the block, so that no process is left half started."""
+    # A process that starts within it inherits that it receives no Ctrl-C.
     if sys.platform == "win32" or threading.current_thread() is not threading.main_thread():
         yield
         return
@@ -183,13 +159,7 @@ def _kill_workers(pool: ProcessPoolExecutor) -> None:
 
 
 def engine_of(jobs: int | Engine, kernels: Sequence[Any] = ()) -> Engine:
-    """Return an engine for what a caller gives as `jobs`: a number of processes, or an engine.
-
-    Raises
-    ------
-    InputError
-        If it is neither.
-    """
+    """Return an engine for what a caller gives as `jobs`: a number of processes, or an engine."""
     if hasattr(jobs, "map"):
         return cast(Engine, jobs)
     return Processes(cast(int, jobs), kernels)
@@ -211,10 +181,8 @@ def _environment(variables: dict[str, str]) -> Iterator[None]:
 
 
 def _begin(parent: int) -> None:
-    """Set up a worker, which logs nothing: its parent logs the compilation.
-
-    Ctrl-C reaches all processes of a terminal; the parent ends the workers.
-    """
+    """Set up a worker, which logs nothing: its parent logs the compilation."""
+    # Ctrl-C reaches all processes of a terminal; the parent ends the workers.
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     LOGGER.disabled = True
     _end_with_parent(parent)

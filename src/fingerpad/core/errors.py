@@ -45,13 +45,7 @@ class _Shown(reprlib.Repr):
 
 
 def shown(value: Any) -> str:
-    """Text of a value in an error: its `repr` on one line, shortened where it is long.
-
-    Examples
-    --------
-    >>> shown("half"), shown([0.0] * 1000), shown(10**5000)
-    ("'half'", '[0.0, 0.0, 0.0, 0.0, 0.0, 0.0, ...]', 'a whole number of 16610 bits')
-    """
+    """Text of a value in an error: its `repr` on one line, shortened where it is long."""
     return " ".join(_SHOWN.repr(value).split())
 
 
@@ -59,27 +53,13 @@ _SHOWN = _Shown()
 
 
 def did_you_mean(wrong: str, known: Collection[str], owner: str = "") -> str:
-    """Name the known word that is closest to a wrong one, or all of them.
-
-    Examples
-    --------
-    >>> did_you_mean("radius", ["curvature_per_m", "radius_mm"], "Sphere")
-    'did you mean radius_mm?'
-    >>> did_you_mean("colour", ["curvature_per_m", "radius_mm"], "Sphere")
-    'Sphere has curvature_per_m, radius_mm.'
-    """
+    """Name the known word that is closest to a wrong one, or all of them."""
     near = closest(wrong, known)
     return f"did you mean {near}?" if near else f"{owner or 'it'} has {', '.join(known) or 'no keyword'}."
 
 
 def closest(wrong: Any, known: Collection[str]) -> str | None:
-    """Known word that a wrong one may be meant for; None if none is close.
-
-    Examples
-    --------
-    >>> closest("shpere", ["sphere", "bar"])
-    'sphere'
-    """
+    """Known word that a wrong one may be meant for; None if none is close."""
     if not isinstance(wrong, str):
         return None
     names = [name for name in known if isinstance(name, str)]
@@ -92,15 +72,7 @@ def closest(wrong: Any, known: Collection[str]) -> str | None:
 
 
 def got(value: Any, known: Collection[str], shown: str | None = None) -> str:
-    """End of an error about a value that is none of several names.
-
-    Examples
-    --------
-    >>> got("humn", ["human", "paper"])
-    "got 'humn' (did you mean human?)."
-    >>> got("wood", ["human", "paper"])
-    "got 'wood'."
-    """
+    """End of an error about a value that is none of several names."""
     near, said = closest(value, known), f"got {shown or repr(value)}"
     return f"{said} (did you mean {near}?)." if near else f"{said}."
 

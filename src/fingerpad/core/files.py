@@ -15,27 +15,6 @@ def write_atomically(path: Path, content: bytes) -> None:
 
     The bytes are written to a temporary file in the same folder, flushed to the disk, and renamed.
     A concurrent reader gets the old file or the new one, never a part.
-
-    Parameters
-    ----------
-    path : Path
-        Path of the file; folders are created.
-    content : bytes
-        The complete content.
-
-    Raises
-    ------
-    StoreError
-        If the folder or the file cannot be written; an existing file is then unchanged.
-
-    Examples
-    --------
-    >>> from pathlib import Path
-    >>> from tempfile import TemporaryDirectory
-    >>> with TemporaryDirectory() as folder:
-    ...     write_atomically(Path(folder) / "deeper" / "note.txt", b"whole")
-    ...     (Path(folder) / "deeper" / "note.txt").read_bytes()
-    b'whole'
     """
     path = Path(path)
     # A rename is atomic within one file system only. The name is hidden and unique among processes.
@@ -63,13 +42,7 @@ LARGEST_TEXT_MB = 200
 
 
 def path_of(name: str, value: object) -> Path:
-    """Return a path given as a text or as a path, else raise `InputError`.
-
-    Examples
-    --------
-    >>> path_of("path", "touch.yaml").suffix
-    '.yaml'
-    """
+    """Return a path given as a text or as a path, else raise `InputError`."""
     if isinstance(value, str | os.PathLike) and isinstance(path := os.fspath(value), str):
         return Path(path)
     raise InputError(f"{name} must be a path, as a text or a Path: got {shown(value)}.")

@@ -26,18 +26,6 @@ def known_keywords(function: Callable[_Given, _Made]) -> Callable[_Given, _Made]
     """Make a function raise `InputError` for a keyword that it does not have, and for an argument too few.
 
     Arguments of other types than annotated are named where the call fails by one of Python's own errors.
-
-    Examples
-    --------
-    >>> @known_keywords
-    ... def area_mm2(width_mm, height_mm):
-    ...     return width_mm * height_mm
-    >>> area_mm2(2.0, heigth_mm=3.0)
-    Traceback (most recent call last):
-    fingerpad.core.errors.InputError: area_mm2 has no heigth_mm: did you mean height_mm?
-    >>> area_mm2(2.0)
-    Traceback (most recent call last):
-    fingerpad.core.errors.InputError: area_mm2 needs height_mm: it is not given.
     """
     signature = inspect.signature(function)
     names = tuple(name for name in signature.parameters if name not in _RECEIVERS)
@@ -117,33 +105,7 @@ def _refuse_mistyped(
 
 
 class OtherName:
-    """A size under another name than its field: a class takes it as a keyword, an instance has it.
-
-    Parameters
-    ----------
-    meaning : str or callable
-        The field that it is; or a function whose parameters are names like this one, and which returns values
-        of fields.
-    read : callable, optional
-        Value of an instance. By default that of the field.
-    unit : str
-        Of the values; empty for a ratio.
-
-    Examples
-    --------
-    >>> from dataclasses import dataclass
-    >>> @dataclass(frozen=True)
-    ... class Ball(metaclass=KnownKeywords):
-    ...     radius_mm: float = 1.0
-    ...     diameter_mm = OtherName(
-    ...         lambda diameter_mm: {"radius_mm": diameter_mm / 2}, lambda ball: 2 * ball.radius_mm
-    ...     )
-    >>> Ball(diameter_mm=3.0), Ball(diameter_mm=3.0).diameter_mm
-    (Ball(radius_mm=1.5), 3.0)
-    >>> Ball(diametre_mm=3.0)
-    Traceback (most recent call last):
-    fingerpad.core.errors.InputError: Ball has no diametre_mm: did you mean diameter_mm?
-    """
+    """A size under another name than its field: a class takes it as a keyword, an instance has it."""
 
     def __init__(
         self,
@@ -233,14 +195,7 @@ def _fields(kind: type) -> tuple[inspect.Parameter, ...]:
 
 
 def other_names(kind: type) -> dict[str, OtherName]:
-    """Return the other names of a class, inherited ones included.
-
-    Examples
-    --------
-    >>> from fingerpad.geometry.indenters import Sphere
-    >>> list(other_names(Sphere))
-    ['radius_mm', 'diameter_mm']
-    """
+    """Return the other names of a class, inherited ones included."""
     found = {name: part for home in reversed(kind.__mro__) for name, part in vars(home).items()}
     return {name: part for name, part in found.items() if isinstance(part, OtherName)}
 

@@ -32,29 +32,15 @@ MOST_RECEPTORS = 1_000_000
 @dataclass(frozen=True)
 @converted
 class Layout:
-    """Positions of receptors in a plane.
-
-    Parameters
-    ----------
-    places_mm : array (n_receptors, 2)
-        In the plane of the region. [mm]
-    pitch_mm : float
-        Distance of neighbours in a lattice; 1/sqrt(density) in a random layout. [mm]
-    pattern : str
-        One of `PATTERNS`.
-    seed : int, optional
-        Seed of random positions; None for a lattice.
-
-    Raises
-    ------
-    InputError
-        If there is no position or they are not pairs of finite numbers.
-    """
+    """Positions of receptors in a plane."""
 
     places_mm: FloatArray
+    """In the plane of the region, (n_receptors, 2). [mm]"""
     pitch_mm: float
+    """Distance of neighbours in a lattice; 1/sqrt(density) in a random layout. [mm]"""
     pattern: str
     seed: int | None = None
+    """Seed of random positions; None for a lattice."""
 
     def __post_init__(self) -> None:
         places = float_array("places_mm", self.places_mm, 2)
@@ -71,22 +57,10 @@ class Layout:
 
 
 def mean_spacing_mm(density_per_cm2: float) -> float:
-    """Side of the square with the area per receptor, 1/sqrt(density). [mm]
-
-    Examples
-    --------
-    >>> mean_spacing_mm(25.0)
-    2.0
-    """
+    """Side of the square with the area per receptor, 1/sqrt(density). [mm]"""
     return math.sqrt(MM2_PER_CM2 / density_per_cm2)
 
 
 def around_zero(count: int) -> FloatArray:
-    """Positions of `count` points with unit distance, centred on 0, (count,).
-
-    Examples
-    --------
-    >>> around_zero(2).tolist(), around_zero(3).tolist()
-    ([-0.5, 0.5], [-1.0, 0.0, 1.0])
-    """
+    """Positions of `count` points with unit distance, centred on 0, (count,)."""
     return np.arange(count, dtype=np.float64) - 0.5 * (count - 1)

@@ -31,19 +31,7 @@ ALIGNMENT = 64
 
 
 def is_compiled(kernel: Any) -> bool:
-    """Whether a cached Numba kernel need not be compiled.
-
-    Parameters
-    ----------
-    kernel : Numba dispatcher
-        A function decorated with `njit(cache=True)`.
-
-    Returns
-    -------
-    bool
-        True if it was compiled in this process, or if the cache on disk has it for this version of Python and
-        Numba and for the present source; also where nothing is compiled at all, as under NUMBA_DISABLE_JIT.
-    """
+    """Whether a cached Numba kernel need not be compiled."""
     if getattr(kernel, "signatures", ()):
         return True
     try:
@@ -79,52 +67,13 @@ def small_array(typing_context: Any, shape: Any) -> Any:
 
     Its memory is freed when the function that made it returns: pass it to other functions, but never return
     or store it. An array made in a loop has the same memory in each round.
-
-    Parameters
-    ----------
-    shape : tuple of int
-        Sizes, as literal numbers or global constants: the compiler must know them.
-
-    Returns
-    -------
-    array
-        Float64 in C order; its numbers are undefined.
-
-    Raises
-    ------
-    numba.errors.TypingError
-        If the compiler does not know the sizes.
-
-    Examples
-    --------
-    >>> from numba import njit
-    >>> @njit
-    ... def squares_of_three():
-    ...     squares = small_array((3,))
-    ...     for k in range(3):
-    ...         squares[k] = k * k
-    ...     return squares.sum()
-    >>> squares_of_three()
-    5.0
     """
     return _on_the_stack(shape, types.float64, ir.DoubleType())
 
 
 @intrinsic(prefer_literal=True)
 def small_single_array(typing_context: Any, shape: Any) -> Any:
-    """Uninitialised array of float32 for use in compiled functions, else like `small_array`.
-
-    Examples
-    --------
-    >>> from numba import njit
-    >>> @njit
-    ... def third():
-    ...     numbers = small_single_array((1,))
-    ...     numbers[0] = 1.0 / 3.0
-    ...     return numbers[0]
-    >>> third()
-    0.3333333432674408
-    """
+    """Uninitialised array of float32 for use in compiled functions, else like `small_array`."""
     return _on_the_stack(shape, types.float32, ir.FloatType())
 
 

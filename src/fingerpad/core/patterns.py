@@ -31,34 +31,7 @@ _MOST_ATTEMPTS = 1000
 
 @known_keywords
 def rectangular(region: Region, density_per_cm2: float) -> Layout:
-    """Square lattice, the pitch being 1/sqrt(density).
-
-    Parameters
-    ----------
-    region : Region
-        Where receptors may lie.
-    density_per_cm2 : float
-        Receptors per area. [1/cm²]
-
-    Returns
-    -------
-    Layout
-        Symmetric about the middle of the region's bounds, ordered by the first, then by the second
-        coordinate. A rectangle of whole pitches holds one receptor per cell.
-
-    Raises
-    ------
-    InputError
-        If the density is not positive, no receptor falls into the region, or there would be more than
-        `MOST_RECEPTORS`.
-
-    Examples
-    --------
-    >>> from fingerpad.core.regions import Rectangle
-    >>> paper = rectangular(Rectangle(length_mm=3.0, width_mm=6.0), density_per_cm2=100.0)
-    >>> len(paper), paper.pitch_mm, paper.places_mm[0].tolist()
-    (18, 1.0, [-1.0, -2.5])
-    """
+    """Square lattice, the pitch being 1/sqrt(density)."""
     _expected(region, density_per_cm2)
     pitch = mean_spacing_mm(density_per_cm2)
     middle, extent = _middle_and_extent(region)
@@ -108,33 +81,7 @@ def hexagonal(region: Region, density_per_cm2: float) -> Layout:
 
 @known_keywords
 def uniform(region: Region, density_per_cm2: float, seed: int) -> Layout:
-    """Independent positions with uniform probability.
-
-    Parameters
-    ----------
-    region, density_per_cm2
-        As in `rectangular`.
-    seed : int
-        Of the random numbers.
-
-    Returns
-    -------
-    Layout
-        Of density times area receptors, rounded.
-
-    Raises
-    ------
-    InputError
-        As `rectangular`, or if the seed is negative.
-
-    Examples
-    --------
-    >>> from fingerpad.core.regions import Ellipse
-    >>> disc = Ellipse(5.0, 5.0)
-    >>> random = uniform(disc, density_per_cm2=100.0, seed=7)
-    >>> len(random), bool(disc.contains(random.places_mm).all())
-    (79, True)
-    """
+    """Independent positions with uniform probability."""
     count = _expected(region, density_per_cm2)
     places = _inside(region, count, lambda who, attempt: _anywhere(region, seed, attempt, who))
     return Layout(places, mean_spacing_mm(density_per_cm2), "uniform", seed)
@@ -142,35 +89,7 @@ def uniform(region: Region, density_per_cm2: float, seed: int) -> Layout:
 
 @known_keywords
 def jittered(region: Region, density_per_cm2: float, seed: int, jitter: float = 0.2) -> Layout:
-    """Square lattice with random displacements: each coordinate by Normal(0, jitter times the pitch).
-
-    Parameters
-    ----------
-    region, density_per_cm2
-        As in `rectangular`.
-    seed : int
-        Of the random numbers.
-    jitter : float, optional
-        Standard deviation over the pitch; 0 leaves the lattice as it is.
-
-    Returns
-    -------
-    Layout
-        A displacement out of the region is sampled again.
-
-    Raises
-    ------
-    InputError
-        As `rectangular`, or if the jitter or the seed is negative.
-
-    Examples
-    --------
-    >>> from fingerpad.core.regions import Rectangle
-    >>> patch = Rectangle(3.0, 6.0)
-    >>> moved = jittered(patch, 100.0, seed=7, jitter=0.1).places_mm - rectangular(patch, 100.0).places_mm
-    >>> 0.05 < float(moved.std()) < 0.15
-    True
-    """
+    """Square lattice with random displacements: each coordinate by Normal(0, jitter times the pitch)."""
     lattice = rectangular(region, density_per_cm2)
     spread = not_negative("jitter", jitter) * lattice.pitch_mm
     places = _inside(

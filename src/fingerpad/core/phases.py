@@ -67,13 +67,7 @@ def ramp_and_hold_phases(
 
 
 def from_onset(phases: Sequence[Phase], onset_ms: float) -> tuple[Phase, ...]:
-    """Cut a phase that begins before first touch and ends after it: it begins there.
-
-    Examples
-    --------
-    >>> from_onset(ramp_and_hold_phases(150.0, 1100.0), 100.0)[0].window_ms
-    (100.0, 150.0)
-    """
+    """Cut a phase that begins before first touch and ends after it: it begins there."""
     return tuple(
         Phase(phase.name, onset_ms, phase.end_ms) if phase.start_ms < onset_ms < phase.end_ms else phase
         for phase in phases
@@ -81,13 +75,7 @@ def from_onset(phases: Sequence[Phase], onset_ms: float) -> tuple[Phase, ...]:
 
 
 def phase_named(phases: Sequence[Phase], name: str, asks: str = "phase") -> Phase:
-    """Return the first phase with a name, or raise `InputError` that says who asks.
-
-    Examples
-    --------
-    >>> phase_named(ramp_and_hold_phases(50.0, 1000.0), "hold").window_ms
-    (50.0, 1000.0)
-    """
+    """Return the first phase with a name, or raise `InputError` that says who asks."""
     for phase in phases:
         if phase.name == name:
             return phase

@@ -34,10 +34,6 @@ def read_yaml(text: str, source: str) -> Any:
     source : str
         Name of the source, for errors.
 
-    Returns
-    -------
-    mappings, lists, texts, numbers, booleans and None
-
     Raises
     ------
     InputError
@@ -67,20 +63,7 @@ def read_yaml(text: str, source: str) -> Any:
 
 
 def line_at(text: str, place: Sequence[int | str]) -> int | None:
-    r"""Line at which a place of a text in YAML begins; that of the last part that is there.
-
-    Parameters
-    ----------
-    text : str
-        One document, which `read_yaml` can read.
-    place : sequence of int or str
-        Keys and indices that lead there.
-
-    Examples
-    --------
-    >>> line_at("object:\n  kind: sphere\n  radius_mm: 3", ["object", "radius_mm"])
-    3
-    """
+    r"""Line at which a place of a text in YAML begins; that of the last part that is there."""
     try:
         node, line = yaml.compose(text, _Loader), None
     except (yaml.YAMLError, InputError):  # not what `read_yaml` read

@@ -167,13 +167,7 @@ def _line(stage: _Stage) -> str:
 
 
 class Bars:
-    """One bar per stage on a terminal; nothing elsewhere.
-
-    Parameters
-    ----------
-    console : rich.console.Console
-        The terminal.
-    """
+    """One bar per stage on a terminal; nothing elsewhere."""
 
     def __init__(self, console: Console):
         self._console = console
@@ -191,15 +185,7 @@ class Bars:
 
 
 class NotebookBars:
-    """One bar per stage below the cell of a notebook.
-
-    Parameters
-    ----------
-    display : callable
-        `IPython.display.display`.
-    every_s : float
-        Shortest time between two pictures of a bar. [s]
-    """
+    """One bar per stage below the cell of a notebook."""
 
     def __init__(self, display: Callable[..., object], every_s: float = 0.5):
         self._display, self._every_s = display, every_s

@@ -69,33 +69,14 @@ class Purpose(IntEnum):
 
 @dataclass(frozen=True)
 class Presentations:
-    """Site, trial and receptor of each spike train; trial and receptor are part of its random key.
-
-    Parameters
-    ----------
-    sites : int array (n_trains,)
-        Column of the current or drive.
-    trials : int array (n_trains,)
-        Number of the presentation; trains of one receptor need different ones.
-    receptors : int array (n_trains,)
-        Number of the end organ.
-
-    Raises
-    ------
-    InputError
-        If the three differ in length, a number is negative, or two trains have the same trial and receptor.
-
-    Examples
-    --------
-    >>> Presentations.of_population(n_receptors=2, n_trials=2).trials.tolist()
-    [0, 0, 1, 1]
-    >>> Presentations.of_one_afferent(n_stimuli=2, n_repeats=2).trials.tolist()
-    [0, 1, 2, 3]
-    """
+    """Site, trial and receptor of each spike train; trial and receptor are part of its random key."""
 
     sites: IntArray
+    """Column of the current or drive, (n_trains,)."""
     trials: IntArray
+    """Number of the presentation; trains of one receptor need different ones, (n_trains,)."""
     receptors: IntArray
+    """Number of the end organ, (n_trains,)."""
 
     def __post_init__(self) -> None:
         for name in ("sites", "trials", "receptors"):
@@ -135,97 +116,23 @@ class Presentations:
 
 
 def checked_sites(sites: IntArray, n_sites: int) -> IntArray:
-    """Return the sites of spike trains if a current has these columns, else raise `InputError`.
-
-    Parameters
-    ----------
-    sites : int array (n_trains,)
-        Of presentations, or chosen by the user.
-    n_sites : int
-        Number of columns of the current.
-
-    Returns
-    -------
-    int array (n_trains,)
-
-    Raises
-    ------
-    InputError
-        If one lies outside.
-
-    Examples
-    --------
-    >>> checked_sites(np.array([1, 0, 1]), n_sites=2).tolist()
-    [1, 0, 1]
-    """
+    """Return the sites of spike trains if a current has these columns, else raise `InputError`."""
     if sites.size and (sites.min() < 0 or sites.max() >= n_sites):
         raise InputError(f"sites must be within 0 ... {n_sites - 1}: got {sites.min()} ... {sites.max()}.")
     return sites
 
 
 def uniforms(seed: int, trials: Numbers, receptors: Numbers, purpose: Purpose, count: int) -> FloatArray:
-    """Draw uniform numbers of many streams at once.
-
-    Parameters
-    ----------
-    seed : int
-        Of the whole run; saved with its results.
-    trials, receptors : int or sequence of int
-        Presentations and end organs: their numbers, such as `range(3, 5)`, or their count, numbered from 0.
-    purpose : Purpose
-        Purpose of the numbers.
-    count : int
-        Numbers per stream.
-
-    Returns
-    -------
-    array (n_trials, n_receptors, count)
-        In [0, 1).
-
-    Raises
-    ------
-    InputError
-        If a number is negative or not whole, or the purpose is not a `Purpose`.
-
-    Examples
-    --------
-    >>> two_trials = uniforms(7, trials=2, receptors=[3, 5], purpose=Purpose.GAIN, count=4)
-    >>> two_trials.shape
-    (2, 2, 4)
-    >>> alone = uniforms(7, trials=[1], receptors=[5], purpose=Purpose.GAIN, count=1)
-    >>> bool(alone[0, 0, 0] == two_trials[1, 1, 0])
-    True
-    """
+    """Draw uniform numbers of many streams at once."""
     return _of_each_pair(seed, trials, receptors, purpose, count, normal=False)
 
 
 def normals(seed: int, trials: Numbers, receptors: Numbers, purpose: Purpose, count: int) -> FloatArray:
     """Draw standard normal numbers of many streams at once.
 
-    Parameters
-    ----------
-    seed, trials, receptors, purpose, count
-        As in `uniforms`.
-
-    Returns
-    -------
-    array (n_trials, n_receptors, count)
-        Mean 0, variance 1.
-
-    Raises
-    ------
-    InputError
-        As in `uniforms`.
-
     Notes
     -----
     Box & Muller 1958. NumPy computes normal numbers of the same generator by another method.
-
-    Examples
-    --------
-    >>> numbers = normals(7, trials=100, receptors=10, purpose=Purpose.GAIN, count=10)
-    >>> abs(float(numbers.mean())) < 0.05, 0.95 < float(numbers.std()) < 1.05
-    (True, True)
     """
     return _of_each_pair(seed, trials, receptors, purpose, count, normal=True)
 
@@ -242,15 +149,7 @@ def _of_each_pair(
 def draw_each(
     seed: int, trials: IntArray, receptors: IntArray, purpose: Purpose, count: int, normal: bool
 ) -> FloatArray:
-    """Draw uniform or normal numbers of the stream of each trial and receptor (n,), (n, count).
-
-    Examples
-    --------
-    >>> every = normals(7, trials=2, receptors=6, purpose=Purpose.GAIN, count=3)
-    >>> one = draw_each(7, np.array([1]), np.array([5]), Purpose.GAIN, 3, normal=True)
-    >>> bool((one[0] == every[1, 5]).all())
-    True
-    """
+    """Draw uniform or normal numbers of the stream of each trial and receptor (n,), (n, count)."""
     numbers = np.empty((trials.size, whole("count", count, 0, MOST_NUMBERS // max(trials.size, 1))))
     _fill(
         _number("seed", seed), trials, receptors, int(instance("purpose", purpose, Purpose)), normal, numbers
@@ -274,29 +173,7 @@ def _fill(seed, trials, receptors, purpose, normal, numbers):  # type: ignore[no
 
 
 def numbered(name: str, which: Numbers) -> IntArray:
-    """Return the numbers of trials or receptors: the given ones, or the first `which` from 0.
-
-    Parameters
-    ----------
-    name : str
-        Name of the argument, for the message.
-    which : int or sequence of int
-        Count, or the numbers themselves.
-
-    Returns
-    -------
-    int array (n,)
-
-    Raises
-    ------
-    InputError
-        If one is negative or not whole.
-
-    Examples
-    --------
-    >>> numbered("trials", 3).tolist(), numbered("trials", [4, 2]).tolist()
-    ([0, 1, 2], [4, 2])
-    """
+    """Return the numbers of trials or receptors: the given ones, or the first `which` from 0."""
     if isinstance(which, int | np.integer):
         return np.arange(whole(name, which, 1, MOST_NUMBERS), dtype=np.int64)
     if isinstance(which, np.ndarray) and np.issubdtype(which.dtype, np.integer) and which.min(initial=0) >= 0:

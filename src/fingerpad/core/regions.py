@@ -28,9 +28,7 @@ class Region(Protocol):
     """A part of the plane with an area and a test for points."""
 
     @property
-    def area_mm2(self) -> float:
-        """Area. [mm²]"""
-        ...
+    def area_mm2(self) -> float: ...
 
     @property
     def bounds_mm(self) -> tuple[Point, Point]:

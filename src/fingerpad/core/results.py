@@ -120,30 +120,7 @@ class ResultFile(Protocol):
 
 @dataclass_transform(frozen_default=True, kw_only_default=True)
 def result_class(cls: type[_Kind]) -> type[_Kind]:
-    """Make a class a frozen dataclass with named fields that are checked on construction.
-
-    Parameters
-    ----------
-    cls : type
-        Annotated fields, as of a dataclass. NumPy scalars are taken for Python's numbers.
-
-    Returns
-    -------
-    type
-        The dataclass; an unknown, missing or unfit field raises `pydantic.ValidationError`.
-
-    Examples
-    --------
-    >>> @result_class
-    ... class Rates:
-    ...     rate_hz: Vector
-    ...     label: str = "hold"
-    >>> rates = Rates(rate_hz=[1.0, np.nan])
-    >>> to_json(rates, indent=None)
-    b'{"rate_hz":[1.0,null],"label":"hold"}'
-    >>> from_json(Rates, to_json(rates)).rate_hz
-    array([ 1., nan])
-    """
+    """Make a class a frozen dataclass with named fields that are checked on construction."""
     cls._plain_scalars = model_validator(mode="before")(_plain_scalars)  # type: ignore[attr-defined]
     made: Any = dataclass(frozen=True, kw_only=True, config=ConfigDict(extra="forbid"))(cls)
     return made
@@ -167,33 +144,12 @@ def _plain(value: Any) -> Any:
 
 
 def to_json(result: Any, indent: int | None = 1) -> bytes:
-    """JSON of a result, null for NaN.
-
-    Parameters
-    ----------
-    result : instance of a `result_class`
-        What is written.
-    indent : int, optional
-        Spaces per level; None writes one line.
-    """
+    """JSON of a result, null for NaN."""
     return TypeAdapter(type(result)).dump_json(result, indent=indent)
 
 
 def from_json(cls: type[_Kind], content: bytes) -> _Kind:
-    """Read a result from its JSON.
-
-    Parameters
-    ----------
-    cls : type
-        The `result_class`.
-    content : bytes
-        As from `to_json`.
-
-    Raises
-    ------
-    InputError
-        If the content is no JSON, or a field is missing, unknown or unfit; the first one is named.
-    """
+    """Read a result from its JSON."""
     try:
         return TypeAdapter(cls).validate_json(content)
     except ValidationError as error:
@@ -210,22 +166,7 @@ def schema_of(cls: type) -> JsonSchema:
 
 
 def write_results(path: Path, results: ResultFile, schema: JsonSchema) -> None:
-    """Write a file of results atomically.
-
-    Parameters
-    ----------
-    path : Path
-        Path of the file; folders are created.
-    results : ResultFile
-        An instance of a `result_class` with format and version.
-    schema : dict
-        JSON schema that the file has to meet.
-
-    Raises
-    ------
-    StoreError
-        If the results do not meet the schema, or as `write_atomically`.
-    """
+    """Write a file of results atomically."""
     content = to_json(results)
     check_schema(path, json.loads(content), schema)
     write_atomically(path, content + b"\n")
@@ -243,20 +184,7 @@ def check_schema(path: Path, values: dict[str, Any], schema: JsonSchema) -> None
 
 
 def read_results(path: Path, cls: type[_Kind]) -> _Kind:
-    """Read a file of results.
-
-    Parameters
-    ----------
-    path : Path
-        Written by `write_results`.
-    cls : type
-        The class of its results, a `ResultFile`.
-
-    Raises
-    ------
-    StoreError
-        If the file cannot be read, has another format or version, or is damaged.
-    """
+    """Read a file of results."""
     content, _ = _json_of_format(path, dict([file_format(cls)]))
     try:
         return from_json(cls, content)
@@ -265,20 +193,7 @@ def read_results(path: Path, cls: type[_Kind]) -> _Kind:
 
 
 def read_format(path: Path, versions: Mapping[str, int]) -> dict[str, Any]:
-    """Read the JSON values of a file whose format and version are known.
-
-    Parameters
-    ----------
-    path : Path
-        Written by `write_results`.
-    versions : mapping of str to int
-        Version of each format that will do.
-
-    Raises
-    ------
-    StoreError
-        If the file cannot be read as JSON, or has another format or version.
-    """
+    """Read the JSON values of a file whose format and version are known."""
     return _json_of_format(path, versions)[1]
 
 

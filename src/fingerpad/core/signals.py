@@ -235,38 +235,7 @@ class SedTraces(Result):
 
 
 def traces_below(skin: Skin, sites: ArrayLike, dynamic_quantity: str, static_quantity: str) -> SedTraces:
-    """Traces of two quantities below sites of a skin.
-
-    Parameters
-    ----------
-    skin : Skin
-        A skin that has no quantity but strain energy density need not accept the arguments of `Skin.sed`
-        that name quantities.
-    sites : array_like (n_sites, 2) or (n_sites, 3)
-        As in `Skin.sed`. [mm]
-    dynamic_quantity, static_quantity : str
-        What the two terms of the current follow.
-
-    Returns
-    -------
-    SedTraces
-
-    Raises
-    ------
-    InputError
-        If there is no `sed`, or another quantity than strain energy density is needed and it accepts none.
-
-    Examples
-    --------
-    >>> class Pressed:
-    ...     def sed(self, sites):
-    ...         return SedTraces([0.0, 50.0], [[0.0] * len(sites), [2.0] * len(sites)])
-    >>> traces_below(Pressed(), [[17.0, 0.0]], "stored", "stored").n_sites
-    1
-    >>> traces_below(Pressed(), [[17.0, 0.0]], "von_mises", "stored")
-    Traceback (most recent call last):
-    fingerpad.core.errors.InputError: skin.sed must accept dynamic_quantity and static_quantity, since ...
-    """
+    """Traces of two quantities below sites of a skin."""
     if not callable(getattr(skin, "sed", None)):
         raise InputError(
             f"skin must have a method sed(sites), as a solved indentation has: got {skin!r:.60}."

@@ -22,27 +22,14 @@ Check = Callable[[str, Any, str], float]
 
 @dataclass(frozen=True)
 class TableRow:
-    """One row of a table and its position in the file.
-
-    Parameters
-    ----------
-    place : str
-        File and line, for messages.
-    entries : mapping of str to Any
-        Texts, or typed values, by column; an absent or empty entry was not given.
-    line : int, optional
-        Line of the file; 0 where there are no lines.
-
-    Examples
-    --------
-    >>> line = TableRow("rates.csv, line 2", {"static_rate_hz": "61"})
-    >>> line.number("static_rate_hz", "spikes/s"), line.has("fold")
-    (61.0, False)
-    """
+    """One row of a table and its position in the file."""
 
     place: str
+    """File and line, for messages."""
     entries: Mapping[str, Any]
+    """Texts, or typed values, by column; an absent or empty entry was not given."""
     line: int = 0
+    """Line of the file; 0 where there are no lines."""
 
     def has(self, column: str) -> bool:
         """Whether this row gives a value for `column`."""
@@ -92,37 +79,7 @@ def column_of(rows: Sequence[TableRow], column: str, unit: str = "", check: Chec
 
 
 def read_csv(path: Path, known: Sequence[str], prefixes: tuple[str, ...] = ()) -> list[TableRow]:
-    r"""Rows of a CSV file: comments begin with #, then a header, then one row per line.
-
-    Parameters
-    ----------
-    path : Path
-        A file in UTF-8, its entries separated by commas.
-    known : sequence of str
-        Columns that it may have, in any order.
-    prefixes : tuple of str, optional
-        A column that begins with one of these is known as well.
-
-    Returns
-    -------
-    list of TableRow
-        At least one.
-
-    Raises
-    ------
-    InputError
-        If the file cannot be read, is empty, has an unknown or repeated column, or a row with too few or too
-        many entries.
-
-    Examples
-    --------
-    >>> from tempfile import TemporaryDirectory
-    >>> with TemporaryDirectory() as folder:
-    ...     path = Path(folder) / "rates.csv"
-    ...     _ = path.write_text("# mine\nstimulus,static_rate_hz\nedge,61\n", encoding="utf-8")
-    ...     read_csv(path, ("stimulus", "static_rate_hz"))[0].number("static_rate_hz")
-    61.0
-    """
+    r"""Rows of a CSV file: comments begin with #, then a header, then one row per line."""
     reader = csv.reader(_without_comments(read_text(path)), strict=True)
     try:
         rows = [(reader.line_num, row) for row in reader if any(entry.strip() for entry in row)]

@@ -67,27 +67,6 @@ def compiled_threads(threads: int | None = None) -> Iterator[int]:
     """Set the number of threads within a `with` block; afterwards it is what it was.
 
     Every Python thread has a number of its own, which the threads that help it take over.
-
-    Parameters
-    ----------
-    threads : int, optional
-        Number of threads; unchanged by default.
-
-    Yields
-    ------
-    int
-        The number of threads.
-
-    Raises
-    ------
-    InputError
-        If the number is not a positive integer or exceeds `available_threads`.
-
-    Examples
-    --------
-    >>> with compiled_threads(1) as threads:
-    ...     print(threads, current_threads())
-    1 1
     """
     most = available_threads()
     if threads is not None and whole("threads", threads, at_least=1) > most:
@@ -100,13 +79,7 @@ def compiled_threads(threads: int | None = None) -> Iterator[int]:
 
 
 def even_chunks(count: int) -> list[Chunk]:
-    """Cut `count` numbers into chunks of one size; only the last may be smaller.
-
-    Examples
-    --------
-    >>> even_chunks(300)
-    [(0, 128), (128, 256), (256, 300)]
-    """
+    """Cut `count` numbers into chunks of one size; only the last may be smaller."""
     return _chunks(count, max(FEWEST_IN_CHUNK, -(-count // MANY_CHUNKS)))
 
 
@@ -118,28 +91,6 @@ def in_chunks(work: Callable[[int, int], Result], chunks: Sequence[Chunk]) -> li
     """Run a function on every chunk, on `current_threads` threads, the calling one included.
 
     A thread that has finished a chunk takes the next one. Calls may be nested.
-
-    Parameters
-    ----------
-    work : callable
-        Called with the first and the last number of each chunk. No two chunks may write to the same place.
-    chunks : sequence of (int, int)
-        First number, and the number after the last, of each chunk.
-
-    Returns
-    -------
-    list
-        One result per chunk, in the order of the chunks.
-
-    Raises
-    ------
-    Exception
-        Whatever the work raises, in any thread.
-
-    Examples
-    --------
-    >>> in_chunks(lambda first, last: last - first, [(0, 4), (4, 9)])
-    [4, 5]
     """
     threads = current_threads()
     if threads == 1 or len(chunks) == 1:
@@ -162,50 +113,10 @@ def in_chunks(work: Callable[[int, int], Result], chunks: Sequence[Chunk]) -> li
 
 
 def run_kernel(kernel: Callable[..., Result], count: int, *arguments: Any) -> list[Result]:
-    """Run a kernel on the chunks of `count` elements, on threads as in `in_chunks`.
-
-    Parameters
-    ----------
-    kernel : callable
-        Called with the arguments, then the first and the last number of each chunk.
-    count : int
-        Number of elements.
-    *arguments
-        What the kernel reads and writes.
-
-    Returns
-    -------
-    list
-        One result per chunk, in the order of the chunks.
-
-    Examples
-    --------
-    >>> run_kernel(lambda size, first, last: size * (last - first), 200, 10.0)
-    [1280.0, 720.0]
-    """
+    """Run a kernel on the chunks of `count` elements, on threads as in `in_chunks`."""
     return in_chunks(lambda first, last: kernel(*arguments, first, last), even_chunks(count))
 
 
 def in_blocks(work: Callable[[slice], Result], count: int, block: int = BLOCK) -> list[Result]:
-    """Run a function on slices of `count` receptors, trials or rows, on threads as in `in_chunks`.
-
-    Parameters
-    ----------
-    work : callable
-        Called with the slice of each block; blocks must not depend on each other.
-    count : int
-        Number of receptors.
-    block : int, optional
-        Receptors of a block.
-
-    Returns
-    -------
-    list
-        One result per block, in the order of the receptors.
-
-    Examples
-    --------
-    >>> in_blocks(lambda receptors: (receptors.start, receptors.stop), 5, block=2)
-    [(0, 2), (2, 4), (4, 5)]
-    """
+    """Run a function on slices of `count` receptors, trials or rows, on threads as in `in_chunks`."""
     return in_chunks(lambda first, last: work(slice(first, last)), _chunks(count, block))

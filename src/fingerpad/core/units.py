@@ -25,47 +25,23 @@ QUANTITY_UNITS = {
 
 
 def with_unit(said: str, quantity: str, brackets: str = " [{}]") -> str:
-    """Text about a quantity, with its unit where it has one.
-
-    Examples
-    --------
-    >>> with_unit("displacement", "deep_displacement"), with_unit("0.1", "skin_stretch", " {}")
-    ('displacement [mm]', '0.1')
-    """
+    """Text about a quantity, with its unit where it has one."""
     unit = QUANTITY_UNITS.get(quantity, "")
     return said + brackets.format(unit) if unit else said
 
 
 def radius_mm(curvature_per_m: float) -> float:
-    """Radius of a sphere from its curvature. [mm]
-
-    Examples
-    --------
-    >>> round(radius_mm(287.0), 3)
-    3.484
-    """
+    """Radius of a sphere from its curvature. [mm]"""
     return MM_PER_M / curvature_per_m
 
 
 def curvature_per_m(radius_mm: float) -> float:
-    """Curvature of a sphere from its radius. [1/m]
-
-    Examples
-    --------
-    >>> curvature_per_m(2.0)
-    500.0
-    """
+    """Curvature of a sphere from its radius. [1/m]"""
     return MM_PER_M / radius_mm
 
 
 def cosine_and_sine(angle_deg: float) -> tuple[float, float]:
-    """Cosine and sine of an angle in degrees, without rounding at quarter turns.
-
-    Examples
-    --------
-    >>> cosine_and_sine(90.0), cosine_and_sine(-90.0)
-    ((0.0, 1.0), (0.0, -1.0))
-    """
+    """Cosine and sine of an angle in degrees, without rounding at quarter turns."""
     if angle_deg % 90.0 == 0.0:
         return ((1.0, 0.0), (0.0, 1.0), (-1.0, 0.0), (0.0, -1.0))[int(angle_deg // 90.0) % 4]
     angle = math.radians(angle_deg)

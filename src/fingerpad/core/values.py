@@ -50,25 +50,6 @@ def converted(cls: type[_Kind]) -> type[_Kind]:
     a bool. Text is no number. A field whose annotation is a class of this package must hold an instance. What
     is left to `__post_init__` are limits, and arrays, whose shapes an annotation does not say. A field may
     keep its default, whatever that is.
-
-    Raises
-    ------
-    InputError
-        When an instance is made from a value of another type, or from a number that is not finite.
-
-    Examples
-    --------
-    >>> from dataclasses import dataclass
-    >>> @dataclass(frozen=True)
-    ... @converted
-    ... class Dot:
-    ...     height_mm: float
-    ...     at_mm: tuple[float, float] = (0.0, 0.0)
-    >>> Dot(np.float32(0.5), [17, 0])
-    Dot(height_mm=0.5, at_mm=(17.0, 0.0))
-    >>> Dot("0.5")
-    Traceback (most recent call last):
-    fingerpad.core.errors.InputError: height_mm must be a finite number [mm]: got '0.5'.
     """
     check = getattr(cls, "__post_init__", None)
 
@@ -98,16 +79,7 @@ def _conversions(cls: Any) -> list[tuple[str, Any, _Convert | None]]:
 
 
 def refuse_mistyped(function: Callable[..., Any], given: Mapping[str, Any]) -> None:
-    """Raise `InputError` for an argument that is not of the annotated type; called where a call failed.
-
-    Examples
-    --------
-    >>> def area_mm2(width_mm: float, height_mm: float) -> float:
-    ...     return width_mm * height_mm
-    >>> refuse_mistyped(area_mm2, {"width_mm": [2.0], "height_mm": 3.0})
-    Traceback (most recent call last):
-    fingerpad.core.errors.InputError: width_mm must be a finite number [mm]: got [2.0].
-    """
+    """Raise `InputError` for an argument that is not of the annotated type; called where a call failed."""
     known = getattr(function, "__globals__", {})
     for name, part in inspect.signature(function).parameters.items():
         if name not in given or given[name] is part.default:

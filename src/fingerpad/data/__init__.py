@@ -52,10 +52,6 @@ _MODULES: tuple[ModuleType, ...] = (
 def all_published() -> tuple[Published, ...]:
     """Every published number of the package, module by module, in the order of definition.
 
-    Returns
-    -------
-    tuple of Published
-
     Examples
     --------
     >>> from fingerpad.data import all_published

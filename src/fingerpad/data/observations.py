@@ -81,10 +81,6 @@ class HitRateObservations:
 def bar_firing_rates() -> BarObservations:
     """Rates under a 3.0 mm bar at a depth of 1.0 mm and 36 positions (Phillips & Johnson 1981).
 
-    Returns
-    -------
-    BarObservations
-
     Examples
     --------
     >>> observed = bar_firing_rates()
@@ -99,10 +95,6 @@ def cylinder_deflection() -> DeflectionObservations:
     """Deflection under a 3.17 mm cylinder at a depth of 1.0 mm (Dandekar 1995, Srinivasan's laboratory).
 
     The observations under the 50 µm line, which the paper also uses, are not available to us.
-
-    Returns
-    -------
-    DeflectionObservations
 
     Examples
     --------
@@ -119,10 +111,6 @@ def cylinder_deflection() -> DeflectionObservations:
 
 def goodwin_hit_rates() -> HitRateObservations:
     """Hit rates of participants who compare spheres with a standard of 287 /m (Goodwin et al. 1991).
-
-    Returns
-    -------
-    HitRateObservations
 
     Examples
     --------

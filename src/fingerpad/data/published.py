@@ -64,27 +64,14 @@ class Published(Generic[Value]):
 
 @dataclass(frozen=True)
 class Source:
-    """A publication, and the status of the numbers that were taken from it; called, it makes one of them.
-
-    Parameters
-    ----------
-    text : str
-        Where the numbers stand.
-    status : {"paper", "read", "recalled", "assumed"}
-        Their reliability, see `STATUSES`.
-
-    Examples
-    --------
-    >>> printed = Source("Gerling et al. 2014, section 2.2.2", "paper")
-    >>> printed("time constant", 68, "ms").source
-    'Gerling et al. 2014, section 2.2.2'
-    """
+    """A publication, and the status of the numbers that were taken from it; called, it makes one of them."""
 
     text: str
+    """Where the numbers stand."""
     status: Status
+    """Their reliability, see `STATUSES`."""
 
     def __call__(self, name: str, value: Value, unit: str) -> Published[Value]:
-        """Make a number of this source."""
         return Published(name, value, unit, self.text, self.status)
 
 

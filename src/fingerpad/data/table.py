@@ -13,58 +13,25 @@ from fingerpad.data.published import STATUSES
 
 @dataclass(frozen=True)
 class Table:
-    """Columns of numbers with content, source and status.
-
-    Parameters
-    ----------
-    columns : dict of str to array (n_rows,)
-        Values by column name; the name carries the unit.
-    content, source, status : str
-        Observed quantity, publication, and status of the numbers.
-    """
+    """Columns of numbers with content, source and status."""
 
     columns: dict[str, FloatArray]
+    """Values by column name; the name carries the unit, (n_rows,)."""
     content: str
     source: str
     status: str
+    """Observed quantity, publication, and status of the numbers."""
 
 
 def packaged_table(name: str) -> Table:
-    """Table `name` of the data that come with the package.
-
-    Parameters
-    ----------
-    name : str
-        File name without extension.
-
-    Returns
-    -------
-    Table
-
-    Examples
-    --------
-    >>> packaged_table("goodwin_hit_rates").status
-    'paper'
-    """
+    """Table `name` of the data that come with the package."""
     return parsed_table(
         name, (files("fingerpad.data") / "tables" / f"{name}.csv").read_text(encoding="utf-8")
     )
 
 
 def parsed_table(name: str, text: str) -> Table:
-    r"""Table from the text of a file with lines `# source: ...`, `# status: ...`, a header and numbers.
-
-    Raises
-    ------
-    InputError
-        If a comment line is missing, a row has too few or too many entries, or an entry is not a number.
-
-    Examples
-    --------
-    >>> text = "# content: two rates\n# source: nobody\n# status: assumed\nrate_hz\n1\n2\n"
-    >>> parsed_table("rates", text).columns["rate_hz"].tolist()
-    [1.0, 2.0]
-    """
+    r"""Table from the text of a file with lines `# source: ...`, `# status: ...`, a header and numbers."""
     lines = [line for line in text.splitlines() if line.strip()]
     story = dict(_labelled(line) for line in lines if line.startswith("#"))
     for label in ("content", "source", "status"):

@@ -19,25 +19,7 @@ CHOSEN = "fingerpad fit of chosen numbers"
 
 
 def fitted_afferent(path: Path, tissues: str | Tissues = DEFAULT_TISSUES) -> AnyAfferent:
-    """Afferent of a file of results: `fit.json`, or `results.json` of a reproduction.
-
-    Parameters
-    ----------
-    path : Path
-        Written by `fingerpad fit` or `fingerpad reproduce`.
-    tissues : str or Tissues, optional
-        Tissues that are pressed. A reproduction holds two afferents, that of `human` and that of its first
-        column, which is taken for all tissues but `human`.
-
-    Returns
-    -------
-    Afferent or another type
-
-    Raises
-    ------
-    InputError
-        If the file cannot be read or holds no fitted parameters.
-    """
+    """Afferent of a file of results: `fit.json`, or `results.json` of a reproduction."""
     try:
         read_text(path)  # names a file that cannot be read
         values = schemas.read(path, "fingerpad fit", CHOSEN, "fingerpad reproduction")

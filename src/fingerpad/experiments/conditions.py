@@ -128,10 +128,6 @@ class Conditions(metaclass=KnownKeywords):
             Along the finger, from the middle of the population, distal positive. [mm]
         grading : Grading, optional
             Mesh; default: that of all spheres.
-
-        Returns
-        -------
-        Touch
         """
         return self.touch(
             Sphere(curvature_per_m=curvature_per_m),

@@ -13,32 +13,7 @@ from fingerpad.geometry.names import INDENTERS, SIZE_UNITS
 
 @lru_cache(maxsize=1024)
 def indenter_named(text: str) -> Indenter:
-    """Make an indenter from its name and sizes, `name:size:size`.
-
-    Parameters
-    ----------
-    text : str
-        A name of `INDENTERS`. Sizes follow after colons, in the order of the parameters of its class or by
-        name, each in its unit of `SIZE_UNITS`; those that are left out are the paper's.
-
-    Returns
-    -------
-    Indenter
-
-    Raises
-    ------
-    InputError
-        If a name is unknown, a size is no number or cannot be, or there are more sizes than the body has.
-
-    Examples
-    --------
-    >>> indenter_named("punch:6.35")
-    FlatPunch(diameter_mm=6.35, fillet_mm=0.3)
-    >>> indenter_named("sphere:287"), indenter_named("plate")
-    (Sphere(curvature_per_m=287.0), Plate())
-    >>> indenter_named("grating:period_mm=2:duty=0.25")
-    Grating(ridge_mm=0.5, groove_mm=1.5, lip_mm=0.2)
-    """
+    """Make an indenter from its name and sizes, `name:size:size`."""
     name, *given = (part.strip() for part in text.split(":"))
     body = INDENTERS[one_of("indenter", name, tuple(INDENTERS))]
     sizes = [size.name for size in fields(body)]  # type: ignore[arg-type]

@@ -37,27 +37,18 @@ SUFFIXES_OF_NWB = (".nwb", ".h5", ".hdf5")
 
 @dataclass(frozen=True)
 class Recorded:
-    """Recordings with the stimuli they belong to.
-
-    Parameters
-    ----------
-    recordings : RateRecordings or SpikeRecordings
-        What the afferent answered.
-    stimuli : mapping of str to NamedStimulus
-        What touched it, in the order of their first presentations.
-    memberships : int array (n_stimuli,) or None
-        Fold of each stimulus, from 0, if the file says so.
-    presentations : mapping of str to int
-        How often each was presented.
-    spikes_after_hold : int
-        Spikes that came after the motion had ended and are not used, since the model ends there.
-    """
+    """Recordings with the stimuli they belong to."""
 
     recordings: RateRecordings | SpikeRecordings
+    """What the afferent answered."""
     stimuli: Mapping[str, NamedStimulus]
+    """What touched it, in the order of their first presentations."""
     memberships: NDArray[np.int64] | None
+    """Fold of each stimulus, from 0, if the file says so, (n_stimuli,)."""
     presentations: Mapping[str, int]
+    """How often each was presented."""
     spikes_after_hold: int = 0
+    """Spikes that came after the motion had ended and are not used, since the model ends there."""
 
 
 @known_keywords
@@ -294,10 +285,9 @@ def _trials(path: Path, content: Any, column: str, unit: int | None) -> list[Tab
 def _check_clock(
     path: Path, spikes_s: FloatArray, starts_s: FloatArray, stops_s: FloatArray, observed: bool
 ) -> None:
-    """Raise an error if spikes seem to count from the onset of their trials, not from that of the session.
-
-    They all come within one duration of a trial, and no trial has any, or the first alone, which starts then.
-    """
+    """Raise an error if spikes seem to count from the onset of their trials, not from that of the session."""
+    # They all come within one duration of a trial, and no trial has any, or the first alone, which starts
+    # then.
     if observed or not spikes_s.size or len(starts_s) < 2:
         return
     answered = [

@@ -31,29 +31,7 @@ Key = TypeVar("Key")
 
 
 class Runner:
-    """What every experiment does around its own arithmetic.
-
-    Parameters
-    ----------
-    folder : Path
-        Folder of the run; finished indentations are stored below it.
-    jobs : int or Engine
-        Processes, or the engine that solves the indentations; the numbers do not depend on it.
-    progress : Progress, optional
-        Shown each finished part.
-
-    Examples
-    --------
-    >>> from pathlib import Path
-    >>> from tempfile import TemporaryDirectory
-    >>> with TemporaryDirectory() as folder:
-    ...     runner = Runner(Path(folder))
-    ...     with runner.stage("fit", 1) as advance:
-    ...         advance()
-    ...     manifest = runner.manifest(Conditions(resolution="quick"))
-    >>> [stage.name for stage in manifest.stages], manifest.resolution
-    (['fit'], 'quick')
-    """
+    """What every experiment does around its own arithmetic."""
 
     def __init__(self, folder: Path, jobs: int | Engine = 1, progress: Progress | None = None):
         self.folder = path_of("folder", folder)
@@ -80,53 +58,14 @@ class Runner:
         stage: str = "indentations",
         on_failed: OnFailed | None = None,
     ) -> Collection[Path]:
-        """Solve and store the touches that are not stored yet.
-
-        Parameters
-        ----------
-        touches : iterable of Touch
-            In the order in which they are started: the longest first keeps all processes busy to the end.
-        stage : str, optional
-            Name under which this is timed and shown.
-        on_failed : callable, optional
-            As of `solve_missing`: called with a touch that cannot be solved and its error.
-
-        Returns
-        -------
-        collection of Path
-            Files of those that were solved.
-
-        Raises
-        ------
-        ConvergenceError, InputError
-            Without `on_failed`, if one cannot be solved; those finished before stay stored.
-        StoreError
-            If the folder cannot be written.
-        """
+        """Solve and store the touches that are not stored yet."""
         missing = self.store.missing(touches)
         with self.stage(stage, len(missing)) as advance:
             solve_missing(missing, self._engine, lambda seconds: advance(), on_failed)
         return missing.keys()
 
     def load(self, name: str, touches: Mapping[Key, Touch]) -> dict[Key, SkinResponse]:
-        """Read the indentations of one part of the experiment, all of which are stored.
-
-        Parameters
-        ----------
-        name : str
-            Of the part, for the manifest.
-        touches : mapping of key to Touch
-            What was pressed.
-
-        Returns
-        -------
-        dict of key to SkinResponse
-
-        Raises
-        ------
-        StoreError
-            If a stored indentation is missing or damaged.
-        """
+        """Read the indentations of one part of the experiment, all of which are stored."""
         with self.stage(name, 0):
             responses = {key: self.store.load(touch) for key, touch in touches.items()}
         self.note(responses.values())
@@ -146,24 +85,7 @@ class Runner:
     def responses(
         self, groups: Mapping[str, Mapping[Any, Touch]], on_failed: OnFailed | None = None
     ) -> dict[str, dict[Any, SkinResponse]]:
-        """Solve what is missing of all groups, then read them group by group.
-
-        Parameters
-        ----------
-        groups : mapping of str to mapping of key to Touch
-            Touches of each part of the experiment, by its name.
-        on_failed : callable, optional
-            As of `solve`; the responses lack the touches that failed.
-
-        Returns
-        -------
-        dict of str to dict of key to SkinResponse
-
-        Raises
-        ------
-        ConvergenceError, StoreError
-            As `solve` and `load`.
-        """
+        """Solve what is missing of all groups, then read them group by group."""
         solved = self.solve(
             (touch for touches in groups.values() for touch in touches.values()), on_failed=on_failed
         )
@@ -172,17 +94,7 @@ class Runner:
     def read(
         self, groups: Mapping[str, Mapping[Any, Touch]], solved: Collection[Path] = (), complete: bool = True
     ) -> dict[str, dict[Any, SkinResponse]]:
-        """Read the indentations of several groups, and note how many of them this run solved.
-
-        Parameters
-        ----------
-        groups : mapping of str to mapping of key to Touch
-            Touches of each part of the experiment, by its name.
-        solved : collection of Path, optional
-            Files that `solve` returned.
-        complete : bool, optional
-            Whether all must be stored; otherwise those that are not are left out.
-        """
+        """Read the indentations of several groups, and note how many of them this run solved."""
         responses = {}
         for name, wanted in groups.items():
             touches = {key: touch for key, touch in wanted.items() if complete or self.store.holds(touch)}
@@ -208,21 +120,7 @@ class Runner:
         command: str | None = None,
         inputs: Mapping[str, str] | None = None,
     ) -> Manifest:
-        """Record what ran.
-
-        Parameters
-        ----------
-        conditions : Conditions
-            Tissues, accuracy and seed.
-        meshes : mapping of str to Mesh, optional
-            By what is pressed.
-        half_model : bool, optional
-            Whether the finger is cut at its plane of symmetry.
-        command : str, optional
-            The command line.
-        inputs : mapping of str to str, optional
-            SHA-256 of the input files, by name.
-        """
+        """Record what ran."""
         tissues = conditions.tissues
         return Manifest(
             **software(),

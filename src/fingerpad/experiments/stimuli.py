@@ -82,35 +82,18 @@ class Stimuli(Protocol):
 
 @dataclass(frozen=True)
 class ShiftedBar:
-    """The paper's stimuli: one bar at several places along the finger.
-
-    Parameters
-    ----------
-    bar : Bar
-        Width and fillets.
-    motion : Motion
-        The same at all shifts.
-    column : str
-        Column of the recordings with the shifts.
-    conditions : Conditions
-        Finger, tissues and accuracy.
-    finger_files : tuple of Path
-        Those that the finger is read from.
-
-    Examples
-    --------
-    A positive shift lies on the proximal side, along the skin (docs/decisions/bar-shift.md).
-
-    >>> stimulus = ShiftedBar().named("1.50")
-    >>> stimulus.name, round(stimulus.x_mm, 2)
-    ('1.5', -1.49)
-    """
+    """The paper's stimuli: one bar at several places along the finger."""
 
     bar: Bar = field(default_factory=Bar)
+    """Width and fillets."""
     motion: Motion = field(default_factory=RampAndHold)
+    """The same at all shifts."""
     column: str = "shift_mm"
+    """Column of the recordings with the shifts."""
     conditions: Conditions = field(default_factory=Conditions)
+    """Finger, tissues and accuracy."""
     finger_files: tuple[Path, ...] = ()
+    """Those that the finger is read from."""
 
     def named(self, entry: str) -> NamedStimulus:
         """Return the bar at a shift."""
@@ -131,30 +114,19 @@ class ShiftedBar:
 
 @dataclass(frozen=True)
 class ListedStimuli:
-    """Stimuli of your own, each with a name.
-
-    Parameters
-    ----------
-    stimuli : mapping of str to NamedStimulus
-        By name.
-    source : str
-        Where they are listed, for errors.
-    column : str
-        Column of the recordings with the names.
-    conditions : Conditions
-        Finger, tissues and accuracy.
-    reach_mm : float, optional
-        As of `StimulusSet`. [mm]
-    finger_files : tuple of Path
-        Those that the finger is read from.
-    """
+    """Stimuli of your own, each with a name."""
 
     stimuli: Mapping[str, NamedStimulus]
     source: str = "stimuli"
+    """Where they are listed, for errors."""
     column: str = "stimulus"
+    """Column of the recordings with the names."""
     conditions: Conditions = field(default_factory=Conditions)
+    """Finger, tissues and accuracy."""
     reach_mm: float | None = None
+    """As of `StimulusSet`. [mm]"""
     finger_files: tuple[Path, ...] = ()
+    """Those that the finger is read from."""
 
     def named(self, entry: str) -> NamedStimulus:
         """Return the stimulus of that name."""
@@ -193,10 +165,6 @@ def read_stimuli(path: str | Path, **replacing: str | None) -> ListedStimuli:
         `object.width_mm`, `motion.depth_mm`, `place.x_mm`.
     **replacing
         Values that replace those of the file: `resolution`, `tissues` or `finger`; None leaves them.
-
-    Returns
-    -------
-    ListedStimuli
 
     Raises
     ------

@@ -55,50 +55,32 @@ _RATIOS = (published.LONG_TERM_POISSON, published.POISSON_RATIO, published.WU_HY
 
 @result_class
 class TissueLayer:
-    """One layer of a named set of tissues.
-
-    Parameters
-    ----------
-    tissues, layer : str
-        Name of the set, and of the layer.
-    law : str
-        Strain energy.
-    shear_kpa, shear_at_once_kpa : float
-        Shear modulus for small strains, long-term and instantaneous. [kPa]
-    poisson, poisson_at_once : float
-        Poisson's ratio for small strains, long-term and instantaneous: only the deviator relaxes.
-    prony_shares, prony_times_s : tuple of float
-        Shares of the instantaneous modulus that relax, and their times. [1, s]
-    modulus_status, poisson_status, prony_status : str
-        Status of these numbers, see `fingerpad.data.STATUSES`; empty without relaxation.
-    source : str
-        Of the moduli.
-    """
+    """One layer of a named set of tissues."""
 
     tissues: str
     layer: str
+    """Name of the set, and of the layer."""
     law: str
+    """Strain energy."""
     shear_kpa: float
     shear_at_once_kpa: float
+    """Shear modulus for small strains, long-term and instantaneous. [kPa]"""
     poisson: float
     poisson_at_once: float
+    """Poisson's ratio for small strains, long-term and instantaneous: only the deviator relaxes."""
     prony_shares: tuple[float, ...]
     prony_times_s: tuple[float, ...]
+    """Shares of the instantaneous modulus that relax, and their times. [1, s]"""
     modulus_status: str
     poisson_status: str
     prony_status: str
+    """Status of these numbers, see `fingerpad.data.STATUSES`; empty without relaxation."""
     source: str
+    """Of the moduli."""
 
 
 def tissue_layers() -> tuple[TissueLayer, ...]:
-    """Describe every layer of every named set of tissues.
-
-    Examples
-    --------
-    >>> first = tissue_layers()[0]
-    >>> first.tissues, first.layer, first.law, round(first.poisson_at_once, 2)
-    ('human', 'stratum corneum', 'neo-Hooke', 0.34)
-    """
+    """Describe every layer of every named set of tissues."""
     return tuple(
         _layer(tissues, layer, material, numbers)
         for tissues in TISSUES

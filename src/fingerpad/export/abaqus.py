@@ -23,24 +23,6 @@ def abaqus_deck(job: Job) -> str:
     in which shape and volume are coupled, have C3D8 and C3D6. The indenter is an exact rigid surface, or
     rigid facets where it has no outline, moved by its reference node. Steps are *VISCO with the increments of
     the indentation, or *STATIC when nothing relaxes.
-
-    Parameters
-    ----------
-    job : Job
-        The indentation.
-
-    Raises
-    ------
-    InputError
-        If Abaqus has no card for a law or indenter.
-
-    Examples
-    --------
-    >>> import fingerpad as fp
-    >>> from fingerpad.export.job import job_of
-    >>> deck = abaqus_deck(job_of(fp.touch_of(fp.Fingertip(), fp.Sphere(), tissues="trial1")))
-    >>> [line for line in deck.splitlines() if line.startswith("*HYPERELASTIC")][0]
-    '*HYPERELASTIC, NEO HOOKE, MODULI=LONG TERM'
     """
     reference = len(job.mesh.nodes_mm) + 1
     relaxes = any(job.materials[layer].prony.shares for layer in job.layer_names)

@@ -36,38 +36,7 @@ _WEDGE_EDGES = ((0, 1), (1, 2), (2, 0), (3, 4), (4, 5), (5, 3), (0, 3), (1, 4), 
 
 
 def calculix_deck(job: Job, elastic_moduli: str | None = None, element: str = "C3D8I") -> str:
-    """Text of a CalculiX input file.
-
-    Parameters
-    ----------
-    job : Job
-        The indentation.
-    elastic_moduli : {"long_term", "instantaneous"}, optional
-        Moduli of materials that relax, because CalculiX has no relaxation. Nothing then changes during a
-        hold, so steps without motion are left out.
-    element : {"C3D8I", "C3D8", "C3D20R"}
-        Kind of brick. With the incompatible modes of C3D8I a deep indentation may fail to converge. C3D20R,
-        which has nodes in the middle of edges, converges then; its faces are in contact, not its nodes.
-
-    Raises
-    ------
-    InputError
-        If a material relaxes and `elastic_moduli` is not given, or there is no card for a law or indenter.
-
-    Examples
-    --------
-    >>> import fingerpad as fp
-    >>> from fingerpad.export.job import job_of
-    >>> job = job_of(fp.touch_of(fp.Fingertip(), fp.Sphere(), tissues="trial1"))
-    >>> calculix_deck(job)
-    Traceback (most recent call last):
-    ...
-    fingerpad.core.errors.InputError: CalculiX cannot relax the hyperelastic layer stratum_corneum: give \
-elastic_moduli ("long_term" or "instantaneous"; in a command --elastic-moduli), or export for Abaqus or FEBio.
-    >>> deck = calculix_deck(job, elastic_moduli="long_term")
-    >>> [line for line in deck.splitlines() if line.startswith("*STATIC")]
-    ['*STATIC']
-    """
+    """Text of a CalculiX input file."""
     one_of("element", element, tuple(ELEMENTS))
     points, bricks, wedges = _with_middle_nodes(job) if element == "C3D20R" else _of_mesh(job)
     first = len(points) + 1

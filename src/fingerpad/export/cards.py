@@ -21,13 +21,7 @@ SKIN, INDENTER = "SKIN", "INDENTER"
 
 
 def digits(value: float) -> str:
-    """Write a number with 12 digits, in at most 20 characters, which is the limit of CalculiX.
-
-    Examples
-    --------
-    >>> digits(-1 / 3), digits(2.0)
-    ('-0.333333333333', '2')
-    """
+    """Write a number with 12 digits, in at most 20 characters, which is the limit of CalculiX."""
     return f"{value:.12g}"
 
 
@@ -38,7 +32,6 @@ def data(values: Iterable[float | int | str], per_line: int = PER_LINE) -> list[
 
 
 def comments(lines: Iterable[str]) -> list[str]:
-    """Comment lines."""
     return [f"** {line}" for line in lines]
 
 
@@ -98,22 +91,7 @@ def body_elements(
 
 
 def law(material: Material, factor: float, moduli: str = "") -> list[str]:
-    """Card of a material's strain energy.
-
-    Parameters
-    ----------
-    material : Material
-        Its law must be Polynomial, Ogden or Hyperfoam.
-    factor : float
-        Factor of its coefficients of shape; of all coefficients of a foam.
-    moduli : str
-        Parameter after the keyword, for example ", MODULI=LONG TERM".
-
-    Raises
-    ------
-    InputError
-        If neither program has the law.
-    """
+    """Card of a material's strain energy."""
     energy = material.law
     if isinstance(energy, Polynomial):
         return _polynomial(energy, factor, moduli)

@@ -79,27 +79,17 @@ _OBJECT_REACH_MM, _OBJECT_STEPS = (14.0, 10.0), 240
 
 @dataclass(frozen=True)
 class Variable:
-    """One variable that is no field of the press.
-
-    Parameters
-    ----------
-    unit : str
-        Unit, "1" for a pure number; empty for numbers of nodes or elements, which have none.
-    dims : tuple of str
-        Its dimensions.
-    long_name : str
-        What it is.
-    points_into : str
-        Dimension of which it holds numbers, from 0.
-    holes : bool
-        Whether it may be NaN.
-    """
+    """One variable that is no field of the press."""
 
     unit: str
+    """Unit, "1" for a pure number; empty for numbers of nodes or elements, which have none."""
     dims: tuple[str, ...]
+    """Its dimensions."""
     long_name: str
     points_into: str = ""
+    """Dimension of which it holds numbers, from 0."""
     holes: bool = False
+    """Whether it may be NaN."""
 
 
 MESH_PARTS = {
@@ -310,13 +300,7 @@ def read_touch(path: str | Path) -> xarray.Dataset:
 
 
 def touch_file(path: Path) -> Path:
-    """Return the file of a touch: `path` itself, or the one in this folder.
-
-    Raises
-    ------
-    InputError
-        If there is none.
-    """
+    """Return the file of a touch: `path` itself, or the one in this folder."""
     try:
         path.stat()
         held = [path / name for name in FILE_NAMES if (path / name).exists()]
@@ -582,13 +566,7 @@ def unit_of(field: Field) -> str:
 
 
 def unit_of_name(name: str) -> str:
-    """Return the unit that the name of a value ends with, as UDUNITS reads it; "1" without one.
-
-    Examples
-    --------
-    >>> unit_of_name("static_rate_hz"), unit_of_name("hit_rate")
-    ('s-1', '1')
-    """
+    """Return the unit that the name of a value ends with, as UDUNITS reads it; "1" without one."""
     return next((unit for ending, unit in _ENDINGS if name.endswith(ending)), "1")
 
 

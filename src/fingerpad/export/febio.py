@@ -43,26 +43,7 @@ KINDS = ("hex8", "penta6")
 
 
 def febio_deck(job: Job) -> str:
-    """Text of an FEBio 4 input file.
-
-    Parameters
-    ----------
-    job : Job
-        The indentation.
-
-    Raises
-    ------
-    InputError
-        If FEBio cannot express a law or indenter.
-
-    Examples
-    --------
-    >>> import fingerpad as fp
-    >>> from fingerpad.export.job import job_of
-    >>> deck = febio_deck(job_of(fp.touch_of(fp.Fingertip(), fp.Sphere(), tissues="trial1")))
-    >>> [line.strip() for line in deck.splitlines() if "<material " in line][0]
-    '<material id="1" name="stratum_corneum" type="uncoupled viscoelastic">'
-    """
+    """Text of an FEBio 4 input file."""
     root = xml.Element("febio_spec", version="4.0")
     _add(root, "Module", type="solid")
     _control(root, job)
@@ -264,11 +245,9 @@ def _rigid(root: xml.Element, job: Job) -> None:
 
 
 def _contact(root: xml.Element, job: Job) -> None:
-    """Write the contact: of nodes as here, or of Gauss points, which is the one that rubs reliably.
-
-    A contact that closes at Gauss points instead of nodes presses a ball deeper by (2/3) (hx² + hz²) / (8 R)
-    for elements of hx by hz.
-    """
+    """Write the contact: of nodes as here, or of Gauss points, which is the one that rubs reliably."""
+    # A contact that closes at Gauss points instead of nodes presses a ball deeper by (2/3) (hx² + hz²) / (8
+    # R) for elements of hx by hz.
     kind = "sliding-elastic" if job.friction else "sliding-node-on-facet"
     contact = _add(_add(root, "Contact"), "contact", name="touch", surface_pair="touch", type=kind)
     deepest_mm = float(job.depths_mm.max())
@@ -295,10 +274,9 @@ def _load_curves(root: xml.Element, job: Job) -> None:
 
 
 def _output(root: xml.Element, job: Job) -> None:
-    """Ask for what every material can answer: FEBio stops when a relaxing one is asked for its energy.
-
-    The energy density of a layer that does not relax is devsed + K/2 (J-1)², with the mean J of the element.
-    """
+    """Ask for what every material can answer: FEBio stops when a relaxing one is asked for its energy."""
+    # The energy density of a layer that does not relax is devsed + K/2 (J-1)², with the mean J of the
+    # element.
     section = _add(root, "Output")
     plot = _add(section, "plotfile", type="febio")
     for name in ("displacement", "stress", "contact pressure", "reaction forces"):

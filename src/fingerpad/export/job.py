@@ -32,78 +32,45 @@ BESIDE_FACETS_MM = 0.1
 
 @dataclass(frozen=True)
 class Phase:
-    """Consecutive steps of equal length at constant speed.
-
-    Parameters
-    ----------
-    start_ms, end_ms : float
-        Begin and end. [ms]
-    steps : int
-        Its number of steps.
-    depth_mm : float
-        Depth at its end. [mm]
-    """
+    """Consecutive steps of equal length at constant speed."""
 
     start_ms: float
     end_ms: float
+    """Begin and end. [ms]"""
     steps: int
     depth_mm: float
+    """Depth at its end. [mm]"""
 
 
 @dataclass(frozen=True)
 class Support:
-    """Nodes that are held.
-
-    Parameters
-    ----------
-    name : str
-        Name of their set in a deck.
-    nodes : int array (n,)
-        Their numbers, from 0.
-    axes : (int, int)
-        First and last axis along which they are held, 1 for x to 3 for z.
-    """
+    """Nodes that are held."""
 
     name: str
+    """Name of their set in a deck."""
     nodes: IntArray
     axes: tuple[int, int]
+    """First and last axis along which they are held, 1 for x to 3 for z."""
 
 
 @dataclass(frozen=True)
 class Job:
-    """One indentation, described for another solver.
-
-    Parameters
-    ----------
-    mesh : Mesh
-        The body; its bone and nail are fixed.
-    materials : tuple of Material
-        One per layer of the mesh.
-    indenter : Indenter
-        The rigid body.
-    placement : Placement
-        Its position at first touch.
-    times_ms : array (n_times,)
-        Steps, from 0. [ms]
-    depths_mm : array (n_times,)
-        How far the indenter has advanced at each, from 0. [mm]
-    friction : float
-        Coulomb's coefficient between skin and indenter.
-
-    Raises
-    ------
-    InputError
-        If times do not increase from 0, depths do not match them, a layer has no material, or friction is not
-        a coefficient.
-    """
+    """One indentation, described for another solver."""
 
     mesh: Mesh
+    """The body; its bone and nail are fixed."""
     materials: tuple[Material, ...]
+    """One per layer of the mesh."""
     indenter: Indenter
+    """The rigid body."""
     placement: Placement
+    """Its position at first touch."""
     times_ms: FloatArray
+    """Steps, from 0, (n_times,). [ms]"""
     depths_mm: FloatArray
+    """How far the indenter has advanced at each, from 0, (n_times,). [mm]"""
     friction: float = 0.0
+    """Coulomb's coefficient between skin and indenter."""
 
     def __post_init__(self) -> None:
         instance("mesh", self.mesh, Mesh)
@@ -277,13 +244,7 @@ class Job:
 
 
 def wedge_nodes(mesh: Mesh) -> IntArray:
-    """Nodes of each wedge (n_elements, 6), lower triangle first; -1 where the element is a brick.
-
-    Raises
-    ------
-    InputError
-        If an element repeats nodes in another way than a brick with one collapsed side.
-    """
+    """Nodes of each wedge (n_elements, 6), lower triangle first; -1 where the element is a brick."""
     elements = mesh.elements
     wedges = np.full((len(elements), 6), -1, dtype=np.int64)
     lower, upper = elements[:, :4], elements[:, 4:]
@@ -305,36 +266,7 @@ def wedge_nodes(mesh: Mesh) -> IntArray:
 
 
 def job_of(touch: Touch, times_ms: ArrayLike | None = None, depths_mm: ArrayLike | None = None) -> Job:
-    """Describe an indentation for other solvers.
-
-    Parameters
-    ----------
-    touch : Touch
-        The indentation.
-    times_ms : array, optional
-        Times of the steps; by default those of the settings. Required when a tolerance chooses them: take the
-        times of the response. [ms]
-    depths_mm : array, optional
-        Depths at `times_ms`. Required when the indentation is controlled by force: take the depths of the
-        response. [mm]
-
-    Returns
-    -------
-    Job
-
-    Raises
-    ------
-    InputError
-        If the indenter moves aside or turns, or times or depths are needed and missing, or do not fit each
-        other.
-
-    Examples
-    --------
-    >>> import fingerpad as fp
-    >>> job = job_of(fp.touch_of(fp.Fingertip(), fp.Sphere(), fp.RampAndHold(depth_mm=0.5)))
-    >>> [(phase.end_ms, phase.steps, phase.depth_mm) for phase in job.phases][:1]
-    [(50.0, 5, 0.5)]
-    """
+    """Describe an indentation for other solvers."""
     instance("touch", touch, Touch)
     stimulus, settings = touch.stimulus, touch.settings
     if not stimulus.stays:

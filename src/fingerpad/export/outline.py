@@ -40,29 +40,16 @@ SHELL_MM = 0.1
 
 @dataclass(frozen=True)
 class Outline:
-    """Section of a rigid indenter.
-
-    Parameters
-    ----------
-    revolved : bool
-        Whether it turns about the axis of pressing; else it is swept along z.
-    corners : tuple of (float, float)
-        u and y where segments meet. [mm]
-    centres : tuple of (float, float) or None
-        For each segment the centre of its arc, or None for a straight line. [mm]
-    middles : tuple of float
-        u of the middle of each ridge: 0, unless a groove parts the body or it ends there. [mm]
-
-    Examples
-    --------
-    >>> Outline(True, ((0.0, 0.0), (2.0, -2.0)), ((0.0, -2.0),)).points(lowest_mm=-0.9).shape
-    (20, 2)
-    """
+    """Section of a rigid indenter."""
 
     revolved: bool
+    """Whether it turns about the axis of pressing; else it is swept along z."""
     corners: tuple[Point, ...]
+    """u and y where segments meet. [mm]"""
     centres: tuple[Point | None, ...]
+    """For each segment the centre of its arc, or None for a straight line. [mm]"""
     middles: tuple[float, ...] = (0.0,)
+    """u of the middle of each ridge: 0, unless a groove parts the body or it ends there. [mm]"""
 
     def points(self, lowest_mm: float) -> FloatArray:
         """Points along the outline, arcs divided finely, to just below y = `lowest_mm`, (n, 2). [mm]"""
@@ -89,26 +76,6 @@ def _arc(start: Point, end: Point, centre: Point) -> FloatArray:
 
 
 def outline_of(indenter: Indenter, reach_mm: float) -> Outline | None:
-    """Outline of an indenter.
-
-    Parameters
-    ----------
-    indenter : Indenter
-        Any body.
-    reach_mm : float
-        Half extent of a body without edges (plate), height of straight sides, and depth of grooves. [mm]
-
-    Returns
-    -------
-    Outline or None
-        None if it has no outline of lines and arcs: `face_mesh` divides its face.
-
-    Examples
-    --------
-    >>> ball = outline_of(Sphere(curvature_per_m=500), reach_mm=5.0)
-    >>> ball.revolved, ball.corners, ball.centres
-    (True, ((0.0, 0.0), (2.0, -2.0)), ((0.0, -2.0),))
-    """
     positive("reach_mm", reach_mm, "mm")
     if isinstance(indenter, Sphere):
         radius = indenter.radius_mm
@@ -188,21 +155,15 @@ def _without_empty_segments(
 
 @dataclass(frozen=True)
 class RigidMesh:
-    """Facets of a rigid indenter, each the outer face of a thin solid element.
-
-    Parameters
-    ----------
-    nodes_mm : array (n_nodes, 3)
-        The outer nodes, then as many inner ones in the same order, in the indenter's frame. [mm]
-    quads : int array (n_quads, 4)
-        Outer nodes, counter-clockwise seen from the skin.
-    triangles : int array (n_triangles, 3)
-        The same about the axis of a body of revolution.
-    """
+    """Facets of a rigid indenter, each the outer face of a thin solid element."""
 
     nodes_mm: FloatArray
+    """The outer nodes, then as many inner ones in the same order, in the indenter's frame, (n_nodes, 3). [mm]
+    """
     quads: IntArray
+    """Outer nodes, counter-clockwise seen from the skin, (n_quads, 4)."""
     triangles: IntArray
+    """The same about the axis of a body of revolution, (n_triangles, 3)."""
 
     def solids(self, faces: IntArray) -> IntArray:
         """Bricks or wedges behind `faces`, their first nodes those of the outer face.
@@ -214,27 +175,7 @@ class RigidMesh:
 
 
 def rigid_mesh(outline: Outline, lowest_mm: float, z_mm: tuple[float, float]) -> RigidMesh:
-    """Divide an indenter into facets.
-
-    Parameters
-    ----------
-    outline : Outline
-        Its section.
-    lowest_mm : float
-        Lowest y of the facets, negative. [mm]
-    z_mm : (float, float)
-        Extent of a swept body. [mm]
-
-    Returns
-    -------
-    RigidMesh
-
-    Examples
-    --------
-    >>> ball = rigid_mesh(outline_of(Sphere(curvature_per_m=500), 5.0), lowest_mm=-1.0, z_mm=(0.0, 1.0))
-    >>> ball.quads.shape[0] % 96, ball.triangles.shape
-    (0, (96, 3))
-    """
+    """Divide an indenter into facets."""
     line = outline.points(lowest_mm)
     if outline.revolved:
         outer, quads, triangles = _revolved(line)
@@ -252,32 +193,7 @@ def rigid_mesh(outline: Outline, lowest_mm: float, z_mm: tuple[float, float]) ->
 def face_mesh(
     indenter: Indenter, lowest_mm: float, x_mm: tuple[float, float], z_mm: tuple[float, float]
 ) -> RigidMesh:
-    """Divide the face of any body into facets over a grid; walls are as steep as one of its cells is wide.
-
-    Parameters
-    ----------
-    indenter : Indenter
-        The body.
-    lowest_mm : float
-        Lowest y of the facets, negative. [mm]
-    x_mm, z_mm : (float, float)
-        Extent of the facets. [mm]
-
-    Returns
-    -------
-    RigidMesh
-
-    Raises
-    ------
-    InputError
-        If there would be more than 250,000 facets.
-
-    Examples
-    --------
-    >>> dome = face_mesh(Sphere(curvature_per_m=500), -1.0, (-2.5, 2.5), (-2.5, 2.5))
-    >>> dome.quads.shape[1], round(float(dome.nodes_mm[:, 1].max()), 3)
-    (4, 0.0)
-    """
+    """Divide the face of any body into facets over a grid; walls are as steep as one of its cells is wide."""
     pitch = np.clip(indenter.relief_mm / FACETS_ACROSS_RELIEF, SMALLEST_FACET_MM, LARGEST_FACET_MM)
     lines = []
     for low, high in (x_mm, z_mm):

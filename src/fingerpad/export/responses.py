@@ -122,23 +122,7 @@ def _rows(response: ResponseMap, pitches: FloatArray) -> Iterator[list[object]]:
 
 @known_keywords
 def read_response_csv(path: Path) -> ResponseMap | MixedResponse:
-    """Read what `write_response_csv` wrote.
-
-    Parameters
-    ----------
-    path : Path
-        The file.
-
-    Returns
-    -------
-    ResponseMap or MixedResponse
-        The latter where the file has a column with types. Duration and phases of the touch are not in it.
-
-    Raises
-    ------
-    InputError
-        If the file cannot be read, or lacks a column.
-    """
+    """Read what `write_response_csv` wrote."""
     rows = list(csv.DictReader(io.StringIO(read_text(path_of("path", path)))))
     have = list(rows[0]) if rows else []
     for column in ("x_mm", "z_mm", PITCH, *MEASURED, SPIKES):

@@ -153,23 +153,7 @@ def write_responses_nwb(
 
 @known_keywords
 def read_responses_nwb(path: Path) -> dict[str, ResponseMap | MixedResponse]:
-    """Read what `write_responses_nwb` wrote.
-
-    Parameters
-    ----------
-    path : Path
-        The file.
-
-    Returns
-    -------
-    dict of str to ResponseMap or MixedResponse
-        By the names of the touches; mixed where the units have types.
-
-    Raises
-    ------
-    InputError
-        If the file cannot be read, lacks a column of `write_responses_nwb`, or pynwb is not installed.
-    """
+    """Read what `write_responses_nwb` wrote."""
     pynwb = require_pynwb()
     try:
         with warnings.catch_warnings():

@@ -62,17 +62,7 @@ def spike_columns(trains: SpikeTrains) -> Columns:
 
 
 def response_columns(response: ResponseMap) -> Columns:
-    """Place, rates, latency and number of spikes, by afferent.
-
-    Examples
-    --------
-    >>> spikes, rates = SpikeTrains.from_lists([[12.0, 40.0], []]), np.array([30.0, 0.0])
-    >>> places, latency = [[17.0, 0.0], [18.0, 0.0]], np.array([12.0, np.nan])
-    >>> columns = response_columns(ResponseMap(places, 1.0, spikes, rates, rates, latency))
-    >>> list(columns), columns["spikes"].tolist()  # doctest: +NORMALIZE_WHITESPACE
-    (['afferent', 'x_mm', 'z_mm', 'dynamic_rate_hz', 'static_rate_hz', 'dynamic_count_hz', 'static_count_hz',
-      'first_spike_latency_ms', 'spikes'], [2, 0])
-    """
+    """Place, rates, latency and number of spikes, by afferent."""
     axes = ("x_mm", "z_mm") if response.positions_mm.shape[1] == 2 else ("x_mm", "y_mm", "z_mm")
     rates = (
         "dynamic_rate_hz",
@@ -185,13 +175,7 @@ TABLES: Mapping[str, Callable[[Any], Columns]] = {
 
 
 def table(result: Result) -> pandas.DataFrame:
-    """Return a result as a table; see `Result.to_pandas`.
-
-    Examples
-    --------
-    >>> table(SpikeTrains.from_lists([[12.0, 40.0], [], [15.5]])).time_ms.groupby("afferent").size().to_dict()
-    {0: 2, 2: 1}
-    """
+    """Return a result as a table; see `Result.to_pandas`."""
     columns = TABLES[type(result).__name__](result)
     made: pandas.DataFrame = library("pandas").DataFrame(columns)
     return made.set_index(next(iter(columns)))

@@ -65,25 +65,16 @@ _NAMES = {"times_ms": "time_ms"}
 
 @dataclass(frozen=True)
 class Variable:
-    """One variable of the data set.
-
-    Parameters
-    ----------
-    dims : tuple of str
-        Dimensions after those of the sweep.
-    unit, long_name : str
-        What it is.
-    of_press : bool
-        Whether it has the dimensions that change the skin alone.
-    dtype : str
-        Type of its numbers.
-    """
+    """One variable of the data set."""
 
     dims: tuple[str, ...]
+    """Dimensions after those of the sweep."""
     unit: str
     long_name: str
     of_press: bool = False
+    """Whether it has the dimensions that change the skin alone."""
     dtype: str = "f8"
+    """Type of its numbers."""
 
 
 def variables(fields: Sequence[str] = ()) -> dict[str, Variable]:
@@ -105,24 +96,7 @@ def variables(fields: Sequence[str] = ()) -> dict[str, Variable]:
 
 
 class SweepFile:
-    """The data set of a sweep, opened for writing.
-
-    Parameters
-    ----------
-    path : Path
-        Its folder, which ends in .zarr.
-    sweep : Sweep
-        What it is of.
-    attributes : mapping
-        Provenance, for a new data set.
-
-    Raises
-    ------
-    InputError
-        If the folder holds something else: another sweep, other files or another format.
-    StoreError
-        If it cannot be written.
-    """
+    """The data set of a sweep, opened for writing."""
 
     def __init__(self, path: Path, sweep: Sweep, attributes: Mapping[str, Any]):
         zarr = library("zarr")

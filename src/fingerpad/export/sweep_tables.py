@@ -146,10 +146,6 @@ def setting_response(data: xarray.Dataset, **where: int) -> ResponseMap:
     **where : int
         Index of the setting along each dimension of the sweep, as in `setting_touch`.
 
-    Returns
-    -------
-    ResponseMap
-
     Raises
     ------
     InputError

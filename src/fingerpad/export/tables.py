@@ -23,33 +23,6 @@ def write_touch_csv(path: Path, skin: SkinResponse) -> tuple[Path, ...]:
 
     Columns are time, depth, force, area of contact, reaction of bone and nail, and energies, each with its
     unit in its name; a vector has one column per axis. Numbers have all their digits.
-
-    Parameters
-    ----------
-    path : Path
-        The file; folders are created if needed.
-    skin : SkinResponse
-        From `indent`.
-
-    Returns
-    -------
-    tuple of Path
-        The file.
-
-    Raises
-    ------
-    StoreError
-        If the file cannot be written.
-
-    Examples
-    --------
-    >>> from tempfile import TemporaryDirectory
-    >>> import fingerpad as fp
-    >>> skin = fp.indent(fp.Fingertip(), fp.Sphere(curvature_per_m=287), fp.RampAndHold(depth_mm=0.3))
-    >>> with TemporaryDirectory() as folder:
-    ...     (file,) = write_touch_csv(Path(folder) / "touch.csv", skin)
-    ...     print(file.read_text().split("contact_force")[0])
-    times_ms,force_mn,depth_mm,contact_area_mm2,
     """
     columns: dict[str, np.ndarray] = {}
     for name, field in FIELDS.items():
@@ -70,23 +43,6 @@ def write_touch_npz(path: Path, skin: SkinResponse) -> tuple[Path, ...]:
 
     `numpy.load` reads the file. It holds every array of `SkinResponse.fields` under its name, the arrays
     `MESH_ARRAYS` of the mesh, `kinks_ms`, and in `units` the unit of every field as JSON.
-
-    Parameters
-    ----------
-    path : Path
-        The file; folders are created if needed.
-    skin : SkinResponse
-        From `indent`.
-
-    Returns
-    -------
-    tuple of Path
-        The file.
-
-    Raises
-    ------
-    StoreError
-        If the file cannot be written.
     """
     buffer, units = io.BytesIO(), {name: FIELDS[name].unit for name in skin.fields}
     content: dict[str, Any] = {name: getattr(skin.mesh, name) for name in MESH_ARRAYS}

@@ -184,7 +184,6 @@ def _can_be_shown(values: xarray.DataArray) -> bool:
 
 
 def _variable(data: xarray.Dataset, field: str) -> str:
-    """Name of the variable of a field."""
     one_of("field", field, tuple(dict.fromkeys([*fields_of(data), *SHORT_NAMES.values()])))
     return SHORT_NAMES.get(field, field) if field not in data else field
 

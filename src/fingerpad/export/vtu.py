@@ -41,38 +41,6 @@ def write_vtu_series(path: Path, skin: SkinResponse) -> tuple[Path, ...]:
     Mises stress, pressure, largest compressive strain and stress. Point data: displacement, contact pressure,
     and the sets skin, bone, nail, symmetry and midline as masks. Field data: time, depth and force of the
     indenter, area of contact, reaction of bone and nail, and energies.
-
-    Parameters
-    ----------
-    path : Path
-        The PVD file; the VTU files are in the same folder, with its name and a number.
-    skin : SkinResponse
-        With its deformation, as `Touch.solve(whole=True)` returns it.
-
-    Returns
-    -------
-    tuple of Path
-        The PVD first, then one VTU per time.
-
-    Raises
-    ------
-    InputError
-        If VTK is not installed, or the response is without its deformation.
-    StoreError
-        If a file cannot be written. Each file is written as a whole, the PVD as the last one.
-
-    Examples
-    --------
-    >>> from tempfile import TemporaryDirectory
-    >>> from fingerpad import Fingertip, Grading, Sphere, Touch, RampAndHold, named_tissues
-    >>> from fingerpad.mechanics.press_settings import PressSettings
-    >>> coarse = Grading(17.37, 2.0, 2.0, 1.0, 1.0, 5.0, stratum_corneum=1, living_epidermis=1, dermis=1)
-    >>> motion, steps = RampAndHold(depth_mm=0.2), PressSettings(ramp_steps=1, hold_steps=1)
-    >>> touch = Touch(Fingertip(), Sphere(), motion, named_tissues("trial3"), coarse, steps)
-    >>> with TemporaryDirectory() as folder:
-    ...     written = write_vtu_series(Path(folder) / "touch.pvd", touch.solve(whole=True))
-    ...     [file.name for file in written]
-    ['touch.pvd', 'touch_0000.vtu', 'touch_0001.vtu', 'touch_0002.vtu']
     """
     require_vtk()
     path = path_of("path", path)
@@ -98,23 +66,16 @@ def write_vtu_series(path: Path, skin: SkinResponse) -> tuple[Path, ...]:
 
 @dataclass(frozen=True)
 class VtuSeries:
-    """A deformation as VTU files hold it.
-
-    Parameters
-    ----------
-    times_ms : array (n_times,)
-        Times of the files. [ms]
-    points_mm : array (n_nodes, 3)
-        Undeformed nodes. [mm]
-    points, cells, press : mapping of str to array (n_times, ...)
-        Values at nodes, in elements, and of the whole press, by ParaView's names.
-    """
+    """A deformation as VTU files hold it."""
 
     times_ms: FloatArray
+    """Times of the files, (n_times,). [ms]"""
     points_mm: FloatArray
+    """Undeformed nodes, (n_nodes, 3). [mm]"""
     points: Mapping[str, np.ndarray]
     cells: Mapping[str, np.ndarray]
     press: Mapping[str, np.ndarray]
+    """Values at nodes, in elements, and of the whole press, by ParaView's names, (n_times, ...)."""
 
 
 @known_keywords
@@ -125,10 +86,6 @@ def read_vtu_series(path: str | Path) -> VtuSeries:
     ----------
     path : str or Path
         The PVD file.
-
-    Returns
-    -------
-    VtuSeries
 
     Raises
     ------
@@ -215,27 +172,7 @@ def _node_sets(mesh: Mesh) -> dict[str, np.ndarray]:
 
 
 def cells_of(mesh: Mesh) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return VTK's cells of a mesh.
-
-    Parameters
-    ----------
-    mesh : Mesh
-        Bricks, some of them with one side collapsed to an edge.
-
-    Returns
-    -------
-    offsets : int array (n_elements + 1,)
-        Where the nodes of each cell begin.
-    nodes : int array
-        Nodes of all cells, one after the other.
-    kinds : uint8 array (n_elements,)
-        `HEXAHEDRON` or `WEDGE`.
-
-    Raises
-    ------
-    InputError
-        If an element repeats nodes and is not a wedge.
-    """
+    """Return VTK's cells of a mesh."""
     wedges = wedge_nodes(mesh)
     is_wedge = wedges[:, 0] >= 0
     sizes = np.where(is_wedge, 6, 8)

@@ -31,34 +31,25 @@ _ON_SURFACE_MM = 1e-9
 
 @dataclass(frozen=True)
 class Triangles:
-    """Triangles in a tree, ready for distances.
-
-    Parameters
-    ----------
-    corners_mm : array (n_slots, 3, 3)
-        Corners, sorted; the last triangle fills the slots that are left. [mm]
-    normals : array (n_slots, 7, 3)
-        Outward normals at the three corners, on the three edges (opposite to each corner) and on the face.
-    low_mm, high_mm : array (n_boxes, 3)
-        Boxes; the first is not used. [mm]
-    kinds : int8 array (n_slots, 3)
-        Kinds of edges (`fingerpad.geometry.creases`), opposite to each corner.
-    hollow : bool array (n_boxes,)
-        Whether a box has triangles with hollow creases.
-    radius_mm : float
-        Distance over which hollow creases are blunted. [mm]
-    far_mm : float
-        Distance beyond which points above the triangles have this one, along y; it need not be sought. [mm]
-    """
+    """Triangles in a tree, ready for distances."""
 
     corners_mm: FloatArray
+    """Corners, sorted; the last triangle fills the slots that are left, (n_slots, 3, 3). [mm]"""
     normals: FloatArray
+    """Outward normals at the three corners, on the three edges (opposite to each corner) and on the face,
+    (n_slots, 7, 3).
+    """
     low_mm: FloatArray
     high_mm: FloatArray
+    """Boxes; the first is not used, (n_boxes, 3). [mm]"""
     kinds: np.ndarray
+    """Kinds of edges (`fingerpad.geometry.creases`), opposite to each corner, (n_slots, 3)."""
     hollow: np.ndarray
+    """Whether a box has triangles with hollow creases, (n_boxes,)."""
     radius_mm: float
+    """Distance over which hollow creases are blunted. [mm]"""
     far_mm: float
+    """Distance beyond which points above the triangles have this one, along y; it need not be sought. [mm]"""
 
     @classmethod
     def of(
@@ -112,14 +103,6 @@ class Triangles:
         """Signed distance (n,) and its gradient (n, 3) at points (n, 3). [mm]
 
         On the surface the gradient is the normal of a face, or the mean normal of an edge or a corner.
-
-        Examples
-        --------
-        >>> square = np.array([[0.0, 0.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 1.0], [1.0, 0.0, 0.0]])
-        >>> triangles = Triangles.of(square, np.array([[0, 1, 2], [0, 2, 3]]))
-        >>> gap, normal = triangles.gap(np.array([[0.5, 2.0, 0.5], [0.5, -1.0, 0.2], [4.0, 4.0, 0.5]]))
-        >>> gap.tolist(), normal[2].tolist()
-        ([2.0, -1.0, 5.0], [0.6, 0.8, 0.0])
         """
         points_mm = np.ascontiguousarray(points_mm, dtype=np.float64)
         gap, normal = np.empty(len(points_mm)), np.empty((len(points_mm), 3))

@@ -41,19 +41,7 @@ _GAUSS = (0.21132486540518713, 0.7886751345948129)
 def kinds_of_edges(
     corners: FloatArray, face_normals: FloatArray, edge: IntArray, smooth_below_deg: float
 ) -> np.ndarray:
-    """Kind of each edge of each triangle (opposite to its corner), int8 (n, 3).
-
-    Parameters
-    ----------
-    corners : array (n, 3, 3)
-        Corners of the triangles. [mm]
-    face_normals : array (n, 3)
-        Outward unit normals.
-    edge : int array (n, 3)
-        Number of each edge, which neighbours share.
-    smooth_below_deg : float
-        Angle between the normals of neighbours from which on their edge is sharp. [degrees]
-    """
+    """Kind of each edge of each triangle (opposite to its corner), int8 (n, 3)."""
     order = np.argsort(edge.ravel(), kind="stable")
     sorted_edges = edge.ravel()[order]
     pair = np.flatnonzero(sorted_edges[1:] == sorted_edges[:-1])

@@ -133,10 +133,8 @@ class Embossed(Indenter):
 
     @cached_property
     def _widths_mm(self) -> FloatArray:
-        """Width of the narrowest stroke, and of the narrowest hole or gap; infinite without one. [mm]
-
-        From the middle of each piece the nearest piece that faces it is sought at a right angle.
-        """
+        """Width of the narrowest stroke, and of the narrowest hole or gap; infinite without one. [mm]"""
+        # From the middle of each piece the nearest piece that faces it is sought at a right angle.
         begin, end = self._pieces[:, 0], self._pieces[:, 1]
         middle, along = 0.5 * (begin + end), end - begin
         facing = self._normals @ self._normals.T < OPPOSITE

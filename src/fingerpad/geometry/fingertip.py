@@ -69,28 +69,13 @@ class Profile:
 
     The function is s g(s) with s = sqrt(1 - x / L); g is a smoothing spline through the readings, continued
     linearly beyond them.
-
-    Parameters
-    ----------
-    readings_mm : tuple of (x, value)
-        At least five readings with x increasing from 0 or more to less than `length_mm`, values above 0. [mm]
-    length_mm : float
-        x of the tip, L. [mm]
-
-    Raises
-    ------
-    InputError
-        If there are too few readings, x does not increase or leaves the finger, or a value is not positive.
-
-    Examples
-    --------
-    >>> sphere = Profile(tuple((x, 10.0 * (1.0 - x / 30.0) ** 0.5) for x in (0, 5, 10, 15, 20, 25)), 30.0)
-    >>> sphere.at([0.0, 22.5, 30.0]).round(6).tolist()
-    [10.0, 5.0, 0.0]
     """
 
     readings_mm: Readings
+    """At least five readings with x increasing from 0 or more to less than `length_mm`, values above 0. [mm]
+    """
     length_mm: float
+    """x of the tip, L. [mm]"""
 
     def __post_init__(self) -> None:
         length = positive("length_mm", self.length_mm, "mm")
@@ -158,7 +143,6 @@ class Finger(metaclass=KnownKeywords):
 
     @property
     def own_mesh(self) -> Mesh | None:
-        """Mesh of a finger that is one."""
         return None
 
     def own_grading(self, x_mm: float, z_mm: float) -> Grading | None:
@@ -298,10 +282,6 @@ class Fingertip(Displayed, Finger):
         stratum_corneum_mm, living_epidermis_mm, dermis_mm : float, optional
             Thicknesses of the layers. [mm]
 
-        Returns
-        -------
-        Fingertip
-
         Raises
         ------
         InputError
@@ -340,10 +320,6 @@ class Fingertip(Displayed, Finger):
         ----------
         factor : float
             Above 0.
-
-        Returns
-        -------
-        Fingertip
 
         Examples
         --------

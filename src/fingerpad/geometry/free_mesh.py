@@ -28,17 +28,14 @@ class FreeMesh(Mesh):
 
     `skin_grid` holds the corners of the faces of the skin, and `living_epidermis` the elements around the end
     organs.
-
-    Parameters
-    ----------
-    outer_elements : int array (n_faces,)
-        Element of each face of the skin, whose last four nodes lie on the skin wherever that is possible.
-    receptor_depth_mm : float
-        Depth of the end organs below the skin, along its normal. [mm]
     """
 
     outer_elements: IntArray
+    """Element of each face of the skin, whose last four nodes lie on the skin wherever that is possible,
+    (n_faces,).
+    """
     receptor_depth_mm: float
+    """Depth of the end organs below the skin, along its normal. [mm]"""
 
     @property
     def is_grid(self) -> bool:
@@ -75,22 +72,7 @@ class FreeMesh(Mesh):
         return normals / np.where(length > 0.0, length, 1.0)
 
     def on_skin(self, points_mm: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Find the closest points of the skin.
-
-        Parameters
-        ----------
-        points_mm : array (n, 3)
-            Points. [mm]
-
-        Returns
-        -------
-        feet_mm : array (n, 3)
-            Closest points. [mm]
-        normals : array (n, 3)
-            Outward unit normals there, interpolated between nodes.
-        sizes_mm : array (n,)
-            Longest side of the triangle there. [mm]
-        """
+        """Find the closest points of the skin."""
         triangle, weights = closest_on_triangles(points_mm, self.nodes_mm[self.skin_triangles])
         nodes = self.skin_triangles[triangle]
         feet = (weights[..., None] * self.nodes_mm[nodes]).sum(axis=1)

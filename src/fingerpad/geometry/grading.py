@@ -150,29 +150,7 @@ def resolution_grading(
     half_width_mm: float = 1.0,
     finger_size: float = 1.0,
 ) -> Grading:
-    """Grading of a named resolution.
-
-    Parameters
-    ----------
-    resolution : {"quick", "standard", "paper"}
-        "quick" for a first look, "standard" for results, "paper" for the published size: both halves, at
-        least 232,000 nodes, edges of 0.1 mm (none above 0.106 mm) over an oval pad of 11 by 9 mm, at the skin
-        and at the epidermal-dermal border.
-    centre_mm, half_length_mm, half_width_mm : float
-        The fine zone, as in `Grading`; "paper" widens it to the whole pad. [mm]
-    finger_size : float
-        `Fingertip.relative_size`: elements of a smaller finger are smaller, those of a larger one are not
-        larger.
-
-    Returns
-    -------
-    Grading
-
-    Examples
-    --------
-    >>> resolution_grading("quick", 17.37).size_x_mm
-    0.45
-    """
+    """Grading of a named resolution."""
     one_of("resolution", resolution, RESOLUTIONS)
     k = min(positive("finger_size", finger_size), 1.0)
     zone = Grading(centre_mm, half_length_mm, half_width_mm, 0.25 * k, 0.25 * k, largest_mm=3.0 * k)
@@ -189,28 +167,6 @@ def covering(gradings: Sequence[Grading]) -> Grading:
     """One grading that is at least as fine everywhere as each of several.
 
     Stimuli that are compared should be pressed into one mesh, so that the error of the mesh is the same.
-
-    Parameters
-    ----------
-    gradings : sequence of Grading
-        At least one.
-
-    Returns
-    -------
-    Grading
-        Its fine zone covers all of theirs; both halves are meshed if one of them requires it.
-
-    Raises
-    ------
-    InputError
-        If there is none.
-
-    Examples
-    --------
-    >>> near, far = resolution_grading("quick", 16.0, 1.0), resolution_grading("standard", 18.0, 2.0)
-    >>> both = covering([near, far])
-    >>> both.centre_mm, both.half_length_mm, both.size_x_mm, both.dermis
-    (17.5, 2.5, 0.25, 4)
     """
     if not gradings:
         raise InputError("covering needs at least one grading: got none.")
@@ -255,28 +211,7 @@ def _joined(strips: Iterable[tuple[Strip, ...]]) -> tuple[Strip, ...]:
 
 
 def lines_along(grading: Grading, length: float, strips: Sequence[Strip] = ()) -> FloatArray:
-    """Lines from the middle of the fine zone to one end of the finger.
-
-    Parameters
-    ----------
-    grading : Grading
-        Sizes and zones along the finger.
-    length : float
-        Where the last line lies. [mm]
-    strips : sequence of (from, to, size)
-        `finer_along` as distances from the middle towards this end. [mm]
-
-    Returns
-    -------
-    array (n_steps + 1,)
-        Lines, from 0, an even number of steps. [mm]
-
-    Examples
-    --------
-    >>> wire = Grading(17.0, 0.5, 1.0, 0.2, 0.2, 0.2, core_half_length_mm=0.1, core_size_mm=0.1)
-    >>> lines_along(wire, 1.3).round(3).tolist()
-    [0.0, 0.1, 0.215, 0.348, 0.5, 0.7, 0.9, 1.1, 1.3]
-    """
+    """Lines from the middle of the fine zone to one end of the finger."""
     fine, size = grading.half_length_mm, grading.size_x_mm
     growth, largest = grading.growth, grading.largest_mm
     core = grading.core_half_length_mm, grading.core_size_mm
@@ -293,13 +228,7 @@ def lines_along(grading: Grading, length: float, strips: Sequence[Strip] = ()) -
 
 
 def lines_across(grading: Grading, length: float, strips: Sequence[Strip] = ()) -> FloatArray:
-    """Lines from the midline around the finger to its dorsal side, as those of `lines_along`.
-
-    Examples
-    --------
-    >>> lines_across(Grading(17.0, 0.5, 1.0, 0.2, 0.5, 0.5), 2.0).round(3).tolist()
-    [0.0, 0.5, 1.0, 1.5, 2.0]
-    """
+    """Lines from the midline around the finger to its dorsal side, as those of `lines_along`."""
     zone = grading.half_width_mm, grading.size_z_mm, length, grading.growth, grading.largest_mm
     return lines_of_sizes(*zone, strips) if strips else graded_lines(*zone)
 
@@ -312,23 +241,6 @@ def lines_of_sizes(
     The size h of the elements is a function of place: the least of that of the fine zone, of those of the
     strips, and of what growth from there allows. The number of elements is the integral of 1/h, rounded up to
     an even number.
-
-    Parameters
-    ----------
-    fine, size, length, growth, largest
-        As in `graded_lines`. [mm]
-    strips : sequence of (from, to, size)
-        Places of smaller elements, beyond the ends too, where they do not count. [mm]
-
-    Returns
-    -------
-    array (n_steps + 1,)
-        Lines, from 0. [mm]
-
-    Examples
-    --------
-    >>> lines_of_sizes(1.0, 0.5, 2.0, 1.3, 2.0, [(0.9, 1.1, 0.1)]).round(2).tolist()
-    [0.0, 0.28, 0.5, 0.67, 0.8, 0.91, 1.0, 1.09, 1.2, 1.33, 1.5, 1.72, 2.0]
     """
     places = np.linspace(0.0, length, STEPS_TO_SUM + 1)
     slope = np.log(growth)
@@ -345,27 +257,7 @@ def lines_of_sizes(
 
 
 def graded_lines(fine: float, size: float, length: float, growth: float, largest: float) -> FloatArray:
-    """Lines from 0 to `length`: equal steps over the fine zone, then growing ones, an even number in all.
-
-    Parameters
-    ----------
-    fine, size : float
-        Extent of the fine zone and the step in it. [mm]
-    length : float
-        Where the last line lies. [mm]
-    growth, largest : float
-        Largest ratio of neighbouring steps, and largest step [mm].
-
-    Returns
-    -------
-    array (n_steps + 1,)
-        Lines, from 0. [mm]
-
-    Examples
-    --------
-    >>> graded_lines(1.0, 0.5, 3.2, 1.3, 2.0).round(2).tolist()
-    [0.0, 0.5, 1.0, 1.52, 2.06, 2.62, 3.2]
-    """
+    """Lines from 0 to `length`: equal steps over the fine zone, then growing ones, an even number in all."""
     n_fine = int(np.ceil(min(fine, length) / size - 1e-9))
     rest = length - n_fine * size
     if rest < size:

@@ -83,34 +83,7 @@ def grading_about(
     finger_size: float = 1.0,
     moves: bool = False,
 ) -> Grading:
-    """Grading that is fine under an indenter at (x, z) and 1 mm beyond, and finer about its edges.
-
-    Parameters
-    ----------
-    indenter : Indenter
-        The rigid body.
-    resolution : {"quick", "standard", "paper"}
-        Named resolution.
-    x_mm, z_mm : float
-        Position at which its axis meets the skin. [mm]
-    spin_deg : float
-        Rotation about its direction of pressing, as of a `Touch`. [degrees]
-    finger_size : float
-        `Fingertip.relative_size`, see `resolution_grading`.
-    moves : bool
-        Whether it moves aside, which takes a longer fine zone below a wide body.
-
-    Returns
-    -------
-    Grading
-        Both halves are meshed if the indenter is off the midline or not symmetric when turned.
-
-    Examples
-    --------
-    >>> from fingerpad.geometry.indenters import Bar
-    >>> grading_about(Bar(), "quick", 17.37).full, grading_about(Bar(), "quick", 17.37, spin_deg=20.0).full
-    (False, True)
-    """
+    """Grading that is fine under an indenter at (x, z) and 1 mm beyond, and finer about its edges."""
     reach = indenter.half_width_mm + 1.0
     if not indenter.mirrors(spin_deg):  # extent of a turned square along and across
         reach *= sum(map(abs, cosine_and_sine(spin_deg)))
@@ -226,34 +199,7 @@ def grading_along(
     tilt_deg: float = 0.0,
     spin_deg: float = 0.0,
 ) -> Grading:
-    """Grading that is fine under an indenter wherever it goes, and where its ridges or dots first touch.
-
-    Parameters
-    ----------
-    finger : Finger
-        The finger.
-    indenter, resolution, spin_deg
-        As for `grading_about`, at first touch.
-    at_mm : (float, float)
-        x and z of its axis on the skin at first touch. [mm]
-    poses : sequence of Pose
-        Poses between which it moves along straight lines.
-    tilt_deg : float
-        Rotation about z at first touch, as of a `Touch`. [degrees]
-
-    Returns
-    -------
-    Grading
-        It covers the gradings about all poses.
-
-    Examples
-    --------
-    >>> from fingerpad.geometry.fingertip import Fingertip
-    >>> from fingerpad.geometry.indenters import Sphere
-    >>> slides = grading_along(Fingertip(), Sphere(), "quick", (17.0, 0.0), [Pose(), Pose(x_mm=4.0)])
-    >>> slides.centre_mm, round(slides.half_length_mm, 2)
-    (19.0, 6.48)
-    """
+    """Grading that is fine under an indenter wherever it goes, and where its ridges or dots first touch."""
     (x_mm, z_mm), size = at_mm, finger.relative_size
     places = {(pose.x_mm, pose.z_mm, pose.spin_deg) for pose in poses}
     outermost = sorted(places, key=lambda place: (place[2], place[0], place[1]))
@@ -279,29 +225,7 @@ def grading_along(
 
 
 def first_touch_x_mm(finger: Fingertip, x_mm: float, half_width_mm: float, tilt_deg: float) -> float:
-    """Where a flat face that presses on a finger first touches its midline, x. [mm]
-
-    Parameters
-    ----------
-    finger : Fingertip
-        The finger.
-    x_mm, half_width_mm : float
-        Place of the face's axis, and half of its extent along the finger. [mm]
-    tilt_deg : float
-        Rotation of the face about z. [degrees]
-
-    Returns
-    -------
-    float
-
-    Examples
-    --------
-    The default pad is highest 7 mm from its middle. A face that is tilted touches it there.
-
-    >>> from fingerpad.geometry.fingertip import Fingertip
-    >>> [round(first_touch_x_mm(Fingertip(), 17.37, np.inf, tilt), 1) for tilt in (0.0, 8.0)]
-    [10.3, 17.4]
-    """
+    """Where a flat face that presses on a finger first touches its midline, x. [mm]"""
     begin, end = max(x_mm - half_width_mm, 0.0), min(x_mm + half_width_mm, finger.length_mm)
     x = np.linspace(begin, end, int(np.ceil((end - begin) / OUTLINE_STEP_MM)) + 1)
     cosine, sine = cosine_and_sine(tilt_deg)

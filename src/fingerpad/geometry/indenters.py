@@ -179,12 +179,10 @@ def round_front(beside: FloatArray, radius: float) -> FloatArray:
 
 
 def _rod_end(centred: FloatArray, beside: FloatArray, radius: float) -> tuple[FloatArray, FloatArray]:
-    """Gap and normal of a ball or cylinder from offsets (n, 3) to its centre or axis.
-
-    Behind its widest section the body goes on with straight sides: `beside` (n, 3) are the offsets along the
-    finger and across only. Skin that has passed the widest section is then held beside the body, and the
-    normal is the gradient of the gap everywhere (docs/decisions/small-bodies.md).
-    """
+    """Gap and normal of a ball or cylinder from offsets (n, 3) to its centre or axis."""
+    # Behind its widest section the body goes on with straight sides: `beside` (n, 3) are the offsets along
+    # the finger and across only. Skin that has passed the widest section is then held beside the body, and
+    # the normal is the gradient of the gap everywhere (docs/decisions/small-bodies.md).
     distance, normal = _norm_and_direction(np.where(centred[:, 1:2] < 0.0, beside, centred))
     return distance - radius, normal
 

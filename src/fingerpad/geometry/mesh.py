@@ -32,42 +32,34 @@ CORNERS = np.array(  # local coordinates of a brick's nodes, in their order
 
 @dataclass(frozen=True)
 class Mesh:
-    """Hexahedra in a structured grid, with the sets of nodes that mechanics needs.
-
-    Parameters
-    ----------
-    nodes_mm : array (n_nodes, 3)
-        x, y and z of the nodes. [mm]
-    elements : int array (n_elements, 8)
-        Nodes of each brick: lower face (towards the bone) counter-clockwise seen from the skin, then upper.
-        Elements are numbered along, around, through (skin to bone), the last running fastest.
-    layer : int array (n_elements,)
-        Index into `LAYERS`.
-    shape : (int, int, int)
-        Number of elements along, around and through.
-    full : bool
-        Whether both halves are meshed; otherwise only z >= 0, with `symmetry_nodes` on the plane z = 0.
-    skin_grid : int array (n_along + 1, n_around + 1)
-        Nodes of the skin in grid order; the pole, and the seam of a full finger, appear more than once.
-    bone_nodes, nail_nodes, symmetry_nodes : int array
-        Nodes on the bone (or bottom of a block), under the nail, and on the plane of symmetry.
-    midline_nodes : int array (n_along + 1,)
-        Nodes of the volar skin at z = 0, x increasing.
-    living_epidermis : int array (n_along, n_around)
-        The sheet of elements just above the epidermal-dermal border; empty if there is none.
-    """
+    """Hexahedra in a structured grid, with the sets of nodes that mechanics needs."""
 
     nodes_mm: FloatArray
+    """x, y and z of the nodes, (n_nodes, 3). [mm]"""
     elements: IntArray
+    """Nodes of each brick: lower face (towards the bone) counter-clockwise seen from the skin, then upper.
+    Elements are numbered along, around, through (skin to bone), the last running fastest, (n_elements, 8).
+    """
     layer: IntArray
+    """Index into `LAYERS`, (n_elements,)."""
     shape: tuple[int, int, int]
+    """Number of elements along, around and through."""
     full: bool
+    """Whether both halves are meshed; otherwise only z >= 0, with `symmetry_nodes` on the plane z = 0."""
     skin_grid: IntArray
+    """Nodes of the skin in grid order; the pole, and the seam of a full finger, appear more than once,
+    (n_along + 1, n_around + 1).
+    """
     bone_nodes: IntArray
     nail_nodes: IntArray
     symmetry_nodes: IntArray
+    """Nodes on the bone (or bottom of a block), under the nail, and on the plane of symmetry."""
     midline_nodes: IntArray
+    """Nodes of the volar skin at z = 0, x increasing, (n_along + 1,)."""
     living_epidermis: IntArray
+    """The sheet of elements just above the epidermal-dermal border; empty if there is none, (n_along,
+    n_around).
+    """
 
     def __post_init__(self) -> None:
         for field in fields(self):
@@ -175,33 +167,7 @@ def _mesh(
 def block_mesh(
     x_edges: ArrayLike, y_edges: ArrayLike, z_edges: ArrayLike, layers: Sequence[int], symmetric: bool = False
 ) -> Mesh:
-    """Build a block of layers: skin at y = 0 facing -y, depth along +y, its bottom the set `bone_nodes`.
-
-    Parameters
-    ----------
-    x_edges, y_edges, z_edges : array
-        Grid lines, increasing; `y_edges` starts at 0, the skin. [mm]
-    layers : sequence of int
-        Index into `LAYERS` for each interval of `y_edges`.
-    symmetric : bool
-        Whether the plane z = 0, the first of `z_edges`, is a plane of symmetry.
-
-    Returns
-    -------
-    Mesh
-        Its midline is the grid line nearest to z = 0.
-
-    Raises
-    ------
-    InputError
-        If edges do not increase, the skin is not at 0 or layers do not match.
-
-    Examples
-    --------
-    >>> block = block_mesh([0.0, 1.0, 2.0], [0.0, 0.5], [0.0, 1.0], layers=[2])
-    >>> block.elements.shape, float(block.skin_area_mm2.sum().round(9))
-    ((2, 8), 2.0)
-    """
+    """Build a block of layers: skin at y = 0 facing -y, depth along +y, its bottom the set `bone_nodes`."""
     x, y, z = (
         increasing(name, float_array(name, edges, 1))
         for name, edges in (("x_edges", x_edges), ("y_edges", y_edges), ("z_edges", z_edges))
@@ -224,22 +190,16 @@ def block_mesh(
 
 @dataclass(frozen=True)
 class GridLines:
-    """Grid lines of a finger's mesh in coordinates along, around and through.
-
-    Parameters
-    ----------
-    along_mm : array (n_along + 1,)
-        Arc length on the volar midline from the cut to the pole at the tip. [mm]
-    around_rad : array (n_around + 1,)
-        Angle about the bone's axis: 0 volar, pi dorsal; from -pi for both halves. [rad]
-    through : array (n_through + 1,)
-        0 at the skin, 1, 2 and 3 at the lower borders of stratum corneum, living epidermis and dermis, 4 at
-        the bone.
-    """
+    """Grid lines of a finger's mesh in coordinates along, around and through."""
 
     along_mm: FloatArray
+    """Arc length on the volar midline from the cut to the pole at the tip, (n_along + 1,). [mm]"""
     around_rad: FloatArray
+    """Angle about the bone's axis: 0 volar, pi dorsal; from -pi for both halves, (n_around + 1,). [rad]"""
     through: FloatArray
+    """0 at the skin, 1, 2 and 3 at the lower borders of stratum corneum, living epidermis and dermis, 4 at
+    the bone, (n_through + 1,).
+    """
 
     @property
     def full(self) -> bool:
@@ -248,10 +208,8 @@ class GridLines:
 
 
 def _rays(finger: Fingertip, station: FloatArray, around_rad: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Origins and directions (..., 3) of rays from the bone's axis.
-
-    `station` is x along the axis and, beyond its end, 1 mm per radian of the rays that fan out to the tip.
-    """
+    """Origins and directions (..., 3) of rays from the bone's axis."""
+    # `station` is x along the axis and, beyond its end, 1 mm per radian of the rays that fan out to the tip.
     turn = np.clip(station - finger.spine_end_x_mm, 0.0, 0.5 * np.pi)
     # Exact zeros on the plane of symmetry and at the pole, where sin(pi) and cos(pi / 2) leave rounding.
     side = np.where(np.abs(around_rad) == np.pi, 0.0, np.sin(around_rad))
@@ -281,24 +239,7 @@ def _midline(finger: Fingertip) -> tuple[FloatArray, FloatArray, FloatArray]:
 
 
 def finger_lines(finger: Fingertip, grading: Grading) -> GridLines:
-    """Grid lines of a finger, an even number of steps to either side of the centre.
-
-    Parameters
-    ----------
-    finger : Fingertip
-        The geometry.
-    grading : Grading
-        Fine zone and sizes of elements.
-
-    Returns
-    -------
-    GridLines
-
-    Raises
-    ------
-    InputError
-        If the centre does not lie on the volar midline between cut and tip.
-    """
+    """Grid lines of a finger, an even number of steps to either side of the centre."""
     station, x, arc = _midline(finger)
     centre = grading.centre_mm
     if not 0.0 < centre < x[-1]:
@@ -361,24 +302,6 @@ def finger_mesh(finger: Fingertip, grading: Grading | GridLines) -> Mesh:
     point of the bone and one of the skin. Layers are offset from the skin along its normal, on the lateral
     ridge and the dorsal side, where normals would meet, partly along the ray; the subcutis runs straight from
     there to the bone.
-
-    Parameters
-    ----------
-    finger : Fingertip
-        The geometry.
-    grading : Grading or GridLines
-        Sizes of the elements, or grid lines from `finger_lines`.
-
-    Returns
-    -------
-    Mesh
-
-    Examples
-    --------
-    >>> from fingerpad.geometry.grading import resolution_grading
-    >>> mesh = finger_mesh(Fingertip(), resolution_grading("quick", 17.37))
-    >>> mesh.shape
-    (40, 16, 9)
     """
     lines = grading if isinstance(grading, GridLines) else finger_lines(finger, grading)
     around = lines.around_rad[:-1] if lines.full else lines.around_rad
@@ -413,12 +336,10 @@ def _finger_points(finger: Fingertip, lines: GridLines, around_rad: FloatArray) 
 
 
 def _inward(finger: Fingertip, skin: FloatArray, rays: FloatArray) -> FloatArray:
-    """Directions (..., 3) in which layers are offset; their component along the inward normal is 1.
-
-    On the volar side that is the inward normal. At the lateral ridge, y = 0, the skin turns within a radius
-    smaller than its layers are thick, so normals would meet: from the height of the bone's axis up to y = 0
-    they turn towards the rays.
-    """
+    """Directions (..., 3) in which layers are offset; their component along the inward normal is 1."""
+    # On the volar side that is the inward normal. At the lateral ridge, y = 0, the skin turns within a radius
+    # smaller than its layers are thick, so normals would meet: from the height of the bone's axis up to y = 0
+    # they turn towards the rays.
     normal = finger.skin_normal(skin)
     height = np.clip(1.0 - skin[..., 1:2] / finger.spine_y_mm, 0.0, 1.0)
     share = _TURN_TO_RAYS * height**2 * (3.0 - 2.0 * height)

@@ -26,28 +26,7 @@ _RIGID_MOTIONS = 6
 
 
 def check_mesh(mesh: Mesh, n_materials: int = len(LAYERS)) -> None:
-    """Raise an error if a mesh cannot be solved.
-
-    Parameters
-    ----------
-    mesh : Mesh
-        The undeformed body.
-    n_materials : int
-        Number of materials.
-
-    Raises
-    ------
-    InputError
-        If nodes are not finite or belong to no element; an element refers to nodes that do not exist, repeats
-        a node other than as a wedge, is turned inside out or has no material; a set of nodes is missing or
-        out of range; nodes of the plane of symmetry are not those at z = 0; or a part of the body is free to
-        move as a whole.
-
-    Examples
-    --------
-    >>> from fingerpad.geometry.mesh import block_mesh
-    >>> check_mesh(block_mesh([0.0, 1.0], [0.0, 1.0], [0.0, 1.0], layers=[0]))
-    """
+    """Raise an error if a mesh cannot be solved."""
     _check_arrays(mesh)
     _check_elements(mesh, n_materials)
     _check_sets(mesh)

@@ -42,38 +42,24 @@ _OF_CONTACT = 8
 
 @dataclass(frozen=True)
 class MeshParts:
-    """What a file holds: nodes, bricks and wedges, and named sets.
-
-    Parameters
-    ----------
-    source : str
-        Name of the file, for errors.
-    nodes : array (n_nodes, 3)
-        Coordinates, in the file's unit.
-    elements : int array (n_elements, 8)
-        Rows of `nodes`; a wedge repeats its third and its sixth node: 0, 1, 2, 2, 3, 4, 5, 5.
-    labels : int array (n_elements,)
-        Numbers of the elements in the file.
-    node_sets, element_sets : mapping of str to int array
-        Rows of `nodes` and of `elements`.
-    """
+    """What a file holds: nodes, bricks and wedges, and named sets."""
 
     source: str
+    """Name of the file, for errors."""
     nodes: FloatArray
+    """Coordinates, in the file's unit, (n_nodes, 3)."""
     elements: IntArray
+    """Rows of `nodes`; a wedge repeats its third and its sixth node: 0, 1, 2, 2, 3, 4, 5, 5, (n_elements, 8).
+    """
     labels: IntArray
+    """Numbers of the elements in the file, (n_elements,)."""
     node_sets: Mapping[str, IntArray]
     element_sets: Mapping[str, IntArray]
+    """Rows of `nodes` and of `elements`."""
 
 
 def plain_name(name: str) -> str:
-    """Write the name of a set in small letters with single spaces.
-
-    Examples
-    --------
-    >>> plain_name("Stratum_Corneum"), plain_name("LIVING-EPIDERMIS")
-    ('stratum corneum', 'living epidermis')
-    """
+    """Write the name of a set in small letters with single spaces."""
     return " ".join("".join(c if c.isalnum() else " " for c in name.lower()).split())
 
 

@@ -44,14 +44,7 @@ def scaled_jacobian(mesh: Mesh) -> FloatArray:
 
 
 def element_place(mesh: Mesh, element: int) -> str:
-    """Describe an element by its number, layer and middle.
-
-    Examples
-    --------
-    >>> from fingerpad.geometry.mesh import block_mesh
-    >>> element_place(block_mesh([0.0, 1.0], [0.0, 1.0], [0.0, 1.0], layers=[2]), 0)
-    'element 0 (dermis, about x = 0.5, y = 0.5, z = 0.5 mm)'
-    """
+    """Describe an element by its number, layer and middle."""
     layer = int(mesh.layer[element])
     name = LAYERS[layer] if 0 <= layer < len(LAYERS) else f"layer {layer}"
     x, y, z = mesh.nodes_mm[mesh.elements[element]].mean(axis=0)
@@ -59,28 +52,7 @@ def element_place(mesh: Mesh, element: int) -> str:
 
 
 def squeezed_most(mesh: Mesh, displacement_mm: FloatArray) -> tuple[int, float]:
-    """Find the element with the smallest ratio of present to undeformed volume.
-
-    Parameters
-    ----------
-    mesh : Mesh
-        The undeformed body.
-    displacement_mm : array (n_nodes, 3)
-        Displacements. [mm]
-
-    Returns
-    -------
-    (int, float)
-        The element, and its smallest ratio at a Gauss point; 0 or below if it is inverted.
-
-    Examples
-    --------
-    >>> from fingerpad.geometry.mesh import block_mesh
-    >>> block = block_mesh([0.0, 1.0], [0.0, 1.0, 2.0], [0.0, 1.0], layers=[2, 3])
-    >>> element, ratio = squeezed_most(block, -0.1 * block.nodes_mm**2 * [0.0, 1.0, 0.0])
-    >>> element, round(ratio, 9)
-    (1, 0.7)
-    """
+    """Find the element with the smallest ratio of present to undeformed volume."""
     deformed = replace(mesh, nodes_mm=mesh.nodes_mm + displacement_mm)
     ratio = (jacobian_at_gauss(deformed) / jacobian_at_gauss(mesh)).min(axis=1)
     element = int(ratio.argmin())
@@ -88,24 +60,7 @@ def squeezed_most(mesh: Mesh, displacement_mm: FloatArray) -> tuple[int, float]:
 
 
 def rigid_motions(nodes_mm: FloatArray) -> FloatArray:
-    """Three translations and three rotations of the nodes about their middle.
-
-    Parameters
-    ----------
-    nodes_mm : array (n_nodes, 3)
-        Positions. [mm]
-
-    Returns
-    -------
-    array (n_nodes, 3, 6)
-        Displacement of every node in each motion. Rotations are divided by the size of the body, so that all
-        columns have similar size.
-
-    Examples
-    --------
-    >>> rigid_motions(np.array([[0.0, 0.0, 0.0], [2.0, 0.0, 0.0]]))[:, 1, 3].tolist()  # along y, about z
-    [-0.5, 0.5]
-    """
+    """Three translations and three rotations of the nodes about their middle."""
     centred = nodes_mm - nodes_mm.mean(axis=0)
     x, y, z = (centred / (np.ptp(nodes_mm, axis=0).max() or 1.0)).T
     zero, one = np.zeros_like(x), np.ones_like(x)

@@ -28,20 +28,14 @@ MOTION_UNITS = {"depth_mm": "mm", "force_mn": "mN", "ramp_ms": "ms", "hold_ms": 
 @dataclass(frozen=True)
 @converted
 class Pose:
-    """How far an indenter has moved and turned since first touch, beside its advance.
-
-    Parameters
-    ----------
-    x_mm, z_mm : float
-        Way of its tip along the finger, distal positive, and across it. [mm]
-    tilt_deg, spin_deg : float
-        Rotations about its tip, added to those of the `Touch`. [degrees]
-    """
+    """How far an indenter has moved and turned since first touch, beside its advance."""
 
     x_mm: float = 0.0
     z_mm: float = 0.0
+    """Way of its tip along the finger, distal positive, and across it. [mm]"""
     tilt_deg: float = 0.0
     spin_deg: float = 0.0
+    """Rotations about its tip, added to those of the `Touch`. [degrees]"""
 
     @property
     def way(self) -> FloatArray:
@@ -163,15 +157,7 @@ class Motion(metaclass=KnownKeywords):
 
     @abstractmethod
     def step_times_ms(self, ramp_steps: int, hold_steps: int) -> FloatArray:
-        """List the times to solve at, from 0. [ms]
-
-        Parameters
-        ----------
-        ramp_steps : int
-            Equal steps from nothing to the largest depth or force.
-        hold_steps : int
-            Steps of a hold.
-        """
+        """List the times to solve at, from 0. [ms]"""
 
 
 class _OneRamp(Motion):
@@ -207,16 +193,9 @@ class _OneRamp(Motion):
         return self.largest * np.clip(np.asarray(times_ms, dtype=float) / self.ramp_ms, 0.0, 1.0)
 
     def step_times_ms(self, ramp_steps: int, hold_steps: int) -> FloatArray:
-        """List the times to solve at: 0, equal ramp steps, hold steps that grow geometrically. [ms]
-
-        The first hold step is as long as a ramp step, or shorter for a short hold, because relaxation is
-        fastest right after the ramp.
-
-        Examples
-        --------
-        >>> RampAndHold().step_times_ms(2, 3).round(1).tolist()
-        [0.0, 25.0, 50.0, 75.0, 204.1, 1000.0]
-        """
+        """List the times to solve at: 0, equal ramp steps, hold steps that grow geometrically. [ms]"""
+        # The first hold step is as long as a ramp step, or shorter for a short hold, because relaxation is
+        # fastest right after the ramp.
         ramp = np.linspace(0.0, self.ramp_ms, ramp_steps + 1)
         return np.concatenate(
             [ramp, self.ramp_ms + hold_ends_ms(self.hold_ms, self.ramp_ms / ramp_steps, hold_steps)]

@@ -35,11 +35,5 @@ SIZE_UNITS = (
 
 
 def sizes_of(indenter: str) -> tuple[str, ...]:
-    """Sizes that an indenter has: fields of its class, then other names.
-
-    Examples
-    --------
-    >>> sizes_of("sphere")
-    ('curvature_per_m', 'radius_mm', 'diameter_mm')
-    """
+    """Sizes that an indenter has: fields of its class, then other names."""
     return tuple(dict.fromkeys([*_FIELDS[indenter], *other_names(INDENTERS[indenter])]))

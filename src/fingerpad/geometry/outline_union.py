@@ -16,27 +16,7 @@ _SAME = 1e-9
 
 
 def joined_outlines(outlines: Sequence[FloatArray]) -> list[FloatArray]:
-    """Boundary of what closed outlines enclose, where those that turn one way enclose and the others cut out.
-
-    Parameters
-    ----------
-    outlines : sequence of array (n, 2)
-        Corners of each, the first not repeated. A place is inside if outlines go around it more often one
-        way than the other (the rule of fonts).
-
-    Returns
-    -------
-    list of array (n, 2)
-        Outlines that do not cross, holes too.
-
-    Examples
-    --------
-    >>> square = np.array([[0.0, 0.0], [2.0, 0.0], [2.0, 2.0], [0.0, 2.0]])
-    >>> [len(corners) for corners in joined_outlines([square, square + 1.0])]
-    [8]
-    >>> [len(corners) for corners in joined_outlines([square, 0.5 + 0.5 * square[::-1]])]
-    [4, 4]
-    """
+    """Boundary of what closed outlines enclose, where those that turn the other way cut out."""
     whole = np.concatenate([np.stack([line, np.roll(line, -1, axis=0)], axis=1) for line in outlines])
     extent = float(np.ptp(whole, axis=(0, 1)).max())
     parts = _parted(whole, _SAME * extent)

@@ -20,31 +20,7 @@ FAR_MM = 1000.0
 
 
 def check_path(finger: Finger, motion: Motion, at_mm: tuple[float, float]) -> None:
-    """Check every place of a motion before anything is pressed.
-
-    Parameters
-    ----------
-    finger : Fingertip or FingerMesh
-        The finger.
-    motion : Motion
-        Depths are checked if it prescribes them.
-    at_mm : (float, float)
-        x and z of the skin point at first touch. [mm]
-
-    Raises
-    ------
-    InputError
-        If a sample stands beside the finger, or the depth exceeds 80 % of the way to the bone at a sample or
-        between two of them.
-
-    Examples
-    --------
-    >>> from fingerpad.geometry.fingertip import Fingertip
-    >>> from fingerpad.geometry.motion import RampAndHold
-    >>> check_path(Fingertip(), RampAndHold(depth_mm=9.0), (17.37, 0.0))
-    Traceback (most recent call last):
-    fingerpad.core.errors.InputError: depth_mm must stay below 4.44 mm at x = 17.37, z = 0 mm, ...
-    """
+    """Check every place of a motion before anything is pressed."""
     samples_ms = np.array(motion.samples_ms)
     if motion.stays:
         # Depths between samples lie between theirs.

@@ -34,15 +34,7 @@ _CLOSE_MM, _STEP_MM, _MOST_STEPS = 1e-9, 1e-4, 200
 
 
 def mirrored(gap: Gap, spin_deg: float) -> bool:
-    """Whether a body, turned by `spin_deg` about y, is its own mirror image across z = 0, from its gap.
-
-    Examples
-    --------
-    >>> def beside(points):
-    ...     return points[:, 1] + 0.1 * points[:, 2], points
-    >>> mirrored(beside, 0.0), mirrored(beside, 90.0)
-    (False, True)
-    """
+    """Whether a body, turned by `spin_deg` about y, is its own mirror image across z = 0, from its gap."""
     cosine, sine = cosine_and_sine(spin_deg)
     axes = np.array([[cosine, 0.0, -sine], [0.0, 1.0, 0.0], [sine, 0.0, cosine]])
     line = np.arange(-REACH_MM, REACH_MM + SPACING_MM / 2, SPACING_MM)
@@ -59,13 +51,6 @@ def traced_front(gap: Gap, points_mm: FloatArray, above_mm: FloatArray | float =
     From above each height is lowered by its gap, which is the distance to the body or less. Where a gap is
     more than the distance, the last step is halved until the face is found. `above_mm` are heights above the
     face from which it is sought, -inf beside it.
-
-    Examples
-    --------
-    >>> def ball(points):
-    ...     return np.linalg.norm(points + [0.0, 2.0, 0.0], axis=1) - 2.0, points
-    >>> traced_front(ball, np.array([[0.0, 3.0, 0.0], [1.2, 0.0, 0.0], [4.0, 0.0, 0.0]])).round(6).tolist()
-    [0.0, -0.4, -inf]
     """
     at = np.array(points_mm, dtype=np.float64)
     at[:, 1] = above_mm
@@ -92,20 +77,7 @@ def traced_front(gap: Gap, points_mm: FloatArray, above_mm: FloatArray | float =
 
 
 def check_gap(gap: Gap, name: str) -> None:
-    """Check that a gap has the shapes of its contract, and unit normals that are its gradient on the face.
-
-    Parameters
-    ----------
-    gap : callable
-        Returns gap (n,) and normal (n, 3) at points (n, 3).
-    name : str
-        The body, for the message.
-
-    Raises
-    ------
-    InputError
-        If it does not keep the contract.
-    """
+    """Check that a gap has the shapes of its contract, and unit normals that are its gradient on the face."""
     line = np.linspace(-2.1, 2.2, 9)
     points = np.stack(np.meshgrid(line, [0.05], line, indexing="ij"), axis=-1).reshape(-1, 3)
     face_mm = traced_front(lambda at: _shaped(gap, at, name), points)

@@ -56,23 +56,6 @@ def narrowest_relief(height_mm: FloatArray, spacing_mm: float, beside_mm: float)
     0.2 of that width, apart from the outermost heights along walls and from slopes above 45 degrees,
     where triangles are ragged. What is sharp is measured a little beside its tip, and a groove as far down
     as skin reaches.
-
-    Parameters
-    ----------
-    height_mm : array (nx, nz)
-        Heights of the face over a grid of x and z. [mm]
-    spacing_mm : float
-        Of the grid. [mm]
-    beside_mm : float
-        Height beside the grid. [mm]
-
-    Examples
-    --------
-    A sharp wedge of 90 degrees is as wide as below its tip:
-
-    >>> x = np.arange(-3.0, 3.0, 0.025)[:, None] * np.ones(240)
-    >>> narrowest_relief(-np.abs(x), 0.025, -3.0)
-    0.6
     """
     lowest = max(beside_mm, height_mm.max() - RELIEF_MM)
     crack = max(1, round(CRACK_MM / spacing_mm))

@@ -37,37 +37,7 @@ def check_edge_radius(radius_mm: float, narrowest_mm: float) -> None:
 
 
 def with_rounded_edges(sharp: Gap, points_mm: FloatArray, radius_mm: float) -> tuple[FloatArray, FloatArray]:
-    """Gap and normal of a body whose convex edges and corners are rounded; hollows stay as they are.
-
-    Parameters
-    ----------
-    sharp : callable
-        Gap of the body with sharp edges, a distance inside as well as outside.
-    points_mm : array (n, 3)
-        Points of the indenter's frame. [mm]
-    radius_mm : float
-        Radius of the edges, above 0. Parts thinner than twice this keep their edges. [mm]
-
-    Returns
-    -------
-    gap : array (n,)
-        Signed distance. [mm]
-    normal : array (n, 3)
-        Its gradient.
-
-    Examples
-    --------
-    The corner x < 0, y < 0 with a radius of 1 mm:
-
-    >>> def corner(points):
-    ...     x, y = points[:, :1], points[:, 1:2]
-    ...     gap = np.where((x > 0) & (y > 0), np.hypot(x, y), np.maximum(x, y))
-    ...     away = np.where((x > 0) & (y > 0), points, np.where(x > y, [1.0, 0, 0], [0, 1.0, 0]))
-    ...     return gap[:, 0], away / np.linalg.norm(away, axis=1)[:, None]
-    >>> gap, normal = with_rounded_edges(corner, np.array([[0.2, 0.6, 0.0], [-2.0, 0.5, 0.0]]), 1.0)
-    >>> gap.round(6).tolist(), normal[0].tolist()
-    ([1.0, 0.5], [0.6, 0.8, 0.0])
-    """
+    """Gap and normal of a body whose convex edges and corners are rounded; hollows stay as they are."""
     gap, normal = sharp(points_mm)
     rows = np.flatnonzero((gap > -radius_mm) & (gap < NEAR_MM))
     points = np.ascontiguousarray(points_mm[rows], dtype=np.float64)

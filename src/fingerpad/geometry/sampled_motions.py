@@ -61,10 +61,6 @@ def sampled(
     phases : sequence of Phase, optional
         As of `Trajectory`.
 
-    Returns
-    -------
-    Trajectory
-
     Raises
     ------
     InputError

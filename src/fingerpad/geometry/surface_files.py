@@ -73,10 +73,6 @@ def read_surface(
     smooth_below_deg : float
         Hollow creases between triangles of a smaller angle are rounded; see `Surface`. [degrees]
 
-    Returns
-    -------
-    Surface
-
     Raises
     ------
     InputError
@@ -114,10 +110,8 @@ def read_surface(
 
 
 def _welded(vertices: FloatArray, faces: IntArray) -> tuple[FloatArray, IntArray]:
-    """Vertices without a second one at the same place, sorted, and the triangles of them.
-
-    Several times as fast for a million triangles as `numpy.unique` by rows.
-    """
+    """Vertices without a second one at the same place, sorted, and the triangles of them."""
+    # Several times as fast for a million triangles as `numpy.unique` by rows.
     order = np.lexsort(vertices.T[::-1])
     ahead = vertices[order]
     is_new = np.r_[True, (ahead[1:] != ahead[:-1]).any(axis=1)]

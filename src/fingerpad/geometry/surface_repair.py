@@ -190,10 +190,8 @@ def _nested(
 
 
 def _facing_walls(vertices: FloatArray, faces: IntArray) -> tuple[np.ndarray, FloatArray, float] | None:
-    """Triangles along which another part faces them within `JOIN_MM`, a place, and how far apart they are.
-
-    None if no crack opens to the skin.
-    """
+    """Triangles along which another part faces them within `JOIN_MM`, a place, and how far apart they are."""
+    # None if no crack opens to the skin.
     layer = layers_of(vertices, faces, border_of(faces))
     if not layer.any():
         return None

@@ -421,25 +421,6 @@ def samples_of_line(times: FloatArray, table: FloatArray, tolerance: float) -> N
     """Find the samples between which lines miss none of the others by more than a tolerance.
 
     A part is divided at the sample that its line misses most (Ramer-Douglas-Peucker).
-
-    Parameters
-    ----------
-    times : array (n_samples,)
-        Increasing.
-    table : array (n_samples, n_columns)
-        Values.
-    tolerance : float
-        Largest error of any column.
-
-    Returns
-    -------
-    bool array (n_samples,)
-        Whether a sample is kept, as the first and the last one are.
-
-    Examples
-    --------
-    >>> samples_of_line(np.arange(4.0), np.array([[0.0], [0.9], [2.0], [2.0]]), 0.2).tolist()
-    [True, False, True, True]
     """
     keep = np.zeros(times.size, dtype=bool)
     keep[[0, -1]] = True

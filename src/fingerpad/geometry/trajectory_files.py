@@ -112,10 +112,6 @@ def recorded(file: Path, first_touch_mm: float = 0.0, tolerance: float = TOLERAN
     tolerance : float, optional
         Samples this close to a line, relative to the extent of the motion, are left out; 0 keeps all.
 
-    Returns
-    -------
-    Trajectory
-
     Raises
     ------
     InputError

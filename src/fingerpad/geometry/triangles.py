@@ -12,28 +12,7 @@ _NEAREST = 24
 
 
 def closest_on_triangles(points_mm: FloatArray, corners_mm: FloatArray) -> tuple[IntArray, FloatArray]:
-    """Closest point on a surface of triangles of similar size.
-
-    Parameters
-    ----------
-    points_mm : array (n, 3)
-        Points. [mm]
-    corners_mm : array (n_triangles, 3, 3)
-        Corners of the triangles. [mm]
-
-    Returns
-    -------
-    triangle : int array (n,)
-        Triangle of the closest point.
-    weights : array (n, 3)
-        Weights of its corners, not negative, with sum 1.
-
-    Examples
-    --------
-    >>> one = np.array([[[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]])
-    >>> closest_on_triangles(np.array([[0.25, 0.25, 3.0], [2.0, 0.0, 0.0]]), one)[1].tolist()
-    [[0.5, 0.25, 0.25], [0.0, 1.0, 0.0]]
-    """
+    """Closest point on a surface of triangles of similar size."""
     count = min(_NEAREST, len(corners_mm))
     _, near = cKDTree(corners_mm.mean(axis=1)).query(points_mm, k=count)
     near = near.reshape(len(points_mm), count)

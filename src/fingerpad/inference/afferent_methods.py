@@ -48,13 +48,7 @@ MOST_EVALUATIONS = 600
 
 
 def fitted_four(numbers: FloatArray) -> FloatArray:
-    """Return the four identifiable parameters of the four numbers of a fit.
-
-    Examples
-    --------
-    >>> fitted_four(np.array([0.5, 4.0, 0.02, 50.0])).tolist()
-    [0.01, 4.0, 0.02, 50.0]
-    """
+    """Return the four identifiable parameters of the four numbers of a fit."""
     return np.array([numbers[0] / numbers[3], *numbers[1:]])
 
 
@@ -64,28 +58,12 @@ def fitted_six(numbers: FloatArray) -> FloatArray:
 
 
 def four_number_problem(model: RateModel, recordings: RateRecordings) -> RateProblem:
-    """Make the problem of fitting recorded rates in the four numbers of `FITTED_NAMES`.
-
-    Parameters
-    ----------
-    model : RateModel
-        Model of the paper's six parameters.
-    recordings : RateRecordings
-        Observed rates.
-    """
+    """Make the problem of fitting recorded rates in the four numbers of `FITTED_NAMES`."""
     return RateProblem(Reparametrised(model, FITTED_NAMES, fitted_six), recordings)
 
 
 def five_number_problem(model: RateModel, recordings: RateRecordings) -> RateProblem:
-    """Make the problem of fitting recorded rates in the four numbers of `FITTED_NAMES` and the offset.
-
-    Parameters
-    ----------
-    model : RateModel
-        Model of the paper's six parameters and the offset.
-    recordings : RateRecordings
-        Observed rates.
-    """
+    """Make the problem of fitting recorded rates in the four numbers of `FITTED_NAMES` and the offset."""
 
     def seven(numbers: FloatArray) -> FloatArray:
         return np.append(fitted_six(numbers[:4]), numbers[4])
@@ -94,19 +72,7 @@ def five_number_problem(model: RateModel, recordings: RateRecordings) -> RatePro
 
 
 def bounds_of(*drives: Drive) -> Bounds:
-    """Bounds of the four numbers of a fit: those of `LOWEST`, `HIGHEST` and `SCALES`.
-
-    Parameters
-    ----------
-    *drives : Drive
-        Drives of all stimuli; the strongest one sets the unit of both gains.
-
-    Examples
-    --------
-    >>> driven = Drive([0.0, 1.0], [[0.0], [2.0]], [[4.0], [4.0]])
-    >>> bounds_of(driven).high.tolist()
-    [0.95, 0.15, 0.1, 300.0]
-    """
+    """Bounds of the four numbers of a fit: those of `LOWEST`, `HIGHEST` and `SCALES`."""
     rate, sed = (
         max(float(getattr(driven, name).max()) for driven in drives)
         for name in ("rate_kpa_per_ms", "sed_kpa")
@@ -126,17 +92,7 @@ def by_differences(bounds: Bounds) -> LeastSquares:
 
 
 def along_slopes(smooth: SmoothRateModel, problem: RateProblem, bounds: Bounds) -> LeastSquares:
-    """Make the method of least squares with the derivatives of a smooth model.
-
-    Parameters
-    ----------
-    smooth : SmoothRateModel
-        The model of the four identifiable parameters in the closed form of constant drive.
-    problem : RateProblem
-        From `four_number_problem`.
-    bounds : Bounds
-        Of the four parameters.
-    """
+    """Make the method of least squares with the derivatives of a smooth model."""
 
     def slopes(numbers: FloatArray) -> Rates:
         # By the chain rule: beta/(C v) is the first number over the last, tau.
@@ -151,15 +107,5 @@ def along_slopes(smooth: SmoothRateModel, problem: RateProblem, bounds: Bounds) 
 
 
 def search_from(begun: FloatArray, bounds: Bounds, seed: int = 0) -> CovarianceAdaptation:
-    """Make CMA-ES from the result of a faster method.
-
-    Parameters
-    ----------
-    begun : array (n_parameters,)
-        Mean of the first generation.
-    bounds : Bounds
-        Of the same parameters.
-    seed : int, optional
-        Seed of the random numbers.
-    """
+    """Make CMA-ES from the result of a faster method."""
     return CovarianceAdaptation(begun, bounds, most_evaluations=MOST_EVALUATIONS, seed=seed)

@@ -48,13 +48,7 @@ _START = identifiable(
 
 
 def to_coordinates(four: ArrayLike) -> FloatArray:
-    """Transform the four identifiable parameters (..., 4) to the coordinates (..., 4).
-
-    Examples
-    --------
-    >>> to_coordinates([0.01, 4.0, 0.014, 68.0]).round(2).tolist()
-    [0.68, 1.39, -4.27, 4.22]
-    """
+    """Transform the four identifiable parameters (..., 4) to the coordinates (..., 4)."""
     numbers = np.asarray(four, dtype=np.float64)
     if numbers.shape[-1:] != (4,) or not (numbers[..., 1:] > 0.0).all():
         raise InputError(
@@ -66,13 +60,7 @@ def to_coordinates(four: ArrayLike) -> FloatArray:
 
 
 def from_coordinates(points: ArrayLike) -> FloatArray:
-    """Transform the coordinates (..., 4) to the four identifiable parameters (..., 4).
-
-    Examples
-    --------
-    >>> from_coordinates(to_coordinates([0.01, 4.0, 0.014, 68.0])).round(6).tolist()
-    [0.01, 4.0, 0.014, 68.0]
-    """
+    """Transform the coordinates (..., 4) to the four identifiable parameters (..., 4)."""
     coordinates = np.asarray(points, dtype=np.float64)
     positive_three = np.exp(coordinates[..., 1:])
     return np.concatenate([coordinates[..., :1] / positive_three[..., 2:], positive_three], axis=-1)
@@ -86,23 +74,17 @@ class AfferentPrior:
     The potential at rest is normal about 0 and stays below the threshold, so that no spike occurs without a
     stimulus; gains and time constant are log-normal about the start point of
     fits, the paper's first one with its gains rescaled. See docs/decisions/priors.md.
-
-    Parameters
-    ----------
-    resting_share_sd : float
-        Standard deviation of the potential at rest over the threshold. [1]
-    dynamic_gain_per_kpa, static_gain_per_kpa_ms, time_constant_ms : float
-        Medians of k_d/(C v), k_s/(C v) and tau. [1/kPa, 1/(kPa ms), ms]
-    gain_factor, time_constant_factor : float
-        Two thirds of the prior lie between the median divided and multiplied by this factor. [1]
     """
 
     resting_share_sd: float = 1.0
+    """Standard deviation of the potential at rest over the threshold. [1]"""
     dynamic_gain_per_kpa: float = float(_START[1])
     static_gain_per_kpa_ms: float = float(_START[2])
     time_constant_ms: float = float(_START[3])
+    """Medians of k_d/(C v), k_s/(C v) and tau. [1/kPa, 1/(kPa ms), ms]"""
     gain_factor: float = 10.0
     time_constant_factor: float = 2.0
+    """Two thirds of the prior lie between the median divided and multiplied by this factor. [1]"""
 
     def __post_init__(self) -> None:
         for name in ("resting_share_sd", *IDENTIFIABLE_NAMES[1:]):
@@ -131,21 +113,14 @@ class AfferentPrior:
 
 @dataclass(frozen=True)
 class AfferentPosterior:
-    """Posterior draws of the four identifiable parameters and of the rates that they predict.
-
-    Parameters
-    ----------
-    chains : Chains
-        Draws in the coordinates, with their measures of convergence.
-    four : array (n_draws, 4)
-        The same draws as the four identifiable parameters.
-    rates : dict of str to ResidualDraws
-        By phase, for some of the draws: predicted rates, new recordings, sigma and length.
-    """
+    """Posterior draws of the four identifiable parameters and of the rates that they predict."""
 
     chains: Chains
+    """Draws in the coordinates, with their measures of convergence."""
     four: FloatArray
+    """The same draws as the four identifiable parameters, (n_draws, 4)."""
     rates: dict[str, ResidualDraws]
+    """By phase, for some of the draws: predicted rates, new recordings, sigma and length."""
 
     def six(self, capacitance_mf: float, threshold_mv: float) -> FloatArray:
         """Return the draws as six parameters (n_draws, 6) with the given C [mF] and v [mV]."""
@@ -153,20 +128,7 @@ class AfferentPosterior:
 
 
 def log_posterior(likelihood: RateLikelihood, prior: AfferentPrior) -> LogDensity:
-    """Log posterior density of rows of coordinates, up to a constant.
-
-    Parameters
-    ----------
-    likelihood : RateLikelihood
-        Of a model of the four parameters, from `fingerpad.inference.rate_model.four_number_model`.
-    prior : AfferentPrior
-        Prior of the parameters.
-
-    Returns
-    -------
-    callable
-        From points (n_points, 4) to log densities (n_points,).
-    """
+    """Log posterior density of rows of coordinates, up to a constant."""
     if likelihood.model.names != IDENTIFIABLE_NAMES:
         raise InputError(
             f"likelihood needs a model of {', '.join(IDENTIFIABLE_NAMES)}, as four_number_model makes it: "
@@ -190,32 +152,7 @@ def afferent_posterior(
     prior: AfferentPrior | None = None,
     **settings: Any,
 ) -> AfferentPosterior:
-    """Sample the posterior of the four identifiable parameters.
-
-    Parameters
-    ----------
-    likelihood : RateLikelihood
-        Of a model of the four parameters, from `fingerpad.inference.rate_model.four_number_model`.
-    start : array_like (4,)
-        A fit, about which the walkers start.
-    seed : int
-        Seed of the random numbers; the same one gives the same bits on any number of threads.
-    prior : AfferentPrior, optional
-        Default: `AfferentPrior()`.
-    **settings
-        Settings of `fingerpad.inference.fitting.posterior.sample`.
-
-    Returns
-    -------
-    AfferentPosterior
-
-    Raises
-    ------
-    InputError
-        If the model has other parameters, or the start is not a valid set of them.
-    ConvergenceError
-        If the draws have not converged.
-    """
+    """Sample the posterior of the four identifiable parameters."""
     density, centre = log_posterior(likelihood, prior or AfferentPrior()), to_coordinates(start)
     centre[0] = min(centre[0], 1.0 - SMALLEST_MARGIN)
 

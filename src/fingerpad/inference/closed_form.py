@@ -38,39 +38,7 @@ def constant_drive_rate(
     refractory_ms: float = neuron.REFRACTORY.value,
     bend: float = 0.0,
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Rate under a constant drive, and its derivatives along the drive and the time constant.
-
-    Parameters
-    ----------
-    drive_per_ms : array_like
-        g, the current over C v. [1/ms]
-    time_constant_ms : float
-        tau. [ms]
-    refractory_ms : float, optional
-        Refractory period t_r. [ms]
-    bend : float, optional
-        Width s over which the rate sets in; 0 for the exact rate. [1]
-
-    Returns
-    -------
-    rate_hz : array
-        f. [spikes/s]
-    per_drive, per_time_constant : array
-        df/dg [spikes/s ms] and df/dtau [spikes/s / ms]; 0 where f is 0.
-
-    Raises
-    ------
-    InputError
-        If the time constant is not positive, or refractory period or width are negative.
-
-    Examples
-    --------
-    2 µA over 1e-6 mF and 50 mV, as in `fingerpad.neuron.lif`: an interval is 31.165 ms + 1 ms.
-
-    >>> rate_hz, _, _ = constant_drive_rate([0.04, 0.01], time_constant_ms=68.0)
-    >>> rate_hz.round(3).tolist(), round(1000.0 / 32.165, 3)
-    ([31.09, 0.0], 31.09)
-    """
+    """Rate under a constant drive, and its derivatives along the drive and the time constant."""
     tau = positive("time_constant_ms", time_constant_ms, "ms")
     rest = not_negative("refractory_ms", refractory_ms, "ms")
     g = np.asarray(drive_per_ms, dtype=np.float64)
@@ -100,28 +68,12 @@ class ClosedFormModel:
 
     The model neglects the charging from rest and single spikes. It is inaccurate in the ramp, but smooth, and
     its derivatives are cheap.
-
-    Parameters
-    ----------
-    stimuli : AfferentModel
-        Drives, windows and refractory period.
-    bend : float
-        Width over which the rate sets in. [1]
-
-    Examples
-    --------
-    >>> from fingerpad.core.signals import SedTraces
-    >>> sed = SedTraces([0.0, 50.0, 1000.0], [[0.0], [2.0], [2.0]], kinks_ms=[50.0])
-    >>> model = ClosedFormModel(AfferentModel.of_traces(sed))
-    >>> dynamic_hz, static_hz = model.evaluate(np.array([0.01, 4.0, 0.014, 68.0]))
-    >>> dynamic_hz.round().tolist(), static_hz.round().tolist()
-    ([156.0], [29.0])
-    >>> [slopes.shape for slopes in model.slopes(np.array([0.01, 4.0, 0.014, 68.0]))]
-    [(1, 4), (1, 4)]
     """
 
     stimuli: AfferentModel
+    """Drives, windows and refractory period."""
     bend: float = BEND
+    """Width over which the rate sets in. [1]"""
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -130,7 +82,6 @@ class ClosedFormModel:
 
     @property
     def n_stimuli(self) -> int:
-        """Number of stimuli."""
         return self.stimuli.n_stimuli
 
     def evaluate(self, parameters: FloatArray) -> Rates:

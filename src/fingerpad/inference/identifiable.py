@@ -35,29 +35,7 @@ IDENTIFIABLE_UNITS = ("1/ms", "1/kPa", "1/(kPa ms)", "ms")
 
 
 def identifiable(parameters: ArrayLike) -> FloatArray:
-    """Return the four identifiable parameters.
-
-    Parameters
-    ----------
-    parameters : array_like (..., 6)
-        beta [mA], k_d [mA ms/kPa], k_s [mA/kPa], tau [ms], C [mF], v [mV]: the order of
-        `fingerpad.neuron.afferent.PARAMETER_NAMES`.
-
-    Returns
-    -------
-    array (..., 4)
-        beta/(C v) [1/ms], k_d/(C v) [1/kPa], k_s/(C v) [1/(kPa ms)], tau [ms].
-
-    Raises
-    ------
-    InputError
-        If there are not six finite numbers, or C or v is not positive.
-
-    Examples
-    --------
-    >>> identifiable([5e-7, 2e-4, 7e-7, 68.0, 1e-6, 50.0]).round(6).tolist()
-    [0.01, 4.0, 0.014, 68.0]
-    """
+    """Return the four identifiable parameters."""
     six = _rows("parameters", parameters, PARAMETER_NAMES)
     scale = six[..., 4:5] * six[..., 5:6]
     if (six[..., 4:] <= 0.0).any():
@@ -72,30 +50,7 @@ def six_parameters(
     capacitance_mf: float = neuron.CAPACITANCE.value,
     threshold_mv: float = neuron.THRESHOLD.value,
 ) -> FloatArray:
-    """Return the six parameters with given C and v that are equivalent to four identifiable ones.
-
-    Parameters
-    ----------
-    four : array_like (..., 4)
-        In the order of `IDENTIFIABLE_NAMES`.
-    capacitance_mf, threshold_mv : float, optional
-        C [mF] and v [mV]; they can be chosen freely. Default: the paper's start.
-
-    Returns
-    -------
-    array (..., 6)
-        In the order of `fingerpad.neuron.afferent.PARAMETER_NAMES`.
-
-    Raises
-    ------
-    InputError
-        If there are not four finite numbers along the last axis, or C or v is not positive.
-
-    Examples
-    --------
-    >>> [f"{value:.3g}" for value in six_parameters([0.01, 4.0, 0.014, 68.0])]
-    ['5e-07', '0.0002', '7e-07', '68', '1e-06', '50']
-    """
+    """Return the six parameters with given C and v that are equivalent to four identifiable ones."""
     numbers = _rows("four", four, IDENTIFIABLE_NAMES)
     capacitance = positive("capacitance_mf", capacitance_mf, "mF")
     threshold = positive("threshold_mv", threshold_mv, "mV")
@@ -108,26 +63,6 @@ def silent_at_rest(parameters: ArrayLike) -> FloatArray:
 
     Without a stimulus the potential tends to beta tau/C. SAI afferents are silent at rest, so every fit keeps
     beta tau/(C v) at most at `LARGEST_RESTING_SHARE`.
-
-    Parameters
-    ----------
-    parameters : array_like (..., 6)
-        In the order of `fingerpad.neuron.afferent.PARAMETER_NAMES`.
-
-    Returns
-    -------
-    array (..., 6)
-        The same, with the intercept lowered to the bound where it was above.
-
-    Raises
-    ------
-    InputError
-        If there are not six finite numbers.
-
-    Examples
-    --------
-    >>> [f"{value:.3g}" for value in silent_at_rest([1e-6, 2e-4, 7e-7, 50.0, 1e-6, 50.0])]
-    ['9.5e-07', '0.0002', '7e-07', '50', '1e-06', '50']
     """
     six = _rows("parameters", parameters, PARAMETER_NAMES)
     rheobase = six[..., 4:5] * six[..., 5:6] / six[..., 3:4]

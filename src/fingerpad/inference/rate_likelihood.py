@@ -42,36 +42,16 @@ PRIOR_OBSERVATIONS = 1.0
 
 @dataclass(frozen=True)
 class CorrelatedResiduals:
-    """Distribution of residuals along a line, whose deviation and correlation length are integrated out.
-
-    Parameters
-    ----------
-    n_residuals : int
-        How many.
-    positions_mm : array (n_residuals,), optional
-        Their places along a line; default: independent residuals. [mm]
-    lengths_mm : tuple of float, optional
-        Grid of correlation lengths; 0 for independence. [mm]
-    deviation : float, optional
-        Scale s of the prior of sigma. [unit of the residuals]
-
-    Raises
-    ------
-    InputError
-        If a length is negative, the deviation is not positive, or two residuals have the same position.
-
-    Examples
-    --------
-    >>> residuals = CorrelatedResiduals(3, np.array([0.0, 1.0, 2.0]), deviation=0.1)
-    >>> small, large = residuals.log_likelihood(np.array([[0.1, 0.1, 0.1], [0.4, 0.4, 0.4]]))
-    >>> bool(small > large)
-    True
-    """
+    """Distribution of residuals along a line, whose deviation and correlation length are integrated out."""
 
     n_residuals: int
+    """How many."""
     positions_mm: FloatArray | None = None
+    """Their places along a line; default: independent residuals, (n_residuals,). [mm]"""
     lengths_mm: tuple[float, ...] = LENGTHS_MM
+    """Grid of correlation lengths; 0 for independence. [mm]"""
     deviation: float = DEVIATION_HZ
+    """Scale s of the prior of sigma. [unit of the residuals]"""
     _whitening: FloatArray = field(init=False, repr=False, compare=False)
     _log_weights: FloatArray = field(init=False, repr=False, compare=False)
 
@@ -125,45 +105,18 @@ class CorrelatedResiduals:
 
 @dataclass(frozen=True)
 class RateLikelihood:
-    """Likelihood of the parameters of a rate model, given the observed rates of one afferent.
-
-    Parameters
-    ----------
-    model : RateModel
-        Predicts the rates under all stimuli.
-    recordings : RateRecordings
-        Observed rates, one row per stimulus.
-    positions_mm : array (n_stimuli,), optional
-        Position of each stimulus along a line; default: independent residuals. [mm]
-    lengths_mm : tuple of float, optional
-        Grid of correlation lengths; 0 for independence. [mm]
-    deviation_hz : float, optional
-        Scale s of the prior of sigma. [spikes/s]
-
-    Raises
-    ------
-    InputError
-        If numbers of stimuli differ, or two stimuli have the same position.
-
-    Examples
-    --------
-    >>> from fingerpad.neuron.afferent import Afferent
-    >>> from fingerpad.inference.rate_model import AfferentModel
-    >>> from fingerpad.core.signals import SedTraces
-    >>> sed = SedTraces([0.0, 50.0, 1000.0], [[0.0, 0.0], [1.0, 2.0], [1.0, 2.0]], kinks_ms=[50.0])
-    >>> observed = RateRecordings(("flat", "edge"), [120.0, 210.0], [35.0, 60.0])
-    >>> likelihood = RateLikelihood(AfferentModel.of_traces(sed), observed)
-    >>> fitted = Afferent.for_tissues("trial3").parameters
-    >>> good, poor = likelihood.log_likelihood(fitted * np.array([[1.0], [2.0]]))
-    >>> bool(good > poor)
-    True
-    """
+    """Likelihood of the parameters of a rate model, given the observed rates of one afferent."""
 
     model: RateModel
+    """Predicts the rates under all stimuli."""
     recordings: RateRecordings
+    """Observed rates, one row per stimulus."""
     positions_mm: FloatArray | None = None
+    """Position of each stimulus along a line; default: independent residuals, (n_stimuli,). [mm]"""
     lengths_mm: tuple[float, ...] = LENGTHS_MM
+    """Grid of correlation lengths; 0 for independence. [mm]"""
     deviation_hz: float = DEVIATION_HZ
+    """Scale s of the prior of sigma. [spikes/s]"""
     _residuals: CorrelatedResiduals = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
@@ -187,15 +140,6 @@ class RateLikelihood:
         """Log likelihood of parameters up to a constant, with sigma and length integrated out.
 
         The constant does not depend on the model or the lengths, so differences between them are evidence.
-
-        Parameters
-        ----------
-        points : array (n_points, n_parameters)
-            Parameters of the model.
-
-        Returns
-        -------
-        array (n_points,)
         """
         return sum(
             (self._residuals.log_likelihood(residuals) for _, _, residuals in self._phases(points)),
@@ -203,20 +147,7 @@ class RateLikelihood:
         )
 
     def residual_draws(self, points: FloatArray, random: np.random.Generator) -> dict[str, ResidualDraws]:
-        """Draw sigma and length of every phase for each row of parameters.
-
-        Parameters
-        ----------
-        points : array (n_points, n_parameters)
-            Draws from the posterior.
-        random : Generator
-            Source of the random numbers.
-
-        Returns
-        -------
-        dict of str to ResidualDraws
-            By phase.
-        """
+        """Draw sigma and length of every phase for each row of parameters."""
         drawn = {}
         for phase, predicted, residuals in self._phases(points):
             deviation, length = self._residuals.draw(residuals, random)
@@ -234,22 +165,15 @@ class RateLikelihood:
 
 @dataclass(frozen=True)
 class ResidualDraws:
-    """Rates of one phase, predicted and of a new recording.
-
-    Parameters
-    ----------
-    predicted_hz, new_hz : array (n_points, n_stimuli)
-        Predicted rates, and rates with a random residual, not below 0. [spikes/s]
-    deviation_hz : array (n_points,)
-        Standard deviation sigma. [spikes/s]
-    length_mm : array (n_points,)
-        Correlation length of the residuals; 0 if they are independent. [mm]
-    """
+    """Rates of one phase, predicted and of a new recording."""
 
     predicted_hz: FloatArray
     new_hz: FloatArray
+    """Predicted rates, and rates with a random residual, not below 0, (n_points, n_stimuli). [spikes/s]"""
     deviation_hz: FloatArray
+    """Standard deviation sigma, (n_points,). [spikes/s]"""
     length_mm: FloatArray
+    """Correlation length of the residuals; 0 if they are independent, (n_points,). [mm]"""
 
 
 def _whitening(distances_mm: FloatArray, length_mm: float) -> FloatArray:

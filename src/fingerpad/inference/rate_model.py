@@ -46,9 +46,7 @@ class RateModel(Protocol):
         ...
 
     @property
-    def n_stimuli(self) -> int:
-        """Number of stimuli."""
-        ...
+    def n_stimuli(self) -> int: ...
 
     def evaluate(self, parameters: FloatArray) -> Rates:
         """Rates (n_stimuli,) for one set of parameters (n_parameters,). [spikes/s]"""
@@ -70,28 +68,7 @@ class SmoothRateModel(RateModel, Protocol):
 def evaluate_rows(
     model: RateModel, points: FloatArray, new_evaluator: Callable[[], Evaluate] | None = None
 ) -> Rates:
-    """Evaluate a model row by row on all threads: what `evaluate_batch` of most models does.
-
-    Parameters
-    ----------
-    model : RateModel
-        The model.
-    points : array (n_points, n_parameters)
-        One set of parameters per row.
-    new_evaluator : callable, optional
-        Returns a function like `model.evaluate` that one thread may call again and again; default:
-        `model.evaluate` itself.
-
-    Returns
-    -------
-    dynamic_hz, static_hz : array (n_points, n_stimuli)
-        [spikes/s]
-
-    Raises
-    ------
-    InputError
-        If the rows do not have one entry per parameter, or a row is not a valid set of parameters.
-    """
+    """Evaluate a model row by row on all threads: what `evaluate_batch` of most models does."""
     rows = checked_rows(model, points)
     rates = np.empty((2, len(rows), model.n_stimuli))
 
@@ -270,38 +247,17 @@ class AfferentModel(metaclass=KnownKeywords):
 
 @dataclass(frozen=True)
 class Reparametrised:
-    """A rate model in other parameters.
-
-    Parameters
-    ----------
-    model : RateModel
-        The model in its own parameters.
-    names : tuple of str
-        Names of the new parameters.
-    transform : callable
-        From the new parameters to those of `model`.
-
-    Examples
-    --------
-    A model that has only its static gain free:
-
-    >>> sed = SedTraces([0.0, 50.0, 1000.0], [[0.0], [2.0], [2.0]], kinks_ms=[50.0])
-    >>> model = Reparametrised(
-    ...     AfferentModel.of_traces(sed),
-    ...     ("static_gain",),
-    ...     lambda gain: np.array([0.0, 1e-4, gain[0], 70.0, 1e-6, 50.0]),
-    ... )
-    >>> model.evaluate_batch(np.array([[5e-7], [2e-6]]))[1].round().tolist()
-    [[11.0], [68.0]]
-    """
+    """A rate model in other parameters."""
 
     model: RateModel
+    """The model in its own parameters."""
     names: tuple[str, ...]
+    """Names of the new parameters."""
     transform: Callable[[FloatArray], FloatArray]
+    """From the new parameters to those of `model`."""
 
     @property
     def n_stimuli(self) -> int:
-        """Number of stimuli."""
         return self.model.n_stimuli
 
     def evaluate(self, parameters: FloatArray) -> Rates:
@@ -317,18 +273,7 @@ class Reparametrised:
 
 
 def four_number_model(model: RateModel) -> Reparametrised:
-    """Express a model of the paper's six parameters in the four identifiable ones.
-
-    Parameters
-    ----------
-    model : RateModel
-        A model of six parameters, such as `AfferentModel`.
-
-    Returns
-    -------
-    Reparametrised
-        The same model; C and v are the paper's, which changes no spike.
-    """
+    """Express a model of the paper's six parameters in the four identifiable ones."""
     return Reparametrised(model, IDENTIFIABLE_NAMES, six_parameters)
 
 

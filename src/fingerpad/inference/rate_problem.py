@@ -19,41 +19,18 @@ from fingerpad.inference.recordings import RateRecordings
 class RateProblem:
     """Recorded rates and the model that is fitted to them.
 
-    Parameters
-    ----------
-    model : RateModel
-        Predicts the rates under all stimuli, in the order of the recordings.
-    recordings : RateRecordings
-        Observed rates. A phase that was not recorded does not enter the score.
-    dynamic_weight, static_weight : float
-        Weights of the two phases where both were recorded, Eq. 12. [1]
-
-    Raises
-    ------
-    InputError
-        If model and recordings differ in the number of stimuli, or a weight is negative.
-
     Notes
     -----
     Gerling et al. 2014, Eqs. 12-14. The sums run over the chosen stimuli.
-
-    Examples
-    --------
-    >>> from fingerpad.neuron.afferent import Afferent
-    >>> from fingerpad.core.signals import SedTraces
-    >>> from fingerpad.inference.rate_model import AfferentModel
-    >>> sed = SedTraces([0.0, 50.0, 1000.0], [[0.0], [2.0], [2.0]], kinks_ms=[50.0])
-    >>> model = AfferentModel.of_traces(sed)
-    >>> problem = RateProblem(model, RateRecordings(("flat",), [217.0], [126.0]))
-    >>> fitted = Afferent.for_tissues("trial3").parameters
-    >>> round(problem.score(fitted, np.array([0])), 2)  # static rates half as observed
-    0.81
     """
 
     model: RateModel
+    """Predicts the rates under all stimuli, in the order of the recordings."""
     recordings: RateRecordings
+    """Observed rates. A phase that was not recorded does not enter the score."""
     dynamic_weight: float = protocol.DYNAMIC_WEIGHT.value
     static_weight: float = protocol.STATIC_WEIGHT.value
+    """Weights of the two phases where both were recorded, Eq. 12. [1]"""
 
     def __post_init__(self) -> None:
         observed = len(self.recordings.stimuli)

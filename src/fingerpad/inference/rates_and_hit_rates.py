@@ -44,22 +44,6 @@ CHANCE = 0.5
 class RatesAndHitRates:
     """Recorded rates and hit rates of people, to which one afferent is fitted.
 
-    Parameters
-    ----------
-    rates : RateProblem
-        Recorded rates and the model that predicts them.
-    hit_rates : callable
-        From the parameters of that model to predicted hit rates (n,). [0-1]
-    observed : array (n,)
-        Hit rates of people. [0-1]
-    weight : float, optional
-        Weight w of the squared differences against FSS.
-
-    Raises
-    ------
-    InputError
-        If the weight is not positive.
-
     Notes
     -----
     The contract of `fingerpad.inference.fitting.problem.Problem`. All hit rates enter whichever rates are
@@ -67,9 +51,13 @@ class RatesAndHitRates:
     """
 
     rates: RateProblem
+    """Recorded rates and the model that predicts them."""
     hit_rates: Callable[[FloatArray], FloatArray]
+    """From the parameters of that model to predicted hit rates (n,). [0-1]"""
     observed: FloatArray
+    """Hit rates of people, (n,). [0-1]"""
     weight: float = WEIGHT
+    """Weight w of the squared differences against FSS."""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "observed", float_array("observed", self.observed, 1))
@@ -98,34 +86,21 @@ class RatesAndHitRates:
 
 @dataclass(frozen=True)
 class SphereHitRates:
-    """Hit rates of two codes, predicted from the parameters of every afferent of a population.
-
-    Parameters
-    ----------
-    model : RateModel
-        Rates of all receptors under all spheres at all positions, one column each, receptors fastest and
-        positions slowest.
-    n_positions, n_receptors : int
-        Sizes; the number of spheres, the standard first, follows.
-    neighbours : int array (n_pairs, 2)
-        Pairs of the Gradient Sum.
-    noise_sigma : float
-        Standard deviation of the multiplicative noise.
-    standard_normals : array (n_draws, n_receptors)
-        Common random presentations of the Gradient Sum.
-
-    Raises
-    ------
-    InputError
-        If the columns of the model are no multiple of positions times receptors.
-    """
+    """Hit rates of two codes, predicted from the parameters of every afferent of a population."""
 
     model: RateModel
+    """Rates of all receptors under all spheres at all positions, one column each, receptors fastest and
+    positions slowest.
+    """
     n_positions: int
     n_receptors: int
+    """Sizes; the number of spheres, the standard first, follows."""
     neighbours: np.ndarray
+    """Pairs of the Gradient Sum, (n_pairs, 2)."""
     noise_sigma: float
+    """Standard deviation of the multiplicative noise."""
     standard_normals: FloatArray
+    """Common random presentations of the Gradient Sum, (n_draws, n_receptors)."""
 
     def __post_init__(self) -> None:
         if self.model.n_stimuli % (self.n_positions * self.n_receptors):
@@ -152,23 +127,16 @@ class ToRatesAndHitRates:
 
     Least squares finds the four numbers that explain the rates best. From there CMA-ES maximises the score of
     `RatesAndHitRates`. The scores of the result are FSS of the rates alone.
-
-    Parameters
-    ----------
-    hit_rates : SphereHitRates
-        Predicts hit rates from the paper's six parameters.
-    observed : array (n,)
-        Hit rates of people, in the same order. [0-1]
-    seed : int
-        Of CMA-ES.
-    name : str
-        Name in tables.
     """
 
     hit_rates: SphereHitRates
+    """Predicts hit rates from the paper's six parameters."""
     observed: FloatArray
+    """Hit rates of people, in the same order, (n,). [0-1]"""
     seed: int = 0
+    """Of CMA-ES."""
     name: str = "rates and hit rates"
+    """Name in tables."""
 
     def fit(self, problem: Problem, chosen: IntArray) -> Fit:
         """Fit the chosen rates, and all hit rates."""

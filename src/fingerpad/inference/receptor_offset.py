@@ -28,31 +28,13 @@ class ReceptorOffset:
     """The paper's model with the offset of the receptor as a seventh parameter; a `RateModel`.
 
     Between two sampled offsets the drive is interpolated linearly.
-
-    Parameters
-    ----------
-    offsets_mm : array (n_offsets,)
-        Offsets along the finger at which the drive is sampled, distal positive, increasing. [mm]
-    models : sequence of AfferentModel
-        The model at each offset, all with the same stimuli and times.
-
-    Raises
-    ------
-    InputError
-        If there are not at least two offsets with one model each, or the models differ in stimuli or times.
-
-    Examples
-    --------
-    >>> near, far = (SedTraces([0, 50, 1000], [[0], [peak], [peak]], [50]) for peak in (2.0, 1.0))
-    >>> model = ReceptorOffset.of_traces({-0.1: near, 0.1: far})
-    >>> model.at(0.0).drives[0].sed_kpa[-1].tolist()
-    [1.5]
-    >>> model.names[-1]
-    'offset_mm'
     """
 
     offsets_mm: FloatArray
+    """Offsets along the finger at which the drive is sampled, distal positive, increasing, (n_offsets,). [mm]
+    """
     models: Sequence[AfferentModel]
+    """The model at each offset, all with the same stimuli and times."""
 
     def __post_init__(self) -> None:
         offsets = increasing("offsets_mm", float_array("offsets_mm", self.offsets_mm, 1))
@@ -74,15 +56,7 @@ class ReceptorOffset:
     def of_traces(
         cls, traces: Mapping[float, SedTraces | Sequence[SedTraces]], windows_ms: Windows | None = None
     ) -> ReceptorOffset:
-        """Make the model from strain energy density at each offset.
-
-        Parameters
-        ----------
-        traces : mapping of float to SedTraces or to a sequence of SedTraces
-            By offset along the finger, distal positive [mm]; one column per stimulus.
-        windows_ms : ((float, float), (float, float)), optional
-            As of `AfferentModel`. [ms]
-        """
+        """Make the model from strain energy density at each offset."""
         return cls(
             np.array(list(traces), dtype=np.float64),
             [AfferentModel.of_traces(sed, windows_ms) for sed in traces.values()],
@@ -95,17 +69,10 @@ class ReceptorOffset:
 
     @property
     def n_stimuli(self) -> int:
-        """Number of stimuli."""
         return self.models[0].n_stimuli
 
     def at(self, offset_mm: float) -> AfferentModel:
-        """Return the model of a receptor at this offset.
-
-        Raises
-        ------
-        InputError
-            If the offset lies outside of the sampled ones.
-        """
+        """Return the model of a receptor at this offset."""
         offset = finite(OFFSET_NAME, offset_mm, "mm")
         if not self.offsets_mm[0] <= offset <= self.offsets_mm[-1]:
             raise InputError(

@@ -23,15 +23,7 @@ PREDICTED_PRESENTATIONS = 20
 
 
 def soft_membrane(driven: Drive, parameters: FloatArray) -> tuple[EscapeRate, CurrentTraces]:
-    """Return the membrane and the current of an afferent with a soft threshold.
-
-    Parameters
-    ----------
-    driven : Drive
-        One column per stimulus.
-    parameters : array (5,)
-        In the order of `fingerpad.inference.spike_parameters.SPIKE_PARAMETER_NAMES`.
-    """
+    """Return the membrane and the current of an afferent with a soft threshold."""
     afferent = Afferent.from_parameters(six_parameters(parameters[:4]))
     return EscapeRate(afferent.membrane, float(parameters[4])), afferent.transduction.current(driven)
 
@@ -39,44 +31,21 @@ def soft_membrane(driven: Drive, parameters: FloatArray) -> tuple[EscapeRate, Cu
 def soft_spikes(
     driven: Drive, parameters: FloatArray, presentations: Presentations, seed: int
 ) -> SpikeTrains:
-    """Simulate the spikes of an afferent with a soft threshold.
-
-    Parameters
-    ----------
-    driven : Drive
-        One column per stimulus.
-    parameters : array (5,)
-        In the order of `fingerpad.inference.spike_parameters.SPIKE_PARAMETER_NAMES`.
-    presentations : Presentations
-        Stimulus of each train.
-    seed : int
-        Seed of the random numbers.
-
-    Returns
-    -------
-    SpikeTrains
-    """
+    """Simulate the spikes of an afferent with a soft threshold."""
     membrane, current = soft_membrane(driven, parameters)
     return membrane.spikes(current, seed, presentations)
 
 
 @dataclass(frozen=True)
 class SoftAfferent:
-    """Mean rates of an afferent with a soft threshold; a `RateModel` in the five parameters of its spikes.
-
-    Parameters
-    ----------
-    drive : Drive
-        One column per stimulus.
-    windows_ms : ((float, float), (float, float))
-        Windows of the dynamic and of the static rate. [ms]
-    seed : int
-        Seed of the simulated presentations, the same for all parameters.
-    """
+    """Mean rates of an afferent with a soft threshold; a `RateModel` in the five parameters of its spikes."""
 
     drive: Drive
+    """One column per stimulus."""
     windows_ms: Windows
+    """Windows of the dynamic and of the static rate. [ms]"""
     seed: int
+    """Seed of the simulated presentations, the same for all parameters."""
 
     @property
     def names(self) -> tuple[str, ...]:

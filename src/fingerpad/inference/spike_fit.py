@@ -91,10 +91,6 @@ def fit_spikes(recorded: SpikeLikelihood, start: ArrayLike, most_steps: int = 10
     most_steps : int, optional
         Largest number of steps.
 
-    Returns
-    -------
-    SpikeFit
-
     Raises
     ------
     InputError

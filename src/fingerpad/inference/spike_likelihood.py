@@ -137,10 +137,6 @@ class SpikeLikelihood:
             beta/(C v) [1/ms], k_d/(C v) [1/kPa], k_s/(C v) [1/(kPa ms)], tau [ms] and the width of the
             threshold over the threshold [1].
 
-        Returns
-        -------
-        float
-
         Raises
         ------
         InputError
@@ -220,21 +216,14 @@ class SpikeLikelihood:
 
 @dataclass(frozen=True)
 class TimeRescaling:
-    """Goodness-of-fit test of spikes by the time-rescaling theorem (Brown et al. 2002).
-
-    Parameters
-    ----------
-    quantiles : array (n_spikes,)
-        1 - exp(-rescaled interval) of each interval, sorted: uniform under the model.
-    statistic : float
-        Kolmogorov-Smirnov distance between their distribution and the uniform one.
-    p_value : float
-        Probability of a larger distance under the true parameters; for fitted ones it is too large.
-    """
+    """Goodness-of-fit test of spikes by the time-rescaling theorem (Brown et al. 2002)."""
 
     quantiles: FloatArray
+    """1 - exp(-rescaled interval) of each interval, sorted: uniform under the model, (n_spikes,)."""
     statistic: float
+    """Kolmogorov-Smirnov distance between their distribution and the uniform one."""
     p_value: float
+    """Probability of a larger distance under the true parameters; for fitted ones it is too large."""
 
 
 @known_keywords
@@ -247,10 +236,6 @@ def time_rescaling(recorded: SpikeLikelihood, parameters: ArrayLike) -> TimeResc
         The trains.
     parameters : array_like (5,)
         As in `SpikeLikelihood.log_likelihood`.
-
-    Returns
-    -------
-    TimeRescaling
 
     Raises
     ------

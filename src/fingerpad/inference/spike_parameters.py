@@ -28,57 +28,18 @@ N_PARAMETERS = len(SPIKE_PARAMETER_NAMES)
 
 
 def canonical(parameters: FloatArray) -> FloatArray:
-    """Return (A, B, C, G, ln tau) of (a, b, c, tau, w).
-
-    Parameters
-    ----------
-    parameters : array (5,)
-        In the order of `SPIKE_PARAMETER_NAMES`.
-
-    Returns
-    -------
-    array (5,)
-
-    Examples
-    --------
-    >>> canonical(np.array([0.01, 4.0, 0.02, 1.0, 0.5])).tolist()
-    [0.02, 8.0, 0.04, 2.0, 0.0]
-    """
+    """Return (A, B, C, G, ln tau) of (a, b, c, tau, w)."""
     width = parameters[4]
     return np.array([*(parameters[:3] / width), 1.0 / width, math.log(parameters[3])])
 
 
 def from_canonical(numbers: FloatArray) -> FloatArray:
-    """Return (a, b, c, tau, w) of (A, B, C, G, ln tau): the inverse of `canonical`.
-
-    Parameters
-    ----------
-    numbers : array (5,)
-
-    Returns
-    -------
-    array (5,)
-
-    Examples
-    --------
-    >>> from_canonical(np.array([0.02, 8.0, 0.04, 2.0, 0.0])).tolist()
-    [0.01, 4.0, 0.02, 1.0, 0.5]
-    """
+    """Return (a, b, c, tau, w) of (A, B, C, G, ln tau): the inverse of `canonical`."""
     sharpness = numbers[3]
     return np.array([*(numbers[:3] / sharpness), math.exp(numbers[4]), 1.0 / sharpness])
 
 
 def canonical_jacobian(parameters: FloatArray) -> FloatArray:
-    """Return the Jacobian of `canonical`.
-
-    Parameters
-    ----------
-    parameters : array (5,)
-
-    Returns
-    -------
-    array (5, 5)
-    """
     a, b, c, tau, width = parameters
     jacobian = np.zeros((N_PARAMETERS, N_PARAMETERS))
     jacobian[[0, 1, 2], [0, 1, 2]] = 1.0 / width
@@ -88,21 +49,7 @@ def canonical_jacobian(parameters: FloatArray) -> FloatArray:
 
 
 def checked_spike_parameters(parameters: ArrayLike) -> FloatArray:
-    """Return five finite parameters with positive tau and width, else raise `InputError`.
-
-    Parameters
-    ----------
-    parameters : array_like (5,)
-
-    Returns
-    -------
-    array (5,)
-
-    Raises
-    ------
-    InputError
-        If they are not.
-    """
+    """Return five finite parameters with positive tau and width, else raise `InputError`."""
     numbers = float_array("parameters", parameters, 1)
     if numbers.size != N_PARAMETERS:
         raise InputError(

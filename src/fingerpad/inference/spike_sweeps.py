@@ -29,18 +29,7 @@ def cut(
     offsets: np.ndarray,
     refractory: float,
 ) -> tuple[FloatArray, np.ndarray, np.ndarray]:
-    """Divide trains into intervals without knots or spikes inside, without refractory periods.
-
-    Returns
-    -------
-    array (n_intervals, 5)
-        Length [ms], U' at the beginning and end [kPa/ms], U at the beginning and end [kPa]. The first
-        interval of a train has no length: it is at rest, under the first values of the drive.
-    int array (n_intervals, 2)
-        Whether the potential is reset, and whether a spike ends the interval.
-    array (n_trains + 1,)
-        Index of the first interval of each train.
-    """
+    """Divide trains into intervals without knots or spikes inside, without refractory periods."""
     most = sites.size * (times.size + 1) + 2 * spikes.size
     values = np.empty((most, 5))
     flags = np.zeros((most, 2), dtype=np.bool_)

@@ -20,18 +20,7 @@ START_WIDTH = 0.5
 
 
 def printed_starts() -> FloatArray:
-    """Both start points of the paper as printed, (2, 6), with energy density in kPa.
-
-    Returns
-    -------
-    array (2, 6)
-        In the order of `fingerpad.neuron.afferent.PARAMETER_NAMES`.
-
-    Examples
-    --------
-    >>> printed_starts()[:, 1].tolist()
-    [8e-09, 8.2e-09]
-    """
+    """Both start points of the paper as printed, (2, 6), with energy density in kPa."""
     shared = (neuron.TIME_CONSTANT.value, neuron.CAPACITANCE.value, neuron.THRESHOLD.value)
     return np.array(
         [
@@ -54,13 +43,7 @@ def start_points() -> FloatArray:
 
 
 def spike_start() -> FloatArray:
-    """Start of every fit to spikes: the paper's first start point with a soft threshold.
-
-    Returns
-    -------
-    array (5,)
-        In the order of `fingerpad.inference.spike_parameters.SPIKE_PARAMETER_NAMES`.
-    """
+    """Start of every fit to spikes: the paper's first start point with a soft threshold."""
     return np.array([*identifiable(start_points()[0]), START_WIDTH])
 
 
@@ -73,13 +56,7 @@ def increments(starts: FloatArray) -> FloatArray:
 
 
 def response_surface(starts: FloatArray | None = None) -> ResponseSurface:
-    """Return the paper's method, silent at rest, with gains and parameters of the membrane bounded below.
-
-    Parameters
-    ----------
-    starts : array (n_starts, 6), optional
-        Start points; default: the paper's two, rescaled.
-    """
+    """Return the paper's method, silent at rest, with gains and parameters of the membrane bounded below."""
     starts = start_points() if starts is None else starts
     bounds = np.array([-np.inf, 0.0, 0.0, *(LOWEST_SHARE * starts[0, 3:])])
     return ResponseSurface(starts, increments(starts), bounds, restrict=silent_at_rest)

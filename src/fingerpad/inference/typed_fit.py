@@ -70,26 +70,19 @@ class TypedModel:
 
 @dataclass(frozen=True)
 class TypedFit:
-    """An afferent of any type as it was fitted to recorded rates.
-
-    Parameters
-    ----------
-    afferent : AnyAfferent
-        With the fitted numbers.
-    free : tuple of str
-        Names of these.
-    fss_in_sample, fss_out_of_sample : float
-        Fractional sum of squares of the fit to all stimuli, and its mean over the stimuli left out of folds.
-    dynamic_rate_hz, static_rate_hz : array (n_stimuli,)
-        Rates of the afferent under all stimuli. [spikes/s]
-    """
+    """An afferent of any type as it was fitted to recorded rates."""
 
     afferent: AnyAfferent
+    """With the fitted numbers."""
     free: tuple[str, ...]
+    """Names of these."""
     fss_in_sample: float
     fss_out_of_sample: float
+    """Fractional sum of squares of the fit to all stimuli, and its mean over the stimuli left out of folds.
+    """
     dynamic_rate_hz: FloatArray
     static_rate_hz: FloatArray
+    """Rates of the afferent under all stimuli, (n_stimuli,). [spikes/s]"""
 
 
 def _largest_factor(afferent: AnyAfferent, name: str) -> float:
@@ -129,10 +122,6 @@ def fit_afferent(
         Fold of each stimulus from 0; by default in turn to six, or one per stimulus where there are fewer.
     windows_ms : ((float, float), (float, float)), optional
         Windows of the dynamic and of the static rate; by default those of `rate_windows_ms`. [ms]
-
-    Returns
-    -------
-    TypedFit
 
     Raises
     ------

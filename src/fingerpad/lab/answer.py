@@ -54,35 +54,25 @@ SPREAD_SPIKES = 1.0
 
 @dataclass(frozen=True)
 class Answer:
-    """A touch over time.
-
-    Parameters
-    ----------
-    times_ms : array (n_times,)
-        Times. [ms]
-    depth_mm, force_mn, force_error_mn, contact_area_mm2 : array (n_times,)
-        Depth below the first touch of the range, force, what it lies within for 95 % of touches (0 in full,
-        infinite if not measured), and undeformed skin in contact. [mm, mN, mN, mm²]
-    middle_mm : array (n_times, 2)
-        Middle of the contact, x and z. [mm]
-    x_mm, z_mm : array (nx,), array (nz,)
-        Points of the map. [mm]
-    sed_kpa : array (n_times, nx, nz)
-        Strain energy density at the depth of the end organs; NaN beside the pad. [kPa]
-    response : ResponseMap
-        Spikes and rates of the afferents.
-    """
+    """A touch over time."""
 
     times_ms: FloatArray
     depth_mm: FloatArray
     force_mn: FloatArray
     force_error_mn: FloatArray
     contact_area_mm2: FloatArray
+    """Depth below the first touch of the range, force, what it lies within for 95 % of touches (0 in full,
+    infinite if not measured), and undeformed skin in contact, (n_times,). [mm, mN, mN, mm²]
+    """
     middle_mm: FloatArray
+    """Middle of the contact, x and z, (n_times, 2). [mm]"""
     x_mm: FloatArray
     z_mm: FloatArray
+    """Points of the map, (nx,). [mm]"""
     sed_kpa: FloatArray
+    """Strain energy density at the depth of the end organs; NaN beside the pad, (n_times, nx, nz). [kPa]"""
     response: ResponseMap
+    """Spikes and rates of the afferents."""
 
 
 def shape_of(described: DescribedReduction, size: float) -> tuple[float, ...]:
@@ -99,11 +89,6 @@ def motion_of(
     """Press, hold and perhaps slide, lift; and the shape of the object.
 
     Without a reduced touch, first touches are found from the shapes of object and finger.
-
-    Raises
-    ------
-    InputError
-        If a pose lies out of the range.
     """
     training = described.training
     if state.depth_mm > training.range.depth_mm:
@@ -188,13 +173,7 @@ def map_axes(described: DescribedReduction) -> tuple[FloatArray, FloatArray]:
 
 
 def reduced_answer(described: DescribedReduction, model: ReducedModel, state: LabState) -> Answer:
-    """Answer by the reduced touch.
-
-    Raises
-    ------
-    InputError
-        If a pose lies out of the range.
-    """
+    """Answer by the reduced touch."""
     motion, shape = motion_of(described, model, state)
     weights = [
         model.pose_weights((pose.x_mm, pose.z_mm, pose.tilt_deg, *shape))
@@ -270,17 +249,13 @@ def _answer(
 
 @dataclass(frozen=True)
 class Comparison:
-    """What observers say about two touches, in trials of two alternatives.
-
-    Parameters
-    ----------
-    ideal, summed : float
-        Proportion correct of the observer that knows every afferent, and of the one that knows the sum of all
-        spikes. [0-1]
-    """
+    """What observers say about two touches, in trials of two alternatives."""
 
     ideal: float
     summed: float
+    """Proportion correct of the observer that knows every afferent, and of the one that knows the sum of all
+    spikes. [0-1]
+    """
 
 
 @known_keywords

@@ -43,19 +43,13 @@ KEPT_ANSWERS = 16
 
 @dataclass(frozen=True)
 class Making:
-    """A computation that is under way.
-
-    Parameters
-    ----------
-    what : str
-        In words.
-    done, total : int
-        Finished presses, and all of them; 0 before that is known.
-    """
+    """A computation that is under way."""
 
     what: str
+    """In words."""
     done: int = 0
     total: int = 0
+    """Finished presses, and all of them; 0 before that is known."""
 
 
 class Laboratory(metaclass=KnownKeywords):
@@ -186,10 +180,6 @@ class Laboratory(metaclass=KnownKeywords):
             What is pressed, and how.
         exact : bool, optional
             Whether the full solver presses.
-
-        Returns
-        -------
-        Answer
 
         Raises
         ------

@@ -104,22 +104,7 @@ def require_panel() -> None:
 
 
 def serve(laboratory: Laboratory, port: int = 0, ready: Callable[[str], None] = print) -> None:
-    """Serve the page on the loopback interface until the process is interrupted.
-
-    Parameters
-    ----------
-    laboratory : Laboratory
-        What is shown.
-    port : int, optional
-        0 for any that is free.
-    ready : callable, optional
-        Called with the address of the page.
-
-    Raises
-    ------
-    InputError
-        If Panel is not installed, or the port is none or taken.
-    """
+    """Serve the page on the loopback interface until the process is interrupted."""
     require_panel()
     from panel.custom import JSComponent
     from panel.io.server import get_server

@@ -75,13 +75,7 @@ class LabState:
 
 
 def state_of(asked: Mapping[str, Any] | Any) -> LabState:
-    """Read a state from plain values, such as those of the address of the page.
-
-    Raises
-    ------
-    InputError
-        If a name is unknown, or a value is no number or out of its bounds.
-    """
+    """Read a state from plain values, such as those of the address of the page."""
     if not isinstance(asked, Mapping):
         raise InputError(f"The state of the laboratory must be a mapping: got {type(asked).__name__}.")
     known = {each.name: each.type for each in fields(LabState)}

@@ -34,27 +34,7 @@ CONTROLS = (
 
 
 def write_static(laboratory: Laboratory, folder: Path, progress: Progress | None = None) -> Path:
-    """Compute answers over a grid of states, and write `index.html`, which opens without a server.
-
-    Parameters
-    ----------
-    laboratory : Laboratory
-        Its objects; reduced touches are made where there are none.
-    folder : Path
-        Folder of the page.
-    progress : Progress, optional
-        Shown each answer.
-
-    Returns
-    -------
-    Path
-        The file.
-
-    Raises
-    ------
-    FingerpadError
-        If a press fails or the folder cannot be written.
-    """
+    """Compute answers over a grid of states, and write `index.html`, which opens without a server."""
     progress = progress or NoProgress()
     objects = {label: state for name in laboratory.names for label, state in _sizes(laboratory, name)}
     known = {label: _grid(laboratory, state) for label, state in objects.items()}

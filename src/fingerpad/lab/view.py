@@ -23,95 +23,62 @@ OUTLINE_POINTS = 40
 
 @dataclass(frozen=True)
 class Shown:
-    """An answer, rounded to what a picture shows.
-
-    Parameters
-    ----------
-    times_ms, force_mn, error_mn, area_mm2, largest_kpa : list of float
-        Time, force with its error (0 if not measured), contact and largest strain energy density.
-    contact_mm : list of list
-        Middle x and z, half-axes and angle of an ellipse of the area of the contact. [mm, rad]
-    peak_kpa : float
-        Value of the byte 254 of `frames`. [kPa]
-    frames_ms : list of float
-        Times of the map. [ms]
-    frames : str
-        The map at these times, bytes (n_frames, nx, nz) in base 64.
-    spikes : list of list
-        Spike times of each afferent. [ms]
-    """
+    """An answer, rounded to what a picture shows."""
 
     times_ms: list[float]
     force_mn: list[float]
     error_mn: list[float]
     area_mm2: list[float]
     largest_kpa: list[float]
+    """Time, force with its error (0 if not measured), contact and largest strain energy density."""
     contact_mm: list[list[float]]
+    """Middle x and z, half-axes and angle of an ellipse of the area of the contact. [mm, rad]"""
     peak_kpa: float
+    """Value of the byte 254 of `frames`. [kPa]"""
     frames_ms: list[float]
+    """Times of the map. [ms]"""
     frames: str
+    """The map at these times, bytes (n_frames, nx, nz) in base 64."""
     spikes: list[list[float]]
+    """Spike times of each afferent. [ms]"""
 
 
 @dataclass(frozen=True)
 class View:
-    """All that the page shows of a state.
-
-    Parameters
-    ----------
-    answer : Shown
-        The answer of the reduced touch.
-    x_mm, z_mm : list of float
-        Points of the map. [mm]
-    pad_mm : list of float
-        Place of the touch. [mm]
-    outline_mm : list of list
-        x and half-width of the finger. [mm]
-    positions_mm : list of list
-        Afferents. [mm]
-    order : list of int
-        Afferents by their distance from the contact.
-    shown_ms : float
-        End of the hold. [ms]
-    said, python : str
-        What is pressed, and Python lines that reproduce it.
-    other : Shown, optional
-        The answer to the object that it is compared with.
-    compared : str
-        What observers say of both.
-    exact : Shown, optional
-        The full solution.
-    difference : str
-        How far the reduced answer is from it.
-    making : Making, optional
-        How far the reduced touch is, if the answer is the full solution because there is none yet.
-    """
+    """All that the page shows of a state."""
 
     answer: Shown
+    """The answer of the reduced touch."""
     x_mm: list[float]
     z_mm: list[float]
+    """Points of the map. [mm]"""
     pad_mm: list[float]
+    """Place of the touch. [mm]"""
     outline_mm: list[list[float]]
+    """x and half-width of the finger. [mm]"""
     positions_mm: list[list[float]]
+    """Afferents. [mm]"""
     order: list[int]
+    """Afferents by their distance from the contact."""
     shown_ms: float
+    """End of the hold. [ms]"""
     said: str
     python: str
+    """What is pressed, and Python lines that reproduce it."""
     other: Shown | None = None
+    """The answer to the object that it is compared with."""
     compared: str = ""
+    """What observers say of both."""
     exact: Shown | None = None
+    """The full solution."""
     difference: str = ""
+    """How far the reduced answer is from it."""
     making: Making | None = None
+    """How far the reduced touch is, if the answer is the full solution because there is none yet."""
 
 
 def view_of(laboratory: Laboratory, state: LabState, exact: bool = False) -> View | Making:
-    """Make the view of a state, or tell how far its presses are.
-
-    Raises
-    ------
-    FingerpadError
-        If the state is out of the range, or a press failed.
-    """
+    """Make the view of a state, or tell how far its presses are."""
     answer = laboratory.poll(state)
     if isinstance(answer, Making):
         return answer
@@ -135,17 +102,7 @@ def view_of(laboratory: Laboratory, state: LabState, exact: bool = False) -> Vie
 def view_of_answer(
     laboratory: Laboratory, state: LabState, answer: Answer, frames: int | None = None, path: str = ""
 ) -> View:
-    """Make the view of a reduced answer.
-
-    Parameters
-    ----------
-    laboratory, state, answer
-        What was answered.
-    frames : int, optional
-        Number of pictures of the skin; default: one at each time.
-    path : str, optional
-        Name of the reduced touch in the Python lines; default: its file.
-    """
+    """Make the view of a reduced answer."""
     described = laboratory.described(state)
     touch, finger = described.training.touch, finger_of(described)
     x = np.linspace(0.3, finger.length_mm - 0.3, OUTLINE_POINTS)

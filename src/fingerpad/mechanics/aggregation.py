@@ -22,22 +22,7 @@ _COARSEST = 500
 
 
 class SmoothedAggregation:
-    """A hierarchy of an earlier tangent, for products with the present one.
-
-    Parameters
-    ----------
-    sparsity : Sparsity
-        Block pattern of the tangent.
-    free : int array (n_free,)
-        Degrees of freedom that move.
-    nodes_mm : array (n_nodes, 3)
-        Positions, for the motions of a rigid body. [mm]
-
-    Raises
-    ------
-    InputError
-        If PyAMG is not installed.
-    """
+    """A hierarchy of an earlier tangent, for products with the present one."""
 
     patience = 20
     number_type = np.float64

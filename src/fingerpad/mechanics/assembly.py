@@ -24,27 +24,18 @@ from fingerpad.mechanics.materials import has_formulas
 
 @dataclass(frozen=True)
 class Sparsity:
-    """Block pattern of the tangent, where each element adds to it, and which ones may add at the same time.
-
-    Parameters
-    ----------
-    row_start : int array (n_nodes + 1,)
-        First block of every block row.
-    column : int array (n_blocks,)
-        Block column, increasing within a row.
-    position : int array (n_elements, 8, 8)
-        Block to which a pair of element nodes adds.
-    diagonal : int array (n_nodes,)
-        Block of each node with itself.
-    colours : list of list of (int, int)
-        Chunks of elements that threads may add up at the same time, see `coloured_chunks`.
-    """
+    """Block pattern of the tangent, where each element adds to it, and which may add at the same time."""
 
     row_start: np.ndarray
+    """First block of every block row, (n_nodes + 1,)."""
     column: np.ndarray
+    """Block column, increasing within a row, (n_blocks,)."""
     position: np.ndarray
+    """Block to which a pair of element nodes adds, (n_elements, 8, 8)."""
     diagonal: np.ndarray
+    """Block of each node with itself, (n_nodes,)."""
     colours: list[list[Chunk]]
+    """Chunks of elements that threads may add up at the same time, see `coloured_chunks`."""
 
     @classmethod
     def of(cls, elements: np.ndarray, n_nodes: int) -> Sparsity:
@@ -90,28 +81,7 @@ class Sparsity:
 
 
 def coloured_chunks(elements: np.ndarray, n_nodes: int) -> list[list[Chunk]]:
-    """Chunks of a mesh by colour, each in the first colour that is free.
-
-    Parameters
-    ----------
-    elements : int array (n_elements, 8)
-        Nodes of each element.
-    n_nodes : int
-        Number of nodes of the mesh.
-
-    Returns
-    -------
-    list of list of (int, int)
-        For each colour its chunks, of which no two share a node.
-
-    Examples
-    --------
-    A row of 400 elements takes every second chunk in the first colour:
-
-    >>> row = np.arange(400)[:, None] + np.array([0, 1, 1, 0, 0, 1, 1, 0])
-    >>> coloured_chunks(row, n_nodes=401)
-    [[(0, 128), (256, 384)], [(128, 256), (384, 400)]]
-    """
+    """Chunks of a mesh by colour, each in the first colour that is free."""
     colours: list[list[Chunk]] = []
     taken: list[np.ndarray] = []  # for each colour, whether one of its chunks has a node
     for first, last in even_chunks(len(elements)):
@@ -149,34 +119,7 @@ def assemble(
     force: FloatArray,
     blocks: np.ndarray,
 ) -> float:
-    """Add up all elements, on as many threads as Numba is set to; the result does not depend on it.
-
-    Parameters
-    ----------
-    mesh : Mesh
-        The undeformed body.
-    displacement : array (n_nodes, 3)
-        Displacements. [mm]
-    law : array (n_layers, n)
-        `MaterialTable.law`.
-    s : array (n_layers,)
-        `StepCoefficients.s`.
-    history : array (n_elements, 8, 6)
-        H of the step. [kPa]
-    sparsity : Sparsity
-        Pattern of the tangent.
-    with_tangent : bool
-        Whether `blocks` is written.
-    force : array (n_nodes, 3)
-        Overwritten with the internal force. [mN]
-    blocks : float64 or float32 array (n_blocks, 3, 3)
-        Overwritten with the tangent if wanted. [mN/mm]
-
-    Returns
-    -------
-    float
-        Incremental potential; NaN if an element is turned inside out. [µJ]
-    """
+    """Add up all elements, on as many threads as Numba is set to; the result does not depend on it."""
 
     def clear(first: int, last: int) -> None:
         blocks[first:last] = 0.0

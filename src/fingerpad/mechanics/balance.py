@@ -41,33 +41,18 @@ _GAUSS_POINTS, _GAUSS_WEIGHTS = np.polynomial.legendre.leggauss(3)
 
 @dataclass(frozen=True)
 class EnergyBalance:
-    """Energies over time, of the whole body also when half of it is solved.
-
-    Parameters
-    ----------
-    times_ms : array (n_times,)
-        From 0, the unloaded state. [ms]
-    external_uj : array (n_times,)
-        Work of the indenter since then. [µJ]
-    stored_uj : array (n_times,)
-        Energy in the springs of the tissue. [µJ]
-    dissipated_uj : array (n_times,)
-        Energy that relaxation and friction have turned into heat. [µJ]
-    contact_uj : array (n_times,)
-        Energy in the springs of the contact's penalty. [µJ]
-
-    Examples
-    --------
-    >>> balance = EnergyBalance(*np.array([[0.0, 1.0], [0.0, 10.0], [0.0, 8.0], [0.0, 1.5], [0.0, 0.4]]))
-    >>> balance.imbalance_uj.round(3).tolist(), round(balance.relative_imbalance, 3)
-    ([0.0, 0.1], 0.01)
-    """
+    """Energies over time, of the whole body also when half of it is solved."""
 
     times_ms: FloatArray
+    """From 0, the unloaded state, (n_times,). [ms]"""
     external_uj: FloatArray
+    """Work of the indenter since then, (n_times,). [µJ]"""
     stored_uj: FloatArray
+    """Energy in the springs of the tissue, (n_times,). [µJ]"""
     dissipated_uj: FloatArray
+    """Energy that relaxation and friction have turned into heat, (n_times,). [µJ]"""
     contact_uj: FloatArray
+    """Energy in the springs of the contact's penalty, (n_times,). [µJ]"""
 
     @property
     def imbalance_uj(self) -> FloatArray:
@@ -90,63 +75,36 @@ class EnergyBalance:
 
 
 class Entry(NamedTuple):
-    """State and energies at the end of one step; the first is the unloaded body.
-
-    Parameters
-    ----------
-    time_ms : float
-        End of the step. [ms]
-    way, force : tuple of 5 floats
-        The indenter's advance, ways along x and z [mm] and rotations [radians], and the forces [mN] and
-        torques [mN mm] that do work on them.
-    stored_uj, dissipated_uj, contact_uj : float
-        As in `EnergyBalance`; dissipated and contact are sums over all steps up to here. [µJ]
-    lost_uj : float
-        What would be stored if nothing had relaxed, less what is. [µJ]
-    """
+    """State and energies at the end of one step; the first is the unloaded body."""
 
     time_ms: float = 0.0
+    """End of the step. [ms]"""
     way: tuple[float, ...] = (0.0,) * 5
     force: tuple[float, ...] = (0.0,) * 5
+    """The indenter's advance, ways along x and z [mm] and rotations [radians], and the forces [mN] and
+    torques [mN mm] that do work on them.
+    """
     stored_uj: float = 0.0
     dissipated_uj: float = 0.0
     contact_uj: float = 0.0
+    """As in `EnergyBalance`; dissipated and contact are sums over all steps up to here. [µJ]"""
     lost_uj: float = 0.0
+    """What would be stored if nothing had relaxed, less what is. [µJ]"""
 
 
 class TissueEnergies(NamedTuple):
-    """Energies of the body as it is meshed at the end of a step.
-
-    Parameters
-    ----------
-    stored_uj : float
-        Held by its springs. [µJ]
-    instantaneous_uj : float
-        What they would hold if nothing had relaxed, see `instantaneous_energy`. [µJ]
-    relaxed_work_uj : float
-        See `relaxed_work`; of this step. [µJ]
-    """
+    """Energies of the body as it is meshed at the end of a step."""
 
     stored_uj: float
+    """Held by its springs. [µJ]"""
     instantaneous_uj: float
+    """What they would hold if nothing had relaxed, see `instantaneous_energy`. [µJ]"""
     relaxed_work_uj: float
+    """See `relaxed_work`; of this step. [µJ]"""
 
 
 def energy_balance(entries: Sequence[Entry], kinks_ms: Sequence[float]) -> EnergyBalance:
-    """Balance of all steps of a press.
-
-    Parameters
-    ----------
-    entries : sequence of Entry
-        One per step, from the unloaded state.
-    kinks_ms : sequence of float
-        Times at which the motion changes its speed abruptly: the end of the ramp. [ms]
-
-    Returns
-    -------
-    EnergyBalance
-        One row per entry.
-    """
+    """Balance of all steps of a press."""
     times, ways, forces, stored, dissipated, contact, _ = (
         np.array(column).T for column in zip(*entries, strict=True)
     )
@@ -164,24 +122,6 @@ def indenter_work(
 
     Force and depth are cubic splines of time between kinks and the integral of F dd/dt is exact for them.
     A trapezium over the five ramp steps of a sphere errs by 2 % and would hide what the balance shall show.
-
-    Parameters
-    ----------
-    times_ms, depth_mm, force_mn : array (n_times,)
-        Increasing times, depth and force. [ms, mm, mN]
-    kinks_ms : sequence of float
-        Those of the times where neither is smooth. [ms]
-
-    Returns
-    -------
-    array (n_times,)
-        [µJ]
-
-    Examples
-    --------
-    >>> depth = np.linspace(0.0, 1.0, 5)
-    >>> indenter_work(depth, depth, 3.0 * depth**2, kinks_ms=()).round(9).tolist()
-    [0.0, 0.015625, 0.125, 0.421875, 1.0]
     """
     borders = np.flatnonzero(np.isin(times_ms, kinks_ms))
     borders = np.unique(np.concatenate([[0], borders, [times_ms.size - 1]]))
@@ -211,23 +151,6 @@ def contact_energy(
 
     Only the part of the way on which a node is pressed counts: a node without force is taken to lie on the
     indenter's surface, whatever its gap.
-
-    Parameters
-    ----------
-    gap_before, gap_now : array (n,)
-        Signed gaps of the candidate nodes at the ends of the step. [mm]
-    pressed_before, pressed_now : array (n,)
-        Their contact forces lambda. [mN]
-
-    Returns
-    -------
-    float
-        [µJ]
-
-    Examples
-    --------
-    >>> contact_energy(np.array([0.2]), np.array([0.0]), np.array([-0.01]), np.array([4.0]))
-    0.02
     """
     way = np.where(pressed_now > 0.0, gap_now, 0.0) - np.where(pressed_before > 0.0, gap_before, 0.0)
     return float(-0.5 * ((pressed_before + pressed_now) * way).sum())
@@ -240,16 +163,12 @@ class MeanRelaxed:
     With S0 linear in the step, S_i' = (g_i S0 - S_i) / tau_i gives g_i (new S0 + old S0_n) + kept S_i,n,
 
         kept = (1 - exp(-x)) / x,   new = 1/2 - (1 - kept) / x,   old = 1 - kept - new,   x = dt / tau_i.
-
-    Parameters
-    ----------
-    new, old, kept : array (n_layers, n_terms)
-        Shares g_i times `new` and `old`, and `kept`.
     """
 
     new: FloatArray
     old: FloatArray
     kept: FloatArray
+    """Shares g_i times `new` and `old`, and `kept`, (n_layers, n_terms)."""
 
     @classmethod
     def of(cls, table: MaterialTable, step_ms: float) -> MeanRelaxed:
@@ -304,26 +223,6 @@ def relaxed_work(
     """Work that the relaxed stress would have done in one step: the integral of sum_i S_i : dE.
 
     The mean of S_i is exact if S0 is linear in the step, as the stress update takes it.
-
-    Parameters
-    ----------
-    mesh : Mesh
-        The undeformed body.
-    before_mm, now_mm : array (n_nodes, 3)
-        Displacements at the start and at the end of the step. [mm]
-    table : MaterialTable
-        Laws.
-    step_ms : float
-        Length of the step. [ms]
-    before : StressHistory
-        State at its start.
-    now : InstantaneousState
-        State at its end.
-
-    Returns
-    -------
-    float
-        Of all elements together. [µJ]
     """
     mean = MeanRelaxed.of(table, step_ms)
     return sum(run_kernel(

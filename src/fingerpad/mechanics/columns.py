@@ -47,18 +47,12 @@ MOST_LANES = 512
 
 @dataclass(frozen=True)
 class ColumnGraph:
-    """Which columns are neighbours.
-
-    Parameters
-    ----------
-    start : int array (n_columns + 1,)
-        First pair of every column.
-    neighbour : int array (n_pairs,)
-        The other column, increasing within a column; a column is its own neighbour.
-    """
+    """Which columns are neighbours."""
 
     start: np.ndarray
+    """First pair of every column, (n_columns + 1,)."""
     neighbour: np.ndarray
+    """The other column, increasing within a column; a column is its own neighbour, (n_pairs,)."""
 
     @classmethod
     def of(cls, pairs: np.ndarray, n_columns: int) -> ColumnGraph:
@@ -69,7 +63,6 @@ class ColumnGraph:
 
     @property
     def n_columns(self) -> int:
-        """Number of columns."""
         return self.start.size - 1
 
     @property
@@ -93,18 +86,7 @@ class ColumnGraph:
         return np.zeros((self.neighbour.size, 3, 3, 3, lanes(depth)), dtype=np.float32)
 
     def entries(self, number: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Row and column of every entry of a matrix in a numbering of its unknowns.
-
-        Parameters
-        ----------
-        number : int array (n_columns, 3, depth)
-            Number of every unknown; -1 for those that are held.
-
-        Returns
-        -------
-        (int array, int array)
-            Each like the matrix; -1 for held unknowns and for entries beyond the ends of a column.
-        """
+        """Row and column of every entry of a matrix in a numbering of its unknowns."""
         width = lanes(number.shape[2])
         padded = np.full((*number.shape[:2], width + 2), -1, dtype=np.int32)
         padded[:, :, 1 : 1 + number.shape[2]] = number
@@ -154,21 +136,7 @@ def to_nodes(columns: SingleArray, order: np.ndarray, depth: int) -> FloatArray:
 
 @njit(cache=True)
 def find_blocks(row_start, column, order, place, start, neighbour, depth, source):  # type: ignore[no-untyped-def]
-    """Find the block of a tangent (see `assembly.Sparsity`) that each entry of a matrix is copied from.
-
-    Parameters
-    ----------
-    row_start, column : int array
-        Block rows and their columns.
-    order, place : int array (n_columns,)
-        Which column of the nodes each column of the matrix is, and the inverse of that.
-    start, neighbour : int array
-        `ColumnGraph`.
-    depth : int
-        Nodes in a column.
-    source : int array (n_pairs, 3, lanes)
-        Overwritten with the number of the block; -1 beyond the ends of the columns.
-    """
+    """Find the block of a tangent (see `assembly.Sparsity`) that each entry of a matrix is copied from."""
     source[:] = -1
     for c in range(order.size):
         for k in range(depth):
@@ -185,23 +153,7 @@ def find_blocks(row_start, column, order, place, start, neighbour, depth, source
 
 @njit(cache=True, nogil=True)
 def take_blocks(first, last, source, blocks, start, neighbour, free, matrix):  # type: ignore[no-untyped-def]
-    """Copy a tangent of 3 x 3 blocks into a matrix, zero where unknowns are held.
-
-    Parameters
-    ----------
-    first, last : int
-        Columns.
-    source : int array (n_pairs, 3, lanes)
-        From `find_blocks`.
-    blocks : array (n_blocks, 3, 3)
-        The tangent.
-    start, neighbour : int array
-        `ColumnGraph`.
-    free : array (n_columns, 3, lanes + 2)
-        1 for unknowns that move, 0 for others.
-    matrix : array (n_pairs, 3, 3, 3, lanes)
-        Overwritten; zero beyond the ends of the columns, as it was.
-    """
+    """Copy a tangent of 3 x 3 blocks into a matrix, zero where unknowns are held."""
     for c in range(first, last):
         for pair in range(start[c], start[c + 1]):
             d = neighbour[pair]
@@ -283,19 +235,7 @@ def _invert(d, inverse):  # type: ignore[no-untyped-def]
 
 @njit(cache=True, nogil=True)
 def find_scales(first, last, own, matrix, free, scale, shrink):  # type: ignore[no-untyped-def]
-    """Write D and its inverse, both zero where an unknown is held.
-
-    Parameters
-    ----------
-    first, last : int
-        Columns.
-    own : int array (n_columns,)
-        `ColumnGraph.own`.
-    matrix : array (n_pairs, 3, 3, 3, lanes)
-        The matrix A.
-    free, scale, shrink : array (n_columns, 3, lanes + 2)
-        1 for unknowns that move, 0 for others; the other two are overwritten.
-    """
+    """Write D and its inverse, both zero where an unknown is held."""
     for c in range(first, last):
         for a in range(3):
             for k in range(matrix.shape[4]):
@@ -331,19 +271,6 @@ def factor_columns(first, last, own, matrix, depth, lower, inverse):  # type: ig
     """Factor the part T of a matrix that stays within a column, block tridiagonal.
 
     T = (1 + M) D (1 + M)' with D_0 = T_00, M_k = T_k,k-1 D_k-1^-1, D_k = T_kk - M_k T_k,k-1'.
-
-    Parameters
-    ----------
-    first, last : int
-        Columns.
-    own : int array (n_columns,)
-        `ColumnGraph.own`.
-    matrix : array (n_pairs, 3, 3, 3, lanes)
-        The matrix Q, or A where sweeps do not round.
-    depth : int
-        Nodes in a column.
-    lower, inverse : array (n_columns, depth, 9)
-        Overwritten with M and D^-1, row by row.
     """
     for c in range(first, last):
         d, m, before = np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3))
@@ -389,23 +316,6 @@ def sweep(first, last, begin, end, neighbour, matrix, depth, lower, inverse, rig
     A forward sweep takes the colours in order, takes the pairs with columns before its own into account, and
     overwrites x: over all colours, with A = L + T + L' by the order of the columns, (T + L) x = right. A
     backward sweep takes the last colour first and all pairs into account, and adds to x.
-
-    Parameters
-    ----------
-    first, last : int
-        Columns.
-    begin, end : int array (n_columns,)
-        First pair of every column, and the one after the last, that the sweep takes into account.
-    neighbour, matrix, depth
-        The matrix.
-    lower, inverse : array (n_columns, depth, 9)
-        From `factor_columns`.
-    right : array (n_columns, 3, lanes + 2)
-        Right-hand side.
-    x : array (n_columns, 3, lanes + 2)
-        Improved.
-    keeps : bool
-        Whether x is added to instead of overwritten.
     """
     r = small_single_array((3, MOST_LANES))
     for c in range(first, last):

@@ -35,27 +35,18 @@ CURVATURE_BELOW_RESIDUAL = 0.1
 
 @dataclass(frozen=True)
 class Body:
-    """The discretised tissue with what its equations need.
-
-    Parameters
-    ----------
-    mesh : Mesh
-        Nodes, bricks and node sets.
-    table : MaterialTable
-        Laws, one row per layer.
-    sparsity : Sparsity
-        Pattern of the tangent.
-    free : int array (n_free,)
-        Degrees of freedom that move.
-    is_mixed : bool
-        Whether Newton's method treats pressure as an unknown of its own (see `mixed`).
-    """
+    """The discretised tissue with what its equations need."""
 
     mesh: Mesh
+    """Nodes, bricks and node sets."""
     table: MaterialTable
+    """Laws, one row per layer."""
     sparsity: Sparsity
+    """Pattern of the tangent."""
     free: np.ndarray
+    """Degrees of freedom that move, (n_free,)."""
     is_mixed: bool = False
+    """Whether Newton's method treats pressure as an unknown of its own (see `mixed`)."""
 
 
 @dataclass(frozen=True)
@@ -64,17 +55,12 @@ class Reached:
 
     Force and depth fall to 0 when the indenter is withdrawn. Tolerances relative to them would then ask for
     more than round-off allows, so these are the least that a tolerance refers to.
-
-    Parameters
-    ----------
-    force_mn : float
-        Largest contact force on the body as it is meshed. [mN]
-    depth_mm : float
-        Largest depth. [mm]
     """
 
     force_mn: float = 0.0
+    """Largest contact force on the body as it is meshed. [mN]"""
     depth_mm: float = 0.0
+    """Largest depth. [mm]"""
 
     @property
     def least_force_mn(self) -> float:
@@ -95,40 +81,28 @@ class Reached:
 
 @dataclass(frozen=True)
 class Load:
-    """What acts on the body in one time step.
-
-    Parameters
-    ----------
-    contact : Contact
-        The indenter.
-    depth_mm : float
-        How far it has advanced since first touch; under a given force, where its search begins. [mm]
-    step : StepCoefficients
-        Relaxation coefficients of the step.
-    carried : array (n_elements, 8, 6)
-        H, the history that the step starts from. [kPa]
-    force_mn : float, optional
-        Force along the indenter's axis on the body as it is meshed, half of it or whole; the depth is then
-        found. [mN]
-    anchors : Anchors, optional
-        Where the skin holds on to the indenter at the start of the step; without friction nothing.
-    pressure_kpa : array (n_elements,), optional
-        Pressures at the start of the step, for a mixed method. [kPa]
-    reached : Reached, optional
-        Largest force and depth before the step.
-    pressed_before : bool array (n_points,), optional
-        Points that were pressed before the step.
-    """
+    """What acts on the body in one time step."""
 
     contact: Contact
+    """The indenter."""
     depth_mm: float
+    """How far it has advanced since first touch; under a given force, where its search begins. [mm]"""
     step: StepCoefficients
+    """Relaxation coefficients of the step."""
     carried: FloatArray
+    """H, the history that the step starts from, (n_elements, 8, 6). [kPa]"""
     force_mn: float | None = None
+    """Force along the indenter's axis on the body as it is meshed, half of it or whole; the depth is then
+    found. [mN]
+    """
     anchors: Anchors | None = None
+    """Where the skin holds on to the indenter at the start of the step; without friction nothing."""
     pressure_kpa: FloatArray | None = None
+    """Pressures at the start of the step, for a mixed method, (n_elements,). [kPa]"""
     reached: Reached = Reached()
+    """Largest force and depth before the step."""
     pressed_before: np.ndarray | None = None
+    """Points that were pressed before the step, (n_points,)."""
 
     def force_scale_mn(self, force_mn: float) -> float:
         """Force to which a force that is out of balance is compared. [mN]"""
@@ -141,85 +115,58 @@ class Balance:
 
     Bone and nail hold every direction. The plane of symmetry holds z, and a strip of skin that does not slide
     is held along x by the indenter; these two count as supports in the direction that they hold.
-
-    Parameters
-    ----------
-    reaction_mn : array (3,)
-        Force of the body on bone and nail. [mN]
-    nail_mn : array (3,)
-        Its part on the nail. [mN]
-    imbalance : float
-        Contact force minus the force on all supports, over the contact force along the indenter's axis.
     """
 
     reaction_mn: FloatArray
+    """Force of the body on bone and nail, (3,). [mN]"""
     nail_mn: FloatArray
+    """Its part on the nail, (3,). [mN]"""
     imbalance: float
+    """Contact force minus the force on all supports, over the contact force along the indenter's axis."""
 
 
 @dataclass(frozen=True)
 class Lagging:
-    """What lags behind Newton's method and is renewed between its runs.
-
-    Parameters
-    ----------
-    multipliers_mn : array (n_points,)
-        Normal contact forces of earlier augmentations. [mN]
-    anchors : Anchors, optional
-        Where the skin holds on to the indenter, and how strongly; without friction nothing.
-    """
+    """What lags behind Newton's method and is renewed between its runs."""
 
     multipliers_mn: FloatArray
+    """Normal contact forces of earlier augmentations, (n_points,). [mN]"""
     anchors: Anchors | None = None
+    """Where the skin holds on to the indenter, and how strongly; without friction nothing."""
 
 
 @dataclass(frozen=True)
 class Configuration:
-    """A trial configuration; its tangent is in the blocks that `evaluate` was given.
-
-    Parameters
-    ----------
-    displacement_mm : array (n_nodes, 3)
-        Displacements. [mm]
-    depth_mm : float
-        How far the indenter has advanced. [mm]
-    positions_mm : array (n_points, 3)
-        Where the points are that may touch. [mm]
-    contact : ContactState
-        Contact there.
-    contact_stiffness : array (n_points, 3, 3)
-        Its part of the tangent. [mN/mm]
-    potential_uj : float
-        Incremental potential, NaN if an element is turned inside out. [µJ]
-    out_of_balance_mn : array (n_nodes, 3)
-        Contact forces minus internal forces; on nodes that are held, what their supports take. [mN]
-    residual_mn : array (n_free,)
-        The same of the free degrees of freedom. [mN]
-    residual_norm_mn : float
-        Norm of the residual, infinite if an element is turned inside out. [mN]
-    relative_residual : float
-        This norm over the contact force.
-    has_tangent : bool
-        Whether the tangent was assembled.
-    is_curved : bool
-        Whether the indenter's curvature is part of it.
-    pressures : Pressures, optional
-        Of the elements, for a mixed method.
-    """
+    """A trial configuration; its tangent is in the blocks that `evaluate` was given."""
 
     displacement_mm: FloatArray
+    """Displacements, (n_nodes, 3). [mm]"""
     depth_mm: float
+    """How far the indenter has advanced. [mm]"""
     positions_mm: FloatArray
+    """Where the points are that may touch, (n_points, 3). [mm]"""
     contact: ContactState
+    """Contact there."""
     contact_stiffness: FloatArray
+    """Its part of the tangent, (n_points, 3, 3). [mN/mm]"""
     potential_uj: float
+    """Incremental potential, NaN if an element is turned inside out. [µJ]"""
     out_of_balance_mn: FloatArray
+    """Contact forces minus internal forces; on nodes that are held, what their supports take, (n_nodes, 3).
+    [mN]
+    """
     residual_mn: FloatArray
+    """The same of the free degrees of freedom, (n_free,). [mN]"""
     residual_norm_mn: float
+    """Norm of the residual, infinite if an element is turned inside out. [mN]"""
     relative_residual: float
+    """This norm over the contact force."""
     has_tangent: bool
+    """Whether the tangent was assembled."""
     is_curved: bool
+    """Whether the indenter's curvature is part of it."""
     pressures: Pressures | None = None
+    """Of the elements, for a mixed method."""
 
     @property
     def whole(self) -> bool:
@@ -258,33 +205,7 @@ def evaluate(
     curved: bool = True,
     closed: bool = False,
 ) -> Configuration:
-    """Potential, out-of-balance forces and tangent of one configuration.
-
-    Parameters
-    ----------
-    body, load : Body, Load
-        The tissue and what acts on it.
-    displacement_mm : array (n_nodes, 3)
-        Displacements. [mm]
-    depth_mm : float
-        How far the indenter has advanced. [mm]
-    lagging : Lagging
-        Multipliers and anchors.
-    blocks : float64 or float32 array (n_blocks, 3, 3)
-        Overwritten with the tangent; if it has no blocks none is assembled. [mN/mm]
-    before : Friction, optional
-        Friction one Newton step ago, for the same anchors.
-    pressure_kpa : array (n_elements,), optional
-        Pressures in the tangent of a mixed method; those that belong to the displacements by default. [kPa]
-    curved : bool
-        Whether the tangent may have the indenter's curvature, near the solution.
-    closed : bool
-        Whether points that were pressed before the step resist in the tangent even where they are free now.
-
-    Returns
-    -------
-    Configuration
-    """
+    """Potential, out-of-balance forces and tangent of one configuration."""
     mesh, contact = body.mesh, load.contact
     force, has_tangent = np.empty_like(displacement_mm), blocks.size > 0
     internal = assemble(

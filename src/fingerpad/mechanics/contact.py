@@ -37,21 +37,15 @@ CURVATURE_STEP_MM = 1e-5
 
 @dataclass(frozen=True)
 class Placement:
-    """Where an indenter stands and which way it presses.
-
-    Parameters
-    ----------
-    origin_mm : array (3,)
-        Position of the indenter's tip at first touch. [mm]
-    rotation : array (3, 3)
-        Columns are the indenter's x, y and z axes in the finger's frame.
-    pressing : array (3,), optional
-        Unit direction of pressing; the indenter's y axis by default, as it is until the indenter tilts.
-    """
+    """Where an indenter stands and which way it presses."""
 
     origin_mm: FloatArray
+    """Position of the indenter's tip at first touch, (3,). [mm]"""
     rotation: FloatArray
+    """Columns are the indenter's x, y and z axes in the finger's frame, (3, 3)."""
     pressing: FloatArray | None = None
+    """Unit direction of pressing; the indenter's y axis by default, as it is until the indenter tilts, (3,).
+    """
 
     @property
     def axis(self) -> FloatArray:
@@ -75,22 +69,7 @@ class Placement:
         return Placement(origin_mm, tilt @ self.rotation @ spin, self.axis)
 
     def generalised_force(self, force_mn: FloatArray, points_mm: FloatArray, depth_mm: float) -> FloatArray:
-        """Return the forces that do work on the advance, the ways along x and z, the tilt and the spin.
-
-        Parameters
-        ----------
-        force_mn : array (n, 3)
-            Forces of the indenter on points of the skin. [mN]
-        points_mm : array (n, 3)
-            These points. [mm]
-        depth_mm : float
-            How far the indenter has advanced. [mm]
-
-        Returns
-        -------
-        array (5,)
-            Three forces [mN], two torques about the tip [mN mm per radian].
-        """
+        """Return the forces that do work on the advance, the ways along x and z, the tilt and the spin."""
         force = force_mn.sum(axis=0)
         torque = np.cross(points_mm - self.tip_mm(depth_mm), force_mn).sum(axis=0)
         # A positive tilt turns about the finger's z axis, a positive spin about the indenter's -y axis.
@@ -106,24 +85,7 @@ def rotation_of(tilt_deg: float, spin_deg: float) -> FloatArray:
 
 
 def place(indenter: Indenter, skin_mm: FloatArray, at_mm: FloatArray, rotation: FloatArray) -> Placement:
-    """Advance an indenter along its axis through `at_mm` until it first touches the undeformed skin.
-
-    Parameters
-    ----------
-    indenter : Indenter
-        The rigid body.
-    skin_mm : array (n, 3)
-        Points of the undeformed skin. [mm]
-    at_mm : array (3,)
-        A point on the indenter's axis. [mm]
-    rotation : array (3, 3)
-        See `Placement`.
-
-    Raises
-    ------
-    InputError
-        If the indenter passes by the skin without touching a node of it.
-    """
+    """Advance an indenter along its axis through `at_mm` until it first touches the undeformed skin."""
     local = Placement(at_mm, rotation).to_local(skin_mm, 0.0)
     advance = float((local[:, 1] - indenter.front(local)).min())
     if not np.isfinite(advance):
@@ -135,14 +97,7 @@ def place(indenter: Indenter, skin_mm: FloatArray, at_mm: FloatArray, rotation: 
 
 
 def check_friction(friction: float, indenter: Indenter) -> float:
-    """Return the coefficient if it is not negative, and 0 for an indenter that grips the skin anyway.
-
-    Examples
-    --------
-    >>> from fingerpad.geometry.indenters import Plate
-    >>> check_friction(0.5, Plate())
-    0.5
-    """
+    """Return the coefficient if it is not negative, and 0 for an indenter that grips the skin anyway."""
     if not_negative("friction", friction) > 0.0 and indenter.grips:
         raise InputError(
             f"friction must be 0 for {type(indenter).__name__}, under which skin does not slide along the "
@@ -153,34 +108,24 @@ def check_friction(friction: float, indenter: Indenter) -> float:
 
 @dataclass(frozen=True)
 class ContactState:
-    """Contact at one configuration.
-
-    Parameters
-    ----------
-    gap_mm : array (n,)
-        Signed gap of every point; of a middle, with the sag that it may have. [mm]
-    normal : array (n, 3)
-        Outward normal of the indenter at every point.
-    pressed_mn : array (n,)
-        lambda, the normal force on each point. [mN]
-    force_mn : array (n, 3)
-        Whole force of the indenter on each point: lambda n and friction. [mN]
-    stiffness : array (n, 3, 3)
-        epsilon A n n' of the points in contact and that of friction, without the curvature of the indenter.
-        [mN/mm]
-    potential : float
-        Energy of the penalty and of friction. [µJ]
-    friction : Friction, optional
-        Friction in the indenter's frame, if there is any.
-    """
+    """Contact at one configuration."""
 
     gap_mm: FloatArray
+    """Signed gap of every point; of a middle, with the sag that it may have, (n,). [mm]"""
     normal: FloatArray
+    """Outward normal of the indenter at every point, (n, 3)."""
     pressed_mn: FloatArray
+    """lambda, the normal force on each point, (n,). [mN]"""
     force_mn: FloatArray
+    """Whole force of the indenter on each point: lambda n and friction, (n, 3). [mN]"""
     stiffness: FloatArray
+    """epsilon A n n' of the points in contact and that of friction, without the curvature of the indenter,
+    (n, 3, 3). [mN/mm]
+    """
     potential: float
+    """Energy of the penalty and of friction. [µJ]"""
     friction: Friction | None = None
+    """Friction in the indenter's frame, if there is any."""
 
     @property
     def friction_mn(self) -> FloatArray:
@@ -204,36 +149,24 @@ class ContactState:
 
 @dataclass(frozen=True)
 class Contact:
-    """Skin that may touch one placed indenter.
-
-    Parameters
-    ----------
-    indenter : Indenter
-        The rigid body.
-    placement : Placement
-        Where it stands at first touch.
-    nodes : int array (n_nodes,)
-        Candidate nodes, the first of the points.
-    area_mm2 : array (n_nodes,)
-        Their tributary areas. [mm²]
-    penalty : float
-        epsilon. [kPa/mm]
-    friction : float
-        mu, Coulomb's coefficient.
-    stick_penalty : float
-        Stiffness per area of skin that sticks. [kPa/mm]
-    middles : Middles
-        The other points; none by default.
-    """
+    """Skin that may touch one placed indenter."""
 
     indenter: Indenter
+    """The rigid body."""
     placement: Placement
+    """Where it stands at first touch."""
     nodes: np.ndarray
+    """Candidate nodes, the first of the points, (n_nodes,)."""
     area_mm2: FloatArray
+    """Their tributary areas, (n_nodes,). [mm²]"""
     penalty: float = PENALTY_KPA_PER_MM
+    """epsilon. [kPa/mm]"""
     friction: float = 0.0
+    """mu, Coulomb's coefficient."""
     stick_penalty: float = PENALTY_KPA_PER_MM
+    """Stiffness per area of skin that sticks. [kPa/mm]"""
     middles: Middles = field(default_factory=Middles.none)
+    """The other points; none by default."""
 
     @property
     def stiffness(self) -> FloatArray:

@@ -51,15 +51,10 @@ NOT_BLENDED = frozenset({
 
 @dataclass(frozen=True)
 class PronyCycle:
-    """Relaxation over equal cycles, for each branch and element.
-
-    Parameters
-    ----------
-    period_over_tau : array (n_terms, n_elements, 1, 1)
-        Period over relaxation time.
-    """
+    """Relaxation over equal cycles, for each branch and element."""
 
     period_over_tau: FloatArray
+    """Period over relaxation time, (n_terms, n_elements, 1, 1)."""
 
     @classmethod
     def of(cls, table: MaterialTable, layer: np.ndarray, period_ms: float) -> PronyCycle:
@@ -130,50 +125,24 @@ class _Totals(NamedTuple):
 
 @dataclass(frozen=True)
 class CycleJumps:
-    """Steps through many equal cycles, few of which are solved.
-
-    Parameters
-    ----------
-    times_ms : array (n_cycles, n_steps)
-        Times to solve at in each cycle; its last one is its end. [ms]
-    tolerance : float
-        Largest error of SED by what is not solved, over the largest SED.
-    where : int array
-        Elements that count for it.
-    table : MaterialTable
-        Laws.
-    layer : int array (n_elements,)
-        Row of the table of each element.
-    step, stop : callable
-        Solve a step; make the final error, as in `steps_at`.
-    """
+    """Steps through many equal cycles, few of which are solved."""
 
     times_ms: FloatArray
+    """Times to solve at in each cycle; its last one is its end, (n_cycles, n_steps). [ms]"""
     tolerance: float
+    """Largest error of SED by what is not solved, over the largest SED."""
     where: np.ndarray
+    """Elements that count for it."""
     table: MaterialTable
+    """Laws."""
     layer: np.ndarray
+    """Row of the table of each element, (n_elements,)."""
     step: Step[Moment]
     stop: Stop[Moment]
+    """Solve a step; make the final error, as in `steps_at`."""
 
     def moments(self, start: Moment) -> Iterator[Moment]:
-        """Solve or interpolate all cycles.
-
-        Parameters
-        ----------
-        start : Moment
-            The moment before the first cycle.
-
-        Yields
-        ------
-        Moment
-            One per time of `times_ms`.
-
-        Raises
-        ------
-        ConvergenceError
-            What `stop` makes, if a step fails in a cycle that follows a solved one.
-        """
+        """Solve or interpolate all cycles."""
         count, gap = len(self.times_ms), 1
         prony = PronyCycle.of(self.table, self.layer, self.times_ms[1, -1] - self.times_ms[0, -1])
         before, last = None, self.solved(0, start, prony)
@@ -272,14 +241,7 @@ class CycleJumps:
 
 
 def blended(early: Any, late: Any, share: float) -> Any:
-    """Interpolate all numbers of two values of one type, `share` of the way from the first to the second.
-
-    Examples
-    --------
-    >>> from fingerpad.mechanics.balance import Entry
-    >>> blended(Entry(stored_uj=1.0), Entry(stored_uj=3.0), 0.25).stored_uj
-    1.5
-    """
+    """Interpolate all numbers of two values of one type, `share` of the way from the first to the second."""
     if is_dataclass(early) and not isinstance(early, type):
         changed = {
             field.name: blended(getattr(early, field.name), getattr(late, field.name), share)

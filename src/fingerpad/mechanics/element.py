@@ -157,12 +157,10 @@ def _polynomial_points(law, first, second, b, b2, energies, stresses):  # type: 
 
 @njit(cache=True)
 def _formula_points(law, b, dilatation, logs, axes, derivatives):  # type: ignore[no-untyped-def]
-    """Evaluate a formula at the points of one element, in the instantaneous state.
-
-    From the isochoric b~ (6, 8) it writes `logs` (8, 4), `axes` (8, 3, 3) and `derivatives` (8, 15) of W, and
-    returns the volumetric energy. Unless shape and volume are coupled, that is no part of W, but its
-    derivatives are kept.
-    """
+    """Evaluate a formula at the points of one element, in the instantaneous state."""
+    # From the isochoric b~ (6, 8) it writes `logs` (8, 4), `axes` (8, 3, 3) and `derivatives` (8, 15) of W,
+    # and returns the volumetric energy. Unless shape and volume are coupled, that is no part of W, but its
+    # derivatives are kept.
     count, factor = int(law[10]), law[9]
     results = np.empty((count + 1, CARRIED))
     volumetric = 0.0
@@ -209,14 +207,12 @@ def _kirchhoff(s, relaxed, pressure, jacobians, stresses, tau):  # type: ignore[
 
 @njit(cache=True, forceinline=True)
 def _elasticity(stresses, pressure, jacobians, moduli):  # type: ignore[no-untyped-def]
-    """Write the part of the spatial (Kirchhoff) elasticity (6, 6, 8) that needs no second derivatives.
-
-    `stresses` T (6, 8) are those before the deviator is taken; with p' = p J
-
-        c = P : c~ : P + 2/3 tr(T) (I_s - 1/3 1x1) - 2/3 (dev T x 1 + 1 x dev T) + p' (1x1 - 2 I_s),
-
-    of which c~ is left out.
-    """
+    """Write the part of the spatial (Kirchhoff) elasticity (6, 6, 8) that needs no second derivatives."""
+    # `stresses` T (6, 8) are those before the deviator is taken; with p' = p J
+    #
+    # c = P : c~ : P + 2/3 tr(T) (I_s - 1/3 1x1) - 2/3 (dev T x 1 + 1 x dev T) + p' (1x1 - 2 I_s),
+    #
+    # of which c~ is left out.
     for q in range(N_POINTS):
         trace, spherical = stresses[0, q] + stresses[1, q] + stresses[2, q], pressure * jacobians[q]
         identity, both = 2.0 / 3.0 * trace - 2.0 * spherical, spherical - 2.0 / 9.0 * trace
@@ -239,10 +235,8 @@ def _elasticity(stresses, pressure, jacobians, moduli):  # type: ignore[no-untyp
 
 @njit(cache=True)
 def _add_polynomial(law, s, first, b, b2, q, moduli):  # type: ignore[no-untyped-def]
-    """Add P : c~ : P of the polynomial at point q, with
-
-    c~ = d1 b x b + d2 (b x b² + b² x b) + d3 b² x b² + d4 b . b.
-    """
+    """Add P : c~ : P of the polynomial at point q, with"""
+    # c~ = d1 b x b + d2 (b x b² + b² x b) + d3 b² x b² + d4 b . b.
     third, third_b2 = first / 3.0, (b2[0, q] + b2[1, q] + b2[2, q]) / 3.0
     second = 0.5 * (first * first - 3.0 * third_b2)
     w2 = law[1] + law[3] * (first - 3.0) + 2.0 * law[4] * (second - 3.0)
@@ -269,11 +263,9 @@ def _add_polynomial(law, s, first, b, b2, q, moduli):  # type: ignore[no-untyped
 
 @njit(cache=True)
 def _add_principal(s, derivatives, logs, axes, q, moduli):  # type: ignore[no-untyped-def]
-    """Add P : c~ : P of a formula at point q, from h_ab = d²W/dx_a dx_b and beta_a = dW/dx_a.
-
-    Along the axes c~_aabb = h_ab - 2 beta_a delta_ab; between them, with l the squares of the stretches,
-    c~_abab = (beta_a l_b - beta_b l_a) / (l_a - l_b), or (h_aa - h_ab) / 2 - beta_a for equal stretches.
-    """
+    """Add P : c~ : P of a formula at point q, from h_ab = d²W/dx_a dx_b and beta_a = dW/dx_a."""
+    # Along the axes c~_aabb = h_ab - 2 beta_a delta_ab; between them, with l the squares of the stretches,
+    # c~_abab = (beta_a l_b - beta_b l_a) / (l_a - l_b), or (h_aa - h_ab) / 2 - beta_a for equal stretches.
     block, mean = small_array((3, 3)), small_array((3,))
     mean[:] = 0.0
     for a in range(3):
@@ -313,10 +305,8 @@ EQUAL_STRETCHES = 1e-5
 
 @njit(cache=True, forceinline=True)
 def _point_forces(q, weight, jacobian, local, tau, present, forces, dilatation):  # type: ignore[no-untyped-def]
-    """Add the forces of point q.
-
-    Writes G = dN/dx (3, 8), and adds w tau G to `forces` and w J G to `dilatation`, both (3, 8).
-    """
+    """Add the forces of point q."""
+    # Writes G = dN/dx (3, 8), and adds w tau G to `forces` and w J G to `dilatation`, both (3, 8).
     for node in range(N_NODES):
         u, v, w = BY_NODE[q, 0, node], BY_NODE[q, 1, node], BY_NODE[q, 2, node]
         x = u * local[0, 0, q] + v * local[1, 0, q] + w * local[2, 0, q]
@@ -334,11 +324,10 @@ def _point_forces(q, weight, jacobian, local, tau, present, forces, dilatation):
 
 @njit(cache=True, forceinline=True)
 def _point_products(q, weight, moduli, tau, present, products):  # type: ignore[no-untyped-def]
-    """Write V_ij = w A_ij G of point q for i <= j, with A_ij,pr = c_ip,jr + delta_ij tau_pr.
-
-    `products` (3, 48) has the pairs ij in the order of a tensor's components, and the eight nodes of a pair
-    side by side. Every pair is spelt out: loops over pairs would keep the compiler from vector instructions.
-    """
+    """Write V_ij = w A_ij G of point q for i <= j, with A_ij,pr = c_ip,jr + delta_ij tau_pr."""
+    # `products` (3, 48) has the pairs ij in the order of a tensor's components, and the eight nodes of a pair
+    # side by side. Every pair is spelt out: loops over pairs would keep the compiler from vector
+    # instructions.
     c = moduli
     for node in range(N_NODES):
         x, y, z = weight * present[0, node], weight * present[1, node], weight * present[2, node]
@@ -372,11 +361,9 @@ def _point_products(q, weight, moduli, tau, present, products):  # type: ignore[
 
 @njit(cache=True, forceinline=True)
 def _add_rows(slopes, products, packed):  # type: ignore[no-untyped-def]
-    """Write K_ij = sum_q G_q' V_ij,q of all pairs ij as one product of matrices.
-
-    `slopes` is G_q (rows q, 3, 8), `products` V_ij,q (rows q, 3, 48) and `packed` K_ij (8, 48). The innermost
-    loop runs over 48 neighbours in memory, which is what vector registers want.
-    """
+    """Write K_ij = sum_q G_q' V_ij,q of all pairs ij as one product of matrices."""
+    # `slopes` is G_q (rows q, 3, 8), `products` V_ij,q (rows q, 3, 48) and `packed` K_ij (8, 48). The
+    # innermost loop runs over 48 neighbours in memory, which is what vector registers want.
     for node in range(N_NODES):
         for k in range(N_COLUMNS):
             packed[node, k] = 0.0
@@ -388,17 +375,7 @@ def _add_rows(slopes, products, packed):  # type: ignore[no-untyped-def]
 
 @njit(cache=True, forceinline=True)
 def add_tangent(packed, position, blocks):  # type: ignore[no-untyped-def]
-    """Add the tangent of one element to blocks.
-
-    Parameters
-    ----------
-    packed : array (8, 48)
-        K_ij of `element_system`.
-    position : int array (8, 8)
-        Block of each pair of nodes.
-    blocks : array (n_blocks, 3, 3)
-        The matrix. [mN/mm]
-    """
+    """Add the tangent of one element to blocks."""
     for a in range(N_NODES):
         for b in range(N_NODES):
             target, low, high = position[a, b], min(a, b), max(a, b)  # K_ii is symmetric but for round-off
@@ -417,33 +394,7 @@ def add_tangent(packed, position, blocks):  # type: ignore[no-untyped-def]
 def element_system(  # type: ignore[no-untyped-def]
     reference, displacement, law, s, history, with_tangent, force, tangent, formulas=True
 ):
-    """Energy, internal force and tangent of one element.
-
-    Parameters
-    ----------
-    reference, displacement : array (8, 3)
-        Nodes and their displacements. [mm]
-    law : array
-        One row of `MaterialTable.law`.
-    s : float
-        Factor on the instantaneous energy in this step.
-    history : array (8, 6)
-        H of the step at each point. [kPa]
-    with_tangent : bool
-        Whether `tangent` is written.
-    force : array (8, 3)
-        Overwritten with the internal force. [mN]
-    tangent : array (8, 48)
-        Overwritten with the tangent if wanted: K_ij of the pairs xx, yy, zz, xy, yz, xz, and of each pair the
-        eight nodes, see `add_tangent`. [mN/mm]
-    formulas : bool or None
-        None if the law is a polynomial, see `has_formulas`.
-
-    Returns
-    -------
-    float
-        Incremental potential, or NaN if a point of the element is turned inside out. [µJ]
-    """
+    """Energy, internal force and tangent of one element."""
     weights, jacobians, scales = small_array((N_POINTS,)), small_array((N_POINTS,)), small_array((N_POINTS,))
     local, onto = small_array((3, 3, N_POINTS)), small_array((3, 3, N_POINTS))  # dxi/dX and dxi/dx
     gradients, inverse = small_array((3, 3, N_POINTS)), small_array((3, 3, N_POINTS))
@@ -537,10 +488,8 @@ def element_system(  # type: ignore[no-untyped-def]
 
 @njit(cache=True)
 def _couple(s, weights, present_volume, derivatives, axes, relaxed, slopes, coupling):  # type: ignore[no-untyped-def]
-    """Write the coupling of shape and volume (3, 8): d²W / dx d(ln Jbar) acts like a stress with its forces.
-
-    `relaxed` (6, 8) is overwritten.
-    """
+    """Write the coupling of shape and volume (3, 8): d²W / dx d(ln Jbar) acts like a stress."""
+    # `relaxed` (6, 8) is overwritten.
     with_volume = small_array((3,))
     coupling[:] = 0.0
     for q in range(N_POINTS):
@@ -559,27 +508,7 @@ def _couple(s, weights, present_volume, derivatives, axes, relaxed, slopes, coup
 
 @njit(cache=True, error_model="numpy")
 def element_state(reference, displacement, law, instantaneous, energies, formulas=True):  # type: ignore[no-untyped-def]
-    """Instantaneous relaxing stress and energies at the points of one element.
-
-    Parameters
-    ----------
-    reference, displacement : array (8, 3)
-        Nodes and their displacements. [mm]
-    law : array
-        One row of `MaterialTable.law`.
-    instantaneous : array (8, 6)
-        Overwritten with S0 = F~^-1 dev(tau0) F~^-T at each point (see `frame_scales`). [kPa]
-    energies : array (8, 2)
-        Overwritten with the integration weight and the instantaneous energy W0 that may relax. [mm³, kPa]
-    formulas : bool or None
-        None if the law is a polynomial, see `has_formulas`.
-
-    Returns
-    -------
-    (float, float, float)
-        Volumetric energy density U(Jbar) and pressure U'(Jbar) [kPa], both 0 if the law couples shape and
-        volume and all stress is in S0; and Jbar.
-    """
+    """Instantaneous relaxing stress and energies at the points of one element."""
     weights, jacobians, scales = small_array((N_POINTS,)), small_array((N_POINTS,)), small_array((N_POINTS,))
     local, gradients = small_array((3, 3, N_POINTS)), small_array((3, 3, N_POINTS))
     inverse, b, b2 = small_array((3, 3, N_POINTS)), small_array((6, N_POINTS)), small_array((6, N_POINTS))
@@ -620,19 +549,7 @@ def element_state(reference, displacement, law, instantaneous, energies, formula
 
 @njit(cache=True, error_model="numpy")
 def relaxing_norms(reference, displacement, law, tensors, norms):  # type: ignore[no-untyped-def]
-    """Squared norm of the spatial stress c F T F' of reference tensors, of its deviator if only that relaxes.
-
-    Parameters
-    ----------
-    reference, displacement : array (8, 3)
-        Nodes and their displacements. [mm]
-    law : array
-        One row of `MaterialTable.law`.
-    tensors : array (n, 8, 6)
-        Reference tensors at each point. [kPa]
-    norms : array (n, 8)
-        Overwritten with the squared norms. [kPa²]
-    """
+    """Squared norm of the spatial stress c F T F' of reference tensors, or of its deviator."""
     weights, jacobians, scales = small_array((N_POINTS,)), small_array((N_POINTS,)), small_array((N_POINTS,))
     local, gradients = small_array((3, 3, N_POINTS)), small_array((3, 3, N_POINTS))
     spatial, whole = small_array((6, N_POINTS)), 1.0 if law[8] == COUPLED else 0.0
@@ -651,24 +568,7 @@ def relaxing_norms(reference, displacement, law, tensors, norms):  # type: ignor
 
 @njit(cache=True, error_model="numpy")
 def strain_changes(reference, before, now, law, weights, changes):  # type: ignore[no-untyped-def]
-    """Change of strain between two states of one element, 1/2 (C_n+1 - C_n) with C = c F'F of `frame_scales`.
-
-    Parameters
-    ----------
-    reference, before, now : array (8, 3)
-        Nodes, and their displacements in the two states. [mm]
-    law : array
-        One row of `MaterialTable.law`.
-    weights : array (8,)
-        Overwritten with the weights of the points. [mm³]
-    changes : array (6, 8)
-        Overwritten with the tensors at the points.
-
-    Returns
-    -------
-    float
-        Reference volume. [mm³]
-    """
+    """Change of strain between two states, 1/2 (C_n+1 - C_n) with C = c F'F of `frame_scales`."""
     start, end, local = (
         small_array((3, 3, N_POINTS)), small_array((3, 3, N_POINTS)), small_array((3, 3, N_POINTS)),
     )  # fmt: skip

@@ -61,31 +61,7 @@ _BINARY: dict[type[ast.operator], tuple[int, Callable[[float, float], float]]] =
 
 
 def translate(formula: str, coefficients: Mapping[str, float]) -> FloatArray:
-    """List of operations of a formula.
-
-    Parameters
-    ----------
-    formula : str
-        Energy per reference volume, see the module.
-    coefficients : mapping of str to float
-        Values of the names that the formula uses beside the variables.
-
-    Returns
-    -------
-    array (n_operations, 4)
-        Code, left and right operand (numbers of earlier operations) and constant of each operation.
-
-    Raises
-    ------
-    InputError
-        If the formula cannot be read, uses an unknown name or leaves a coefficient unused.
-
-    Examples
-    --------
-    >>> program = translate("shear / 2 * (I1 - 3)", {"shear": 8.0})
-    >>> [int(code) for code in program[:, 0]] == [VARIABLE, SHIFT, SCALE]
-    True
-    """
+    """List of operations of a formula."""
     return _Translator(formula, coefficients).program()
 
 
@@ -265,18 +241,6 @@ def differentiate(operations, count, x, results):  # type: ignore[no-untyped-def
 
     Numbers are copied one by one: for an assignment between arrays Numba compiles code that words an error
     about their shapes, which takes seconds.
-
-    Parameters
-    ----------
-    operations : array (4 n_operations,)
-        `translate`, row after row.
-    count : int
-        Number of operations.
-    x : array (4,)
-        ln lambdabar_1, 2, 3 and ln J.
-    results : array (at least n_operations + 1, 15)
-        Room for intermediate results; row `count - 1` holds the answer afterwards: the energy, its four first
-        and ten second derivatives (see `SECOND`).
     """
     spare = results[count]
     for n in range(count):

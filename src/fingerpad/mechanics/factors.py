@@ -23,13 +23,7 @@ class NotPositiveDefiniteError(ConvergenceError):
 
 
 class SuperLuFactor:
-    """Double-precision factor from SciPy's SuperLU, renewed for other numbers in the same places.
-
-    Parameters
-    ----------
-    row, column : int array
-        Place of every value; -1 where an unknown is held.
-    """
+    """Double-precision factor from SciPy's SuperLU, renewed for other numbers in the same places."""
 
     def __init__(self, row: np.ndarray, column: np.ndarray):
         row, column = row.ravel(), column.ravel()
@@ -42,15 +36,7 @@ class SuperLuFactor:
         self._size = size
 
     def renew(self, values: np.ndarray) -> None:
-        """Factor the matrix of these values.
-
-        Raises
-        ------
-        NotPositiveDefiniteError
-            If the matrix is not positive definite.
-        ConvergenceError
-            If it is singular.
-        """
+        """Factor the matrix of these values."""
         chosen = values.ravel()[self._entries].astype(np.float64)
         shape = (self._size, self._size)
         matrix = sparse.csc_matrix((chosen, self._row, self._column_start), shape=shape)

@@ -43,37 +43,21 @@ from fingerpad.mechanics.viscoelastic import InstantaneousState, StressHistory, 
 
 @dataclass(frozen=True)
 class ElementFields:
-    """Stress, strain and energies of some elements over time.
-
-    Parameters
-    ----------
-    elements : int array (n_elements,)
-        Numbers of the elements in their mesh.
-    gradient : array (n_times, n_elements, 3, 3)
-        Mean deformation gradient, its determinant the dilatation of the element.
-    stress_kpa : array (n_times, n_elements, 6)
-        Cauchy stress, mean over the present volume. [kPa]
-    stored_kpa, instantaneous_kpa, work_kpa : array (n_times, n_elements)
-        Strain energy density per reference volume by its three definitions. [kPa = µJ/mm³]
-
-    Examples
-    --------
-    One element, stretched to 1.21 times its length at constant volume, under a uniaxial tension of 6 kPa:
-
-    >>> stretched = np.diag([1.21, 1 / 1.1, 1 / 1.1]).reshape(1, 1, 3, 3)
-    >>> tension = np.array([[[6.0, 0, 0, 0, 0, 0]]])
-    >>> energy = np.array([[0.5]])
-    >>> values = ElementFields(np.array([0]), stretched, tension, energy, energy, energy)
-    >>> values.von_mises_kpa.tolist(), values.compressive_strain.round(4).tolist()
-    ([[6.0]], [[0.0953]])
-    """
+    """Stress, strain and energies of some elements over time."""
 
     elements: np.ndarray
+    """Numbers of the elements in their mesh, (n_elements,)."""
     gradient: FloatArray
+    """Mean deformation gradient, its determinant the dilatation of the element, (n_times, n_elements, 3, 3).
+    """
     stress_kpa: FloatArray
+    """Cauchy stress, mean over the present volume, (n_times, n_elements, 6). [kPa]"""
     stored_kpa: FloatArray
     instantaneous_kpa: FloatArray
     work_kpa: FloatArray
+    """Strain energy density per reference volume by its three definitions, (n_times, n_elements). [kPa =
+    µJ/mm³]
+    """
 
     def of(self, elements: np.ndarray) -> ElementFields:
         """Return the fields of some of the elements, by their numbers in the mesh."""
@@ -130,24 +114,12 @@ class ElementFields:
 
 
 def largest_compression(stress_kpa: FloatArray) -> FloatArray:
-    """Largest compressive stress of tensors (..., 6); 0 where there is none. [kPa]
-
-    Examples
-    --------
-    >>> largest_compression(np.array([1.0, -3.0, 0.0, 0.0, 0.0, 0.0])).item()
-    3.0
-    """
+    """Largest compressive stress of tensors (..., 6); 0 where there is none. [kPa]"""
     return np.maximum(-np.linalg.eigvalsh(stress_kpa[..., INDEX])[..., 0].astype(np.float64), 0.0)
 
 
 def von_mises(stress_kpa: FloatArray) -> FloatArray:
-    """Equivalent stress of tensors (..., 6), sqrt(3/2 s : s) with the deviator s. [kPa]
-
-    Examples
-    --------
-    >>> von_mises(np.array([0.0, 0.0, 0.0, 2.0, 0.0, 0.0])).round(4).item()  # pure shear: sqrt(3) times it
-    3.4641
-    """
+    """Equivalent stress of tensors (..., 6), sqrt(3/2 s : s) with the deviator s. [kPa]"""
     mean = stress_kpa[..., :3].mean(axis=-1, keepdims=True)
     normal = ((stress_kpa[..., :3] - mean) ** 2).sum(axis=-1)
     return np.sqrt(1.5 * (normal + 2.0 * (stress_kpa[..., 3:] ** 2).sum(axis=-1)))
@@ -165,25 +137,17 @@ class FieldValues(NamedTuple):
 
 @dataclass(frozen=True)
 class FieldState:
-    """State of the watched elements at one time, from which the work of the next step is computed.
-
-    Parameters
-    ----------
-    values : FieldValues
-        Fields of the elements.
-    displacement_mm : array (n_nodes, 3)
-        Displacements of all nodes. [mm]
-    convected_kpa : array (n_elements, 8, 6)
-        S0 - sum S_i, the relaxing stress in the convected frame. [kPa]
-    pressure_kpa, dilatation : array (n_elements,)
-        U'(Jbar) and Jbar. [kPa, -]
-    """
+    """State of the watched elements at one time, from which the work of the next step is computed."""
 
     values: FieldValues
+    """Fields of the elements."""
     displacement_mm: FloatArray
+    """Displacements of all nodes, (n_nodes, 3). [mm]"""
     convected_kpa: FloatArray
+    """S0 - sum S_i, the relaxing stress in the convected frame, (n_elements, 8, 6). [kPa]"""
     pressure_kpa: FloatArray
     dilatation: FloatArray
+    """U'(Jbar) and Jbar, (n_elements,). [kPa, -]"""
 
     @classmethod
     def unloaded(cls, n_nodes: int, n_elements: int) -> FieldState:
@@ -203,27 +167,17 @@ def fields_over_time(elements: np.ndarray, moments: Sequence[FieldValues]) -> El
 
 @dataclass(frozen=True)
 class Watched:
-    """Elements whose fields are computed during an indentation.
-
-    Parameters
-    ----------
-    elements : int array (n_elements,)
-        Their numbers.
-    nodes_mm : array (n_nodes, 3)
-        Reference nodes of the whole mesh. [mm]
-    corners : int array (n_elements, 8)
-        Their nodes.
-    layer : int array (n_elements,)
-        Their row of the material table.
-    table : MaterialTable
-        Laws.
-    """
+    """Elements whose fields are computed during an indentation."""
 
     elements: np.ndarray
     nodes_mm: FloatArray
+    """Reference nodes of the whole mesh, (n_nodes, 3). [mm]"""
     corners: np.ndarray
+    """Their nodes, (n_elements, 8)."""
     layer: np.ndarray
+    """Their row of the material table, (n_elements,)."""
     table: MaterialTable
+    """Laws."""
 
     def after(
         self,
@@ -233,22 +187,7 @@ class Watched:
         now: InstantaneousState,
         stored_kpa: FloatArray,
     ) -> FieldState:
-        """State at the end of a step.
-
-        Parameters
-        ----------
-        before : FieldState
-            State at its start.
-        displacement_mm : array (n_nodes, 3)
-            Displacements at its end. [mm]
-        history, now, stored_kpa
-            Relaxation, instantaneous state and stored energy density of all elements of the mesh at its end,
-            as `viscoelastic` gives them.
-
-        Returns
-        -------
-        FieldState
-        """
+        """State at the end of a step."""
         chosen, n = self.elements, len(self.elements)
         convected = history.instantaneous[chosen] - history.relaxed[:, chosen].sum(axis=0)
         gradient, stress = np.empty((n, 3, 3)), np.empty((n, 6))
@@ -273,24 +212,7 @@ class Watched:
 def cauchy_stress(
     mesh: Mesh, displacement_mm: FloatArray, table: MaterialTable, history: StressHistory
 ) -> FloatArray:
-    """Mean Cauchy stress of all elements of a mesh.
-
-    Parameters
-    ----------
-    mesh : Mesh
-        The undeformed body.
-    displacement_mm : array (n_nodes, 3)
-        Displacements. [mm]
-    table : MaterialTable
-        Laws.
-    history : StressHistory
-        State of relaxation.
-
-    Returns
-    -------
-    array (n_elements, 6)
-        [kPa]
-    """
+    """Mean Cauchy stress of all elements of a mesh."""
     n = len(mesh.elements)
     stress, gradient = np.empty((n, 6)), np.empty((n, 3, 3))
     # Writable copies, as those of `Watched`: Numba then compiles one signature for both.
@@ -345,10 +267,8 @@ def _mean_fields(  # type: ignore[no-untyped-def]
 def _isochoric_work(  # type: ignore[no-untyped-def]
     nodes, corners, layer, law, before, now, convected_before, convected_now, work, first, last,
 ):  # fmt: skip
-    """Write the element means of 1/2 (S_n + S_n+1) : 1/2 (C_n+1 - C_n), with C as in `strain_changes`.
-
-    The trapezoidal rule is over strain, not over time: it is exact if stress is linear in strain.
-    """
+    """Write the element means of 1/2 (S_n + S_n+1) : 1/2 (C_n+1 - C_n), with C as in `strain_changes`."""
+    # The trapezoidal rule is over strain, not over time: it is exact if stress is linear in strain.
     weights, changes = small_array((N_POINTS,)), small_array((6, N_POINTS))
     reference, start, end = (
         small_array((N_NODES, 3)), small_array((N_NODES, 3)), small_array((N_NODES, 3)),

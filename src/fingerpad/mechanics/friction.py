@@ -35,23 +35,16 @@ MOST_EXPECTED = 4.0
 
 @dataclass(frozen=True)
 class Approach:
-    """Skin and indenter at the end of the step before, and how they moved in it.
-
-    Parameters
-    ----------
-    local_mm : array (n, 3)
-        Nodes in the indenter's frame of then. [mm]
-    skin_mm, skin_step_mm : array (n, 3)
-        Nodes in the finger's frame, and their motion in that step. [mm]
-    tip_mm, tip_step_mm : array (3,)
-        The indenter's tip, and its motion. [mm]
-    """
+    """Skin and indenter at the end of the step before, and how they moved in it."""
 
     local_mm: FloatArray
+    """Nodes in the indenter's frame of then, (n, 3). [mm]"""
     skin_mm: FloatArray
     skin_step_mm: FloatArray
+    """Nodes in the finger's frame, and their motion in that step, (n, 3). [mm]"""
     tip_mm: FloatArray
     tip_step_mm: FloatArray
+    """The indenter's tip, and its motion, (3,). [mm]"""
 
     @classmethod
     def at_rest(cls, local_mm: FloatArray, skin_mm: FloatArray, tip_mm: FloatArray) -> Approach:
@@ -76,30 +69,20 @@ class Approach:
 
 @dataclass(frozen=True)
 class Anchors:
-    """Where each node of skin holds on to the indenter, and how strongly.
-
-    Parameters
-    ----------
-    anchor_mm : array (n, 3)
-        a, in the indenter's frame; meaningless where a node is not held. [mm]
-    normal : array (n, 3)
-        n, in the indenter's frame.
-    limit_mn : array (n,)
-        L, the largest friction. [mN]
-    pull_mn : array (n, 3)
-        t, where the search for the pull begins, see `friction`. [mN]
-    held : bool array (n,)
-        Nodes that were in contact at the end of the step before.
-    approach : Approach
-        Motion of skin and indenter in the step before.
-    """
+    """Where each node of skin holds on to the indenter, and how strongly."""
 
     anchor_mm: FloatArray
+    """a, in the indenter's frame; meaningless where a node is not held, (n, 3). [mm]"""
     normal: FloatArray
+    """n, in the indenter's frame, (n, 3)."""
     limit_mn: FloatArray
+    """L, the largest friction, (n,). [mN]"""
     pull_mn: FloatArray
+    """t, where the search for the pull begins, see `friction`, (n, 3). [mN]"""
     held: np.ndarray
+    """Nodes that were in contact at the end of the step before, (n,)."""
     approach: Approach
+    """Motion of skin and indenter in the step before."""
 
     @classmethod
     def none_held(cls, approach: Approach) -> Anchors:
@@ -129,48 +112,26 @@ class Anchors:
 
 @dataclass(frozen=True)
 class Friction:
-    """Friction at one configuration, in the indenter's frame.
-
-    Parameters
-    ----------
-    force_mn : array (n, 3)
-        Friction on each node. [mN]
-    stiffness : array (n, 3, 3)
-        Its tangent, or a stiffer one far from the solution; symmetric, without negative eigenvalues. [mN/mm]
-    potential : float
-        Sum of phi. [µJ]
-    slip_mm : array (n, 3)
-        g. [mm]
-    pull_mn : array (n, 3)
-        t, the pull towards which the linearised law leads, within the limit. [mN]
-    """
+    """Friction at one configuration, in the indenter's frame."""
 
     force_mn: FloatArray
+    """Friction on each node, (n, 3). [mN]"""
     stiffness: FloatArray
+    """Its tangent, or a stiffer one far from the solution; symmetric, without negative eigenvalues, (n, 3,
+    3). [mN/mm]
+    """
     potential: float
+    """Sum of phi. [µJ]"""
     slip_mm: FloatArray
+    """g, (n, 3). [mm]"""
     pull_mn: FloatArray
+    """t, the pull towards which the linearised law leads, within the limit, (n, 3). [mN]"""
 
 
 def friction(
     anchors: Anchors, local_mm: FloatArray, stiffness: FloatArray, before: Friction | None = None
 ) -> Friction:
     """Friction on nodes that have slipped from their anchors.
-
-    Parameters
-    ----------
-    anchors : Anchors
-        a, n and L.
-    local_mm : array (n, 3)
-        x, nodes in the indenter's frame. [mm]
-    stiffness : array (n,)
-        k. [mN/mm]
-    before : Friction, optional
-        Friction one Newton step ago, for the same anchors.
-
-    Returns
-    -------
-    Friction
 
     Notes
     -----
@@ -183,20 +144,6 @@ def friction(
 
     with t kept within L. At the solution t = L e and the tangent is exact. A search that begins with t = 0
     takes a stiffer tangent, that of the paraboloid that touches phi from above.
-
-    Examples
-    --------
-    A node pressed with 2 mN against a face with mu = 0.5 sticks at 0.001 mm and slips at 0.1 mm:
-
-    >>> from dataclasses import replace
-    >>> up, zero = np.array([[0.0, 1.0, 0.0]]), np.zeros((1, 3))
-    >>> free = Anchors.none_held(Approach.at_rest(zero, zero, tip_mm=np.zeros(3)))
-    >>> anchors = replace(free, normal=up, limit_mn=np.array([0.5 * 2.0]))
-    >>> for slip_mm in (0.001, 0.1):
-    ...     there = np.array([[slip_mm, 0.0, 0.0]])
-    ...     print(friction(anchors, there, np.array([100.0])).force_mn[0, 0].round(6))
-    -0.1
-    -1.0
     """
     n, limit, k = anchors.normal, anchors.limit_mn, stiffness
     g, s, m, e = _slip(anchors, local_mm, k)
@@ -231,23 +178,7 @@ def _slip(
 
 
 def dragged(anchors: Anchors, local_mm: FloatArray, stiffness: FloatArray, touching: np.ndarray) -> Anchors:
-    """Anchors with which the next step starts: of nodes that slip they follow, of nodes set free they go.
-
-    Parameters
-    ----------
-    anchors : Anchors
-        Those of the equilibrium found.
-    local_mm : array (n, 3)
-        x there, in the indenter's frame. [mm]
-    stiffness : array (n,)
-        k. [mN/mm]
-    touching : bool array (n,)
-        Nodes in contact there.
-
-    Returns
-    -------
-    Anchors
-    """
+    """Anchors with which the next step starts: of nodes that slip they follow, of nodes set free they go."""
     pull = np.where(touching[:, None], -friction(anchors, local_mm, stiffness).force_mn, 0.0)
     return replace(
         anchors,
@@ -260,11 +191,6 @@ def dragged(anchors: Anchors, local_mm: FloatArray, stiffness: FloatArray, touch
 
 def by_secants(tried: Sequence[tuple[Anchors, Anchors]]) -> Anchors:
     """Anchors that are likely to be those of the equilibrium that they lead to (Anderson 1965).
-
-    Parameters
-    ----------
-    tried : sequence of (given, found)
-        Anchors under which an equilibrium was sought, and those of the contact there, oldest first.
 
     Notes
     -----
@@ -281,13 +207,6 @@ def by_secants(tried: Sequence[tuple[Anchors, Anchors]]) -> Anchors:
 
 def slid_mm(found: Anchors, after: Anchors, normal_before: FloatArray) -> FloatArray:
     """How far each node slid over the indenter in a step: the way that its anchor was dragged, (n,). [mm]
-
-    Parameters
-    ----------
-    found, after : Anchors
-        Of the equilibrium found, and dragged along for the next step.
-    normal_before : array (n, 3)
-        Normals of the indenter where the anchors were before, in its frame.
 
     Notes
     -----

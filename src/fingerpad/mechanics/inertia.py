@@ -39,21 +39,7 @@ LEAST_WAY = 1e-3
 
 
 def resonance_hz(materials: Sequence[Material], thickness_mm: ArrayLike) -> float:
-    """First resonance of a column of tissue on bone. [Hz]
-
-    Parameters
-    ----------
-    materials : sequence of Material
-        Layers.
-    thickness_mm : array (n_layers,)
-        Their thicknesses. [mm]
-
-    Examples
-    --------
-    >>> soft = Material.neo_hooke(shear_kpa=5.0, poisson=0.48)
-    >>> round(resonance_hz([soft], [5.0]))
-    183
-    """
+    """First resonance of a column of tissue on bone. [Hz]"""
     young_kpa = np.array([_young_at_once_kpa(material) for material in materials])
     speed_m_per_s = np.sqrt(1e3 * young_kpa / DENSITY.value)
     return float(MS_PER_S / (4.0 * (float_array("thickness_mm", thickness_mm, 1) / speed_m_per_s).sum()))
@@ -68,22 +54,13 @@ def _young_at_once_kpa(material: Material) -> float:
 
 
 def fastest_hz(motion: Motion) -> float:
-    """Frequency of the sine that is as fast as the fastest part of a motion. [Hz]
-
-    Examples
-    --------
-    >>> from fingerpad.geometry.motion import RampAndHold
-    >>> round(fastest_hz(RampAndHold(ramp_ms=50.0)), 2)  # 1 / (pi 50 ms)
-    6.37
-    """
+    """Frequency of the sine that is as fast as the fastest part of a motion. [Hz]"""
     return float(_strokes(motion)[0].max(initial=0.0))
 
 
 def _strokes(motion: Motion) -> tuple[FloatArray, FloatArray]:
-    """Frequency of each part from reversal to reversal [Hz], and half of its way over the deepest there.
-
-    Air has no inertia: what comes before first touch, and above the skin, does not count.
-    """
+    """Frequency of each part from reversal to reversal [Hz], and half of its way over the deepest there."""
+    # Air has no inertia: what comes before first touch, and above the skin, does not count.
     times_ms = np.union1d(motion.samples_ms, motion.onset_ms)
     prescribed = np.maximum(motion.prescribed_at(times_ms), 0.0)
     steps, lengths_ms = np.diff(prescribed), np.diff(times_ms)
@@ -103,58 +80,20 @@ def _strokes(motion: Motion) -> tuple[FloatArray, FloatArray]:
 def inertial_share(
     motion: Motion, materials: Sequence[Material], thickness_mm: ArrayLike
 ) -> tuple[float, float, float]:
-    """Force that accelerates the tissue over what the motion adds to its elastic force; also f and f_0.
-
-    Parameters
-    ----------
-    motion : Motion
-        Motion of the indenter.
-    materials, thickness_mm
-        As in `resonance_hz`.
-    """
+    """Force that accelerates the tissue over what the motion adds to its elastic force; also f and f_0."""
     resonance, fastest = resonance_hz(materials, thickness_mm), fastest_hz(motion)
     return (fastest / resonance) ** 2, fastest, resonance
 
 
 def share_of_force(motion: Motion, materials: Sequence[Material], thickness_mm: ArrayLike) -> float:
-    """Force that accelerates the tissue over the whole elastic force of the press at that time. [1]
-
-    Parameters
-    ----------
-    motion : Motion
-        Motion of the indenter.
-    materials, thickness_mm
-        As in `resonance_hz`.
-
-    Examples
-    --------
-    A vibration of 0.01 mm about 0.5 mm accelerates little tissue beside what the hold compresses:
-
-    >>> from fingerpad.geometry.motions import sine
-    >>> soft = [Material.neo_hooke(shear_kpa=5.0, poisson=0.48)]
-    >>> [round(share_of_force(sine(0.5, mm, 183.0, cycles=4), soft, [5.0]), 2) for mm in (0.01, 0.1)]
-    [0.02, 0.16]
-    """
+    """Force that accelerates the tissue over the whole elastic force of the press at that time. [1]"""
     frequency_hz, amplitude = _strokes(motion)
     resonance = resonance_hz(materials, thickness_mm)
     return float(((frequency_hz / resonance) ** 2 * amplitude).max(initial=0.0))
 
 
 def warn_of_inertia(motion: Motion, materials: Sequence[Material], thickness_mm: ArrayLike) -> None:
-    """Warn if a motion is so fast that the inertia of the tissue changes the force of the press.
-
-    Parameters
-    ----------
-    motion : Motion
-        Motion of the indenter.
-    materials, thickness_mm
-        As in `resonance_hz`.
-
-    Warns
-    -----
-    InertiaWarning
-        If the share of the force that accelerates the tissue is above `LARGEST_SHARE`.
-    """
+    """Warn if a motion is so fast that the inertia of the tissue changes the force of the press."""
     share, fastest = share_of_force(motion, materials, thickness_mm), fastest_hz(motion)
     if share > LARGEST_SHARE:
         warnings.warn(
@@ -168,20 +107,7 @@ def warn_of_inertia(motion: Motion, materials: Sequence[Material], thickness_mm:
 
 
 def moved_mass_mg(mesh: Mesh, way: FloatArray) -> float:
-    """Mass that moves with an indenter, rho integral |du/dd|² dV: twice its kinetic energy at unit speed.
-
-    Parameters
-    ----------
-    mesh : Mesh
-        The undeformed body.
-    way : array (n_nodes, 3)
-        Displacement of its nodes over that of the indenter, du/dd.
-
-    Returns
-    -------
-    float
-        Of the whole body also when half of it is meshed. [mg]
-    """
+    """Mass that moves with an indenter, rho integral |du/dd|² dV: twice its kinetic energy at unit speed."""
     elastic = MaterialTable.of((Material.neo_hooke(1.0, 0.4),) * (int(mesh.layer.max()) + 1))
     at_rest = np.zeros_like(mesh.nodes_mm)
     volume_mm3 = instantaneous_state(mesh, at_rest, elastic).energies[:, :, 0].sum(axis=1)

@@ -76,17 +76,7 @@ class Preconditioner(Protocol):
 
 
 class KeptFactor:
-    """A factor of an earlier tangent, for products with the present one.
-
-    Parameters
-    ----------
-    sparsity : Sparsity
-        Block pattern of the tangent.
-    free : int array (n_free,)
-        Degrees of freedom that move.
-    factor : callable, optional
-        Makes the factor from the row and the column of every value.
-    """
+    """A factor of an earlier tangent, for products with the present one."""
 
     patience = 14
     number_type = np.float64
@@ -129,29 +119,7 @@ class KeptFactor:
 def choose_preconditioner(
     sparsity: Sparsity, free: np.ndarray, mesh: Mesh, poisson: float
 ) -> tuple[Preconditioner, str]:
-    """Choose the preconditioner for a body, and say why.
-
-    Parameters
-    ----------
-    sparsity : Sparsity
-        Block pattern of the tangent.
-    free : int array (n_free,)
-        Degrees of freedom that move.
-    mesh : Mesh
-        The body.
-    poisson : float
-        Poisson's ratio of the least compressible material.
-
-    Returns
-    -------
-    (Preconditioner, str)
-        The preconditioner and the reason for it in a sentence.
-
-    Raises
-    ------
-    InputError
-        If no solver serves a mesh of this size with this material.
-    """
+    """Choose the preconditioner for a body, and say why."""
     # Materials are distinguished by moduli; the ratio computed from them differs in the last digits.
     if poisson > DIRECT_POISSON + 1e-9:
         raise InputError(
@@ -188,15 +156,10 @@ def choose_preconditioner(
 
 @dataclass
 class LinearSolver:
-    """Solve with a tangent on the free degrees of freedom, keeping the preconditioner while it serves.
-
-    Parameters
-    ----------
-    approximate : Preconditioner
-        The tangent's product and approximate inverse.
-    """
+    """Solve with a tangent on the free degrees of freedom, keeping the preconditioner while it serves."""
 
     approximate: Preconditioner
+    """The tangent's product and approximate inverse."""
     renewals: int = field(default=0, init=False)
     iterations: int = field(default=0, init=False)
     _stale: bool = field(default=True, init=False)
@@ -213,29 +176,7 @@ class LinearSolver:
         return self.approximate.leave(self.approximate.multiply(vector))
 
     def solve(self, blocks: np.ndarray, residual: FloatArray, relative_tolerance: float) -> FloatArray:
-        """Solve K x = r for the free degrees of freedom.
-
-        Parameters
-        ----------
-        blocks : array (n_blocks, 3, 3)
-            The tangent.
-        residual : array (n_free,)
-            Right-hand side.
-        relative_tolerance : float
-            Residual norm to reach, relative to the right-hand side's.
-
-        Returns
-        -------
-        array (n_free,)
-            The solution.
-
-        Raises
-        ------
-        NotPositiveDefiniteError
-            If the tangent is not positive definite.
-        ConvergenceError
-            If conjugate gradients do not converge even with a new preconditioner.
-        """
+        """Solve K x = r for the free degrees of freedom."""
         digits = -np.log10(relative_tolerance)
         for _ in range(2):
             fresh = self._stale

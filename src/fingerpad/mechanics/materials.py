@@ -271,10 +271,6 @@ class Tissues(metaclass=KnownKeywords):
         factor : float
             Above 0; Poisson's ratios and relaxation are kept.
 
-        Returns
-        -------
-        Tissues
-
         Raises
         ------
         InputError
@@ -291,21 +287,16 @@ class Tissues(metaclass=KnownKeywords):
 
 @dataclass(frozen=True)
 class MaterialTable:
-    """Materials as arrays for the compiled kernels; one row per layer.
-
-    Parameters
-    ----------
-    law : array (n_layers, 11 + 4 n_operations)
-        Instantaneous c10, c01, c20, c11, c02, then 1/D1, 1/D2 [kPa]; the long-term share; the kind of law,
-        the factor from given to instantaneous coefficients and the number of operations; then the operations
-        of a formula.
-    shares, times_ms : array (n_layers, n_terms)
-        Prony series, padded with zero shares.
-    """
+    """Materials as arrays for the compiled kernels; one row per layer."""
 
     law: FloatArray
+    """Instantaneous c10, c01, c20, c11, c02, then 1/D1, 1/D2 [kPa]; the long-term share; the kind of law, the
+    factor from given to instantaneous coefficients and the number of operations; then the operations of a
+    formula, (n_layers, 11 + 4 n_operations).
+    """
     shares: FloatArray
     times_ms: FloatArray
+    """Prony series, padded with zero shares, (n_layers, n_terms)."""
 
     @classmethod
     def of(cls, materials: Sequence[Material]) -> MaterialTable:

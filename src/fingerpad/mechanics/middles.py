@@ -22,24 +22,16 @@ N_CORNERS = 4
 
 @dataclass(frozen=True)
 class Middles:
-    """Middles of facets of the skin and of the edges of facets.
-
-    Parameters
-    ----------
-    corners : int array (n, 4)
-        Nodes whose mean a middle is: those of a facet, or both ends of an edge twice.
-    blocks : int array (n, 4, 4)
-        Block of the tangent of each pair of these nodes.
-    area_mm2 : array (n,)
-        Undeformed area that belongs to each middle. [mm²]
-    sag_mm : float
-        How deep a middle lies within the indenter before it is pushed out. [mm]
-    """
+    """Middles of facets of the skin and of the edges of facets."""
 
     corners: IntArray
+    """Nodes whose mean a middle is: those of a facet, or both ends of an edge twice, (n, 4)."""
     blocks: IntArray
+    """Block of the tangent of each pair of these nodes, (n, 4, 4)."""
     area_mm2: FloatArray
+    """Undeformed area that belongs to each middle, (n,). [mm²]"""
     sag_mm: float
+    """How deep a middle lies within the indenter before it is pushed out. [mm]"""
 
     @classmethod
     def none(cls) -> Middles:

@@ -41,18 +41,12 @@ steps instead of 17 at this ratio, and 21 instead of 116 at 0.4999."""
 
 @dataclass(frozen=True)
 class Pressures:
-    """Pressure of every element and how it changes with the displacements.
-
-    Parameters
-    ----------
-    pressure_kpa : array (n_elements,)
-        U'(Jbar); 0 where shape and volume are coupled. [kPa]
-    slope_kpa_per_mm : array (n_elements, 8, 3)
-        Its derivative by the displacement of each node. [kPa/mm]
-    """
+    """Pressure of every element and how it changes with the displacements."""
 
     pressure_kpa: FloatArray
+    """U'(Jbar); 0 where shape and volume are coupled, (n_elements,). [kPa]"""
     slope_kpa_per_mm: FloatArray
+    """Its derivative by the displacement of each node, (n_elements, 8, 3). [kPa/mm]"""
 
     @classmethod
     def of(cls, mesh: Mesh, displacement: FloatArray, law: FloatArray) -> Pressures:
@@ -126,19 +120,6 @@ def exchange_pressure(
     """Add (change of p) d²v of every element to a tangent.
 
     With g the present gradients of the shape functions, d²v_ai,bj = sum_q w_q J_q (g_ai g_bj - g_aj g_bi).
-
-    Parameters
-    ----------
-    mesh : Mesh
-        The undeformed body.
-    displacement : array (n_nodes, 3)
-        Displacements. [mm]
-    change : array (n_elements,)
-        Pressure wanted minus pressure in the tangent. [kPa]
-    sparsity : Sparsity
-        Pattern of the tangent.
-    blocks : float64 or float32 array (n_blocks, 3, 3)
-        The tangent. [mN/mm]
     """
 
     def exchange(first: int, last: int) -> None:

@@ -68,29 +68,21 @@ WORTHWHILE = 0.8
 
 @dataclass(frozen=True)
 class Transfer:
-    """Interpolation from the columns of a coarse grid to those of a fine one, and the product P' A P.
-
-    Parameters
-    ----------
-    parent, weight : array (n_fine, 4)
-        Coarse columns around each fine one, and their weights, which add up to 1.
-    child_start, child, child_weight : array
-        The same seen from the coarse columns: their fine columns and weights.
-    graph : ColumnGraph
-        Neighbours on the coarse grid.
-    part_start, part, part_weight : array
-        For each coarse pair of columns the fine pairs whose weighted sum it is.
-    """
+    """Interpolation from the columns of a coarse grid to those of a fine one, and the product P' A P."""
 
     parent: np.ndarray
     weight: SingleArray
+    """Coarse columns around each fine one, and their weights, which add up to 1, (n_fine, 4)."""
     child_start: np.ndarray
     child: np.ndarray
     child_weight: SingleArray
+    """The same seen from the coarse columns: their fine columns and weights."""
     graph: ColumnGraph
+    """Neighbours on the coarse grid."""
     part_start: np.ndarray
     part: np.ndarray
     part_weight: SingleArray
+    """For each coarse pair of columns the fine pairs whose weighted sum it is."""
 
     @classmethod
     def of(cls, graph: ColumnGraph, parent: np.ndarray, weight: FloatArray) -> Transfer:
@@ -129,25 +121,7 @@ def _grouped(
 
 
 def kept_lines(steps_mm: FloatArray, finest_mm: float) -> np.ndarray:
-    """Lines of a coarse grid: two steps become one where together they are short.
-
-    Parameters
-    ----------
-    steps_mm : array (n,)
-        Distances of successive lines. [mm]
-    finest_mm : float
-        Smallest distance of lines on the grid, in any direction. [mm]
-
-    Returns
-    -------
-    int array
-        Numbers of the lines kept, the first and the last among them.
-
-    Examples
-    --------
-    >>> kept_lines(np.array([4.0, 2.0, 1.0, 1.0, 1.0, 1.0, 3.0]), finest_mm=1.0).tolist()
-    [0, 1, 3, 5, 7]
-    """
+    """Lines of a coarse grid: two steps become one where together they are short."""
     kept = [0]
     while kept[-1] < steps_mm.size:
         line = kept[-1]
@@ -169,23 +143,18 @@ def _between(steps_mm: FloatArray, kept: np.ndarray) -> tuple[np.ndarray, FloatA
 
 @dataclass(frozen=True)
 class ColumnGrid:
-    """The columns of one level at the crossings of its lines.
-
-    Parameters
-    ----------
-    columns : int array (n_along, n_around)
-        Number of the column at each crossing; the pole and the seam of a finger appear repeatedly.
-    along_mm, around_mm : array (n_along - 1,), (n_around - 1,)
-        Distances of successive lines. [mm]
-    """
+    """The columns of one level at the crossings of its lines."""
 
     columns: np.ndarray
+    """Number of the column at each crossing; the pole and the seam of a finger appear repeatedly, (n_along,
+    n_around).
+    """
     along_mm: FloatArray
     around_mm: FloatArray
+    """Distances of successive lines, (n_along - 1,). [mm]"""
 
     @property
     def n_columns(self) -> int:
-        """Number of columns."""
         return int(self.columns.max()) + 1
 
     def renumbered(self, order: np.ndarray) -> ColumnGrid:
@@ -276,10 +245,9 @@ def _share(kernel: Callable[..., None], first: int, last: int, *arguments: Any) 
 
 
 class _Level:
-    """One grid: its matrix A, what sweeps need of it (see `columns`), and the vectors of a cycle.
+    """One grid: its matrix A, what sweeps need of it (see `columns`), and the vectors of a cycle."""
 
-    Where sweeps round, they sweep Q instead of A, and vectors are scaled. The coarsest grid is not swept.
-    """
+    # Where sweeps round, they sweep Q instead of A, and vectors are scaled. The coarsest grid is not swept.
 
     def __init__(self, graph: ColumnGraph, colour_start: np.ndarray, free: SingleArray, depth: int):
         self.graph, self.free, self.depth = graph, free, depth
@@ -291,7 +259,6 @@ class _Level:
 
     @property
     def n_columns(self) -> int:
-        """Number of columns."""
         return int(self.own.size)
 
     def make_sweepable(self, rounds: bool) -> None:
@@ -338,19 +305,7 @@ def _by_colour(graph: ColumnGraph) -> tuple[np.ndarray, np.ndarray]:
 
 
 class Multigrid:
-    """Product of the tangent, and its approximate inverse by one V-cycle.
-
-    Parameters
-    ----------
-    sparsity : Sparsity
-        Block pattern of the tangent.
-    free : int array (n_free,)
-        Degrees of freedom that move.
-    nodes_mm : array (n_nodes, 3)
-        Reference nodes. [mm]
-    grid : int array (n_along, n_around, depth)
-        Nodes in grid order, `Mesh.grid`.
-    """
+    """Product of the tangent, and its approximate inverse by one V-cycle."""
 
     patience = 3
     number_type = np.float32

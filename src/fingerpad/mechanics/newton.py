@@ -93,34 +93,28 @@ FIRST_DEPTH_MM, MOST_ADVANCE = 0.01, 4.0
 @dataclass(frozen=True)
 @converted
 class NewtonSettings:
-    """When an equilibrium counts as found.
-
-    Parameters
-    ----------
-    residual_tolerance : float
-        Norm of the out-of-balance nodal forces over the contact force.
-    penetration_tolerance : float
-        Largest distance between pressed skin and indenter, over the depth of indentation; contact is
-        augmented until it is met.
-    most_iterations : int
-        Newton steps before the attempt is given up.
-    balance_tolerance : float
-        Difference between the force of the indenter and the reaction of the supports, over that force. A
-        small residual does not imply it: many small nodal forces of one sign add up.
-    persistent : bool
-        Whether the search goes on through an indefinite tangent and insists on a falling potential, as skin
-        about a small body or a sharp edge needs. Elsewhere a shorter step in time is the faster remedy.
-    least_penetration_mm : float
-        Penetration that is accepted at any depth after two augmentations: about a small body, a share of its
-        elements. [mm]
-    """
+    """When an equilibrium counts as found."""
 
     residual_tolerance: float = 1e-5
+    """Norm of the out-of-balance nodal forces over the contact force."""
     penetration_tolerance: float = 5e-3
+    """Largest distance between pressed skin and indenter, over the depth of indentation; contact is augmented
+    until it is met.
+    """
     most_iterations: int = 40
+    """Newton steps before the attempt is given up."""
     balance_tolerance: float = 1e-4
+    """Difference between the force of the indenter and the reaction of the supports, over that force. A small
+    residual does not imply it: many small nodal forces of one sign add up.
+    """
     persistent: bool = False
+    """Whether the search goes on through an indefinite tangent and insists on a falling potential, as skin
+    about a small body or a sharp edge needs. Elsewhere a shorter step in time is the faster remedy.
+    """
     least_penetration_mm: float = 0.0
+    """Penetration that is accepted at any depth after two augmentations: about a small body, a share of its
+    elements. [mm]
+    """
 
     def __post_init__(self) -> None:
         positive("residual_tolerance", self.residual_tolerance)
@@ -131,45 +125,30 @@ class NewtonSettings:
 
 @dataclass(frozen=True)
 class Equilibrium:
-    """A converged configuration.
-
-    Parameters
-    ----------
-    displacement_mm : array (n_nodes, 3)
-        Displacements. [mm]
-    depth_mm : float
-        How far the indenter has advanced since first touch. [mm]
-    contact : ContactState
-        Contact there.
-    multipliers_mn : array (n_points,)
-        Contact multipliers to start the next step from. [mN]
-    iterations : int
-        Newton steps taken.
-    balance : Balance
-        Reaction of the supports.
-    anchors : Anchors, optional
-        Where the skin holds on to the indenter when the next step starts.
-    slid_mm : array (n_points,), optional
-        How far each point slid over the indenter in this step, with friction. [mm]
-    rubbed_uj : float
-        Energy that friction has turned into heat in this step. [µJ]
-    pressure_kpa : array (n_elements,), optional
-        Pressures for the next step of a mixed method. [kPa]
-    was_shifted : bool
-        Whether an indefinite tangent was shifted on the way: the skin may have snapped to another state.
-    """
+    """A converged configuration."""
 
     displacement_mm: FloatArray
+    """Displacements, (n_nodes, 3). [mm]"""
     depth_mm: float
+    """How far the indenter has advanced since first touch. [mm]"""
     contact: ContactState
+    """Contact there."""
     multipliers_mn: FloatArray
+    """Contact multipliers to start the next step from, (n_points,). [mN]"""
     iterations: int
+    """Newton steps taken."""
     balance: Balance
+    """Reaction of the supports."""
     anchors: Anchors | None = None
+    """Where the skin holds on to the indenter when the next step starts."""
     slid_mm: FloatArray | None = None
+    """How far each point slid over the indenter in this step, with friction, (n_points,). [mm]"""
     rubbed_uj: float = 0.0
+    """Energy that friction has turned into heat in this step. [µJ]"""
     pressure_kpa: FloatArray | None = None
+    """Pressures for the next step of a mixed method, (n_elements,). [kPa]"""
     was_shifted: bool = False
+    """Whether an indefinite tangent was shifted on the way: the skin may have snapped to another state."""
 
 
 def find_equilibrium(
@@ -181,30 +160,7 @@ def find_equilibrium(
     settings: NewtonSettings,
     before_mm: FloatArray | None = None,
 ) -> Equilibrium:
-    """Newton's method from a guess.
-
-    Parameters
-    ----------
-    body : Body
-        The tissue.
-    load : Load
-        What acts in this step.
-    solver : LinearSolver
-        Keeps its preconditioner from call to call.
-    guess_mm : array (n_nodes, 3)
-        Displacements to start from; fixed nodes must be at their place. [mm]
-    multipliers_mn : array (n_points,)
-        Contact multipliers to start from. [mN]
-    settings : NewtonSettings
-        When to stop.
-    before_mm : array (n_nodes, 3), optional
-        Displacements to start from if the guess turns an element inside out. [mm]
-
-    Raises
-    ------
-    ConvergenceError
-        If no equilibrium is found; its history has one line per Newton step.
-    """
+    """Newton's method from a guess."""
     search = _Search(body, load, solver, Lagging(multipliers_mn, load.anchors), settings.persistent)
     try:
         return search.run(guess_mm, settings, before_mm)
@@ -299,12 +255,10 @@ class _Search:
         return evaluate(self.body, self.load, *where, self.lagging, self.blocks, curved=curved is not False)
 
     def better(self, now: Configuration, forcing: float, potentials: list[float]) -> Configuration:
-        """Take a Newton step, and where no part of it helps, one that is solved for in another way.
-
-        Skin at the brink of a snap has next to no stiffness, and the step is far too long for the quadratic
-        model behind it. A larger shift of the tangent makes it shorter and turns it downhill, as in a trust
-        region (Nocedal & Wright 2006, section 4.1).
-        """
+        """Take a Newton step, and where no part of it helps, one that is solved for in another way."""
+        # Skin at the brink of a snap has next to no stiffness, and the step is far too long for the quadratic
+        # model behind it. A larger shift of the tangent makes it shorter and turns it downhill, as in a trust
+        # region (Nocedal & Wright 2006, section 4.1).
         while True:
             try:
                 return self.line_search(*self.direction_from(now, forcing), potentials)
@@ -325,13 +279,11 @@ class _Search:
         return now, self.contact_direction(now, direction, forcing)
 
     def contact_direction(self, now: Configuration, direction: FloatArray, forcing: float) -> FloatArray:
-        """Repeat a Newton step for the points that it presses, until they are those it was solved for.
-
-        A Newton step takes the points that are pressed now as those that will be. At an edge many change
-        sides, and points that are set free in one step are driven deep into the indenter in the next. To
-        second order the potential is piecewise quadratic: its minimum, not that of one piece, is the step
-        (primal-dual active set strategy; Hintermüller, Ito & Kunisch 2002).
-        """
+        """Repeat a Newton step for the points that it presses, until they are those it was solved for."""
+        # A Newton step takes the points that are pressed now as those that will be. At an edge many change
+        # sides, and points that are set free in one step are driven deep into the indenter in the next. To
+        # second order the potential is piecewise quadratic: its minimum, not that of one piece, is the step
+        # (primal-dual active set strategy; Hintermüller, Ito & Kunisch 2002).
         contact, touch, free = self.load.contact, now.contact, self.body.free
         assumed = touch.pressed_mn > 0.0
         stiffness = contact.stiffness[:, None, None] * touch.normal[:, :, None] * touch.normal[:, None]
@@ -364,12 +316,10 @@ class _Search:
         return best
 
     def newton_direction(self, now: Configuration, forcing: float) -> tuple[Configuration, FloatArray]:
-        """Solve for a Newton step, and return the configuration with the tangent that could be solved.
-
-        Skin that is about to slide round a sharp edge has no stiffness along it. Without the curvature of
-        the indenter the tangent still leads downhill, but slowly. After some such steps, and where tissue
-        alone has no stiffness in some direction, the tangent is shifted along its diagonal.
-        """
+        """Solve for a Newton step, and return the configuration with the tangent that could be solved."""
+        # Skin that is about to slide round a sharp edge has no stiffness along it. Without the curvature of
+        # the indenter the tangent still leads downhill, but slowly. After some such steps, and where tissue
+        # alone has no stiffness in some direction, the tangent is shifted along its diagonal.
         if self.shift > 0.0:
             return self.shifted_direction(now, forcing)
         most_straight = MOST_STRAIGHT if self.persistent else np.inf
@@ -388,11 +338,9 @@ class _Search:
             return self.shifted_direction(now, forcing)
 
     def shifted_direction(self, now: Configuration, forcing: float) -> tuple[Configuration, FloatArray]:
-        """Solve with the smallest of some shifts of the tangent that makes it positive definite.
-
-        The step leads downhill, and `line_search` takes it only as far as the potential falls. Without the
-        curvature of the indenter a smaller shift suffices, but the step is further from Newton's.
-        """
+        """Solve with the smallest of some shifts of the tangent that makes it positive definite."""
+        # The step leads downhill, and `line_search` takes it only as far as the potential falls. Without the
+        # curvature of the indenter a smaller shift suffices, but the step is further from Newton's.
         first = FIRST_SHIFT if self.shift == 0.0 else self.shift / CHANGE_SHIFT
         if first < FIRST_SHIFT:
             first = 0.0
@@ -421,11 +369,9 @@ class _Search:
         return before is not None and bool((before & (now.contact.pressed_mn == 0.0)).any())
 
     def closed_direction(self, now: Configuration, forcing: float) -> tuple[Configuration, FloatArray]:
-        """Solve for a Newton step in which the skin does not fly into an indenter that moves aside.
-
-        An indenter that slides by more than the penetration sets most nodes free for one iteration. Without
-        their stiffness a Newton step drives the skin deep into the indenter.
-        """
+        """Solve for a Newton step in which the skin does not fly into an indenter that moves aside."""
+        # An indenter that slides by more than the penetration sets most nodes free for one iteration. Without
+        # their stiffness a Newton step drives the skin deep into the indenter.
         where = now.displacement_mm, now.depth_mm
         closed = evaluate(self.body, self.load, *where, self.lagging, self.blocks, curved=False, closed=True)
         return closed, self.solver.solve(self.blocks, closed.residual_mn, forcing)
@@ -482,12 +428,10 @@ class _Search:
         return evaluate(self.body, self.load, displacement, depth_mm, self.lagging, blocks, before, pressure)
 
     def along_surface(self, start: Configuration, displacement_mm: FloatArray, depth_mm: float) -> FloatArray:
-        """Displacements that keep pressed nodes as deep in the indenter as the linear step leaves them.
-
-        A node that moves straight on leaves a curved surface, or enters it, by the square of its step over
-        twice the radius. The penalty turns this into a large force, so that steps along an edge had to be
-        short (the effect of Maratos and its correction; Nocedal & Wright 2006, sections 15.5 and 15.6).
-        """
+        """Displacements that keep pressed nodes as deep in the indenter as the linear step leaves them."""
+        # A node that moves straight on leaves a curved surface, or enters it, by the square of its step over
+        # twice the radius. The penalty turns this into a large force, so that steps along an edge had to be
+        # short (the effect of Maratos and its correction; Nocedal & Wright 2006, sections 15.5 and 15.6).
         contact, n_nodes = self.load.contact, self.load.contact.nodes.size
         positions_mm = contact.points_mm(self.body.mesh.nodes_mm + displacement_mm)
         gap_mm, normal = contact.gap(contact.placement.to_local(positions_mm, depth_mm))
@@ -506,11 +450,10 @@ class _Search:
     def line_search(
         self, start: Configuration, direction: FloatArray, potentials: list[float]
     ) -> Configuration:
-        """Go along `direction`, halving until the potential falls below the highest remembered one.
-
-        Nodes that come into contact raise the potential for a step or two until the next steps push them out
-        again; a comparison with several earlier potentials allows this (Grippo, Lampariello & Lucidi 1986).
-        """
+        """Go along `direction`, halving until the potential falls below the highest remembered one."""
+        # Nodes that come into contact raise the potential for a step or two until the next steps push them
+        # out again; a comparison with several earlier potentials allows this (Grippo, Lampariello & Lucidi
+        # 1986).
         highest_uj = max(potentials[-(1 if self.is_monotone else REMEMBERED_POTENTIALS) :])
         slope = -float(direction @ start.residual_mn)
         at_rest = start.relative_residual < LAST_STEP
@@ -533,11 +476,9 @@ class _Search:
         raise ConvergenceError(f"The line search found no better configuration{folds}.")
 
     def lengthened(self, start: Configuration, direction: FloatArray, trial: Configuration) -> Configuration:
-        """Double a step with a shifted tangent while the potential falls.
-
-        Away from an unstable state each step is a multiple of the one before, which a shift much larger than
-        the negative stiffness makes little more than one.
-        """
+        """Double a step with a shifted tangent while the potential falls."""
+        # Away from an unstable state each step is a multiple of the one before, which a shift much larger
+        # than the negative stiffness makes little more than one.
         length = 1.0
         while self.load.anchors is None and length < LONGEST_SHIFTED_STEP:
             further = self.moved(start, 2.0 * length * direction)
@@ -547,13 +488,11 @@ class _Search:
         return trial
 
     def advance_indenter(self, start: Configuration) -> Configuration:
-        """Newton step of displacements and depth together, towards the given force.
-
-        With r the residuals and K, b, c the second derivatives of the potential by uu, ud and dd, the exact
-        step lies in the plane of (x, 0) and t = (-y, 1), where K x = r_u and K y = b. The step along t
-        minimises the quadratic model after x, however loosely x and y are solved. The usual c - b'y for the
-        stiffness along t would not do: contact is so stiff that the two nearly cancel.
-        """
+        """Newton step of displacements and depth together, towards the given force."""
+        # With r the residuals and K, b, c the second derivatives of the potential by uu, ud and dd, the exact
+        # step lies in the plane of (x, 0) and t = (-y, 1), where K x = r_u and K y = b. The step along t
+        # minimises the quadratic model after x, however loosely x and y are solved. The usual c - b'y for the
+        # stiffness along t would not do: contact is so stiff that the two nearly cancel.
         axis, free = self.load.contact.placement.axis, self.body.free
         coupling = np.zeros_like(start.displacement_mm)
         self.load.contact.add_to_nodes(coupling, -start.contact_stiffness @ axis)

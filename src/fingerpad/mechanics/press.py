@@ -78,72 +78,57 @@ LIFT_MM = 100.0
 
 @dataclass(frozen=True)
 class Deformation:
-    """What a press did to a body.
-
-    Parameters
-    ----------
-    times_ms : array (n_times,)
-        From 0, the unloaded state. [ms]
-    force_mn : array (n_times,)
-        Force of the indenter along its axis; that of the whole body also when half of it is solved. [mN]
-    displacement_mm : array (n_times, n_nodes, 3)
-        Displacements. [mm]
-    sed_kpa : array (n_times, n_elements)
-        Stored strain energy density, element mean. [kPa]
-    depth_mm : array (n_times,)
-        How far the indenter has advanced since first touch. [mm]
-    contact_force_mn : array (n_times, 3)
-        Whole force of the indenter on the skin, with friction, of the whole body also when half of it is
-        solved. [mN]
-    reaction_mn : array (n_times, 3)
-        Force of the body on bone and nail, of the whole body also when half of it is solved. [mN]
-    nail_reaction_mn : array (n_times, 3)
-        Its part on the nail. [mN]
-    force_imbalance : float
-        Largest difference at any time between the indenter's force and the reaction of the supports, over
-        that force.
-    stress_kpa : array (n_elements, 6)
-        Cauchy stress of all elements at the last time, as in `ElementFields`. [kPa]
-    fields : ElementFields
-        Stress, strain and energies over time of the elements that were watched.
-    contact : SkinContact
-        Pressure on the skin and area of contact over time.
-    energy : EnergyBalance
-        Where the work of the indenter went.
-    penetration_mm : float
-        Deepest penetration at any time. [mm]
-    newton_steps, factorisations : int
-        Work done.
-    linear_solver : str
-        Which one was chosen, and why.
-    """
+    """What a press did to a body."""
 
     times_ms: FloatArray
+    """From 0, the unloaded state, (n_times,). [ms]"""
     force_mn: FloatArray
+    """Force of the indenter along its axis; that of the whole body also when half of it is solved,
+    (n_times,). [mN]
+    """
     displacement_mm: FloatArray
+    """Displacements, (n_times, n_nodes, 3). [mm]"""
     sed_kpa: FloatArray
+    """Stored strain energy density, element mean, (n_times, n_elements). [kPa]"""
     depth_mm: FloatArray
+    """How far the indenter has advanced since first touch, (n_times,). [mm]"""
     contact_force_mn: FloatArray
+    """Whole force of the indenter on the skin, with friction, of the whole body also when half of it is
+    solved, (n_times, 3). [mN]
+    """
     reaction_mn: FloatArray
+    """Force of the body on bone and nail, of the whole body also when half of it is solved, (n_times, 3).
+    [mN]
+    """
     nail_reaction_mn: FloatArray
+    """Its part on the nail, (n_times, 3). [mN]"""
     force_imbalance: float
+    """Largest difference at any time between the indenter's force and the reaction of the supports, over that
+    force.
+    """
     stress_kpa: FloatArray
+    """Cauchy stress of all elements at the last time, as in `ElementFields`, (n_elements, 6). [kPa]"""
     fields: ElementFields
+    """Stress, strain and energies over time of the elements that were watched."""
     contact: SkinContact
+    """Pressure on the skin and area of contact over time."""
     energy: EnergyBalance
+    """Where the work of the indenter went."""
     penetration_mm: float
+    """Deepest penetration at any time. [mm]"""
     newton_steps: int
     factorisations: int
+    """Work done."""
     linear_solver: str
+    """Which one was chosen, and why."""
 
 
 @dataclass(frozen=True)
 class _Moment:
-    """The press at one time: what the next step starts from.
+    """The press at one time: what the next step starts from."""
 
-    `step_mm`, `step_depth_mm` and `advance` are the changes of displacements, of depth and of the prescribed
-    course in the step that ends here. `slip_mm` is how far each point has slid since it touched.
-    """
+    # `step_mm`, `step_depth_mm` and `advance` are the changes of displacements, of depth and of the
+    # prescribed course in the step that ends here. `slip_mm` is how far each point has slid since it touched.
 
     time_ms: float
     found: Equilibrium
@@ -266,10 +251,8 @@ class _Press:
             )
 
     def check_that_it_holds(self, start: _Moment, found: Equilibrium) -> None:
-        """Refuse a step after which no force, or with a shifted tangent less, drives the indenter deeper.
-
-        Skin may lie beside or behind the indenter then. A shift leads through an unstable state.
-        """
+        """Refuse a step after which no force, or with a shifted tangent less, drives the indenter deeper."""
+        # Skin may lie beside or behind the indenter then. A shift leads through an unstable state.
         deeper = found.depth_mm > start.found.depth_mm
         forces_mn = [each.contact.force_mn.sum(axis=0) for each in (start.found, found)]
         # Skin beside the indenter may press on its sides.
@@ -305,11 +288,9 @@ class _Press:
         return max(slide, steps_of_advance(abs(after_mm - before_mm), self.finest_mm))
 
     def continued(self, start: _Moment, target_ms: float) -> float:
-        """Advance of the indenter in a step over that in the step before: how far the skin is expected to go.
-
-        It is 0 in a hold and negative after a reversal; of another direction only the part along the old one
-        counts.
-        """
+        """Advance of the indenter in a step over that in the step before."""
+        # It is 0 in a hold and negative after a reversal; of another direction only the part along the old
+        # one counts.
         before = float(start.advance @ start.advance)
         if before == 0.0:
             return 0.0
@@ -397,13 +378,7 @@ class _Press:
 
 
 def length_ms(start_ms: float, end_ms: float) -> float:
-    """Length of a step. [ms]
-
-    Examples
-    --------
-    >>> length_ms(500.1, 500.4) == length_ms(0.0, 0.3) == 0.3
-    True
-    """
+    """Length of a step. [ms]"""
     return round(end_ms - start_ms, SAME_DIGITS)
 
 
@@ -419,46 +394,7 @@ def press(
     friction: float = 0.0,
     finest_mm: float = np.inf,
 ) -> Deformation:
-    """Solve a whole ramp and hold.
-
-    Parameters
-    ----------
-    mesh : Mesh
-        The body; its bone and nail nodes stay where they are.
-    materials : tuple of Material
-        One per layer of the mesh.
-    indenter : Indenter
-        The rigid body.
-    placement : Placement
-        Where it stands at first touch.
-    stimulus : RampAndHold, ForceRampAndHold or Trajectory
-        Its motion.
-    settings : PressSettings, optional
-        Steps and tolerances.
-    deepest_mm : float
-        Depth that a force must not exceed. [mm]
-    watched : int array, optional
-        Elements whose stress and strain are kept over time; all by default.
-    friction : float
-        Coulomb's coefficient between skin and indenter.
-    finest_mm : float
-        Size of the smallest elements about a small body or a sharp edge, which limits steps and penetration;
-        infinite about others. [mm]
-
-    Returns
-    -------
-    Deformation
-        Only of a press in which every step converged.
-
-    Raises
-    ------
-    InputError
-        If the mesh fails `check_mesh`, a material is less compressible than a solver of this machine can
-        take, a depth drives the indenter into the bone, a force pushes it deeper than `deepest_mm`, or the
-        indenter never touches the skin, or is so small that it goes between its nodes.
-    ConvergenceError
-        If a step fails even when it is cut; the history lists each attempt.
-    """
+    """Solve a whole ramp and hold."""
     settings = settings or PressSettings()
     check_mesh(mesh, len(materials))
     _check_bone(mesh, indenter, placement, stimulus)
@@ -601,10 +537,8 @@ def _solved(job: _Press, settings: PressSettings, times: FloatArray, start: _Mom
 
 
 def _cycle_times(job: _Press, settings: PressSettings, times: FloatArray) -> FloatArray:
-    """List the times of many equal cycles of which not all are solved, (n_cycles, n_steps); else (0, 0).
-
-    Skin that slides may creep from cycle to cycle, so that with friction all are solved.
-    """
+    """List the times of many equal cycles of which not all are solved, (n_cycles, n_steps); else (0, 0)."""
+    # Skin that slides may creep from cycle to cycle, so that with friction all are solved.
     cycles = job.stimulus.cycles
     if cycles is None or settings.cycle_tolerance is None or job.contact.friction > 0.0:
         return np.empty((0, 0))

@@ -104,10 +104,6 @@ class PressSettings(metaclass=KnownKeywords):
         ----------
         finest_mm : float
             Size of the smallest elements about a small body; infinite about others. [mm]
-
-        Returns
-        -------
-        NewtonSettings
         """
         newton = newton_about(self.newton, finest_mm) if np.isfinite(finest_mm) else self.newton
         if self.sed_tolerance is None:

@@ -29,25 +29,23 @@ SHARE_BESIDE = 0.5
 
 @dataclass(frozen=True)
 class SkinContact:
-    """Where and how hard the indenter presses, over time.
-
-    Parameters
-    ----------
-    pressure_kpa : array (n_times, n_skin_nodes)
-        Normal force on each node of `mesh.skin_nodes` over the present area that belongs to it. [kPa]
-    shear_kpa : array (n_times, n_skin_nodes, 3)
-        Friction on each node over that area. [kPa]
-    slip_mm : array (n_times, n_skin_nodes)
-        How far each node in contact has slid over the indenter since it came to touch, with friction. [mm]
-    area_mm2, present_area_mm2 : array (n_times,)
-        Skin in contact, undeformed and as it is then; of the whole body also when half of it is solved. [mm²]
-    """
+    """Where and how hard the indenter presses, over time."""
 
     pressure_kpa: FloatArray
+    """Normal force on each node of `mesh.skin_nodes` over the present area that belongs to it, (n_times,
+    n_skin_nodes). [kPa]
+    """
     shear_kpa: FloatArray
+    """Friction on each node over that area, (n_times, n_skin_nodes, 3). [kPa]"""
     slip_mm: FloatArray
+    """How far each node in contact has slid over the indenter since it came to touch, with friction,
+    (n_times, n_skin_nodes). [mm]
+    """
     area_mm2: FloatArray
     present_area_mm2: FloatArray
+    """Skin in contact, undeformed and as it is then; of the whole body also when half of it is solved,
+    (n_times,). [mm²]
+    """
 
 
 def skin_contact(
@@ -59,30 +57,7 @@ def skin_contact(
     gap_mm: FloatArray,
     modulus_kpa: float,
 ) -> SkinContact:
-    """Pressure, shear, slip and area from the forces on each node of the skin and its gap.
-
-    Parameters
-    ----------
-    mesh : Mesh
-        The undeformed body.
-    displacement_mm : array (n_times, n_nodes, 3)
-        Displacements. [mm]
-    pressed_mn : array (n_times, n_skin_nodes)
-        Normal forces on `mesh.skin_nodes`. [mN]
-    friction_mn : array (n_times, n_skin_nodes, 3)
-        Friction on them. [mN]
-    slip_mm : array (n_times, n_skin_nodes)
-        How far each has slid over the indenter since it came to touch. [mm]
-    gap_mm : array (n_times, n_skin_nodes)
-        Distances of these nodes from the indenter, infinite for nodes that it cannot touch; those of pressed
-        nodes do not matter. [mm]
-    modulus_kpa : float
-        E* of the outermost tissue. [kPa]
-
-    Returns
-    -------
-    SkinContact
-    """
+    """Pressure, shear, slip and area from the forces on each node of the skin and its gap."""
     whole_body = 2.0 if mesh.symmetry_nodes.size else 1.0
     triangles = _triangles(mesh)
     undeformed_mm2 = _areas(mesh.nodes_mm[mesh.skin_nodes], triangles)
@@ -105,31 +80,7 @@ def covered(
     gap_mm: FloatArray,
     modulus_kpa: float,
 ) -> FloatArray:
-    """Share of each triangle of skin that is in contact.
-
-    Parameters
-    ----------
-    skin_mm : array (n_skin_nodes, 3)
-        Where the skin is. [mm]
-    triangles : int array (n_triangles, 3)
-        Rows of `skin_mm`.
-    pressure_kpa, gap_mm : array (n_skin_nodes,)
-        Pressure and distance from the indenter. [kPa, mm]
-    modulus_kpa : float
-        E* of the outermost tissue. [kPa]
-
-    Returns
-    -------
-    array (n_triangles,)
-
-    Examples
-    --------
-    The contact ends at t = 1/2 of both sides from the one pressed corner, where s² = 1/4:
-
-    >>> corners, one = np.array([[0.0, 0, 0], [1, 0, 0], [0, 0, 1]]), np.array([[0, 1, 2]])
-    >>> covered(corners, one, np.array([7.5, 0, 0]), np.array([0, 0.05, 0.05]), modulus_kpa=100.0).round(9)
-    array([0.25])
-    """
+    """Share of each triangle of skin that is in contact."""
     share = np.zeros(len(triangles))
     is_pressed = pressure_kpa > 0.0
     pressed_corners = is_pressed[triangles].sum(axis=1)

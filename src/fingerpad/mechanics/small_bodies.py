@@ -49,37 +49,14 @@ is renewed after each."""
 
 
 def contact_about(contact: Contact, mesh: Mesh, sparsity: Sparsity, finest_mm: float) -> Contact:
-    """Let contact act between nodes too, and as stiffly as small elements need.
-
-    Parameters
-    ----------
-    contact : Contact
-        Contact at the nodes of the skin.
-    mesh : Mesh
-        The body.
-    sparsity : Sparsity
-        Block pattern of its tangent.
-    finest_mm : float
-        Size of the smallest elements. [mm]
-
-    Returns
-    -------
-    Contact
-    """
+    """Let contact act between nodes too, and as stiffly as small elements need."""
     middles = Middles.of(mesh, sparsity, contact.nodes, sag_mm(contact.indenter, finest_mm))
     penalty = STIFFNESS_KPA / finest_mm
     return replace(contact, penalty=penalty, stick_penalty=STICK_PENALTY, middles=middles)
 
 
 def sag_mm(indenter: Indenter, finest_mm: float) -> float:
-    """How deep the middle of a facet may lie within a small body. [mm]
-
-    Examples
-    --------
-    >>> from fingerpad.geometry.indenters import Bar, Sphere
-    >>> sag_mm(Sphere(curvature_per_m=4000.0), finest_mm=0.08), sag_mm(Bar(3.0, 0.05), finest_mm=0.05)
-    (0.01, 0.025)
-    """
+    """How deep the middle of a facet may lie within a small body. [mm]"""
     narrowest_mm = min(indenter.half_width_mm, indenter.narrowest_mm / 2)
     least, most = SAGS
     return float(np.clip(SAG_OF_WIDTH * narrowest_mm, least * finest_mm, most * finest_mm))
@@ -96,13 +73,7 @@ def newton_about(newton: NewtonSettings, finest_mm: float) -> NewtonSettings:
 
 
 def steps_of_advance(advance_mm: float, finest_mm: float) -> int:
-    """Return the number of equal steps of an advance, none of them longer than allowed.
-
-    Examples
-    --------
-    >>> steps_of_advance(0.4, finest_mm=0.05), steps_of_advance(0.4, finest_mm=float("inf"))
-    (8, 1)
-    """
+    """Return the number of equal steps of an advance, none of them longer than allowed."""
     return _steps(advance_mm, LONGEST_STEP * finest_mm)
 
 
@@ -110,12 +81,6 @@ def steps_of_slide(way_mm: float, indenter: Indenter) -> int:
     """Return the number of equal steps of a way aside, none of them longer than the edges allow.
 
     Edges that are sharper than any mesh made for them count as round as the sharpest of these.
-
-    Examples
-    --------
-    >>> from fingerpad.geometry.indenters import Bar, Sphere
-    >>> [steps_of_slide(0.1, body) for body in (Bar(fillet_mm=0.3), Bar(fillet_mm=0.0), Sphere())]
-    [2, 12, 1]
     """
     return _steps(way_mm, LONGEST_SLIDE * max(indenter.sharpest_mm, SHARPEST_MM))
 

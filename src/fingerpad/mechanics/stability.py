@@ -24,17 +24,6 @@ def instability(law: Law) -> str:
     the Hessian of the energy with respect to the logarithms of the stretches is positive definite, for a law
     with its own volumetric energy at constant volume. Uniaxial, equibiaxial and planar stretch are examined,
     from 1 outwards; for a law that couples shape and volume with stress-free sides, and change of volume.
-
-    Parameters
-    ----------
-    law : Polynomial, Ogden, Hyperfoam, Hencky or Energy
-        The strain energy.
-
-    Examples
-    --------
-    >>> from fingerpad.mechanics.laws import Polynomial
-    >>> instability(Polynomial(c10=5.0, c20=-1.0, bulk_linear=200.0))
-    'in uniaxial compression from stretch 0.57 on'
     """
     energy = law.energy
     for far in STABLE_STRETCHES:
@@ -53,10 +42,8 @@ def _isochoric_stiffness(energy: Energy, logs: tuple[float, float, float]) -> Fl
 
 
 def _free_stiffness(energy: Energy, log: float, pulled: int, free: int) -> FloatArray:
-    """Hessian of the energy in the three logarithmic strains (3, 3), where free sides carry no stress. [kPa]
-
-    The first `pulled` sides have stretch exp(log), the last `free` ones find theirs, any other stays at 1.
-    """
+    """Hessian of the energy in the logarithmic strains (3, 3); free sides carry no stress. [kPa]"""
+    # The first `pulled` sides have stretch exp(log), the last `free` ones find theirs, any other stays at 1.
 
     def state(side: float) -> FloatArray:
         strain = np.array([log] * pulled + [0.0] * (3 - pulled - free) + [side] * free)

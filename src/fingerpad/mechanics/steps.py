@@ -47,9 +47,7 @@ class Moment(Protocol):
     """A solved time; the next step starts from it and leaves it as it is."""
 
     @property
-    def time_ms(self) -> float:
-        """Its time. [ms]"""
-        ...
+    def time_ms(self) -> float: ...
 
     @property
     def sed_kpa(self) -> FloatArray:
@@ -76,29 +74,6 @@ def steps_at(
     """Reach each of the given times, in one step if it converges, else in halves, quarters ... of it.
 
     After a cut the steps stay short, over the next times too, until some in a row converge.
-
-    Parameters
-    ----------
-    start : Moment
-        Where to begin.
-    times_ms : sequence of float
-        Increasing, after `start`. [ms]
-    step, stop : callable
-        Solve a step; make the final error.
-    parts : callable
-        Number of equal steps to take between two times [ms], one by default.
-    last_resort : callable, optional
-        Solves the shortest steps in another way than `step`, which failed at them.
-
-    Yields
-    ------
-    Moment
-        One per time.
-
-    Raises
-    ------
-    ConvergenceError
-        What `stop` makes, if a step fails at 1/32 of its length.
     """
     moment, share, converged = start, 1.0, 0
     attempts: list[str] = []
@@ -134,22 +109,16 @@ def _attempt(moment: Moment, target_ms: float, error: ConvergenceError) -> str:
 
 @dataclass(frozen=True)
 class Phase:
-    """A part of the motion at constant speed, within which SED is smooth in time.
-
-    Parameters
-    ----------
-    end_ms : float
-        Its end, always reached exactly. [ms]
-    first_ms : float
-        Length of the first step to try. [ms]
-    loading : bool
-        Whether SED grows to the end. Errors then are relative to the largest SED expected there, by growth in
-        proportion to time: no step is small beside what it has reached from nothing.
-    """
+    """A part of the motion at constant speed, within which SED is smooth in time."""
 
     end_ms: float
+    """Its end, always reached exactly. [ms]"""
     first_ms: float
+    """Length of the first step to try. [ms]"""
     loading: bool
+    """Whether SED grows to the end. Errors then are relative to the largest SED expected there, by growth in
+    proportion to time: no step is small beside what it has reached from nothing.
+    """
 
 
 def adaptive_steps(
@@ -160,31 +129,7 @@ def adaptive_steps(
     step: Step[Reached],
     stop: Stop[Reached],
 ) -> Iterator[Reached]:
-    """Choose steps so that the error of SED stays below a tolerance.
-
-    Parameters
-    ----------
-    start : Moment
-        Where to begin, without any load.
-    phases : sequence of Phase
-        What follows, one after the other.
-    tolerance : float
-        Largest error of SED, over the largest SED.
-    where : int array
-        Elements that count.
-    step, stop : callable
-        Solve a step; make the final error.
-
-    Yields
-    ------
-    Moment
-        One per step that meets the tolerance.
-
-    Raises
-    ------
-    ConvergenceError
-        What `stop` makes, if steps at their shortest neither converge nor meet the tolerance.
-    """
+    """Choose steps so that the error of SED stays below a tolerance."""
     last, largest_kpa = start, 0.0
     for phase in phases:
         for moment in _adapt(last, phase, tolerance, largest_kpa, where, step, stop):
@@ -205,11 +150,9 @@ def _adapt(
     step: Step[Reached],
     stop: Stop[Reached],
 ) -> Iterator[Reached]:
-    """Choose the steps of one phase.
-
-    The first two are equal and judged together: it takes three moments to see a curvature, and the speed
-    changes at the start of a phase.
-    """
+    """Choose the steps of one phase."""
+    # The first two are equal and judged together: it takes three moments to see a curvature, and the speed
+    # changes at the start of a phase.
     whole_ms = phase.end_ms - start.time_ms
     step_ms = min(phase.first_ms, whole_ms / 2)
     before: Reached | None = None
@@ -269,29 +212,7 @@ def change_of_length(error_kpa: float, allowed_kpa: float, lengthen: float = LEN
 def interpolation_error(
     before: Moment, moment: Moment, after: Moment, where: np.ndarray, both: bool = False
 ) -> float:
-    """Largest error of linear interpolation of SED from `moment` to `after`.
-
-    Parameters
-    ----------
-    before, moment, after : Moment
-        Three in a row.
-    where : int array
-        Elements that count.
-    both : bool
-        Whether the step from `before` to `moment` is judged too.
-
-    Returns
-    -------
-    float
-        The error. [kPa]
-
-    Examples
-    --------
-    >>> from types import SimpleNamespace as M
-    >>> squares = [M(time_ms=t, sed_kpa=np.array([t * t])) for t in (0.0, 1.0, 3.0)]
-    >>> interpolation_error(*squares, where=np.array([0]))  # (3 - 1)² / 4
-    1.0
-    """
+    """Largest error of linear interpolation of SED from `moment` to `after`."""
     earlier_ms, later_ms = moment.time_ms - before.time_ms, after.time_ms - moment.time_ms
     slope_before = (moment.sed_kpa[where] - before.sed_kpa[where]) / earlier_ms
     slope_after = (after.sed_kpa[where] - moment.sed_kpa[where]) / later_ms

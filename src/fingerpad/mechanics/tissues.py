@@ -142,11 +142,5 @@ def named_tissues(name: str) -> Tissues:
 
 
 def name_of_tissues(tissues: Tissues) -> str:
-    """Name of a set of tissues that ships; empty for any other.
-
-    Examples
-    --------
-    >>> name_of_tissues(named_tissues("paper")), name_of_tissues(named_tissues("paper").scaled(1.1))
-    ('paper', '')
-    """
+    """Name of a set of tissues that ships; empty for any other."""
     return next((name for name, made in TISSUES.items() if made() == tissues), "")

@@ -36,20 +36,14 @@ def flat(stresses: FloatArray) -> FloatArray:
 
 @dataclass(frozen=True)
 class StepCoefficients:
-    """Coefficients of one time step, one row per layer.
-
-    Parameters
-    ----------
-    s : array (n_layers,)
-        1 - sum_i a_i g_i, the factor on the instantaneous energy.
-    new, old, decay : array (n_layers, n_terms)
-        a_i g_i, b_i g_i and gamma_i.
-    """
+    """Coefficients of one time step, one row per layer."""
 
     s: FloatArray
+    """1 - sum_i a_i g_i, the factor on the instantaneous energy, (n_layers,)."""
     new: FloatArray
     old: FloatArray
     decay: FloatArray
+    """a_i g_i, b_i g_i and gamma_i, (n_layers, n_terms)."""
 
     @classmethod
     def of(cls, table: MaterialTable, step_ms: float) -> StepCoefficients:
@@ -62,18 +56,12 @@ class StepCoefficients:
 
 @dataclass(frozen=True)
 class StressHistory:
-    """Stress state that a step starts from, at every Gauss point of every element.
-
-    Parameters
-    ----------
-    instantaneous : array (n_elements, 8, 6)
-        S0, the instantaneous deviatoric stress. [kPa]
-    relaxed : array (n_terms, n_elements, 8, 6)
-        S_i, the stress that each branch has relaxed away. [kPa]
-    """
+    """Stress state that a step starts from, at every Gauss point of every element."""
 
     instantaneous: FloatArray
+    """S0, the instantaneous deviatoric stress, (n_elements, 8, 6). [kPa]"""
     relaxed: FloatArray
+    """S_i, the stress that each branch has relaxed away, (n_terms, n_elements, 8, 6). [kPa]"""
 
     @classmethod
     def unloaded(cls, n_elements: int, n_terms: int) -> StressHistory:
@@ -166,25 +154,19 @@ def _stored_energy(  # type: ignore[no-untyped-def]
 
 
 class InstantaneousState(NamedTuple):
-    """What the deformation alone determines, without relaxation.
-
-    Parameters
-    ----------
-    stress_kpa : array (n_elements, 8, 6)
-        S0, the instantaneous stress that may relax, at each Gauss point. [kPa]
-    energies : array (n_elements, 8, 2)
-        Integration weight and instantaneous energy W0 that may relax. [mm³, kPa]
-    volumetric_kpa, pressure_kpa : array (n_elements,)
-        U(Jbar) and U'(Jbar); 0 for laws that couple shape and volume, whose whole stress is in S0. [kPa]
-    dilatation : array (n_elements,)
-        Jbar.
-    """
+    """What the deformation alone determines, without relaxation."""
 
     stress_kpa: FloatArray
+    """S0, the instantaneous stress that may relax, at each Gauss point, (n_elements, 8, 6). [kPa]"""
     energies: FloatArray
+    """Integration weight and instantaneous energy W0 that may relax, (n_elements, 8, 2). [mm³, kPa]"""
     volumetric_kpa: FloatArray
     pressure_kpa: FloatArray
+    """U(Jbar) and U'(Jbar); 0 for laws that couple shape and volume, whose whole stress is in S0,
+    (n_elements,). [kPa]
+    """
     dilatation: FloatArray
+    """Jbar, (n_elements,)."""
 
 
 def instantaneous_state(mesh: Mesh, displacement: FloatArray, table: MaterialTable) -> InstantaneousState:
@@ -215,11 +197,6 @@ def stored_energy_density(
 
     which is exact for a linear law and for an unrelaxed branch of any law (docs/decisions/stored-energy.md).
     The volumetric part does not relax.
-
-    Returns
-    -------
-    array (n_elements,)
-        Stored energy per reference volume. [kPa = µJ/mm³]
     """
     stored = np.empty(len(mesh.elements))
     run_kernel(

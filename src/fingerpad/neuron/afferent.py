@@ -174,10 +174,6 @@ class Afferent(metaclass=KnownKeywords):
             For any other name and for tissues of your own, no afferent was fitted; the one of "trial3" is
             returned.
 
-        Returns
-        -------
-        Afferent
-
         Examples
         --------
         >>> Afferent.for_tissues("human").static_quantity, Afferent.for_tissues("paper").static_quantity
@@ -235,10 +231,6 @@ class Afferent(metaclass=KnownKeywords):
             What the two terms follow; default: as of `Afferent()`.
         initial_mv : float, optional
             Potential at the start; default: that at rest. [mV]
-
-        Returns
-        -------
-        Afferent
 
         Raises
         ------
@@ -302,10 +294,6 @@ class Afferent(metaclass=KnownKeywords):
         ----------
         quantity : float
             The threshold. [kPa]
-
-        Returns
-        -------
-        Afferent
 
         Raises
         ------
@@ -391,29 +379,7 @@ class Afferent(metaclass=KnownKeywords):
 def spikes_where(
     may_fire: np.ndarray, sed: SedTraces, spikes: Callable[[SedTraces], SpikeTrains]
 ) -> SpikeTrains:
-    """Spikes of the sites that may fire, block by block on all threads; the others are silent.
-
-    Parameters
-    ----------
-    may_fire : bool array (n_sites,)
-        Sites that are simulated.
-    sed : SedTraces
-        Traces of all sites.
-    spikes : callable
-        From traces of some sites to their spikes.
-
-    Returns
-    -------
-    SpikeTrains
-        One train per site.
-
-    Examples
-    --------
-    >>> sed = SedTraces([0.0, 50.0], [[0.0, 0.0], [1.0, 2.0]])
-    >>> found = spikes_where(np.array([False, True]), sed, lambda some: SpikeTrains.from_lists([[9.0]]))
-    >>> [train.tolist() for train in found]
-    [[], [9.0]]
-    """
+    """Spikes of the sites that may fire, block by block on all threads; the others are silent."""
     if not may_fire.any():
         return SpikeTrains.from_lists([[]] * sed.n_sites)
     some = sed.selected(may_fire)

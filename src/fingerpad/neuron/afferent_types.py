@@ -33,43 +33,28 @@ from fingerpad.neuron.transduction import Drive
 @dataclass(frozen=True)
 @converted
 class RapidlyAdapting(metaclass=KnownKeywords):
-    """Afferent that follows the band-passed and rectified course of one quantity: the chain of RA and PC.
-
-    Parameters
-    ----------
-    threshold : float
-        Band-passed quantity that, if it stayed, would just bring the membrane to its threshold. [kPa, or the
-        unit of the quantity]
-    corner_hz : float
-        Corner frequency of the band pass. [Hz]
-    rise, fall : int
-        Its powers of the frequency below and above the corner.
-    retraction : float
-        Share of the response to a decreasing quantity, 0 to 1. [1]
-    membrane_ms : float
-        Time constant of the membrane. [ms]
-    refractory_ms : float
-        Refractory period. [ms]
-    quantity : str
-        What is followed, by the names of `SkinResponse.sample`.
-
-    Raises
-    ------
-    InputError
-        If a number is not positive, or the share of retraction not within 0 ... 1.
-    """
+    """Afferent that follows the band-passed and rectified course of one quantity: the chain of RA and PC."""
 
     rate_measure: ClassVar[str] = COUNT
     """Many of these afferents fire once or twice in a ramp, without an interval to measure."""
 
     threshold: float
+    """Band-passed quantity that, if it stayed, would just bring the membrane to its threshold. [kPa, or the
+    unit of the quantity]
+    """
     corner_hz: float
+    """Corner frequency of the band pass. [Hz]"""
     rise: int
     fall: int
+    """Its powers of the frequency below and above the corner."""
     retraction: float
+    """Share of the response to a decreasing quantity, 0 to 1. [1]"""
     membrane_ms: float
+    """Time constant of the membrane. [ms]"""
     refractory_ms: float
+    """Refractory period. [ms]"""
     quantity: str
+    """What is followed, by the names of `SkinResponse.sample`."""
 
     def __post_init__(self) -> None:
         positive("threshold", self.threshold)
@@ -108,23 +93,7 @@ class RapidlyAdapting(metaclass=KnownKeywords):
         return (np.maximum(passed, 0.0) + self.retraction * np.maximum(-passed, 0.0)) / self.threshold
 
     def spikes(self, sed: SedTraces) -> SpikeTrains:
-        """Simulate the spikes of this afferent at every site.
-
-        Parameters
-        ----------
-        sed : SedTraces
-            Traces of `quantity`.
-
-        Returns
-        -------
-        SpikeTrains
-            One train per site.
-
-        Raises
-        ------
-        InputError
-            If the traces are those of another quantity.
-        """
+        """Simulate the spikes of this afferent at every site."""
         check_quantities(self, sed)
         # Most of the skin moves too little for a spike; a current below 1 never reaches the threshold.
         may_fire = self.band_pass.largest_share * np.ptp(sed.sed_kpa, axis=0) > self.threshold

@@ -35,34 +35,15 @@ _MOST_PIECES = 2**20
 @dataclass(frozen=True)
 @converted
 class BandPass:
-    """A filter that transmits a band of frequencies.
-
-    Parameters
-    ----------
-    corner_hz : float
-        Corner frequency. [Hz]
-    rise, fall : int
-        Powers of the frequency by which it increases below the corner and decreases above it. A constant
-        input gives no output, because the rise is at least 1.
-
-    Raises
-    ------
-    InputError
-        If the corner is not positive, or a power is below 1.
-
-    Examples
-    --------
-    A ramp of 1 kPa in 10 ms and a hold: the output follows the speed of the ramp, and is gone in the hold.
-
-    >>> ramp = SedTraces([0.0, 10.0, 100.0], [[0.0], [1.0], [1.0]], kinks_ms=[10.0])
-    >>> times_ms, values = BandPass(corner_hz=100.0, rise=1, fall=1).of(ramp)
-    >>> [round(float(values[np.searchsorted(times_ms, at), 0]), 3) for at in (5.0, 10.0, 30.0)]
-    [0.133, 0.157, 0.0]
-    """
+    """A filter that transmits a band of frequencies."""
 
     corner_hz: float
+    """Corner frequency. [Hz]"""
     rise: int
     fall: int
+    """Powers of the frequency by which it increases below the corner and decreases above it. A constant input
+    gives no output, because the rise is at least 1.
+    """
 
     def __post_init__(self) -> None:
         positive("corner_hz", self.corner_hz, "Hz")
@@ -76,41 +57,16 @@ class BandPass:
 
     @property
     def largest_share(self) -> float:
-        """Bound of the output over the range of the input: half of the integral of |impulse response|. [1]
-
-        Examples
-        --------
-        >>> round(BandPass(corner_hz=100.0, rise=1, fall=1).largest_share, 3)  # 1/e
-        0.368
-        """
+        """Bound of the output over the range of the input: half of the integral of |impulse response|. [1]"""
         return _largest_share(self.rise, self.fall)
 
     def gain(self, frequency_hz: FloatArray) -> FloatArray:
-        """Amplitude of the output over that of a sinusoidal input.
-
-        Examples
-        --------
-        >>> BandPass(corner_hz=100.0, rise=1, fall=1).gain(np.array([10.0, 100.0, 1000.0])).round(3).tolist()
-        [0.099, 0.5, 0.099]
-        """
+        """Amplitude of the output over that of a sinusoidal input."""
         relative = np.asarray(frequency_hz, np.float64) / self.corner_hz
         return relative**self.rise / np.sqrt(1.0 + relative**2) ** (self.rise + self.fall)
 
     def of(self, traces: SedTraces | Drive) -> tuple[FloatArray, FloatArray]:
-        """Filter the quantity of the static term at every site; before the first time it is constant.
-
-        Parameters
-        ----------
-        traces : SedTraces or Drive
-            Traces are resampled, so that four knots lie within the time constant.
-
-        Returns
-        -------
-        times_ms : array (n_knots,)
-            Knots. [ms]
-        values : array (n_knots, n_sites)
-            Output, with the unit of the input, linear between the knots.
-        """
+        """Filter the quantity of the static term at every site; before the first time it is constant."""
         driven = traces if isinstance(traces, Drive) else resampled(traces, self.time_constant_ms)
 
         def filtered(sites: slice) -> FloatArray:
@@ -145,29 +101,7 @@ def resampled(traces: SedTraces, time_constant_ms: float) -> Drive:
 
 
 def smoothed_rate(traces: SedTraces, time_constant_ms: float) -> tuple[FloatArray, FloatArray]:
-    """Rate of change of a quantity behind a first-order low pass: what this holds back, over its constant.
-
-    Parameters
-    ----------
-    traces : SedTraces
-        The quantity is that of the static term.
-    time_constant_ms : float
-        [ms]
-
-    Returns
-    -------
-    times_ms : array (n_knots,)
-        Knots, those of `resampled`. [ms]
-    rates : array (n_knots, n_sites)
-        Signed. [unit of the quantity per ms]
-
-    Examples
-    --------
-    >>> ramp = SedTraces([0.0, 100.0], [[0.0], [2.0]])
-    >>> times_ms, rates = smoothed_rate(ramp, 10.0)
-    >>> [round(float(rates[np.searchsorted(times_ms, at), 0]), 4) for at in (0.0, 10.0, 100.0)]
-    [0.0, 0.0126, 0.02]
-    """
+    """Rate of change of a quantity behind a first-order low pass: what this holds back, over its constant."""
     driven = resampled(traces, time_constant_ms)
 
     def held_back(sites: slice) -> FloatArray:

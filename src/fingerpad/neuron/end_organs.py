@@ -108,10 +108,6 @@ class EndOrgans(metaclass=KnownKeywords):
         combine : {"sum", "largest"}, optional
             As in `EndOrgans`.
 
-        Returns
-        -------
-        EndOrgans
-
         Raises
         ------
         InputError

@@ -36,12 +36,10 @@ def potential_at(x: float, start: float, steady: float, drift: float) -> float:
 
 @njit(cache=True, error_model="numpy", nogil=True)
 def _first_guess(missing: float, rise: float, drift: float) -> float:
-    """Estimate the time in which the potential rises by `missing`, from r = `rise` and c = `drift`.
-
-    Halley's formula gives a first time, h = 2 missing r/q. For a constant current, equal to its mean until h,
-    x = -ln(1 - s) with s = missing/(r + c h/2), here by its Padé approximant s (6 - 3 s)/(6 - 6 s + s^2).
-    Both are combined in one fraction, because divisions are the expensive operations.
-    """
+    """Estimate the time in which the potential rises by `missing`, from r = `rise` and c = `drift`."""
+    # Halley's formula gives a first time, h = 2 missing r/q. For a constant current, equal to its mean until
+    # h, x = -ln(1 - s) with s = missing/(r + c h/2), here by its Padé approximant s (6 - 3 s)/(6 - 6 s +
+    # s^2). Both are combined in one fraction, because divisions are the expensive operations.
     q = 2.0 * rise * rise + (drift - rise) * missing
     a = missing * q
     b = rise * (q + drift * missing)  # s = a/b
@@ -50,15 +48,13 @@ def _first_guess(missing: float, rise: float, drift: float) -> float:
 
 @njit(cache=True, error_model="numpy", nogil=True)
 def _next_guess(guess: float, missing: float, rise: float, drift: float, high: float) -> tuple[float, bool]:
-    """Improve an estimate of the crossing; also return whether it is exact to the round-off of `high`.
-
-    From the time of the estimate on, the potential rises by
-
-        r y + b (y^2/2 - y^3/6 + y^4/24 - ...)    in the time y,    r = w - u,    b = c - r.
-
-    Halley's formula estimates the y of the rise `missing`, and one Newton step on the series up to y^5
-    improves it. The remainder of the series and the error of the Newton step are known.
-    """
+    """Improve an estimate of the crossing; also return whether it is exact to the round-off of `high`."""
+    # From the time of the estimate on, the potential rises by
+    #
+    # r y + b (y^2/2 - y^3/6 + y^4/24 - ...)    in the time y,    r = w - u,    b = c - r.
+    #
+    # Halley's formula estimates the y of the rise `missing`, and one Newton step on the series up to y^5
+    # improves it. The remainder of the series and the error of the Newton step are known.
     bend = drift - rise
     y = 2.0 * missing * rise / (2.0 * rise * rise + bend * missing)
     gained = y * (rise + bend * y * (1 / 2 - y * (1 / 6 - y * (1 / 24 - y * (1 / 120)))))
@@ -121,23 +117,6 @@ def exact_trains(
 ) -> tuple[FloatArray, np.ndarray]:
     """Compute the spike times of all neurons, neuron after neuron.
 
-    Parameters
-    ----------
-    times : array (n_knots,)
-        Knots, in order; a repeated knot is a jump. [ms]
-    currents : array (n_knots, n_neurons)
-        Current at the knots, linear between them. [mA]
-    tau, capacitance, threshold, refractory, initial : float
-        Parameters of the membrane, in the units of `fingerpad.neuron.lif.LeakyIntegrateAndFire`; an `initial`
-        of NaN is the potential at rest.
-
-    Returns
-    -------
-    array (n_spikes,)
-        Spike times, neuron by neuron. [ms]
-    array (n_neurons + 1,)
-        Index of the first spike of each neuron.
-
     Notes
     -----
     All neurons are advanced over an interval before the next one begins: they share its exponential, rows of
@@ -161,21 +140,7 @@ def continued_trains(
     potentials: FloatArray,
     ready: FloatArray,
 ) -> tuple[FloatArray, np.ndarray]:
-    """Compute spike times as `exact_trains`, from a state that is carried on.
-
-    Parameters
-    ----------
-    times, currents, tau, capacitance, threshold, refractory
-        As of `exact_trains`.
-    potentials, ready : array (n_neurons,)
-        Potentials at the first knot [mV] and ends of the refractory periods [ms]; overwritten with those at
-        the last knot.
-
-    Returns
-    -------
-    array (n_spikes,), array (n_neurons + 1,)
-        As of `exact_trains`.
-    """
+    """Compute spike times as `exact_trains`, from a state that is carried on."""
     n_neurons = currents.shape[1]
     resistance = tau / capacitance
     busy = np.empty(n_neurons, dtype=np.int64)
@@ -218,11 +183,9 @@ def _pass(
     ready: FloatArray,
     busy: np.ndarray,
 ) -> int:
-    """Advance to the next knot all neurons that are not refractory and cannot fire; list the others.
-
-    A potential equals w at its maximum. If it is below the threshold at both knots, it can cross the
-    threshold in between only if w falls from above the threshold to below it. Returns the number of others.
-    """
+    """Advance to the next knot all neurons that are not refractory and cannot fire; list the others."""
+    # A potential equals w at its maximum. If it is below the threshold at both knots, it can cross the
+    # threshold in between only if w falls from above the threshold to below it. Returns the number of others.
     gone = -math.expm1(-length)
     # The closed form sorted by u, w now and w later.
     of_later = 1.0 - gone / length
@@ -252,11 +215,9 @@ def _bracket(
     busy: np.ndarray,
     searches: FloatArray,
 ) -> int:
-    """Select those of the `busy` neurons that fire before the next knot, and return their number.
-
-    Each of them gets a column of `searches`: start of its bracket [ms] and length of it, the potential at
-    both ends, steady potential and drift. The others are advanced to the next knot.
-    """
+    """Select those of the `busy` neurons that fire before the next knot, and return their number."""
+    # Each of them gets a column of `searches`: start of its bracket [ms] and length of it, the potential at
+    # both ends, steady potential and drift. The others are advanced to the next knot.
     n_firing = 0
     for neuron in busy:
         begin = max(start, ready[neuron])

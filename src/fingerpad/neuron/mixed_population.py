@@ -33,19 +33,7 @@ PUBLISHED_DENSITIES: Mapping[str, float] = MappingProxyType(
 
 
 def types_of_afferents(tissues: object = DEFAULT_TISSUES) -> dict[str, AnyAfferent]:
-    """Return the four types with their default parameters, by their names: the one table of types.
-
-    Parameters
-    ----------
-    tissues : str or Tissues, optional
-        SAI is that of these, as in `Afferent.for_tissues`; the others were held against people with the
-        default ones.
-
-    Examples
-    --------
-    >>> list(types_of_afferents())
-    ['SAI', 'RA', 'PC', 'SAII']
-    """
+    """Return the four types with their default parameters, by their names: the one table of types."""
     return dict(zip(published.TYPES, (SAI.for_tissues(tissues), RA(), PC(), SAII()), strict=True))
 
 
@@ -239,10 +227,6 @@ class MixedPopulation(metaclass=KnownKeywords):
         seed : int, optional
             Seed of positions and sensitivities. Each type has random numbers of its own.
 
-        Returns
-        -------
-        MixedPopulation
-
         Raises
         ------
         InputError
@@ -290,10 +274,6 @@ class MixedPopulation(metaclass=KnownKeywords):
         ----------
         skin, dynamic_window_ms, static_window_ms
             As in `Population.respond`.
-
-        Returns
-        -------
-        MixedResponse
 
         Raises
         ------

@@ -177,10 +177,6 @@ class Population(metaclass=KnownKeywords):
         ends : EndOrgans, optional
             As in `Population`, such as `EndOrgans.scattered(layout.places_mm, ..., place=place)`.
 
-        Returns
-        -------
-        Population
-
         Examples
         --------
         >>> from fingerpad.core.patterns import hexagonal
@@ -360,10 +356,6 @@ class Population(metaclass=KnownKeywords):
             Traces of `quantities` at `sites_mm`.
         dynamic_window_ms, static_window_ms : (float, float), optional
             As in `respond`. [ms]
-
-        Returns
-        -------
-        ResponseMap
 
         Raises
         ------

@@ -37,37 +37,6 @@ def rate_windows_ms(
     A window that is not given has the place of the paper's window in its phase: the last 40 % of the ramp,
     and 550 to 900 ms from the start of the hold, or 58 to 95 % of a hold shorter than the paper's 950 ms
     (docs/decisions/rate-windows.md). Afferents that fire once or twice in a ramp are counted in all of it.
-
-    Parameters
-    ----------
-    phases : sequence of Phase
-        Of the touch; those called "ramp" and "hold" are used, the first of each.
-    dynamic_ms, static_ms : (float, float), optional
-        Windows that are returned as they are. [ms]
-    end_ms : float, optional
-        End of what was recorded, if windows are checked. [ms]
-    measure : {"interval", "count"}
-        What the rates of the afferents are, as of `ResponseMap`.
-
-    Returns
-    -------
-    (float, float), (float, float)
-        Start and end of the two windows. [ms]
-
-    Raises
-    ------
-    InputError
-        If a window is not given and there is no phase of that name; with `end_ms`, if one is not two times in
-        order from 0 to this end.
-
-    Examples
-    --------
-    >>> rate_windows_ms(ramp_and_hold_phases(50.0, 1000.0))
-    ((30.0, 50.0), (600.0, 950.0))
-    >>> rate_windows_ms(ramp_and_hold_phases(200.0, 1150.0))
-    ((120.0, 200.0), (750.0, 1100.0))
-    >>> rate_windows_ms(ramp_and_hold_phases(50.0, 525.0))
-    ((30.0, 50.0), (325.0, 500.0))
     """
     dynamic, static = (
         given if given is not None else _within(phase_named(phases, paper.name, asks), paper, window)
@@ -83,14 +52,7 @@ def rate_windows_ms(
 
 
 def check_windows(windows_ms: Windows, end_ms: float) -> Windows:
-    """Return two windows if both lie in what was recorded, else raise `InputError`.
-
-    Examples
-    --------
-    >>> check_windows(((30.0, 50.0), (600.0, 9500.0)), end_ms=1000.0)
-    Traceback (most recent call last):
-    fingerpad.core.errors.InputError: static_window_ms must be a start from 0 on and a later end, at most ...
-    """
+    """Return two windows if both lie in what was recorded, else raise `InputError`."""
     checked = []
     for name, window in zip(_NAMES, windows_ms, strict=True):
         bounds = float_array(name, window, 1)
@@ -108,19 +70,7 @@ def common_rate_windows_ms(
     static_ms: Window | None = None,
     measure: str = INTERVAL,
 ) -> Windows:
-    """Return the windows that several touches share, each given by its phases, as `rate_windows_ms`.
-
-    Raises
-    ------
-    InputError
-        If their windows differ, or one has none.
-
-    Examples
-    --------
-    >>> common_rate_windows_ms([ramp_and_hold_phases(50.0, 1000.0), ramp_and_hold_phases(100.0, 1000.0)])
-    Traceback (most recent call last):
-    fingerpad.core.errors.InputError: Windows of the rates must be given where the phases differ: ...
-    """
+    """Return the windows that several touches share, each given by its phases, as `rate_windows_ms`."""
     asked = (rate_windows_ms(phases, dynamic_ms, static_ms, measure=measure) for phases in touches)
     found = list(dict.fromkeys(asked))
     if len(found) != 1:

@@ -27,28 +27,7 @@ _PAIRS_AT_A_TIME = 4_000_000
 
 
 def recruitment_rank(latency_ms: ArrayLike) -> FloatArray:
-    """Rank of every afferent in the order of first spikes.
-
-    Parameters
-    ----------
-    latency_ms : array_like (n_afferents,)
-        First-spike latencies; NaN for a silent afferent. [ms]
-
-    Returns
-    -------
-    array (n_afferents,)
-        1 for the first; equal latencies have their mean rank; NaN for a silent afferent. [1]
-
-    Raises
-    ------
-    InputError
-        If the latencies are not a one-dimensional array of numbers.
-
-    Examples
-    --------
-    >>> recruitment_rank([12.0, np.nan, 7.0, 12.0]).tolist()
-    [2.5, nan, 1.0, 2.5]
-    """
+    """Rank of every afferent in the order of first spikes."""
     latency = _latencies("latency_ms", latency_ms)
     fires = ~np.isnan(latency)
     rank = np.full(latency.size, np.nan)
@@ -92,28 +71,6 @@ def evoked_latency_ms(latency_ms: ArrayLike, resting_latency_ms: float) -> Float
 
     A first spike counts as evoked if its latency is at most half of the latency at rest, where the afferent
     fires at least twice as fast as at rest.
-
-    Parameters
-    ----------
-    latency_ms : array_like (n_afferents,)
-        First-spike latencies; NaN for a silent afferent. [ms]
-    resting_latency_ms : float
-        Latency without a stimulus; infinity or NaN if the afferent is silent at rest. [ms]
-
-    Returns
-    -------
-    array (n_afferents,)
-        Latencies; NaN for an afferent without an evoked spike. [ms]
-
-    Raises
-    ------
-    InputError
-        If the latencies are not a one-dimensional array of numbers, or the one at rest is negative.
-
-    Examples
-    --------
-    >>> evoked_latency_ms([12.0, 249.0, np.nan], 250.0).tolist(), evoked_latency_ms([249.0], np.inf).tolist()
-    ([12.0, nan, nan], [249.0])
     """
     latency = _latencies("latency_ms", latency_ms)
     if resting_latency_ms < 0.0:
@@ -124,23 +81,17 @@ def evoked_latency_ms(latency_ms: ArrayLike, resting_latency_ms: float) -> Float
 
 @dataclass(frozen=True)
 class OrderChange:
-    """Difference of the order of first spikes between two stimuli.
-
-    Parameters
-    ----------
-    both, either : int
-        Afferents that fire under both stimuli, and under at least one.
-    rank_correlation : float
-        Spearman's coefficient of the two orders, over afferents that fire under both: 1 for the same order,
-        -1 for the reverse. NaN for fewer than two of them, or if all tie under one stimulus. [1]
-    swapped : float
-        Share of their pairs whose order is reversed; a pair with a tie is not. NaN without a pair. [0-1]
-    """
+    """Difference of the order of first spikes between two stimuli."""
 
     both: int
     either: int
+    """Afferents that fire under both stimuli, and under at least one."""
     rank_correlation: float
+    """Spearman's coefficient of the two orders, over afferents that fire under both: 1 for the same order, -1
+    for the reverse. NaN for fewer than two of them, or if all tie under one stimulus. [1]
+    """
     swapped: float
+    """Share of their pairs whose order is reversed; a pair with a tie is not. NaN without a pair. [0-1]"""
 
 
 @known_keywords
@@ -156,10 +107,6 @@ def order_change(latency_ms: ArrayLike, other_latency_ms: ArrayLike) -> OrderCha
     ----------
     latency_ms, other_latency_ms : array_like (n_afferents,)
         First-spike latencies of the same afferents; NaN for a silent one. [ms]
-
-    Returns
-    -------
-    OrderChange
 
     Raises
     ------
@@ -221,24 +168,16 @@ def _swapped(r: FloatArray, s: FloatArray) -> float:
 
 @dataclass(frozen=True)
 class PopulationRate:
-    """Spike counts of groups of afferents over time.
-
-    Parameters
-    ----------
-    edges_ms : array (n_bins + 1,)
-        Edges of the bins, increasing. [ms]
-    spikes : array (n_groups, n_bins)
-        Spikes of each group in each bin; whole numbers unless smoothed.
-    active : int array (n_groups, n_bins)
-        Afferents of each group with at least one spike in the bin.
-    n_afferents : int array (n_groups,)
-        Size of each group, including silent afferents.
-    """
+    """Spike counts of groups of afferents over time."""
 
     edges_ms: FloatArray
+    """Edges of the bins, increasing, (n_bins + 1,). [ms]"""
     spikes: FloatArray
+    """Spikes of each group in each bin; whole numbers unless smoothed, (n_groups, n_bins)."""
     active: np.ndarray
+    """Afferents of each group with at least one spike in the bin, (n_groups, n_bins)."""
     n_afferents: np.ndarray
+    """Size of each group, including silent afferents, (n_groups,)."""
 
     @property
     def times_ms(self) -> FloatArray:
@@ -256,23 +195,7 @@ class PopulationRate:
         return self._per_afferent(self.active)
 
     def rate_per_area(self, density_per_cm2: float) -> FloatArray:
-        """Rate per area of skin: the rate per afferent times the density.
-
-        Parameters
-        ----------
-        density_per_cm2 : float
-            Afferents per area of skin. [1/cm2]
-
-        Returns
-        -------
-        array (n_groups, n_bins)
-            [spikes/s per cm2]
-
-        Raises
-        ------
-        InputError
-            If the density is not positive.
-        """
+        """Rate per area of skin: the rate per afferent times the density."""
         return self.rate_hz * positive("density_per_cm2", density_per_cm2, "1/cm2")
 
     def _per_afferent(self, counts: np.ndarray) -> FloatArray:
@@ -304,10 +227,6 @@ def population_rate(
         Group of each afferent, from 0, or `NO_GROUP`, such as those of `rings`. Default: one group.
     smoothing_ms : float, optional
         Standard deviation of phi; 0 for no smoothing. [ms]
-
-    Returns
-    -------
-    PopulationRate
 
     Raises
     ------
@@ -365,10 +284,8 @@ def _groups(groups: ArrayLike | None, n_afferents: int) -> np.ndarray:
 
 
 def _kernel(edges: FloatArray, smoothing_ms: float) -> FloatArray:
-    """Weights K_ij of the counts of bin j in bin i, (n_bins, n_bins).
-
-    The double integral of phi is G(x) = x Phi(x) + phi(x), with signs, at the four pairs of edges.
-    """
+    """Weights K_ij of the counts of bin j in bin i, (n_bins, n_bins)."""
+    # The double integral of phi is G(x) = x Phi(x) + phi(x), with signs, at the four pairs of edges.
     # A density much narrower than the bins has no effect, and its square overflows.
     scale_ms = max(smoothing_ms, _LEAST_SMOOTHING * np.diff(edges).min())
     x = (edges[:, np.newaxis] - edges) / scale_ms

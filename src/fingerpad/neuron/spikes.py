@@ -19,51 +19,13 @@ def firing_rate_hz(spikes: SpikeTrains, window_ms: tuple[float, ...]) -> FloatAr
 
     An interval belongs to the window that contains its closing spike. The window excludes its start and
     includes its end, so adjacent windows share no interval.
-
-    Parameters
-    ----------
-    spikes : SpikeTrains
-        One train per afferent.
-    window_ms : (float, float)
-        Start and end of the window. [ms]
-
-    Returns
-    -------
-    array (n_afferents,)
-        Rate; 0 for an afferent without an interval that closes in the window. [spikes/s]
-
-    Raises
-    ------
-    InputError
-        If the window is not two numbers, the second above the first.
-
-    Examples
-    --------
-    >>> trains = SpikeTrains.from_lists([[10.0, 35.0, 40.0, 60.0], [45.0], []])
-    >>> firing_rate_hz(trains, (30.0, 50.0)).round(3).tolist()
-    [66.667, 0.0, 0.0]
     """
     return window_rates_hz(spikes.times_ms, spikes.offsets, *window_bounds(window_ms))
 
 
 @njit(cache=True, error_model="numpy", nogil=True)
 def window_rates_hz(times_ms: FloatArray, offsets: np.ndarray, start: float, end: float) -> FloatArray:
-    """Compute `firing_rate_hz` of unchecked arrays, for evaluations that are repeated often.
-
-    Parameters
-    ----------
-    times_ms : array (n_spikes,)
-        Spike times, train after train. [ms]
-    offsets : int array (n_trains + 1,)
-        Index of the first spike of each train.
-    start, end : float
-        The window. [ms]
-
-    Returns
-    -------
-    array (n_trains,)
-        [spikes/s]
-    """
+    """Compute `firing_rate_hz` of unchecked arrays, for evaluations that are repeated often."""
     rates = np.zeros(offsets.size - 1)
     for train in range(rates.size):
         count = 0
@@ -84,69 +46,18 @@ RATE_OF: Mapping[str, Callable[[SpikeTrains, tuple[float, ...]], FloatArray]] = 
 
 
 def first_spike_latency_ms(spikes: SpikeTrains, onset_ms: float = 0.0) -> FloatArray:
-    """Time from first touch to the first spike of every afferent after it.
-
-    Parameters
-    ----------
-    spikes : SpikeTrains
-        One train per afferent.
-    onset_ms : float, optional
-        Time of first touch. [ms]
-
-    Returns
-    -------
-    array (n_afferents,)
-        Latency; NaN for an afferent without a spike after the onset. [ms]
-
-    Examples
-    --------
-    >>> first_spike_latency_ms(SpikeTrains.from_lists([[10.0, 35.0], []]), onset_ms=15.0).tolist()
-    [20.0, nan]
-    """
+    """Time from first touch to the first spike of every afferent after it."""
     after = (train[train > onset_ms] for train in spikes)
     return np.array([float(train[0]) - onset_ms if train.size else np.nan for train in after])
 
 
 def modulation_index(largest_hz: ArrayLike, smallest_hz: ArrayLike) -> FloatArray:
-    """Modulation index, Eq. 11: (R_max - R_min) / (R_max + R_min).
-
-    Parameters
-    ----------
-    largest_hz, smallest_hz : array_like
-        Rates with the edge and with the flat part of the stimulus above the receptor; shapes that
-        broadcast. [spikes/s]
-
-    Returns
-    -------
-    array
-        Index within 0 ... 1 for rates in order; NaN where both rates are 0. [1]
-
-    Examples
-    --------
-    >>> float(modulation_index(60.0, 20.0))
-    0.5
-    """
+    """Modulation index, Eq. 11: (R_max - R_min) / (R_max + R_min)."""
     largest, smallest = np.asarray(largest_hz, np.float64), np.asarray(smallest_hz, np.float64)
     difference, total = largest - smallest, largest + smallest
     return np.divide(difference, total, out=np.full(np.shape(total), np.nan), where=total != 0.0)
 
 
 def modulation_difference(largest_hz: ArrayLike, smallest_hz: ArrayLike) -> FloatArray:
-    """Difference R_max - R_min, which the text of the paper calls modulation index.
-
-    Parameters
-    ----------
-    largest_hz, smallest_hz : array_like
-        As in `modulation_index`. [spikes/s]
-
-    Returns
-    -------
-    array
-        Difference of the rates. [spikes/s]
-
-    Examples
-    --------
-    >>> float(modulation_difference(212.0, 54.0))
-    158.0
-    """
+    """Difference R_max - R_min, which the text of the paper calls modulation index."""
     return np.asarray(largest_hz, np.float64) - np.asarray(smallest_hz, np.float64)

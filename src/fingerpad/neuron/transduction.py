@@ -42,29 +42,21 @@ SAME_COUNT = 1e-6
 @dataclass(frozen=True)
 @converted
 class Drive:
-    """Strain energy density and its rate of change, both piecewise linear between the same knots.
-
-    Parameters
-    ----------
-    times_ms : array (n_knots,)
-        Knots; a repeated knot is a jump of the rate. [ms]
-    sed_kpa : array (n_knots, n_sites)
-        Strain energy density, or the quantity of the static term in its place. [kPa]
-    rate_kpa_per_ms : array (n_knots, n_sites)
-        Absolute rate of change of SED, U' of Eq. 2, or of another quantity of the dynamic term; 0 at the
-        onset. [kPa/ms, for a strain 1/ms]
-    dynamic_quantity, static_quantity : str, optional
-        What the two terms follow, by the names of `SkinResponse.sample`; "stored" is SED.
-    phases : tuple of Phase, optional
-        As of `SedTraces`.
-    """
+    """Strain energy density and its rate of change, both piecewise linear between the same knots."""
 
     times_ms: FloatArray
+    """Knots; a repeated knot is a jump of the rate, (n_knots,). [ms]"""
     sed_kpa: FloatArray
+    """Strain energy density, or the quantity of the static term in its place, (n_knots, n_sites). [kPa]"""
     rate_kpa_per_ms: FloatArray
+    """Absolute rate of change of SED, U' of Eq. 2, or of another quantity of the dynamic term; 0 at the
+    onset, (n_knots, n_sites). [kPa/ms, for a strain 1/ms]
+    """
     dynamic_quantity: str = STORED_ENERGY
     static_quantity: str = STORED_ENERGY
+    """What the two terms follow, by the names of `SkinResponse.sample`; "stored" is SED."""
     phases: tuple[Phase, ...] = ()
+    """As of `SedTraces`."""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "times_ms", float_array("times_ms", self.times_ms, 1))
@@ -280,21 +272,10 @@ def drive(
 
 @njit(cache=True, error_model="numpy", nogil=True)
 def _interpolate(given, known, times, values, rates):  # type: ignore[no-untyped-def]
-    """Evaluate the monotone cubic through known values, and the absolute value of its derivative.
-
-    It is the interpolant of Fritsch and Butland (1984), as in SciPy's `PchipInterpolator`: the slope at a
-    time is a weighted harmonic mean of the slopes of the two intervals beside it, or 0 if they differ in
-    sign. Sites are computed side by side, interval by interval.
-
-    Parameters
-    ----------
-    given, known : array (n_given,), (n_given, n_sites)
-        Times, two at least, and the values there. [ms]
-    times : array (n_times,)
-        Increasing, from the first to the last of the given times. [ms]
-    values, rates : array (n_times, n_sites)
-        Overwritten.
-    """
+    """Evaluate the monotone cubic through known values, and the absolute value of its derivative."""
+    # It is the interpolant of Fritsch and Butland (1984), as in SciPy's `PchipInterpolator`: the slope at a
+    # time is a weighted harmonic mean of the slopes of the two intervals beside it, or 0 if they differ in
+    # sign. Sites are computed side by side, interval by interval.
     n_given, n_sites = known.shape
     begin, end, ahead = np.empty(n_sites), np.empty(n_sites), np.empty(n_sites)
     row = 0

@@ -31,30 +31,7 @@ _AMPLITUDES, _ROUNDS = 41, 3
 def vibration(
     frequency_hz: float, amplitudes_um: ArrayLike, per_um: float, hold: float, quantity: str
 ) -> SedTraces:
-    """Traces of one quantity under a vibration on a hold, a column per amplitude; none falls below 0.
-
-    Parameters
-    ----------
-    frequency_hz : float
-        Frequency. [Hz]
-    amplitudes_um : array_like (n_amplitudes,)
-        From the middle to a peak. [µm]
-    per_um : float
-        Change of the quantity per indentation. [unit of the quantity per µm]
-    hold : float
-        Quantity in the hold.
-    quantity : str
-        Its name.
-
-    Returns
-    -------
-    SedTraces
-
-    Examples
-    --------
-    >>> vibration(100.0, [1.0, 10.0], 0.02, 5.0, "compressive_stress").sed_kpa[-31].round(3).tolist()
-    [5.02, 5.2]
-    """
+    """Traces of one quantity under a vibration on a hold, a column per amplitude; none falls below 0."""
     period_ms = MS_PER_S / positive("frequency_hz", frequency_hz, "Hz")
     phase = np.arange(CYCLES * SAMPLES_PER_CYCLE + 1) / SAMPLES_PER_CYCLE
     wave = np.outer(np.sin(2.0 * np.pi * phase), per_um * float_array("amplitudes_um", amplitudes_um, 1))

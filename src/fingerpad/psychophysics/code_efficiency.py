@@ -97,10 +97,6 @@ def code_statistic(
         Pairs of the Gradient Sum.
     seed, session : int
         As in `noisy_presentations`.
-
-    Returns
-    -------
-    Statistic
     """
     if one_of("code", code, POPULATION_CODES) == "gradient_sum":
         return lambda responses: gradient_sum(responses, neighbours)
@@ -118,10 +114,6 @@ def code_efficiency(shown: Presentation, statistic: Statistic) -> CodeEfficiency
         From `noisy_presentations`, or from `present` for other noise.
     statistic : Statistic
         Of the code, from `code_statistic`.
-
-    Returns
-    -------
-    CodeEfficiency
 
     Examples
     --------

@@ -90,29 +90,7 @@ class JudgementCounts:
 def log_probability(
     n_correct: ArrayLike, n_trials: ArrayLike, proportion: ArrayLike, overdispersion: ArrayLike = 0.0
 ) -> FloatArray:
-    """Logarithm of the probability of a count; all arguments broadcast.
-
-    Parameters
-    ----------
-    n_correct, n_trials : array_like
-        k and n.
-    proportion : array_like
-        p. [0-1]
-    overdispersion : array_like, optional
-        rho; 0 is the binomial distribution. [0-1]
-
-    Returns
-    -------
-    array
-        -inf where p is 0 or 1 and k contradicts it.
-
-    Examples
-    --------
-    Two judgements that always agree are both correct as often as one:
-
-    >>> np.exp(log_probability(2, 2, 0.5, [0.0, 0.999999])).round(3).tolist()
-    [0.25, 0.5]
-    """
+    """Logarithm of the probability of a count; all arguments broadcast."""
     k, n = np.asarray(n_correct, dtype=np.float64), np.asarray(n_trials, dtype=np.float64)
     p, rho = np.asarray(proportion, dtype=np.float64), np.asarray(overdispersion, dtype=np.float64)
     ways = gammaln(n + 1.0) - gammaln(k + 1.0) - gammaln(n - k + 1.0)
@@ -130,30 +108,7 @@ _NEARLY_NEVER = 1e-12
 def binomial_interval(
     proportion: ArrayLike, trials: int, confidence: float = 0.95
 ) -> tuple[FloatArray, FloatArray]:
-    """Exact confidence interval of a probability, given an observed proportion (Clopper & Pearson 1934).
-
-    Parameters
-    ----------
-    proportion : array_like
-        Observed proportions of successes; their counts are rounded to whole numbers. [0-1]
-    trials : int
-        Trials behind each of them.
-    confidence : float, optional
-        Least probability that such an interval contains the true probability. [0-1]
-
-    Returns
-    -------
-    (array, array)
-        Lower and upper end. [0-1]
-
-    Examples
-    --------
-    After three successes in three trials the lower end is where three successes have a probability of 2.5 %.
-
-    >>> low, high = binomial_interval(1.0, trials=3)
-    >>> round(float(low) ** 3, 6), float(high)
-    (0.025, 1.0)
-    """
+    """Exact confidence interval of a probability, given an observed proportion (Clopper & Pearson 1934)."""
     successes = np.rint(np.asarray(proportion, dtype=np.float64) * trials).astype(np.int64)
     intervals = [binomtest(int(count), trials).proportion_ci(confidence) for count in successes.ravel()]
     low, high = np.moveaxis(np.reshape(intervals, (*successes.shape, 2)), -1, 0)

@@ -60,50 +60,31 @@ _REPETITIONS_VARIED = int(psychophysics.REPETITIONS_VARIED_CRITERION.value)
 @dataclass(frozen=True)
 @converted
 class Experiment:
-    """Numbers of repetitions, and decision criterion.
-
-    Parameters
-    ----------
-    presentations : int
-        Noisy presentations of each sphere: gradient sums behind one mean and standard deviation (d), or
-        sets of responses from which pairs are sampled (c*).
-    distributions : int
-        Pairs of mean and standard deviation per sphere, Gradient Sum only (f).
-    pairs : int
-        Distances per sphere behind one hit rate, Euclidean Distance only (f*).
-    hit_rates : int
-        Hit rates per comparison, of which mean and standard deviation are reported (i, h*).
-    criterion : float
-        Decision point beta, as a fraction of the distance from the standard's mean to the comparison's.
-    criterion_sigma : float
-        Spread of the decision point: for each hit rate it is multiplied by Normal(1, criterion_sigma).
-        Above 0 this is the paper's derivative of Gradient Sum: one mean and standard deviation per
-        sphere, from `presentations_varied` sums; steps (f) and (g) are omitted.
-    presentations_varied : int
-        Presentations of each sphere when the criterion varies.
-    criterion_moves : {"point", "fraction", "likelihood"}
-        Quantity multiplied by the varied criterion: the decision point itself, beta, or a likelihood ratio of
-        1 that replaces beta.
-
-    Raises
-    ------
-    InputError
-        If a count is below 2, the criterion not finite, its spread negative, or `criterion_moves` unknown.
-
-    Examples
-    --------
-    >>> Experiment().hit_rates, Experiment(criterion_sigma=0.02).sums_per_sphere
-    (100, (1, 5000))
-    """
+    """Numbers of repetitions, and decision criterion."""
 
     presentations: int = _REPETITIONS
+    """Noisy presentations of each sphere: gradient sums behind one mean and standard deviation (d), or sets
+    of responses from which pairs are sampled (c*).
+    """
     distributions: int = _REPETITIONS
+    """Pairs of mean and standard deviation per sphere, Gradient Sum only (f)."""
     pairs: int = _REPETITIONS
+    """Distances per sphere behind one hit rate, Euclidean Distance only (f*)."""
     hit_rates: int = _REPETITIONS
+    """Hit rates per comparison, of which mean and standard deviation are reported (i, h*)."""
     criterion: float = psychophysics.DECISION_CRITERION.value
+    """Decision point beta, as a fraction of the distance from the standard's mean to the comparison's."""
     criterion_sigma: float = 0.0
+    """Spread of the decision point: for each hit rate it is multiplied by Normal(1, criterion_sigma). Above 0
+    this is the paper's derivative of Gradient Sum: one mean and standard deviation per sphere, from
+    `presentations_varied` sums; steps (f) and (g) are omitted.
+    """
     presentations_varied: int = _REPETITIONS_VARIED
+    """Presentations of each sphere when the criterion varies."""
     criterion_moves: str = CRITERION_MOVES[0]
+    """Quantity multiplied by the varied criterion: the decision point itself, beta, or a likelihood ratio of
+    1 that replaces beta.
+    """
 
     def __post_init__(self) -> None:
         for name in ("presentations", "distributions", "pairs", "hit_rates", "presentations_varied"):
@@ -190,31 +171,6 @@ def compare_gradient_sum_observers(
 
     All observers meet the same random numbers, which are drawn once: each has the hit rates that
     `discriminate_gradient_sum` gives it.
-
-    Parameters
-    ----------
-    responses, neighbours, seed, silent_value, session
-        As in `discriminate_gradient_sum`.
-    observers : sequence of (float, Experiment)
-        Standard deviation sigma_1 of the noise, and repetitions and criterion, of each.
-
-    Returns
-    -------
-    list of HitRates
-        One per observer.
-
-    Raises
-    ------
-    InputError
-        As of `discriminate_gradient_sum`.
-
-    Examples
-    --------
-    >>> responses = [[50.0, 60.0], [50.0, 64.0]]
-    >>> noises = [(sigma, Experiment()) for sigma in (0.01, 0.05)]
-    >>> found = compare_gradient_sum_observers(responses, [[0, 1]], noises, seed=1)
-    >>> [round(float(hits.hit_rate[0]), 1) for hits in found]
-    [1.0, 0.7]
     """
     values = checked_responses(responses, silent_value)
     pairs = check_neighbours(neighbours, values.shape[1])
@@ -242,30 +198,7 @@ def compare_gradient_sum_observers(
 def hit_rates_of_sums(
     sums: FloatArray, seed: int, experiment: Experiment | None = None, session: int = 0
 ) -> HitRates:
-    """Discriminate spheres with given Gradient Sums, steps (e) and (g) to (k).
-
-    Parameters
-    ----------
-    sums : array (n_spheres, n_distributions, n_presentations)
-        From `fingerpad.psychophysics.noisy_responses.noisy_gradient_sums`, the standard first. [any unit]
-    seed : int
-        Of the whole run.
-    experiment : Experiment, optional
-        Hit rates and criterion; the numbers of sums are those of `sums`.
-    session : int, optional
-        Session of the sums.
-
-    Returns
-    -------
-    HitRates
-        One mean and standard deviation per comparison, mu_3 and sigma_3.
-
-    Examples
-    --------
-    >>> sums = np.array([[[9.0, 10.0, 11.0]] * 2, [[11.0, 12.0, 13.0]] * 2])
-    >>> hit_rates_of_sums(sums, seed=1).hit_rate.round(2).tolist()
-    [0.84]
-    """
+    """Discriminate spheres with given Gradient Sums, steps (e) and (g) to (k)."""
     plan = experiment or Experiment()
     means, spreads = moments(sums)  # (e): (n_spheres, n_distributions)
     varied = plan.criterion_sigma > 0.0
@@ -288,41 +221,6 @@ def discriminate_euclidean(
     decision (h*). If the sets were sampled once, their sampling error would shift the mean hit rate
     regardless of the repetitions, but the paper finds it stable with 100 hit rates. The standard's own
     distances are between two different sets of it.
-
-    Parameters
-    ----------
-    responses : array_like (n_spheres, n_receptors)
-        One measure (a rate, a latency) of every receptor; the standard in the first row. [any unit]
-    noise_sigma : float
-        Standard deviation sigma_1 of the multiplicative noise.
-    seed : int
-        Of the whole run; the same seed and session give the same result.
-    experiment : Experiment, optional
-        Repetitions and criterion; default: the paper's. Its criterion does not vary here.
-    silent_value : float, optional
-        Value that replaces a response of NaN; without it NaN is refused.
-    norm : {"city-block", "euclidean"}, optional
-        Sum of absolute differences, as printed, or root of the sum of squares, as named.
-    session : int, optional
-        Session of this seed; sessions have different random numbers.
-
-    Returns
-    -------
-    HitRates
-        One mean and standard deviation per comparison, mu_3 and sigma_3.
-
-    Raises
-    ------
-    InputError
-        If there are fewer than two spheres, no receptor responds, the noise, the seed or the session is
-        negative, the norm unknown, the criterion is to vary, or a response is not finite and no
-        `silent_value` is given.
-
-    Examples
-    --------
-    >>> responses = [[50.0, 60.0], [51.0, 62.0], [60.0, 80.0]]
-    >>> discriminate_euclidean(responses, 0.02, seed=1).hit_rate.round(1).tolist()
-    [0.6, 1.0]
     """
     observer = noise_sigma, experiment or Experiment()
     return compare_euclidean_observers(responses, [observer], seed, silent_value, norm, session)[0]
@@ -340,30 +238,6 @@ def compare_euclidean_observers(
 
     All observers meet the same random numbers, which are drawn once: each has the hit rates that
     `discriminate_euclidean` gives it.
-
-    Parameters
-    ----------
-    responses, seed, silent_value, norm, session
-        As in `discriminate_euclidean`.
-    observers : sequence of (float, Experiment)
-        Standard deviation sigma_1 of the noise, and repetitions and criterion, of each.
-
-    Returns
-    -------
-    list of HitRates
-        One per observer.
-
-    Raises
-    ------
-    InputError
-        As of `discriminate_euclidean`.
-
-    Examples
-    --------
-    >>> noises = [(sigma, Experiment()) for sigma in (0.02, 0.2)]
-    >>> found = compare_euclidean_observers([[50.0, 60.0], [55.0, 66.0]], noises, seed=1)
-    >>> [round(float(hits.hit_rate[0]), 1) for hits in found]
-    [1.0, 0.5]
     """
     one_of("norm", norm, NORMS)
     values = checked_responses(responses, silent_value)
@@ -396,30 +270,7 @@ def compare_euclidean_observers(
 
 
 def checked_responses(responses: ArrayLike, silent_value: float | None = None) -> FloatArray:
-    """Return responses as a table if they are valid for a discrimination, else raise `InputError`.
-
-    Parameters
-    ----------
-    responses : array_like (n_spheres, n_receptors)
-        One measure of every receptor; the standard in the first row. [any unit]
-    silent_value : float, optional
-        Value that replaces a response of NaN; without it NaN is refused.
-
-    Returns
-    -------
-    array (n_spheres, n_receptors)
-
-    Raises
-    ------
-    InputError
-        If there are fewer than two spheres or no receptor, a response is not finite, or no receptor responds
-        to any sphere.
-
-    Examples
-    --------
-    >>> checked_responses([[20.0, np.nan], [30.0, 40.0]], silent_value=50.0).tolist()
-    [[20.0, 50.0], [30.0, 40.0]]
-    """
+    """Return responses as a table if they are valid for a discrimination, else raise `InputError`."""
     try:
         table = np.array(responses, dtype=np.float64)
     except (TypeError, ValueError) as error:

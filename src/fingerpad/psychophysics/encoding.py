@@ -83,28 +83,6 @@ def delaunay_pairs(positions_mm: ArrayLike, pitch_mm: float) -> np.ndarray:
 
     Neighbours are joined by an edge of the Delaunay triangulation: their Voronoi cells are adjacent. Edges
     longer than 3 pitches are left out, because they cross a hole or a concave border of the region.
-
-    Parameters
-    ----------
-    positions_mm : array_like (n_receptors, 2)
-        Positions of the receptors, such as `Population.places_mm`. [mm]
-    pitch_mm : float
-        1/sqrt(density) of the layout. [mm]
-
-    Returns
-    -------
-    int array (n_pairs, 2)
-        Every pair of neighbours once, the lower index first.
-
-    Raises
-    ------
-    InputError
-        If the positions are not pairs, fewer than three or all on one line, or the pitch is not positive.
-
-    Examples
-    --------
-    >>> delaunay_pairs([[0.0, 0.0], [2.0, 0.1], [1.0, 1.0], [1.0, -1.0]], pitch_mm=1.0).tolist()
-    [[0, 2], [0, 3], [1, 2], [1, 3], [2, 3]]
     """
     positions = _plane(positions_mm)
     longest = _LONGEST_PITCHES * positive("pitch_mm", pitch_mm, "mm")
@@ -121,35 +99,7 @@ def delaunay_pairs(positions_mm: ArrayLike, pitch_mm: float) -> np.ndarray:
 
 
 def neighbours_of(places_mm: ArrayLike, pitch_mm: float, pattern: str) -> np.ndarray:
-    """Find the pairs of neighbours in a layout of any pattern of `fingerpad.core.layouts`.
-
-    Parameters
-    ----------
-    places_mm : array_like (n_receptors, 2)
-        Of the layout. [mm]
-    pitch_mm : float
-        Of the layout. [mm]
-    pattern : str
-        "rectangular" has 8 neighbours, "hexagonal" 6, all others those of `delaunay_pairs`.
-
-    Returns
-    -------
-    int array (n_pairs, 2)
-        Every pair of neighbours once, the lower index first.
-
-    Raises
-    ------
-    InputError
-        If the pattern is unknown, or as the functions above.
-
-    Examples
-    --------
-    >>> from fingerpad.core.patterns import hexagonal
-    >>> from fingerpad.core.regions import Ellipse
-    >>> seven = hexagonal(Ellipse(1.2, 1.2), density_per_cm2=115.47)
-    >>> len(neighbours_of(seven.places_mm, seven.pitch_mm, seven.pattern))
-    12
-    """
+    """Find the pairs of neighbours in a layout of any pattern of `fingerpad.core.layouts`."""
     one_of("pattern", pattern, PATTERNS)
     if pattern in _LATTICE_NEIGHBOURS:
         return neighbour_pairs(places_mm, pitch_mm, _LATTICE_NEIGHBOURS[pattern])
@@ -176,29 +126,6 @@ def taking_part(responses: ArrayLike, neighbours: np.ndarray) -> tuple[FloatArra
 
     A receptor that is silent under one stimulus has no latency to compare with its neighbours'. It is left
     out under every stimulus, so that silence itself does not discriminate two stimuli.
-
-    Parameters
-    ----------
-    responses : array_like (n_stimuli, n_receptors)
-        Response measure of every receptor; NaN without a response. [any unit]
-    neighbours : int array (n_pairs, 2)
-        From `neighbour_pairs`.
-
-    Returns
-    -------
-    (array (n_stimuli, n_receptors), int array (n_pairs, 2))
-        Responses with zeros for receptors that are left out, and the pairs without them.
-
-    Raises
-    ------
-    InputError
-        If a pair contains an index outside the population.
-
-    Examples
-    --------
-    >>> table, pairs = taking_part([[20.0, 25.0, np.nan], [20.0, 24.0, 90.0]], np.array([[0, 1], [1, 2]]))
-    >>> table.tolist(), pairs.tolist()
-    ([[20.0, 25.0, 0.0], [20.0, 24.0, 0.0]], [[0, 1]])
     """
     table = np.asarray(responses, dtype=np.float64)
     pairs = check_neighbours(neighbours, table.shape[-1] if table.ndim else 0)
@@ -251,28 +178,6 @@ def distance(values_a: ArrayLike, values_b: ArrayLike, norm: str = "city-block")
     """Euclidean Distance: difference between two populations, receptor by receptor, step (e*) of Figure 3.
 
     The paper uses this name for a sum of absolute differences, which is the city-block distance.
-
-    Parameters
-    ----------
-    values_a, values_b : array_like (..., n_receptors)
-        Response measure of the same receptors to two touches; leading axes broadcast. [any unit]
-    norm : {"city-block", "euclidean"}, optional
-        Sum of absolute differences, as printed, or root of the sum of squares, as named.
-
-    Returns
-    -------
-    array (...)
-        One distance per pair of populations. [unit of the values]
-
-    Raises
-    ------
-    InputError
-        If the norm is unknown or the populations differ in size.
-
-    Examples
-    --------
-    >>> float(distance([10.0, 20.0], [13.0, 24.0])), float(distance([10.0, 20.0], [13.0, 24.0], "euclidean"))
-    (7.0, 5.0)
     """
     one_of("norm", norm, NORMS)
     first, second = np.asarray(values_a, dtype=np.float64), np.asarray(values_b, dtype=np.float64)
@@ -285,29 +190,7 @@ def distance(values_a: ArrayLike, values_b: ArrayLike, norm: str = "city-block")
 
 
 def check_neighbours(neighbours: np.ndarray, n_receptors: int) -> np.ndarray:
-    """Return `neighbours` as integers if they are pairs of receptors, else raise `InputError`.
-
-    Parameters
-    ----------
-    neighbours : int array (n_pairs, 2)
-        From `neighbour_pairs`.
-    n_receptors : int
-        Size of the population.
-
-    Returns
-    -------
-    int array (n_pairs, 2)
-
-    Raises
-    ------
-    InputError
-        If they are not pairs of two indices within 0 ... n_receptors - 1.
-
-    Examples
-    --------
-    >>> check_neighbours([[0, 1]], 2).tolist()
-    [[0, 1]]
-    """
+    """Return `neighbours` as integers if they are pairs of receptors, else raise `InputError`."""
     pairs = np.asarray(neighbours)
     if pairs.ndim != 2 or pairs.shape[1] != 2 or not np.issubdtype(pairs.dtype, np.integer):
         raise InputError(

@@ -32,20 +32,14 @@ Curve = Callable[[FloatArray], FloatArray]
 
 @dataclass(frozen=True)
 class Sigmoid:
-    """A shape S of the psychometric function.
-
-    Parameters
-    ----------
-    cumulative, density, quantile : callable
-        S, its derivative and its inverse.
-    logarithmic : bool
-        Whether the coordinate is ln x instead of x.
-    """
+    """A shape S of the psychometric function."""
 
     cumulative: Curve
     density: Curve
     quantile: Curve
+    """S, its derivative and its inverse."""
     logarithmic: bool = False
+    """Whether the coordinate is ln x instead of x."""
 
     def coordinate(self, levels: ArrayLike) -> FloatArray:
         """c(x)."""
@@ -281,13 +275,7 @@ class PsychometricFunction:
 
 
 def checked_levels(levels: ArrayLike, sigmoid: str) -> FloatArray:
-    """Return levels as an array if they are in the domain of `sigmoid`, else raise `InputError`.
-
-    Examples
-    --------
-    >>> checked_levels([1, 2], "weibull").tolist()
-    [1.0, 2.0]
-    """
+    """Return levels as an array if they are in the domain of `sigmoid`, else raise `InputError`."""
     checked = float_array("levels", levels, 1)
     if SIGMOIDS[sigmoid].logarithmic and (checked <= 0.0).any():
         raise InputError(

@@ -56,10 +56,6 @@ def goodness_of_fit(fit: PsychometricFit, seed: int, n_replicates: int = 1000) -
     n_replicates : int, optional
         Number of simulated data sets.
 
-    Returns
-    -------
-    GoodnessOfFit
-
     Raises
     ------
     InputError

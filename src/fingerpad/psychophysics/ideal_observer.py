@@ -150,10 +150,6 @@ def present(
     session : int, optional
         Sessions of one seed share no random number.
 
-    Returns
-    -------
-    Presentation
-
     Raises
     ------
     InputError

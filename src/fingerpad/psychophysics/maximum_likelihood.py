@@ -48,24 +48,17 @@ class Model:
     """Family of psychometric functions to be fitted.
 
     Working coordinates are c(m), ln w, gamma, lambda and rho, in the order of `PARAMETERS`.
-
-    Parameters
-    ----------
-    sigmoid : Sigmoid
-        Shape.
-    coordinates : array (n_levels,)
-        c(x) of the levels.
-    n_trials : array (n_levels,)
-        Judgements at each.
-    lower, upper : array (5,)
-        Bounds in working coordinates; equal where a parameter is given.
     """
 
     sigmoid: Sigmoid
+    """Shape."""
     coordinates: FloatArray
+    """c(x) of the levels, (n_levels,)."""
     n_trials: FloatArray
+    """Judgements at each, (n_levels,)."""
     lower: FloatArray
     upper: FloatArray
+    """Bounds in working coordinates; equal where a parameter is given, (5,)."""
 
     @property
     def free(self) -> np.ndarray:
@@ -88,26 +81,7 @@ class Model:
 
 
 def maximise_likelihood(model: Model, n_correct: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Find the maximum-likelihood function of each set of counts.
-
-    Parameters
-    ----------
-    model : Model
-        Levels, trials and bounds.
-    n_correct : array (n_sets, n_levels)
-        Counts.
-
-    Returns
-    -------
-    points : array (n_sets, 5)
-        Working coordinates.
-    log_likelihoods : array (n_sets,)
-
-    Raises
-    ------
-    ConvergenceError
-        If a set has not converged after `MOST_STEPS`.
-    """
+    """Find the maximum-likelihood function of each set of counts."""
     points = _starts(model, n_correct)
     heights = model.log_likelihood(n_correct, points)
     damping = np.full(len(points), 1e-3)

@@ -8,29 +8,7 @@ LARGEST_NOISE = 1000.0
 
 
 def checked_noise(noise_sigma: float, above_zero: bool = False) -> float:
-    """Return the standard deviation of multiplicative noise, over the response, as a float.
-
-    Parameters
-    ----------
-    noise_sigma : float
-        At most `LARGEST_NOISE`.
-    above_zero : bool, optional
-        Whether 0 is refused.
-
-    Returns
-    -------
-    float
-
-    Raises
-    ------
-    InputError
-        If it is no number of this range.
-
-    Examples
-    --------
-    >>> checked_noise(0.055)
-    0.055
-    """
+    """Return the standard deviation of multiplicative noise, over the response, as a float."""
     sigma = (positive if above_zero else not_negative)("noise_sigma", noise_sigma)
     if sigma > LARGEST_NOISE:
         raise InputError(

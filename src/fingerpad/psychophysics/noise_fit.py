@@ -27,21 +27,14 @@ _NOISE_SCAN = 33
 
 @dataclass(frozen=True)
 class NoiseFit:
-    """Noise for which predicted hit rates are closest to observed ones.
-
-    Parameters
-    ----------
-    noise_sigma : float
-        Standard deviation sigma_1 of the multiplicative noise.
-    hit_rates : array (n_targets,)
-        Predicted hit rates at that noise. [0-1]
-    root_mean_square_error : float
-        Of the predicted against the observed hit rates.
-    """
+    """Noise for which predicted hit rates are closest to observed ones."""
 
     noise_sigma: float
+    """Standard deviation sigma_1 of the multiplicative noise."""
     hit_rates: FloatArray
+    """Predicted hit rates at that noise, (n_targets,). [0-1]"""
     root_mean_square_error: float
+    """Of the predicted against the observed hit rates."""
 
 
 def expected_hit_rates(
@@ -56,32 +49,6 @@ def expected_hit_rates(
 
     The same standard normal samples are used for every sphere and every noise, so the result is a smooth
     function of `noise_sigma`, as `fit_noise_sigma` needs.
-
-    Parameters
-    ----------
-    responses, neighbours, noise_sigma, silent_value
-        As in `discriminate_gradient_sum`.
-    standard_normals : array_like (n_draws, n_receptors)
-        Samples of Normal(0, 1), several thousand, for example from
-        `fingerpad.core.random_streams.normals`.
-    criterion : float, optional
-        Decision point beta.
-
-    Returns
-    -------
-    array (n_comparisons,)
-        Expected hit rates. [0-1]
-
-    Raises
-    ------
-    InputError
-        As `discriminate_gradient_sum`, or if the draws are not one column per receptor.
-
-    Examples
-    --------
-    >>> draws = np.random.default_rng(1).standard_normal((5000, 2))
-    >>> expected_hit_rates([[50.0, 60.0], [50.0, 64.0]], [[0, 1]], 0.02, draws).round(2).tolist()
-    [0.89]
     """
     values = checked_responses(responses, silent_value)
     draws = float_array("standard_normals", standard_normals, 2)
@@ -118,23 +85,6 @@ def expected_euclidean_hit_rates(
     The sum over a population is close to normal but skewed, by 0.4 with the paper's 18 receptors. The first
     term of Edgeworth's series, g (z^2 - 1) phi(z) / 6 with the skewness g, corrects for it: without it hit
     rates near chance would be 0.02 too high.
-
-    Parameters
-    ----------
-    responses, noise_sigma, silent_value
-        As in `fingerpad.psychophysics.discrimination.discriminate_euclidean`.
-    criterion : float, optional
-        Decision point beta.
-
-    Returns
-    -------
-    array (n_comparisons,)
-        Expected hit rates, within 0.005 with 18 receptors. [0-1]
-
-    Examples
-    --------
-    >>> expected_euclidean_hit_rates([[50.0, 60.0], [51.0, 62.0], [60.0, 80.0]], 0.02).round(1).tolist()
-    [0.6, 1.0]
     """
     values = checked_responses(responses, silent_value)
     sigma = checked_noise(noise_sigma, above_zero=True)
@@ -163,35 +113,6 @@ def fit_noise_sigma(
 
     The interval between the bounds is scanned on a logarithmic grid and the best cell is refined. This is
     robust at very small and very large noise, where hit rates are constant. It uses no random number.
-
-    Parameters
-    ----------
-    hit_rates_of_sigma : callable
-        Hit rates (n_targets,) at a given noise sigma_1; smooth, such as `expected_hit_rates`.
-    target_hit_rates : array_like (n_targets,), optional
-        Observed hit rates; default: Goodwin's for 296 and 365 /m. [0-1]
-    bounds : (float, float), optional
-        Smallest and largest noise to consider.
-
-    Returns
-    -------
-    NoiseFit
-
-    Raises
-    ------
-    InputError
-        If the bounds are not positive and in order, or predictions and targets differ in number.
-    ConvergenceError
-        If the best noise lies on a bound.
-
-    Examples
-    --------
-    >>> from scipy.special import ndtr
-    >>> def predict(sigma):
-    ...     return ndtr([0.01 / sigma, 0.09 / sigma])
-    >>> fit = fit_noise_sigma(predict, predict(0.055))
-    >>> round(fit.noise_sigma, 4)
-    0.055
     """
     targets = float_array("target_hit_rates", target_hit_rates, 1)
     smallest, largest = (positive("bounds", bound) for bound in bounds)

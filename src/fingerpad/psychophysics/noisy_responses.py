@@ -31,32 +31,6 @@ _PRESENTATIONS_AT_ONCE = 128
 
 
 def session_trials(session: int, *shape: int) -> IntArray:
-    """Return the numbers of the trials of a session.
-
-    Parameters
-    ----------
-    session : int
-        Session of the same seed, from 0.
-    *shape : int
-        Number of stimuli, and repetitions of each.
-
-    Returns
-    -------
-    int array of that shape
-        Different from those of every other session.
-
-    Raises
-    ------
-    InputError
-        If the session is negative, too large or not whole.
-
-    Examples
-    --------
-    >>> session_trials(0, 2, 3).tolist()
-    [[0, 1, 2], [3, 4, 5]]
-    >>> int(session_trials(1, 2, 3)[0, 0]) == TRIALS_PER_SESSION
-    True
-    """
     if whole("session", session, 0) > LARGEST_SESSION:
         raise InputError(f"session must not exceed {LARGEST_SESSION}: got {session}.")
     return session * TRIALS_PER_SESSION + np.arange(int(np.prod(shape)), dtype=np.int64).reshape(shape)
@@ -65,32 +39,7 @@ def session_trials(session: int, *shape: int) -> IntArray:
 def noisy_responses(
     responses: FloatArray, noise_sigma: float, seed: int, trials: IntArray, presentations: int
 ) -> FloatArray:
-    """Sample noisy presentations of every stimulus, step (a).
-
-    Parameters
-    ----------
-    responses : array (n_stimuli, n_receptors)
-        One measure of every receptor. [any unit]
-    noise_sigma : float
-        Standard deviation sigma_1 of the multiplicative noise.
-    seed : int
-        Of the whole run.
-    trials : int array (n_stimuli,)
-        One trial per stimulus, from `session_trials`.
-    presentations : int
-        Presentations of each stimulus.
-
-    Returns
-    -------
-    array (n_stimuli, presentations, n_receptors)
-        Noisy responses. [unit of `responses`]
-
-    Examples
-    --------
-    >>> noisy = noisy_responses(np.array([[10.0, 20.0]]), 0.1, 7, session_trials(0, 1), 1000)
-    >>> noisy.shape, noisy.mean(axis=1).round().tolist(), noisy.std(axis=1).round().tolist()
-    ((1, 1000, 2), [[10.0, 20.0]], [[1.0, 2.0]])
-    """
+    """Sample noisy presentations of every stimulus, step (a)."""
     draws = normals(seed, trials, responses.shape[1], Purpose.RESPONSE, presentations)
     return responses[:, np.newaxis] * (1.0 + noise_sigma * draws.transpose(0, 2, 1))
 
@@ -109,32 +58,6 @@ def noisy_gradient_sums(
     Several
     measures of the same presentations, or several strengths of the noise, meet the same random numbers,
     which are drawn once.
-
-    Parameters
-    ----------
-    responses : array (..., n_stimuli, n_receptors)
-        One measure of every receptor, or several of them. [any unit]
-    neighbours : int array (n_pairs, 2)
-        From `fingerpad.psychophysics.encoding.neighbour_pairs`.
-    noise_sigma : float or array (...)
-        Standard deviation sigma_1 of the multiplicative noise, one for all measures or one for each.
-    seed : int
-        Of the whole run.
-    trials : int array (n_stimuli, n_repeats)
-        Trials of every stimulus, from `session_trials`.
-    presentations : int
-        Presentations of a trial.
-
-    Returns
-    -------
-    array (..., n_stimuli, n_repeats, presentations)
-        Gradient Sums. [unit of `responses`]
-
-    Examples
-    --------
-    >>> two_receptors, trials = np.array([[10.0, 20.0]]), session_trials(0, 1, 2)
-    >>> noisy_gradient_sums(two_receptors, np.array([[0, 1]]), 0.0, 7, trials, 3).tolist()
-    [[[20.0, 20.0, 20.0], [20.0, 20.0, 20.0]]]
     """
     values = np.asarray(responses, dtype=np.float64)
     measures = np.ascontiguousarray(values.reshape(-1, *values.shape[-2:]))
@@ -154,26 +77,7 @@ def noisy_gradient_sums(
 def shared_noise_gradient_sums(
     responses: FloatArray, neighbours: np.ndarray, noise_sigma: float, standard_normals: FloatArray
 ) -> FloatArray:
-    """Sum the gradients of every stimulus under the same noise.
-
-    Parameters
-    ----------
-    responses, neighbours, noise_sigma
-        As in `noisy_gradient_sums`.
-    standard_normals : array (n_draws, n_receptors)
-        Draws from Normal(0, 1) that serve every stimulus.
-
-    Returns
-    -------
-    array (n_stimuli, n_draws)
-        Gradient Sums. [unit of `responses`]
-
-    Examples
-    --------
-    >>> draws = np.array([[0.0, 0.0], [1.0, 1.0]])
-    >>> shared_noise_gradient_sums(np.array([[10.0, 20.0]]), np.array([[0, 1]]), 0.5, draws).tolist()
-    [[20.0, 30.0]]
-    """
+    """Sum the gradients of every stimulus under the same noise."""
     values = np.ascontiguousarray(responses, dtype=np.float64)
     pairs = np.ascontiguousarray(neighbours, dtype=np.int64)
     sums = np.zeros((len(values), len(standard_normals)))

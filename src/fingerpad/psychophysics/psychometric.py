@@ -155,10 +155,6 @@ def fit_psychometric(
         Correlation of judgements of one level; 0 for the binomial likelihood, None to fit it within
         0 ... 0.5. [0-1]
 
-    Returns
-    -------
-    PsychometricFit
-
     Raises
     ------
     InputError

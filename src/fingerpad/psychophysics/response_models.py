@@ -122,10 +122,6 @@ def multiplied_responses(
     smallest_spread : float, optional
         Standard deviation of further noise that does not depend on the response. [unit of `responses`]
 
-    Returns
-    -------
-    GaussianResponses
-
     Raises
     ------
     InputError

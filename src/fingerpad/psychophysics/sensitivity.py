@@ -64,10 +64,6 @@ def sensitivity(
     spread_ratio : float, optional
         s, standard deviation without the signal over that with it: 1 gives d', others d_a.
 
-    Returns
-    -------
-    Sensitivity
-
     Raises
     ------
     InputError

@@ -131,22 +131,7 @@ def same_different_by_difference(d_prime: float, criterion: float | None = None)
 def best_difference(d_prime: float) -> float:
     """Return the difference k above which "different" is more likely.
 
-        exp(-d'^2 / 4) cosh(d' k / 2) = 1,    k = (2 / d') arcosh(exp(d'^2 / 4))
-
-    Parameters
-    ----------
-    d_prime : float
-        Not negative. [standard deviations]
-
-    Returns
-    -------
-    float
-        sqrt 2 where d' vanishes. [standard deviations]
-
-    Examples
-    --------
-    >>> round(best_difference(1e-6), 4), round(best_difference(2.0), 4)
-    (1.4142, 1.6575)
+    exp(-d'^2 / 4) cosh(d' k / 2) = 1,    k = (2 / d') arcosh(exp(d'^2 / 4))
     """
     d = not_negative("d_prime", d_prime)
     exponent = 0.25 * d * d

@@ -162,24 +162,6 @@ def weighted_quantiles(values: ArrayLike, weights: ArrayLike, shares: ArrayLike)
     """Weighted quantiles.
 
     Each value is at the middle of its own weight; quantiles between values are interpolated.
-
-    Parameters
-    ----------
-    values : array_like (n,)
-        May be infinite.
-    weights : array_like (n,)
-        Not negative, with a positive sum.
-    shares : array_like (n_shares,)
-        [0-1]
-
-    Returns
-    -------
-    array (n_shares,)
-
-    Examples
-    --------
-    >>> weighted_quantiles([1.0, 2.0, 3.0], [1.0, 2.0, 1.0], [0.5, 0.9]).tolist()
-    [2.0, 3.0]
     """
     # Equal values, as on a grid, are merged with the sum of their weights.
     quantity, which = np.unique(np.asarray(values, dtype=np.float64), return_inverse=True)
@@ -242,27 +224,7 @@ def bootstrap(fit: PsychometricFit, seed: int, n_replicates: int = 1000) -> Func
 
 
 def drawn_counts(fit: PsychometricFit, seed: int, n_replicates: int) -> FloatArray:
-    """Sample counts (n_replicates, n_levels) from a fit.
-
-    Parameters
-    ----------
-    fit : PsychometricFit
-        Function, overdispersion, levels and trials.
-    seed : int
-        Of the random numbers; keyed by replicate and level.
-    n_replicates : int
-        Number of data sets.
-
-    Returns
-    -------
-    array (n_replicates, n_levels)
-        Whole numbers.
-
-    Raises
-    ------
-    InputError
-        If a number is not whole or not positive.
-    """
+    """Sample counts (n_replicates, n_levels) from a fit."""
     instance("fit", fit, PsychometricFit)
     whole("n_replicates", n_replicates, at_least=1)
     expected = fit.predict(fit.counts.levels)

@@ -71,10 +71,6 @@ def reduce_touch(
     seed : int, optional
         Of these touches.
 
-    Returns
-    -------
-    ReducedModel
-
     Raises
     ------
     InputError
@@ -124,21 +120,7 @@ def reduce_touch(
 
 
 def joint_bounds(errors: FloatArray) -> FloatArray:
-    """Bounds of several errors, (n_errors,), that all of them keep in `COVERAGE` of new touches.
-
-    Parameters
-    ----------
-    errors : array (n_touches, n_errors)
-        Errors of touches that were not used.
-
-    Examples
-    --------
-    The touch with the largest error for its kind sets both bounds:
-
-    >>> errors = np.column_stack([np.linspace(0.5, 1.5, 19), np.full(19, 0.1)])
-    >>> joint_bounds(errors).round(3).tolist()
-    [1.5, 0.15]
-    """
+    """Bounds of several errors, (n_errors,), that all of them keep in `COVERAGE` of new touches."""
     medians = np.maximum(np.median(errors, axis=0), np.finfo(float).tiny)
     scores = np.sort((errors / medians).max(axis=1))
     rank = math.ceil(COVERAGE * (len(errors) + 1)) - 1
@@ -146,17 +128,7 @@ def joint_bounds(errors: FloatArray) -> FloatArray:
 
 
 def with_exponents(model: ReducedModel, skin: SkinResponse, shape: Iterable[float] = ()) -> ReducedModel:
-    """Choose the exponents with which a touch is met best, by least squares over its times.
-
-    Parameters
-    ----------
-    model : ReducedModel
-        Exponents do not count.
-    skin : SkinResponse
-        A touch that has relaxed at one depth before it goes to others.
-    shape : iterable of float
-        Value of the indenter's parameter, if one varies.
-    """
+    """Choose the exponents with which a touch is met best, by least squares over its times."""
     sums = []
     for exponent in EXPONENTS:
         tried = replace(model, exponents=np.full(model.error.size, exponent))
@@ -172,13 +144,7 @@ def _in_turn(touches: Sequence[Touch], stage: str) -> list[SkinResponse]:
 def draw_touch(
     training: ReducedTraining, model: ReducedModel, random: np.random.Generator
 ) -> tuple[tuple[float, ...], Touch]:
-    """Draw a touch of the range: press, perhaps move aside, hold, go to another depth, hold.
-
-    Returns
-    -------
-    (tuple of float, Touch)
-        Value of the indenter's parameter, if one varies, and the touch.
-    """
+    """Draw a touch of the range: press, perhaps move aside, hold, go to another depth, hold."""
     axes = training.range.axes
     start, end = ({axis.name: random.uniform(axis.low, axis.high) for axis in axes} for _ in range(2))
     shape = tuple(start[axis.name] for axis in axes[3:])
@@ -225,23 +191,7 @@ def _relative(model: ReducedModel, rows: Iterable[_Row]) -> FloatArray:
 def streamed(
     model: ReducedModel, skin: SkinResponse, shape: Iterable[float] = ()
 ) -> tuple[FloatArray, FloatArray, bool]:
-    """Compare a reduced touch with a full one.
-
-    Parameters
-    ----------
-    model : ReducedModel
-        The reduced touch.
-    skin : SkinResponse
-        The full one.
-    shape : iterable of float
-        Value of the indenter's parameter, if one varies.
-
-    Returns
-    -------
-    (array (n_quantities + 1,), array (n_quantities + 1,), bool)
-        Largest errors and largest values of the quantities [kPa] and of the force [mN], and whether all
-        errors stay within what the reduced touch says of them.
-    """
+    """Compare a reduced touch with a full one."""
     rows = list(_compared(model, skin, shape))
     wrong, known = (np.max([getattr(row, name) for row in rows], axis=0) for name in ("wrong", "known"))
     return wrong, known, bool((_relative(model, rows) <= model.error).all())

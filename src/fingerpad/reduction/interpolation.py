@@ -22,13 +22,7 @@ from fingerpad.core.values import converted
 
 @cache
 def chebyshev_points(count: int) -> FloatArray:
-    """Chebyshev's points of [0, 1] with both ends, (count,); the middle for one point.
-
-    Examples
-    --------
-    >>> chebyshev_points(3).round(9).tolist(), chebyshev_points(1).tolist()
-    ([0.0, 0.5, 1.0], [0.5])
-    """
+    """Chebyshev's points of [0, 1] with both ends, (count,); the middle for one point."""
     points = np.array([0.5])
     if count > 1:
         points = 0.5 - 0.5 * np.cos(np.pi * np.arange(count) / (count - 1))
@@ -37,13 +31,7 @@ def chebyshev_points(count: int) -> FloatArray:
 
 
 def lagrange(points: FloatArray, values: ArrayLike) -> FloatArray:
-    """Lagrange's polynomials of `points` (n,) at `values` (...,), (..., n).
-
-    Examples
-    --------
-    >>> lagrange(np.array([0.0, 1.0]), [0.25]).tolist()
-    [[0.75, 0.25]]
-    """
+    """Lagrange's polynomials of `points` (n,) at `values` (...,), (..., n)."""
     at = np.asarray(values, dtype=float)
     return np.asarray(_lagrange(points, at.ravel()).reshape(*at.shape, points.size))
 
@@ -67,32 +55,15 @@ def weighted(weights: FloatArray, values: FloatArray) -> FloatArray:
 @dataclass(frozen=True)
 @converted
 class Axis:
-    """One quantity that varies over the range of a reduced touch.
-
-    Parameters
-    ----------
-    name : str
-        "x_mm", "z_mm", "tilt_deg", or a parameter of the indenter.
-    low, high : float
-        Its range; equal if it does not vary.
-    count : int
-        Number of Chebyshev's points, 1 if it does not vary.
-
-    Raises
-    ------
-    InputError
-        If the range is empty, or the count does not suit it.
-
-    Examples
-    --------
-    >>> Axis("x_mm", 1.0, 5.0, 3).values.round(9).tolist()
-    [1.0, 3.0, 5.0]
-    """
+    """One quantity that varies over the range of a reduced touch."""
 
     name: str
+    """"x_mm", "z_mm", "tilt_deg", or a parameter of the indenter."""
     low: float
     high: float
+    """Its range; equal if it does not vary."""
     count: int
+    """Number of Chebyshev's points, 1 if it does not vary."""
 
     def __post_init__(self) -> None:
         finite(f"low of {self.name}", self.low)
@@ -116,13 +87,7 @@ class Axis:
         return self.low + (self.high - self.low) * self.points
 
     def weights(self, value: float) -> FloatArray:
-        """Weights of the points at a value, (count,).
-
-        Raises
-        ------
-        InputError
-            If the value lies outside of the range.
-        """
+        """Weights of the points at a value, (count,)."""
         # Sums of positions differ in the last digits.
         slack = 1e-9 * max(1.0, abs(self.low), abs(self.high))
         if not self.low - slack <= value <= self.high + slack:

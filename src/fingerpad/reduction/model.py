@@ -198,24 +198,7 @@ def fitted_model(
     responses: Sequence[Sequence[SkinResponse]],
     quantities: tuple[str, ...],
 ) -> ReducedModel:
-    """Fit a model to the presses of all poses.
-
-    Parameters
-    ----------
-    axes, deepest_mm, at_mm
-        Of the range, and the place of the touch.
-    poses : sequence of TrainingPose
-        All poses, in the order of `ReducedTraining.poses`.
-    responses : sequence of sequence of SkinResponse
-        For each pose the responses to its touches.
-    quantities : tuple of str
-        What to keep.
-
-    Returns
-    -------
-    ReducedModel
-        Not calibrated, and with exponents of 0.
-    """
+    """Fit a model to the presses of all poses."""
     touch = poses[0].touches[0]
     finger = cast(Fingertip, touch.finger)
     constants = np.unique([time for law in touch.tissues.layers for time in law.prony.times_ms])
@@ -281,10 +264,8 @@ def squares(quantities: Sequence[str]) -> np.ndarray:
 def _terms(
     times_ms: FloatArray, depth_mm: FloatArray, deepest_mm: float, constants_ms: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    """One row per time: the response at once, less what each branch has relaxed; and the same of squares.
-
-    The strain behind a square grows with the depth here.
-    """
+    """One row per time: the response at once, less what each branch has relaxed; and the same of squares."""
+    # The strain behind a square grows with the depth here.
     steps = np.arange(FINE_PARTS * (times_ms.size - 1) + 1) / FINE_PARTS
     fine = np.interp(steps, np.arange(times_ms.size), times_ms)
     depth = np.maximum(np.interp(fine, times_ms, depth_mm), 0.0)[:, None]

@@ -24,14 +24,7 @@ from fingerpad.core.checks import FloatArray
 
 
 def filter_step(step_ms: float, times_ms: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Factors a, b and gamma of m = a D + b D_before + gamma m_before, (n_branches,) each.
-
-    Examples
-    --------
-    >>> a, b, gamma = filter_step(100.0, np.array([100.0]))
-    >>> print(f"{a[0]:.4f} {b[0]:.4f} {gamma[0]:.4f}")
-    0.3679 0.2642 0.3679
-    """
+    """Factors a, b and gamma of m = a D + b D_before + gamma m_before, (n_branches,) each."""
     if step_ms == 0.0:
         return np.zeros(times_ms.size), np.zeros(times_ms.size), np.ones(times_ms.size)
     gamma = np.exp(-step_ms / times_ms)
@@ -44,13 +37,7 @@ SHALLOWEST = 0.4
 
 
 def depth_scale(depth_mm: float, deepest_mm: float, exponents: FloatArray) -> FloatArray:
-    """Scale s of what relaxes at a depth, of the shape of the exponents; 1 at the largest depth.
-
-    Examples
-    --------
-    >>> print(depth_scale(0.64, 1.0, np.array([0.0, 0.5])))
-    [1.  0.8]
-    """
+    """Scale s of what relaxes at a depth, of the shape of the exponents; 1 at the largest depth."""
     return np.asarray(max(depth_mm / deepest_mm, SHALLOWEST) ** exponents)
 
 
@@ -62,35 +49,14 @@ def amplitudes(values: FloatArray, squared: FloatArray) -> FloatArray:
 
 
 def lost(amplitude: FloatArray, relaxed: FloatArray, squared: FloatArray) -> FloatArray:
-    """Values that are lost when amplitudes have relaxed by `relaxed`, (..., n_quantities, n).
-
-    Examples
-    --------
-    >>> print(lost(np.array([[2.0], [2.0]]), np.array([[0.5], [0.5]]), np.array([False, True])).ravel())
-    [0.5  1.75]
-    """
+    """Values that are lost when amplitudes have relaxed by `relaxed`, (..., n_quantities, n)."""
     found = relaxed.copy()
     found[..., squared, :] *= 2.0 * amplitude[..., squared, :] - relaxed[..., squared, :]
     return found
 
 
 def filtered(times_ms: FloatArray, values: FloatArray, constant_ms: float) -> FloatArray:
-    """Filter values over time that start from rest.
-
-    Parameters
-    ----------
-    times_ms : array (n_times,)
-        Increasing. [ms]
-    values : array (n_times, n)
-        D, linear between the times.
-    constant_ms : float
-        Time constant. [ms]
-
-    Returns
-    -------
-    array (n_times, n)
-        m.
-    """
+    """Filter values over time that start from rest."""
     found = np.zeros_like(values)
     for now in range(1, times_ms.size):
         a, b, gamma = filter_step(times_ms[now] - times_ms[now - 1], np.array([constant_ms]))

@@ -34,11 +34,6 @@ def slope_changes(levels: FloatArray, deepest_mm: float, values: FloatArray) -> 
     """Weights s_e of the springs, (n_levels, n), of functions with values (n_levels + 1, n).
 
     The values are those at the levels and at the largest depth; between them the functions are linear.
-
-    Examples
-    --------
-    >>> slope_changes(np.array([0.0, 1.0]), 2.0, np.array([[0.0], [1.0], [4.0]])).ravel().tolist()
-    [1.0, 2.0]
     """
     slopes = np.diff(values, axis=0) / np.diff(np.append(levels, deepest_mm))[:, None]
     return np.diff(slopes, axis=0, prepend=0.0)
@@ -46,18 +41,12 @@ def slope_changes(levels: FloatArray, deepest_mm: float, values: FloatArray) -> 
 
 @dataclass(frozen=True)
 class Springs:
-    """Ways of the springs, and what their branches have relaxed.
-
-    Parameters
-    ----------
-    way_mm : array (n_levels,)
-        u, at most 0 before the first touch of a level. [mm]
-    relaxed_mm : array (n_branches, n_levels)
-        m. [mm]
-    """
+    """Ways of the springs, and what their branches have relaxed."""
 
     way_mm: FloatArray
+    """u, at most 0 before the first touch of a level, (n_levels,). [mm]"""
     relaxed_mm: FloatArray
+    """m, (n_branches, n_levels). [mm]"""
 
     @classmethod
     def at_rest(cls, n_branches: int) -> Springs:
@@ -72,19 +61,7 @@ class Springs:
         shares: FloatArray,
         kept: float = 1.0,
     ) -> Springs:
-        """Springs after a step.
-
-        Parameters
-        ----------
-        step_ms : float
-            Duration of the step. [ms]
-        followed_mm : array (n_levels,)
-            Ways of springs that follow the indenter, at least 0. [mm]
-        times_ms, shares : array (n_branches,)
-            Time constants [ms], and g: what a branch relaxes in a long hold, as part of the force at once.
-        kept : float
-            Part of the skin below the contact that is still there, if the indenter has slid.
-        """
+        """Springs after a step."""
         a, b, gamma = (each[:, None] for each in filter_step(step_ms, times_ms))
         known = kept * (b * shares[:, None] * self.way_mm + gamma * self.relaxed_mm)
         now = a * shares[:, None]

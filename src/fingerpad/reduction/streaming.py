@@ -248,34 +248,22 @@ class _Contact:
 
 @dataclass(frozen=True)
 class _Press:
-    """One step at a pose, to any depth.
-
-    Parameters
-    ----------
-    model : ReducedModel
-        The model.
-    totals : array (n_terms, 2)
-        Coefficients of force and area at the pose.
-    amounts : array (n_terms, n_modes)
-        Those of the modes.
-    sheet_places : array (n_sheet, 2)
-        Places of the sheet, in steps of the grid.
-    springs, sheet
-        State before the step.
-    kept : float
-        Part of the skin below the contact that is still there after the way aside.
-    step_ms : float
-        Duration. [ms]
-    """
+    """One step at a pose, to any depth."""
 
     model: ReducedModel
     totals: FloatArray
+    """Coefficients of force and area at the pose, (n_terms, 2)."""
     amounts: FloatArray
+    """Those of the modes, (n_terms, n_modes)."""
     sheet_places: FloatArray
+    """Places of the sheet, in steps of the grid, (n_sheet, 2)."""
     springs: Springs
     sheet: _Filters
+    """State before the step."""
     kept: float
+    """Part of the skin below the contact that is still there after the way aside."""
     step_ms: float
+    """Duration. [ms]"""
 
     @cached_property
     def factors(self) -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -305,10 +293,8 @@ class _Press:
         return _Contact(terms, springs, sheet, max(float(force), 0.0), max(float(area), 0.0))
 
     def depth_of(self, force_mn: float, near_mm: float, further_mm: float) -> float:
-        """Depth below first touch at which the indenter presses with a force; infinite beyond the range.
-
-        It is looked for about `near_mm`, the depth before, and further on by as much as in the step before.
-        """
+        """Depth below first touch at which the indenter presses with a force; infinite beyond the range."""
+        # It is looked for about `near_mm`, the depth before, and further on by as much as in the step before.
 
         def missing_mn(at_mm: float) -> float:
             return self.to(at_mm).force_mn - force_mn
@@ -358,12 +344,7 @@ def _weights(share):  # type: ignore[no-untyped-def]
 
 @njit(cache=True, nogil=True)
 def read_local(fields, places):  # type: ignore[no-untyped-def]
-    """Read fields (n_grid, n_grid, n) at places (n_sites, 2) in steps of the grid; 0 outside of it.
-
-    Returns
-    -------
-    array (n, n_sites)
-    """
+    """Read fields (n_grid, n_grid, n) at places (n_sites, 2) in steps of the grid; 0 outside of it."""
     last, n = fields.shape[0] - 1, fields.shape[2]
     found = np.zeros((len(places), n))
     for site in range(len(places)):

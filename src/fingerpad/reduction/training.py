@@ -146,25 +146,18 @@ def _pair(name: str, values: tuple[float, float]) -> tuple[float, float]:
 
 @dataclass(frozen=True)
 class TrainingPose:
-    """One pose, and the presses there.
-
-    Parameters
-    ----------
-    values : tuple of float
-        Its place on each axis of the range.
-    first_touch_mm : float
-        Depth at which the indenter meets the undeformed skin, along the pressing of the touch and from its
-        first touch. [mm]
-    meets_mm : float
-        The same from the first touch at this place, before the indenter tilts. [mm]
-    touches : tuple of Touch
-        One per depth.
-    """
+    """One pose, and the presses there."""
 
     values: tuple[float, ...]
+    """Its place on each axis of the range."""
     first_touch_mm: float
+    """Depth at which the indenter meets the undeformed skin, along the pressing of the touch and from its
+    first touch. [mm]
+    """
     meets_mm: float
+    """The same from the first touch at this place, before the indenter tilts. [mm]"""
     touches: tuple[Touch, ...]
+    """One per depth."""
 
 
 @dataclass(frozen=True)
@@ -277,11 +270,9 @@ class ReducedTraining(metaclass=KnownKeywords):
 
 
 def _moved(base: Touch, x_mm: float, z_mm: float) -> tuple[Touch, float]:
-    """Touch whose indenter stands aside, and by how much deeper it meets the skin there. [mm]
-
-    It presses along the same line as one that has moved there, so its axis goes through another point of the
-    skin if it is tilted.
-    """
+    """Touch whose indenter stands aside, and by how much deeper it meets the skin there. [mm]"""
+    # It presses along the same line as one that has moved there, so its axis goes through another point of
+    # the skin if it is tilted.
     if x_mm == 0.0 and z_mm == 0.0:
         return base, 0.0
     axis, start_mm = base.placement.axis, base.placement.origin_mm + np.array([x_mm, 0.0, z_mm])
@@ -314,11 +305,6 @@ def first_touch_mm(touch: Touch, pose: Pose) -> float:
 
     From afar it advances by its gap, which is the distance to the skin or less: so it meets the skin with its
     face, however thin the body is behind that.
-
-    Raises
-    ------
-    InputError
-        If it passes by the skin.
     """
     if pose == STILL:
         return 0.0

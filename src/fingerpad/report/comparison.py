@@ -42,13 +42,7 @@ SETS = (
 
 
 def side_by_side(paper: Sequence[ClaimRow], human: Sequence[ClaimRow]) -> list[tuple[ClaimRow, Row]]:
-    """Return the rows that are no statement, each with its cells for both sets.
-
-    Parameters
-    ----------
-    paper, human : sequence of ClaimRow
-        The comparison of each set.
-    """
+    """Return the rows that are no statement, each with its cells for both sets."""
     by_name = [{row.quantity: row for row in rows} for rows in (paper, human)]
     stated = {row.quantity for row in (*paper, *human) if row.group is Group.STATEMENT}
     names = dict.fromkeys(row.quantity for row in (*paper, *human) if row.quantity not in stated)

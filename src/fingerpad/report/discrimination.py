@@ -101,19 +101,7 @@ def caption_noise(section: SphereDiscrimination) -> str:
 
 
 def observer_panels(section: SphereDiscrimination) -> list[Panel]:
-    """Titles and hit rates of Figure 7 in the paper's order.
-
-    Parameters
-    ----------
-    section : SphereDiscrimination
-        Of a run.
-
-    Returns
-    -------
-    list of (str, ObserverHitRates or None)
-        The codes (None for a measure without responses), the paper's noise on either side of its best, 10
-        noise matrices, and last the paper's best noise.
-    """
+    """Titles and hit rates of Figure 7 in the paper's order."""
     sums, variants, static = section.gradient_sum, section.variants, CODES["static"]
     best = f"σ₁ = {number(section.noise_sigma)}"
 

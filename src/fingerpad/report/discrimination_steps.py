@@ -37,17 +37,7 @@ EUCLIDEAN = (
 
 
 def draw_steps(sets: Mapping[str, SphereDiscrimination]) -> Figure:
-    """Draw Figure 3: what each code does, from left to right, and the hit rates of each set of tissues.
-
-    Parameters
-    ----------
-    sets : mapping of str to SphereDiscrimination
-        Of a run, by the names of the sets.
-
-    Returns
-    -------
-    Figure
-    """
+    """Draw Figure 3: what each code does, from left to right, and the hit rates of each set of tissues."""
     figure = new_figure(12.4, 4.4)
     figure.set_layout_engine("none")
     axes = figure.add_axes((0.0, 0.0, 1.0, 1.0))

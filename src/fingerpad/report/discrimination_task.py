@@ -43,20 +43,7 @@ def task_tables(found: TaskResult) -> list[Table]:
 
 
 def write_task_page(results: DiscriminationFile, folder: Path) -> Path:
-    """Write the page of a task, `discriminate.html`, and its figures.
-
-    Parameters
-    ----------
-    results : DiscriminationFile
-        From `discriminate`.
-    folder : Path
-        Where; made if needed.
-
-    Returns
-    -------
-    Path
-        The page.
-    """
+    """Write the page of a task, `discriminate.html`, and its figures."""
     found = results.discrimination
     parts = illustrated(
         found,

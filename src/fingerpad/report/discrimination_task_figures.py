@@ -48,17 +48,7 @@ _STYLES = (
 
 
 def draw_task_responses(found: TaskResult) -> Figure:
-    """Draw the responses to the standard and to comparisons, seen from the volar side.
-
-    Parameters
-    ----------
-    found : TaskResult
-        What the task found.
-
-    Returns
-    -------
-    Figure
-    """
+    """Draw the responses to the standard and to comparisons, seen from the volar side."""
     measure = main_decoding(found).measure
     what, unit = MEASURE_LABELS[measure]
     responses, places = found.responses[measure], found.population.positions_mm
@@ -122,17 +112,7 @@ def _differences(axes: Axes, places: FloatArray, difference: FloatArray, largest
 
 
 def draw_task_statistics(found: TaskResult) -> Figure:
-    """Draw the statistic of each code for every stimulus: mean and spread over noisy presentations.
-
-    Parameters
-    ----------
-    found : TaskResult
-        What the task found.
-
-    Returns
-    -------
-    Figure
-    """
+    """Draw the statistic of each code for every stimulus: mean and spread over noisy presentations."""
     decodings = [decoding for decoding in found.decodings if decoding.code != "ideal"]
     codes = list(dict.fromkeys(decoding.code for decoding in decodings))
     measures = list(dict.fromkeys(decoding.measure for decoding in decodings))
@@ -154,17 +134,7 @@ def draw_task_statistics(found: TaskResult) -> Figure:
 
 
 def draw_task_curves(found: TaskResult) -> Figure:
-    """Draw hit rates, psychometric curves with their bands, and hit rates of people.
-
-    Parameters
-    ----------
-    found : TaskResult
-        What the task found.
-
-    Returns
-    -------
-    Figure
-    """
+    """Draw hit rates, psychometric curves with their bands, and hit rates of people."""
     measures = list(dict.fromkeys(decoding.measure for decoding in found.decodings))
     figure = new_figure(min(10.0, 3.6 * len(measures) + 2.0), 4.6)
     grid = figure.subplots(1, len(measures), sharey=True, squeeze=False)
@@ -259,7 +229,6 @@ def caption_task_responses(found: TaskResult) -> str:
 
 
 def caption_task_statistics(found: TaskResult) -> str:
-    """Caption of the statistics."""
     return (
         "Statistic of the code for each stimulus: mean and standard deviation over noisy presentations, "
         f"noise σ₁ = {number(found.noise.sigma)}. Diamond and grey band: the standard, "
@@ -268,7 +237,6 @@ def caption_task_statistics(found: TaskResult) -> str:
 
 
 def caption_task_curves(found: TaskResult) -> str:
-    """Caption of the curves."""
     fitted = [side.fit for decoding in found.decodings for side in decoding.curves if side.fit]
     said = (
         "Hit rate of each comparison against the standard; bars are one standard deviation over the "

@@ -91,19 +91,7 @@ def draw_surface_profile(axes: Axes, profile: SurfaceProfile) -> None:
 
 
 def draw_pad(axes: Axes, skin: SkinResponse, quantity: str = "stored", reach_mm: float = 6.0) -> None:
-    """Draw a quantity at the end organs below the pad, at the last time.
-
-    Parameters
-    ----------
-    axes : Axes
-        Where.
-    skin : SkinResponse
-        What was pressed.
-    quantity : str
-        As of `SkinResponse.sample`.
-    reach_mm : float
-        How far from the object's axis. [mm]
-    """
+    """Draw a quantity at the end organs below the pad, at the last time."""
     low, high = -reach_mm, reach_mm
     x = skin.axis_x_mm + skin.pose.x_mm + np.linspace(low, high, 61)
     z = np.linspace(low, high, 61)
@@ -127,17 +115,7 @@ def draw_raster(axes: Axes, spikes: SpikeTrains | ResponseMap) -> None:
 
 
 def draw_map(axes: Axes, response: ResponseMap, quantity: str | None = None) -> None:
-    """Draw a quantity of every afferent at its place, seen onto the pad.
-
-    Parameters
-    ----------
-    axes : Axes
-        Where.
-    response : ResponseMap
-        Of a population.
-    quantity : {"static_rate_hz", "dynamic_rate_hz", "first_spike_latency_ms", "spike_count"}, optional
-        Which; by default the static rate, or the number of spikes of afferents whose spikes are counted.
-    """
+    """Draw a quantity of every afferent at its place, seen onto the pad."""
     quantity = quantity or ("spike_count" if response.rate_measure == COUNT else "static_rate_hz")
     mapped = {**QUANTITIES, "spike_count": ("whole touch", "spikes", "viridis", Normalize)}
     phase, label, colours, _ = mapped[one_of("quantity", quantity, tuple(mapped))]
@@ -191,17 +169,7 @@ def draw_hit_rates(axes: Axes, rates: HitRates) -> None:
 
 
 def draw_fit(axes: Axes, fit: FitResult, phase: str | None = None) -> None:
-    """Draw observed, fitted and predicted rates.
-
-    Parameters
-    ----------
-    axes : Axes
-        Where.
-    fit : FitResult
-        From `fit_recordings`.
-    phase : {"static", "dynamic"}, optional
-        By default the static one, if it was recorded.
-    """
+    """Draw observed, fitted and predicted rates."""
     recorded = recorded_phases(fit)
     by_default = "static" if "static" in recorded else recorded[0]
     draw_phase(axes, fit, one_of("phase", phase or by_default, tuple(recorded)))
@@ -221,17 +189,7 @@ def draw_parameters(axes: Axes, fit: SpikeFit) -> None:
 
 
 def draw_task(axes: Axes, task: TaskResult, measure: str | None = None) -> None:
-    """Draw hit rates and psychometric curves of all codes.
-
-    Parameters
-    ----------
-    axes : Axes
-        Where.
-    task : TaskResult
-        Of `discriminate`.
-    measure : {"static", "dynamic", "latency"}, optional
-        What is decoded; by default what the first decoding with an answer decodes.
-    """
+    """Draw hit rates and psychometric curves of all codes."""
     measures = tuple(dict.fromkeys(decoding.measure for decoding in task.decodings))
     draw_curves_of_measure(axes, task, one_of("measure", measure or main_decoding(task).measure, measures))
     axes.legend(fontsize="small")

@@ -31,24 +31,7 @@ _SUPERSCRIPT = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
 def number(value: float | None, digits: int = 3) -> str:
-    """Return a number with so many significant digits, or a dash for one that does not exist.
-
-    Parameters
-    ----------
-    value : float or None
-        Any number; None and NaN are what silent afferents and skipped steps leave.
-    digits : int
-        Significant digits of fractions; whole numbers keep all of theirs up to a million.
-
-    Returns
-    -------
-    str
-
-    Examples
-    --------
-    >>> number(0.8371), number(232000), number(8e-9), number(-0.25), number(None)
-    ('0.837', '232 000', '8 × 10⁻⁹', '−0.25', '–')
-    """
+    """Return a number with so many significant digits, or a dash for one that does not exist."""
     if value is None or math.isnan(value):
         return ABSENT
     if math.isinf(value):
@@ -70,37 +53,19 @@ def number(value: float | None, digits: int = 3) -> str:
 
 
 def fixed(value: float | None, decimals: int) -> str:
-    """Return a number with so many decimals, for columns of numbers.
-
-    Examples
-    --------
-    >>> fixed(0.9, 2), fixed(-0.1, 2), fixed(None, 2)
-    ('0.90', '−0.10', '–')
-    """
+    """Return a number with so many decimals, for columns of numbers."""
     if value is None or not math.isfinite(value):
         return number(value)
     return f"{value:.{decimals}f}".replace("-", "−")
 
 
 def joined(parts: Sequence[str]) -> str:
-    """Return a list as a sentence has it.
-
-    Examples
-    --------
-    >>> joined(["skin", "nerve", "percept"])
-    'skin, nerve and percept'
-    """
+    """Return a list as a sentence has it."""
     return " and ".join([", ".join(parts[:-1]), parts[-1]] if len(parts) > 1 else parts)
 
 
 def spelled(key: str) -> str:
-    """Return the name of a field in words, its unit in brackets.
-
-    Examples
-    --------
-    >>> spelled("peak_memory_mb"), spelled("largest_contact_mm2"), spelled("worst_scaled_jacobian")
-    ('peak memory [MB]', 'largest contact [mm²]', 'worst scaled jacobian')
-    """
+    """Return the name of a field in words, its unit in brackets."""
     words = key.split("_")
     for length, unit in ((2, _UNITS.get("_".join(words[-2:]))), (1, _UNITS.get(words[-1]))):
         if unit and len(words) > length:
@@ -127,15 +92,7 @@ _UNITS = {
 
 
 def plain(value: Any, digits: int = 3, longest: int = 8) -> str:
-    """Return any JSON value as a short text: lists above the longest by their size and range.
-
-    Examples
-    --------
-    >>> plain(["direct, by SuperLU.", "multigrid, 5 levels."])
-    'direct, by SuperLU; multigrid, 5 levels'
-    >>> plain(True), plain(0.5), plain("coarse"), plain([1, 2]), plain(list(range(40)))
-    ('yes', '0.5', 'coarse', '1, 2', '40 values, 0 … 39')
-    """
+    """Return any JSON value as a short text: lists above the longest by their size and range."""
     if isinstance(value, bool):
         return "yes" if value else "no"
     if value is None or isinstance(value, int | float):
@@ -155,22 +112,10 @@ def plain(value: Any, digits: int = 3, longest: int = 8) -> str:
 
 
 def whole_percent(share: float | None) -> str:
-    """Return a share in whole percent, or a dash for one that does not exist.
-
-    Examples
-    --------
-    >>> whole_percent(0.926), whole_percent(None)
-    ('93 %', '– %')
-    """
+    """Return a share in whole percent, or a dash for one that does not exist."""
     return f"{fixed(None if share is None else 100.0 * share, 0)} %"
 
 
 def with_error(value: float | None, error: float | None, decimals: int = 2) -> str:
-    """Return a number with its error, which no line break separates.
-
-    Examples
-    --------
-    >>> with_error(1.5, 0.25).replace(UNBROKEN, " ")
-    '1.50 ± 0.25'
-    """
+    """Return a number with its error, which no line break separates."""
     return f"{fixed(value, decimals)}{UNBROKEN}±{UNBROKEN}{fixed(error, decimals)}"

@@ -11,17 +11,7 @@ from fingerpad.report.parts import Chapter, Row, Table
 
 
 def manifest_chapter(manifest: Manifest) -> Chapter:
-    """Return the chapter: facts about the run, its stages, and versions of packages.
-
-    Parameters
-    ----------
-    manifest : Manifest or a subclass of it
-        Fields that are None or empty are left out.
-
-    Returns
-    -------
-    Chapter
-    """
+    """Return the chapter: facts about the run, its stages, and versions of packages."""
     facts = asdict(manifest)
     stages, packages = facts.pop("stages"), facts.pop("packages")
     tables = [facts_table("The run", facts)]
@@ -39,12 +29,6 @@ def edition(manifest: Manifest) -> str:
 
 
 def facts_table(title: str, facts: Mapping[str, object]) -> Table:
-    """Return names and values as a table; what is None or empty is left out.
-
-    Examples
-    --------
-    >>> facts_table("The run", {"wall_s": 4.2, "command": None}).rows
-    [Row(cells=('wall [s]', '4.2'), kind='')]
-    """
+    """Return names and values as a table; what is None or empty is left out."""
     given = {name: value for name, value in facts.items() if value is not None and value not in ({}, ())}
     return Table(title, ("", ""), [Row((spelled(name), plain(value))) for name, value in given.items()])

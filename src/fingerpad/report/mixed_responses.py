@@ -41,10 +41,6 @@ def draw_mixed_responses(touches: Mapping[str, Mapping[str, ResponseMap]]) -> Fi
     touches : mapping of str to mapping of str to ResponseMap
         Responses by the name of the touch and by type, such as `MixedResponse.maps`.
 
-    Returns
-    -------
-    Figure
-
     Raises
     ------
     InputError

@@ -19,34 +19,7 @@ VERDICTS = {"✓": "met", "✗": "missed", "?": "open"}
 
 
 def write_html(page: Page, path: Path) -> Path:
-    """Write a page as one HTML file that holds its figures; they are also written beside it in `figures/`.
-
-    Parameters
-    ----------
-    page : Page
-        What to write.
-    path : Path
-        The file. All figures are drawn before the first file is written, and each file is written whole.
-
-    Returns
-    -------
-    Path
-        The file.
-
-    Raises
-    ------
-    StoreError
-        If the folder cannot be written.
-
-    Examples
-    --------
-    >>> from tempfile import TemporaryDirectory
-    >>> from fingerpad.report.parts import Chapter, Paragraph
-    >>> page = Page("Skin", "A sphere", ["It yields."], [Chapter("Depth", [Paragraph("1 mm.")])])
-    >>> with TemporaryDirectory() as folder:
-    ...     "<p>1 mm.</p>" in write_html(page, Path(folder) / "skin.html").read_text(encoding="utf-8")
-    True
-    """
+    """Write a page as one HTML file that holds its figures; they are also written beside it in `figures/`."""
     images = images_of(page)
     environment = Environment(
         loader=PackageLoader("fingerpad.report", "."),

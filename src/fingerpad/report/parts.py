@@ -18,81 +18,52 @@ COLUMNS = ("paper", "human")
 
 @dataclass(frozen=True)
 class Paragraph:
-    """A paragraph.
-
-    Parameters
-    ----------
-    text : str
-        Plain text; links as `[text](address)` and code in backticks, as in Markdown.
-    """
+    """A paragraph."""
 
     text: str
+    """Plain text; links as `[text](address)` and code in backticks, as in Markdown."""
 
 
 @dataclass(frozen=True)
 class Row:
-    """A row of a table.
-
-    Parameters
-    ----------
-    cells : sequence of str
-        Finished texts, the first is the row's heading.
-    kind : str, optional
-        How the row is marked.
-    """
+    """A row of a table."""
 
     cells: Sequence[str]
+    """Finished texts, the first is the row's heading."""
     kind: Kind = ""
+    """How the row is marked."""
 
 
 @dataclass(frozen=True)
 class Table:
-    """A table.
-
-    Parameters
-    ----------
-    title : str
-        Its heading.
-    columns : sequence of str
-        Headings with units; all empty where the table lists names and values.
-    rows : sequence of Row
-        One cell per column.
-    note : str, optional
-        A sentence below it.
-    """
+    """A table."""
 
     title: str
+    """Its heading."""
     columns: Sequence[str]
+    """Headings with units; all empty where the table lists names and values."""
     rows: Sequence[Row]
+    """One cell per column."""
     note: str = ""
+    """A sentence below it."""
 
 
 @dataclass(frozen=True)
 class Drawing:
-    """A figure with its caption.
-
-    Parameters
-    ----------
-    name : str
-        Name of the image file, without its ending.
-    title : str
-        A few words.
-    draw : callable
-        Makes the figure.
-    caption : str
-        What it shows.
-    number : int, optional
-        Figures up to 9 of a reproduction have the paper's numbers; others go on from 10.
-    human : callable, optional
-        Makes the same figure of the set `human`, to stand on the right; `draw` is then that of `paper`.
-    """
+    """A figure with its caption."""
 
     name: str
+    """Name of the image file, without its ending."""
     title: str
+    """A few words."""
     draw: Callable[[], Figure]
+    """Makes the figure."""
     caption: str
+    """What it shows."""
     number: int | None = None
+    """Figures up to 9 of a reproduction have the paper's numbers; others go on from 10."""
     human: Callable[[], Figure] | None = None
+    """Makes the same figure of the set `human`, to stand on the right; `draw` is then that of `paper`."""
 
     @property
     def images(self) -> dict[str, Callable[[], Figure]]:
@@ -104,13 +75,7 @@ class Drawing:
 
     @property
     def label(self) -> str:
-        """Number and title.
-
-        Examples
-        --------
-        >>> Drawing("figure_9_nail", "The nail", Figure, "Stress.", number=9).label
-        'Figure 9. The nail'
-        """
+        """Number and title."""
         return self.title if self.number is None else f"Figure {self.number}. {self.title}"
 
 
@@ -123,21 +88,7 @@ def illustrated(
     tables: Callable[[_Section], Sequence[Table]] | None,
     *figures: tuple[int, str, str, Callable[[_Section], Figure], Callable[[_Section], str]],
 ) -> list[Part]:
-    """Return the figures of a part of the results, then its tables.
-
-    Parameters
-    ----------
-    section : Any
-        The part; None, for one that was not computed, has neither.
-    tables : callable or None
-        Makes its tables.
-    *figures : tuple
-        Number, file name and title of each figure, and the functions that draw and caption it.
-
-    Returns
-    -------
-    list of Drawing and Table
-    """
+    """Return the figures of a part of the results, then its tables."""
     if section is None:
         return []
     drawings = [
@@ -149,31 +100,18 @@ def illustrated(
 
 @dataclass(frozen=True)
 class Chapter:
-    """A heading and what stands below it.
-
-    Parameters
-    ----------
-    title : str
-        The heading; empty for parts that follow the introduction directly.
-    parts : sequence of Paragraph, Table or Drawing
-        In order.
-    folded : sequence of Paragraph, Table or Drawing, optional
-        What stands below them behind a fold.
-    """
+    """A heading and what stands below it."""
 
     title: str
+    """The heading; empty for parts that follow the introduction directly."""
     parts: Sequence[Part]
+    """In order."""
     folded: Sequence[Part] = ()
+    """What stands below them behind a fold."""
 
     @property
     def anchor(self) -> str:
-        """Name for links within the page.
-
-        Examples
-        --------
-        >>> Chapter("Level 1: skin", ()).anchor
-        'level-1-skin'
-        """
+        """Name for links within the page."""
         kept = "".join(letter if letter.isalnum() else " " for letter in self.title.lower())
         return "-".join(kept.split())
 
@@ -192,34 +130,24 @@ class Chapter:
 
     @property
     def tables(self) -> list[Table]:
-        """Tables of the chapter."""
         return [part for part in (*self.parts, *self.folded) if isinstance(part, Table)]
 
 
 @dataclass(frozen=True)
 class Page:
-    """A page.
-
-    Parameters
-    ----------
-    heading, subtitle : str
-        Title, and what the page is about.
-    paragraphs : sequence of str
-        Summary; links and code as in `Paragraph`.
-    chapters : sequence of Chapter
-        In order.
-    opening : sequence of Drawing, optional
-        Small figures after the summary, each with one sentence as its caption.
-    verdicts : Table, optional
-        What stands beside them.
-    """
+    """A page."""
 
     heading: str
     subtitle: str
+    """Title, and what the page is about."""
     paragraphs: Sequence[str]
+    """Summary; links and code as in `Paragraph`."""
     chapters: Sequence[Chapter]
+    """In order."""
     opening: Sequence[Drawing] = ()
+    """Small figures after the summary, each with one sentence as its caption."""
     verdicts: Table | None = None
+    """What stands beside them."""
 
     @property
     def drawings(self) -> list[Drawing]:

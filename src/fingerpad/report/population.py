@@ -57,13 +57,7 @@ def _span(values: FloatArray) -> tuple[float, float]:
 
 
 def round_ticks(scale: Normalize) -> list[float]:
-    """Return the round numbers within a logarithmic scale.
-
-    Examples
-    --------
-    >>> round_ticks(LogNorm(4.0, 60.0))
-    [5.0, 10.0, 20.0, 50.0]
-    """
+    """Return the round numbers within a logarithmic scale."""
     return [tick for tick in TICKS_MS if 0.0 <= float(scale(tick, clip=False)) <= 1.0]
 
 

@@ -25,21 +25,7 @@ def draw_profile(
     fitted: float | None,
     credible: tuple[float, float] | None = None,
 ) -> None:
-    """Draw one profile: its points, the level at which the interval ends, the fit, the posterior's interval.
-
-    Parameters
-    ----------
-    axes : Axes
-        An empty panel.
-    profile : ParameterProfile
-        What is drawn.
-    unit : str
-        Of the number.
-    fitted : float or None
-        Value of the fit.
-    credible : (float, float), optional
-        Ends of the credible interval, where one was drawn.
-    """
+    """Draw one profile: its points, the level of the interval, the fit, the posterior's interval."""
     axes.plot(profile.values, profile.losses, ".-", color=BLACK, linewidth=1.2)
     axes.axhline(ALLOWED_LOSS, color=GREY, linestyle="--", linewidth=1.0)
     if fitted is not None:
@@ -51,26 +37,12 @@ def draw_profile(
 
 
 def profile_ends(profile: ParameterProfile) -> str:
-    """Return the interval of a profile as text; an end that the rates do not set is open.
-
-    Examples
-    --------
-    >>> profile_ends(ParameterProfile(name="time_constant_ms", values=[], losses=[], low=0.5, high=None))
-    '0.5 … open'
-    """
+    """Return the interval of a profile as text; an end that the rates do not set is open."""
     return " … ".join("open" if end is None else number(end) for end in (profile.low, profile.high))
 
 
 def draw_indices(axes: Axes, found: FssSensitivity) -> None:
-    """Draw first-order and total indices of each number, as bars with their confidence intervals.
-
-    Parameters
-    ----------
-    axes : Axes
-        An empty panel.
-    found : FssSensitivity
-        Indices of the four numbers.
-    """
+    """Draw first-order and total indices of each number, as bars with their confidence intervals."""
     for indices, half_width, label, colour, side, hatch in (
         (found.total, found.total_half_width, "with others", BLUE, -0.19, ""),
         (found.first, found.first_half_width, "alone", "white", 0.19, "////"),
@@ -95,19 +67,7 @@ def draw_indices(axes: Axes, found: FssSensitivity) -> None:
 
 
 def sensitivity_table(found: FssSensitivity, units: Mapping[str, str]) -> Table:
-    """Return Sobol's indices of the four numbers and the ranges that they belong to.
-
-    Parameters
-    ----------
-    found : FssSensitivity
-        Indices of the four numbers.
-    units : mapping of str to str
-        Units of the four numbers.
-
-    Returns
-    -------
-    Table
-    """
+    """Return Sobol's indices of the four numbers and the ranges that they belong to."""
     rows = [
         Row(
             (

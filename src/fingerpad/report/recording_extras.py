@@ -17,17 +17,7 @@ _Part = TypeVar("_Part")
 
 
 def draw_profiles(found: FitResult) -> Figure:
-    """Draw the profile of each of the four numbers.
-
-    Parameters
-    ----------
-    found : FitResult
-        From `fit_recordings`.
-
-    Returns
-    -------
-    Figure
-    """
+    """Draw the profile of each of the four numbers."""
     figure = new_figure(10.0, 3.2)
     intervals = found.posterior.interval if found.posterior else {}
     panels = figure.subplots(1, len(_present(found.profiles)), sharey=True)
@@ -40,7 +30,6 @@ def draw_profiles(found: FitResult) -> Figure:
 
 
 def caption_profiles(found: FitResult) -> str:
-    """Caption of the profiles."""
     beneath = ", the bar below it the credible interval" if found.posterior else ""
     return (
         "Loss of log likelihood with one parameter held and the others fitted again. Values below the dashed "
@@ -90,17 +79,7 @@ def sensitivity_tables(found: FitResult) -> list[Table]:
 
 
 def draw_offset(found: FitResult) -> Figure:
-    """Draw the best FSS with the receptor held at each offset, and the offsets of the fit and the folds.
-
-    Parameters
-    ----------
-    found : FitResult
-        From `fit_recordings`.
-
-    Returns
-    -------
-    Figure
-    """
+    """Draw the best FSS with the receptor held at each offset, and the offsets of the fit and the folds."""
     offset = _present(found.offset)
     figure = new_figure(6.5, 3.8)
     axes = figure.subplots()

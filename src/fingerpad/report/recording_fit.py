@@ -45,17 +45,7 @@ LONGEST_LABEL = 12
 
 
 def draw_fit(found: FitResult) -> Figure:
-    """Draw observed rates with the prediction fitted to all, and that made without each stimulus.
-
-    Parameters
-    ----------
-    found : FitResult
-        From `fit_recordings`.
-
-    Returns
-    -------
-    Figure
-    """
+    """Draw observed rates with the prediction fitted to all, and that made without each stimulus."""
     figure = new_figure(10.0, 4.5)
     phases = recorded_phases(found)
     for axes, phase in zip(np.ravel(figure.subplots(1, len(phases))), phases, strict=True):
@@ -89,17 +79,7 @@ def draw_phase(axes: Axes, found: FitResult, phase: str) -> None:
 
 
 def draw_fit_residuals(found: FitResult) -> Figure:
-    """Draw the residuals: observed less predicted rates, in and out of sample.
-
-    Parameters
-    ----------
-    found : FitResult
-        From `fit_recordings`.
-
-    Returns
-    -------
-    Figure
-    """
+    """Draw the residuals: observed less predicted rates, in and out of sample."""
     figure = new_figure(10.0, 4.0)
     phases = _recorded(found)
     where, order = _places(found)
@@ -131,7 +111,6 @@ def caption_fit(found: FitResult) -> str:
 
 
 def caption_fit_residuals(found: FitResult) -> str:
-    """Caption of the residuals."""
     worst = []
     for phase, rates, observed_hz in _recorded(found):
         residual = observed_hz - rates.out_of_sample_hz

@@ -52,25 +52,7 @@ ALL_DIGITS, ALL_VALUES = 12, 1000
 
 
 def write_report(result: ReproductionResult, folder: Path) -> Path:
-    """Write the page of a reproduction, `report.html` with its figures, and the figures as `figures/*.png`.
-
-    Parameters
-    ----------
-    result : ReproductionResult
-        From `fingerpad.experiments.gerling2014.reproduce`.
-    folder : Path
-        Made if needed; every file in it is written whole or not at all.
-
-    Returns
-    -------
-    Path
-        The page.
-
-    Raises
-    ------
-    StoreError
-        If the folder cannot be written.
-    """
+    """Write the page of a reproduction, `report.html`, and its figures as `figures/*.png`."""
     return write_html(reproduction_page(result), Path(folder) / "report.html")
 
 

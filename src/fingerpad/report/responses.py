@@ -29,20 +29,6 @@ def draw_responses(responses: Mapping[str, ResponseMap]) -> Figure:
 
     They are seen from below, x to the right. Receptors on the dorsal side (y above 0) are squares; hollow
     ones do not respond. A column has one scale.
-
-    Parameters
-    ----------
-    responses : mapping of str to ResponseMap
-        Responses by the name of the population, of the touch, or both.
-
-    Returns
-    -------
-    Figure
-
-    Raises
-    ------
-    InputError
-        If there is none.
     """
     if not responses:
         raise InputError("responses must hold at least one population: it is empty.")

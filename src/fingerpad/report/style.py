@@ -63,13 +63,7 @@ class LineStyle(TypedDict, total=False):
 
 
 def numbers(values: Any) -> FloatArray:
-    """Return nested lists of numbers as an array; None becomes NaN.
-
-    Examples
-    --------
-    >>> numbers([1, None])
-    array([ 1., nan])
-    """
+    """Return nested lists of numbers as an array; None becomes NaN."""
     return np.array(values, dtype=np.float64)
 
 

@@ -28,17 +28,7 @@ NOTE = (
 
 
 def tissue_table(layers: Sequence[TissueLayer]) -> Table:
-    """Return one row per set and layer.
-
-    Parameters
-    ----------
-    layers : sequence of TissueLayer
-        From `fingerpad.experiments.tissue_sets.tissue_layers`.
-
-    Returns
-    -------
-    Table
-    """
+    """Return one row per set and layer."""
     rows = [
         Row(
             (

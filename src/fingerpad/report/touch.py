@@ -126,19 +126,7 @@ def draw(skin: SkinResponse, response: ResponseMap, indenter: Indenter | None = 
 def draw_section(
     axes: Axes, skin: SkinResponse, indenter: Indenter | None = None, quantity: str = STORED_ENERGY
 ) -> None:
-    """Draw the middle plane of the pressed finger at the end of the touch.
-
-    Parameters
-    ----------
-    axes : Axes
-        An empty panel.
-    skin : SkinResponse
-        What is drawn.
-    indenter : Indenter, optional
-        The body that pressed.
-    quantity : str, optional
-        What colours it, as of `SkinResponse.at_end`. Default: strain energy density.
-    """
+    """Draw the middle plane of the pressed finger at the end of the touch."""
     section, (name, values) = skin.section(), skin.at_end(quantity)
     shown = values[section.elements]
     largest = float(shown.max()) or 1.0

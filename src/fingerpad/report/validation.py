@@ -25,17 +25,7 @@ QUANTITIES = {"N": "force", "mm": "deflection", "spikes/s": "firing rate"}
 
 
 def draw_validation(results: ValidationFile) -> Figure:
-    """Draw the observed values and their range over the prediction of each condition.
-
-    Parameters
-    ----------
-    results : ValidationFile
-        From `validate`.
-
-    Returns
-    -------
-    Figure
-    """
+    """Draw the observed values and their range over the prediction of each condition."""
     figure = new_figure(6.5, 5.5)
     axes = figure.subplots()
     shown = [row for row in results.predictions if np.isfinite(row.predicted)]
@@ -77,20 +67,7 @@ def caption_validation(results: ValidationFile) -> str:
 
 
 def write_validation_page(results: ValidationFile, folder: Path) -> Path:
-    """Write the page of a validation, `validate.html`, and its figure.
-
-    Parameters
-    ----------
-    results : ValidationFile
-        From `validate`.
-    folder : Path
-        Where; made if needed.
-
-    Returns
-    -------
-    Path
-        The page.
-    """
+    """Write the page of a validation, `validate.html`, and its figure."""
     quantity = QUANTITIES[results.unit]
     drawing = Drawing(
         "validation",

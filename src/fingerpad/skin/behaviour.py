@@ -41,18 +41,12 @@ _SHOWING = ("__repr__", "_repr_html_", "plot")
 
 @dataclass(frozen=True)
 class Behaviour:
-    """Hashes of some sources.
-
-    Parameters
-    ----------
-    code : str
-        Hash of all of them, 16 hexadecimal digits.
-    classes : mapping of str to str
-        Tag of each class by its name, 16 hexadecimal digits.
-    """
+    """Hashes of some sources."""
 
     code: str
+    """Hash of all of them, 16 hexadecimal digits."""
     classes: Mapping[str, str]
+    """Tag of each class by its name, 16 hexadecimal digits."""
 
 
 def code_hash() -> str:
@@ -66,27 +60,7 @@ def own_class_tag(name: str) -> str | None:
 
 
 def behaviour_of(sources: Sequence[str], modules: frozenset[str] = frozenset()) -> Behaviour:
-    """Hash some sources; their order does not matter.
-
-    Parameters
-    ----------
-    sources : sequence of str
-        Text of each file.
-    modules : frozenset of str
-        Dotted names of all modules of the package. The local name of an imported module does not count.
-
-    Returns
-    -------
-    Behaviour
-
-    Examples
-    --------
-    >>> one, other = "class Ball: radius = 2  # mm", "class Sphere: radius = 2"
-    >>> behaviour_of([one]).code == behaviour_of([other]).code
-    True
-    >>> behaviour_of([one]).code == behaviour_of([one.replace("2", "3")]).code
-    False
-    """
+    """Hash some sources; their order does not matter."""
     readers = [_Reader(modules) for _ in sources]
     texts = [reader.text(ast.parse(source)) for reader, source in zip(readers, sources, strict=True)]
     bodies = sorted(body for reader in readers for body in reader.classes)
@@ -125,16 +99,10 @@ def _python_files(folder: Traversable) -> Iterator[Traversable]:
 
 
 class _Reader:
-    """Writes the syntax tree of one file as text, the same for trees that do the same.
+    """Writes the syntax tree of one file as text, the same for trees that do the same."""
 
-    Identifiers stand in angle brackets. Own code, not `ast.dump`, whose text differs between versions of
-    Python.
-
-    Parameters
-    ----------
-    modules : frozenset of str
-        Dotted names of the package's modules.
-    """
+    # Identifiers stand in angle brackets. Own code, not `ast.dump`, whose text differs between versions of
+    # Python.
 
     def __init__(self, modules: frozenset[str]):
         self.modules = modules

@@ -33,31 +33,15 @@ presses whose meshes docs/presses.md compares. Skin that snaps round an edge wit
 
 @dataclass(frozen=True)
 class Caveat:
-    """One quantity of a result that lies outside of what was verified.
-
-    Parameters
-    ----------
-    name : str
-        The quantity, such as "strain".
-    value, limit : float
-        What it is, and up to where results were verified.
-    text : str
-        A sentence with both.
-
-    Examples
-    --------
-    >>> from fingerpad.geometry.fingertip import Fingertip
-    >>> from fingerpad.geometry.indenters import Sphere
-    >>> from fingerpad.geometry.motion import RampAndHold
-    >>> from fingerpad.skin.indentation import indent
-    >>> indent(Fingertip(), Sphere(curvature_per_m=287), RampAndHold(0.5)).caveats
-    ()
-    """
+    """One quantity of a result that lies outside of what was verified."""
 
     name: str
+    """The quantity, such as "strain"."""
     value: float
     limit: float
+    """What it is, and up to where results were verified."""
     text: str
+    """A sentence with both."""
 
 
 def strain(skin: SkinResponse) -> Caveat | None:

@@ -42,19 +42,7 @@ _WRITTEN = frozenset(
 
 
 def class_tag(kind: type) -> str:
-    """Identify a class in the key of a stored indentation, whatever its name.
-
-    Raises
-    ------
-    InputError
-        If a class of a user's own refers to a value that has no fixed content.
-
-    Examples
-    --------
-    >>> from fingerpad.geometry.indenters import Cylinder, Sphere
-    >>> class_tag(Sphere) == class_tag(Cylinder), class_tag(dict)
-    (False, 'builtins builtins.dict')
-    """
+    """Identify a class in the key of a stored indentation, whatever its name."""
     return own_class_tag(kind.__name__) or kind.__name__ if _is_own(kind.__module__) else _Tagger().tag(kind)
 
 

@@ -39,46 +39,30 @@ class Times(Enum):
 
 @dataclass(frozen=True)
 class Field:
-    """One field of an indentation.
-
-    Parameters
-    ----------
-    name : str
-        Name in `SkinResponse.fields` and in stored files.
-    unit : str
-        Unit; empty for a pure number.
-    long_name : str
-        What it is, in words for an axis or a legend.
-    place : Place
-        Where it has values.
-    of : callable
-        Computes it from a `Deformation` and its mesh: array (n_times, n_places, n_components), without an
-        axis of places for `Place.PRESS` and without one of components for a scalar.
-    components : int
-        Number of components: 1 of a scalar, 3 of a vector, 6 of a symmetric tensor.
-    stored : Times
-        Times at which it is stored. Fields at places are stored in single precision.
-    sampled : str
-        Name under which receptors sample it, see `SkinResponse.sample`; empty if they do not. It needs a
-        scalar of elements that is stored at all times and is never negative.
-    exported : str
-        Name in VTU files; empty if it is not exported.
-
-    Examples
-    --------
-    >>> FIELDS["von_mises"].unit, FIELDS["von_mises"].sampled, FIELDS["von_mises"].exported
-    ('kPa', 'von_mises', 'von_mises_kpa')
-    """
+    """One field of an indentation."""
 
     name: str
+    """Name in `SkinResponse.fields` and in stored files."""
     unit: str
+    """Unit; empty for a pure number."""
     long_name: str
+    """What it is, in words for an axis or a legend."""
     place: Place
+    """Where it has values."""
     of: Callable[[Deformation, Mesh], FloatArray]
+    """Computes it from a `Deformation` and its mesh: array (n_times, n_places, n_components), without an axis
+    of places for `Place.PRESS` and without one of components for a scalar.
+    """
     components: int = 1
+    """Number of components: 1 of a scalar, 3 of a vector, 6 of a symmetric tensor."""
     stored: Times = Times.NONE
+    """Times at which it is stored. Fields at places are stored in single precision."""
     sampled: str = ""
+    """Name under which receptors sample it, see `SkinResponse.sample`; empty if they do not. It needs a
+    scalar of elements that is stored at all times and is never negative.
+    """
     exported: str = ""
+    """Name in VTU files; empty if it is not exported."""
 
     def shape(self, mesh: Mesh, n_times: int) -> tuple[int, ...]:
         """Shape of the stored array."""
@@ -315,11 +299,5 @@ def stored_fields() -> tuple[Field, ...]:
 
 
 def sampled_fields() -> dict[str, Field]:
-    """Fields that may drive an afferent, by the names under which receptors sample them.
-
-    Examples
-    --------
-    >>> list(sampled_fields())
-    ['stored', 'instantaneous', 'work', 'von_mises', 'compressive_strain', 'compressive_stress']
-    """
+    """Fields that may drive an afferent, by the names under which receptors sample them."""
     return {field.sampled: field for field in FIELDS.values() if field.sampled}

@@ -31,31 +31,20 @@ _LARGEST_WEIGHT = 1e3
 
 @dataclass(frozen=True)
 class Interpolation:
-    """Elements near each site and their weights.
-
-    Parameters
-    ----------
-    elements : int array (n_sites, n_neighbours)
-        Rows of the elements around the end organs.
-    weights : array (n_sites, n_neighbours)
-        Their sum is 1.
-    """
+    """Elements near each site and their weights."""
 
     elements: IntArray
+    """Rows of the elements around the end organs, (n_sites, n_neighbours)."""
     weights: FloatArray
+    """Their sum is 1, (n_sites, n_neighbours)."""
 
 
 @dataclass(frozen=True)
 class FreeReceptors:
-    """End organs of a mesh of one's own.
-
-    Parameters
-    ----------
-    mesh : FreeMesh
-        The undeformed body.
-    """
+    """End organs of a mesh of one's own."""
 
     mesh: FreeMesh
+    """The undeformed body."""
 
     def below(self, sites_mm: FloatArray) -> Interpolation:
         """Find end organs below points of the skin, on any side; InputError if one is not on the skin."""

@@ -34,15 +34,6 @@ def coefficients(values: FloatArray) -> FloatArray:
 
     The influence of a value falls to 27 % from one point to the next. At the ends the slope is 0, so a grid
     is continued by some 20 points beyond the range of interest first.
-
-    Parameters
-    ----------
-    values : array (n_rows, n_columns, n_quantities)
-        On the grid.
-
-    Returns
-    -------
-    array (n_rows, n_columns, n_quantities)
     """
     n_rows, n_columns, n_quantities = values.shape
     found = np.array(values, dtype=np.float64, order="C")
@@ -53,10 +44,8 @@ def coefficients(values: FloatArray) -> FloatArray:
 
 @njit(cache=True, error_model="numpy", nogil=True)
 def _solve_along(lines: FloatArray) -> None:
-    """Solve (c_(i-1) + 4 c_i + c_(i+1))/6 = f_i along lines (n_sets, n_points, n_lines), in place.
-
-    The slope is 0 at the ends. Gaussian elimination, point after point for all lines of a set.
-    """
+    """Solve (c_(i-1) + 4 c_i + c_(i+1))/6 = f_i along lines (n_sets, n_points, n_lines), in place."""
+    # The slope is 0 at the ends. Gaussian elimination, point after point for all lines of a set.
     n_sets, n_points, n_lines = lines.shape
     upper = np.empty(n_points)
     upper[0] = 0.5
@@ -136,49 +125,10 @@ def _add_near(known: FloatArray, first: int, at: int, along: Four, around: Four,
 
 
 def values_at(known: FloatArray, uv: FloatArray, padding: int) -> FloatArray:
-    """Interpolate.
-
-    Parameters
-    ----------
-    known : array (n_rows, n_columns, n_quantities)
-        `coefficients` on the grid, which begins `padding` rows and columns before u = 0 and v = 0.
-    uv : array (n_places, 2)
-        Where; at least one row and column from the first, and two from the last.
-    padding : int
-        Rows and columns before 0.
-
-    Returns
-    -------
-    array (n_places, n_quantities)
-
-    Examples
-    --------
-    >>> u, v = np.indices((41, 41)) - 20.0
-    >>> known = coefficients((u * u * v)[:, :, None])
-    >>> values_at(known, np.array([[1.5, 2.0]]), 20).round(6).tolist()
-    [[4.5]]
-    """
+    """Interpolate."""
     return _interpolated(known, uv, padding)
 
 
 def values_and_slopes_at(known: FloatArray, uv: FloatArray, padding: int) -> FloatArray:
-    """Interpolate, and differentiate by u and by v.
-
-    Parameters
-    ----------
-    known, uv, padding
-        As in `values_at`.
-
-    Returns
-    -------
-    array (3, n_places, n_quantities)
-        Values, their derivatives by u, those by v.
-
-    Examples
-    --------
-    >>> u, v = np.indices((41, 41)) - 20.0
-    >>> known = coefficients((u * u * v)[:, :, None])
-    >>> values_and_slopes_at(known, np.array([[1.5, 2.0]]), 20).ravel().round(6).tolist()
-    [4.5, 6.0, 2.25]
-    """
+    """Interpolate, and differentiate by u and by v."""
     return _with_slopes(known, uv, padding)

@@ -136,10 +136,6 @@ class NailEdge(metaclass=KnownKeywords):
         width_mm : float
             Its width from the edge, at most the reach. [mm]
 
-        Returns
-        -------
-        Polygon
-
         Raises
         ------
         InputError

@@ -59,20 +59,10 @@ Surface = Callable[[FloatArray], FloatArray]
 
 @dataclass(frozen=True)
 class ReceptorSheet:
-    """The elements just above the epidermal-dermal border, and coordinates on them.
-
-    Parameters
-    ----------
-    mesh : Mesh
-        The undeformed body.
-
-    Raises
-    ------
-    InputError
-        If it has no living epidermis, or only one element along or around.
-    """
+    """The elements just above the epidermal-dermal border, and coordinates on them."""
 
     mesh: Mesh
+    """The undeformed body."""
 
     def __post_init__(self) -> None:
         shape = self.mesh.living_epidermis.shape
@@ -82,23 +72,7 @@ class ReceptorSheet:
             raise InputError(f"Sampling needs two elements along and around, or more: got {shape}.")
 
     def below(self, sites_mm: FloatArray) -> FloatArray:
-        """Find end organs below points of the skin, on any side of the finger.
-
-        Parameters
-        ----------
-        sites_mm : array (n_sites, 3)
-            x, y and z. [mm]
-
-        Returns
-        -------
-        array (n_sites, 2)
-            u and v, for `read`.
-
-        Raises
-        ------
-        InputError
-            If a site is not on the skin.
-        """
+        """Find end organs below points of the skin, on any side of the finger."""
         target = self._in_mesh(sites_mm)
         start = self._middles[_nearest(self._skin(self._middles)[0], target)]
         uv, missed = self._solve(lambda uv, which: _tangential(self._skin(uv), target[which]), start)
@@ -116,23 +90,7 @@ class ReceptorSheet:
         return self._below(uv)
 
     def under(self, organs_mm: FloatArray) -> FloatArray:
-        """Find end organs by their own x and z, on the volar side.
-
-        Parameters
-        ----------
-        organs_mm : array (n_sites, 2)
-            x and z. [mm]
-
-        Returns
-        -------
-        array (n_sites, 2)
-            u and v, for `read`.
-
-        Raises
-        ------
-        InputError
-            If no point of the volar side has this x and z.
-        """
+        """Find end organs by their own x and z, on the volar side."""
         target = self._in_mesh(organs_mm)
         volar = self._middles[self._volar.ravel()]
         start = volar[_nearest(self._centre(volar)[0][:, [0, 2]], target)]
@@ -147,19 +105,7 @@ class ReceptorSheet:
         return uv
 
     def read(self, uv: FloatArray, values: FloatArray) -> FloatArray:
-        """Interpolate values of the sheet's elements.
-
-        Parameters
-        ----------
-        uv : array (n_sites, 2)
-            From `below` or `under`.
-        values : array (n_times, n_sheet)
-            Of the elements `mesh.living_epidermis`, flattened.
-
-        Returns
-        -------
-        array (n_times, n_sites)
-        """
+        """Interpolate values of the sheet's elements."""
 
         def at_times(times: slice) -> FloatArray:
             some = np.asarray(values[times], dtype=np.float64).T
@@ -217,10 +163,8 @@ class ReceptorSheet:
 
     @cached_property
     def _limits(self) -> tuple[tuple[float, float], tuple[float, float]]:
-        """Smallest and largest u and v: half an element past the last middle at a mirror or pole, else one.
-
-        Where elements grow towards a rim, it lies a little more than half a step beyond the last middle.
-        """
+        """Smallest and largest u and v: half an element past the last middle at a mirror or pole."""
+        # Where elements grow towards a rim, it lies a little more than half a step beyond the last middle.
         n_along, n_around = self.mesh.living_epidermis.shape
         if self._closed:
             around = 0.0, float(n_around)
@@ -291,11 +235,9 @@ class ReceptorSheet:
         return by_u[:, 0] * by_v[:, 2] - by_u[:, 2] * by_v[:, 0]
 
     def _padded_points(self, through: int) -> FloatArray:
-        """Middles of the faces of one level of the grid, lifted onto the surface of its nodes, padded.
-
-        The middle of a face's corners lies below that surface. Cubics through four nodes, along and around
-        the finger, give the distance.
-        """
+        """Middles of the faces of one level of the grid, lifted onto the surface of its nodes, padded."""
+        # The middle of a face's corners lies below that surface. Cubics through four nodes, along and around
+        # the finger, give the distance.
         nodes = self.mesh.nodes_mm[self.mesh.grid[:, :, through]]
         middles = 0.25 * (nodes[:-1, :-1] + nodes[1:, :-1] + nodes[1:, 1:] + nodes[:-1, 1:])
         bulge = np.zeros_like(middles)
@@ -347,17 +289,7 @@ class ReceptorSheet:
         return np.where(inside_out, -1.0, 1.0) * normal / np.linalg.norm(normal, axis=1, keepdims=True)
 
     def _control(self, known: FloatArray, mirror: float | FloatArray, pole: FloatArray) -> FloatArray:
-        """Coefficients of the spline through (n_along, n_around, k), continued beyond its rim as the body is.
-
-        Parameters
-        ----------
-        known : array (n_along, n_around, k)
-            At the elements' middles.
-        mirror : float or array (k,)
-            Sign that each component takes across the plane of symmetry.
-        pole : array (k,)
-            What all columns meet at, if the rows end in a pole.
-        """
+        """Coefficients of the spline through (n_along, n_around, k), continued beyond its rim."""
         first, last = (True, True) if self._closed else self._mirrors
         around = known
         if not first:

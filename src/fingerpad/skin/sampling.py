@@ -424,13 +424,7 @@ def receptors_of(mesh: Mesh) -> Receptors:
 
 
 def places_below(receptors: Receptors, sites: ArrayLike) -> Any:
-    """Find end organs by their x and z on the volar side, or below x, y and z of the skin.
-
-    Raises
-    ------
-    InputError
-        If `sites` is not an array of pairs or triples, or one is not on the skin.
-    """
+    """Find end organs by their x and z on the volar side, or below x, y and z of the skin."""
     points = float_array("sites", sites, None)
     if points.ndim != 2 or points.shape[1] not in (2, 3):
         raise InputError(
@@ -441,10 +435,9 @@ def places_below(receptors: Receptors, sites: ArrayLike) -> Any:
 
 
 class _Sites:
-    """Sites on a mesh, equal to those of another response if both have the same numbers.
+    """Sites on a mesh, equal to those of another response if both have the same numbers."""
 
-    Presses of one object at several depths or stiffnesses have equal meshes.
-    """
+    # Presses of one object at several depths or stiffnesses have equal meshes.
 
     def __init__(self, receptors: Receptors, points: FloatArray):
         self.receptors, self.points, mesh = receptors, points, receptors.mesh

@@ -20,53 +20,22 @@ _ON_PLANE_MM = 1e-9
 
 @dataclass(frozen=True)
 class Section:
-    """Faces of elements on the plane z = 0, as they lie after the deformation.
-
-    Parameters
-    ----------
-    corners_mm : array (n_faces, 4, 2)
-        x and y of the corners, in order around each face. [mm]
-    elements : int array (n_faces,)
-        The element of each face.
-    skin_mm, nail_mm, bone_mm : array (n_edges, 2, 2)
-        Both ends of each edge of the outline on free skin, under the nail and on the bone. [mm]
-    """
+    """Faces of elements on the plane z = 0, as they lie after the deformation."""
 
     corners_mm: FloatArray
+    """x and y of the corners, in order around each face, (n_faces, 4, 2). [mm]"""
     elements: IntArray
+    """The element of each face, (n_faces,)."""
     skin_mm: FloatArray
     nail_mm: FloatArray
     bone_mm: FloatArray
+    """Both ends of each edge of the outline on free skin, under the nail and on the bone, (n_edges, 2, 2).
+    [mm]
+    """
 
 
 def middle_section(mesh: Mesh, displacement_mm: FloatArray) -> Section:
-    """Cut a finger along its plane of symmetry.
-
-    Parameters
-    ----------
-    mesh : Mesh
-        Half a finger, or a whole one.
-    displacement_mm : array (n_nodes, 3)
-        Displacement of the nodes. [mm]
-
-    Returns
-    -------
-    Section
-        Of a whole finger the faces of both halves, which lie on each other. A `FreeMesh` without faces on
-        the plane is shown by those next to the plane of the elements that it cuts.
-
-    Raises
-    ------
-    InputError
-        If no element has a face on the plane.
-
-    Examples
-    --------
-    >>> from fingerpad.geometry.mesh import block_mesh
-    >>> mesh = block_mesh([0.0, 1.0, 2.0], [0.0, 1.0], [0.0, 1.0], layers=[0], symmetric=True)
-    >>> middle_section(mesh, np.zeros_like(mesh.nodes_mm)).elements.tolist()
-    [0, 1]
-    """
+    """Cut a finger along its plane of symmetry."""
     on_plane = np.abs(mesh.nodes_mm[:, 2]) < _ON_PLANE_MM
     moved = (mesh.nodes_mm + displacement_mm)[:, :2]
     faces, elements = [], []

@@ -58,29 +58,13 @@ OnFailed = Callable[[Touch, ConvergenceError | InputError], None]
 
 
 def touch_key(touch: Touch) -> str:
-    """Key under which an indentation is stored, 32 hexadecimal digits.
-
-    Examples
-    --------
-    >>> import fingerpad as fp
-    >>> touch = fp.touch_of(fp.Fingertip(), fp.Line())
-    >>> len(touch_key(touch)), touch_key(touch) == touch_key(fp.touch_of(fp.Fingertip(), fp.Bar()))
-    (32, False)
-    """
+    """Key under which an indentation is stored, 32 hexadecimal digits."""
     text = json.dumps([code_hash(), _plain(touch)], sort_keys=True)
     return hashlib.sha256(text.encode()).hexdigest()[:32]
 
 
 def value_digest(value: Any) -> str:
-    """Sixteen hexadecimal digits, the same for equal values: a finger, tissues, a body.
-
-    Examples
-    --------
-    >>> import fingerpad as fp
-    >>> one, same, other = (value_digest(fp.Cylinder(size)) for size in (3, 3.0, 4))
-    >>> one == same != other
-    True
-    """
+    """Sixteen hexadecimal digits, the same for equal values: a finger, tissues, a body."""
     return hashlib.sha256(json.dumps(_plain(value), sort_keys=True).encode()).hexdigest()[:16]
 
 
@@ -193,21 +177,14 @@ class Store(metaclass=KnownKeywords):
 
 @dataclass(frozen=True)
 class StoredFile:
-    """A file of a store.
-
-    Parameters
-    ----------
-    path : Path
-        The file; its name is the key of the indentation.
-    size : int
-        In bytes.
-    written_s : float
-        When it was written, in seconds since 1970.
-    """
+    """A file of a store."""
 
     path: Path
+    """The file; its name is the key of the indentation."""
     size: int
+    """In bytes."""
     written_s: float
+    """When it was written, in seconds since 1970."""
 
     @property
     def fault(self) -> str | None:
@@ -216,23 +193,7 @@ class StoredFile:
 
 
 def pruned(files: Sequence[StoredFile], before_s: float | None, most_bytes: int | None) -> list[StoredFile]:
-    """Choose files to delete: those written before a time, then the oldest until the rest is small enough.
-
-    Parameters
-    ----------
-    files : sequence of StoredFile
-        Of `Store.files`, the oldest first.
-    before_s : float, optional
-        In seconds since 1970.
-    most_bytes : int, optional
-        Largest size of all files that are left.
-
-    Examples
-    --------
-    >>> files = [StoredFile(Path(f"{day}.npz"), 100, float(day)) for day in (1, 2, 3, 4)]
-    >>> [file.path.stem for file in pruned(files, before_s=2.0, most_bytes=200)]
-    ['1', '2']
-    """
+    """Choose files to delete: those written before a time, then the oldest until the rest is small enough."""
     old = [file for file in files if before_s is not None and file.written_s < before_s]
     left = [file for file in files if file not in old]
     total = sum(file.size for file in left)
@@ -324,10 +285,8 @@ def _packed(response: SkinResponse, key: str) -> bytes:
 
 
 def _compute(item: tuple[Path, Touch], threads: int | None = None) -> float:
-    """Solve one indentation and store it at the path; return the seconds it took.
-
-    The path is given because a worker would hash the sources as they are at that time.
-    """
+    """Solve one indentation and store it at the path; return the seconds it took."""
+    # The path is given because a worker would hash the sources as they are at that time.
     path, touch = item
     started = time.perf_counter()
     if not path.exists():  # another worker may have stored it since

@@ -23,18 +23,12 @@ SURFACE_QUANTITIES = ("skin_displacement", "deep_displacement", "skin_stretch")
 
 @dataclass(frozen=True)
 class SurfaceMotion:
-    """How the faces of the skin move and deform: arrays (n_times, n_faces), never negative.
-
-    Parameters
-    ----------
-    mesh : Mesh
-        The undeformed body.
-    displacement_mm : array (n_times, n_skin_nodes, 3)
-        Displacement of `mesh.skin_nodes`. [mm]
-    """
+    """How the faces of the skin move and deform: arrays (n_times, n_faces), never negative."""
 
     mesh: Mesh
+    """The undeformed body."""
     displacement_mm: FloatArray
+    """Displacement of `mesh.skin_nodes`, (n_times, n_skin_nodes, 3). [mm]"""
 
     @cached_property
     def skin_displacement(self) -> FloatArray:
@@ -84,10 +78,8 @@ class SurfaceMotion:
         return np.stack([values[..., corner, :] for corner in rows.T])
 
     def _shares_within_reach(self) -> csr_matrix:
-        """Share of each face in the mean about each face, (n_faces, n_faces), a column per mean.
-
-        Half of a finger is completed by its mirror image.
-        """
+        """Share of each face in the mean about each face, (n_faces, n_faces), a column per mean."""
+        # Half of a finger is completed by its mirror image.
         corners = self._corners(self.mesh.nodes_mm[self.mesh.skin_nodes])
         middles, areas = corners.mean(axis=0), np.sqrt(_determinant(_metric(corners)))
         weights = csr_matrix((len(middles), len(middles)))

@@ -47,23 +47,16 @@ _HALF = 0.5 * np.pi
 
 @dataclass(frozen=True)
 class _Quarter:
-    """A quarter of each of some sections, volar or dorsal, and its element of area.
-
-    Parameters
-    ----------
-    a, a_slope : array (...)
-        Volar depth or dorsal height and its derivative by s. [mm]
-    c, c_slope : array (...)
-        Half-width and its derivative by s. [mm]
-    x_slope : array (...)
-        |dx/ds|. [mm]
-    """
+    """A quarter of each of some sections, volar or dorsal, and its element of area."""
 
     a: FloatArray
     a_slope: FloatArray
+    """Volar depth or dorsal height and its derivative by s. [mm]"""
     c: FloatArray
     c_slope: FloatArray
+    """Half-width and its derivative by s. [mm]"""
     x_slope: FloatArray
+    """|dx/ds|. [mm]"""
 
     def area_element(self, phi: FloatArray) -> FloatArray:
         """|dP/ds x dP/dphi|. [mm²]"""
@@ -220,10 +213,6 @@ class UnrolledSkin(metaclass=KnownKeywords):
             Its proximal and distal end on the midline; by default in proportion to the finger's length. [mm]
         faces_deg : float, optional
             Largest angle between its normals and the volar direction, above 0 and at most 90. [degrees]
-
-        Returns
-        -------
-        Polygon
 
         Raises
         ------

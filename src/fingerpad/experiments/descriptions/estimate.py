@@ -27,24 +27,20 @@ its memory by `OWN_NODE_MB` n^`OWN_EXPONENT`; measured at 3,249, 4,797 and 6,813
 
 @dataclass(frozen=True)
 class PressEstimate:
-    """What a press will take.
-
-    Parameters
-    ----------
-    nodes, elements, steps : int
-        Size of the mesh, and number of steps that are solved at least.
-    time_s, memory_mb : float
-        Time on two cores with compiled kernels, and memory of the process. [s], [MB]
-    by_force : bool
-        Whether the force is given, so that the depth is not known before the press.
-    """
+    """What a press will take."""
 
     nodes: int
+    """Size of the mesh, and number of steps that are solved at least."""
     elements: int
+    """Size of the mesh, and number of steps that are solved at least."""
     steps: int
+    """Size of the mesh, and number of steps that are solved at least."""
     time_s: float
+    """Time on two cores with compiled kernels, and memory of the process. [s], [MB]"""
     memory_mb: float
+    """Time on two cores with compiled kernels, and memory of the process. [s], [MB]"""
     by_force: bool = False
+    """Whether the force is given, so that the depth is not known before the press."""
 
     @property
     def lines(self) -> tuple[str, ...]:
@@ -70,28 +66,7 @@ def _interpolated_steps(touch: Touch) -> int:
 
 
 def estimate_press(described: DescribedTouch) -> PressEstimate:
-    """Estimate a press from the sizes of its mesh and its steps; the mesh is built for it.
-
-    Parameters
-    ----------
-    described : DescribedTouch
-        The description.
-
-    Returns
-    -------
-    PressEstimate
-
-    Raises
-    ------
-    InputError
-        If a part is impossible.
-
-    Examples
-    --------
-    >>> from fingerpad.experiments.descriptions.touch import described_touch
-    >>> estimate_press(described_touch({"object": {"kind": "sphere", "radius_mm": 4}})).steps
-    10
-    """
+    """Estimate a press from the sizes of its mesh and its steps; the mesh is built for it."""
     touch, _ = described.touch, described.population
     nodes = len(touch.mesh.nodes_mm)
     steps = touch.settings.steps_ms(touch.stimulus).size - 1 - _interpolated_steps(touch)

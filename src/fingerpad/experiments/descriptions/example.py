@@ -51,15 +51,7 @@ outputs: [figures, csv, spikes]   # npz, netcdf, zarr, nwb, vtu, abaqus, calculi
 
 
 def write_example(path: Path) -> Path:
-    """Write the example, and beside it the JSON schema from which editors complete its keys.
-
-    Raises
-    ------
-    InputError
-        If the file exists.
-    StoreError
-        If the folder cannot be written.
-    """
+    """Write the example, and beside it the JSON schema from which editors complete its keys."""
     path = path_of("path", path)
     check_new(path)
     schema = json.dumps(schemas.touch_schema(), indent=1)

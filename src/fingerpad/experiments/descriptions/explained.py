@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import ast
+import inspect
+import textwrap
+from itertools import pairwise
 from typing import Any
 
 from pydantic import BaseModel
@@ -14,18 +18,7 @@ from fingerpad.experiments.descriptions.values import Part
 
 
 def explained_schema(kind: type[Part]) -> JsonSchema:
-    """JSON schema of a description as it is written, with the explanations of the docstrings.
-
-    Parameters
-    ----------
-    kind : type
-        The whole description.
-
-    Returns
-    -------
-    dict
-        A schema by which an editor completes and checks YAML.
-    """
+    """JSON schema of a description as it is written, with the explanations beside its fields."""
     made = {"$schema": "https://json-schema.org/draft/2020-12/schema"} | kind.model_json_schema()
     definitions = made["$defs"]
     for name in [name for name in definitions if name.startswith(UNKNOWN_MODEL)]:
@@ -34,7 +27,8 @@ def explained_schema(kind: type[Part]) -> JsonSchema:
         schema = made if part is kind else definitions.get(part.__name__)
         told: dict[str, str] = {}
         for home in reversed(part.__mro__):
-            told |= described(home.__doc__ or "") if issubclass(home, Part) else {}
+            if issubclass(home, Part):
+                told |= described(home.__doc__ or "") | _written_beside(home)
         properties = (schema or {}).get("properties", {})
         for name, value in properties.items():
             if name in told:
@@ -42,6 +36,19 @@ def explained_schema(kind: type[Part]) -> JsonSchema:
         if properties.get("kind", {}).get("const", MEASURED) not in (MEASURED, RAMP_AND_HOLD):
             schema["required"] = [*schema.get("required", ()), "kind"]
     return _tidied(made)
+
+
+def _written_beside(part: type[Part]) -> dict[str, str]:
+    """Texts that stand below the fields of a part; none for a part that a function makes."""
+    try:
+        (body,) = ast.parse(textwrap.dedent(inspect.getsource(part))).body
+    except (OSError, TypeError):
+        return {}
+    told = {}
+    for field, text in pairwise(getattr(body, "body", [])):
+        if isinstance(field, ast.AnnAssign) and isinstance(text, ast.Expr):
+            told[ast.unparse(field.target)] = " ".join(ast.literal_eval(text.value).split())
+    return told
 
 
 def _parts_of(

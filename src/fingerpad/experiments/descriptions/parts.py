@@ -36,54 +36,27 @@ SHAPES = ("rectangle", "ellipse", "polygon", PAD)
 
 
 class RegionSettings(Part):
-    """Part of the skin that afferents lie in, unrolled; an area there is the same area of skin.
-
-    Parameters
-    ----------
-    shape : {"rectangle", "ellipse", "polygon", "pad"}
-        Kind of shape.
-    length_mm, width_mm : float
-        Extent of a rectangle or an ellipse along the finger and across. [mm]
-    corners_mm : list of (float, float)
-        Of a polygon: along the finger, distal positive, and across, from the middle of the pad. [mm]
-    """
+    """Part of the skin that afferents lie in, unrolled; an area there is the same area of skin."""
 
     shape: Annotated[str, choice_of(SHAPES)]
+    """Kind of shape."""
     length_mm: Positive | None = None
+    """Extent of a rectangle or an ellipse along the finger and across. [mm]"""
     width_mm: Positive | None = None
+    """Extent of a rectangle or an ellipse along the finger and across. [mm]"""
     corners_mm: Annotated[tuple[Pair, ...], Strict(False)] | None = None
+    """Of a polygon: along the finger, distal positive, and across, from the middle of the pad. [mm]"""
 
 
 class PopulationSettings(Part):
-    """The afferents.
-
-    Parameters
-    ----------
-    layout : str
-        "grid": the paper's rows and columns; a pattern that fills a region; or "nail rows", along the edge of
-        the nail.
-    density_per_cm2 : float
-        Afferents per area of skin. [1/cm2]
-    rows, columns : int
-        Of a grid: along the finger and across, the paper's by default; or how many rows along the nail.
-    region : RegionSettings
-        What any other layout fills.
-    offset_mm : (float, float)
-        Middle of grid, rectangle or ellipse from the middle of the pad, along the finger and across. [mm]
-    jitter : float
-        Displacement of afferents in a jittered layout: standard deviation over the pitch.
-    separation : float
-        Least distance in a Poisson-disc layout over 1/sqrt(density).
-    seed : int
-        Of random places and sensitivities; another one is another finger.
-    densities_per_cm2 : dict of str to float
-        Instead of one density, that of each type of a mixed population, which all have this layout. [1/cm2]
-    sensitivity_spread : float
-        How much afferents differ in their gains, as of `fingerpad.neuron.population.sensitivities`.
-    """
+    """The afferents."""
 
     layout: Annotated[str, choice_of(LAYOUT_NAMES)] = GRID
+    """"grid": the paper's rows and columns; a pattern that fills a region; or "nail rows", along the edge of
+    the nail.
+    """
     density_per_cm2: Positive = psychophysics.RECEPTOR_DENSITY.value
+    """Afferents per area of skin. [1/cm2]"""
     densities_per_cm2: (
         Annotated[
             dict[Annotated[str, choice_of(TYPES)], Positive],
@@ -92,38 +65,46 @@ class PopulationSettings(Part):
         ]
         | None
     ) = None
+    """Instead of one density, that of each type of a mixed population, which all have this layout. [1/cm2]"""
     rows: Count | None = None
+    """Of a grid: along the finger and across, the paper's by default; or how many rows along the nail."""
     columns: Count | None = None
+    """Of a grid: along the finger and across, the paper's by default; or how many rows along the nail."""
     region: RegionSettings | None = None
+    """What any other layout fills."""
     offset_mm: Pair = (0.0, 0.0)
+    """Middle of grid, rectangle or ellipse from the middle of the pad, along the finger and across. [mm]"""
     jitter: NotNegative | None = None
+    """Displacement of afferents in a jittered layout: standard deviation over the pitch."""
     separation: NotNegative | None = None
+    """Least distance in a Poisson-disc layout over 1/sqrt(density)."""
     seed: Seed = 0
+    """Of random places and sensitivities; another one is another finger."""
     sensitivity_spread: NotNegative = 0.0
+    """How much afferents differ in their gains, as of `fingerpad.neuron.population.sensitivities`."""
 
 
 class AfferentSettings(Part):
-    """The afferent by its numbers; what is absent is as in the afferent of the tissues.
-
-    Parameters
-    ----------
-    intercept_ma, dynamic_gain, static_gain, time_constant_ms, capacitance_mf, threshold_mv : float
-        As of `fingerpad.Afferent`.
-    refractory_ms : float
-        Rest after each spike. [ms]
-    dynamic_quantity, static_quantity : str
-        What the two terms follow.
-    """
+    """The afferent by its numbers; what is absent is as in the afferent of the tissues."""
 
     intercept_ma: FiniteNumber | None = None
+    """As of `fingerpad.Afferent`."""
     dynamic_gain: FiniteNumber | None = None
+    """As of `fingerpad.Afferent`."""
     static_gain: FiniteNumber | None = None
+    """As of `fingerpad.Afferent`."""
     time_constant_ms: Positive | None = None
+    """As of `fingerpad.Afferent`."""
     capacitance_mf: Positive | None = None
+    """As of `fingerpad.Afferent`."""
     threshold_mv: Positive | None = None
+    """As of `fingerpad.Afferent`."""
     refractory_ms: NotNegative | None = None
+    """Rest after each spike. [ms]"""
     dynamic_quantity: Annotated[str, choice_of(sampled_fields())] | None = None
+    """What the two terms follow."""
     static_quantity: Annotated[str, choice_of(sampled_fields())] | None = None
+    """What the two terms follow."""
 
 
 AfferentChoice = Annotated[

@@ -38,26 +38,7 @@ _OF_LAYOUT = {
 
 
 def afferent_of(chosen: AfferentSettings | str, tissues: str, beside: Path = Path()) -> AnyAfferent:
-    """Make the afferent of a file.
-
-    Parameters
-    ----------
-    chosen : AfferentSettings or str
-        Numbers, "default", a type by its name, or a file of results.
-    tissues : str
-        Tissues by name: the default afferent was fitted with them.
-    beside : Path, optional
-        Folder from which a file of results is named.
-
-    Returns
-    -------
-    AnyAfferent
-
-    Raises
-    ------
-    InputError
-        If the file cannot be read or holds no fitted parameters.
-    """
+    """Make the afferent of a file."""
     fitted = Afferent.for_tissues(tissues)
     if isinstance(chosen, AfferentSettings):
         return replace(fitted, **chosen.given)
@@ -74,30 +55,7 @@ def population_of(
     place: str = "population",
     finger: Finger | None = None,
 ) -> Population | MixedPopulation:
-    """Lay out the afferents of a file.
-
-    Parameters
-    ----------
-    settings : PopulationSettings
-        Layout, density or densities, region.
-    chosen, tissues, beside
-        Each of them, as of `afferent_of`; in a mixed population those of type SAI, unless it is the default.
-    place : str, optional
-        Key of the settings in the file, for errors.
-    finger : Fingertip or FingerMesh, optional
-        The finger in which they lie; by default the paper's.
-
-    Returns
-    -------
-    Population or MixedPopulation
-        The latter with `densities_per_cm2`.
-
-    Raises
-    ------
-    InputError
-        If a key is given that the layout does not have, the region is missing or has no area, or no receptor
-        falls into it.
-    """
+    """Lay out the afferents of a file."""
     for key, layouts in _OF_LAYOUT.items():
         if key in settings.given and settings.layout not in layouts:
             raise InputError(

@@ -24,77 +24,58 @@ from fingerpad.skin.sampling import SkinResponse
 
 @result_class
 class TouchSummary:
-    """What a touch did, in a few numbers.
-
-    Parameters
-    ----------
-    nodes, times : int
-        Size of the mesh, and number of times.
-    end_ms : float
-        End of the motion. [ms]
-    largest_force_mn, largest_depth_mm, largest_contact_mm2 : float
-        Over time. [mN], [mm], [mm²]
-    afferents, firing : int
-        How many, and how many fire at all.
-    dynamic_rate_hz, static_rate_hz : float
-        Largest firing rates in the two windows. [spikes/s]
-    """
+    """What a touch did, in a few numbers."""
 
     nodes: int
+    """Size of the mesh, and number of times."""
     times: int
+    """Size of the mesh, and number of times."""
     end_ms: Number
+    """End of the motion. [ms]"""
     largest_force_mn: Number
+    """Over time. [mN], [mm], [mm²]"""
     largest_depth_mm: Number
+    """Over time. [mN], [mm], [mm²]"""
     largest_contact_mm2: Number
+    """Over time. [mN], [mm], [mm²]"""
     afferents: int
+    """How many, and how many fire at all."""
     firing: int
+    """How many, and how many fire at all."""
     dynamic_rate_hz: Number
+    """Largest firing rates in the two windows. [spikes/s]"""
     static_rate_hz: Number
+    """Largest firing rates in the two windows. [spikes/s]"""
 
 
 @result_class
 class TouchFile:
-    """The file `touch.json`.
-
-    Parameters
-    ----------
-    format, format_version
-        By which a reader knows the file.
-    touch : TouchDescription
-        What was described.
-    summary : TouchSummary
-        What it did.
-    manifest : Manifest
-        What ran.
-    """
+    """The file `touch.json`."""
 
     format: Literal["fingerpad touch result"] = "fingerpad touch result"
+    """By which a reader knows the file."""
     format_version: Literal[1] = 1
+    """By which a reader knows the file."""
     touch: TouchDescription
+    """What was described."""
     summary: TouchSummary
+    """What it did."""
     manifest: Manifest
+    """What ran."""
 
 
 @dataclass(frozen=True)
 class PressedTouch:
-    """A described touch with the responses of skin and afferents.
-
-    Parameters
-    ----------
-    described : DescribedTouch
-        The description.
-    skin : SkinResponse
-        Response of the skin; with all nodes and elements if it was pressed `whole`.
-    response : ResponseMap
-        Responses of the afferents.
-    manifest : Manifest
-        What ran.
-    """
+    """A described touch with the responses of skin and afferents."""
 
     described: DescribedTouch
+    """The description."""
     skin: SkinResponse
+    """Response of the skin; with all nodes and elements if it was pressed `whole`."""
     response: ResponseMap
+    """Responses of the afferents."""
     manifest: Manifest
+    """What ran."""
 
     @property
     def summary(self) -> TouchSummary:
@@ -126,34 +107,7 @@ def press_described(
     command: str | None = None,
     whole: bool = False,
 ) -> PressedTouch:
-    """Press a described touch, or load it from where it is stored, and let the afferents respond.
-
-    Parameters
-    ----------
-    described : DescribedTouch
-        From `read_touch_description` or `described_touch`.
-    folder : Path
-        Where the finished indentation is stored, in a folder `indentations`.
-    progress : Progress, optional
-        Shown each finished part.
-    command : str, optional
-        The command line, for the manifest.
-    whole : bool, optional
-        Whether to keep all nodes and elements over time, which the store does not: it is pressed again then.
-
-    Returns
-    -------
-    PressedTouch
-
-    Raises
-    ------
-    InputError
-        If a part is impossible; this is found before anything is pressed.
-    ConvergenceError
-        If the mechanics cannot be solved.
-    StoreError
-        If the folder cannot be written.
-    """
+    """Press a described touch, or load it from where it is stored, and let the afferents respond."""
     touch, _ = described.touch, described.population
     asked = described.description
     runner = Runner(folder, progress=progress)

@@ -35,15 +35,7 @@ _SHOWN.maxstring, _SHOWN.maxother, _SHOWN.maxlevel = 60, 60, 2
 
 
 class PlacedError(InputError):
-    """An error at a known place of a file, which the sentence names.
-
-    Parameters
-    ----------
-    said : str
-        The sentence, which begins with the place as it is spelled.
-    place : sequence of int or str
-        Keys and indices that lead there.
-    """
+    """An error at a known place of a file, which the sentence names."""
 
     def __init__(self, said: str, place: Sequence[int | str]):
         super().__init__(said)
@@ -52,28 +44,14 @@ class PlacedError(InputError):
 
 @dataclass(frozen=True)
 class Origin:
-    r"""Where a description comes from: errors begin with its name and line.
-
-    Parameters
-    ----------
-    name : str
-        Of the file: files that it names are searched beside it.
-    text : str
-        Its content in YAML, for lines; empty where there is none.
-    rows : tuple of int
-        Lines of the entries of `stimuli` in a table.
-
-    Examples
-    --------
-    >>> with Origin("touch.yaml", "object: sphere\nfriction: 9").located(), at("friction"):
-    ...     raise InputError("too rough.")
-    Traceback (most recent call last):
-    fingerpad.core.errors.InputError: touch.yaml, line 2, friction: too rough.
-    """
+    r"""Where a description comes from: errors begin with its name and line."""
 
     name: str
+    """Of the file: files that it names are searched beside it."""
     text: str = ""
+    """Its content in YAML, for lines; empty where there is none."""
     rows: tuple[int, ...] = ()
+    """Lines of the entries of `stimuli` in a table."""
 
     @property
     def beside(self) -> Path:
@@ -123,20 +101,7 @@ def moved(move: Callable[[Place], tuple[Place, str]]) -> Iterator[None]:
 
 
 def part_from(kind: type[_Kind], content: Any) -> _Kind:
-    """Build a description from plain values.
-
-    Parameters
-    ----------
-    kind : type
-        A part.
-    content : mapping
-        As YAML has it.
-
-    Raises
-    ------
-    PlacedError
-        For the first error.
-    """
+    """Build a description from plain values."""
     try:
         return kind.model_validate(content)
     except ValidationError as error:
@@ -144,27 +109,7 @@ def part_from(kind: type[_Kind], content: Any) -> _Kind:
 
 
 def merged(common: Any, own: Any, default_kind: str | None = None) -> Any:
-    """Replace keys of a block by those of another one, or all of it where their kinds differ.
-
-    Parameters
-    ----------
-    common, own : mapping, str or None
-        Blocks as YAML has them; a text such as `sphere` is a block of that kind.
-    default_kind : str, optional
-        Kind of a block that names none.
-
-    Raises
-    ------
-    InputError
-        If a text with sizes gets keys.
-
-    Examples
-    --------
-    >>> merged("bar", {"width_mm": 3})
-    {'kind': 'bar', 'width_mm': 3}
-    >>> merged({"kind": "bar", "width_mm": 3}, {"kind": "sphere"})
-    {'kind': 'sphere'}
-    """
+    """Replace keys of a block by those of another one, or all of it where their kinds differ."""
     if own is None:
         return common
     if isinstance(common, str) and isinstance(own, Mapping) and "kind" not in own:
@@ -197,20 +142,7 @@ def first_of(error: ValidationError) -> Any:
 
 
 def error_sentence(error: ValidationError, kind: type[Part]) -> str:
-    """Describe the first error that pydantic found: where, what was expected, what came.
-
-    Parameters
-    ----------
-    error : pydantic.ValidationError
-        Of a part.
-    kind : type
-        That part.
-
-    Returns
-    -------
-    str
-        One sentence.
-    """
+    """Describe the first error that pydantic found: where, what was expected, what came."""
     first, path = first_of(error), place_of(error)
     where = place_text(path)
     if first["type"] == "missing":

@@ -27,76 +27,45 @@ NO_WAY = (0.0, 0.0)
 
 
 class RangeSettings(Part):
-    """Poses that the reduced touch serves.
-
-    Parameters
-    ----------
-    depth_mm : float
-        Largest depth below first touch at any pose. [mm]
-    x_mm, z_mm : (float, float)
-        Ways of the object along and across the finger, from its place. [mm]
-    tilt_deg : (float, float)
-        Tilt, added to that of the place. [degrees]
-    parameter : str
-        A parameter of the object that varies, such as `curvature_per_m` of a sphere.
-    values : (float, float)
-        Its range.
-    """
+    """Poses that the reduced touch serves."""
 
     depth_mm: Positive
+    """Largest depth below first touch at any pose. [mm]"""
     x_mm: Pair = NO_WAY
+    """Ways of the object along and across the finger, from its place. [mm]"""
     z_mm: Pair = NO_WAY
+    """Ways of the object along and across the finger, from its place. [mm]"""
     tilt_deg: Pair = NO_WAY
+    """Tilt, added to that of the place. [degrees]"""
     parameter: Text | None = None
+    """A parameter of the object that varies, such as `curvature_per_m` of a sphere."""
     values: Pair | None = None
+    """Its range."""
 
 
 class ReductionDescription(StimulusDescription, FingerDescription):
-    """All that a file of `fingerpad reduce` holds.
-
-    Parameters
-    ----------
-    resolution, finger, tissues
-        As of `FingerDescription`.
-    object, place, friction
-        As of `StimulusDescription`; there is no motion.
-    range : RangeSettings
-        The poses.
-    calibration : int
-        Number of random touches from which the error is measured: 0 for none, else 19 or more.
-    seed : int
-        Of these touches.
-    """
+    """All that a file of `fingerpad reduce` holds."""
 
     range: RangeSettings
+    """The poses."""
     calibration: Annotated[int, Field(ge=0)] = 20
+    """Number of random touches from which the error is measured: 0 for none, else 19 or more."""
     seed: Seed = 1
+    """Of these touches."""
 
 
 @dataclass(frozen=True)
 class DescribedReduction:
-    """A description of a reduced touch, ready to be pressed.
-
-    Parameters
-    ----------
-    description : ReductionDescription
-        The description.
-    training : ReducedTraining
-        Its presses.
-    """
+    """A description of a reduced touch, ready to be pressed."""
 
     description: ReductionDescription
+    """The description."""
     training: ReducedTraining
+    """Its presses."""
 
 
 def read_reduction(source: str | Path) -> DescribedReduction:
-    """Read the description of a reduced touch from a YAML file.
-
-    Raises
-    ------
-    InputError
-        If it is no YAML, or a key is unknown, missing or has an unfit value; with line and key.
-    """
+    """Read the description of a reduced touch from a YAML file."""
     text = read_text(path_of("source", source))
     return described_reduction(read_yaml(text, str(source)), str(source), text)
 
@@ -120,15 +89,7 @@ def described_reduction(content: Content | Any, source: str = "range", text: str
 
 
 def run_reduction(described: DescribedReduction, runner: Runner) -> ReducedModel:
-    """Press what the store of a runner lacks, and make the reduced touch.
-
-    Raises
-    ------
-    ConvergenceError
-        If a press cannot be solved; those finished stay stored.
-    StoreError
-        If the folder of the runner cannot be written.
-    """
+    """Press what the store of a runner lacks, and make the reduced touch."""
 
     def solve(touches: Sequence[Touch], stage: str) -> list[SkinResponse]:
         found = runner.responses({stage: dict(enumerate(touches))})[stage]

@@ -54,47 +54,14 @@ class Made(Part):
     """Keys that name files."""
 
     def made(self, beside: Path = Path()) -> Any:
-        """Return what the function makes.
-
-        Parameters
-        ----------
-        beside : Path, optional
-            Folder from which files are named.
-
-        Raises
-        ------
-        InputError
-            As of the function.
-        """
+        """Return what the function makes."""
         given = {key: value for key, value in self.given.items() if key != "kind"}
         named = {key: beside / value for key, value in given.items() if key in self.files}
         return type(self).makes(**given | named)
 
 
 def made_by(kind: str, makes: Callable[..., Any], without: Sequence[str] = ()) -> type[Made]:
-    """Make the part whose keys are `kind` and the parameters of a function.
-
-    Parameters
-    ----------
-    kind : str
-        Value of the key `kind`; without one there is no such key.
-    makes : callable
-        A function or a class with annotated parameters and a docstring.
-    without : sequence of str, optional
-        Parameters that a file does not have.
-
-    Returns
-    -------
-    type
-        A part.
-
-    Examples
-    --------
-    >>> def box(width_mm: float, open_at_top: bool = False) -> str:
-    ...     return f"{width_mm:g} mm"
-    >>> made_by("box", box).model_validate({"kind": "box", "width_mm": 3}).made()
-    '3 mm'
-    """
+    """Make the part whose keys are `kind` and the parameters of a function."""
     hints = get_type_hints(getattr(makes, "__init__") if isinstance(makes, type) else makes)  # noqa: B009
     told = _of_other_names(makes) | described(makes.__doc__ or "")
     fields: dict[str, Any] = {}
@@ -136,13 +103,7 @@ def _value_of(hint: Any) -> Any:
 
 
 def described(docstring: str) -> dict[str, str]:
-    """Explanation of each parameter in a docstring of NumPy's style.
-
-    Examples
-    --------
-    >>> described(made_by.__doc__)["makes"]
-    'A function or a class with annotated parameters and a docstring.'
-    """
+    """Explanation of each parameter in a docstring of NumPy's style."""
     section = re.search(r"\n *Parameters\n *-+\n(.*?)(\n\n|\Z)", inspect.cleandoc(docstring) + "\n\n", re.S)
     found: dict[str, str] = {}
     for entry in re.split(r"\n(?=\S)", section[1] if section else ""):
@@ -158,25 +119,17 @@ def _first_sentence(makes: Callable[..., Any]) -> str:
 
 @dataclass(frozen=True)
 class LateKind:
-    """Part of one kind, made when it is first needed: a file of spheres does not load braille.
-
-    Parameters
-    ----------
-    kind : str
-        Value of the key `kind`.
-    makes : callable or str
-        As of `made_by`, or its name as module and name.
-    without : sequence of str
-        As of `made_by`.
-    """
+    """Part of one kind, made when it is first needed: a file of spheres does not load braille."""
 
     kind: str
+    """Value of the key `kind`."""
     makes: Callable[..., Any] | str
+    """As of `made_by`, or its name as module and name."""
     without: Sequence[str] = ()
+    """As of `made_by`."""
 
     @cached_property
     def part(self) -> type[Made]:
-        """The part."""
         makes = resolve_name(self.makes) if isinstance(self.makes, str) else self.makes
         return made_by(self.kind, makes, self.without)
 
@@ -196,19 +149,7 @@ def one_of_kinds(
     text: Any = None,
     without: Mapping[str, Sequence[str]] = MappingProxyType({}),
 ) -> Any:
-    """Type of a value that is one of several parts, by its key `kind`.
-
-    Parameters
-    ----------
-    makers : mapping of str to callable or str
-        What makes a part, by kind, as of `LateKind`.
-    default : str, optional
-        Kind of a mapping that names none.
-    text : type, optional
-        Type of a text in the place of the mapping.
-    without : mapping of str to sequence of str, optional
-        Parameters that a file does not have, by kind.
-    """
+    """Type of a value that is one of several parts, by its key `kind`."""
 
     def tag(value: Any) -> str:
         if isinstance(value, Part):

@@ -25,28 +25,7 @@ _OF_SHAPE = {
 
 
 def lay(settings: PopulationSettings, afferent: AnyAfferent, place: str, finger: Finger) -> Population:
-    """Lay out afferents by any layout but the paper's grid.
-
-    Parameters
-    ----------
-    settings : PopulationSettings
-        Of a file.
-    afferent : AnyAfferent
-        Each of them.
-    place : str
-        Key of the settings in the file, for errors.
-    finger : Fingertip or FingerMesh
-        The finger in which they lie.
-
-    Returns
-    -------
-    Population
-
-    Raises
-    ------
-    InputError
-        If the region is missing, a key does not belong to its shape, or no receptor falls into it.
-    """
+    """Lay out afferents by any layout but the paper's grid."""
     if not isinstance(finger, Fingertip):
         raise InputError(
             f"{place}.layout must be grid on a mesh, whose skin has no plane: got {settings.layout}."

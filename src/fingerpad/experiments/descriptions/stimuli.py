@@ -55,123 +55,71 @@ _EXCLUSIVE = {"depth_mm": "force_mn", "force_mn": "depth_mm"}
 
 
 class StimulusBlocks(Part):
-    """What a stimulus, or all of them, say of themselves: blocks of a `StimulusDescription`, or parts.
-
-    Parameters
-    ----------
-    object, motion, place : mapping or str
-        As in the file of a touch. A stimulus has the keys of its own block, then those that all have.
-    friction : float
-        Coulomb's coefficient.
-    """
+    """What a stimulus, or all of them, say of themselves: blocks of a `StimulusDescription`, or parts."""
 
     object: Block | Text | None = None
+    """As in the file of a touch. A stimulus has the keys of its own block, then those that all have."""
     motion: Block | None = None
+    """As in the file of a touch. A stimulus has the keys of its own block, then those that all have."""
     place: Block | None = None
+    """As in the file of a touch. A stimulus has the keys of its own block, then those that all have."""
     friction: FiniteNumber | None = None
+    """Coulomb's coefficient."""
 
 
 class ListedStimulus(StimulusBlocks):
-    """One stimulus by name.
-
-    Parameters
-    ----------
-    name : str
-        How it is called.
-    level : float
-        Where it stands on the axis of the psychometric curve.
-    object, motion, place, friction
-        What differs from the blocks that all have.
-    """
+    """One stimulus by name."""
 
     name: Text
+    """How it is called."""
     level: FiniteNumber | None = None
+    """Where it stands on the axis of the psychometric curve."""
 
 
 class VariedStimuli(Part):
-    """Stimuli that differ in one key.
-
-    Parameters
-    ----------
-    vary : str
-        Block and key, such as "object.radius_mm", "motion.force_mn" or "place.spin_deg"; or "friction".
-    values : list of float or str
-        One per stimulus.
-    """
+    """Stimuli that differ in one key."""
 
     vary: Text
+    """Block and key, such as "object.radius_mm", "motion.force_mn" or "place.spin_deg"; or "friction"."""
     values: Annotated[tuple[LevelOrName, ...], Strict(False)]
+    """One per stimulus."""
 
 
 class StimulusSet(StimulusBlocks, FingerDescription):
-    """Stimuli and the finger that they are pressed into.
-
-    Parameters
-    ----------
-    resolution, finger, tissues
-        As of `FingerDescription`; `resolution` is "standard" by default.
-    reach_mm : float, optional
-        How far to either side of the middle, along the finger and across, the mesh is fine at most; without
-        it, as far as the objects need. [mm]
-    object, motion, place, friction
-        What all stimuli have, unless they say otherwise.
-    stimuli : VariedStimuli or list of ListedStimulus
-        Which they are.
-    """
+    """Stimuli and the finger that they are pressed into."""
 
     resolution: Annotated[str, choice_of(RESOLUTIONS)] = "standard"
+    """As of `FingerDescription`; `resolution` is "standard" by default."""
     reach_mm: Positive | None = None
+    """How far to either side of the middle, along the finger and across, the mesh is fine at most; without
+    it, as far as the objects need. [mm]
+    """
     stimuli: Annotated[
         Annotated[tuple[ListedStimulus, ...], Strict(False), Tag(LISTED)]
         | Annotated[VariedStimuli, Tag(VARIED)],
         Discriminator(lambda value: LISTED if isinstance(value, list | tuple) else VARIED),
     ]
+    """Which they are."""
 
 
 @dataclass(frozen=True, kw_only=True)
 class NamedStimulus(TactileStimulus):
-    """One of several stimuli.
-
-    Parameters
-    ----------
-    name : str
-        How it is called.
-    level : float, optional
-        Where it stands on the axis of a psychometric curve.
-    files : tuple of Path
-        Those that its object and motion name.
-    in_file : callable, optional
-        From a place in its description to that in the file of all, and the words for it.
-    """
+    """One of several stimuli."""
 
     name: str
+    """How it is called."""
     level: float | None = None
+    """Where it stands on the axis of a psychometric curve."""
     files: tuple[Path, ...] = field(default=(), compare=False)
+    """Those that its object and motion name."""
     in_file: Callable[[Place], tuple[Place, str]] = field(
         default=lambda place: (place, place_text(place)), compare=False, repr=False
     )
+    """From a place in its description to that in the file of all, and the words for it."""
 
 
 def named_stimuli(described: StimulusSet, beside: Path = Path()) -> list[NamedStimulus]:
-    """Make the stimuli that a file describes, in its order; an object that several have is made once.
-
-    Parameters
-    ----------
-    described : StimulusSet
-        What the file says.
-    beside : Path, optional
-        Folder from which files are named.
-
-    Returns
-    -------
-    list of NamedStimulus
-
-    Raises
-    ------
-    InputError
-        If two have one name, or one cannot be: no object, a size that it does not have, depth and force at
-        once; with its place in the file.
-    """
+    """Make the stimuli that a file describes, in its order; an object that several have is made once."""
     made: MadeObjects = []
     found: list[NamedStimulus] = []
     for place, name, level, own in _listed(described):
@@ -268,27 +216,6 @@ def touches_of(
     """One touch per stimulus, all on one mesh; those of the paper's spheres are those of a reproduction.
 
     A finger of a mesh has its own, which is as fine as it is.
-
-    Parameters
-    ----------
-    stimuli : sequence of NamedStimulus
-        From `named_stimuli`.
-    conditions : Conditions
-        From `FingerDescription.conditions`.
-    reach_mm : float, optional
-        As of `StimulusSet`; none for a finger of a mesh. [mm]
-    receptor : Grading, optional
-        Where the mesh is fine as well.
-
-    Returns
-    -------
-    dict of str to Touch
-        By name, in the order of `stimuli`.
-
-    Raises
-    ------
-    InputError
-        If one cannot be used, with its place in the file.
     """
     if conditions.finger.own_mesh is None:
         grading = _grading(stimuli, conditions, reach_mm, receptor)

@@ -50,42 +50,33 @@ MadeObjects = list[tuple[object, Indenter]]
 
 
 class PlaceSettings(Part):
-    """Where and in which direction the object is pressed.
-
-    Parameters
-    ----------
-    x_mm, z_mm : float
-        Where the object's axis meets the skin, from the middle of the pad: along the finger, distal positive,
-        and across. [mm]
-    tilt_deg : float
-        0 is perpendicular to the long axis of the finger; without it, perpendicular to the skin. [degrees]
-    spin_deg : float
-        Turn about the direction of pressing. [degrees]
-    """
+    """Where and in which direction the object is pressed."""
 
     x_mm: FiniteNumber = 0.0
+    """Where the object's axis meets the skin, from the middle of the pad: along the finger, distal positive,
+    and across. [mm]
+    """
     z_mm: FiniteNumber = 0.0
+    """Where the object's axis meets the skin, from the middle of the pad: along the finger, distal positive,
+    and across. [mm]
+    """
     tilt_deg: FiniteNumber | None = None
+    """0 is perpendicular to the long axis of the finger; without it, perpendicular to the skin. [degrees]"""
     spin_deg: FiniteNumber = 0.0
+    """Turn about the direction of pressing. [degrees]"""
 
 
 class FingerDescription(Part):
-    """The finger that is pressed.
-
-    Parameters
-    ----------
-    resolution : {"quick", "standard", "paper"}
-        How fine mesh and steps are.
-    finger : mapping or str
-        Whose: a preset such as "child", the sizes of `fingerpad.Fingertip.of`, `kind: outline` with those of
-        `fingerpad.Fingertip`, or `kind: mesh` with the parameters of `fingerpad.read_finger`.
-    tissues : str
-        A set of tissues by name, as of `fingerpad.indent`.
-    """
+    """The finger that is pressed."""
 
     resolution: Annotated[str, choice_of(RESOLUTIONS)] = "quick"
+    """How fine mesh and steps are."""
     finger: FingerPart = Field(default={}, validate_default=True)
+    """Whose: a preset such as "child", the sizes of `fingerpad.Fingertip.of`, `kind: outline` with those of
+    `fingerpad.Fingertip`, or `kind: mesh` with the parameters of `fingerpad.read_finger`.
+    """
     tissues: Annotated[str, choice_of(TISSUES)] = DEFAULT_TISSUES
+    """A set of tissues by name, as of `fingerpad.indent`."""
 
     def conditions(self, seed: int = 0, beside: Path = Path()) -> Conditions:
         """Finger, tissues and accuracy, with a seed; the file of a mesh is named from the folder `beside`."""
@@ -95,35 +86,19 @@ class FingerDescription(Part):
 
 
 class StimulusDescription(Part):
-    """What is pressed in, and how.
-
-    Parameters
-    ----------
-    object : mapping or str
-        What is pressed in: `kind` and its sizes, or a text such as "sphere:radius_mm=3.5".
-    motion : mapping
-        How: `kind` and its numbers; a ramp and hold by default.
-    place : PlaceSettings
-        Where, and in which direction.
-    friction : float
-        Coulomb's coefficient between skin and object.
-    """
+    """What is pressed in, and how."""
 
     object: ObjectPart
+    """What is pressed in: `kind` and its sizes, or a text such as "sphere:radius_mm=3.5"."""
     motion: MotionPart = Field(default={}, validate_default=True)
+    """How: `kind` and its numbers; a ramp and hold by default."""
     place: PlaceSettings = PlaceSettings()
+    """Where, and in which direction."""
     friction: NotNegative = 0.0
+    """Coulomb's coefficient between skin and object."""
 
     def stimulus(self, beside: Path = Path(), made: MadeObjects | None = None) -> TactileStimulus:
-        """Make what is described.
-
-        Parameters
-        ----------
-        beside : Path, optional
-            Folder from which files are named.
-        made : list of (part, Indenter), optional
-            Objects that were made before; one of the same part is used again, a new one is appended.
-        """
+        """Make what is described."""
         known = [] if made is None else made
         indenter = next((body for part, body in known if part == self.object), None)
         if indenter is None:
@@ -142,32 +117,26 @@ class StimulusDescription(Part):
 @dataclass(frozen=True)
 @converted
 class TactileStimulus:
-    """An indenter, its motion, its place from the middle of the pad, and friction.
-
-    Parameters
-    ----------
-    indenter : Indenter
-        The rigid body.
-    motion : Motion
-        How it is pressed.
-    x_mm, z_mm : float
-        Where its axis meets the skin, from the middle of the pad: along the finger, distal positive, and
-        across. [mm]
-    tilt_deg : float, optional
-        As in `fingerpad.Touch`; by default it presses perpendicular to the skin in the middle. [degrees]
-    spin_deg : float
-        As in `fingerpad.Touch`: the orientation of a bar, an edge, a gap or a grating. [degrees]
-    friction : float
-        Coulomb's coefficient.
-    """
+    """An indenter, its motion, its place from the middle of the pad, and friction."""
 
     indenter: Indenter
+    """The rigid body."""
     motion: Motion = field(default_factory=RampAndHold)
+    """How it is pressed."""
     x_mm: float = 0.0
+    """Where its axis meets the skin, from the middle of the pad: along the finger, distal positive, and
+    across. [mm]
+    """
     z_mm: float = 0.0
+    """Where its axis meets the skin, from the middle of the pad: along the finger, distal positive, and
+    across. [mm]
+    """
     tilt_deg: float | None = None
+    """As in `fingerpad.Touch`; by default it presses perpendicular to the skin in the middle. [degrees]"""
     spin_deg: float = 0.0
+    """As in `fingerpad.Touch`: the orientation of a bar, an edge, a gap or a grating. [degrees]"""
     friction: float = 0.0
+    """Coulomb's coefficient."""
 
     def tilt_on(self, finger: Finger) -> float:
         """Tilt of the indenter on a finger. [degrees]"""
@@ -181,26 +150,7 @@ class TactileStimulus:
         grading: Grading | None = None,
         times_ms: Sequence[float] = (),
     ) -> Touch:
-        """Describe the touch for the solver.
-
-        Parameters
-        ----------
-        finger : Finger
-            The finger.
-        tissues : str or Tissues
-            What it consists of.
-        resolution : {"quick", "standard", "paper"}
-            How fine mesh and steps are.
-        grading : Grading, optional
-            Mesh; default: fine wherever the object goes.
-        times_ms : sequence of float, optional
-            Times at which the result is wanted. [ms]
-
-        Raises
-        ------
-        PlacedError
-            If they do not fit each other, with the part of a file that is about it.
-        """
+        """Describe the touch for the solver."""
         with about():
             return touch_of(
                 finger,

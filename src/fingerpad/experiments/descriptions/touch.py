@@ -59,36 +59,27 @@ OUTPUTS = (
 
 
 class RateWindowSettings(Part):
-    """Windows in which spikes count.
-
-    Parameters
-    ----------
-    dynamic, static : (float, float)
-        Start and end of the windows of the two rates; without them they follow the phases. [ms]
-    """
+    """Windows in which spikes count."""
 
     dynamic: Pair | None = None
+    """Start and end of the windows of the two rates; without them they follow the phases. [ms]"""
     static: Pair | None = None
+    """Start and end of the windows of the two rates; without them they follow the phases. [ms]"""
 
 
 class AfferentsSettings(PopulationSettings):
-    """The afferents that respond.
-
-    Parameters
-    ----------
-    afferent : AfferentSettings or str
-        "default", the one that was fitted with the tissues; a type by its name, SAI, RA, PC or SAII; a file
-        of results (`fit.json` of `fingerpad fit`, `results.json` of `fingerpad reproduce`); or numbers.
-    noise : float
-        Width of a soft threshold over the threshold: spikes are random, drawn with `seed`. 0 is a sharp
-        threshold without randomness.
-    windows_ms : RateWindowSettings
-        When spikes count.
-    """
+    """The afferents that respond."""
 
     afferent: AfferentChoice = DEFAULT
+    """"default", the one that was fitted with the tissues; a type by its name, SAI, RA, PC or SAII; a file of
+    results (`fit.json` of `fingerpad fit`, `results.json` of `fingerpad reproduce`); or numbers.
+    """
     noise: NotNegative = 0.0
+    """Width of a soft threshold over the threshold: spikes are random, drawn with `seed`. 0 is a sharp
+    threshold without randomness.
+    """
     windows_ms: RateWindowSettings = RateWindowSettings()
+    """When spikes count."""
 
 
 class TouchDescription(StimulusDescription, FingerDescription):
@@ -132,21 +123,14 @@ class TouchDescription(StimulusDescription, FingerDescription):
 
 @dataclass(frozen=True)
 class DescribedTouch:
-    """A description of a touch with where it comes from: what it takes to press it.
-
-    Parameters
-    ----------
-    description : TouchDescription
-        The description.
-    source : str
-        File of the description, with which errors begin: files that it names are searched beside it.
-    text : str, optional
-        Content of that file, for the lines of errors.
-    """
+    """A description of a touch with where it comes from: what it takes to press it."""
 
     description: TouchDescription
+    """The description."""
     source: str = "touch"
+    """File of the description, with which errors begin: files that it names are searched beside it."""
     text: str = ""
+    """Content of that file, for the lines of errors."""
 
     @property
     def origin(self) -> Origin:
@@ -155,25 +139,12 @@ class DescribedTouch:
 
     @cached_property
     def finger(self) -> Finger:
-        """The finger.
-
-        Raises
-        ------
-        InputError
-            If it is impossible, with its place in the file.
-        """
         with self.origin.located(), at("finger"):
             return finger_of(self.description.finger, self.origin.beside)
 
     @cached_property
     def touch(self) -> Touch:
-        """The touch, described for the solver.
-
-        Raises
-        ------
-        InputError
-            If a part is impossible, with its place in the file.
-        """
+        """The touch, described for the solver."""
         asked = self.description
         with self.origin.located():
             made = asked.stimulus(self.origin.beside)
@@ -183,13 +154,7 @@ class DescribedTouch:
 
     @cached_property
     def population(self) -> Population | MixedPopulation:
-        """The afferents.
-
-        Raises
-        ------
-        InputError
-            If they cannot be, or a window of rates has no phase, with its place in the file.
-        """
+        """The afferents."""
         asked = self.description.afferents
         with self.origin.located():
             tissues, beside = self.description.tissues, self.origin.beside
@@ -230,10 +195,6 @@ def read_touch_description(source: str | Path) -> DescribedTouch:
     ----------
     source : str or Path
         The file; docs/touch.md explains its keys, and `fingerpad init` writes an example.
-
-    Returns
-    -------
-    DescribedTouch
 
     Raises
     ------

@@ -40,29 +40,7 @@ def kind_of(form: int | str) -> str | None:
 
 
 def with_message(words: str, allowed: Collection[Any] | None = None) -> WrapValidator:
-    """Give a value one message for any error: what it must be.
-
-    Parameters
-    ----------
-    words : str
-        Goes on after "must be".
-    allowed : collection, optional
-        The values that it may have.
-
-    Returns
-    -------
-    WrapValidator
-        For the annotation of a field.
-
-    Examples
-    --------
-    >>> from pydantic import TypeAdapter
-    >>> try:
-    ...     TypeAdapter(Positive).validate_python(-1.0)
-    ... except ValidationError as error:
-    ...     print(error.errors()[0]["msg"])
-    must be a number greater than 0
-    """
+    """Give a value one message for any error: what it must be."""
 
     def checked(value: Any, handler: Callable[[Any], Any]) -> Any:
         refusal = PydanticCustomError(
@@ -80,14 +58,7 @@ def with_message(words: str, allowed: Collection[Any] | None = None) -> WrapVali
 
 
 def choice_of(allowed: Collection[str]) -> WrapValidator:
-    """Restrict a value to one of several names.
-
-    Examples
-    --------
-    >>> from pydantic import TypeAdapter
-    >>> TypeAdapter(Annotated[str, choice_of(("mean", "sum"))]).validate_python("sum")
-    'sum'
-    """
+    """Restrict a value to one of several names."""
     return _Choice(with_message(f"one of {', '.join(allowed)}", allowed).func, names=tuple(allowed))
 
 

@@ -71,111 +71,66 @@ Encoded = tuple[FloatArray, np.ndarray]
 
 @result_class
 class TaskPopulation:
-    """The population of a task.
-
-    Parameters
-    ----------
-    layout : str
-        How the afferents are laid out.
-    n_receptors : int
-        How many there are.
-    pitch_mm : float
-        Distance between neighbours. [mm]
-    density_per_cm2 : float
-        Afferents per area of skin. [1/cm2]
-    positions_mm : array (n_receptors, 2 or 3)
-        x and z, or x, y and z. [mm]
-    sensitivity : array (n_receptors,), optional
-        Factor on the gains of each afferent.
-    """
+    """The population of a task."""
 
     layout: str
+    """How the afferents are laid out."""
     n_receptors: int
+    """How many there are."""
     pitch_mm: float
+    """Distance between neighbours. [mm]"""
     density_per_cm2: float
+    """Afferents per area of skin. [1/cm2]"""
     positions_mm: Matrix
+    """x and z, or x, y and z, (n_receptors, 2 or 3). [mm]"""
     sensitivity: Vector | None
+    """Factor on the gains of each afferent, (n_receptors,)."""
 
 
 @result_class
 class FittedNoise:
-    """What the noise was fitted to.
-
-    Parameters
-    ----------
-    code, measure : str
-        The decoding that was brought closest to the observed hit rates.
-    stimulus : tuple of str
-        The comparisons that were observed.
-    observed, hit_rate : array (n_observed,)
-        Hit rates of people and of the model. [0-1]
-    """
+    """What the noise was fitted to."""
 
     code: str
     measure: str
+    """The decoding that was brought closest to the observed hit rates."""
     stimulus: tuple[str, ...]
+    """The comparisons that were observed."""
     observed: Vector
     hit_rate: Vector
+    """Hit rates of people and of the model, (n_observed,). [0-1]"""
 
 
 @result_class
 class TaskNoise:
-    """The noise of a task.
-
-    Parameters
-    ----------
-    sigma : float
-        Standard deviation of the multiplicative noise.
-    fitted_to : FittedNoise, optional
-        Absent where the noise was given.
-    root_mean_square_error : float, optional
-        Of the fitted hit rates.
-    """
+    """The noise of a task."""
 
     sigma: float
+    """Standard deviation of the multiplicative noise."""
     fitted_to: FittedNoise | None = None
+    """Absent where the noise was given."""
     root_mean_square_error: float | None = None
+    """Of the fitted hit rates."""
 
 
 @result_class
 class ForcedChoice:
-    """Two presentations per trial, one of them the comparison: how often it is identified.
-
-    Parameters
-    ----------
-    trials : int
-        Trials per comparison behind the intervals, those of the task.
-    proportions : array (3, n_comparisons)
-        Proportion correct, and the ends of the exact 95 % interval that so many trials leave about it. [0-1]
-    d_primes : array (3, n_comparisons)
-        sqrt(2) times the normal quantile of these; NaN where it is infinite, negative below chance.
-    """
+    """Two presentations per trial, one of them the comparison: how often it is identified."""
 
     trials: int
+    """Trials per comparison behind the intervals, those of the task."""
     proportions: Matrix
+    """Proportion correct, and the ends of the exact 95 % interval that so many trials leave about it, (3,
+    n_comparisons). [0-1]
+    """
     d_primes: Matrix
+    """sqrt(2) times the normal quantile of these; NaN where it is infinite, negative below chance, (3,
+    n_comparisons).
+    """
 
 
 def forced_choice_of(d_prime: FloatArray, trials: int) -> ForcedChoice:
-    """Two-alternative forced choice at some d', with the intervals of an experiment.
-
-    Parameters
-    ----------
-    d_prime : array (n_comparisons,)
-        As of `Decoding`; infinite where the comparison is always identified.
-    trials : int
-        Per comparison.
-
-    Returns
-    -------
-    ForcedChoice
-
-    Examples
-    --------
-    >>> choice = forced_choice_of(np.array([1.0]), trials=200)
-    >>> choice.proportions[:, 0].round(3).tolist(), choice.d_primes[:, 0].round(2).tolist()
-    ([0.76, 0.695, 0.817], [1.0, 0.72, 1.28])
-    """
+    """Two-alternative forced choice at some d', with the intervals of an experiment."""
     proportion = ndtr(np.asarray(d_prime) / np.sqrt(2.0))
     proportions = np.array([proportion, *binomial_interval(proportion, trials)])
     d_primes = np.sqrt(2.0) * ndtri(proportions)
@@ -188,64 +143,43 @@ def forced_choice_of(d_prime: FloatArray, trials: int) -> ForcedChoice:
 
 @result_class
 class Decoding:
-    """One measure of the population, decoded by one code.
-
-    Parameters
-    ----------
-    code, measure : str
-        By the names of `CODES` and `MEASURES`.
-    silent : tuple of str
-        Stimuli under which no afferent responds; there is no hit rate then.
-    hit_rate, hit_rate_sd : array (n_comparisons,), optional
-        Mean and standard deviation over repetitions. [0-1]
-    statistic : TaskStatistic, optional
-        What the code computes for each stimulus; absent for the ideal observer.
-    d_prime : array (n_comparisons,), optional
-        Discriminability; NaN where it is infinite.
-    forced_choice : ForcedChoice, optional
-        The same as proportion correct, with intervals; absent without noise.
-    efficiency, efficiency_error : array (n_comparisons,), optional
-        Against the ideal observer; NaN where it cannot be estimated.
-    curves : tuple of SideCurve
-        Psychometric curves above and below the standard.
-    """
+    """One measure of the population, decoded by one code."""
 
     code: str
     measure: str
+    """By the names of `CODES` and `MEASURES`."""
     silent: tuple[str, ...] = ()
+    """Stimuli under which no afferent responds; there is no hit rate then."""
     hit_rate: Vector | None = None
     hit_rate_sd: Vector | None = None
+    """Mean and standard deviation over repetitions, (n_comparisons,). [0-1]"""
     statistic: TaskStatistic | None = None
+    """What the code computes for each stimulus; absent for the ideal observer."""
     d_prime: Vector | None = None
+    """Discriminability; NaN where it is infinite, (n_comparisons,)."""
     forced_choice: ForcedChoice | None = None
+    """The same as proportion correct, with intervals; absent without noise."""
     efficiency: Vector | None = None
     efficiency_error: Vector | None = None
+    """Against the ideal observer; NaN where it cannot be estimated, (n_comparisons,)."""
     curves: tuple[SideCurve, ...] = ()
+    """Psychometric curves above and below the standard."""
 
 
 @result_class
 class TaskObservation:
-    """A hit rate of people.
-
-    Parameters
-    ----------
-    at : float or str
-        Level or name of the stimulus, as the task gives it.
-    level : float, optional
-        On the axis of the psychometric curve.
-    hit_rate : float
-        Fraction of trials. [0-1]
-    trials : int, optional
-        How many there were.
-    interval : (float, float), optional
-        Binomial interval, where the trials are known. [0-1]
-    """
+    """A hit rate of people."""
 
     at: float | str
+    """Level or name of the stimulus, as the task gives it."""
     level: float | None
+    """On the axis of the psychometric curve."""
     hit_rate: float
+    """Fraction of trials. [0-1]"""
     trials: int | None
+    """How many there were."""
     interval: tuple[float, float] | None
+    """Binomial interval, where the trials are known. [0-1]"""
 
 
 @result_class
@@ -415,10 +349,6 @@ def analyse(prepared: PreparedTask, skins: Mapping[str, Skin]) -> TaskResult:
         The task.
     skins : mapping of str to Skin
         Response of the skin to each stimulus, by its name.
-
-    Returns
-    -------
-    TaskResult
 
     Raises
     ------

@@ -44,27 +44,20 @@ class TaskStatistic:
 
 @result_class
 class CurveThreshold:
-    """Threshold of a psychometric curve.
-
-    Parameters
-    ----------
-    proportion : float
-        Hit rate at the threshold. [0-1]
-    difference, level : float
-        From the standard, and on the axis. [unit of what varies]
-    over_standard : float, optional
-        Difference over the standard (Weber fraction); absent where the standard is 0.
-    bootstrap_interval, posterior_interval : (float, float)
-        Confidence and credible interval of the difference; the former is absent where no comparison lies on
-        the rise of the curve. [unit of what varies]
-    """
+    """Threshold of a psychometric curve."""
 
     proportion: float
+    """Hit rate at the threshold. [0-1]"""
     difference: Number
     level: Number
+    """From the standard, and on the axis. [unit of what varies]"""
     over_standard: float | None
+    """Difference over the standard (Weber fraction); absent where the standard is 0."""
     bootstrap_interval: tuple[Number, Number] | None
     posterior_interval: tuple[Number, Number]
+    """Confidence and credible interval of the difference; the former is absent where no comparison lies on
+    the rise of the curve. [unit of what varies]
+    """
 
 
 @result_class
@@ -80,93 +73,47 @@ class CurvePoints:
 
 @result_class
 class CurveFit:
-    """A fitted psychometric curve.
-
-    Parameters
-    ----------
-    sigmoid : str
-        Its shape.
-    trials : int
-        Judgements per comparison behind the intervals.
-    threshold : CurveThreshold
-        At the proportion that the task asks for.
-    slope : float
-        Of the hit rate at the threshold; NaN where no comparison lies on the rise. [1/unit of what varies]
-    lapse : float
-        What is missing to 1 far above the threshold. [0-1]
-    at_bounds : tuple of str
-        Parameters that ended at a bound.
-    curve : CurvePoints
-        For figures.
-    """
+    """A fitted psychometric curve."""
 
     sigmoid: str
+    """Its shape."""
     trials: int
+    """Judgements per comparison behind the intervals."""
     threshold: CurveThreshold
+    """At the proportion that the task asks for."""
     slope: Number
+    """Of the hit rate at the threshold; NaN where no comparison lies on the rise. [1/unit of what varies]"""
     lapse: float
+    """What is missing to 1 far above the threshold. [0-1]"""
     at_bounds: tuple[str, ...]
+    """Parameters that ended at a bound."""
     curve: CurvePoints
+    """For figures."""
 
 
 @result_class
 class SideCurve:
-    """Hit rates on one side of the standard, with their curve or the reason why there is none.
-
-    Parameters
-    ----------
-    side : {"above", "below"}
-        Of the standard.
-    difference, hit_rate : array (n_comparisons,)
-        Distance from the standard and hit rate. [unit of what varies], [0-1]
-    fit : CurveFit, optional
-        The curve.
-    why_not : str, optional
-        Why there is no curve.
-    """
+    """Hit rates on one side of the standard, with their curve or the reason why there is none."""
 
     side: str
+    """Of the standard."""
     difference: Vector
     hit_rate: Vector
+    """Distance from the standard and hit rate. [unit of what varies],, (n_comparisons,). [0-1]"""
     fit: CurveFit | None = None
+    """The curve."""
     why_not: str | None = None
+    """Why there is no curve."""
 
 
 def response_table(maps: Sequence[ResponseMap], measure: str, latest_ms: float | None = None) -> FloatArray:
-    """Return one measure of every receptor under every stimulus.
-
-    Parameters
-    ----------
-    maps : sequence of ResponseMap
-        Of the population, stimulus by stimulus.
-    measure : {"static", "dynamic", "latency"}
-        Rates in the hold or the ramp, or first-spike latency.
-    latest_ms : float, optional
-        Latest first spike that counts: a later one, or none, counts as this time. [ms]
-
-    Returns
-    -------
-    array (n_stimuli, n_receptors)
-        NaN where a receptor has no latency. [spikes/s or ms]
-    """
+    """Return one measure of every receptor under every stimulus."""
     table = np.array([RESPONSE_MEASURES[measure](answer) for answer in maps])
     return table if measure != "latency" or latest_ms is None else np.fmin(table, latest_ms)
 
 
 def silent_stimuli(table: FloatArray, measure: str, latest_ms: float | None = None) -> IntArray:
-    """Find the stimuli under which no afferent responds by a measure.
-
-    Parameters
-    ----------
-    table, measure, latest_ms
-        Of and as in `response_table`.
-
-    Returns
-    -------
-    int array (n_silent,)
-        Rows of the table. For latencies, if no afferent fires under every stimulus, those under which
-        fewest do.
-    """
+    """Find the stimuli under which no afferent responds by a measure."""
     if measure != "latency" or latest_ms is not None:
         return np.flatnonzero((table == (latest_ms if measure == "latency" else 0.0)).all(axis=1))
     missing = np.isnan(table)
@@ -178,27 +125,7 @@ def silent_stimuli(table: FloatArray, measure: str, latest_ms: float | None = No
 def code_hit_rates(
     code: str, table: FloatArray, neighbours: np.ndarray, noise_sigma: float, seed: int, plan: Experiment
 ) -> HitRates:
-    """Hit rates of every comparison by a code.
-
-    Parameters
-    ----------
-    code : {"gradient_sum", "euclidean"}
-        How the population is read.
-    table : array (n_stimuli, n_receptors)
-        From `response_table`, the standard first.
-    neighbours : int array (n_pairs, 2)
-        Who is whose neighbour, for Gradient Sum.
-    noise_sigma : float
-        Standard deviation of the multiplicative noise.
-    seed : int
-        Of the random numbers.
-    plan : Experiment
-        Repetitions and criterion.
-
-    Returns
-    -------
-    HitRates
-    """
+    """Hit rates of every comparison by a code."""
     if code == "euclidean":
         return discriminate_euclidean(table, noise_sigma, seed, plan, session=SESSION)
     return discriminate_gradient_sum(table, neighbours, noise_sigma, seed, plan, session=SESSION)
@@ -213,26 +140,7 @@ def fit_task_noise(
     seed: int,
     plan: Experiment,
 ) -> NoiseFit:
-    """Noise that brings a code closest to observed hit rates.
-
-    Parameters
-    ----------
-    code, table, neighbours, seed, plan
-        As in `code_hit_rates`.
-    comparisons : sequence of int
-        Which comparisons were observed, from 0.
-    observed : sequence of float
-        Their hit rates. [0-1]
-
-    Returns
-    -------
-    NoiseFit
-
-    Raises
-    ------
-    ConvergenceError
-        If no noise meets them.
-    """
+    """Noise that brings a code closest to observed hit rates."""
     chosen = list(comparisons)
 
     def by_distance(sigma: float) -> FloatArray:
@@ -249,17 +157,7 @@ def fit_task_noise(
 def task_statistic(
     code: str, table: FloatArray, neighbours: np.ndarray, noise_sigma: float, seed: int
 ) -> TaskStatistic:
-    """Compute the statistic of a code for every stimulus: Gradient Sum, or distance from the standard.
-
-    Parameters
-    ----------
-    code, table, neighbours, noise_sigma, seed
-        As in `code_hit_rates`.
-
-    Returns
-    -------
-    TaskStatistic
-    """
+    """Compute the statistic of a code for every stimulus: Gradient Sum, or distance from the standard."""
     n_stimuli = len(table)
     if code == "euclidean":
         sets = noisy_responses(
@@ -281,31 +179,6 @@ def side_curves(
 
     A curve runs over the distance from the standard, where the hit rate is chance. The intervals are those of
     an experiment with so many trials per comparison that finds these hit rates.
-
-    Parameters
-    ----------
-    levels : sequence of float
-        Of the stimuli, the standard first. [unit of what varies]
-    rates : array (n_comparisons,)
-        Hit rates. [0-1]
-    trials : int
-        Per comparison.
-    settings : CurveSettings
-        Shape of the curve, and where its threshold is read.
-    seed : int
-        Of the bootstrap.
-
-    Returns
-    -------
-    tuple of SideCurve
-        One per side that has a comparison.
-
-    Examples
-    --------
-    >>> rates = np.array([0.6, 0.75, 0.95])
-    >>> above = side_curves([10.0, 11.0, 12.0, 14.0], rates, 200, CurveSettings(), seed=1)[0]
-    >>> above.side, round(above.fit.threshold.difference, 1)
-    ('above', 2.0)
     """
     standard, others = levels[0], np.asarray(levels[1:], dtype=np.float64)
     found = []

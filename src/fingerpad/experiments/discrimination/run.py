@@ -30,61 +30,37 @@ from fingerpad.skin.indentation import Touch
 
 @result_class
 class DiscriminationFile:
-    """The file `discriminate.json`.
-
-    Parameters
-    ----------
-    format, format_version
-        By which a reader knows the file.
-    discrimination : TaskResult
-        What was found.
-    task : DiscriminationTask
-        What was asked, defaults included.
-    afferent : dict of str to float or str
-        Parameters of the afferent; those of a mixed population begin with their type, as in "RA.threshold".
-    manifest : Manifest
-        What ran.
-    """
+    """The file `discriminate.json`."""
 
     format: Literal["fingerpad discrimination"] = "fingerpad discrimination"
     format_version: Literal[2] = 2
+    """By which a reader knows the file."""
     discrimination: TaskResult
+    """What was found."""
     task: DiscriminationTask
+    """What was asked, defaults included."""
     afferent: dict[str, float | str]
+    """Parameters of the afferent; those of a mixed population begin with their type, as in "RA.threshold"."""
     manifest: Manifest
+    """What ran."""
 
 
 @dataclass(frozen=True)
 class DiscriminationRun:
-    """A task with all that it takes to run it.
-
-    Parameters
-    ----------
-    task : DiscriminationTask
-        From `task_files.read_task`.
-    folder : Path
-        Where finished indentations are stored.
-    jobs : int or Engine
-        Processes, or the engine that solves the indentations; the numbers do not depend on it.
-    population : Population or MixedPopulation, optional
-        Afferents in the place of those of the task: of types of one's own, for example.
-    source : str
-        File of the task: files that it names are searched beside it, and errors begin with it.
-    text : str
-        Its content, for the lines of errors.
-
-    Raises
-    ------
-    InputError
-        If a part of the task is impossible; this is checked before anything is solved.
-    """
+    """A task with all that it takes to run it."""
 
     task: DiscriminationTask
+    """From `task_files.read_task`."""
     folder: Path
+    """Where finished indentations are stored."""
     jobs: int | Engine = 1
+    """Processes, or the engine that solves the indentations; the numbers do not depend on it."""
     source: str = "task"
+    """File of the task: files that it names are searched beside it, and errors begin with it."""
     text: str = ""
+    """Its content, for the lines of errors."""
     population: Population | MixedPopulation | None = None
+    """Afferents in the place of those of the task: of types of one's own, for example."""
 
     def __post_init__(self) -> None:
         engine_of(self.jobs)
@@ -116,33 +92,7 @@ def discriminate(
     command: str | None = None,
     inputs: Mapping[str, str] | None = None,
 ) -> DiscriminationFile:
-    """Indent with all stimuli, compute the responses of the population, and decode them.
-
-    Parameters
-    ----------
-    run : DiscriminationRun
-        The task, and where finished indentations are stored.
-    progress : Progress, optional
-        Shown each finished indentation.
-    command : str, optional
-        The command line, for the manifest.
-    inputs : mapping of str to str, optional
-        SHA-256 of the files of the task, by name.
-
-    Returns
-    -------
-    DiscriminationFile
-
-    Raises
-    ------
-    InputError
-        If the population is silent.
-    ConvergenceError
-        If an indentation cannot be solved or no noise gives the observed hit rates; finished indentations
-        stay stored.
-    StoreError
-        If a stored indentation is damaged or the folder cannot be written.
-    """
+    """Indent with all stimuli, compute the responses of the population, and decode them."""
     task, runner = run.task, Runner(run.folder, run.jobs, progress)
     with Origin(run.source, run.text).located(), at("population"):
         # The mesh is needed to tell, so this is left to the run; still it comes before anything is solved.

@@ -23,18 +23,7 @@ SUFFIX = ".yaml"
 
 
 def example_tasks() -> dict[str, str]:
-    """Tasks that come with the package.
-
-    Returns
-    -------
-    dict of str to str
-        Texts of the files, by name.
-
-    Examples
-    --------
-    >>> print(example_tasks()["sphere_curvature"].splitlines()[0])
-    question: Which spheres can be discriminated from one of 287 /m?
-    """
+    """Tasks that come with the package."""
     folder = files("fingerpad.experiments.discrimination") / "tasks"
     return {
         entry.name.removesuffix(SUFFIX): entry.read_text(encoding="utf-8")
@@ -44,35 +33,14 @@ def example_tasks() -> dict[str, str]:
 
 
 def title(text: str) -> str:
-    """Return the question of an example task in words.
-
-    Examples
-    --------
-    >>> title(example_tasks()["sphere_curvature"])
-    'Which spheres can be discriminated from one of 287 /m?'
-    """
+    """Return the question of an example task in words."""
     return parse_task(read_yaml(text, "task")).question
 
 
 def input_hashes(
     source: str | Path, task: DiscriminationTask, stimuli: Sequence[NamedStimulus]
 ) -> dict[str, str]:
-    """SHA-256 of the files on which a task rests.
-
-    Parameters
-    ----------
-    source : str or Path
-        As of `read_task`.
-    task : DiscriminationTask
-        What was read there; it may name a file of fitted parameters.
-    stimuli : sequence of NamedStimulus
-        Its stimuli; objects and motions may name files.
-
-    Returns
-    -------
-    dict of str to str
-        By name of the file.
-    """
+    """SHA-256 of the files on which a task rests."""
     hashes = {str(source): hashlib.sha256(task_text(source).encode()).hexdigest()}
     beside = path_of("source", source).parent
     named = [*named_files(task.finger, beside), *(path for stimulus in stimuli for path in stimulus.files)]
@@ -91,10 +59,6 @@ def read_task(source: str | Path, **replacing: Any) -> DiscriminationTask:
         A YAML file, or a name of `example_tasks`.
     **replacing
         Values that replace those of the file, such as `resolution`; None leaves them.
-
-    Returns
-    -------
-    DiscriminationTask
 
     Raises
     ------
@@ -141,10 +105,6 @@ def parse_task(content: Any, source: str = "task", text: str = "") -> Discrimina
         Where it comes from, for errors.
     text : str, optional
         Content of the file, for the lines of errors.
-
-    Returns
-    -------
-    DiscriminationTask
 
     Raises
     ------

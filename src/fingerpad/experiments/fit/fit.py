@@ -91,10 +91,6 @@ def fit_recordings(
     positions_mm : array_like (n_stimuli,), optional
         Where along a line each stimulus was: in posterior and profiles, neighbours may miss alike. [mm]
 
-    Returns
-    -------
-    FitResult
-
     Raises
     ------
     InputError
@@ -162,13 +158,7 @@ def fit_recordings(
 
 
 def folds_in_turn(n_stimuli: int, n_folds: int | None = None) -> IntArray:
-    """Fold of each stimulus, assigned in turn: six folds, or one per stimulus where there are fewer.
-
-    Examples
-    --------
-    >>> folds_in_turn(8).tolist(), folds_in_turn(3).tolist(), folds_in_turn(3, 2).tolist()
-    ([0, 1, 2, 3, 4, 5, 0, 1], [0, 1, 2], [0, 1, 0])
-    """
+    """Fold of each stimulus, assigned in turn: six folds, or one per stimulus where there are fewer."""
     whole("stimuli", n_stimuli, at_least=2)
     if n_folds is None:
         n_folds = min(int(protocol.FOLDS.value), n_stimuli)
@@ -176,17 +166,7 @@ def folds_in_turn(n_stimuli: int, n_folds: int | None = None) -> IntArray:
 
 
 def check_enough(rates: RateRecordings, memberships: IntArray, n_free: int = len(IDENTIFIABLE_NAMES)) -> None:
-    """Raise `InputError` if a training set cannot be fitted, or a set not be judged.
-
-    Parameters
-    ----------
-    rates : RateRecordings
-        What is to be fitted.
-    memberships : int array (n_stimuli,)
-        Fold of each stimulus.
-    n_free : int, optional
-        Free numbers.
-    """
+    """Raise `InputError` if a training set cannot be fitted, or a set not be judged."""
     if memberships.shape != (len(rates.stimuli),):
         raise InputError(
             f"memberships needs one fold per stimulus: got {memberships.size} for {len(rates.stimuli)}."

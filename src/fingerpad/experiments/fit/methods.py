@@ -38,21 +38,14 @@ MethodOf = Callable[[AfferentModel, RateProblem, Bounds, int], Method]
 
 @dataclass(frozen=True)
 class Prepared:
-    """A problem, the method that fits it, and the meaning of its parameters.
-
-    Parameters
-    ----------
-    problem : RateProblem
-        What is fitted, in the parameters of the method.
-    method : Method
-        How.
-    six : callable
-        From those parameters to the paper's six.
-    """
+    """A problem, the method that fits it, and the meaning of its parameters."""
 
     problem: RateProblem
+    """What is fitted, in the parameters of the method."""
     method: Method
+    """How."""
     six: Callable[[FloatArray], FloatArray]
+    """From those parameters to the paper's six."""
 
     def covariance(self, fit: Fit, folds: CrossValidation) -> FloatArray | None:
         """Covariance (4, 4) of the identifiable numbers, from the fits of the folds; None for few folds."""
@@ -64,15 +57,7 @@ class Prepared:
 
 
 def check_spikes(recordings: Recordings, n_motions: int) -> SpikeRecordings:
-    """Return the recordings if the likelihood of their spikes is defined, else raise `InputError`.
-
-    Parameters
-    ----------
-    recordings : RateRecordings or SpikeRecordings
-        What was recorded.
-    n_motions : int
-        How many different motions the stimuli have.
-    """
+    """Return the recordings if the likelihood of their spikes is defined, else raise `InputError`."""
     if isinstance(recordings, RateRecordings):
         raise InputError("likelihood needs spike times: got rates, choose another method.")
     if n_motions > 1:
@@ -120,30 +105,7 @@ METHODS = ("least_squares", "response_surface", "closed_form", "cma_es", "likeli
 def prepare(
     method: str, model: AfferentModel, recordings: Recordings, rates: RateRecordings, seed: int
 ) -> Prepared:
-    """Prepare a method of fitting recordings.
-
-    Parameters
-    ----------
-    method : str
-        One of `METHODS`.
-    model : AfferentModel
-        The afferent under all stimuli.
-    recordings : RateRecordings or SpikeRecordings
-        What was recorded.
-    rates : RateRecordings
-        Its rates.
-    seed : int
-        Of methods that draw.
-
-    Returns
-    -------
-    Prepared
-
-    Raises
-    ------
-    InputError
-        If the method is unknown, or as `check_spikes` for "likelihood".
-    """
+    """Prepare a method of fitting recordings."""
     one_of("method", method, METHODS)
     if method == "likelihood":
         # Only this method loads the module and its kernels.

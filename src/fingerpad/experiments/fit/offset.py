@@ -37,15 +37,7 @@ Beside = Mapping[float, SedTraces | Sequence[SedTraces]]
 
 
 def check_offset(method: str, places_mm: Sequence[float]) -> None:
-    """Raise `InputError` if a receptor's offset cannot be determined.
-
-    Parameters
-    ----------
-    method : str
-        How the recordings are fitted.
-    places_mm : sequence of float
-        Where along the finger each stimulus was. [mm]
-    """
+    """Raise `InputError` if a receptor's offset cannot be determined."""
     if method not in OFFSET_METHODS:
         raise InputError(f"offset needs a method that fits it, {' or '.join(OFFSET_METHODS)}: got {method}.")
     if len(set(places_mm)) < 2:
@@ -74,32 +66,7 @@ def fit_offset(
     windows_ms: Windows | None,
     seed: int = 0,
 ) -> OffsetFit:
-    """Fit the four numbers and the receptor's offset together, on the same folds.
-
-    Parameters
-    ----------
-    beside : mapping of float to SedTraces or to a sequence of SedTraces
-        Strain energy density at a receptor in each place, two places or more on both sides of 0. [mm]
-    rates : RateRecordings
-        What was observed.
-    memberships : int array (n_stimuli,)
-        Fold of each stimulus.
-    method : str
-        One of `OFFSET_METHODS`.
-    windows_ms : ((float, float), (float, float)) or None
-        As of `AfferentModel`. [ms]
-    seed : int, optional
-        Of methods that draw.
-
-    Returns
-    -------
-    OffsetFit
-
-    Raises
-    ------
-    InputError
-        If the places do not lie on both sides of 0, or disagree in their stimuli.
-    """
+    """Fit the four numbers and the receptor's offset together, on the same folds."""
     beside_mm = check_beside(beside)
     roving = ReceptorOffset.of_traces({offset: beside[offset] for offset in beside_mm}, windows_ms)
     problem, everything = five_number_problem(roving, rates), np.arange(roving.n_stimuli)

@@ -26,32 +26,7 @@ def rate_posterior(
     positions_mm: ArrayLike | None = None,
     **settings: Any,
 ) -> RatePosterior:
-    """Draw the four identifiable numbers from their posterior given the rates.
-
-    Parameters
-    ----------
-    model : AfferentModel
-        The afferent under all stimuli.
-    rates : RateRecordings
-        What was observed.
-    four : array_like (4,)
-        A fit, near which the draws begin.
-    seed : int
-        Of the random numbers.
-    positions_mm : array_like (n_stimuli,), optional
-        Where along a line each stimulus was: residuals of neighbours may then be alike. [mm]
-    **settings
-        Those of `fingerpad.inference.fitting.posterior.sample`.
-
-    Returns
-    -------
-    RatePosterior
-
-    Raises
-    ------
-    ConvergenceError
-        If the draws have not converged.
-    """
+    """Draw the four identifiable numbers from their posterior given the rates."""
     likelihood = _likelihood(model, rates, positions_mm)
     found = afferent_posterior(likelihood, admissible(four), seed=seed, **settings)
     ends = credible_band(found.four, LEVEL).T
@@ -75,17 +50,7 @@ def rate_posterior(
 def profiled(
     model: AfferentModel, rates: RateRecordings, four: ArrayLike, positions_mm: ArrayLike | None = None
 ) -> tuple[ParameterProfile, ...]:
-    """Profile the likelihood of each of the four identifiable numbers.
-
-    Parameters
-    ----------
-    model, rates, four, positions_mm
-        As of `rate_posterior`.
-
-    Returns
-    -------
-    tuple of ParameterProfile
-    """
+    """Profile the likelihood of each of the four identifiable numbers."""
     likelihood = _likelihood(model, rates, positions_mm)
     return profiles(likelihood, likely_points(likelihood, admissible(four)))
 

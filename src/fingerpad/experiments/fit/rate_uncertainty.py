@@ -43,20 +43,6 @@ def admissible(four: ArrayLike) -> FloatArray:
 
     A gain at its bound, 0, has no logarithm; the paper's start replaces it. An intercept that would elicit
     spikes without touch is lowered.
-
-    Parameters
-    ----------
-    four : array_like (4,)
-        In the order of `fingerpad.inference.identifiable.IDENTIFIABLE_NAMES`.
-
-    Returns
-    -------
-    array (4,)
-
-    Examples
-    --------
-    >>> admissible([0.05, 4.0, 0.0, 50.0]).round(3).tolist()
-    [0.018, 4.0, 0.042, 50.0]
     """
     fitted = np.array(four, dtype=np.float64)
     usual = identifiable(start_points()[0])
@@ -70,18 +56,6 @@ def likely_points(likelihood: RateLikelihood, four: ArrayLike) -> FloatArray:
 
     A likelihood of rates has many local maxima, and the fit may be at a low one. Clouds of points are laid
     about the best points of all clouds before; points that are not much less likely than the best are kept.
-
-    Parameters
-    ----------
-    likelihood : RateLikelihood
-        Of a model of the four identifiable numbers.
-    four : array_like (4,)
-        A fit, the centre of the first cloud; see `admissible`.
-
-    Returns
-    -------
-    array (n_points, 4)
-        Points whose log likelihood is less than the highest one by `MOST_LOSS` at most.
     """
     middle, reach = to_coordinates(four), np.diag(FIRST_CLOUD)
     design = norm.ppf(qmc.Halton(middle.size, scramble=False).random(CLOUDS * POINTS_OF_CLOUD + 1)[1:])
@@ -98,25 +72,7 @@ def likely_points(likelihood: RateLikelihood, four: ArrayLike) -> FloatArray:
 
 
 def profiles(likelihood: RateLikelihood, starts: FloatArray) -> tuple[ParameterProfile, ...]:
-    """Profile the likelihood of the four numbers; those that are positive in their logarithm.
-
-    Parameters
-    ----------
-    likelihood : RateLikelihood
-        Of a model of the four identifiable numbers.
-    starts : array (n_starts, 4)
-        Draws from the posterior, or `likely_points`.
-
-    Returns
-    -------
-    tuple of ParameterProfile
-        One per number.
-
-    Raises
-    ------
-    ConvergenceError
-        If a fit does not end.
-    """
+    """Profile the likelihood of the four numbers; those that are positive in their logarithm."""
 
     def log_likelihood(points: FloatArray) -> FloatArray:
         numbers = np.concatenate([points[:, :1], np.exp(points[:, 1:])], axis=1)
@@ -145,22 +101,7 @@ def _profile(profile: ProfileLikelihood, logarithm: bool) -> ParameterProfile:
 
 
 def fss_sensitivity(problem: RateProblem, four: ArrayLike, seed: int) -> FssSensitivity:
-    """Compute Sobol indices of FSS, each number within `SENSITIVITY_SHARE` below and above the fit.
-
-    Parameters
-    ----------
-    problem : RateProblem
-        Of a model of the four identifiable numbers.
-    four : array_like (4,)
-        The fit. The range of a number that is 0 is a share of the paper's start, an intercept's of the
-        current that just fires.
-    seed : int
-        Of the design and the bootstrap.
-
-    Returns
-    -------
-    FssSensitivity
-    """
+    """Compute Sobol indices of FSS, each number within `SENSITIVITY_SHARE` below and above the fit."""
     fitted, sizes = np.asarray(four, dtype=np.float64), identifiable(start_points()[0])
     sizes[0] = 1.0 / sizes[3]  # beta tau/(C v) = 1 just fires
     reach = SENSITIVITY_SHARE * np.where(fitted == 0.0, sizes, np.abs(fitted))

@@ -8,27 +8,19 @@ from fingerpad.core.results import Matrix, Number, Vector, WholeVector, result_c
 
 @result_class
 class SpikeFitSummary:
-    """Maximum likelihood of spike trains under a soft threshold.
-
-    Parameters
-    ----------
-    n_spikes : int
-        How many were fitted.
-    log_likelihood, log_likelihood_out_of_sample : float
-        Of all spikes, and of each fold's spikes fitted without it.
-    escape_width, escape_width_standard_error : float
-        Width of the threshold over the threshold.
-    time_rescaling_distance, time_rescaling_p_value : float
-        Kolmogorov-Smirnov test of the rescaled intervals.
-    """
+    """Maximum likelihood of spike trains under a soft threshold."""
 
     n_spikes: int
+    """How many were fitted."""
     log_likelihood: float
     log_likelihood_out_of_sample: float
+    """Of all spikes, and of each fold's spikes fitted without it."""
     escape_width: float
     escape_width_standard_error: Number
+    """Width of the threshold over the threshold."""
     time_rescaling_distance: float
     time_rescaling_p_value: float
+    """Kolmogorov-Smirnov test of the rescaled intervals."""
 
 
 @result_class
@@ -49,90 +41,59 @@ class PhaseBands:
 
 @result_class
 class RatePosterior:
-    """Posterior of the four identifiable numbers.
-
-    Parameters
-    ----------
-    level : float
-        Probability within each interval and band.
-    seed : int
-        Of the random numbers.
-    n_draws, n_evaluations : int
-        Draws that were kept, and evaluations of the likelihood.
-    largest_r_hat, smallest_effective_size : float
-        Convergence: split R-hat and effective number of draws, the worst of the four.
-    median : dict of str to float
-        Of each number.
-    interval : dict of str to (float, float)
-        Credible interval of each number.
-    covariance : array (4, 4)
-        Of the draws.
-    bands : dict of str to PhaseBands
-        By phase.
-    """
+    """Posterior of the four identifiable numbers."""
 
     level: float
+    """Probability within each interval and band."""
     seed: int
+    """Of the random numbers."""
     n_draws: int
     n_evaluations: int
+    """Draws that were kept, and evaluations of the likelihood."""
     largest_r_hat: float
     smallest_effective_size: float
+    """Convergence: split R-hat and effective number of draws, the worst of the four."""
     median: dict[str, float]
     interval: dict[str, tuple[float, float]]
+    """Credible interval of each number."""
     covariance: Matrix
+    """Of the draws, (4, 4)."""
     bands: dict[str, PhaseBands]
+    """By phase."""
 
 
 @result_class
 class ParameterProfile:
-    """Profile likelihood of one of the four identifiable numbers.
-
-    Parameters
-    ----------
-    name : str
-        Of the number.
-    values : array (n_values,)
-        Where it was held.
-    losses : array (n_values,)
-        Loss of log likelihood there, the other three numbers fitted.
-    low, high : float, optional
-        Ends of the interval, None where the rates set none.
-    """
+    """Profile likelihood of one of the four identifiable numbers."""
 
     name: str
     values: Vector
+    """Where it was held, (n_values,)."""
     losses: Vector
+    """Loss of log likelihood there, the other three numbers fitted, (n_values,)."""
     low: float | None
     high: float | None
+    """Ends of the interval, None where the rates set none."""
 
 
 @result_class
 class FssSensitivity:
-    """Sobol indices of FSS for the four identifiable numbers, in their order.
-
-    Parameters
-    ----------
-    lower, upper : array (4,)
-        Range of each number.
-    first, first_half_width : array (4,)
-        First-order index and half of its confidence interval. [1]
-    total, total_half_width : array (4,)
-        Total index and half of its confidence interval. [1]
-    mean_fss, deviation_fss : float
-        Mean and standard deviation of FSS over the ranges. [1]
-    evaluations : int
-        Of FSS.
-    """
+    """Sobol indices of FSS for the four identifiable numbers, in their order."""
 
     lower: Vector
     upper: Vector
+    """Range of each number, (4,)."""
     first: Vector
     first_half_width: Vector
+    """First-order index and half of its confidence interval, (4,). [1]"""
     total: Vector
     total_half_width: Vector
+    """Total index and half of its confidence interval, (4,). [1]"""
     mean_fss: Number
     deviation_fss: Number
+    """Mean and standard deviation of FSS over the ranges. [1]"""
     evaluations: int
+    """Of FSS."""
 
 
 @result_class
@@ -145,90 +106,59 @@ class HeldOffset:
 
 @result_class
 class OffsetFit:
-    """Fit of the four numbers and the receptor's offset.
-
-    Parameters
-    ----------
-    offset_mm, standard_error_mm : float
-        Offset along the finger, distal positive, and its standard error, NaN where it is not known. [mm]
-    folds_mm : array (n_folds,)
-        Offsets that the folds give. [mm]
-    identifiable : dict of str to float
-        The four numbers.
-    fss_in_sample, fss_out_of_sample : float
-        Fractional sum of squares over all stimuli, and mean over the folds.
-    fss_by_phase : dict of str to float
-        In sample, "dynamic" and "static".
-    n_evaluations : int
-        Evaluations of the model.
-    seconds : float
-        Time on the clock. [s]
-    held : HeldOffset
-        Fits with the receptor held.
-    """
+    """Fit of the four numbers and the receptor's offset."""
 
     offset_mm: float
     standard_error_mm: Number
+    """Offset along the finger, distal positive, and its standard error, NaN where it is not known. [mm]"""
     folds_mm: Vector
+    """Offsets that the folds give, (n_folds,). [mm]"""
     identifiable: dict[str, float]
+    """The four numbers."""
     fss_in_sample: float
     fss_out_of_sample: float
+    """Fractional sum of squares over all stimuli, and mean over the folds."""
     fss_by_phase: dict[str, float]
+    """In sample, "dynamic" and "static"."""
     n_evaluations: int
+    """Evaluations of the model."""
     seconds: float
+    """Time on the clock. [s]"""
     held: HeldOffset
+    """Fits with the receptor held."""
 
 
 @result_class
 class PhaseRates:
-    """Rates of one phase, in the ramp or in the hold.
-
-    Parameters
-    ----------
-    fss_in_sample : float, optional
-        Fractional sum of squares over all stimuli; absent where the phase was not recorded.
-    observed_hz : array (n_stimuli,), optional
-        Recorded rates. [spikes/s]
-    fitted_hz : array (n_stimuli,)
-        Rates of the afferent that is fitted to all stimuli. [spikes/s]
-    out_of_sample_hz : array (n_stimuli,)
-        Rates that the fit without the stimulus' fold predicts. [spikes/s]
-    """
+    """Rates of one phase, in the ramp or in the hold."""
 
     fss_in_sample: float | None
+    """Fractional sum of squares over all stimuli; absent where the phase was not recorded."""
     observed_hz: Vector | None
+    """Recorded rates, (n_stimuli,). [spikes/s]"""
     fitted_hz: Vector
+    """Rates of the afferent that is fitted to all stimuli, (n_stimuli,). [spikes/s]"""
     out_of_sample_hz: Vector
+    """Rates that the fit without the stimulus' fold predicts, (n_stimuli,). [spikes/s]"""
 
 
 @result_class
 class FittedFold:
-    """One fold of the cross validation.
-
-    Parameters
-    ----------
-    fold : int
-        Number, from 1.
-    stimuli : tuple of str
-        Left out of the fit.
-    fss_train, fss_test : float
-        Fractional sum of squares over the other stimuli and over these.
-    n_evaluations : int
-        Evaluations of the model.
-    seconds : float
-        Time on the clock. [s]
-    parameters, identifiable : dict of str to float
-        The paper's six parameters, and the four that rates identify.
-    """
+    """One fold of the cross validation."""
 
     fold: int
     stimuli: tuple[str, ...]
+    """Left out of the fit."""
     fss_train: float
     fss_test: float
+    """Fractional sum of squares over the other stimuli and over these."""
     n_evaluations: int
+    """Evaluations of the model."""
     seconds: float
+    """Time on the clock. [s]"""
     parameters: dict[str, float]
     identifiable: dict[str, float]
+    """The paper's six parameters, and the four that rates identify."""
 
 
 @result_class

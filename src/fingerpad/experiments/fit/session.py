@@ -44,29 +44,20 @@ EXAMPLE = "bar.csv"
 
 @result_class
 class FitFile:
-    """The file `fit.json`.
-
-    Parameters
-    ----------
-    format, format_version
-        By which a reader knows the file.
-    fit : FitResult
-        What was found.
-    windows_ms : ((float, float), (float, float))
-        Windows of the dynamic and of the static rate. [ms]
-    dynamic_quantity, static_quantity : str
-        Quantities of the two terms.
-    manifest : Manifest
-        What ran.
-    """
+    """The file `fit.json`."""
 
     format: Literal["fingerpad fit"] = "fingerpad fit"
     format_version: Literal[2] = 2
+    """By which a reader knows the file."""
     fit: FitResult
+    """What was found."""
     windows_ms: tuple[tuple[float, ...], tuple[float, ...]]
+    """Windows of the dynamic and of the static rate. [ms]"""
     dynamic_quantity: str
     static_quantity: str
+    """Quantities of the two terms."""
     manifest: Manifest
+    """What ran."""
 
 
 @dataclass(frozen=True)
@@ -253,10 +244,6 @@ def run_fit(
     inputs : mapping of str to str, optional
         SHA-256 of the input files, by name.
 
-    Returns
-    -------
-    FitFile
-
     Raises
     ------
     ConvergenceError
@@ -318,18 +305,7 @@ def _shifts_mm(stimuli: Sequence[NamedStimulus], along: float) -> list[float] | 
 
 
 def example_recordings() -> dict[str, bytes]:
-    """Return example recordings: the rates under the paper's bar that come with the package.
-
-    Returns
-    -------
-    dict of str to bytes
-        Contents by file name.
-
-    Examples
-    --------
-    >>> print(example_recordings()[EXAMPLE].decode().splitlines()[3])
-    -3.5,0,0
-    """
+    """Return example recordings: the rates under the paper's bar that come with the package."""
     observed = bar_firing_rates()
     rows = np.column_stack([observed.shift_mm, observed.dynamic_rate_hz, observed.static_rate_hz])
     lines = [

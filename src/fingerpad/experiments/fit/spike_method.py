@@ -28,21 +28,14 @@ from fingerpad.neuron.transduction import Drive
 
 @dataclass(frozen=True)
 class MaximumLikelihood:
-    """Fit the soft threshold under which the spikes of the chosen stimuli are most likely.
-
-    Parameters
-    ----------
-    drive : Drive
-        One column per stimulus.
-    recordings : SpikeRecordings
-        Spikes of all presentations.
-    sites : int array (n_presentations,)
-        Column of the drive that each presentation belongs to.
-    """
+    """Fit the soft threshold under which the spikes of the chosen stimuli are most likely."""
 
     drive: Drive
+    """One column per stimulus."""
     recordings: SpikeRecordings
+    """Spikes of all presentations."""
     sites: IntArray
+    """Column of the drive that each presentation belongs to, (n_presentations,)."""
     name: str = "likelihood"
 
     def of(self, chosen: IntArray) -> SpikeLikelihood:
@@ -70,18 +63,12 @@ class MaximumLikelihood:
 
 @dataclass(frozen=True)
 class PreparedSpikes(Prepared):
-    """The likelihood of spikes, the method that maximises it, and the meaning of its parameters.
-
-    Parameters
-    ----------
-    method : MaximumLikelihood
-        How.
-    everything : SpikeLikelihood
-        Likelihood of all spikes.
-    """
+    """The likelihood of spikes, the method that maximises it, and the meaning of its parameters."""
 
     method: MaximumLikelihood
+    """How."""
     everything: SpikeLikelihood
+    """Likelihood of all spikes."""
 
     def covariance(self, fit: Fit, folds: CrossValidation) -> FloatArray:
         """Covariance (4, 4) of the identifiable numbers: part of the inverse of the Fisher information."""
@@ -108,28 +95,7 @@ class PreparedSpikes(Prepared):
 def prepare_spikes(
     model: AfferentModel, recordings: Recordings, rates: RateRecordings, seed: int
 ) -> PreparedSpikes:
-    """Prepare maximum likelihood of spike trains under a soft threshold.
-
-    Parameters
-    ----------
-    model : AfferentModel
-        The afferent under all stimuli, which move alike.
-    recordings : SpikeRecordings
-        What was recorded.
-    rates : RateRecordings
-        Its rates, by which the fit is scored.
-    seed : int
-        Of the spikes that are drawn to find rates.
-
-    Returns
-    -------
-    PreparedSpikes
-
-    Raises
-    ------
-    InputError
-        As `check_spikes`.
-    """
+    """Prepare maximum likelihood of spike trains under a soft threshold."""
     trains, (drive,) = check_spikes(recordings, len(model.drives)), model.drives
     sites = np.array([rates.stimuli.index(name) for name in trains.stimuli], dtype=np.int64)
     method = MaximumLikelihood(drive, trains, sites)

@@ -39,51 +39,27 @@ class Verdict(StrEnum):
 
 @result_class
 class ClaimRow:
-    """A claim of the paper beside this run.
-
-    Parameters
-    ----------
-    group : Group
-        What the row can show.
-    section : str
-        Section of the paper; empty for our own additions.
-    quantity : str
-        What is compared.
-    paper, ours : str
-        As they are printed.
-    status : str
-        How far the inputs can be trusted.
-    verdict : Verdict
-        Whether the claim is met.
-    fitted_to : str
-        What was fitted to the observed number, or chosen by it. Rows of the group `FITTED` have it, and no
-        others.
-    note : str
-        How it was judged.
-
-    Raises
-    ------
-    ValueError
-        If a row of the group `FITTED` lacks `fitted_to`, or another row has it.
-
-    Examples
-    --------
-    >>> row = ClaimRow(
-    ...     group=Group.STATEMENT, quantity="hit rate", paper="0.58", ours="0.60", verdict=Verdict.MET
-    ... )
-    >>> row.verdict.value
-    'met'
-    """
+    """A claim of the paper beside this run."""
 
     group: Group
+    """What the row can show."""
     section: str = ""
+    """Section of the paper; empty for our own additions."""
     quantity: str
+    """What is compared."""
     paper: str
     ours: str
+    """As they are printed."""
     status: str = ""
+    """How far the inputs can be trusted."""
     verdict: Verdict
+    """Whether the claim is met."""
     fitted_to: str = ""
+    """What was fitted to the observed number, or chosen by it. Rows of the group `FITTED` have it, and no
+    others.
+    """
     note: str = ""
+    """How it was judged."""
 
     def __post_init__(self) -> None:
         if (self.group is Group.FITTED) != bool(self.fitted_to):
@@ -99,13 +75,7 @@ def judged(met: bool) -> Verdict:
 
 
 def two_digits(value: float) -> str:
-    """Round to the two digits that another machine reproduces.
-
-    Examples
-    --------
-    >>> two_digits(172.7), two_digits(0.9339), two_digits(float("nan"))
-    ('170', '0.93', '–')
-    """
+    """Round to the two digits that another machine reproduces."""
     return "–" if value != value else f"{float(f'{value:.2g}'):g}"
 
 

@@ -49,21 +49,7 @@ def comparison(
     nail: NailBorder,
     curvature_thresholds: CurvatureThresholds | None = None,
 ) -> list[ClaimRow]:
-    """Rows of the table that compares a reproduction with the paper.
-
-    Parameters
-    ----------
-    materials : str
-        Name of the tissues of the run: what was fitted depends on them.
-    skin, force, unit, course, discrimination, nail
-        Results of the three levels.
-    curvature_thresholds : optional
-        Result beyond the paper.
-
-    Returns
-    -------
-    list of ClaimRow
-    """
+    """Rows of the table that compares a reproduction with the paper."""
     return [
         *_deflection(skin),
         *_force(materials, force),
@@ -231,10 +217,8 @@ def _single_unit(materials: str, found: SingleUnitResult) -> list[ClaimRow]:
 
 
 def _fold_3(found: SingleUnitResult, status: str) -> list[ClaimRow]:
-    """Judge the paper's session of fold 3; a fit without its second start point has no such session.
-
-    The shifts of the paper's fold 3 are lost, so that any of our folds may be it (docs/decisions/folds.md).
-    """
+    """Judge the paper's session of fold 3; a fit without its second start point has no such session."""
+    # The shifts of the paper's fold 3 are lost, so that any of our folds may be it (docs/decisions/folds.md).
     sessions = [climb for fold in found.folds for climb in fold.climbs if climb.start == SESSION_START]
     if not sessions or found.method != ResponseSurface.name:
         return []

@@ -57,160 +57,103 @@ LEFT_OUT_PER_M = (296.0, 305.0, 316.0, 328.0, 340.0)
 
 @result_class
 class PsychometricCurve:
-    """A psychometric function of the difference.
-
-    Parameters
-    ----------
-    step : array (n,)
-        How much more curved than the standard, as a share of it.
-    hit_rate : array (n,)
-        [0-1]
-    """
+    """A psychometric function of the difference."""
 
     step: Vector
+    """How much more curved than the standard, as a share of it, (n,)."""
     hit_rate: Vector
 
 
 @result_class
 class CurvatureThreshold:
-    """Threshold at one standard.
-
-    Parameters
-    ----------
-    standard_per_m, jnd_per_m : float
-        The standard and the just noticeable difference of the model. [1/m]
-    weber_fraction, ideal_weber_fraction : float
-        Threshold over standard, and that of the ideal observer from Fisher's information.
-    step, hit_rate : array (n_comparisons,)
-        Comparisons of an experiment as shares of the standard, and their hit rates. [0-1]
-    fitted_weber_fraction, fitted_interval : float, (float, float)
-        Threshold of the Weibull function through the counts of that experiment, and its 95 % interval.
-    curve : PsychometricCurve
-        That function.
-    """
+    """Threshold at one standard."""
 
     standard_per_m: float
     jnd_per_m: float
+    """The standard and the just noticeable difference of the model. [1/m]"""
     weber_fraction: float
     ideal_weber_fraction: float
+    """Threshold over standard, and that of the ideal observer from Fisher's information."""
     step: Vector
     hit_rate: Vector
+    """Comparisons of an experiment as shares of the standard, and their hit rates, (n_comparisons,). [0-1]"""
     fitted_weber_fraction: Number
     fitted_interval: tuple[Number, Number]
+    """Threshold of the Weibull function through the counts of that experiment, and its 95 % interval."""
     curve: PsychometricCurve
+    """That function."""
 
 
 @result_class
 class MissingThreshold:
-    """A standard without a threshold.
-
-    Parameters
-    ----------
-    standard_per_m : float or None
-        None stands for all standards. [1/m]
-    why_not : str
-        The reason.
-    """
+    """A standard without a threshold."""
 
     standard_per_m: float | None
+    """None stands for all standards. [1/m]"""
     why_not: str
+    """The reason."""
 
 
 @result_class
 class PopulationThresholds:
-    """Thresholds of one population.
-
-    Parameters
-    ----------
-    layout : str
-        One of `LAYOUTS`.
-    rows, columns : int
-        Receptors along the finger and across.
-    noise_sigma : float
-        Standard deviation of the multiplicative noise; NaN if none fits people.
-    gradient_sum : array (n_spheres,)
-        Of static rates, without noise. [spikes/s]
-    standards : tuple of CurvatureThreshold
-        Standards with a threshold.
-    without_threshold : tuple of MissingThreshold
-        The others.
-    """
+    """Thresholds of one population."""
 
     layout: str
     rows: int
     columns: int
+    """Receptors along the finger and across."""
     noise_sigma: Number
+    """Standard deviation of the multiplicative noise; NaN if none fits people."""
     gradient_sum: Vector
+    """Of static rates, without noise, (n_spheres,). [spikes/s]"""
     standards: tuple[CurvatureThreshold, ...]
+    """Standards with a threshold."""
     without_threshold: tuple[MissingThreshold, ...]
+    """The others."""
 
 
 @result_class
 class ThresholdsOfPeople:
-    """Thresholds of people in the literature.
-
-    Parameters
-    ----------
-    standard_per_m, comparison_per_m : array (n,)
-        Standards and the comparisons at threshold. [1/m]
-    weber_fractions : array (2,)
-        Smallest and largest reported fraction.
-    """
+    """Thresholds of people in the literature."""
 
     standard_per_m: Vector
     comparison_per_m: Vector
+    """Standards and the comparisons at threshold, (n,). [1/m]"""
     weber_fractions: Vector
+    """Smallest and largest reported fraction, (2,)."""
 
 
 @result_class
 class InterpolationError:
-    """Gradient Sum of a pressed sphere and of its interpolation from the others.
-
-    Parameters
-    ----------
-    curvature_per_m : float
-        Of the sphere. [1/m]
-    pressed, foretold : float
-        The two sums. [spikes/s]
-    error_per_m : float
-        Difference as a curvature, by the slope of the sum. [1/m]
-    """
+    """Gradient Sum of a pressed sphere and of its interpolation from the others."""
 
     curvature_per_m: float
+    """Of the sphere. [1/m]"""
     pressed: float
     foretold: float
+    """The two sums. [spikes/s]"""
     error_per_m: Number
+    """Difference as a curvature, by the slope of the sum. [1/m]"""
 
 
 @result_class
 class CurvatureThresholds:
-    """Thresholds of the static Gradient Sum at several standards.
-
-    Parameters
-    ----------
-    seed : int
-        Of the random numbers.
-    proportion : float
-        Hit rate at threshold. [0-1]
-    judgements : int
-        Per comparison of an experiment.
-    pressed_per_m : array (n_spheres,)
-        Pressed spheres. [1/m]
-    populations : tuple of PopulationThresholds
-        By layout, the paper's first.
-    literature : ThresholdsOfPeople
-        To compare with.
-    interpolation : tuple of InterpolationError
-        Of the spheres in `LEFT_OUT_PER_M`.
-    """
+    """Thresholds of the static Gradient Sum at several standards."""
 
     seed: int
+    """Of the random numbers."""
     proportion: float
+    """Hit rate at threshold. [0-1]"""
     judgements: int
+    """Per comparison of an experiment."""
     pressed_per_m: Vector
+    """Pressed spheres, (n_spheres,). [1/m]"""
     populations: tuple[PopulationThresholds, ...]
+    """By layout, the paper's first."""
     literature: ThresholdsOfPeople
+    """To compare with."""
     interpolation: tuple[InterpolationError, ...]
+    """Of the spheres in `LEFT_OUT_PER_M`."""
 
 
 def threshold_touches(conditions: Conditions) -> dict[float, Touch]:
@@ -226,23 +169,7 @@ def sphere_touches(conditions: Conditions, curvatures_per_m: Sequence[float]) ->
 def curvature_thresholds(
     responses: Mapping[float, SkinResponse], afferent: Afferent, noise_sigma: float, seed: int
 ) -> CurvatureThresholds:
-    """Thresholds of the static Gradient Sum at several standards.
-
-    Parameters
-    ----------
-    responses : mapping
-        From curvature to solved touch at 0.0 mm: `threshold_touches`, and the paper's spheres. [1/m]
-    afferent : Afferent
-        Model of every afferent of the population.
-    noise_sigma : float
-        Standard deviation of the multiplicative noise, as fitted to Goodwin's two points.
-    seed : int
-        Of the random numbers.
-
-    Returns
-    -------
-    CurvatureThresholds
-    """
+    """Thresholds of the static Gradient Sum at several standards."""
     curvatures = np.array(sorted(responses))
     population = _population("paper", afferent)
     neighbours = neighbour_pairs(population.positions_mm, population.pitch_mm)
@@ -323,19 +250,7 @@ def interpolated(curvature_per_m: FloatArray, table: FloatArray) -> PchipInterpo
 
 
 class Observer:
-    """Discriminates spheres by the Gradient Sum of interpolated rates.
-
-    Parameters
-    ----------
-    rates : callable
-        From the logarithm of the curvature to rates (n_receptors,).
-    neighbours : int array (n_pairs, 2)
-        Of the population.
-    noise_sigma : float
-        Standard deviation of the multiplicative noise.
-    draws : array (n_draws, n_receptors)
-        Standard normal numbers that serve every sphere.
-    """
+    """Discriminates spheres by the Gradient Sum of interpolated rates."""
 
     def __init__(
         self, rates: PchipInterpolator, neighbours: np.ndarray, noise_sigma: float, draws: FloatArray
@@ -362,24 +277,7 @@ class Observer:
 
 
 def just_noticeable_difference(observer: Observer, standard_per_m: float) -> float:
-    """How much more curved a sphere must be to be discriminated in `PROPORTION` of trials. [1/m]
-
-    Parameters
-    ----------
-    observer : Observer
-        Model that judges.
-    standard_per_m : float
-        Curvature of the standard. [1/m]
-
-    Returns
-    -------
-    float
-
-    Raises
-    ------
-    ConvergenceError
-        If no sphere is discriminated from the standard often enough.
-    """
+    """How much more curved a sphere must be to be discriminated in `PROPORTION` of trials. [1/m]"""
     farthest = observer.farthest_per_m
 
     def missing(comparison_per_m: float) -> float:
@@ -394,24 +292,7 @@ def just_noticeable_difference(observer: Observer, standard_per_m: float) -> flo
 
 
 def threshold_at(observer: Observer, standard_per_m: float) -> CurvatureThreshold:
-    """Just noticeable difference at a standard, and the result of an experiment there.
-
-    Parameters
-    ----------
-    observer : Observer
-        Model that judges.
-    standard_per_m : float
-        Curvature of the standard. [1/m]
-
-    Returns
-    -------
-    CurvatureThreshold
-
-    Raises
-    ------
-    ConvergenceError
-        If no sphere is discriminated from the standard often enough.
-    """
+    """Just noticeable difference at a standard, and the result of an experiment there."""
     jnd_per_m, farthest = just_noticeable_difference(observer, standard_per_m), observer.farthest_per_m
     steps = np.array([step for step in STEPS if standard_per_m * (1.0 + step) <= farthest])
     hit_rate = np.array([observer.hit_rate(standard_per_m, standard_per_m * (1.0 + step)) for step in steps])
@@ -437,22 +318,7 @@ def threshold_at(observer: Observer, standard_per_m: float) -> CurvatureThreshol
 def interpolation_errors(
     curvature_per_m: FloatArray, table: FloatArray, neighbours: np.ndarray
 ) -> tuple[InterpolationError, ...]:
-    """Predict the Gradient Sum of some pressed spheres from the others.
-
-    Parameters
-    ----------
-    curvature_per_m : array (n_spheres,)
-        Increasing. [1/m]
-    table : array (n_spheres, n_receptors)
-        Rates. [spikes/s]
-    neighbours : int array (n_pairs, 2)
-        Of the population.
-
-    Returns
-    -------
-    tuple of InterpolationError
-        One per sphere of `LEFT_OUT_PER_M` among them.
-    """
+    """Predict the Gradient Sum of some pressed spheres from the others."""
     sums = gradient_sum(table, neighbours)
     rise = np.gradient(sums, curvature_per_m)
     found = []

@@ -50,131 +50,84 @@ STEEPEST = 20.0
 
 @result_class
 class Interpretation:
-    """One interpretation of the steps that the paper leaves open, and its hit rates.
-
-    Parameters
-    ----------
-    reading : str
-        What it is.
-    receptors : int array (n_positions,)
-        Receptors that take part.
-    rise : array (n_positions,)
-        Share by which the Gradient Sum rises from the standard to the farthest sphere.
-    hit_rate : array (n_positions, n_comparisons)
-        With the noise of the study. [0-1]
-    largest_shift : float
-        Largest change of these by the shift. [0-1]
-    noise_sigma, misfit, own_largest_shift : float
-        Noise that fits people best, root mean square distance to them and largest change by the shift with
-        it; NaN where no noise does. [1], [0-1], [0-1]
-    """
+    """One interpretation of the steps that the paper leaves open, and its hit rates."""
 
     reading: str
     receptors: WholeVector
+    """Receptors that take part, (n_positions,)."""
     rise: Vector
+    """Share by which the Gradient Sum rises from the standard to the farthest sphere, (n_positions,)."""
     hit_rate: Matrix
+    """With the noise of the study, (n_positions, n_comparisons). [0-1]"""
     largest_shift: Number
+    """Largest change of these by the shift. [0-1]"""
     noise_sigma: Number = np.nan
     misfit: Number = np.nan
     own_largest_shift: Number = np.nan
+    """Noise that fits people best, root mean square distance to them and largest change by the shift with it;
+    NaN where no noise does. [1], [0-1], [0-1]
+    """
 
 
 @result_class
 class CriterionErrorBars:
-    """Mean error bar by the spread of the criterion, for three interpretations of what varies.
-
-    Parameters
-    ----------
-    criterion_sigma : array (n_spreads,)
-        Standard deviation of the criterion.
-    point, fraction, likelihood : array (n_spreads,)
-        Error bar if the decision point varies, the fraction beta that places it, or a likelihood ratio of
-        mean 1 between comparison and standard. [0-1]
-    """
+    """Mean error bar by the spread of the criterion, for three interpretations of what varies."""
 
     criterion_sigma: Vector
+    """Standard deviation of the criterion, (n_spreads,)."""
     point: Vector
     fraction: Vector
     likelihood: Vector
+    """Error bar if the decision point varies, the fraction beta that places it, or a likelihood ratio of mean
+    1 between comparison and standard, (n_spreads,). [0-1]
+    """
 
 
 @result_class
 class MisfitCurve:
-    """Expected root mean square distance to Goodwin's points over the noise.
-
-    Parameters
-    ----------
-    noise_sigma : array (n_levels,)
-        Noise sigma_1.
-    misfit : dict of array (n_levels,)
-        By code. [0-1]
-    """
+    """Expected root mean square distance to Goodwin's points over the noise."""
 
     noise_sigma: Vector
+    """Noise sigma_1, (n_levels,)."""
     misfit: dict[str, Vector]
+    """By code, (n_levels,). [0-1]"""
 
 
 @result_class
 class EuclideanFit:
-    """Noise that fits the Euclidean Distance to people, NaN and None if none does.
-
-    Parameters
-    ----------
-    noise_sigma : float
-        Noise sigma_1.
-    misfit : float
-        Root mean square distance to Goodwin's points. [0-1]
-    hit_rate : array (n_positions, n_comparisons) or None
-        With that noise. [0-1]
-    """
+    """Noise that fits the Euclidean Distance to people, NaN and None if none does."""
 
     noise_sigma: Number = np.nan
     misfit: Number = np.nan
+    """Root mean square distance to Goodwin's points. [0-1]"""
     hit_rate: Matrix | None = None
+    """With that noise, (n_positions, n_comparisons). [0-1]"""
 
 
 @result_class
 class DiscrepancyAnalysis:
-    """Numbers behind the differences between the model's percept and the paper's.
-
-    Parameters
-    ----------
-    rise : dict of array (n_positions,)
-        Share by which the Gradient Sum rises from the standard to the farthest sphere, by measure.
-    rise_for_paper_noise : dict of array (n_positions,)
-        Rise with which the paper's noise would give Goodwin's hit rate; NaN if none does.
-    readings : tuple of Interpretation
-        Interpretations of the steps that the paper leaves open.
-    criterion : CriterionErrorBars
-        Of a varied criterion.
-    misfit_curve : MisfitCurve
-        Of every code.
-    euclidean : EuclideanFit
-        With a noise of its own.
-    """
+    """Numbers behind the differences between the model's percept and the paper's."""
 
     rise: dict[str, Vector]
+    """Share by which the Gradient Sum rises from the standard to the farthest sphere, by measure,
+    (n_positions,).
+    """
     rise_for_paper_noise: dict[str, Vector]
+    """Rise with which the paper's noise would give Goodwin's hit rate; NaN if none does, (n_positions,)."""
     readings: tuple[Interpretation, ...]
+    """Interpretations of the steps that the paper leaves open."""
     criterion: CriterionErrorBars
+    """Of a varied criterion."""
     misfit_curve: MisfitCurve
+    """Of every code."""
     euclidean: EuclideanFit
+    """With a noise of its own."""
 
 
 def expected_of_measure(
     measures: Sequence[Measured], noise_sigma: float, standard_normals: FloatArray
 ) -> FloatArray:
-    """Return the expected hit rates (n_positions, n_comparisons) of the Gradient Sum.
-
-    Parameters
-    ----------
-    measures : sequence of Measured
-        One response measure, position by position.
-    noise_sigma : float
-        Standard deviation of the noise.
-    standard_normals : array (n_draws, n_receptors)
-        Draws from Normal(0, 1).
-    """
+    """Return the expected hit rates (n_positions, n_comparisons) of the Gradient Sum."""
     return np.array(
         [expected_hit_rates(one.responses, one.neighbours, noise_sigma, standard_normals) for one in measures]
     )
@@ -190,29 +143,7 @@ def discrepancy_analysis(
     standard_normals: FloatArray,
     seed: int,
 ) -> DiscrepancyAnalysis:
-    """Compute the numbers behind the discrepancies.
-
-    Parameters
-    ----------
-    measures : dict of sequences of Measured
-        As the study decodes them, by measure and position.
-    latency_ms : sequence of arrays (n_spheres, n_receptors)
-        First spikes at every position, NaN without one. [ms]
-    positions_mm, pitch_mm
-        Of the population. [mm]
-    curvature_per_m : sequence of float
-        The spheres, the standard first. [1/m]
-    noise_sigma : float
-        Noise of the study.
-    standard_normals : array (n_draws, n_receptors)
-        Draws from Normal(0, 1).
-    seed : int
-        Of the run.
-
-    Returns
-    -------
-    DiscrepancyAnalysis
-    """
+    """Compute the numbers behind the discrepancies."""
     draws = standard_normals[:DRAWS]
     columns = goodwin.goodwin_columns(curvature_per_m)
     codes: dict[str, Callable[..., FloatArray]] = {
@@ -263,20 +194,6 @@ def rise_needed(measured: Measured, noise_sigma: float, standard_normals: FloatA
     """Rise of the Gradient Sum that gives the farthest sphere Goodwin's hit rate at some noise.
 
     The pattern is kept: the change of responses from the standard to the farthest comparison is scaled.
-
-    Parameters
-    ----------
-    measured : Measured
-        One response measure at one position.
-    noise_sigma : float
-        Standard deviation of the noise.
-    standard_normals : array (n_draws, n_receptors)
-        Draws from Normal(0, 1).
-
-    Returns
-    -------
-    float
-        As a share of the standard's sum; NaN if no rise does it.
     """
     standard, farthest = measured.responses[[0, -1]]
 

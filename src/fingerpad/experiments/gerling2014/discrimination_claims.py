@@ -43,19 +43,7 @@ AFFERENT_FITTED = "the afferent to them at the paper's noise"
 
 
 def discrimination_claims(found: SphereDiscrimination, fitted_to_people: bool) -> list[ClaimRow]:
-    """Judge the paper's statements about discrimination.
-
-    Parameters
-    ----------
-    found : SphereDiscrimination
-        From `discriminate_spheres`.
-    fitted_to_people : bool
-        Whether the afferent was fitted to the hit rates of people as well, by both codes.
-
-    Returns
-    -------
-    list of ClaimRow
-    """
+    """Judge the paper's statements about discrimination."""
     statistics = found.statistics
     fitted_to = f"{NOISE_FITTED}, {AFFERENT_FITTED}" if fitted_to_people else NOISE_FITTED
     fitted = "noise and afferent" if fitted_to_people else "the noise"
@@ -230,11 +218,9 @@ def _shift(statistics: DiscriminationStatistics, before: str) -> list[ClaimRow]:
 
 
 def _latency_shift(found: SphereDiscrimination) -> list[ClaimRow]:
-    """Judge the divergence of latencies by every reading of silent receptors, each at its own best noise.
-
-    The paper does not say what a silent receptor counts as. The verdict holds if the readings can be told
-    apart and agree (docs/decisions/silent-receptors.md).
-    """
+    """Judge the divergence of latencies by every reading of silent receptors, each at its own best noise."""
+    # The paper does not say what a silent receptor counts as. The verdict holds if the readings can be told
+    # apart and agree (docs/decisions/silent-receptors.md).
     readings = [reading for reading in found.reasons.readings if reading.reading.startswith("latency")]
     if not readings:
         return []

@@ -46,23 +46,12 @@ _FIRST_SESSION = 1
 
 @dataclass(frozen=True)
 class Measured:
-    """One response measure of the population at one position of the spheres.
-
-    Parameters
-    ----------
-    responses : array (n_spheres, n_receptors)
-        The standard in the first row. [any unit]
-    neighbours : int array (n_pairs, 2)
-        Pairs that the Gradient Sum goes over.
-
-    Raises
-    ------
-    InputError
-        If no two neighbours respond, or the pairs name receptors that do not exist.
-    """
+    """One response measure of the population at one position of the spheres."""
 
     responses: FloatArray
+    """The standard in the first row, (n_spheres, n_receptors). [any unit]"""
     neighbours: np.ndarray
+    """Pairs that the Gradient Sum goes over, (n_pairs, 2)."""
 
     def __post_init__(self) -> None:
         responses = checked_responses(self.responses)
@@ -75,49 +64,21 @@ class Measured:
 
 @dataclass(frozen=True)
 class Observers:
-    """Hit rates of every observer, session by session.
-
-    Parameters
-    ----------
-    mean, spread : dict of arrays (n_sessions, n_positions, n_comparisons)
-        mu_3 and sigma_3, by the name of the observer. [0-1]
-    unsteadiness : dict of arrays (n_sessions, n_positions)
-        Standard deviation of mu_3 when the judgements of the static Gradient Sum are repeated, by the number
-        of hit rates behind it. [0-1]
-    """
+    """Hit rates of every observer, session by session."""
 
     mean: dict[str, FloatArray]
     spread: dict[str, FloatArray]
+    """mu_3 and sigma_3, by the name of the observer. [0-1]"""
     unsteadiness: dict[int, FloatArray]
+    """Standard deviation of mu_3 when the judgements of the static Gradient Sum are repeated, by the number
+    of hit rates behind it. [0-1]
+    """
 
 
 def observe(
     measures: Mapping[str, Sequence[Measured]], noise_sigma: float, seed: int, sessions: int = SESSIONS
 ) -> Observers:
-    """Simulate the judgements of every observer at every position in several sessions.
-
-    Parameters
-    ----------
-    measures : dict of sequences of Measured
-        Responses by measure, "static" among them, one per position.
-    noise_sigma : float
-        Noise of all observers but those that vary it.
-    seed : int
-        Of the run.
-    sessions : int, optional
-        Repetitions of the whole protocol.
-
-    Returns
-    -------
-    Observers
-        Named by measure; "euclidean", "sigma_0.055" and the like, "ten_matrices", "ten_hit_rates",
-        "criterion_0.01" and the like for those of the static rates.
-
-    Raises
-    ------
-    InputError
-        If there are fewer than two sessions, from which no error follows.
-    """
+    """Simulate the judgements of every observer at every position in several sessions."""
     whole("sessions", sessions, 2)
     n_positions = len(measures["static"])
     judged = [

@@ -36,141 +36,86 @@ class Estimate:
 
 @result_class
 class NoiseEffect:
-    """How the mean hit rate falls with the noise.
-
-    Parameters
-    ----------
-    noise_sigma : array (n_levels,)
-        Noise sigma_1.
-    smallest_fall : Estimate
-        From one level to the next. [0-1]
-    """
+    """How the mean hit rate falls with the noise."""
 
     noise_sigma: Vector
+    """Noise sigma_1, (n_levels,)."""
     smallest_fall: Estimate
+    """From one level to the next. [0-1]"""
 
 
 @result_class
 class ErrorBarChange:
-    """How a variant of the protocol changes the error bars.
-
-    Parameters
-    ----------
-    ratio : Estimate
-        Mean error bar over that of the reference. [1]
-    change : Estimate
-        Largest change of a mean hit rate. [0-1]
-    """
+    """How a variant of the protocol changes the error bars."""
 
     ratio: Estimate
+    """Mean error bar over that of the reference. [1]"""
     change: Estimate
+    """Largest change of a mean hit rate. [0-1]"""
 
 
 @result_class
 class MeanStability:
-    """Standard deviation of a mean hit rate when the same sums are judged again.
-
-    Parameters
-    ----------
-    hit_rates : int array (2,)
-        Hit rates behind a mean.
-    few, many : Estimate
-        Standard deviation with either number. [0-1]
-    ratio : Estimate
-        The first over the second. [1]
-    """
+    """Standard deviation of a mean hit rate when the same sums are judged again."""
 
     hit_rates: WholeVector
+    """Hit rates behind a mean, (2,)."""
     few: Estimate
     many: Estimate
+    """Standard deviation with either number. [0-1]"""
     ratio: Estimate
+    """The first over the second. [1]"""
 
 
 @result_class
 class NoiseSweep:
-    """Misfit of the static Gradient Sum over the noise.
-
-    Parameters
-    ----------
-    noise_sigma : array (n_levels,)
-        Noise sigma_1.
-    misfit : tuple (n_positions) of tuple (n_levels) of Estimate
-        Root mean square distance to Goodwin's points. [0-1]
-    """
+    """Misfit of the static Gradient Sum over the noise."""
 
     noise_sigma: Vector
+    """Noise sigma_1, (n_levels,)."""
     misfit: tuple[tuple[Estimate, ...], ...]
+    """Root mean square distance to Goodwin's points. [0-1]"""
 
 
 @result_class
 class TargetDistances:
-    """Static hit rates of one position beside people's.
-
-    Parameters
-    ----------
-    at_goodwin : tuple (2) of Estimate
-        Hit rates at Goodwin's spheres. [0-1]
-    from_line : tuple (n_comparisons) of Estimate
-        Distance from the line in z. [0-1]
-    largest_from_line : Estimate
-        Largest distance between Goodwin's points. [0-1]
-    """
+    """Static hit rates of one position beside people's."""
 
     at_goodwin: tuple[Estimate, ...]
+    """Hit rates at Goodwin's spheres. [0-1]"""
     from_line: tuple[Estimate, ...]
+    """Distance from the line in z. [0-1]"""
     largest_from_line: Estimate
+    """Largest distance between Goodwin's points. [0-1]"""
 
 
 @result_class
 class DiscriminationStatistics:
-    """Statistics behind the paper's statements; dictionaries go by code.
-
-    Parameters
-    ----------
-    misfit, misfit_above_static : dict of Estimate
-        Root mean square distance to Goodwin's points, and what it has above that of static rates. [0-1]
-    shift, shift_above_static : dict of Estimate
-        Largest change of a hit rate by the shift, and what it has above that of static rates. [0-1]
-    smallest_rise : dict of tuple (n_positions) of Estimate
-        Smallest step of the hit rate from one sphere to the next. [0-1]
-    noise_lowers : NoiseEffect
-        More noise, lower hit rates.
-    ten_matrices, criterion : ErrorBarChange
-        10 noise matrices instead of 100; a criterion that varies more.
-    unsteadiness : MeanStability
-        Means of 10 and of 100 hit rates.
-    sweep : NoiseSweep
-        Misfit over the noise.
-    targets : tuple (n_positions) of TargetDistances
-        Distances from people.
-    """
+    """Statistics behind the paper's statements; dictionaries go by code."""
 
     misfit: dict[str, Estimate]
     misfit_above_static: dict[str, Estimate]
+    """Root mean square distance to Goodwin's points, and what it has above that of static rates. [0-1]"""
     shift: dict[str, Estimate]
     shift_above_static: dict[str, Estimate]
+    """Largest change of a hit rate by the shift, and what it has above that of static rates. [0-1]"""
     smallest_rise: dict[str, tuple[Estimate, ...]]
+    """Smallest step of the hit rate from one sphere to the next. [0-1]"""
     noise_lowers: NoiseEffect
+    """More noise, lower hit rates."""
     ten_matrices: ErrorBarChange
     criterion: ErrorBarChange
+    """10 noise matrices instead of 100; a criterion that varies more."""
     unsteadiness: MeanStability
+    """Means of 10 and of 100 hit rates."""
     sweep: NoiseSweep
+    """Misfit over the noise."""
     targets: tuple[TargetDistances, ...]
+    """Distances from people."""
 
 
 def estimate(by_session: FloatArray) -> Estimate:
-    """Mean over sessions and standard error of that mean.
-
-    Parameters
-    ----------
-    by_session : array (n_sessions,)
-        The quantity in every session.
-
-    Examples
-    --------
-    >>> estimate(np.array([1.0, 2.0, 3.0])).value
-    2.0
-    """
+    """Mean over sessions and standard error of that mean."""
     by_session = np.asarray(by_session, dtype=np.float64)
     return Estimate(
         value=float(by_session.mean()), error=float(by_session.std(ddof=1) / np.sqrt(by_session.size))
@@ -178,41 +123,14 @@ def estimate(by_session: FloatArray) -> Estimate:
 
 
 def extreme(by_session: FloatArray, pick: Callable[[FloatArray], np.intp]) -> Estimate:
-    """Estimate the one of several quantities that `pick` chooses by their means over the sessions.
-
-    Parameters
-    ----------
-    by_session : array (n_sessions, n_quantities)
-        The quantities.
-    pick : callable
-        Such as `np.argmin`; called with the means.
-
-    Examples
-    --------
-    >>> extreme(np.array([[1.0, 5.0], [3.0, 5.0]]), np.argmin)
-    Estimate(value=2.0, error=1.0)
-    """
+    """Estimate the one of several quantities that `pick` chooses by their means over the sessions."""
     return estimate(by_session[:, int(pick(by_session.mean(axis=0)))])
 
 
 def discrimination_statistics(
     observers: Observers, curvature_per_m: Sequence[float], measures: Sequence[str]
 ) -> DiscriminationStatistics:
-    """Compute the statistics behind the paper's statements.
-
-    Parameters
-    ----------
-    observers : Observers
-        Of all sessions.
-    curvature_per_m : sequence of float
-        The seven spheres, the standard first. [1/m]
-    measures : sequence of str
-        Response measures that the Gradient Sum was made of, "static" among them.
-
-    Returns
-    -------
-    DiscriminationStatistics
-    """
+    """Compute the statistics behind the paper's statements."""
     codes = [*measures, "euclidean"]
     others = [name for name in codes if name != "static"]
     columns = goodwin_columns(curvature_per_m)

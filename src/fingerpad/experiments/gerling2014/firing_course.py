@@ -48,17 +48,7 @@ class FiringCourse:
 def firing_course(
     drive: SedTraces, sed: SedTraces, afferent: Afferent, pressed: Mapping[str, SkinResponse]
 ) -> FiringCourse:
-    """Read when the fitted afferent fires and what drives it.
-
-    Parameters
-    ----------
-    drive, sed : SedTraces
-        What the afferent follows under the bar, and strain energy density there, one column per shift.
-    afferent : Afferent
-        The fitted one.
-    pressed : mapping of str to SkinResponse
-        Flat plates, of `skin_force.force_touches`.
-    """
+    """Read when the fitted afferent fires and what drives it."""
     observed, (dynamic_ms, static_ms) = bar_firing_rates(), PAPER_WINDOWS_MS
     population = Population.grid(afferent=afferent, centre_mm=(RECEPTOR_X_MM, 0.0))
     in_hold = interp1d(sed.times_ms, sed.sed_kpa, axis=0)(0.5 * (static_ms[0] + static_ms[1]))

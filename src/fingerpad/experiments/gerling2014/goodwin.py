@@ -24,63 +24,29 @@ SMALLEST_NOISE, LARGEST_NOISE = 1e-4, 2.0
 
 @result_class
 class GoodwinHitRates:
-    """Hit rates of people.
-
-    Parameters
-    ----------
-    curvature_per_m : array (2,)
-        Comparison spheres. [1/m]
-    hit_rate, low, high : array (2,)
-        Observed fractions and their binomial 95 % intervals. [0-1]
-    trials : int
-        Trials behind each fraction (assumed).
-    line : array (n_comparisons,)
-        Hit rates at the spheres of the study on the line that is straight in z. [0-1]
-    """
+    """Hit rates of people."""
 
     curvature_per_m: Vector
+    """Comparison spheres, (2,). [1/m]"""
     hit_rate: Vector
     trials: int
+    """Trials behind each fraction (assumed)."""
     low: Vector
     high: Vector
+    """Observed fractions and their binomial 95 % intervals, (2,). [0-1]"""
     line: Vector
+    """Hit rates at the spheres of the study on the line that is straight in z, (n_comparisons,). [0-1]"""
 
 
 def line_in_z(curvature_per_m: ArrayLike) -> FloatArray:
-    """Hit rates on the straight line in z that Goodwin's two points define.
-
-    Parameters
-    ----------
-    curvature_per_m : array_like
-        Curvatures of comparison spheres. [1/m]
-
-    Returns
-    -------
-    array
-        Hit rates; z is the standard normal quantile. [0-1]
-
-    Examples
-    --------
-    >>> line_in_z([287.0, 296.0, 365.0]).round(3).tolist()
-    [0.505, 0.58, 0.95]
-    """
+    """Hit rates on the straight line in z that Goodwin's two points define."""
     (near, far), (z_near, z_far) = CURVATURES, ndtri(HIT_RATES)
     slope_m = (z_far - z_near) / (far - near)
     return ndtr(z_near + slope_m * (np.asarray(curvature_per_m, dtype=np.float64) - near))
 
 
 def goodwin_hit_rates_at(curvature_per_m: ArrayLike) -> GoodwinHitRates:
-    """Observed hit rates of people, and the line at the comparison spheres.
-
-    Parameters
-    ----------
-    curvature_per_m : array_like
-        Comparison spheres of the study. [1/m]
-
-    Returns
-    -------
-    GoodwinHitRates
-    """
+    """Observed hit rates of people, and the line at the comparison spheres."""
     low, high = binomial_interval(HIT_RATES, TRIALS)
     return GoodwinHitRates(
         curvature_per_m=np.array(CURVATURES),
@@ -93,73 +59,19 @@ def goodwin_hit_rates_at(curvature_per_m: ArrayLike) -> GoodwinHitRates:
 
 
 def goodwin_columns(curvature_per_m: Sequence[float]) -> list[int]:
-    """Find Goodwin's two spheres among the comparisons.
-
-    Parameters
-    ----------
-    curvature_per_m : sequence of float
-        The spheres of the study, the standard first. [1/m]
-
-    Returns
-    -------
-    list of int
-        Their places among the comparisons, from 0.
-
-    Examples
-    --------
-    >>> goodwin_columns([287.0, 296.0, 316.0, 365.0])
-    [0, 2]
-    """
+    """Find Goodwin's two spheres among the comparisons."""
     return [list(curvature_per_m).index(curvature) - 1 for curvature in CURVATURES]
 
 
 def goodwin_misfit(hit_rates: FloatArray, axis: int | tuple[int, ...] | None = None) -> FloatArray:
-    """Root mean square distance of hit rates to people's.
-
-    Parameters
-    ----------
-    hit_rates : array (..., 2)
-        At Goodwin's two spheres. [0-1]
-    axis : int or tuple of int, optional
-        Over which to take the mean. Default: all.
-
-    Returns
-    -------
-    array
-        [0-1]
-
-    Examples
-    --------
-    >>> float(goodwin_misfit(np.array([0.58, 0.93])).round(4))
-    0.0141
-    """
+    """Root mean square distance of hit rates to people's."""
     return np.sqrt(np.square(hit_rates - np.array(HIT_RATES)).mean(axis=axis))
 
 
 def fit_noise_to_goodwin(
     hit_rates: Callable[[float], FloatArray], curvature_per_m: Sequence[float], n_positions: int
 ) -> NoiseFit:
-    """Fit one noise to Goodwin's two points at all positions of the spheres.
-
-    Parameters
-    ----------
-    hit_rates : callable
-        Hit rates (n_positions, n_comparisons) at a given noise sigma_1.
-    curvature_per_m : sequence of float
-        The spheres, the standard first. [1/m]
-    n_positions : int
-        Positions of the spheres.
-
-    Returns
-    -------
-    NoiseFit
-        `hit_rates` position by position.
-
-    Raises
-    ------
-    ConvergenceError
-        If no noise meets the points.
-    """
+    """Fit one noise to Goodwin's two points at all positions of the spheres."""
     columns = goodwin_columns(curvature_per_m)
     return fit_noise_sigma(
         lambda sigma: hit_rates(sigma)[:, columns].ravel(),

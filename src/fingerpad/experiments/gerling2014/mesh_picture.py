@@ -15,87 +15,46 @@ DECIMALS = 4
 
 @result_class
 class MeshPlane:
-    """Nodes of a mesh in one plane, in grid order.
-
-    Parameters
-    ----------
-    right_mm, up_mm : array (n_outline, n_through + 1)
-        Coordinates in the plane, through from the skin to the bone. [mm]
-    under_nail : bool array (n_outline,)
-        Whether the node on the skin lies under the nail.
-    """
+    """Nodes of a mesh in one plane, in grid order."""
 
     right_mm: Matrix
     up_mm: Matrix
+    """Coordinates in the plane, through from the skin to the bone, (n_outline, n_through + 1). [mm]"""
     under_nail: TruthVector
+    """Whether the node on the skin lies under the nail, (n_outline,)."""
 
 
 @result_class
 class MeshPicture:
-    """The mesh without load (Figure 1).
-
-    Parameters
-    ----------
-    x_mm, y_mm, z_mm : array (n_along + 1, n_around + 1)
-        Nodes of the skin. [mm]
-    under_nail : bool array (n_along + 1, n_around + 1)
-        Whether they lie under the nail.
-    along : MeshPlane
-        Plane z = 0; right is x, up is y. The outline runs from the volar side over the tip to the back.
-    across : MeshPlane
-        Proximal end, beside the middle phalanx; right is z, up is y.
-    half : bool
-        Whether `across` is one half, whose other half is its mirror image.
-    contact_mm : (float, float)
-        x and y of the skin at the contact. [mm]
-    layers : tuple of str
-        From the skin inwards.
-    layer : int array (n_through,)
-        Index into `layers` of each element through the skin.
-    receptor_depth_mm : float
-        Of the end organs below the skin. [mm]
-    nodes, elements : int
-        Of the whole mesh.
-    """
+    """The mesh without load (Figure 1)."""
 
     x_mm: Matrix
     y_mm: Matrix
     z_mm: Matrix
+    """Nodes of the skin, (n_along + 1, n_around + 1). [mm]"""
     under_nail: TruthMatrix
+    """Whether they lie under the nail, (n_along + 1, n_around + 1)."""
     along: MeshPlane
+    """Plane z = 0; right is x, up is y. The outline runs from the volar side over the tip to the back."""
     across: MeshPlane
+    """Proximal end, beside the middle phalanx; right is z, up is y."""
     half: bool
+    """Whether `across` is one half, whose other half is its mirror image."""
     contact_mm: tuple[float, float]
+    """x and y of the skin at the contact. [mm]"""
     layers: tuple[str, ...]
+    """From the skin inwards."""
     layer: WholeVector
+    """Index into `layers` of each element through the skin, (n_through,)."""
     receptor_depth_mm: float
+    """Of the end organs below the skin. [mm]"""
     nodes: int
     elements: int
+    """Of the whole mesh."""
 
 
 def mesh_picture(mesh: Mesh, contact_x_mm: float) -> MeshPicture:
-    """Cut a mesh along the finger, and across it at its proximal end.
-
-    Parameters
-    ----------
-    mesh : Mesh
-        A finger.
-    contact_x_mm : float
-        x of the contact on the midline. [mm]
-
-    Returns
-    -------
-    MeshPicture
-
-    Examples
-    --------
-    >>> from fingerpad.geometry.fingertip import Fingertip
-    >>> from fingerpad.geometry.grading import resolution_grading
-    >>> from fingerpad.geometry.mesh import finger_mesh
-    >>> picture = mesh_picture(finger_mesh(Fingertip(), resolution_grading("quick", 17.37)), 17.37)
-    >>> picture.along.right_mm.shape, picture.across.right_mm.shape, round(picture.contact_mm[1], 2)
-    ((81, 10), (17, 10), -9.85)
-    """
+    """Cut a mesh along the finger, and across it at its proximal end."""
     midline = mesh.nodes_mm[mesh.midline_nodes]
     nearest = int(np.abs(midline[:, 0] - contact_x_mm).argmin())
     x, y, _ = midline[nearest].round(DECIMALS).tolist()

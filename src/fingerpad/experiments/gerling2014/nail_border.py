@@ -35,105 +35,71 @@ ELEMENT_MM = {"quick": 0.8, "standard": 0.6, "paper": 0.6}
 
 @result_class
 class StressProfile:
-    """Stress over distance from the nail, over the sections that cross its border.
-
-    Parameters
-    ----------
-    distance_mm : array (n,)
-        From the nail, negative under it. [mm]
-    surface_kpa, living_epidermis_kpa : array (n, 3)
-        Quantiles 0.1, 0.5 and 0.9; NaN without an element. [kPa]
-    """
+    """Stress over distance from the nail, over the sections that cross its border."""
 
     distance_mm: Vector
+    """From the nail, negative under it, (n,). [mm]"""
     surface_kpa: Matrix
     living_epidermis_kpa: Matrix
+    """Quantiles 0.1, 0.5 and 0.9; NaN without an element, (n, 3). [kPa]"""
 
 
 @result_class
 class MiddleSection:
-    """Deformed faces of the elements on the plane z = 0, and their stress.
-
-    Parameters
-    ----------
-    x_mm, y_mm : array (n_faces, 4)
-        Corners. [mm]
-    von_mises_kpa : array (n_faces,)
-        Stress of the element. [kPa]
-    """
+    """Deformed faces of the elements on the plane z = 0, and their stress."""
 
     x_mm: Matrix
     y_mm: Matrix
+    """Corners, (n_faces, 4). [mm]"""
     von_mises_kpa: Vector
+    """Stress of the element, (n_faces,). [kPa]"""
 
 
 @result_class
 class CrossSection:
-    """Deformed quadrilaterals in the middle of a section's elements, and their stress.
-
-    Parameters
-    ----------
-    x_mm : float
-        Where the section lies. [mm]
-    y_mm, z_mm : array (n_elements, 4)
-        Corners. [mm]
-    von_mises_kpa : array (n_elements,)
-        Stress. [kPa]
-    """
+    """Deformed quadrilaterals in the middle of a section's elements, and their stress."""
 
     x_mm: float
+    """Where the section lies. [mm]"""
     y_mm: Matrix
     z_mm: Matrix
+    """Corners, (n_elements, 4). [mm]"""
     von_mises_kpa: Vector
+    """Stress, (n_elements,). [kPa]"""
 
 
 @result_class
 class NailBorder:
-    """Stress of the skin and in two sections at the end of the hold, and its concentration at the nail.
-
-    Parameters
-    ----------
-    x_mm, y_mm, z_mm : array (n_along + 1, n_around + 1)
-        Deformed corners of the faces of the skin. [mm]
-    von_mises_kpa : array (n_along, n_around)
-        Stress of the element below each face. [kPa]
-    nail_mm : array (n_edges, 2, 3)
-        Outline of the nail. [mm]
-    ratio, ratio_range : float, (float, float)
-        Stress of the skin at the border over that away from it: median and range over the sections.
-    ratio_living_epidermis, ratio_energy : float
-        The same median in the living epidermis, for stress and for strain energy density.
-    border_kpa, far_kpa, peak_kpa : float
-        Largest stress at the border, median stress away from it, largest stress anywhere. [kPa]
-    border_energy_kpa : float
-        Largest strain energy density at the border. [kPa]
-    text : str
-        A sentence with these numbers.
-    profile : StressProfile
-        Stress over distance from the nail.
-    middle : MiddleSection
-        The plane z = 0.
-    across : CrossSection
-        The section with the highest ratio.
-    """
+    """Stress of the skin and in two sections at the end of the hold, and its concentration at the nail."""
 
     x_mm: Matrix
     y_mm: Matrix
     z_mm: Matrix
+    """Deformed corners of the faces of the skin, (n_along + 1, n_around + 1). [mm]"""
     von_mises_kpa: Matrix
+    """Stress of the element below each face, (n_along, n_around). [kPa]"""
     nail_mm: Stack
+    """Outline of the nail, (n_edges, 2, 3). [mm]"""
     ratio: Number
     ratio_range: tuple[Number, Number]
+    """Stress of the skin at the border over that away from it: median and range over the sections."""
     ratio_living_epidermis: Number
     ratio_energy: Number
+    """The same median in the living epidermis, for stress and for strain energy density."""
     border_kpa: Number
     far_kpa: Number
     border_energy_kpa: Number
+    """Largest strain energy density at the border. [kPa]"""
     peak_kpa: Number
+    """Largest stress at the border, median stress away from it, largest stress anywhere. [kPa]"""
     text: str
+    """A sentence with these numbers."""
     profile: StressProfile
+    """Stress over distance from the nail."""
     middle: MiddleSection
+    """The plane z = 0."""
     across: CrossSection
+    """The section with the highest ratio."""
 
 
 def nail_touch(conditions: Conditions) -> Touch:
@@ -147,19 +113,13 @@ def nail_touch(conditions: Conditions) -> Touch:
 
 @dataclass(frozen=True)
 class Concentration:
-    """Stress at the border of the nail, section by section.
-
-    Parameters
-    ----------
-    station : int array (n_sections,)
-        Sections along the mesh that cross the border and reach the skin far from it.
-    border_kpa, far_kpa : array (n_sections,)
-        Largest stress at the border, and mean stress at `FAR_MM` from it. [kPa]
-    """
+    """Stress at the border of the nail, section by section."""
 
     station: np.ndarray
+    """Sections along the mesh that cross the border and reach the skin far from it, (n_sections,)."""
     border_kpa: FloatArray
     far_kpa: FloatArray
+    """Largest stress at the border, and mean stress at `FAR_MM` from it, (n_sections,). [kPa]"""
 
     @property
     def ratios(self) -> FloatArray:
@@ -168,22 +128,7 @@ class Concentration:
 
 
 def nail_border(skin: SkinResponse) -> NailBorder:
-    """Evaluate stress at the end of the hold, and its concentration at the nail.
-
-    Parameters
-    ----------
-    skin : SkinResponse
-        To `nail_touch`.
-
-    Returns
-    -------
-    NailBorder
-
-    Raises
-    ------
-    InputError
-        If the mesh does not resolve the border of the nail.
-    """
+    """Evaluate stress at the end of the hold, and its concentration at the nail."""
     mesh = skin.mesh
     numbers = np.arange(len(mesh.elements)).reshape(mesh.shape)
     surface, deep = numbers[:, :, 0], mesh.living_epidermis
@@ -250,26 +195,7 @@ def _fixed_corners(mesh: Mesh) -> np.ndarray:
 
 
 def concentration(mesh: Mesh, stress_kpa: FloatArray, distance_mm: FloatArray) -> Concentration:
-    """Compare stress at the border of the nail with that of the skin away from it in the same section.
-
-    Parameters
-    ----------
-    mesh : Mesh
-        A finger.
-    stress_kpa : array (n_along, n_around)
-        Any stress or energy density below the faces of the skin. [kPa]
-    distance_mm : array (n_along, n_around)
-        See `distance_to_nail`. [mm]
-
-    Returns
-    -------
-    Concentration
-
-    Raises
-    ------
-    InputError
-        If no section has faces both at the border and away from it.
-    """
+    """Compare stress at the border of the nail with that of the skin away from it in the same section."""
     corners = _fixed_corners(mesh)
     crosses = ((corners > 0) & (corners < 4)).any(axis=1) & (corners == 4).any(axis=1)
     near = ((corners > 0) & (corners < 4)) | ((distance_mm > 0.0) & (distance_mm <= BESIDE_MM))

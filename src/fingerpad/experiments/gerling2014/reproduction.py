@@ -61,35 +61,25 @@ PAPER, HUMAN = "paper", "human"
 
 @dataclass(frozen=True)
 class Reproduction:
-    """A run of all parts of the paper with two sets of tissues.
-
-    Parameters
-    ----------
-    folder : Path
-        Where finished indentations are stored.
-    resolution : {"standard", "quick", "paper"}
-        How fine meshes and steps are.
-    seed : int
-        Seed of the observers' noise.
-    tissues : str
-        Tissues of the column `paper`: a name whose afferent follows strain energy density. "paper" is
-        Trial 3 with a Poisson's ratio of 0.40, which is our reading; "trial3" is Trial 3 to the letter, 0.48.
-    finger : Fingertip or FingerMesh
-        The finger.
-    jobs : int or Engine
-        Processes, or the engine that solves the indentations; the numbers do not depend on it.
-    extended : bool, optional
-        Whether to go beyond the paper: uncertainty of the fit, and curvature thresholds at other standards.
-        By default not at "quick" resolution, where this takes half as long again.
-    """
+    """A run of all parts of the paper with two sets of tissues."""
 
     folder: Path
+    """Where finished indentations are stored."""
     resolution: str = "standard"
+    """How fine meshes and steps are."""
     seed: int = 0
+    """Seed of the observers' noise."""
     tissues: str = PAPER
+    """Tissues of the column `paper`: a name whose afferent follows strain energy density. "paper" is Trial 3
+    with a Poisson's ratio of 0.40, which is our reading; "trial3" is Trial 3 to the letter, 0.48.
+    """
     finger: Finger = field(default_factory=Fingertip)
     jobs: int | Engine = 1
+    """Processes, or the engine that solves the indentations; the numbers do not depend on it."""
     extended: bool | None = None
+    """Whether to go beyond the paper: uncertainty of the fit, and curvature thresholds at other standards. By
+    default not at "quick" resolution, where this takes half as long again.
+    """
 
     def __post_init__(self) -> None:
         engine_of(self.jobs)
@@ -112,123 +102,70 @@ class Reproduction:
 
 @result_class
 class PublishedNumber:
-    """A published number on which the results rest, as `fingerpad.data.all_published` lists it.
-
-    Parameters
-    ----------
-    name : str
-        What it is.
-    value : float or tuple of float
-        In `unit`.
-    unit : str
-        "1" for pure numbers.
-    source : str
-        Where it was published.
-    status : {"paper", "read", "recalled", "assumed"}
-        How far it can be trusted; see `fingerpad.data.STATUSES`.
-    """
+    """A published number on which the results rest, as `fingerpad.data.all_published` lists it."""
 
     name: str
     value: float | tuple[float, ...]
+    """In `unit`."""
     unit: str
+    """"1" for pure numbers."""
     source: str
+    """Where it was published."""
     status: str
+    """How far it can be trusted; see `fingerpad.data.STATUSES`."""
 
 
 @result_class
 class SetResult:
-    """What one set of tissues with its afferent gives on all levels.
-
-    Parameters
-    ----------
-    tissues : str
-        Name of the set.
-    mesh, levels : MeshPicture, ThreeLevels
-        The mesh under the standard sphere, and that indentation on all levels.
-    skin_force : SkinForce
-        Level 1: deflection and force.
-    single_unit, firing : SingleUnitResult, FiringCourse
-        Level 2: rates under the bar and their fit; when the afferent fires, and what drives it.
-    discrimination, population, nail : SphereDiscrimination, PopulationMaps, NailBorder
-        Level 3.
-    single_unit_uncertainty, curvature_thresholds : UncertaintyResult, CurvatureThresholds, optional
-        What goes beyond the paper, None where it was not asked for.
-    comparison : tuple of ClaimRow
-        The paper's numbers beside ours.
-    """
+    """What one set of tissues with its afferent gives on all levels."""
 
     tissues: str
+    """Name of the set."""
     mesh: MeshPicture
     levels: ThreeLevels
+    """The mesh under the standard sphere, and that indentation on all levels."""
     skin_force: SkinForce
+    """Level 1: deflection and force."""
     single_unit: SingleUnitResult
     firing: FiringCourse
+    """Level 2: rates under the bar and their fit; when the afferent fires, and what drives it."""
     discrimination: SphereDiscrimination
     population: PopulationMaps
     nail: NailBorder
+    """Level 3."""
     single_unit_uncertainty: UncertaintyResult | None = None
     curvature_thresholds: CurvatureThresholds | None = None
+    """What goes beyond the paper, None where it was not asked for."""
     comparison: tuple[ClaimRow, ...]
+    """The paper's numbers beside ours."""
 
 
 @result_class
 class ReproductionResult:
-    """Result of a reproduction, the content of `results.json`.
-
-    Parameters
-    ----------
-    format, format_version : str, int
-        Of the file.
-    summary : Summaries
-        A few plain numbers of both sets.
-    statements : tuple of Statement
-        Every statement of the paper that can fail, with our value and verdict of both sets.
-    skin_deflection : SkinDeflectionResult
-        Level 1: the paper's three trials.
-    paper, human : SetResult
-        The paper's own system, and the set that serves all three levels.
-    tissues : tuple of TissueLayer
-        Every named set of tissues, those of the run and of the trials among them.
-    inputs : tuple of PublishedNumber
-        Published numbers on which all of it rests.
-    manifest : Manifest
-        What ran.
-    """
+    """Result of a reproduction, the content of `results.json`."""
 
     format: Literal["fingerpad reproduction"] = "fingerpad reproduction"
     format_version: Literal[5] = 5
+    """Of the file."""
     summary: Summaries
+    """A few plain numbers of both sets."""
     statements: tuple[Statement, ...]
+    """Every statement of the paper that can fail, with our value and verdict of both sets."""
     skin_deflection: SkinDeflectionResult
+    """Level 1: the paper's three trials."""
     paper: SetResult
     human: SetResult
+    """The paper's own system, and the set that serves all three levels."""
     tissues: tuple[TissueLayer, ...]
+    """Every named set of tissues, those of the run and of the trials among them."""
     inputs: tuple[PublishedNumber, ...]
+    """Published numbers on which all of it rests."""
     manifest: Manifest
+    """What ran."""
 
 
 def reproduce(run: Reproduction, progress: Progress | None = None) -> ReproductionResult:
-    """Run the three validations with both sets and compare them with the paper.
-
-    Parameters
-    ----------
-    run : Reproduction
-        What to run and where to keep finished indentations.
-    progress : Progress, optional
-        Shows each finished part.
-
-    Returns
-    -------
-    ReproductionResult
-        All but the times, dates and memory of `manifest` and `summary` depend on the conditions only.
-
-    Raises
-    ------
-    ConvergenceError
-        If an indentation cannot be solved; finished ones stay stored.
-    StoreError
-        If a stored indentation is damaged or the folder cannot be written.
-    """
+    """Run the three validations with both sets and compare them with the paper."""
     runner, columns = Runner(run.folder, run.jobs, progress), run.conditions
     trials = {"skin deflection": skin_deflection.deflection_touches(columns[PAPER])}
     parts = {name: set_touches(conditions, run.goes_beyond) for name, conditions in columns.items()}
@@ -309,17 +246,7 @@ def set_result(
     responses: Mapping[str, Mapping[Any, SkinResponse]],
     deflection: SkinDeflectionResult,
 ) -> tuple[SetResult, Summary]:
-    """Fit the afferent of one set of tissues, let observers judge its spikes, and compare with the paper.
-
-    Parameters
-    ----------
-    conditions : Conditions
-        Of the set.
-    responses : mapping of str to mapping of key to SkinResponse
-        Of all `set_touches`, by part.
-    deflection : SkinDeflectionResult
-        The paper's three trials.
-    """
+    """Fit the afferent of one set of tissues, let observers judge its spikes, and compare with the paper."""
     bars, spheres = list(responses["bar, 36 shifts"].values()), dict(responses["spheres"])
     quantity = conditions.quantity
     # A membrane of the paper's own system starts at 0, as it prints, whatever its tissues.

@@ -24,75 +24,43 @@ REACH_MM, STEP_MM = 5.0, 0.25
 
 @result_class
 class RestingResponse:
-    """Response of an afferent without any touch.
-
-    Parameters
-    ----------
-    dynamic_rate_hz, static_rate_hz : float
-        Rates in the windows of the ramp and the hold. [spikes/s]
-    first_spike_latency_ms : float
-        NaN without a spike. [ms]
-    """
+    """Response of an afferent without any touch."""
 
     dynamic_rate_hz: float
     static_rate_hz: float
+    """Rates in the windows of the ramp and the hold. [spikes/s]"""
     first_spike_latency_ms: Number
+    """NaN without a spike. [ms]"""
 
 
 @result_class
 class ResponseSheet:
-    """Responses of a sheet of afferents as tables over x (rows) and z (columns).
-
-    Parameters
-    ----------
-    x_mm, z_mm : array (n_x,), array (n_z,)
-        Places of the afferents. [mm]
-    dynamic_rate_hz, static_rate_hz : array (n_x, n_z)
-        Rates. [spikes/s]
-    first_spike_latency_ms : array (n_x, n_z)
-        NaN without a spike. [ms]
-    """
+    """Responses of a sheet of afferents as tables over x (rows) and z (columns)."""
 
     x_mm: Vector
     z_mm: Vector
+    """Places of the afferents, (n_x,). [mm]"""
     dynamic_rate_hz: Matrix
     static_rate_hz: Matrix
+    """Rates, (n_x, n_z). [spikes/s]"""
     first_spike_latency_ms: Matrix
+    """NaN without a spike, (n_x, n_z). [ms]"""
 
 
 @result_class
 class PopulationMaps(ResponseSheet):
-    """Responses of a dense sheet of afferents under the standard sphere (Figure 6).
-
-    Parameters
-    ----------
-    curvature_per_m : float
-        Of the sphere. [1/m]
-    at_rest : RestingResponse
-        Of the same afferent.
-    receptors_mm : array (18, 2)
-        Places of the paper's receptors. [mm]
-    """
+    """Responses of a dense sheet of afferents under the standard sphere (Figure 6)."""
 
     curvature_per_m: float
+    """Of the sphere. [1/m]"""
     at_rest: RestingResponse
+    """Of the same afferent."""
     receptors_mm: Matrix
+    """Places of the paper's receptors, (18, 2). [mm]"""
 
 
 def population_maps(standard: SkinResponse, afferent: Afferent) -> PopulationMaps:
-    """Simulate a dense sheet of afferents under the standard sphere (Figure 6).
-
-    Parameters
-    ----------
-    standard : SkinResponse
-        Skin under that sphere.
-    afferent : Afferent
-        Model of every afferent of the sheet.
-
-    Returns
-    -------
-    PopulationMaps
-    """
+    """Simulate a dense sheet of afferents under the standard sphere (Figure 6)."""
     return PopulationMaps(
         curvature_per_m=protocol.STANDARD_CURVATURE.value,
         at_rest=resting_response(afferent),
@@ -102,13 +70,7 @@ def population_maps(standard: SkinResponse, afferent: Afferent) -> PopulationMap
 
 
 def resting_response(afferent: Afferent) -> RestingResponse:
-    """Simulate an afferent without any touch.
-
-    Examples
-    --------
-    >>> resting_response(Afferent())
-    RestingResponse(dynamic_rate_hz=0.0, static_rate_hz=0.0, first_spike_latency_ms=nan)
-    """
+    """Simulate an afferent without any touch."""
     end_ms = protocol.RAMP.value + protocol.HOLD.value
     sed = SedTraces.at_rest(end_ms, afferent.dynamic_quantity, afferent.static_quantity)
     dynamic_hz, static_hz = afferent.rates(sed, *PAPER_WINDOWS_MS)
@@ -120,13 +82,7 @@ def resting_response(afferent: Afferent) -> RestingResponse:
 
 
 def sheet(afferent: Afferent, reach_mm: float = REACH_MM, step_mm: float = STEP_MM) -> Population:
-    """Place afferents side by side on a square about the contact point, ordered by x, then by z.
-
-    Examples
-    --------
-    >>> len(sheet(Afferent(), reach_mm=1.0, step_mm=0.5).positions_mm)
-    25
-    """
+    """Place afferents side by side on a square about the contact point, ordered by x, then by z."""
     offsets = step_mm * np.arange(-round(reach_mm / step_mm), round(reach_mm / step_mm) + 1)
     x, z = RECEPTOR_X_MM + offsets, offsets
     sites = np.stack(np.meshgrid(x, z, indexing="ij"), axis=-1).reshape(-1, 2)
@@ -134,17 +90,7 @@ def sheet(afferent: Afferent, reach_mm: float = REACH_MM, step_mm: float = STEP_
 
 
 def response_sheet(response: ResponseMap) -> ResponseSheet:
-    """Arrange the responses of a `sheet` as tables.
-
-    Parameters
-    ----------
-    response : ResponseMap
-        Of its afferents.
-
-    Returns
-    -------
-    ResponseSheet
-    """
+    """Arrange the responses of a `sheet` as tables."""
     x, z = (np.unique(coordinate) for coordinate in response.positions_mm.T)
     shape = (x.size, z.size)
     return ResponseSheet(

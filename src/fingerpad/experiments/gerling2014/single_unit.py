@@ -53,29 +53,13 @@ def receptor_sed(
     dynamic_quantity: str = STORED_ENERGY,
     static_quantity: str = STORED_ENERGY,
 ) -> SedTraces:
-    """Strain energy density at the one receptor, one column per shift of the bar.
-
-    Parameters
-    ----------
-    responses : list of SkinResponse
-        One per shift.
-    dynamic_quantity, static_quantity : str, optional
-        What the two terms follow.
-    """
+    """Strain energy density at the one receptor, one column per shift of the bar."""
     quantities = (dynamic_quantity, static_quantity)
     return SedTraces.joined([traces_below(skin, RECEPTOR, *quantities) for skin in responses])
 
 
 def receptor_traces(responses: list[SkinResponse], quantity: str) -> SedTraces:
-    """Another quantity at the receptor in the place of strain energy density, one column per shift.
-
-    Parameters
-    ----------
-    responses : list of SkinResponse
-        One per shift.
-    quantity : str
-        By the names of `SkinResponse.sample`.
-    """
+    """Another quantity at the receptor in the place of strain energy density, one column per shift."""
     sampled = np.hstack([skin.sample(quantity, RECEPTOR) for skin in responses])
     first = responses[0]
     return SedTraces(
@@ -84,17 +68,7 @@ def receptor_traces(responses: list[SkinResponse], quantity: str) -> SedTraces:
 
 
 def following(static: SedTraces, dynamic: SedTraces, quantity: str) -> SedTraces:
-    """Traces whose dynamic term follows another quantity.
-
-    Parameters
-    ----------
-    static : SedTraces
-        What the static term follows.
-    dynamic : SedTraces
-        The other quantity in the place of strain energy density, as from `receptor_traces`.
-    quantity : str
-        Its name.
-    """
+    """Traces whose dynamic term follows another quantity."""
     return replace(static, dynamic_kpa=dynamic.sed_kpa, dynamic_quantity=quantity)
 
 
@@ -116,19 +90,7 @@ def fit(
     method: Method | None = None,
     known: FloatArray | None = None,
 ) -> tuple[Fit, CrossValidation]:
-    """Best fit to all shifts, and the six folds.
-
-    Parameters
-    ----------
-    problem : RateProblem
-        From `rate_problem`.
-    memberships : int array (n_shifts,), optional
-        Fold of each shift; default: assigned in turn.
-    method : Method, optional
-        Fits the paper's six parameters; default: the paper's method from both of its start points.
-    known : array (6,), optional
-        Parameters of a fit to all shifts that was made before; only the folds are fitted then.
-    """
+    """Best fit to all shifts, and the six folds."""
     method, everything = method or response_surface(), np.arange(problem.n_observations)
     folds = interleaved_folds(everything.size) if memberships is None else memberships
     if known is None:
@@ -141,197 +103,124 @@ def fit(
 
 @result_class
 class Modulation:
-    """Modulation of the rate at the edge of the bar (Eq. 11).
-
-    Parameters
-    ----------
-    maximum_hz : float
-        Largest rate. [spikes/s]
-    minimum_hz : float
-        Smallest rate with the flat face of the bar over the receptor. [spikes/s]
-    difference_hz : float
-        Their difference. [spikes/s]
-    index : float
-        Modulation index; NaN if there are no spikes. [1]
-    """
+    """Modulation of the rate at the edge of the bar (Eq. 11)."""
 
     maximum_hz: Number
+    """Largest rate. [spikes/s]"""
     minimum_hz: Number
+    """Smallest rate with the flat face of the bar over the receptor. [spikes/s]"""
     difference_hz: Number
+    """Their difference. [spikes/s]"""
     index: Number
+    """Modulation index; NaN if there are no spikes. [1]"""
 
 
 @result_class
 class PhaseModulation:
-    """Modulation of the rates of one phase.
-
-    Parameters
-    ----------
-    observed, ours : Modulation
-        Of the recorded and of the predicted rates.
-    """
+    """Modulation of the rates of one phase."""
 
     observed: Modulation
     ours: Modulation
+    """Of the recorded and of the predicted rates."""
 
 
 @result_class
 class RateModulation:
-    """Modulation of both rates.
-
-    Parameters
-    ----------
-    dynamic, static : PhaseModulation
-        During the ramp and during the hold.
-    """
+    """Modulation of both rates."""
 
     dynamic: PhaseModulation
     static: PhaseModulation
+    """During the ramp and during the hold."""
 
 
 @result_class
 class SearchStep:
-    """One iteration of the response-surface method.
-
-    Parameters
-    ----------
-    iteration : int
-        From 0, the start point.
-    fss : float
-        Fractional sum of squares of the training set. [1]
-    parameters : dict of str to float
-        Six parameters, by name.
-    """
+    """One iteration of the response-surface method."""
 
     iteration: int
+    """From 0, the start point."""
     fss: Number
+    """Fractional sum of squares of the training set. [1]"""
     parameters: dict[str, Number]
+    """Six parameters, by name."""
 
 
 @result_class
 class Search:
-    """Search of one fold from one start point.
-
-    Parameters
-    ----------
-    start : int
-        Number of the start point, from 1.
-    fss_train, fss_test : float
-        Fractional sum of squares of the training and of the testing set. [1]
-    runs : int
-        Evaluations of the model.
-    history : tuple of SearchStep
-        Steps from the start point to the end.
-    """
+    """Search of one fold from one start point."""
 
     start: int
+    """Number of the start point, from 1."""
     fss_train: Number
     fss_test: Number
+    """Fractional sum of squares of the training and of the testing set. [1]"""
     runs: int
+    """Evaluations of the model."""
     history: tuple[SearchStep, ...]
+    """Steps from the start point to the end."""
 
 
 @result_class
 class FoldResult:
-    """One fold of the cross-validation.
-
-    Parameters
-    ----------
-    fold, start : int
-        Number of the fold and of the better start point, from 1.
-    testing_shift_mm : array (n_testing,)
-        Shifts left out. [mm]
-    fss_start : array (n_starts,)
-        Fractional sum of squares of the training set at the start points. [1]
-    fss_train, fss_test : float
-        Of the better search. [1]
-    parameters : dict of str to float
-        Six parameters of the better search, by name.
-    climbs : tuple of Search
-        One per start point.
-    """
+    """One fold of the cross-validation."""
 
     fold: int
     start: int
+    """Number of the fold and of the better start point, from 1."""
     testing_shift_mm: Vector
+    """Shifts left out, (n_testing,). [mm]"""
     fss_start: Vector
+    """Fractional sum of squares of the training set at the start points, (n_starts,). [1]"""
     fss_train: Number
     fss_test: Number
+    """Of the better search. [1]"""
     parameters: dict[str, Number]
+    """Six parameters of the better search, by name."""
     climbs: tuple[Search, ...]
+    """One per start point."""
 
 
 @result_class
 class SingleUnitResult:
-    """Result of level 2.
-
-    Parameters
-    ----------
-    fss_in_sample, fss_in_sample_dynamic, fss_in_sample_static : float
-        Fractional sum of squares over all shifts, weighted and by phase. [1]
-    fss_out_of_sample, fss_training_mean : float
-        Mean over the folds, of the testing and of the training sets. [1]
-    method : str
-        Name of the method of fitting.
-    dynamic_quantity, static_quantity : str
-        What the two terms of the current follow, see `SkinResponse.sample`.
-    parameters, units : dict
-        Six parameters fitted to all shifts, and their units, by name.
-    shift_mm : array (n_shifts,)
-        Shifts of the bar, proximal positive. [mm]
-    dynamic_rate_hz, static_rate_hz : array (n_shifts,)
-        Predicted rates. [spikes/s]
-    observed_dynamic_rate_hz, observed_static_rate_hz : array (n_shifts,)
-        Recorded rates. [spikes/s]
-    start_points : tuple of dict
-        Both start points, by name of the parameter.
-    folds : tuple of FoldResult
-        Cross-validation.
-    modulation : RateModulation
-        At the edge of the bar.
-    initial_mv : float, optional
-        Potential of the membrane at the start; that at rest if there is none. [mV]
-    """
+    """Result of level 2."""
 
     fss_in_sample: Number
     fss_in_sample_dynamic: Number
     fss_in_sample_static: Number
+    """Fractional sum of squares over all shifts, weighted and by phase. [1]"""
     fss_out_of_sample: Number
     fss_training_mean: Number
+    """Mean over the folds, of the testing and of the training sets. [1]"""
     method: str
+    """Name of the method of fitting."""
     dynamic_quantity: str
     static_quantity: str
+    """What the two terms of the current follow, see `SkinResponse.sample`."""
     parameters: dict[str, Number]
     units: dict[str, str]
+    """Six parameters fitted to all shifts, and their units, by name."""
     shift_mm: Vector
+    """Shifts of the bar, proximal positive, (n_shifts,). [mm]"""
     dynamic_rate_hz: Vector
     static_rate_hz: Vector
+    """Predicted rates, (n_shifts,). [spikes/s]"""
     observed_dynamic_rate_hz: Vector
     observed_static_rate_hz: Vector
+    """Recorded rates, (n_shifts,). [spikes/s]"""
     start_points: tuple[dict[str, Number], ...]
+    """Both start points, by name of the parameter."""
     folds: tuple[FoldResult, ...]
+    """Cross-validation."""
     modulation: RateModulation
+    """At the edge of the bar."""
     initial_mv: Number | None = None
+    """Potential of the membrane at the start; that at rest if there is none. [mV]"""
 
 
 def single_unit_result(
     problem: RateProblem, best: Fit, folds: CrossValidation, afferent: Afferent, method: str
 ) -> SingleUnitResult:
-    """Rates, fits and modulation.
-
-    Parameters
-    ----------
-    problem : RateProblem
-        From `rate_problem`.
-    best : Fit
-        To all shifts.
-    folds : CrossValidation
-        The six folds.
-    afferent : Afferent
-        That of the best fit.
-    method : str
-        Name of the method of fitting.
-    """
+    """Rates, fits and modulation."""
     shift_mm, recordings = bar_firing_rates().shift_mm, problem.recordings
     observed_dynamic, observed_static = recordings.dynamic_rate_hz, recordings.static_rate_hz
     assert observed_dynamic is not None
@@ -400,13 +289,7 @@ def _named(parameters: FloatArray) -> dict[str, float]:
 
 
 def edge_modulation(shift_mm: FloatArray, rate_hz: FloatArray) -> Modulation:
-    """Return the largest rate, the smallest under the flat face of the bar, and their modulation.
-
-    Parameters
-    ----------
-    shift_mm, rate_hz : array (n_shifts,)
-        Shifts of the bar, and rates. [mm, spikes/s]
-    """
+    """Return the largest rate, the smallest under the flat face of the bar, and their modulation."""
     under_flat = np.abs(shift_mm) < protocol.BAR_WIDTH.value / 2 - protocol.BAR_FILLET.value
     largest, smallest = float(rate_hz.max()), float(rate_hz[under_flat].min())
     return Modulation(

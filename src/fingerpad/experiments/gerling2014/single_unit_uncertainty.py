@@ -46,133 +46,89 @@ class CredibleInterval:
 
 @result_class
 class ParameterIdentifiability:
-    """Directions of the six parameters that the rates determine.
-
-    Parameters
-    ----------
-    rank : int
-        Singular values of the Jacobian of the rates that are not zero.
-    relative_singular_values : array (6,)
-        Over the largest. [1]
-    silent_directions : tuple of dict
-        Directions that do not change the rates, by name of the parameter.
-    """
+    """Directions of the six parameters that the rates determine."""
 
     rank: int
+    """Singular values of the Jacobian of the rates that are not zero."""
     relative_singular_values: Vector
+    """Over the largest, (6,). [1]"""
     silent_directions: tuple[dict[str, Number], ...]
+    """Directions that do not change the rates, by name of the parameter."""
 
 
 @result_class
 class PosteriorConvergence:
-    """Size and convergence of the MCMC ensembles.
-
-    Parameters
-    ----------
-    ensembles, walkers : int
-        Independent ensembles, and walkers of each.
-    draws, evaluations : int
-        Draws kept, and evaluations of the likelihood.
-    acceptance : float
-        Share of accepted proposals. [1]
-    r_hat : float
-        Largest split R-hat. [1]
-    effective_draws, effective_draws_of_tails : float
-        Smallest effective sample sizes.
-    draws_per_effective_draw : float
-        Largest autocorrelation time, in draws.
-    """
+    """Size and convergence of the MCMC ensembles."""
 
     ensembles: int
     walkers: int
+    """Independent ensembles, and walkers of each."""
     draws: int
     evaluations: int
+    """Draws kept, and evaluations of the likelihood."""
     acceptance: Number
+    """Share of accepted proposals. [1]"""
     r_hat: Number
+    """Largest split R-hat. [1]"""
     effective_draws: Number
     effective_draws_of_tails: Number
+    """Smallest effective sample sizes."""
     draws_per_effective_draw: Number
+    """Largest autocorrelation time, in draws."""
 
 
 @result_class
 class PhasePrediction:
-    """Posterior prediction of the rates of one phase, shift by shift.
-
-    Parameters
-    ----------
-    observed_hz, median_hz, low_hz, high_hz : array (n_shifts,)
-        Observed rates; median and credible band of the predicted rates. [spikes/s]
-    new_low_hz, new_high_hz : array (n_shifts,)
-        Credible band of a new recording. [spikes/s]
-    share_within_new : float
-        Share of the observed rates within that band. [1]
-    residual_deviation_hz, residual_length_mm : CredibleInterval
-        Standard deviation and correlation length of the residuals. [spikes/s], [mm]
-    probability_of_independence : float
-        That residuals of neighbouring shifts are independent. [1]
-    """
+    """Posterior prediction of the rates of one phase, shift by shift."""
 
     observed_hz: Vector
     median_hz: Vector
     low_hz: Vector
     high_hz: Vector
+    """Observed rates; median and credible band of the predicted rates, (n_shifts,). [spikes/s]"""
     new_low_hz: Vector
     new_high_hz: Vector
+    """Credible band of a new recording, (n_shifts,). [spikes/s]"""
     share_within_new: Number
+    """Share of the observed rates within that band. [1]"""
     residual_deviation_hz: CredibleInterval
     residual_length_mm: CredibleInterval
+    """Standard deviation and correlation length of the residuals. [spikes/s], [mm]"""
     probability_of_independence: Number
+    """That residuals of neighbouring shifts are independent. [1]"""
 
 
 @result_class
 class UncertaintyResult:
-    """Uncertainty of the fit to the rates under the bar.
-
-    Parameters
-    ----------
-    level : float
-        Probability within each interval and band.
-    seed : int
-        Of the random numbers.
-    names : tuple of str
-        The four identifiable numbers.
-    units, fit : dict
-        Their units and the fit, by name.
-    capacitance_mf, threshold_mv : float
-        Of the fit; they set the common scale of the gains in `posterior`. [mF], [mV]
-    identifiability : ParameterIdentifiability
-        Of the six parameters.
-    posterior : dict of str to CredibleInterval
-        Of the four numbers, of the gains, and of the resting potential over the threshold, `resting_share`.
-    convergence : PosteriorConvergence
-        Of the draws.
-    shift_mm : array (n_shifts,)
-        Shifts of the bar. [mm]
-    rates : dict of str to PhasePrediction
-        By phase.
-    evidence_for_alike_residuals : float
-        Gain of the largest log likelihood by correlated residuals.
-    profiles : tuple of ParameterProfile
-        Of the four numbers.
-    sensitivity : FssSensitivity
-        Of FSS to the four numbers.
-    """
+    """Uncertainty of the fit to the rates under the bar."""
 
     level: Number
+    """Probability within each interval and band."""
     seed: int
+    """Of the random numbers."""
     names: tuple[str, ...]
+    """The four identifiable numbers."""
     units: dict[str, str]
     fit: dict[str, Number]
     capacitance_mf: Number
     threshold_mv: Number
+    """Of the fit; they set the common scale of the gains in `posterior`. [mF], [mV]"""
     identifiability: ParameterIdentifiability
+    """Of the six parameters."""
     posterior: dict[str, CredibleInterval]
+    """Of the four numbers, of the gains, and of the resting potential over the threshold, `resting_share`."""
     convergence: PosteriorConvergence
+    """Of the draws."""
     shift_mm: Vector
+    """Shifts of the bar, (n_shifts,). [mm]"""
     rates: dict[str, PhasePrediction]
+    """By phase."""
     evidence_for_alike_residuals: Number
+    """Gain of the largest log likelihood by correlated residuals."""
     profiles: tuple[ParameterProfile, ...]
+    """Of the four numbers."""
     sensitivity: FssSensitivity
+    """Of FSS to the four numbers."""
 
 
 def uncertainty_result(
@@ -183,31 +139,7 @@ def uncertainty_result(
     quick: bool = False,
     initial_mv: float | None = None,
 ) -> UncertaintyResult:
-    """Compute identifiability, posterior, profile likelihoods and sensitivity.
-
-    Parameters
-    ----------
-    sed : SedTraces
-        Strain energy density at the receptor, one column per shift of the bar.
-    fitted : array_like (6,)
-        A fit, in the order of `fingerpad.neuron.afferent.PARAMETER_NAMES`: where the draws begin, and the
-        centre of the sensitivity analysis.
-    seed : int
-        Of the random numbers.
-    quick : bool, optional
-        Whether half as many effective draws are enough.
-    initial_mv : float, optional
-        As of `AfferentModel`. [mV]
-
-    Returns
-    -------
-    UncertaintyResult
-
-    Raises
-    ------
-    ConvergenceError
-        If draws or profiles do not converge.
-    """
+    """Compute identifiability, posterior, profile likelihoods and sensitivity."""
     recordings, shift_mm = single_unit.bar_recordings(), bar_firing_rates().shift_mm
     six_model = AfferentModel.of_drive(drive(sed, pieces=PIECES), initial_mv=initial_mv)
     model = four_number_model(six_model)

@@ -19,90 +19,59 @@ SHOWN_MM = 10.0
 
 @result_class
 class IndenterDeflection:
-    """Deflection of the skin under one indenter.
-
-    Parameters
-    ----------
-    distance_mm, deflection_mm : array (n_nodes,)
-        Profile along the midline: distance from the indenter's axis, proximal positive. [mm]
-    force_mn, peak_force_mn : float
-        Force at the end of the hold, and the largest force. [mN]
-    penetration_mm : float
-        Largest overlap of skin and indenter. [mm]
-    """
+    """Deflection of the skin under one indenter."""
 
     distance_mm: Vector
     deflection_mm: Vector
+    """Profile along the midline: distance from the indenter's axis, proximal positive, (n_nodes,). [mm]"""
     force_mn: Number
     peak_force_mn: Number
+    """Force at the end of the hold, and the largest force. [mN]"""
     penetration_mm: Number
+    """Largest overlap of skin and indenter. [mm]"""
 
 
 @result_class
 class CylinderDeflection(IndenterDeflection):
-    """Deflection of the skin under the cylinder, compared with the observations.
-
-    Parameters
-    ----------
-    r2 : float
-        Coefficient of determination, see `deflection_r2`.
-    r2_mirrored : float
-        The same with proximal and distal exchanged.
-    """
+    """Deflection of the skin under the cylinder, compared with the observations."""
 
     r2: Number
+    """Coefficient of determination, see `deflection_r2`."""
     r2_mirrored: Number
+    """The same with proximal and distal exchanged."""
 
 
 @result_class
 class TrialDeflection:
-    """Deflections with the tissues of one trial.
-
-    Parameters
-    ----------
-    line : IndenterDeflection
-        Under the line load.
-    cylinder : CylinderDeflection
-        Under the cylinder.
-    """
+    """Deflections with the tissues of one trial."""
 
     line: IndenterDeflection
+    """Under the line load."""
     cylinder: CylinderDeflection
+    """Under the cylinder."""
 
 
 @result_class
 class ObservedDeflection:
-    """Observed deflection under the cylinder.
-
-    Parameters
-    ----------
-    distance_mm, deflection_mm : array (n_points,)
-        [mm]
-    is_artefact : bool array (n_points,)
-        Points that R² leaves out.
-    """
+    """Observed deflection under the cylinder."""
 
     distance_mm: Vector
     deflection_mm: Vector
+    """(n_points,)."""
     is_artefact: TruthVector
+    """Points that R² leaves out, (n_points,)."""
 
 
 @result_class
 class SkinDeflectionResult:
-    """Result of level 1.
-
-    Parameters
-    ----------
-    trial1, trial2, trial3 : TrialDeflection
-        By the tissues of the paper's trials.
-    observed : ObservedDeflection
-        What they are compared with.
-    """
+    """Result of level 1."""
 
     trial1: TrialDeflection
     trial2: TrialDeflection
     trial3: TrialDeflection
+    """By the tissues of the paper's trials."""
     observed: ObservedDeflection
+    """What they are compared with."""
 
 
 def deflection_touches(conditions: Conditions) -> dict[tuple[str, str], Touch]:
@@ -129,13 +98,7 @@ def deflection_r2(profile: SurfaceProfile, proximal_positive: bool = True) -> fl
 
 
 def deflection_result(responses: dict[tuple[str, str], SkinResponse]) -> SkinDeflectionResult:
-    """Profiles, forces and R², with distances in the direction of the observations.
-
-    Parameters
-    ----------
-    responses : dict of (trial, indenter) to SkinResponse
-        Of all `deflection_touches`.
-    """
+    """Profiles, forces and R², with distances in the direction of the observations."""
     observed = cylinder_deflection()
     trials = {
         trial: TrialDeflection(

@@ -20,22 +20,15 @@ PLATE_DEPTHS_MM = (1.0, 2.0)
 
 @result_class
 class SkinForce:
-    """Deflection and force with the tissues of the run.
-
-    Parameters
-    ----------
-    deflection_r2 : float
-        R² of the deflection under the cylinder, see `deflection_r2`.
-    plate_1mm_n, plate_2mm_n : float
-        Force of a flat plate at the end of the hold, 1.0 and 2.0 mm deep. [N]
-    disc_1mm_n : float
-        Force of a flat disc of 6.35 mm diameter at the end of the hold, 1.0 mm deep. [N]
-    """
+    """Deflection and force with the tissues of the run."""
 
     deflection_r2: Number
+    """R² of the deflection under the cylinder, see `deflection_r2`."""
     plate_1mm_n: Number
     plate_2mm_n: Number
+    """Force of a flat plate at the end of the hold, 1.0 and 2.0 mm deep. [N]"""
     disc_1mm_n: Number
+    """Force of a flat disc of 6.35 mm diameter at the end of the hold, 1.0 mm deep. [N]"""
 
 
 def plate(depth_mm: float) -> str:
@@ -63,13 +56,7 @@ def force_touches(conditions: Conditions) -> dict[str, Touch]:
 
 
 def skin_force(responses: Mapping[str, SkinResponse]) -> SkinForce:
-    """Read deflection and forces.
-
-    Parameters
-    ----------
-    responses : mapping of str to SkinResponse
-        Of all `force_touches`.
-    """
+    """Read deflection and forces."""
     force_n = {name: float(skin.force_mn[-1]) / MN_PER_N for name, skin in responses.items()}
     return SkinForce(
         deflection_r2=deflection_r2(responses["cylinder"].surface_profile()),

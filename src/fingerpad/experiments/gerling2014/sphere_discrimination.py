@@ -61,62 +61,43 @@ FITTED_SPHERES = tuple(
 
 @result_class
 class ObserverHitRates:
-    """Hit rates of one observer in one session, as the paper reports them.
-
-    Parameters
-    ----------
-    hit_rate, hit_rate_shifted : array (n_comparisons,)
-        Means with the spheres at 0.0 and at 0.2 mm. [0-1]
-    hit_rate_sd, hit_rate_shifted_sd : array (n_comparisons,)
-        Standard deviations. [0-1]
-    """
+    """Hit rates of one observer in one session, as the paper reports them."""
 
     hit_rate: Vector
     hit_rate_sd: Vector
     hit_rate_shifted: Vector
+    """Means with the spheres at 0.0 and at 0.2 mm, (n_comparisons,). [0-1]"""
     hit_rate_shifted_sd: Vector
+    """Standard deviations, (n_comparisons,). [0-1]"""
 
 
 @result_class
 class SphereDiscrimination:
-    """Hit rates of all observers at the noise that fits Goodwin's two points best.
-
-    Parameters
-    ----------
-    seed, sessions : int
-        Of all noise; repetitions of the protocol.
-    curvature_per_m : array (7,)
-        The spheres, the standard first. [1/m]
-    noise_sigma, noise_fit_error, noise_sigma_paper : float
-        Fitted noise, root mean square error of the fit [0-1], and the paper's noise.
-    goodwin : GoodwinHitRates
-        Of people.
-    gradient_sums : dict of array (n_positions, 7)
-        Without noise, by measure. [spikes/s or ms]
-    gradient_sum, euclidean, variants : dict of ObserverHitRates
-        First session: by measure for the two codes, and variants of the static Gradient Sum by name.
-    silent : tuple of str
-        Measures that are left out because the population stays silent.
-    statistics : DiscriminationStatistics
-        Behind the paper's statements.
-    reasons : DiscrepancyAnalysis
-        Why the numbers differ from the paper's.
-    """
+    """Hit rates of all observers at the noise that fits Goodwin's two points best."""
 
     seed: int
     sessions: int
+    """Of all noise; repetitions of the protocol."""
     curvature_per_m: Vector
+    """The spheres, the standard first, (7,). [1/m]"""
     noise_sigma: float
     noise_fit_error: float
     noise_sigma_paper: float
+    """Fitted noise, root mean square error of the fit [0-1], and the paper's noise."""
     goodwin: GoodwinHitRates
+    """Of people."""
     gradient_sums: dict[str, Matrix]
+    """Without noise, by measure, (n_positions, 7). [spikes/s or ms]"""
     gradient_sum: dict[str, ObserverHitRates]
     euclidean: dict[str, ObserverHitRates]
     variants: dict[str, ObserverHitRates]
+    """First session: by measure for the two codes, and variants of the static Gradient Sum by name."""
     silent: tuple[str, ...]
+    """Measures that are left out because the population stays silent."""
     statistics: DiscriminationStatistics
+    """Behind the paper's statements."""
     reasons: DiscrepancyAnalysis
+    """Why the numbers differ from the paper's."""
 
 
 def discrimination_touches(conditions: Conditions) -> dict[tuple[float, float], Touch]:
@@ -138,13 +119,6 @@ def to_rates_and_hit_rates(
 
     The two points are those of people at 296 and 365 /m, at both positions, by the Gradient Sum and by the
     Euclidean Distance of static rates, with the paper's noise.
-
-    Parameters
-    ----------
-    responses : dict of SkinResponse
-        By position and curvature, from `discrimination_touches`.
-    quantity : str
-        What drives both terms of the current.
     """
     sites = Population.grid(centre_mm=(RECEPTOR_X_MM, 0.0)).positions_mm
     return fit_to_people(
@@ -156,13 +130,7 @@ def to_rates_and_hit_rates(
 
 
 def fit_to_people(traces: Sequence[SedTraces]) -> ToRatesAndHitRates:
-    """Return the method of `to_rates_and_hit_rates` for given drives of the afferents.
-
-    Parameters
-    ----------
-    traces : sequence of SedTraces
-        At the receptors of the population, one per sphere of `FITTED_SPHERES`.
-    """
+    """Return the method of `to_rates_and_hit_rates` for given drives of the afferents."""
     population = Population.grid(centre_mm=(RECEPTOR_X_MM, 0.0))
     n_receptors = len(population.positions_mm)
     hit_rates = SphereHitRates(
@@ -184,24 +152,7 @@ def discriminate_spheres(
     seed: int,
     sessions: int = SESSIONS,
 ) -> SphereDiscrimination:
-    """Hit rates of both codes and all measures, at the noise that fits Goodwin's two points best.
-
-    Parameters
-    ----------
-    responses : dict of SkinResponse
-        By position and curvature, from `discrimination_touches`.
-    afferent : Afferent
-        Model of every receptor.
-    seed : int
-        Of all noise.
-    sessions : int, optional
-        How often the protocol is repeated. The first session is drawn; all of them give the Monte-Carlo
-        errors.
-
-    Returns
-    -------
-    SphereDiscrimination
-    """
+    """Hit rates of both codes and all measures, at the noise that fits Goodwin's two points best."""
     population = Population.grid(afferent=afferent, centre_mm=(RECEPTOR_X_MM, 0.0))
     neighbours = neighbour_pairs(population.positions_mm, population.pitch_mm)
     maps = {key: population.respond(skin) for key, skin in responses.items()}

@@ -13,52 +13,37 @@ from fingerpad.neuron.afferent import Afferent
 
 @result_class
 class Summary:
-    """One number per quantity, at the tissues, the afferent and the noise of the run.
-
-    Parameters
-    ----------
-    deflection_r2 : float
-        R² of the deflection under the cylinder at 1.0 mm.
-    force_plate_1mm_n, force_plate_2mm_n, force_disc_1mm_n : float
-        Force at the end of the hold of a flat plate 1.0 and 2.0 mm deep, and of a disc of 6.35 mm. [N]
-    fss_out_of_sample, fss_in_sample : float
-        Fractional sum of squares of the rates under the bar: mean of the folds, and all shifts.
-    dynamic_flat_hz, dynamic_max_hz : float
-        Smallest dynamic rate under the flat face of the bar, and the largest. [spikes/s]
-    static_difference_hz : float
-        Largest static rate less the smallest under the flat face. [spikes/s]
-    resting_rate_hz : float
-        Rate without a touch. [spikes/s]
-    noise_sigma : float
-        Noise that fits people's two points best.
-    euclidean_rms_same_noise : float
-        Root mean square distance of the Euclidean Distance to these points at that noise. [0-1]
-    hit_rate_296, hit_rate_365 : (float, float)
-        Hit rates of the static Gradient Sum at that noise, spheres at 0.0 and at 0.2 mm. [0-1]
-    weber_144, weber_287 : float
-        Curvature threshold at 75 % over the standard; NaN where it was not asked for or does not exist.
-    wall_s, peak_memory_mb : float
-        Of the whole run, both sets. [s, MB]
-    """
+    """One number per quantity, at the tissues, the afferent and the noise of the run."""
 
     deflection_r2: Number
+    """R² of the deflection under the cylinder at 1.0 mm."""
     force_plate_1mm_n: Number
     force_plate_2mm_n: Number
     force_disc_1mm_n: Number
+    """Force at the end of the hold of a flat plate 1.0 and 2.0 mm deep, and of a disc of 6.35 mm. [N]"""
     fss_out_of_sample: Number
     fss_in_sample: Number
+    """Fractional sum of squares of the rates under the bar: mean of the folds, and all shifts."""
     dynamic_flat_hz: Number
     dynamic_max_hz: Number
+    """Smallest dynamic rate under the flat face of the bar, and the largest. [spikes/s]"""
     static_difference_hz: Number
+    """Largest static rate less the smallest under the flat face. [spikes/s]"""
     resting_rate_hz: Number
+    """Rate without a touch. [spikes/s]"""
     noise_sigma: Number
+    """Noise that fits people's two points best."""
     euclidean_rms_same_noise: Number
+    """Root mean square distance of the Euclidean Distance to these points at that noise. [0-1]"""
     hit_rate_296: tuple[Number, Number]
     hit_rate_365: tuple[Number, Number]
+    """Hit rates of the static Gradient Sum at that noise, spheres at 0.0 and at 0.2 mm. [0-1]"""
     weber_144: Number
     weber_287: Number
+    """Curvature threshold at 75 % over the standard; NaN where it was not asked for or does not exist."""
     wall_s: float = 0.0
     peak_memory_mb: float = 0.0
+    """Of the whole run, both sets. [s, MB]"""
 
 
 @result_class
@@ -78,17 +63,7 @@ def summary(
     discrimination: SphereDiscrimination,
     thresholds: CurvatureThresholds | None,
 ) -> Summary:
-    """Collect the numbers of one set; time and memory are known when the run ends.
-
-    Parameters
-    ----------
-    force, unit, discrimination
-        Results of the three levels.
-    afferent : Afferent
-        The fitted one.
-    thresholds : CurvatureThresholds or None
-        Where they were asked for.
-    """
+    """Collect the numbers of one set; time and memory are known when the run ends."""
     dynamic, static = unit.modulation.dynamic.ours, unit.modulation.static.ours
     centred, shifted = (place.at_goodwin for place in discrimination.statistics.targets)
     at_296, at_365 = ((here.value, aside.value) for here, aside in zip(centred, shifted, strict=True))

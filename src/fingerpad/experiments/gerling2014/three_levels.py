@@ -24,72 +24,45 @@ UNTIL_MS, POTENTIAL_STEP_MS = 200.0, 0.5
 
 @result_class
 class ThreeLevels:
-    """Skin, one afferent and three afferents under the standard sphere (Figure 2).
-
-    Parameters
-    ----------
-    curvature_per_m : float
-        Of the sphere. [1/m]
-    centre_mm : (float, float)
-        x and y of its centre at the end of the hold. [mm]
-    ramp_ms : float
-        Duration of the ramp. [ms]
-    x_mm, y_mm : array (n_outline + 1, n_through + 1)
-        Nodes of the plane z = 0 at the end of the hold, through from the skin to the bone. [mm]
-    pressed : str
-        Name of what the afferent follows, as it is known in all elements.
-    pressed_kpa : array (n_outline, n_through)
-        Its values in the elements beside that plane. [kPa]
-    end_ms : float
-        End of the hold. [ms]
-    offset_mm : array (3,)
-        Positions of the afferents relative to the contact. [mm]
-    spikes_ms : tuple of arrays
-        Spike times of each afferent. [ms]
-    dynamic_rate_hz, static_rate_hz : array (3,)
-        Their rates. [spikes/s]
-    times_ms, until_ms : array (n_times,), float
-        Times of the next two, and their end. [ms]
-    current_ma, potential_mv : array (n_times,)
-        Current through the membrane of the first afferent, and its potential. [mA, mV]
-    rheobase_ma, threshold_mv : float
-        Smallest constant current that elicits spikes, and the potential that elicits one. [mA, mV]
-    """
+    """Skin, one afferent and three afferents under the standard sphere (Figure 2)."""
 
     curvature_per_m: float
+    """Of the sphere. [1/m]"""
     centre_mm: tuple[float, float]
+    """x and y of its centre at the end of the hold. [mm]"""
     ramp_ms: float
+    """Duration of the ramp. [ms]"""
     x_mm: Matrix
     y_mm: Matrix
+    """Nodes of the plane z = 0 at the end of the hold, through from the skin to the bone, (n_outline + 1,
+    n_through + 1). [mm]
+    """
     pressed: str
+    """Name of what the afferent follows, as it is known in all elements."""
     pressed_kpa: Matrix
+    """Its values in the elements beside that plane, (n_outline, n_through). [kPa]"""
     end_ms: float
+    """End of the hold. [ms]"""
     offset_mm: Vector
+    """Positions of the afferents relative to the contact, (3,). [mm]"""
     spikes_ms: tuple[Vector, ...]
+    """Spike times of each afferent. [ms]"""
     dynamic_rate_hz: Vector
     static_rate_hz: Vector
+    """Their rates, (3,). [spikes/s]"""
     times_ms: Vector
     until_ms: float
+    """Times of the next two, and their end, (n_times,). [ms]"""
     current_ma: Vector
     potential_mv: Vector
+    """Current through the membrane of the first afferent, and its potential, (n_times,). [mA, mV]"""
     rheobase_ma: float
     threshold_mv: float
+    """Smallest constant current that elicits spikes, and the potential that elicits one. [mA, mV]"""
 
 
 def three_levels(standard: SkinResponse, afferent: Afferent) -> ThreeLevels:
-    """Read one indentation by the standard sphere on all levels.
-
-    Parameters
-    ----------
-    standard : SkinResponse
-        Skin under that sphere, centred on the contact.
-    afferent : Afferent
-        Model of all afferents.
-
-    Returns
-    -------
-    ThreeLevels
-    """
+    """Read one indentation by the standard sphere on all levels."""
     mesh, curvature = standard.mesh, protocol.STANDARD_CURVATURE.value
     nodes = outline_nodes(mesh)
     moved = (mesh.nodes_mm + standard.displacement_mm)[nodes].round(DECIMALS)
@@ -134,32 +107,7 @@ def three_levels(standard: SkinResponse, afferent: Afferent) -> ThreeLevels:
 def membrane_potential(
     membrane: LeakyIntegrateAndFire, current: CurrentTraces, spikes_ms: FloatArray, times_ms: FloatArray
 ) -> FloatArray:
-    """Potential of a membrane whose spike times are known, Eq. 3.
-
-    Parameters
-    ----------
-    membrane : LeakyIntegrateAndFire
-        The membrane.
-    current : CurrentTraces
-        Current of one neuron, linear between its times.
-    spikes_ms : array (n_spikes,)
-        Its spikes, at which the potential is reset. [ms]
-    times_ms : array (n_times,)
-        Increasing, from the first time of the current on. [ms]
-
-    Returns
-    -------
-    array (n_times,)
-        0 during the refractory period. [mV]
-
-    Examples
-    --------
-    >>> membrane = LeakyIntegrateAndFire(68.0, 1e-6, 50.0, 1.0)
-    >>> current = CurrentTraces([0.0, 100.0], [[2e-6], [2e-6]])
-    >>> times, spikes = np.array([0.0, 31.16, 32.0]), membrane.spikes(current)[0]
-    >>> membrane_potential(membrane, current, spikes, times).round()
-    array([ 0., 50.,  0.])
-    """
+    """Potential of a membrane whose spike times are known, Eq. 3."""
     tau, capacitance = membrane.time_constant_ms, membrane.capacitance_mf
     knots = np.unique(
         np.concatenate([times_ms, current.times_ms, spikes_ms, spikes_ms + membrane.refractory_ms])

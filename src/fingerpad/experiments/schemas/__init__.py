@@ -19,13 +19,7 @@ TOUCH_SCHEMA = "fingerpad-touch.schema.json"
 
 @cache
 def schema(file_format: str) -> JsonSchema:
-    """JSON schema of a format, as packaged.
-
-    Parameters
-    ----------
-    file_format : str
-        The field `format` of a file of results.
-    """
+    """JSON schema of a format, as packaged."""
     return _packaged(file_name(file_format))
 
 
@@ -39,54 +33,17 @@ def _packaged(name: str) -> JsonSchema:
 
 
 def file_name(file_format: str) -> str:
-    """Name of the file that holds the schema of a format.
-
-    Examples
-    --------
-    >>> file_name("fingerpad reproduction")
-    'fingerpad-reproduction.schema.json'
-    """
+    """Name of the file that holds the schema of a format."""
     return file_format.replace(" ", "-") + ".schema.json"
 
 
 def write(path: Path, results: ResultFile) -> None:
-    """Write a file of results that meets the schema of its format.
-
-    Parameters
-    ----------
-    path : Path
-        Where the file shall be; folders are made as needed.
-    results : ResultFile
-        What it holds.
-
-    Raises
-    ------
-    StoreError
-        If the results do not meet the schema or the file cannot be written.
-    """
+    """Write a file of results that meets the schema of its format."""
     write_results(path, results, schema(results.format))
 
 
 def read(path: Path, *formats: str) -> dict[str, Any]:
-    """Read the values of a file of results without its types.
-
-    Parameters
-    ----------
-    path : Path
-        Written by `write`.
-    *formats : str
-        Formats that will do, in the version of this package.
-
-    Returns
-    -------
-    dict
-        JSON values that meet the schema of their format.
-
-    Raises
-    ------
-    StoreError
-        If the file cannot be read, has another format or version, or does not meet its schema.
-    """
+    """Read the values of a file of results without its types."""
     versions = {name: schema(name)["properties"]["format_version"]["const"] for name in formats}
     values = read_format(path, versions)
     check_schema(path, values, schema(values["format"]))

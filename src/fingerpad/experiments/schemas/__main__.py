@@ -39,13 +39,7 @@ def write_schemas(folder: Path = Path(__file__).parent) -> None:
 
 
 def structure(schema: Any) -> Any:
-    """Return a schema without titles and descriptions: a docstring is no part of a format.
-
-    Examples
-    --------
-    >>> structure({"title": "Rates", "type": "object", "properties": {"title": {"title": "Title"}}})
-    {'type': 'object', 'properties': {'title': {}}}
-    """
+    """Return a schema without titles and descriptions: a docstring is no part of a format."""
     if isinstance(schema, list):
         return [structure(item) for item in schema]
     if not isinstance(schema, dict):

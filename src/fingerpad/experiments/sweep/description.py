@@ -70,26 +70,18 @@ _OPERATORS = (*_COMPARISONS, *_OPERATIONS, ast.And, ast.Or, ast.USub)
 
 
 class EvenValues(Part):
-    """Evenly spaced values of a field.
-
-    Parameters
-    ----------
-    start, stop : float
-        First and last value. [unit of the field]
-    count : int
-        How many.
-    spacing : {"linear", "logarithmic"}
-        Whether differences or ratios are equal.
-    """
+    """Evenly spaced values of a field."""
 
     start: FiniteNumber
     stop: FiniteNumber
+    """First and last value. [unit of the field]"""
     count: Count
+    """How many."""
     spacing: Annotated[str, choice_of((LINEAR, LOGARITHMIC))] = LINEAR
+    """Whether differences or ratios are equal."""
 
     @property
     def values(self) -> list[float]:
-        """The values."""
         if self.spacing == LINEAR:
             return np.linspace(self.start, self.stop, self.count).tolist()
         if min(self.start, self.stop) <= 0.0:
@@ -101,24 +93,16 @@ class EvenValues(Part):
 
 
 class SampleSettings(Part):
-    """Points that fill a box of several fields.
-
-    Parameters
-    ----------
-    method : {"sobol", "latin_hypercube"}
-        How: a scrambled Sobol sequence, or a Latin hypercube.
-    count : int
-        Number of points; powers of two suit Sobol.
-    seed : int
-        Of the random numbers.
-    fields : mapping of str to (float, float)
-        Lower and upper bound by field. [unit of the field]
-    """
+    """Points that fill a box of several fields."""
 
     method: Annotated[str, choice_of((SOBOL, LATIN_HYPERCUBE))] = SOBOL
+    """How: a scrambled Sobol sequence, or a Latin hypercube."""
     count: Count
+    """Number of points; powers of two suit Sobol."""
     seed: Seed = 0
+    """Of the random numbers."""
     fields: dict[str, Pair]
+    """Lower and upper bound by field. [unit of the field]"""
 
     @property
     def values(self) -> dict[str, list[float]]:
@@ -139,88 +123,61 @@ class SampleSettings(Part):
 
 
 class ObserverSettings(Part):
-    """An observer who discriminates the stimuli along one dimension of a sweep from one of them.
-
-    Parameters
-    ----------
-    along : str
-        Field of the touch that varies from stimulus to stimulus, such as "object.curvature_per_m".
-    standard : float or str
-        Its value under the standard, that all others are discriminated from.
-    code : {"gradient_sum", "euclidean"}
-        How the population is decoded.
-    measure : {"static", "dynamic", "latency"}
-        What is measured of each afferent.
-    latest_ms : float, optional
-        Latest first spike that counts, as `windows_ms.latency` of a task. [ms]
-    noise : float
-        Standard deviation of the multiplicative noise.
-    experiment : ExperimentSettings
-        Repetitions, criterion and seed.
-    """
+    """An observer who discriminates the stimuli along one dimension of a sweep from one of them."""
 
     along: Text
+    """Field of the touch that varies from stimulus to stimulus, such as "object.curvature_per_m"."""
     standard: LevelOrName
+    """Its value under the standard, that all others are discriminated from."""
     code: Annotated[str, choice_of(tuple(code for code in CODES if code != IDEAL))] = CODES[0]
+    """How the population is decoded."""
     measure: Annotated[str, choice_of(MEASURES)] = MEASURES[0]
+    """What is measured of each afferent."""
     latest_ms: Positive | None = None
+    """Latest first spike that counts, as `windows_ms.latency` of a task. [ms]"""
     noise: Annotated[NotNegative, Field(le=LARGEST_NOISE)]
+    """Standard deviation of the multiplicative noise."""
     experiment: ExperimentSettings = ExperimentSettings()
+    """Repetitions, criterion and seed."""
 
 
 class SweepDescription(Part):
-    """All that a file of a sweep holds.
-
-    Parameters
-    ----------
-    title : str
-        What it is, in words.
-    touch : mapping
-        The touch, with the keys of `TouchDescription`; what varies need not be given.
-    grid : mapping of str to list or EvenValues
-        Values by field, such as "motion.depth_mm": each field is a dimension, and settings are all
-        combinations.
-    zip : mapping of str to list
-        Fields that vary together, one value of each per setting: one dimension.
-    sample : SampleSettings
-        Fields that vary together over a box: one dimension.
-    where : list of str
-        Constraints such as "motion.depth_mm < 0.5 * object.radius_mm": other settings are left out.
-    fields : list of str
-        Fields of the skin that the result holds beside force, depth and contact, by the names of
-        `fingerpad.skin.fields.FIELDS`.
-    observer : mapping
-        An observer of the responses, with the keys of `ObserverSettings`; what varies need not be given.
-    """
+    """All that a file of a sweep holds."""
 
     title: Text = "A sweep"
+    """What it is, in words."""
     touch: Block
+    """The touch, with the keys of `TouchDescription`; what varies need not be given."""
     observer: Block | None = None
+    """An observer of the responses, with the keys of `ObserverSettings`; what varies need not be given."""
     grid: Block = Field(default={})
+    """Values by field, such as "motion.depth_mm": each field is a dimension, and settings are all
+    combinations.
+    """
     zip: Block = Field(default={})
+    """Fields that vary together, one value of each per setting: one dimension."""
     sample: SampleSettings | None = None
+    """Fields that vary together over a box: one dimension."""
     where: Annotated[tuple[Text, ...], Strict(False), BeforeValidator(as_list)] = ()
+    """Constraints such as "motion.depth_mm < 0.5 * object.radius_mm": other settings are left out."""
     fields: Annotated[
         tuple[Annotated[str, choice_of([field.name for field in stored_fields()])], ...],
         Strict(False),
         BeforeValidator(as_list),
     ] = ()
+    """Fields of the skin that the result holds beside force, depth and contact, by the names of
+    `fingerpad.skin.fields.FIELDS`.
+    """
 
 
 @dataclass(frozen=True)
 class Axis:
-    """One dimension of a sweep.
-
-    Parameters
-    ----------
-    name : str
-        Of the dimension: that of its field with underscores, "zip" or "sample".
-    values : mapping of str to list
-        Values by field, all of one length.
-    """
+    """One dimension of a sweep."""
 
     name: str
+    """Of the dimension: that of its field with underscores, "zip" or "sample"."""
     values: Mapping[str, list[Any]]
+    """Values by field, all of one length."""
 
     def __len__(self) -> int:
         return len(next(iter(self.values.values())))
@@ -232,13 +189,7 @@ class Axis:
 
     @property
     def observes(self) -> bool:
-        """Whether it changes the observer, and nothing else.
-
-        Raises
-        ------
-        InputError
-            If fields of the observer and others vary together.
-        """
+        """Whether it changes the observer, and nothing else."""
         kinds = {field.partition(".")[0] == OBSERVER for field in self.values}
         if len(kinds) > 1:
             raise InputError(
@@ -253,26 +204,13 @@ class Sweep:
 
     A setting is a number from 0 to `size` - 1, in the order of a C array of `shape`; so is a press within
     `press_shape`.
-
-    Parameters
-    ----------
-    description : SweepDescription
-        The description.
-    source : str
-        File of the description: files that it names are searched beside it, and errors begin with it.
-    text : str
-        Content of that file, for the lines of errors.
-
-    Examples
-    --------
-    >>> sweep = sweep_of({"touch": {"object": "sphere"}, "grid": {"motion.depth_mm": [0.5, 1.0]}})
-    >>> sweep.axes[0].name, sweep.shape, sweep.content(1)["motion"]
-    ('motion_depth_mm', (2,), {'depth_mm': 1.0})
     """
 
     description: SweepDescription
     source: str = "sweep"
+    """File of the description: files that it names are searched beside it, and errors begin with it."""
     text: str = ""
+    """Content of that file, for the lines of errors."""
 
     @property
     def origin(self) -> Origin:
@@ -347,13 +285,7 @@ class Sweep:
 
     @cached_property
     def observers(self) -> tuple[ObserverSettings, ...]:
-        """Observers in the order of a C array of `observer_shape`; none without a block `observer`.
-
-        Raises
-        ------
-        InputError
-            If a value is unfit, `along` is no field that changes the skin, or `standard` none of its values.
-        """
+        """Observers in the order of a C array of `observer_shape`; none without a block `observer`."""
         content = self.description.observer
         if content is None:
             if self.observer_axes:
@@ -413,23 +345,11 @@ class Sweep:
         return content
 
     def described(self, setting: int) -> DescribedTouch:
-        """Touch of a setting.
-
-        Raises
-        ------
-        InputError
-            If a field is unknown, or a value is unfit.
-        """
+        """Touch of a setting."""
         return described_touch(self.content(setting), f"{self.source}, touch")
 
     def check(self) -> None:
-        """Check all keys and values, and press nothing.
-
-        Raises
-        ------
-        InputError
-            If one is unknown or unfit, or no setting meets the constraints.
-        """
+        """Check all keys and values, and press nothing."""
         strides = [int(np.prod(self.shape[number + 1 :])) for number in range(len(self.axes))]
         for axis, stride in zip(self.axes, strides, strict=True):
             for number in range(min(len(axis), MOST_CHECKED)):
@@ -464,24 +384,7 @@ class Sweep:
 
 
 class Constraint:
-    """A comparison of fields of a touch, written as in `a.b < 2 * c.d`.
-
-    Parameters
-    ----------
-    text : str
-        Names of fields, numbers, + - * /, comparisons, `and`, `or` and parentheses.
-
-    Raises
-    ------
-    InputError
-        If it is anything else.
-
-    Examples
-    --------
-    >>> shallow = Constraint("motion.depth_mm < 0.5 * object.radius_mm")
-    >>> shallow({"motion": {"depth_mm": 1.0}, "object": {"radius_mm": 4.0}})
-    True
-    """
+    """A comparison of fields of a touch, written as in `a.b < 2 * c.d`."""
 
     def __init__(self, text: str):
         self.text = text
@@ -545,22 +448,7 @@ class Constraint:
 
 
 def read_sweep(source: str | Path) -> Sweep:
-    """Read the description of a sweep from a YAML file.
-
-    Parameters
-    ----------
-    source : str or Path
-        The file; docs/sweeps.md explains its keys.
-
-    Returns
-    -------
-    Sweep
-
-    Raises
-    ------
-    InputError
-        If it is no YAML, or a key is unknown, missing or has an unfit value; with line and key.
-    """
+    """Read the description of a sweep from a YAML file."""
     text = read_text(path_of("source", source))
     return sweep_of(read_yaml(text, str(source)), str(source), text)
 

@@ -20,27 +20,19 @@ CORES = 2
 
 @dataclass(frozen=True)
 class SweepEstimate:
-    """What a sweep will take if nothing of it is stored yet.
-
-    Parameters
-    ----------
-    settings, presses : int
-        How many, without those that are left out.
-    looked_at : int
-        Presses that the estimate is from.
-    time_s, memory_mb, disk_mb : float
-        Time on the clock, memory of all processes, and stored indentations. [s], [MB], [MB]
-    processes : int
-        How many press at a time.
-    """
+    """What a sweep will take if nothing of it is stored yet."""
 
     settings: int
     presses: int
+    """How many, without those that are left out."""
     looked_at: int
+    """Presses that the estimate is from."""
     time_s: float
     memory_mb: float
     disk_mb: float
+    """Time on the clock, memory of all processes, and stored indentations. [s], [MB], [MB]"""
     processes: int
+    """How many press at a time."""
 
     @property
     def lines(self) -> tuple[str, ...]:
@@ -54,27 +46,7 @@ class SweepEstimate:
 
 
 def estimate_sweep(sweep: Sweep, processes: int) -> SweepEstimate:
-    """Estimate a sweep; the meshes of a few presses are built for it.
-
-    Parameters
-    ----------
-    sweep : Sweep
-        The sweep.
-    processes : int
-        How many press at a time, one thread each.
-
-    Returns
-    -------
-    SweepEstimate
-        Presses that are impossible count as the others.
-
-    Examples
-    --------
-    >>> from fingerpad.experiments.sweep.description import sweep_of
-    >>> sweep = sweep_of({"touch": {"object": "sphere"}, "grid": {"motion.depth_mm": [0.2, 0.4, 0.6]}})
-    >>> estimate_sweep(sweep, 2).presses
-    3
-    """
+    """Estimate a sweep; the meshes of a few presses are built for it."""
     kept = [press for press in range(sweep.presses) if any(map(sweep.allowed, sweep.settings_of(press)))]
     chosen = [kept[n] for n in np.unique(np.linspace(0, len(kept) - 1, MOST_LOOKED_AT).round().astype(int))]
     found, bytes_each = [], []

@@ -25,25 +25,7 @@ MEASURED = {
 def observe(
     sweep: Sweep, responses: Mapping[str, FloatArray], done: np.ndarray, on_finished: Callable[[], None]
 ) -> FloatArray:
-    """Compute the hit rates of all observers of a sweep.
-
-    Parameters
-    ----------
-    sweep : Sweep
-        With observers.
-    responses : mapping of str to array (*shape, n_receptors)
-        By the names of `MEASURED`, with NaN behind the receptors of a setting that has fewer.
-    done : bool array (*shape)
-        Settings that have responses.
-    on_finished : callable
-        Called after each group of settings that differ in the stimulus alone.
-
-    Returns
-    -------
-    array (*shape, *observer_shape)
-        Share of trials in which the stimulus is told from the standard. NaN for the standard itself, and
-        where a stimulus of the group is not done or leaves the population silent. [0-1]
-    """
+    """Compute the hit rates of all observers of a sweep."""
     observers = sweep.observers
     along, _ = sweep.stimuli_axis(observers[0])
     found = np.full((*sweep.shape, len(observers)), np.nan)

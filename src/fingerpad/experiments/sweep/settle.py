@@ -38,75 +38,37 @@ PLACES_MM: dict[Place, tuple[str, Callable[[Mesh], np.ndarray]]] = {
 
 @dataclass(frozen=True)
 class Case:
-    """One press with the settings that are wanted of it.
-
-    Parameters
-    ----------
-    text, source : str
-        Description of the sweep in JSON, and its file.
-    press : int
-        Number of the press.
-    settings : tuple of int
-        Numbers of the settings, all of this press.
-    store : Path
-        Folder of stored indentations.
-    """
+    """One press with the settings that are wanted of it."""
 
     text: str
     source: str
+    """Description of the sweep in JSON, and its file."""
     press: int
     settings: tuple[int, ...]
+    """Numbers of the settings, all of this press."""
     store: Path
+    """Folder of stored indentations."""
 
 
 @dataclass(frozen=True)
 class Settled:
-    """What became of a case.
-
-    Parameters
-    ----------
-    press : int
-        Number of the press.
-    pressed : bool
-        Whether it was pressed, and not loaded.
-    seconds : float
-        Time of the press. [s]
-    skin : mapping of str to array
-        Traces and fields of the skin by name; empty if it failed.
-    responses : mapping of int to ResponseMap
-        By number of the setting.
-    failures : mapping of int to str
-        Reason why there is no response, by number of the setting.
-    """
+    """What became of a case."""
 
     press: int
     pressed: bool
+    """Whether it was pressed, and not loaded."""
     seconds: float
+    """Time of the press. [s]"""
     skin: Mapping[str, np.ndarray] = field(default_factory=dict)
+    """Traces and fields of the skin by name; empty if it failed."""
     responses: Mapping[int, ResponseMap] = field(default_factory=dict)
+    """By number of the setting."""
     failures: Mapping[int, str] = field(default_factory=dict)
+    """Reason why there is no response, by number of the setting."""
 
 
 def settle(case: Case, threads: int | None = None) -> Settled:
-    """Press, or load what is stored, and let the afferents of every setting respond.
-
-    Parameters
-    ----------
-    case : Case
-        The press.
-    threads : int, optional
-        Number of threads, all by default; the result does not depend on it.
-
-    Returns
-    -------
-    Settled
-        With reasons in the place of what cannot be pressed or cannot respond.
-
-    Raises
-    ------
-    StoreError
-        If the store cannot be written.
-    """
+    """Press, or load what is stored, and let the afferents of every setting respond."""
     sweep = _sweep(case.text, case.source)
     began = time.perf_counter()
     first = case.settings[0]
@@ -152,17 +114,7 @@ def _sweep(text: str, source: str) -> Sweep:
 
 
 def unsettled(sweep: Sweep, done: np.ndarray, store: Path) -> Sequence[Case]:
-    """Cases of a sweep of which some settings are not done and meet the constraints.
-
-    Parameters
-    ----------
-    sweep : Sweep
-        The sweep.
-    done : bool array (size,)
-        Settings that need nothing.
-    store : Path
-        Folder of stored indentations.
-    """
+    """Cases of a sweep of which some settings are not done and meet the constraints."""
     text = sweep.description.model_dump_json()
     cases = []
     for press in range(sweep.presses):

@@ -54,27 +54,17 @@ INDENTER = "indenter"
 
 @dataclass(frozen=True)
 class Kind:
-    """A kind of observation.
-
-    Parameters
-    ----------
-    name : str
-        Name of the kind.
-    conditions : tuple of str
-        Columns that say under what was observed.
-    observed : str
-        Column of what was observed.
-    example : tuple of str
-        Rows of an example file, with made-up numbers.
-    axis : str, optional
-        Condition that is a place along the finger, whose direction a source may leave open.
-    """
+    """A kind of observation."""
 
     name: str
     conditions: tuple[str, ...]
+    """Columns that say under what was observed."""
     observed: str
+    """Column of what was observed."""
     example: tuple[str, ...]
+    """Rows of an example file, with made-up numbers."""
     axis: str = ""
+    """Condition that is a place along the finger, whose direction a source may leave open."""
 
     @property
     def columns(self) -> tuple[str, ...]:
@@ -140,40 +130,26 @@ KINDS: dict[str, Kind] = {
 
 @dataclass(frozen=True)
 class Observation:
-    """One row of a file.
-
-    Parameters
-    ----------
-    line : int
-        Line of the file.
-    condition : tuple of float or str
-        Values of the kind's conditions, in their order; an indenter as it is written.
-    observed : float
-        What was observed. [unit of the kind]
-    """
+    """One row of a file."""
 
     line: int
+    """Line of the file."""
     condition: tuple[Value, ...]
+    """Values of the kind's conditions, in their order; an indenter as it is written."""
     observed: float
+    """What was observed. [unit of the kind]"""
 
 
 @dataclass(frozen=True)
 class Observations:
-    """What a file holds.
-
-    Parameters
-    ----------
-    kind : Kind
-        One of `KINDS`.
-    rows : tuple of Observation
-        In the order of the file.
-    source : str
-        Name of the file.
-    """
+    """What a file holds."""
 
     kind: Kind
+    """One of `KINDS`."""
     rows: tuple[Observation, ...]
+    """In the order of the file."""
     source: str
+    """Name of the file."""
 
     @cached_property
     def observed(self) -> FloatArray:
@@ -198,10 +174,6 @@ def read_observations(path: str | Path) -> Observations:
     path : str or Path
         A CSV file in UTF-8, of at most `LARGEST_FILE_MB`. Its header decides the kind; columns may stand in
         any order, and lines that begin with # are comments.
-
-    Returns
-    -------
-    Observations
 
     Raises
     ------
@@ -272,23 +244,7 @@ def _value(line: TableRow, column: str) -> Value:
 
 
 def example_file(kind: str) -> str:
-    """Return an example file of a kind, whose numbers are made up.
-
-    Parameters
-    ----------
-    kind : str
-        One of `KINDS`.
-
-    Examples
-    --------
-    >>> print(example_file("rate_curvature"))
-    # Made-up numbers that show the format. They are no data.
-    force_n,curvature_per_m,rate_hz
-    0.2,0,10
-    0.2,287,40
-    0.2,287,50
-    <BLANKLINE>
-    """
+    """Return an example file of a kind, whose numbers are made up."""
     shown = KINDS[one_of("--example", kind, tuple(KINDS))]
     lines = ["# Made-up numbers that show the format. They are no data.", ",".join(shown.columns)]
     return "\n".join([*lines, *shown.example, ""])

@@ -74,18 +74,12 @@ class FingertipModel(metaclass=KnownKeywords):
 
 @dataclass(frozen=True)
 class Reading:
-    """How the prediction of one row is obtained.
-
-    Parameters
-    ----------
-    touch : Touch or None
-        What is pressed; None if nothing is, at depth or force 0.
-    of : callable
-        Reads the prediction from the response of the skin, None without a touch.
-    """
+    """How the prediction of one row is obtained."""
 
     touch: Touch | None
+    """What is pressed; None if nothing is, at depth or force 0."""
     of: Callable[[SkinResponse | None], float]
+    """Reads the prediction from the response of the skin, None without a touch."""
 
 
 Plan = Reading | InputError
@@ -96,43 +90,20 @@ Condition = tuple[Value, ...]
 
 @dataclass(frozen=True)
 class Predictions:
-    """Predictions row by row.
-
-    Parameters
-    ----------
-    values : array (n_rows,)
-        In the unit of the observations; NaN where there is none.
-    mirrored : array (n_rows,) or None
-        The same with proximal and distal exchanged, for kinds with an axis.
-    reasons : mapping of int to str
-        Why a row has no prediction.
-    meshed : SkinResponse or None
-        One of the responses, for its mesh.
-    """
+    """Predictions row by row."""
 
     values: FloatArray
+    """In the unit of the observations; NaN where there is none, (n_rows,)."""
     mirrored: FloatArray | None
+    """The same with proximal and distal exchanged, for kinds with an axis, (n_rows,)."""
     reasons: Mapping[int, str]
+    """Why a row has no prediction."""
     meshed: SkinResponse | None
+    """One of the responses, for its mesh."""
 
 
 def predict(observations: Observations, model: FingertipModel, runner: Runner) -> Predictions:
-    """Press what is not stored yet, and read the prediction of every row.
-
-    Parameters
-    ----------
-    observations : Observations
-        From `read_observations`.
-    model : FingertipModel
-        Finger, tissues, afferent.
-    runner : Runner
-        Stores the presses.
-
-    Returns
-    -------
-    Predictions
-        A row whose touch cannot be pressed or does not converge has a reason instead of a value.
-    """
+    """Press what is not stored yet, and read the prediction of every row."""
     kind, axis = observations.kind, observations.kind.axis
     given = {
         row.condition: dict(zip(kind.conditions, row.condition, strict=True)) for row in observations.rows

@@ -30,121 +30,83 @@ from fingerpad.mechanics.tissues import named_tissues
 
 @result_class
 class Prediction:
-    """One row of the file with its prediction. Conditions that the kind does not have are null.
-
-    Parameters
-    ----------
-    line : int
-        Line of the file.
-    indenter : str, optional
-        As it is written in the file.
-    depth_mm, distance_mm : float, optional
-        Depth, and distance from the indenter's axis, proximal positive. [mm]
-    force_n : float, optional
-        Force that presses. [N]
-    curvature_per_m : float, optional
-        Of the sphere. [1/m]
-    ridge_mm, groove_mm : float, optional
-        Of the grating. [mm]
-    position_mm : float, optional
-        Of the receptor from the middle of the touch, proximal positive. [mm]
-    observed, predicted : float
-        In the unit of the kind; no prediction where a touch failed.
-    observed_low, observed_high : float
-        Lowest and highest observation of this condition.
-    inside_range : bool, optional
-        Whether the prediction lies between them; null with fewer than two observations.
-    reason : str, optional
-        Why there is no prediction.
-    """
+    """One row of the file with its prediction. Conditions that the kind does not have are null."""
 
     line: int
+    """Line of the file."""
     indenter: str | None = None
+    """As it is written in the file."""
     depth_mm: float | None = None
     distance_mm: float | None = None
+    """Depth, and distance from the indenter's axis, proximal positive. [mm]"""
     force_n: float | None = None
+    """Force that presses. [N]"""
     curvature_per_m: float | None = None
+    """Of the sphere. [1/m]"""
     ridge_mm: float | None = None
     groove_mm: float | None = None
+    """Of the grating. [mm]"""
     position_mm: float | None = None
+    """Of the receptor from the middle of the touch, proximal positive. [mm]"""
     observed: float
     predicted: Number
+    """In the unit of the kind; no prediction where a touch failed."""
     observed_low: float
     observed_high: float
+    """Lowest and highest observation of this condition."""
     inside_range: bool | None
+    """Whether the prediction lies between them; null with fewer than two observations."""
     reason: str | None = None
+    """Why there is no prediction."""
 
 
 @result_class
 class ValidationFile:
-    """The file `validate.json`.
-
-    Parameters
-    ----------
-    format, format_version
-        By which a reader knows the file.
-    kind, unit : str
-        What was observed, and its unit.
-    resolution, tissues : str
-        Accuracy and tissues of the prediction.
-    loading : str, optional
-        How depths were reached, for force and deflection.
-    afferent : dict of str to float or str, optional
-        Parameters of the afferent, for rates.
-    ramp_ms, hold_ms : float, optional
-        Motion of the force, for rates. [ms]
-    static_window_ms : (float, float), optional
-        Window of the rates. [ms]
-    receptor_depth_mm : float, optional
-        Depth of the receptor below the skin, for rates. [mm]
-    n_rows, n_predicted : int
-        Rows of the file, and those with a prediction. Scores are over the latter.
-    r2 : float
-        1 - sum (o - p)² / sum (o - mean of o)², with observations o and predictions p.
-    correlation : float
-        Pearson's correlation of o and p.
-    gain : float
-        sum o p / sum p², the factor on p with the least squares.
-    r2_after_gain : float
-        r2 of gain times p.
-    r2_mirrored : float
-        r2 with the direction of positive distances or positions reversed; null for kinds without either.
-    inside_range : bool, optional
-        Whether all predictions that can be judged lie in the observed range of their condition.
-    n_judged : int
-        Conditions with a prediction and at least two observations.
-    share_inside : float
-        Share of these with a prediction inside the observed range.
-    predictions : tuple of Prediction
-        In the order of the file.
-    manifest : Manifest
-        What ran.
-    """
+    """The file `validate.json`."""
 
     format: Literal["fingerpad validation"] = "fingerpad validation"
     format_version: Literal[1] = 1
+    """By which a reader knows the file."""
     kind: str
     unit: str
+    """What was observed, and its unit."""
     resolution: str
     tissues: str
+    """Accuracy and tissues of the prediction."""
     loading: str | None = None
+    """How depths were reached, for force and deflection."""
     afferent: dict[str, float | str | None] | None = None
+    """Parameters of the afferent, for rates."""
     ramp_ms: float | None = None
     hold_ms: float | None = None
+    """Motion of the force, for rates. [ms]"""
     static_window_ms: tuple[float, ...] | None = None
+    """Window of the rates. [ms]"""
     receptor_depth_mm: float | None = None
+    """Depth of the receptor below the skin, for rates. [mm]"""
     n_rows: int
     n_predicted: int
+    """Rows of the file, and those with a prediction. Scores are over the latter."""
     r2: Number
+    """1 - sum (o - p)² / sum (o - mean of o)², with observations o and predictions p."""
     correlation: Number
+    """Pearson's correlation of o and p."""
     gain: Number
+    """sum o p / sum p², the factor on p with the least squares."""
     r2_after_gain: Number
+    """r2 of gain times p."""
     r2_mirrored: Number
+    """r2 with the direction of positive distances or positions reversed; null for kinds without either."""
     inside_range: bool | None
+    """Whether all predictions that can be judged lie in the observed range of their condition."""
     n_judged: int
+    """Conditions with a prediction and at least two observations."""
     share_inside: Number
+    """Share of these with a prediction inside the observed range."""
     predictions: tuple[Prediction, ...]
+    """In the order of the file."""
     manifest: Manifest
+    """What ran."""
 
 
 @dataclass(frozen=True)

@@ -14,29 +14,13 @@ from fingerpad.core.errors import InputError
 
 @dataclass(frozen=True)
 class Bounds:
-    """Bounds and scales of the parameters of a fit.
-
-    Parameters
-    ----------
-    scales : array_like (n_parameters,)
-        Typical changes of the parameters, the units of the steps of a method.
-    low, high : array_like (n_parameters,) or float, optional
-        Limits; -inf and inf for none.
-
-    Raises
-    ------
-    InputError
-        If a scale is not positive, or a lower limit is not below the upper one.
-
-    Examples
-    --------
-    >>> Bounds([0.1, 10.0], [0.0, 0.0], [1.0, 90.0]).spread(3).tolist()
-    [[0.5, 30.0], [0.25, 60.0], [0.75, 10.0]]
-    """
+    """Bounds and scales of the parameters of a fit."""
 
     scales: FloatArray
+    """Typical changes of the parameters, the units of the steps of a method, (n_parameters,)."""
     low: FloatArray = -np.inf  # type: ignore[assignment]
     high: FloatArray = np.inf  # type: ignore[assignment]
+    """Limits; -inf and inf for none, (n_parameters,)."""
 
     def __post_init__(self) -> None:
         scales = float_array("scales", self.scales, 1)

@@ -18,27 +18,9 @@ def jackknife_covariance(estimates: ArrayLike) -> FloatArray | None:
     maxima. A covariance from derivatives at the best fit neglects both and is too small
     (docs/decisions/jackknife.md).
 
-    Parameters
-    ----------
-    estimates : array_like (g, n_parameters)
-        One row per fit.
-
-    Returns
-    -------
-    array (n_parameters, n_parameters) or None
-        None if there are no more groups than parameters: the covariance would be singular.
-
     Notes
     -----
     R. G. Miller, Biometrika 61 (1974) 1, the delete-a-group jackknife.
-
-    Examples
-    --------
-    Without one of the numbers 1, 2 and 6 the mean is 4, 3.5 or 1.5. The variance of the mean of all three
-    is 7/3, where 7 is their variance.
-
-    >>> float(jackknife_covariance([[4.0], [3.5], [1.5]])[0, 0].round(6))
-    2.333333
     """
     rows = float_array("estimates", estimates, 2)
     groups, parameters = rows.shape

@@ -18,46 +18,21 @@ from fingerpad.inference.fitting.problem import Problem
 class CovarianceAdaptation:
     """CMA-ES from one start, with the package `cma`.
 
-    Parameters
-    ----------
-    start : array_like (n_parameters,)
-        Mean of the first generation.
-    bounds : Bounds
-        Limits of the parameters, and the scales that set their units in the search.
-    first_spread : float
-        Standard deviation of the first generation, in units of the scales.
-    most_evaluations : int
-        The search ends with the generation that reaches this number, or when it has converged.
-    seed : int
-        Seed of the random numbers; the same seed gives the same bits.
-
-    Raises
-    ------
-    InputError
-        If shapes disagree or the spread is not positive.
-
     Notes
     -----
     Hansen & Ostermeier 2001.
-
-    Examples
-    --------
-    >>> class Hill:
-    ...     names, n_observations = ("x", "y"), 1
-    ...     def residuals(self, parameters, chosen):
-    ...         return parameters - [3.0, -1.0]
-    ...     def score(self, parameters, chosen):
-    ...         return 1.0 - float((self.residuals(parameters, chosen) ** 2).sum())
-    >>> search = CovarianceAdaptation([0.0, 0.0], Bounds([1.0, 1.0]))
-    >>> search.fit(Hill(), np.arange(1)).parameters.round(3).tolist()
-    [3.0, -1.0]
     """
 
     start: ArrayLike
+    """Mean of the first generation, (n_parameters,)."""
     bounds: Bounds
+    """Limits of the parameters, and the scales that set their units in the search."""
     first_spread: float = 0.5
+    """Standard deviation of the first generation, in units of the scales."""
     most_evaluations: int = 2000
+    """The search ends with the generation that reaches this number, or when it has converged."""
     seed: int = 0
+    """Seed of the random numbers; the same seed gives the same bits."""
     name: str = "CMA-ES"
 
     def __post_init__(self) -> None:

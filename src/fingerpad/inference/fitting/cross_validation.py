@@ -16,25 +16,16 @@ from fingerpad.inference.fitting.problem import Problem
 
 @dataclass(frozen=True)
 class FoldFit:
-    """Result of one fold.
-
-    Parameters
-    ----------
-    fold : int
-        Number of the fold, from 0.
-    fit : Fit
-        Fit of the training set.
-    score_test : float
-        Score of its parameters on the observations left out.
-    training, testing : int array (n_training,), (n_testing,)
-        Observations used for fitting, and those left out.
-    """
+    """Result of one fold."""
 
     fold: int
     fit: Fit
+    """Fit of the training set."""
     score_test: float
+    """Score of its parameters on the observations left out."""
     training: IntArray
     testing: IntArray
+    """Observations used for fitting, and those left out, (n_training,)."""
 
     @property
     def score_train(self) -> float:
@@ -44,15 +35,10 @@ class FoldFit:
 
 @dataclass(frozen=True)
 class CrossValidation:
-    """Results of all folds.
-
-    Parameters
-    ----------
-    folds : tuple of FoldFit
-        In the order of their numbers.
-    """
+    """Results of all folds."""
 
     folds: tuple[FoldFit, ...]
+    """In the order of their numbers."""
 
     @property
     def score_train(self) -> float:
@@ -66,22 +52,7 @@ class CrossValidation:
 
 
 def interleaved_folds(n_observations: int, n_folds: int = int(protocol.FOLDS.value)) -> IntArray:
-    """Assign observations to folds in turn: index modulo the number of folds.
-
-    Parameters
-    ----------
-    n_observations, n_folds : int
-        There must be at least one observation per fold.
-
-    Returns
-    -------
-    int array (n_observations,)
-
-    Examples
-    --------
-    >>> interleaved_folds(8, 3).tolist()
-    [0, 1, 2, 0, 1, 2, 0, 1]
-    """
+    """Assign observations to folds in turn: index modulo the number of folds."""
     if whole("n_folds", n_folds, at_least=2) > whole("n_observations", n_observations, at_least=2):
         raise InputError(f"n_folds must be at most the number of stimuli, {n_observations}: got {n_folds}.")
     return np.arange(n_observations, dtype=np.int64) % n_folds
@@ -90,43 +61,9 @@ def interleaved_folds(n_observations: int, n_folds: int = int(protocol.FOLDS.val
 def cross_validate(problem: Problem, method: Method, memberships: ArrayLike) -> CrossValidation:
     """Fit without the observations of each fold, and score the result on them.
 
-    Parameters
-    ----------
-    problem : Problem
-        The problem.
-    method : Method
-        The method.
-    memberships : int array (n_observations,)
-        Fold of each observation, 0 ... n_folds - 1, none empty, such as from `interleaved_folds`.
-
-    Returns
-    -------
-    CrossValidation
-
-    Raises
-    ------
-    InputError
-        If an observation has no fold, or a fold is empty.
-    ConvergenceError
-        If a fit does not converge.
-
     Notes
     -----
     Gerling et al. 2014, section 2.2.2.
-
-    Examples
-    --------
-    >>> from fingerpad.inference.fitting.response_surface import ResponseSurface
-    >>> class Line:
-    ...     names, n_observations = ("slope",), 4
-    ...     def residuals(self, slope, chosen):
-    ...         return ((np.array([1.0, 2.0, 3.0, 4.0]) - slope * [1, 2, 3, 4]) / 5.0)[chosen]
-    ...     def score(self, slope, chosen):
-    ...         return 1.0 - float((self.residuals(slope, chosen) ** 2).sum())
-    >>> method = ResponseSurface(starts=[[0.5], [2.0]], increments=[0.01])
-    >>> result = cross_validate(Line(), method, interleaved_folds(4, 2))
-    >>> [round(float(fold.fit.parameters[0]), 1) for fold in result.folds]
-    [1.0, 1.0]
     """
     folds = _checked_memberships(memberships, problem.n_observations)
 

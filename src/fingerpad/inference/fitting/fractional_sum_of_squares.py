@@ -13,27 +13,6 @@ def fractional_sum_of_squares(observed: ArrayLike, predicted: ArrayLike) -> floa
 
     FSS = 1 - sum (observed - predicted)^2 / sum observed^2. It is 1 for a perfect prediction, 0 for predicted
     rates of 0, and has no lower limit. R2 differs: it refers to the mean of the observations instead of 0.
-
-    Parameters
-    ----------
-    observed, predicted : array (n_shifts,)
-        Rates at the same shifts. [spikes/s]
-
-    Returns
-    -------
-    float
-
-    Raises
-    ------
-    InputError
-        If the two differ in length or all observed rates are 0.
-
-    Examples
-    --------
-    >>> fractional_sum_of_squares([3.0, 4.0], [3.0, 4.0])
-    1.0
-    >>> fractional_sum_of_squares([3.0, 4.0], [0.0, 4.0])
-    0.64
     """
     observed_rate = float_array("observed", observed, 1)
     predicted_rate = float_array("predicted", predicted, 1)

@@ -27,24 +27,18 @@ ZERO = 1e-5
 
 @dataclass(frozen=True)
 class Identifiability:
-    """Identifiable directions of parameters.
-
-    Parameters
-    ----------
-    names : tuple of str
-        Names of the parameters.
-    singular_values : array (n_parameters,)
-        Change of the outputs per unit step along each direction, largest first.
-    directions : array (n_parameters, n_parameters)
-        One unit direction per row, in units of the scales; those with singular value 0 are last.
-    rank : int
-        Number of singular values above zero, the number of identifiable combinations.
-    """
+    """Identifiable directions of parameters."""
 
     names: tuple[str, ...]
+    """Names of the parameters."""
     singular_values: FloatArray
+    """Change of the outputs per unit step along each direction, largest first, (n_parameters,)."""
     directions: FloatArray
+    """One unit direction per row, in units of the scales; those with singular value 0 are last,
+    (n_parameters, n_parameters).
+    """
     rank: int
+    """Number of singular values above zero, the number of identifiable combinations."""
 
     @property
     def silent_directions(self) -> FloatArray:
@@ -55,31 +49,7 @@ class Identifiability:
 def jacobian(
     answer: Answer, parameters: ArrayLike, scales: ArrayLike, step: float = JACOBIAN_STEP
 ) -> FloatArray:
-    """Change of every output per scale of every parameter, by central differences.
-
-    Parameters
-    ----------
-    answer : callable
-        From parameters (n_parameters,) to outputs (n_answers,).
-    parameters, scales : array (n_parameters,)
-        The point, and the scale of each parameter, such as |parameters|.
-    step : float, optional
-        Half width of a difference over the scale. A wide one averages over jumps of the outputs.
-
-    Returns
-    -------
-    array (n_answers, n_parameters)
-
-    Raises
-    ------
-    InputError
-        If a scale or the step is not positive, or an output is not finite.
-
-    Examples
-    --------
-    >>> jacobian(lambda p: np.array([p[0] * p[1], p[0] ** 2]), [2.0, 3.0], [1.0, 1.0]).round(6).tolist()
-    [[3.0, 2.0], [4.0, 0.0]]
-    """
+    """Change of every output per scale of every parameter, by central differences."""
     centre, units = float_array("parameters", parameters, 1), float_array("scales", scales, 1)
     if centre.shape != units.shape or (units <= 0.0).any():
         raise InputError(
@@ -103,40 +73,7 @@ def identifiability(
     step: float = JACOBIAN_STEP,
     zero: float = ZERO,
 ) -> Identifiability:
-    """Find the combinations of parameters on which outputs depend, and those on which they do not.
-
-    Parameters
-    ----------
-    answer : callable
-        From parameters (n_parameters,) to answers (n_answers,), at least as many as parameters.
-    parameters : array (n_parameters,)
-        Where to look: a fit.
-    names : sequence of str
-        Names of the parameters.
-    scales : array (n_parameters,), optional
-        One unit of each parameter; by default its own size, so that none may be 0.
-    step : float, optional
-        Half width of the differences over the scales.
-    zero : float, optional
-        Singular values below this share of the largest are zero.
-
-    Returns
-    -------
-    Identifiability
-
-    Raises
-    ------
-    InputError
-        If sizes disagree, a scale is 0, or there are fewer answers than parameters.
-
-    Examples
-    --------
-    Only the product of two parameters is seen: one direction is silent, up with one and down with the other.
-
-    >>> found = identifiability(lambda p: p[0] * p[1] * np.array([1.0, 2.0]), [2.0, 3.0], ("a", "b"))
-    >>> found.rank, (found.silent_directions[0] / found.silent_directions[0][0]).round(6).tolist()
-    (1, [1.0, -1.0])
-    """
+    """Find the combinations of parameters on which outputs depend, and those on which they do not."""
     centre = float_array("parameters", parameters, 1)
     labels = tuple(names)
     if len(labels) != centre.size:

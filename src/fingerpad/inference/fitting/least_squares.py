@@ -28,51 +28,24 @@ Jacobian = Callable[[FloatArray, IntArray], FloatArray]
 class LeastSquares:
     """Trust-region least squares from the most promising of several starts.
 
-    Parameters
-    ----------
-    starts : array_like (n_starts, n_parameters)
-        Start points; all are scored.
-    bounds : Bounds
-        Limits of the parameters, and the scales in which steps are taken.
-    n_refined : int
-        Number of starts, the best ones, from which a fit is made.
-    difference_steps : tuple of float
-        Half widths of the central differences, round by round, in units of the scales.
-    jacobian : callable, optional
-        `jacobian(parameters, chosen)`: derivatives of the residuals, instead of differences.
-    most_iterations : int
-        Iterations of each round.
-
-    Raises
-    ------
-    InputError
-        If shapes disagree, a step is not positive, or a start lies outside of the bounds.
-
     Notes
     -----
     The method of `scipy.optimize.least_squares`, "trf" (Branch, Coleman & Li 1999); the result is the best of
     all evaluated points. The method is deterministic.
-
-    Examples
-    --------
-    >>> class Line:
-    ...     names, n_observations = ("slope", "height"), 3
-    ...     def residuals(self, parameters, chosen):
-    ...         predicted = parameters @ [[0, 1, 2], [1, 1, 1]]
-    ...         return (np.array([1.0, 3.0, 5.0]) - predicted)[chosen] / np.sqrt(35.0)
-    ...     def score(self, parameters, chosen):
-    ...         residuals = self.residuals(parameters, chosen)
-    ...         return 1.0 - residuals @ residuals
-    >>> LeastSquares([[1.0, 0.0]], Bounds([1.0, 1.0])).fit(Line(), np.arange(3)).parameters.round(6).tolist()
-    [2.0, 1.0]
     """
 
     starts: ArrayLike
+    """Start points; all are scored, (n_starts, n_parameters)."""
     bounds: Bounds
+    """Limits of the parameters, and the scales in which steps are taken."""
     n_refined: int = 4
+    """Number of starts, the best ones, from which a fit is made."""
     difference_steps: tuple[float, ...] = (0.1, 0.03, 0.01)
+    """Half widths of the central differences, round by round, in units of the scales."""
     jacobian: Jacobian | None = None
+    """`jacobian(parameters, chosen)`: derivatives of the residuals, instead of differences."""
     most_iterations: int = 50
+    """Iterations of each round."""
     name: str = "least squares"
 
     def __post_init__(self) -> None:

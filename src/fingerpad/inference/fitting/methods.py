@@ -14,49 +14,32 @@ from fingerpad.inference.fitting.problem import Problem
 
 @dataclass(frozen=True)
 class FitStep:
-    """One step of a fit.
-
-    Parameters
-    ----------
-    parameters : array (n_parameters,)
-        Parameters at the step.
-    score : float
-        Score of the chosen observations.
-    """
+    """One step of a fit."""
 
     parameters: FloatArray
+    """Parameters at the step, (n_parameters,)."""
     score: float
+    """Score of the chosen observations."""
 
 
 @dataclass(frozen=True)
 class Fit:
-    """Result of a method: parameters, score, effort and history.
-
-    Parameters
-    ----------
-    parameters : array (n_parameters,)
-        The best parameters.
-    score : float
-        Their score over the chosen observations.
-    n_evaluations : int
-        Evaluations of the model, over all starts.
-    seconds : float
-        Elapsed time, over all starts. [s]
-    history : tuple of FitStep
-        Steps of the best fit; the first is its start, the last the result.
-    start : int
-        Number of its start, from 0; the first one of equals.
-    attempts : tuple of Fit
-        The fit from each start, in their order; empty for a method with one start.
-    """
+    """Result of a method: parameters, score, effort and history."""
 
     parameters: FloatArray
+    """The best parameters, (n_parameters,)."""
     score: float
+    """Their score over the chosen observations."""
     n_evaluations: int
+    """Evaluations of the model, over all starts."""
     seconds: float
+    """Elapsed time, over all starts. [s]"""
     history: tuple[FitStep, ...]
+    """Steps of the best fit; the first is its start, the last the result."""
     start: int = 0
+    """Number of its start, from 0; the first one of equals."""
     attempts: tuple[Fit, ...] = ()
+    """The fit from each start, in their order; empty for a method with one start."""
 
 
 class Method(Protocol):
@@ -73,24 +56,7 @@ class Method(Protocol):
 
 
 def best_of(attempts: tuple[Fit, ...]) -> Fit:
-    """Return the fit with the highest score, with the effort of all fits; the first one of equals.
-
-    Parameters
-    ----------
-    attempts : tuple of Fit
-        One per start.
-
-    Returns
-    -------
-    Fit
-
-    Examples
-    --------
-    >>> low, high = (Fit(np.zeros(1), score, 10, 0.5, ()) for score in (0.7, 0.8))
-    >>> best = best_of((low, high))
-    >>> best.score, best.start, best.n_evaluations
-    (0.8, 1, 20)
-    """
+    """Return the fit with the highest score, with the effort of all fits; the first one of equals."""
     start = int(np.argmax([attempt.score for attempt in attempts]))
     return Fit(
         parameters=attempts[start].parameters,
@@ -105,38 +71,16 @@ def best_of(attempts: tuple[Fit, ...]) -> Fit:
 
 @dataclass(frozen=True)
 class Continued:
-    """Two methods in sequence: a cheap one for the start of the second.
-
-    Parameters
-    ----------
-    first : Method
-        Finds the start of the second.
-    second : callable
-        `second(parameters)`: the method that starts there.
-    first_problem : Problem, optional
-        Problem of the first method, if it is a simpler one with the same observations.
-    name : str
-        Name in tables.
-
-    Examples
-    --------
-    >>> class Hill:
-    ...     names, n_observations = ("x",), 1
-    ...     def residuals(self, parameters, chosen):
-    ...         return parameters - 3.0
-    ...     def score(self, parameters, chosen):
-    ...         return 1.0 - float((parameters[0] - 3.0) ** 2)
-    >>> from fingerpad.inference.fitting.response_surface import ResponseSurface
-    >>> wide = ResponseSurface([[0.0]], [0.5])
-    >>> narrow = lambda parameters: ResponseSurface([parameters], [0.01])
-    >>> Continued(wide, narrow, name="both").fit(Hill(), np.arange(1)).parameters.round(2).tolist()
-    [3.0]
-    """
+    """Two methods in sequence: a cheap one for the start of the second."""
 
     first: Method
+    """Finds the start of the second."""
     second: Callable[[FloatArray], Method]
+    """`second(parameters)`: the method that starts there."""
     first_problem: Problem | None = None
+    """Problem of the first method, if it is a simpler one with the same observations."""
     name: str = "continued"
+    """Name in tables."""
 
     def fit(self, problem: Problem, chosen: IntArray) -> Fit:
         """Fit with the first method, then with the second from its result; the effort is that of both."""

@@ -40,43 +40,29 @@ MOST_TRIES = 200
 
 @dataclass(frozen=True)
 class Chains:
-    """Converged draws from a density, and the measures of convergence.
-
-    Parameters
-    ----------
-    names : tuple of str
-        Names of the parameters.
-    draws : array (n_ensembles, n_steps, n_walkers, n_parameters)
-        The second half of all steps.
-    log_densities : array (n_ensembles, n_steps, n_walkers)
-        Up to a constant.
-    r_hat : array (n_parameters,)
-        Split R-hat over the ensembles. [1]
-    effective_sizes, tail_effective_sizes : array (n_parameters,)
-        Effective sample sizes for the middle and for the ends of a 95 % interval. [1]
-    autocorrelation_steps : array (n_parameters,)
-        Draws made per effective one. [1]
-    acceptance : float
-        Accepted share of the proposals. [0-1]
-    n_evaluations : int
-        Evaluations of the density, those of the discarded first half included.
-    seed : int
-        Of the random numbers; the same seed gives the same bits.
-    history : tuple of str
-        One line per check of convergence.
-    """
+    """Converged draws from a density, and the measures of convergence."""
 
     names: tuple[str, ...]
+    """Names of the parameters."""
     draws: FloatArray
+    """The second half of all steps, (n_ensembles, n_steps, n_walkers, n_parameters)."""
     log_densities: FloatArray
+    """Up to a constant, (n_ensembles, n_steps, n_walkers)."""
     r_hat: FloatArray
+    """Split R-hat over the ensembles, (n_parameters,). [1]"""
     effective_sizes: FloatArray
     tail_effective_sizes: FloatArray
+    """Effective sample sizes for the middle and for the ends of a 95 % interval, (n_parameters,). [1]"""
     autocorrelation_steps: FloatArray
+    """Draws made per effective one, (n_parameters,). [1]"""
     acceptance: float
+    """Accepted share of the proposals. [0-1]"""
     n_evaluations: int
+    """Evaluations of the density, those of the discarded first half included."""
     seed: int
+    """Of the random numbers; the same seed gives the same bits."""
     history: tuple[str, ...]
+    """One line per check of convergence."""
 
     @property
     def flat(self) -> FloatArray:
@@ -84,42 +70,13 @@ class Chains:
         return self.draws.reshape(-1, self.draws.shape[-1])
 
     def spread_out(self, n_draws: int) -> FloatArray:
-        """Return some of the draws (n_draws, n_parameters), evenly spaced along the chains.
-
-        Parameters
-        ----------
-        n_draws : int
-            All draws if there are fewer.
-        """
+        """Return some of the draws (n_draws, n_parameters), evenly spaced along the chains."""
         count = min(whole("n_draws", n_draws, at_least=1), len(self.flat))
         return self.flat[np.linspace(0, len(self.flat) - 1, count).round().astype(np.int64)]
 
 
 def credible_band(draws: FloatArray, level: float = 0.95) -> FloatArray:
-    """Return the central interval that contains a share `level` of the draws, for each column.
-
-    Parameters
-    ----------
-    draws : array (n_draws, ...)
-        Any quantities, one row per draw.
-    level : float, optional
-        Probability within. [0-1]
-
-    Returns
-    -------
-    array (2, ...)
-        Lower and upper end.
-
-    Raises
-    ------
-    InputError
-        If the level is not between 0 and 1.
-
-    Examples
-    --------
-    >>> credible_band(np.arange(101.0), 0.5).tolist()
-    [25.0, 75.0]
-    """
+    """Return the central interval that contains a share `level` of the draws, for each column."""
     if not 0.0 < finite("level", level) < 1.0:
         raise InputError(f"level must lie between 0 and 1: got {level!r}.")
     return np.quantile(draws, [0.5 - level / 2.0, 0.5 + level / 2.0], axis=0)
@@ -140,53 +97,7 @@ def sample(
     smallest_effective_size: float = 400.0,
     moves: Sequence[tuple[Any, float]] | None = None,
 ) -> Chains:
-    """Sample a density until the ensembles agree and the effective sample sizes suffice.
-
-    Parameters
-    ----------
-    log_density : callable
-        `log_density(points)` for points (n_points, n_parameters): their log densities up to a constant,
-        -inf where a point is impossible.
-    centre, spread : array (n_parameters,)
-        Walkers start at normally distributed points about the centre. The spread must be wider than the
-        density: walkers that share a start too close to each other pass for converged.
-    names : sequence of str
-        Names of the parameters.
-    seed : int
-        Seed of the random numbers.
-    n_ensembles, n_walkers : int, optional
-        Independent ensembles, at least two, and walkers of each, an even number of at least four per
-        parameter.
-    n_steps, most_steps : int, optional
-        Steps before the first check of convergence; the number doubles until `most_steps`. The first half of
-        the steps is discarded at every check.
-    largest_r_hat, smallest_effective_size : float, optional
-        Limits of convergence: R-hat at most the first, effective sample sizes at least the second, for the
-        middle and the tails of all parameters.
-    moves : sequence of (emcee.moves.Move, float), optional
-        Proposals and how often each is made. Default: both of this module, equally often.
-
-    Returns
-    -------
-    Chains
-
-    Raises
-    ------
-    InputError
-        If sizes disagree, the density is impossible at the start, or it returns NaN.
-    ConvergenceError
-        If it has not converged after `most_steps`; its history has one line per check.
-
-    Examples
-    --------
-    >>> def normal(points):
-    ...     return -0.5 * ((points - [1.0, -2.0]) ** 2).sum(axis=1)
-    >>> chains = sample(normal, [0.0, 0.0], [2.0, 2.0], ("a", "b"), seed=1)
-    >>> chains.flat.mean(axis=0).round(0).tolist()
-    [1.0, -2.0]
-    >>> (credible_band(chains.flat) - [1.0, -2.0]).round(0).tolist()
-    [[-2.0, -2.0], [2.0, 2.0]]
-    """
+    """Sample a density until the ensembles agree and the effective sample sizes suffice."""
     labels = tuple(names)
     middle, scale = float_array("centre", centre, 1), float_array("spread", spread, 1)
     _check_sizes(middle, scale, labels)

@@ -37,52 +37,33 @@ RESTARTS = 5
 
 @dataclass(frozen=True)
 class ProfileLikelihood:
-    """Profile likelihood of one parameter.
-
-    Parameters
-    ----------
-    name : str
-        Name of the parameter.
-    values : array (n_values,)
-        Its fixed values, increasing.
-    losses : array (n_values,)
-        Largest log likelihood of all minus the largest one for this value. [1]
-    points : array (n_values, n_parameters)
-        The best parameters for each value.
-    interval : (float, float)
-        Ends of the confidence interval; infinite where the data set no bound.
-    level : float
-        Level of confidence. [0-1]
-    """
+    """Profile likelihood of one parameter."""
 
     name: str
+    """Name of the parameter."""
     values: FloatArray
+    """Its fixed values, increasing, (n_values,)."""
     losses: FloatArray
+    """Largest log likelihood of all minus the largest one for this value, (n_values,). [1]"""
     points: FloatArray
+    """The best parameters for each value, (n_values, n_parameters)."""
     interval: tuple[float, float]
+    """Ends of the confidence interval; infinite where the data set no bound."""
     level: float
+    """Level of confidence. [0-1]"""
 
 
 @dataclass(frozen=True)
 class ProfileLikelihoods:
-    """Profile likelihoods of all parameters.
-
-    Parameters
-    ----------
-    best : array (n_parameters,)
-        The most likely parameters found.
-    log_likelihood : float
-        Their log likelihood.
-    profiles : tuple of ProfileLikelihood
-        One per parameter.
-    n_evaluations : int
-        Evaluations of the likelihood.
-    """
+    """Profile likelihoods of all parameters."""
 
     best: FloatArray
+    """The most likely parameters found, (n_parameters,)."""
     log_likelihood: float
     profiles: tuple[ProfileLikelihood, ...]
+    """One per parameter."""
     n_evaluations: int
+    """Evaluations of the likelihood."""
 
 
 def profile_likelihoods(
@@ -99,45 +80,6 @@ def profile_likelihoods(
     Each profile is computed outwards from the best fit. A fit starts from the result of its neighbour and, if
     several starts are given, also from the best of the nearest ones, since the likelihood has many local
     maxima.
-
-    Parameters
-    ----------
-    log_likelihood : callable
-        Of rows of parameters.
-    starts : array (n_parameters,) or (n_starts, n_parameters)
-        Points near the best fit, such as draws from a posterior. The search for the best fit starts from the
-        most likely of them.
-    scales : array (n_parameters,)
-        Approximate standard deviation of each parameter.
-    names : sequence of str
-        Names of the parameters, two at least.
-    level : float, optional
-        Level of confidence. [0-1]
-    most_steps : int, optional
-        Largest number of steps of half a scale to each side; a side ends earlier after two consecutive values
-        outside of the interval.
-
-    Returns
-    -------
-    ProfileLikelihoods
-
-    Raises
-    ------
-    InputError
-        If sizes disagree or all starts are impossible.
-    ConvergenceError
-        If a fit does not converge.
-
-    Examples
-    --------
-    A normal likelihood has intervals of 1.96 standard deviations:
-
-    >>> def normal(points):
-    ...     a, b = points.T
-    ...     return -0.5 * (a**2 + (b - a) ** 2)
-    >>> found = profile_likelihoods(normal, [0.3, 0.3], [1.0, 1.4], ("a", "b"))
-    >>> [[round(end, 1) for end in profile.interval] for profile in found.profiles]
-    [[-2.0, 2.0], [-2.8, 2.8]]
     """
     labels = tuple(names)
     origins, units = float_array("starts", np.atleast_2d(starts), 2), float_array("scales", scales, 1)

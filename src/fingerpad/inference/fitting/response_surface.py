@@ -28,25 +28,7 @@ _MOST_STEPS = 200
 
 
 def factorial_design(n_parameters: int) -> FloatArray:
-    """Two-level full factorial design with centre point, in coded units.
-
-    Parameters
-    ----------
-    n_parameters : int
-        k, at most 12.
-
-    Returns
-    -------
-    array (2**k + 1, k)
-        Every combination of -1 and 1, then the centre.
-
-    Examples
-    --------
-    >>> factorial_design(2).astype(int).tolist()
-    [[-1, -1], [-1, 1], [1, -1], [1, 1], [0, 0]]
-    >>> len(factorial_design(6))
-    65
-    """
+    """Two-level full factorial design with centre point, in coded units."""
     whole("n_parameters", n_parameters, at_least=1)
     if n_parameters > _MOST_PARAMETERS:
         raise InputError(
@@ -60,54 +42,12 @@ def regression_slopes(design: FloatArray, values: FloatArray) -> FloatArray:
     """Slopes of the least-squares plane through the runs of a factorial design.
 
     The columns of the design are orthogonal to each other and to the constant, so each slope is a projection.
-
-    Parameters
-    ----------
-    design : array (n_runs, n_parameters)
-        Coded units, from `factorial_design`.
-    values : array (n_runs,)
-        Objective of each run.
-
-    Returns
-    -------
-    array (n_parameters,)
-        Change of the objective per coded unit.
-
-    Examples
-    --------
-    >>> design = factorial_design(2)
-    >>> regression_slopes(design, 5.0 + design @ [2.0, -3.0]).tolist()
-    [2.0, -3.0]
     """
     return (design.T @ values) / (design**2).sum(axis=0)
 
 
 def coding_increments(base: ArrayLike, share: float, where_zero: ArrayLike | None = None) -> FloatArray:
-    """Increments as a share of the base; a parameter whose base is zero needs an increment of its own.
-
-    Parameters
-    ----------
-    base : array (n_parameters,)
-        Parameters at the start.
-    share : float
-        Increment over base; the paper's are about 0.01. [1]
-    where_zero : array (n_parameters,), optional
-        Increments for the parameters whose base is zero; the other entries are not used.
-
-    Returns
-    -------
-    array (n_parameters,)
-
-    Raises
-    ------
-    InputError
-        If an increment is not positive.
-
-    Examples
-    --------
-    >>> coding_increments([0.0, 68.0], 0.01, where_zero=[1e-8, 0.0]).tolist()
-    [1e-08, 0.68]
-    """
+    """Increments as a share of the base; a parameter whose base is zero needs an increment of its own."""
     start = float_array("base", base, 1)
     increments = finite("share", share) * np.abs(start)
     if where_zero is not None:
@@ -126,49 +66,11 @@ def maximise(
 ) -> Fit:
     """Maximise `objective` from `start` by the response surface method.
 
-    Parameters
-    ----------
-    objective : callable
-        Value of one vector of parameters; larger is better.
-    start : array (n_parameters,)
-        Start point.
-    increments : array (n_parameters,)
-        One coded unit of each parameter: small compared with the parameter, but large enough to average over
-        the jumps that single spikes cause in the objective. They are constant during the fit.
-    lower_bounds : array (n_parameters,), optional
-        Lower limits of all evaluations; the base stays one increment above them. Use -inf for none.
-    smallest_gain : float
-        An iteration with a gain of at most this much is rejected and ends the fit.
-    most_iterations : int
-        Largest number of iterations.
-    restrict : callable, optional
-        Moves a point of the ascent to the nearest one that is allowed. Corners of a design may lie one
-        increment beyond.
-
-    Returns
-    -------
-    Fit
-        Its history is the start, then one step per iteration with a gain. Evaluations include those of the
-        last iteration, which has none.
-
-    Raises
-    ------
-    InputError
-        If shapes disagree, the start lies within an increment of a bound, or the objective is not finite.
-    ConvergenceError
-        If the objective still rises after `most_iterations`, or an ascent does not end.
-
     Notes
     -----
     Gerling et al. 2014, section 2.2.2; Box & Wilson 1951 for the method. Steps along the ascent are one coded
     unit at first, double after each gain and halve after each loss; the ascent ends when a step of one unit
     has no gain.
-
-    Examples
-    --------
-    >>> fit = maximise(lambda p: -((p[0] - 3.0) ** 2) - (p[1] + 1.0) ** 2, [0.0, 0.0], [0.01, 0.01])
-    >>> abs(fit.parameters - [3.0, -1.0]).max() < 0.01
-    np.True_
     """
     base = float_array("start", start, 1)
     units = _checked_increments(increments, base)
@@ -207,38 +109,24 @@ def maximise(
 class ResponseSurface:
     """The paper's method: response surfaces and steepest ascent from each start; the best result is taken.
 
-    Parameters
-    ----------
-    starts : array_like (n_starts, n_parameters)
-        Start points.
-    increments : array_like (n_parameters,) or (n_starts, n_parameters)
-        One coded unit of each parameter, for all start points or for each.
-    lower_bounds : array_like (n_parameters,), optional
-        Lower limits of all evaluations; -inf for none.
-    smallest_gain : float
-        A gain of at most this much ends a fit.
-    most_iterations : int
-        Largest number of iterations.
-    restrict : callable, optional
-        As of `maximise`.
-
-    Raises
-    ------
-    InputError
-        If shapes disagree.
-
     Notes
     -----
     Gerling et al. 2014, section 2.2.2; see `maximise`. The method is deterministic.
     """
 
     starts: ArrayLike
+    """Start points, (n_starts, n_parameters)."""
     increments: ArrayLike
+    """One coded unit of each parameter, for all start points or for each, (n_parameters,)."""
     lower_bounds: ArrayLike | None = None
+    """Lower limits of all evaluations; -inf for none, (n_parameters,)."""
     smallest_gain: float = 1.0e-4
+    """A gain of at most this much ends a fit."""
     most_iterations: int = 200
+    """Largest number of iterations."""
     name: str = "response surface"
     restrict: Restriction | None = None
+    """As of `maximise`."""
 
     def __post_init__(self) -> None:
         starts = float_array("starts", self.starts, 2)

@@ -22,38 +22,30 @@ SOBOL_RESAMPLES = 200
 
 @dataclass(frozen=True)
 class SobolIndices:
-    """Shares of the variance of an objective for parameters that are uniform within ranges.
-
-    Parameters
-    ----------
-    names : tuple of str
-        Names of the parameters.
-    lower, upper : array (n_parameters,)
-        Ranges of the parameters.
-    first, first_half_width : array (n_parameters,)
-        First-order index, the share of the variance that the parameter explains alone, and half the width of
-        its confidence interval. [1]
-    total, total_half_width : array (n_parameters,)
-        Total index: the share that the parameter explains alone and in interaction with others. [1]
-    level : float
-        Level of confidence. [0-1]
-    mean, standard_deviation : float
-        Of the objective over the ranges.
-    n_evaluations : int
-        Evaluations of the objective.
-    """
+    """Shares of the variance of an objective for parameters that are uniform within ranges."""
 
     names: tuple[str, ...]
+    """Names of the parameters."""
     lower: FloatArray
     upper: FloatArray
+    """Ranges of the parameters, (n_parameters,)."""
     first: FloatArray
     first_half_width: FloatArray
+    """First-order index, the share of the variance that the parameter explains alone, and half the width of
+    its confidence interval, (n_parameters,). [1]
+    """
     total: FloatArray
     total_half_width: FloatArray
+    """Total index: the share that the parameter explains alone and in interaction with others,
+    (n_parameters,). [1]
+    """
     level: float
+    """Level of confidence. [0-1]"""
     mean: float
     standard_deviation: float
+    """Of the objective over the ranges."""
     n_evaluations: int
+    """Evaluations of the objective."""
 
 
 def sobol_indices(
@@ -68,45 +60,10 @@ def sobol_indices(
 ) -> SobolIndices:
     """Estimate first-order and total Sobol indices with `scipy.stats.sobol_indices`.
 
-    Parameters
-    ----------
-    objective : callable
-        From points (n_points, n_parameters) to numbers (n_points,).
-    lower, upper : array (n_parameters,)
-        Ranges within which the parameters are uniform and independent.
-    names : sequence of str
-        Names of the parameters.
-    seed : int
-        Seed of the scrambled Sobol sequence and of the bootstrap.
-    n_base : int, optional
-        Points of the base design, a power of two; the objective is evaluated (n_parameters + 2) times as
-        often.
-    level : float, optional
-        Level of the confidence intervals. [0-1]
-
-    Returns
-    -------
-    SobolIndices
-
-    Raises
-    ------
-    InputError
-        If sizes disagree, a range is empty, `n_base` is no power of two, or the objective is constant or not
-        finite.
-
     Notes
     -----
     Saltelli et al. 2010. SciPy's own bootstrap of the indices takes no seed, so the points of the design are
     resampled here; a half width is that of a normal interval with the bootstrap's standard error.
-
-    Examples
-    --------
-    In the sum of two uniform numbers, one twice as wide as the other, the wider explains four fifths of the
-    variance.
-
-    >>> found = sobol_indices(lambda p: p[:, 0] + p[:, 1], [0.0, 0.0], [1.0, 2.0], ("a", "b"), seed=1)
-    >>> found.first.round(1).tolist(), found.total.round(1).tolist(), found.n_evaluations
-    ([0.2, 0.8], [0.2, 0.8], 2048)
     """
     labels = tuple(names)
     low, high = float_array("lower", lower, 1), float_array("upper", upper, 1)
