@@ -23,7 +23,7 @@ from fingerpad.geometry.grading import Grading
 from fingerpad.mechanics.press_settings import PressSettings
 from fingerpad.neuron.population import Population
 from fingerpad.psychophysics.encoding import neighbour_pairs
-from fingerpad.skin.behaviour import code_hash
+from fingerpad.skin.code_hash import code_hash
 from fingerpad.skin.indentation import Touch
 from studies.mesh_errors import (
     BarProfile,

@@ -23,7 +23,7 @@ from fingerpad.geometry.grading import resolution_grading
 from fingerpad.geometry.mesh import LAYERS, Mesh, finger_mesh
 from fingerpad.neuron.population import Population
 from fingerpad.psychophysics.encoding import neighbour_pairs
-from fingerpad.skin.behaviour import code_hash
+from fingerpad.skin.code_hash import code_hash
 from fingerpad.skin.indentation import Touch
 from fingerpad.skin.sampling import SkinResponse
 from studies.mesh_errors import (

@@ -38,7 +38,6 @@ LONGEST = (
     "test_estimation_afferent_posterior.py",
     "test_psychometric.py",
     "test_compilation.py",
-    "test_behaviour.py",
     "test_small_bodies.py",
 )
 """Files by their processor time, the longest first; all others follow in the order of their names."""

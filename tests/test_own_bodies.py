@@ -136,33 +136,16 @@ def test_arrays_are_fields_and_every_number_of_them_counts():
     assert len({row, same, other}) == 2
 
 
-def test_the_code_of_a_body_is_part_of_its_key():
-    assert key(body_of(PLATE.format(1))()) == key(body_of(PLATE.format(1))())
-    assert key(body_of(PLATE.format(1))()) != key(body_of(PLATE.format(2))())
-    described = body_of('"""Plate."""\n        ' + PLATE.format(1) + "  # flat")
-    assert key(described()) == key(body_of(PLATE.format(1))())
-
-
-def test_what_the_code_refers_to_is_part_of_the_key():
-    def helper_of(text):
-        names = {"np": np, "__name__": "__main__"}
-        exec(f"def helper(points):\n    return {text}\n", names)
-        return names["helper"]
-
-    by_constant = [body_of(PLATE.format("SLOPE"), SLOPE=slope)() for slope in (1.0, 2.0, np.array([1.0]))]
-    called = PLATE.format("helper(points)")
-    by_function = [body_of(called, helper=helper_of(text))() for text in ("1.0", "2.0", "np.pi")]
-    keys = [key(body) for body in by_constant + by_function]
-    assert len(set(keys)) == len(keys)
-    assert key(body_of(called, helper=helper_of("1.0"))()) == keys[3]
-
-
-def test_a_body_that_refers_to_an_open_file_cannot_be_stored(tmp_path):
-    with (
-        open(tmp_path / "log", "w") as log,
-        pytest.raises(InputError, match="fixed values: got TextIOWrapper"),
-    ):
-        key(body_of(PLATE.format("(LOG is None)"), LOG=log)())
+def test_a_body_of_ones_own_is_stored_under_its_own_key(caplog):
+    unnamed = body_of(PLATE.format(1))
+    assert key(unnamed()) == key(unnamed())  # within one run
+    assert key(unnamed()) != key(body_of(PLATE.format(1))())  # as in another run
+    assert "Each run computes the presses of Own again" in caplog.text
+    named = [body_of(PLATE.format(1), store_key=None) for _ in range(3)]
+    for kind, store_key in zip(named, ("flat 1", "flat 1", "flat 2"), strict=True):
+        kind.store_key = store_key
+    first, same, other = (key(kind()) for kind in named)
+    assert first == same != other
 
 
 @pytest.mark.parametrize(

@@ -2,17 +2,20 @@
 
 import os
 import pickle
+import re
 import signal
 import subprocess
 import sys
 import time
 from dataclasses import fields, is_dataclass, replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 from vtkmodules.util.numpy_support import vtk_to_numpy
 from vtkmodules.vtkIOXML import vtkXMLUnstructuredGridReader
 
+import fingerpad
 from fingerpad.cli import main
 from fingerpad.core.errors import ConvergenceError, InputError, StoreError
 from fingerpad.export.dataset import touch_dataset
@@ -26,6 +29,8 @@ from fingerpad.mechanics.materials import Prony
 from fingerpad.mechanics.newton import NewtonSettings
 from fingerpad.mechanics.press_settings import PressSettings
 from fingerpad.mechanics.tissues import named_tissues
+from fingerpad.skin import code_hash
+from fingerpad.skin.code_hash import MECHANICAL_SOURCES
 from fingerpad.skin.fields import FIELDS, Field, Place, Times
 from fingerpad.skin.indentation import Touch
 from fingerpad.skin.sampling import SkinResponse
@@ -195,6 +200,43 @@ def test_key_is_the_same_in_another_process():
         env=os.environ | {"PYTHONHASHSEED": "12345"},
     )
     assert done.stdout.decode().strip() == touch_key(TINY)
+
+
+def test_every_source_that_mechanics_imports_counts():
+    """Apart from what cannot alter a number: checks, errors, other names, notices, results, inputs.
+
+    Published values and meshes of files reach an indentation as its own fields, which are in the key already.
+    """
+    package = Path(fingerpad.__file__).parent
+    files = [
+        path
+        for name in MECHANICAL_SOURCES
+        for path in ((package / name).glob("*.py") if (package / name).is_dir() else [package / name])
+    ]
+    assert len(files) > 30
+    imported = {
+        module
+        for path in files
+        for module in re.findall(
+            r"^\s*from fingerpad\.([\w.]+) import", path.read_text("utf-8"), re.MULTILINE
+        )
+    }
+    counted = tuple(name.removesuffix(".py").replace("/", ".") for name in MECHANICAL_SOURCES)
+    others = {module for module in imported if not module.startswith((*counted, "data"))}
+    harmless = "checks compilation displayed errors files keywords logger phases progress tables values"
+    assert others <= {"skin.sampling", *(f"core.{name}" for name in harmless.split())}
+
+
+def test_any_change_of_the_mechanical_sources_presses_again(monkeypatch, tmp_path):
+    monkeypatch.setattr(code_hash, "files", lambda _: tmp_path)
+    for name in MECHANICAL_SOURCES:
+        (tmp_path / name).mkdir(exist_ok=True, parents=True)
+    with pytest.raises(StoreError, match=r"installed without its \.py files"):
+        code_hash.code_hash.__wrapped__()
+    (tmp_path / "mechanics" / "law.py").write_text("POWER = 1.0")
+    before = code_hash.code_hash.__wrapped__()
+    (tmp_path / "mechanics" / "law.py").write_text("POWER = 1.1")
+    assert code_hash.code_hash.__wrapped__() != before
 
 
 # What is stored

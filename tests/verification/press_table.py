@@ -35,7 +35,7 @@ from fingerpad.geometry.mesh import LAYERS, Mesh
 from fingerpad.geometry.motion import RampAndHold
 from fingerpad.geometry.trajectory import Trajectory
 from fingerpad.mechanics.press_settings import PressSettings
-from fingerpad.skin.behaviour import code_hash
+from fingerpad.skin.code_hash import code_hash
 from fingerpad.skin.indentation import CONTACT_POINT_MM, touch_of
 
 from .page import PAGE

@@ -16,7 +16,7 @@ from fingerpad import __version__
 from fingerpad.core.results import Number, result_class
 from fingerpad.geometry.mesh import Mesh
 from fingerpad.geometry.mesh_quality import jacobian_at_gauss, scaled_jacobian
-from fingerpad.skin.behaviour import code_hash
+from fingerpad.skin.code_hash import code_hash
 
 PACKAGES = ("numpy", "scipy", "numba", "matplotlib")
 """Packages on which the numbers of a run depend."""

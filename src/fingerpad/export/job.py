@@ -17,7 +17,7 @@ from fingerpad.geometry.indenters import Indenter
 from fingerpad.geometry.mesh import LAYERS, Mesh
 from fingerpad.mechanics.contact import Placement, check_friction
 from fingerpad.mechanics.materials import Material
-from fingerpad.skin.behaviour import code_hash
+from fingerpad.skin.code_hash import code_hash
 from fingerpad.skin.indentation import Touch
 
 CONTACT_KPA_PER_MM = 50_000.0

@@ -35,7 +35,7 @@ from fingerpad.lab.state import LabState
 from fingerpad.mechanics.tissues import TISSUES
 from fingerpad.reduction.files import read_reduced, write_reduced
 from fingerpad.reduction.model import ReducedModel
-from fingerpad.skin.behaviour import code_hash
+from fingerpad.skin.code_hash import code_hash
 
 KEPT_ANSWERS = 16
 """Answers that are kept, so that a comparison and a second user do not compute again."""

@@ -1,10 +1,12 @@
 """Stored indentations on disk: found by everything that determines them, computed where missing.
 
 The key of an indentation is a hash of its whole value (finger, indenter, motion, tissues, mesh, tolerances)
-and of the behaviour of the mechanical sources (`skin.behaviour`). There is one file per indentation, written
-atomically: a run that is killed at any moment continues from the last finished indentation and ends with the
-same bits. Each file holds its key and a checksum of its content. A file that was damaged, edited, renamed or
-written by something else is set aside and computed again. Files hold arrays only, no code.
+and of the bytes of the mechanical sources (`skin.code_hash`). A class of a user's own counts by its
+attribute `store_key`, a text that the user changes with the code; without one, each run presses it again.
+There is one file per indentation, written atomically: a run that is killed at any moment continues from the
+last finished indentation and ends with the same bits. Each file holds its key and a checksum of its
+content. A file that was damaged, edited, renamed or written by something else is set aside and computed
+again. Files hold arrays only, no code.
 """
 
 from __future__ import annotations
@@ -18,19 +20,21 @@ import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import closing
 from dataclasses import Field, dataclass, fields, is_dataclass
+from functools import cache
 from pathlib import Path
 from typing import Any
+from uuid import uuid4
 
 import numpy as np
 
+from fingerpad.core.checks import instance
 from fingerpad.core.engine import Engine, engine_of
 from fingerpad.core.errors import ConvergenceError, InputError, StoreError
 from fingerpad.core.files import check_file, path_of, write_atomically
 from fingerpad.core.keywords import KnownKeywords, known_keywords
 from fingerpad.core.logger import LOGGER
 from fingerpad.mechanics.kernels import KERNELS
-from fingerpad.skin.behaviour import code_hash
-from fingerpad.skin.code_tags import array_digest, class_tag
+from fingerpad.skin.code_hash import PACKAGE, code_hash
 from fingerpad.skin.fields import Place, stored_fields
 from fingerpad.skin.indentation import Touch
 from fingerpad.skin.sampling import SkinResponse
@@ -59,30 +63,44 @@ OnFailed = Callable[[Touch, ConvergenceError | InputError], None]
 
 def touch_key(touch: Touch) -> str:
     """Key under which an indentation is stored, 32 hexadecimal digits."""
-    text = json.dumps([code_hash(), _plain(touch)], sort_keys=True)
+    text = json.dumps([code_hash(), _plain(touch, _class_key)], sort_keys=True)
     return hashlib.sha256(text.encode()).hexdigest()[:32]
 
 
 def value_digest(value: Any) -> str:
     """Sixteen hexadecimal digits, the same for equal values: a finger, tissues, a body."""
-    return hashlib.sha256(json.dumps(_plain(value), sort_keys=True).encode()).hexdigest()[:16]
+    plain = _plain(value, lambda kind: kind.__qualname__)
+    return hashlib.sha256(json.dumps(plain, sort_keys=True).encode()).hexdigest()[:16]
 
 
-def _plain(value: Any, is_float: bool = False) -> Any:
+@cache
+def _class_key(kind: type) -> str:
+    """Identify a class: one of a user's own without a `store_key` differs between any two processes."""
+    if kind.__module__.partition(".")[0] == PACKAGE:
+        return kind.__qualname__
+    if key := getattr(kind, "store_key", None):
+        return f"own {instance('store_key', key, str)}"
+    LOGGER.warning(
+        "Each run computes the presses of %s again: give the class store_key = 'a name and version'.",
+        kind.__name__,
+    )
+    return f"own {uuid4().hex}"
+
+
+def _plain(value: Any, name_of: Callable[[type], str], is_float: bool = False) -> Any:
     """Nested lists and exact numbers, the same for equal values and different for different ones."""
     if isinstance(value, np.ndarray) and not value.dtype.hasobject:
-        return array_digest(value)
+        content = np.ascontiguousarray(value + 0.0 if value.dtype.kind == "f" else value)  # -0.0 equals 0.0
+        return [value.dtype.str, list(value.shape), hashlib.sha256(content.tobytes()).hexdigest()]
     if is_dataclass(value):
-        return [
-            class_tag(type(value)),
-            {
-                field.name: _plain(getattr(value, field.name), _holds_floats(field))
-                for field in fields(value)
-                if field.compare
-            },
-        ]
+        parts = {
+            field.name: _plain(getattr(value, field.name), name_of, _holds_floats(field))
+            for field in fields(value)
+            if field.compare
+        }
+        return [name_of(type(value)), parts]
     if isinstance(value, tuple | list):
-        return [_plain(item, is_float) for item in value]
+        return [_plain(item, name_of, is_float) for item in value]
     if isinstance(value, float | np.floating) or (is_float and isinstance(value, int | np.integer)):
         return (float(value) + 0.0).hex()  # 0.0 added: -0.0 equals 0.0 but is written with its sign
     if isinstance(value, str | int | bool) or value is None:
