@@ -22,7 +22,7 @@ def finite(name: str, value: float, unit: str = "") -> float:
     """Return `value` as float if it is one finite number, else raise `InputError`."""
     number = _real(value)
     if not math.isfinite(number):
-        raise InputError(f"{name} must be a finite number{_in(unit)}: got {shown(value)}.")
+        raise InputError(name, f"must be a finite number{_in(unit)}", shown(value))
     return number
 
 
@@ -42,7 +42,7 @@ def _real(value: Any) -> float:
 def number_in(name: str, text: str, unit: str = "") -> float:
     """Return the finite number that a text writes in plain digits, else raise `InputError`."""
     if not _DIGITS.fullmatch(text):
-        raise InputError(f"{name} must be a finite number{_in(unit)}: got {shown(text)}.")
+        raise InputError(name, f"must be a finite number{_in(unit)}", shown(text))
     return finite(name, float(text), unit)
 
 
@@ -63,7 +63,7 @@ def positive(name: str, value: float, unit: str = "") -> float:
     """Return `value` as float if it is finite and above zero, else raise `InputError`."""
     number = finite(name, value, unit)
     if number <= 0.0:
-        raise InputError(f"{name} must be greater than 0{_in(unit)}: got {shown(value)}.")
+        raise InputError(name, f"must be greater than 0{_in(unit)}", shown(value))
     return number
 
 
@@ -72,7 +72,7 @@ def plausible(name: str, value: float, unit: str, between: tuple[float, float]) 
     number = positive(name, value, unit)
     if not between[0] <= number <= between[1]:
         raise InputError(
-            f"{name} must lie within {between[0]:g} to {between[1]:g} {unit}: got {number:g}; check its unit."
+            name, f"must lie within {between[0]:g} to {between[1]:g} {unit}", f"{number:g}", "check its unit"
         )
     return number
 
@@ -81,7 +81,7 @@ def not_negative(name: str, value: float, unit: str = "") -> float:
     """Return `value` as float if it is finite and not below zero, else raise `InputError`."""
     number = finite(name, value, unit)
     if number < 0.0:
-        raise InputError(f"{name} must not be negative{_in(unit)}: got {shown(value)}.")
+        raise InputError(name, f"must not be negative{_in(unit)}", shown(value))
     return number
 
 
@@ -90,24 +90,24 @@ def pair(name: str, value: Any, unit: str = "mm") -> tuple[float, float]:
     try:
         x, z = value
     except (TypeError, ValueError) as error:
-        raise InputError(f"{name} must be a pair, x and z{_in(unit)}: got {shown(value)}.") from error
-    return finite(f"x of {name}", x, unit), finite(f"z of {name}", z, unit)
+        raise InputError(name, f"must be a pair, x and z{_in(unit)}", shown(value)) from error
+    return finite(f"{name}[0]", x, unit), finite(f"{name}[1]", z, unit)
 
 
 def whole(name: str, value: int, at_least: int, at_most: int | None = None) -> int:
     """Return `value` as int if it is a whole number within limits, else raise `InputError`."""
     counts = isinstance(value, int | np.integer) and not isinstance(value, bool | np.timedelta64)
     if not counts or value < at_least:
-        raise InputError(f"{name} must be a whole number of at least {at_least}: got {shown(value)}.")
+        raise InputError(name, f"must be a whole number of at least {at_least}", shown(value))
     if at_most is not None and value > at_most:
-        raise InputError(f"{name} must be at most {at_most:,}: got {shown(value)}.")
+        raise InputError(name, f"must be at most {at_most:,}", shown(value))
     return int(value)
 
 
 def one_of(name: str, value: Any, allowed: Collection[str]) -> str:
     """Return `value` if it is one of `allowed`, else raise `InputError` that lists them."""
     if not isinstance(value, str) or value not in allowed:
-        raise InputError(f"{name} must be one of {', '.join(allowed)}: {got(value, allowed)}")
+        raise InputError(name, f"must be one of {', '.join(allowed)}", got(value, allowed))
     return value
 
 
@@ -116,9 +116,9 @@ def instance(name: str, value: _Kind, kind: type) -> _Kind:
     if not isinstance(value, kind):
         if isinstance(value, type) and issubclass(value, kind):
             raise InputError(
-                f"{name} must be made from its class: got {value.__name__}, call it: {value.__name__}()."
+                name, "must be made from its class", f"{value.__name__}, call it: {value.__name__}()"
             )
-        raise InputError(f"{name} must be of type {kind.__name__}: got {shown(value)}.")
+        raise InputError(name, f"must be of type {kind.__name__}", shown(value))
     return value
 
 
@@ -130,7 +130,7 @@ def float_array(name: str, values: ArrayLike, ndim: int | None) -> FloatArray:
     """
     array = values if _is_frozen(values) else _numbers(name, values)
     if ndim is not None and array.ndim != ndim:
-        raise InputError(f"{name} must have {ndim} dimension(s): got shape {array.shape}.")
+        raise InputError(name, f"must have {ndim} dimension(s)", f"shape {array.shape}")
     # A sum is finite only if all numbers are, and costs a third of the time.
     with np.errstate(over="ignore", invalid="ignore"):
         total = array.sum()
@@ -138,8 +138,9 @@ def float_array(name: str, values: ArrayLike, ndim: int | None) -> FloatArray:
         bad = np.argwhere(~np.isfinite(array)) + 1
         first = " in row and column " if array.ndim == 2 else " number "
         raise InputError(
-            f"{name} must hold finite numbers only: {len(bad)} are not, first"
-            f"{first if array.ndim else ' '}{', '.join(map(str, bad[0]))}."
+            name,
+            "must hold finite numbers only",
+            remedy=f"{len(bad)} are not, first{first if array.ndim else ' '}{', '.join(map(str, bad[0]))}",
         )
     array.setflags(write=False)
     return array
@@ -151,7 +152,7 @@ def int_array(name: str, values: ArrayLike, ndim: int) -> IntArray:
         return values.astype(np.int64)
     numbers = float_array(name, values, ndim)
     if not (np.abs(numbers) < 2**53).all() or (numbers != np.floor(numbers)).any():
-        raise InputError(f"{name} must hold whole numbers: got {shown(values)}.")
+        raise InputError(name, "must hold whole numbers", shown(values))
     return numbers.astype(np.int64)
 
 
@@ -172,8 +173,8 @@ def _numbers(name: str, values: ArrayLike) -> FloatArray:
         else:
             problem = f" of {given.dtype}"
     except (TypeError, ValueError, OverflowError, Warning) as error:
-        raise InputError(f"{name} must be an array of numbers: got {type(values).__name__}.") from error
-    raise InputError(f"{name} must be an array of numbers: got {type(values).__name__}{problem}.")
+        raise InputError(name, "must be an array of numbers", type(values).__name__) from error
+    raise InputError(name, "must be an array of numbers", f"{type(values).__name__}{problem}")
 
 
 def _has_flag(values: Any) -> bool:
@@ -205,7 +206,7 @@ def increasing(name: str, values: FloatArray) -> FloatArray:
     if values.size and not (np.diff(values) > 0).all():
         last = int(np.argmin(np.diff(values) > 0)) + 1
         pair = f"{values[last]:g} after {values[last - 1]:g}"
-        raise InputError(f"{name} must increase strictly: got {pair}, number {last + 1}.")
+        raise InputError(name, "must increase strictly", f"{pair}, number {last + 1}")
     return values
 
 

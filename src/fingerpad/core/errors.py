@@ -1,11 +1,16 @@
 """Errors of the package: one sentence with the expected value, the actual value and the remedy."""
 
+import copy
 import difflib
+import re
 import reprlib
 import sys
 from collections.abc import Collection
 from itertools import count
 from typing import Any
+
+Place = tuple[int | str, ...]
+"""Keys and indices from 0 that lead to a value."""
 
 LONGEST_MESSAGE = 2000
 """Characters of an error's text; what is between its begin and its end is left out beyond that."""
@@ -24,10 +29,13 @@ class FingerpadError(Exception):
     """Base class of every error that fingerpad raises deliberately."""
 
     def __str__(self) -> str:
-        said = super().__str__()
+        said = self._said()
         if len(said) <= LONGEST_MESSAGE:
             return said
         return f"{said[: LONGEST_MESSAGE // 2]} ... {said[-LONGEST_MESSAGE // 4 :]}"
+
+    def _said(self) -> str:
+        return super().__str__()
 
 
 class _Shown(reprlib.Repr):
@@ -71,14 +79,81 @@ def closest(wrong: Any, known: Collection[str]) -> str | None:
     return near[0] if near else None
 
 
-def got(value: Any, known: Collection[str], shown: str | None = None) -> str:
-    """End of an error about a value that is none of several names."""
-    near, said = closest(value, known), f"got {shown or repr(value)}"
-    return f"{said} (did you mean {near}?)." if near else f"{said}."
+def got(value: Any, known: Collection[str], text: str | None = None) -> str:
+    """Text of a value that is none of several names, with the closest of them."""
+    near, said = closest(value, known), text or shown(value)
+    return f"{said} (did you mean {near}?)" if near else said
 
 
 class InputError(FingerpadError, ValueError):
-    """An argument, option or file that cannot be used as given."""
+    """An argument, option or file that cannot be used as given.
+
+    Parameters
+    ----------
+    path : str or tuple of str and int
+        What it is about, as the attribute `path` tells programs: an argument such as "at_mm[0]", or keys and
+        indices from 0 in a file, such as ("stimuli", 1, "width_mm"). Alone, it is a sentence about no
+        single argument.
+    expected : str, optional
+        What must be, which begins with a verb.
+    got : str, optional
+        What came.
+    remedy : str, optional
+        What to do, or the fact that was met.
+
+    Examples
+    --------
+    >>> error = InputError("depth_mm", "must be greater than 0 [mm]", "-1", "press inwards")
+    >>> print(error)
+    depth_mm must be greater than 0 [mm]: got -1; press inwards.
+    >>> error.path, error.got
+    (('depth_mm',), '-1')
+    """
+
+    def __init__(self, path: object, expected: str = "", got: str = "", remedy: str = ""):
+        super().__init__(path, expected, got, remedy)
+        self.expected, self.got, self.remedy = expected, got, remedy
+        self.path: Place = ()
+        """What it is about."""
+        self.where, self.source, self.in_file = "", "", False
+        """Words for the path; the file and its line; whether the path leads through a file."""
+        self.said = str(path)
+        if expected:
+            self.path = path if isinstance(path, tuple) else _parts(str(path))
+            self.where = spelled(self.path) if isinstance(path, tuple) else str(path)
+            self.said = f"{expected}: got {got}" if got else expected
+            self.said += f"{'; ' if got else ': '}{remedy}" if remedy else ""
+            self.said += "" if self.said.endswith("?") else "."
+
+    def _said(self) -> str:
+        between = " " if self.expected else ": "
+        said = f"{self.where}{between}{self.said}" if self.where else self.said
+        return f"{self.source}, {said}" if self.source else said
+
+    def at(self, place: Place, words: str | None = None) -> "InputError":
+        """Return the same error at a place of a file, which `words` spell."""
+        other = copy.copy(self)
+        other.path, other.where, other.in_file = place, spelled(place) if words is None else words, True
+        return other
+
+    def from_source(self, source: str) -> "InputError":
+        """Return the same error with the file, and perhaps its line, in front."""
+        other = copy.copy(self)
+        other.source = source
+        return other
+
+
+def spelled(path: Place) -> str:
+    """Spell a place in a file, such as stimuli[2].width_mm, entries counted from 1."""
+    text = "".join(f"[{part + 1}]" if isinstance(part, int) else f".{part}" for part in path)
+    return text.lstrip(".") or "the file"
+
+
+def _parts(path: str) -> Place:
+    """Parts of the name of an argument, such as corners_mm[0]; none of the name of a file."""
+    if not re.fullmatch(r"[\w-]+(\[\d+\])*", path):
+        return ()
+    return tuple(int(part) if part.isdigit() else part for part in re.findall(r"[^\[\]]+", path))
 
 
 class StoreError(FingerpadError):

@@ -45,7 +45,7 @@ def path_of(name: str, value: object) -> Path:
     """Return a path given as a text or as a path, else raise `InputError`."""
     if isinstance(value, str | os.PathLike) and isinstance(path := os.fspath(value), str):
         return Path(path)
-    raise InputError(f"{name} must be a path, as a text or a Path: got {shown(value)}.")
+    raise InputError(name, "must be a path, as a text or a Path", shown(value))
 
 
 def check_file(path: Path, largest_mb: float) -> Path:
@@ -57,15 +57,15 @@ def check_file(path: Path, largest_mb: float) -> Path:
     try:
         about = path.stat()
     except OSError as error:
-        raise InputError(f"{path} must be a file that can be read: {error.strerror}.") from error
+        raise InputError(path, "must be a file that can be read", remedy=str(error.strerror)) from error
     except ValueError as error:
         raise InputError(f"The name of a file must not hold a null character: got {str(path)!r}.") from error
     if not stat.S_ISREG(about.st_mode):
         kind = "Is a directory" if stat.S_ISDIR(about.st_mode) else "it is a device or a pipe"
-        raise InputError(f"{path} must be a file that can be read: {kind}.")
+        raise InputError(path, "must be a file that can be read", remedy=str(kind))
     if about.st_size > largest_mb * 1e6:
         raise InputError(
-            f"{path} must have at most {largest_mb:g} MB: got {about.st_size / 1e6:.0f} MB; split it."
+            path, f"must have at most {largest_mb:g} MB", f"{about.st_size / 1e6:.0f} MB", "split it"
         )
     return path
 
@@ -81,10 +81,10 @@ def read_text(path: Path) -> str:
     try:
         return check_file(path, LARGEST_TEXT_MB).read_text(encoding="utf-8-sig")
     except OSError as error:
-        raise InputError(f"{path} must be a file that can be read: {error.strerror}.") from error
+        raise InputError(path, "must be a file that can be read", remedy=str(error.strerror)) from error
     except UnicodeDecodeError as error:
         raise InputError(
-            f"{path} must be text in UTF-8: byte {error.start + 1} is not; save it as UTF-8."
+            path, "must be text in UTF-8", remedy=f"byte {error.start + 1} is not; save it as UTF-8"
         ) from error
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import inspect
-import re
 from abc import ABCMeta
 from collections.abc import Callable, Collection, Iterator, Mapping
 from functools import wraps
@@ -69,7 +68,7 @@ def _refuse_unknown(
         if name not in known:
             other = (elsewhere or {}).get(name)
             hint = f"take {other}." if other else did_you_mean(name, known, owner)
-            raise InputError(f"{owner} has no {name}: {hint}")
+            raise InputError(name, f"is no argument of {owner}", remedy=hint.removesuffix("."))
 
 
 def _refuse_misfit(
@@ -90,7 +89,7 @@ def _refuse_misfit(
     missing = [name for name in needed if name not in taken]
     if missing:
         are = "it is" if len(missing) == 1 else "they are"
-        raise InputError(f"{owner} needs {', '.join(missing)}: {are} not given.") from None
+        raise InputError(owner, f"needs {', '.join(missing)}", remedy=f"{are} not given") from None
 
 
 def _refuse_mistyped(
@@ -158,7 +157,7 @@ class KnownKeywords(ABCMeta):
         try:
             return cls._of_fields(*args, **made)
         except InputError as error:
-            raise InputError(_in_words_of(spelled, str(error))) from error
+            raise _in_words_of(spelled, error) from error
 
     def _of_fields(cls, *args: Any, **given: Any) -> Any:
         """Make an instance from its fields alone."""
@@ -213,9 +212,9 @@ def _meanings(
         yield names, meaning(**{name: given[name] for name in names})
 
 
-def _in_words_of(spelled: Mapping[str, OtherName], message: str) -> str:
-    """Message with the names that were given in the place of the fields."""
+def _in_words_of(spelled: Mapping[str, OtherName], error: InputError) -> InputError:
+    """Name what was given in the place of the field that it is."""
     for name, other in spelled.items():
-        if isinstance(other.meaning, str):
-            message = re.sub(rf"\b{other.meaning}\b", name, message)
-    return message
+        if error.path[:1] == (other.meaning,):
+            return InputError(name, error.expected, error.got, error.remedy)
+    return error

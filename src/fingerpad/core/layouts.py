@@ -45,7 +45,7 @@ class Layout:
     def __post_init__(self) -> None:
         places = float_array("places_mm", self.places_mm, 2)
         if places.shape[1] != 2 or len(places) == 0:
-            raise InputError(f"places_mm must have rows of two numbers: got shape {places.shape}.")
+            raise InputError("places_mm", "must have rows of two numbers", f"shape {places.shape}")
         positive("pitch_mm", self.pitch_mm, "mm")
         one_of("pattern", self.pattern, PATTERNS)
         if self.seed is not None:

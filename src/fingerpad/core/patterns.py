@@ -150,8 +150,9 @@ def poisson_disc(
     count = _expected(region, density_per_cm2)
     if not_negative("separation", separation) > LARGEST_SEPARATION:
         raise InputError(
-            f"separation must not exceed {LARGEST_SEPARATION:g} of 1/sqrt(density), the limit of random "
-            f"placement: got {separation:g}."
+            "separation",
+            f"must not exceed {LARGEST_SEPARATION:g} of 1/sqrt(density), the limit of random placement",
+            f"{separation:g}",
         )
     if count > MOST_APART:
         raise InputError(

@@ -80,4 +80,6 @@ def phase_named(phases: Sequence[Phase], name: str, asks: str = "phase") -> Phas
         if phase.name == name:
             return phase
     names = ", ".join(phase.name for phase in phases) or "none"
-    raise InputError(f"{asks} must be given where no phase is called {name!r}: the phases are {names}.")
+    raise InputError(
+        asks, f"must be given where no phase is called {name!r}", remedy=f"the phases are {names}"
+    )

@@ -49,8 +49,10 @@ def read_yaml(text: str, source: str) -> Any:
     """
     if len(text) > LARGEST_TEXT:
         raise InputError(
-            f"{source} must have at most {LARGEST_TEXT:,} characters of YAML: got {len(text):,}; write long "
-            "tables as CSV."
+            source,
+            f"must have at most {LARGEST_TEXT:,} characters of YAML",
+            f"{len(text):,}",
+            "write long tables as CSV",
         )
     try:
         return yaml.load(text, _Loader)  # a SafeLoader: plain values only

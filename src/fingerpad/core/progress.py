@@ -249,5 +249,7 @@ def notebook_progress() -> Progress:
     try:
         from IPython.display import display
     except ImportError as error:
-        raise InputError("notebook_progress needs IPython, as in a notebook: it is not installed.") from error
+        raise InputError(
+            "notebook_progress", "needs IPython, as in a notebook", remedy="it is not installed"
+        ) from error
     return NotebookBars(display)

@@ -163,11 +163,11 @@ class Polygon(metaclass=KnownKeywords):
     def __post_init__(self) -> None:
         corners = float_array("corners_mm", self.corners_mm, 2)
         if corners.shape[1] != 2 or len(corners) < 3:
-            raise InputError(f"corners_mm needs three pairs or more: got shape {corners.shape}.")
+            raise InputError("corners_mm", "needs three pairs or more", f"shape {corners.shape}")
         object.__setattr__(self, "corners_mm", tuple((float(x), float(z)) for x, z in corners))
         extent = float(np.prod(np.ptp(corners, axis=0)))
         if self.area_mm2 <= _ROUND_OFF * extent:
-            raise InputError("corners_mm must enclose an area: got corners on one line.")
+            raise InputError("corners_mm", "must enclose an area", "corners on one line")
         crossing = _first_crossing(corners)
         if crossing:
             raise InputError(
@@ -234,5 +234,5 @@ def _bounds(centre: Point, half_length: float, half_width: float) -> tuple[Point
 def _points(points_mm: ArrayLike) -> FloatArray:
     points = float_array("points_mm", points_mm, 2)
     if points.shape[1] != 2:
-        raise InputError(f"points_mm needs two columns: got shape {points.shape}.")
+        raise InputError("points_mm", "needs two columns", f"shape {points.shape}")
     return points

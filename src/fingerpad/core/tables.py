@@ -86,7 +86,9 @@ def read_csv(path: Path, known: Sequence[str], prefixes: tuple[str, ...] = ()) -
     except csv.Error as error:
         raise InputError(f"{path}, line {reader.line_num}: cannot be read as CSV: {error}.") from error
     if len(rows) < 2:
-        raise InputError(f"{path} must hold a header and at least one row: it has {len(rows)} of them.")
+        raise InputError(
+            path, "must hold a header and at least one row", remedy=f"it has {len(rows)} of them"
+        )
     (header_line, header), *body = rows
     columns = [column.strip() for column in header]
     repeated = {column for column, count in Counter(columns).items() if count > 1}

@@ -70,7 +70,7 @@ def compiled_threads(threads: int | None = None) -> Iterator[int]:
     """
     most = available_threads()
     if threads is not None and whole("threads", threads, at_least=1) > most:
-        raise InputError(f"threads must not exceed {most}, one per core: got {threads}.")
+        raise InputError("threads", f"must not exceed {most}, one per core", str(threads))
     before = _THREADS.set(threads or _THREADS.get())
     try:
         yield current_threads()

@@ -57,7 +57,7 @@ def converted(cls: type[_Kind]) -> type[_Kind]:
         for name, default, convert in _conversions(cast(Hashable, type(self))):
             value = getattr(self, name)
             if isinstance(value, int) and value.bit_length() > _MOST_BITS:  # Python may not even write it
-                raise InputError(f"{name} must not be so large: got {shown(value)}.")
+                raise InputError(name, "must not be so large", shown(value))
             if convert is not None and value is not default:
                 object.__setattr__(self, name, convert(name, value))
         if check is not None:
@@ -114,7 +114,7 @@ def _refuse_other_type(name: str, value: Any, hint: Any) -> None:
     elif isinstance(kind, type) and not isinstance(value, kind):
         wanted = f"a {kind.__name__.lower()}"
     if wanted:
-        raise InputError(f"{name} must be {wanted}: got {shown(value)}.")
+        raise InputError(name, f"must be {wanted}", shown(value))
 
 
 def _is_refused(name: str, value: Any, hint: Any) -> bool:
@@ -157,7 +157,7 @@ def _tuple_of(first: Any, *others: Any) -> _Convert:
         many = isinstance(values, Sequence) and not isinstance(values, str | bytes | bytearray | memoryview)
         many = many or (isinstance(values, np.ndarray) and values.ndim > 0)
         if not many or not (anyone or len(values) == len(each)):
-            raise InputError(f"{name} must be {kind}: got {shown(values)}.")
+            raise InputError(name, f"must be {kind}", shown(values))
         converts = each * len(values) if anyone else each
         entries = enumerate(zip(converts, values, strict=True))
         return tuple(convert(f"{name}[{number}]", value) for number, (convert, value) in entries)
@@ -167,19 +167,19 @@ def _tuple_of(first: Any, *others: Any) -> _Convert:
 
 def _int(name: str, value: Any) -> int:
     if isinstance(value, bool | np.timedelta64) or not isinstance(value, int | np.integer):
-        raise InputError(f"{name} must be a whole number: got {shown(value)}.")
+        raise InputError(name, "must be a whole number", shown(value))
     return int(value)
 
 
 def _flag(name: str, value: Any) -> bool:
     if not isinstance(value, bool | np.bool_):
-        raise InputError(f"{name} must be True or False: got {shown(value)}.")
+        raise InputError(name, "must be True or False", shown(value))
     return bool(value)
 
 
 def _text(name: str, value: Any) -> str:
     if not isinstance(value, str):
-        raise InputError(f"{name} must be a text: got {shown(value)}.")
+        raise InputError(name, "must be a text", shown(value))
     return str(value)
 
 
@@ -190,7 +190,7 @@ def _floats(name: str, values: Any) -> list[float]:
 def _within(name: str, value: float) -> float:
     """Value, unless it is a length whose square a float may not hold."""
     if abs(value) > _LARGEST_MM and _unit(name) == "mm":
-        raise InputError(f"{name} must lie within {_LARGEST_MM:g} mm: got {value:g}.")
+        raise InputError(name, f"must lie within {_LARGEST_MM:g} mm", f"{value:g}")
     return value
 
 

@@ -10,7 +10,7 @@ from typing import Protocol
 import numpy as np
 
 from fingerpad.core.checks import number_in
-from fingerpad.core.errors import InputError
+from fingerpad.core.errors import InputError, Place, spelled
 from fingerpad.core.files import read_text
 from fingerpad.core.keywords import known_keywords
 from fingerpad.core.plain_yaml import read_yaml
@@ -19,12 +19,9 @@ from fingerpad.experiments.conditions import Conditions
 from fingerpad.experiments.descriptions.pressing import named_files
 from fingerpad.experiments.descriptions.reading import (
     Origin,
-    Place,
-    PlacedError,
     at,
     merged,
     part_from,
-    place_text,
 )
 from fingerpad.experiments.descriptions.stimuli import (
     NamedStimulus,
@@ -101,7 +98,7 @@ class ShiftedBar:
         name = repr(shift_mm).removesuffix(".0")
 
         def in_file(place: Place) -> tuple[Place, str]:
-            return place, f"Stimulus {name} cannot be used: {place_text(place)}"
+            return place, f"Stimulus {name} cannot be used: {spelled(place)}"
 
         along = along_skin(self.conditions)
         return NamedStimulus(self.bar, self.motion, -shift_mm * along, name=name, in_file=in_file)
@@ -195,7 +192,7 @@ def read_stimuli(path: str | Path, **replacing: str | None) -> ListedStimuli:
         conditions = described.conditions(beside=origin.beside)
         stimuli = named_stimuli(described, origin.beside)
         if not stimuli:
-            raise PlacedError("stimuli must have at least one entry: got none.", ("stimuli",))
+            raise InputError("stimuli", "must have at least one entry", "none")
     return ListedStimuli(
         {stimulus.name: replace(stimulus, in_file=_located(stimulus, origin)) for stimulus in stimuli},
         str(path),
@@ -226,6 +223,6 @@ def _located(stimulus: NamedStimulus, origin: Origin) -> Callable[[Place], tuple
 
     def in_file(path: Place) -> tuple[Place, str]:
         place, words = stimulus.in_file(path)
-        return place, origin.sentence(words, place)
+        return place, ", ".join(origin.line_of(place, words))
 
     return in_file

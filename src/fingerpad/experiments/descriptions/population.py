@@ -67,8 +67,10 @@ def population_of(
         return _laid(settings, afferent, place, finger)
     if "density_per_cm2" in settings.given or chosen in TYPES:
         raise InputError(
-            f"{place} must have density_per_cm2 and the type of one afferent, or densities_per_cm2 of "
-            "several: got both; leave one out."
+            place,
+            "must have density_per_cm2 and the type of one afferent, or densities_per_cm2 of several",
+            "both",
+            "leave one out",
         )
     types = types_of_afferents(tissues) | ({} if chosen == DEFAULT else {TYPES[0]: afferent})
     parts = {}

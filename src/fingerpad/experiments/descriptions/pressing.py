@@ -100,7 +100,7 @@ def finger_of(part: Any, beside: Path = Path()) -> Finger:
     sizes = [tuple(word.strip() for word in size.partition("=")) for size in given]
     for _, equals, _ in sizes:
         if not equals:
-            raise InputError(f"finger must be written like:name=mm, as adult:width_mm=18: got {part!r}.")
+            raise InputError("finger", "must be written like:name=mm, as adult:width_mm=18", repr(part))
     return Fingertip.of(like, **{name: number_in(name, value, "mm") for name, _, value in sizes})
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 import reprlib
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -12,13 +11,10 @@ from typing import Any, TypeVar, get_args
 
 from pydantic import BaseModel, ValidationError
 
-from fingerpad.core.errors import InputError, did_you_mean, got
+from fingerpad.core.errors import InputError, Place, did_you_mean, got, spelled
 from fingerpad.core.plain_yaml import line_at
 from fingerpad.experiments.descriptions.signatures import LateKind
 from fingerpad.experiments.descriptions.values import Part, kind_of
-
-Place = tuple[int | str, ...]
-"""Keys and indices that lead to a place in a file."""
 
 _Kind = TypeVar("_Kind", bound=Part)
 
@@ -32,14 +28,6 @@ _EXPECTED = {
 _KEYS = ("extra_forbidden", "invalid_key")
 _SHOWN = reprlib.Repr()
 _SHOWN.maxstring, _SHOWN.maxother, _SHOWN.maxlevel = 60, 60, 2
-
-
-class PlacedError(InputError):
-    """An error at a known place of a file, which the sentence names."""
-
-    def __init__(self, said: str, place: Sequence[int | str]):
-        super().__init__(said)
-        self.place = tuple(place)
 
 
 @dataclass(frozen=True)
@@ -64,40 +52,41 @@ class Origin:
         try:
             yield
         except InputError as error:
-            if str(error).startswith(f"{self.name}, "):  # from a part of the same description
+            if error.source:  # from a part of the same description
                 raise
-            place = error.place if isinstance(error, PlacedError) else _unspelled(str(error))
-            raise InputError(self.sentence(str(error), place)) from error
+            source, words = self.line_of(error.path, error.where)
+            raise error.at(error.path, words).from_source(source) from error
 
-    def sentence(self, said: str, place: Place) -> str:
-        """Begin a sentence about a place with the file and the line."""
+    def line_of(self, place: Place, words: str) -> tuple[str, str]:
+        """Return the file with the line of a place, and the words for the place in that line."""
         row = place[1] if self.rows and len(place) > 1 and place[0] == "stimuli" else None
         if isinstance(row, int):
-            said = said.removeprefix(place_text(place[:2])).lstrip(". ")
-            return f"{self.name}, line {self.rows[row]}, {said}"
+            return f"{self.name}, line {self.rows[row]}", words.removeprefix(spelled(place[:2])).lstrip(".")
         line = line_at(self.text, place) if self.text else None
-        return f"{self.name}, {said}" if line is None else f"{self.name}, line {line}, {said}"
+        return self.name if line is None else f"{self.name}, line {line}", words
 
 
 @contextmanager
 def at(*place: int | str) -> Iterator[None]:
-    """Put the place in front of an `InputError` from within that has none."""
+    """Put the place in front of the path of an `InputError` from within that has none in a file."""
     try:
         yield
-    except PlacedError:
-        raise
     except InputError as error:
-        raise PlacedError(f"{place_text(place)}: {error}", place) from error
+        if error.in_file:
+            raise
+        named = error if error.path else InputError(str(error))
+        raise named.at((*place, *error.path)) from error
 
 
 @contextmanager
 def moved(move: Callable[[Place], tuple[Place, str]]) -> Iterator[None]:
-    """Give a `PlacedError` from within another place, and the words for it."""
+    """Give an `InputError` at a place of a file another place, and the words for it."""
     try:
         yield
-    except PlacedError as error:
-        place, words = move(error.place)
-        raise PlacedError(words + str(error).removeprefix(place_text(error.place)), place) from error
+    except InputError as error:
+        if not error.in_file:
+            raise
+        raise error.at(*move(error.path)) from error
 
 
 def part_from(kind: type[_Kind], content: Any) -> _Kind:
@@ -105,7 +94,7 @@ def part_from(kind: type[_Kind], content: Any) -> _Kind:
     try:
         return kind.model_validate(content)
     except ValidationError as error:
-        raise PlacedError(error_sentence(error, kind), place_of(error)) from error
+        raise input_error(error, kind) from error
 
 
 def merged(common: Any, own: Any, default_kind: str | None = None) -> Any:
@@ -115,7 +104,7 @@ def merged(common: Any, own: Any, default_kind: str | None = None) -> Any:
     if isinstance(common, str) and isinstance(own, Mapping) and "kind" not in own:
         if ":" in common:
             raise InputError(
-                f"sizes must stand in the text or in keys, not in both: got {common!r} and keys."
+                "sizes", "must stand in the text or in keys, not in both", f"{common!r} and keys"
             )
         common = {"kind": common}
     if not isinstance(common, Mapping) or not isinstance(own, Mapping):
@@ -124,9 +113,9 @@ def merged(common: Any, own: Any, default_kind: str | None = None) -> Any:
     return {**common, **own} if own.get("kind", kind) == kind else own
 
 
-def place_of(error: ValidationError) -> list[int | str]:
+def place_of(error: ValidationError) -> Place:
     """Keys and indices that lead to the first error."""
-    return [part for part in first_of(error)["loc"] if kind_of(part) is None]
+    return tuple(part for part in first_of(error)["loc"] if kind_of(part) is None)
 
 
 def first_of(error: ValidationError) -> Any:
@@ -141,33 +130,21 @@ def first_of(error: ValidationError) -> Any:
     return min(found, key=order)
 
 
-def error_sentence(error: ValidationError, kind: type[Part]) -> str:
-    """Describe the first error that pydantic found: where, what was expected, what came."""
+def input_error(error: ValidationError, kind: type[Part]) -> InputError:
+    """Make the first error that pydantic found one of the package."""
     first, path = first_of(error), place_of(error)
-    where = place_text(path)
-    if first["type"] == "missing":
-        return f"{where} must be given: it is missing."
-    if first["type"] == "extra_forbidden":
-        known = _keys_at(first["loc"][:-1], kind)
-        return f"{where} is unknown: {did_you_mean(str(path[-1]), known, place_text(path[:-1]))}"
     expected = _EXPECTED.get(first["type"], first["msg"])
-    if first.get("input") is None and not path:
-        return f"{where} {expected}: it is empty."
     value, allowed = first.get("input"), first.get("ctx", {}).get("allowed", ())
-    return f"{where} {expected}: {got(value, allowed, _SHOWN.repr(value))}"
-
-
-def place_text(path: Sequence[int | str]) -> str:
-    """Spell a place in a file, such as stimuli[2].width_mm, entries counted from 1."""
-    text = "".join(f"[{part + 1}]" if isinstance(part, int) else f".{part}" for part in path)
-    return text.lstrip(".") or "the file"
-
-
-def _unspelled(said: str) -> Place:
-    """Place that a sentence begins with: stimuli[2].width_mm."""
-    begin = re.match(r"[\w.\[\]]*", said)
-    parts = re.findall(r"\[(\d+)\]|(\w+)", begin[0] if begin else "")
-    return tuple(int(number) - 1 if number else key for number, key in parts)
+    if first["type"] == "missing":
+        found = InputError(path, "must be given", remedy="it is missing")
+    elif first["type"] == "extra_forbidden":
+        known = _keys_at(first["loc"][:-1], kind)
+        found = InputError(path, "is unknown", remedy=did_you_mean(str(path[-1]), known, spelled(path[:-1])))
+    elif value is None and not path:
+        found = InputError(path, expected, remedy="it is empty")
+    else:
+        found = InputError(path, expected, got(value, allowed, _SHOWN.repr(value)))
+    return found.at(path)
 
 
 def _keys_at(path: Sequence[int | str], kind: type[Part]) -> list[str]:

@@ -77,7 +77,9 @@ def described_reduction(content: Content | Any, source: str = "range", text: str
         asked = part_from(ReductionDescription, content)
         with at("motion"):
             if "motion" in asked.model_fields_set:
-                raise InputError("motion must be left out: a reduced touch serves any motion in its range.")
+                raise InputError(
+                    "motion", "must be left out", remedy="a reduced touch serves any motion in its range"
+                )
         with at("finger"):
             finger = finger_of(asked.finger, origin.beside)
         touch = asked.stimulus(origin.beside).touch(finger, asked.tissues, asked.resolution)

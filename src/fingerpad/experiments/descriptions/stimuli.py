@@ -9,18 +9,15 @@ from typing import Annotated
 
 from pydantic import Discriminator, Strict, Tag
 
-from fingerpad.core.errors import InputError, closest
+from fingerpad.core.errors import InputError, Place, closest, spelled
 from fingerpad.data import protocol
 from fingerpad.experiments.conditions import Conditions
 from fingerpad.experiments.descriptions.pressing import RAMP_AND_HOLD
 from fingerpad.experiments.descriptions.reading import (
-    Place,
-    PlacedError,
     at,
     merged,
     moved,
     part_from,
-    place_text,
 )
 from fingerpad.experiments.descriptions.stimulus import (
     FingerDescription,
@@ -113,7 +110,7 @@ class NamedStimulus(TactileStimulus):
     files: tuple[Path, ...] = field(default=(), compare=False)
     """Those that its object and motion name."""
     in_file: Callable[[Place], tuple[Place, str]] = field(
-        default=lambda place: (place, place_text(place)), compare=False, repr=False
+        default=lambda place: (place, spelled(place)), compare=False, repr=False
     )
     """From a place in its description to that in the file of all, and the words for it."""
 
@@ -124,7 +121,9 @@ def named_stimuli(described: StimulusSet, beside: Path = Path()) -> list[NamedSt
     found: list[NamedStimulus] = []
     for place, name, level, own in _listed(described):
         if name in [other.name for other in found]:
-            raise PlacedError(f"stimuli must differ: {name!r} is repeated, keep one.", place)
+            raise InputError("stimuli", "must differ", remedy=f"{name!r} is repeated, keep one").at(
+                place, "stimuli"
+            )
         found.append(_named(described, place, name, level, own, beside, made))
     return found
 
@@ -139,16 +138,14 @@ def _listed(described: StimulusSet) -> list[tuple[Place, str, float | None, Stim
         near = closest(
             described.stimuli.vary, [*known, *(f"place.{name}" for name in PlaceSettings.model_fields)]
         )
-        raise PlacedError(
-            "stimuli.vary must be friction, or a key of object, motion or place such as "
-            f"{near or 'object.radius_mm'}: got {described.stimuli.vary!r}.",
+        raise InputError(
             ("stimuli", "vary"),
+            f"must be friction, or a key of object, motion or place such as {near or 'object.radius_mm'}",
+            repr(described.stimuli.vary),
         )
     common = getattr(described, block)
     if common is not None and (not dot or (isinstance(common, Mapping) and key in common)):
-        raise PlacedError(
-            f"{described.stimuli.vary} must not be given where stimuli.vary it: leave it out.", (block, key)
-        )
+        raise InputError((block, key), "must not be given where stimuli.vary it", remedy="leave it out")
     found: list[tuple[Place, str, float | None, StimulusBlocks]] = []
     for row, value in enumerate(described.stimuli.values):
         place = ("stimuli", "values", row)
@@ -161,7 +158,7 @@ def _listed(described: StimulusSet) -> list[tuple[Place, str, float | None, Stim
 
 def _varied(place: Place) -> Callable[[Place], tuple[Place, str]]:
     """Place of a value that varies, for that of the key that it is."""
-    return lambda path: (place, f"{place_text(place)}, {place_text(path)}")
+    return lambda path: (place, f"{spelled(place)}, {spelled(path)}")
 
 
 def _named(
@@ -179,10 +176,10 @@ def _named(
         block = getattr(own, str(path[0]), None) if path else own
         of_all = block is None or (len(path) > 1 and isinstance(block, Mapping) and path[1] not in block)
         if of_all and (listed[1] == "values" or getattr(described, str(path[0]), None) is not None):
-            return path, place_text(path)
+            return path, spelled(path)
         if listed[1] == "values":
             return _varied(listed)(path)
-        return (*listed, *path), place_text((*listed, *path))
+        return (*listed, *path), spelled((*listed, *path))
 
     hidden = {_EXCLUSIVE.get(key) for key in own.motion or ()}
     motion = {key: value for key, value in (described.motion or {}).items() if key not in hidden}
@@ -220,7 +217,7 @@ def touches_of(
     if conditions.finger.own_mesh is None:
         grading = _grading(stimuli, conditions, reach_mm, receptor)
     elif reach_mm is not None:
-        raise PlacedError("reach_mm must not be given: the finger has a mesh of its own.", ("reach_mm",))
+        raise InputError("reach_mm", "must not be given", remedy="the finger has a mesh of its own")
     else:
         grading = None
     return {stimulus.name: pressed_with(stimulus, conditions, grading) for stimulus in stimuli}
@@ -254,8 +251,7 @@ def _grading(
             half_width_mm=min(reach_mm, grading.half_width_mm),
         )
     except InputError as error:
-        said = f"reach_mm leaves no room for the finest elements: {error}"
-        raise PlacedError(said, ("reach_mm",)) from error
+        raise InputError("reach_mm", "leaves no room for the finest elements", remedy=str(error)) from error
 
 
 def _zone(stimulus: NamedStimulus, conditions: Conditions) -> Grading:

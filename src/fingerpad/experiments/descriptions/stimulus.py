@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
@@ -11,7 +10,7 @@ from typing import Annotated
 
 from pydantic import Field
 
-from fingerpad.core.errors import InputError
+from fingerpad.core.errors import InputError, Place
 from fingerpad.core.values import converted
 from fingerpad.data.tissues import DEFAULT_TISSUES
 from fingerpad.experiments.conditions import Conditions, straight_tilt_deg
@@ -23,7 +22,7 @@ from fingerpad.experiments.descriptions.pressing import (
     named_files,
     object_of,
 )
-from fingerpad.experiments.descriptions.reading import Place, PlacedError, at, place_text
+from fingerpad.experiments.descriptions.reading import at
 from fingerpad.experiments.descriptions.values import FiniteNumber, NotNegative, Part, choice_of
 from fingerpad.geometry.fingertip import Finger
 from fingerpad.geometry.grading import RESOLUTIONS, Grading
@@ -33,17 +32,15 @@ from fingerpad.mechanics.materials import Tissues
 from fingerpad.mechanics.tissues import TISSUES
 from fingerpad.skin.indentation import Touch, touch_of
 
-_ABOUT: tuple[tuple[str, Place], ...] = (
-    ("at_mm", ("place",)),
-    ("A", ("place",)),  # a position must lie on the finger
-    ("tilt_deg", ("place", "tilt_deg")),
-    ("spin_deg", ("place", "spin_deg")),
-    ("times_ms", ("times_ms",)),
-    ("friction", ("friction",)),
-    ("grading", ("object",)),
-)
-"""Which key of a file the solver's arguments are; any other error is one of the motion."""
-
+_PLACES: dict[str, Place] = {
+    "at_mm": ("place",),
+    "position": ("place",),
+    "tilt_deg": ("place", "tilt_deg"),
+    "spin_deg": ("place", "spin_deg"),
+    "times_ms": ("times_ms",),
+    "friction": ("friction",),
+}
+"""Keys of a file that set arguments of the solver; any other argument is one of the motion."""
 
 MadeObjects = list[tuple[object, Indenter]]
 """Parts of files with the objects that were made of them."""
@@ -173,8 +170,9 @@ def about() -> Iterator[None]:
     try:
         yield
     except InputError as error:
-        begin = re.match(r"(?:[xz] of )?(\w+)", str(error))
-        place = dict(_ABOUT).get(begin[1] if begin else "", ("motion",))
-        said = str(error).removeprefix(f"{place[-1]} ")
-        between = " " if said != str(error) else ": "
-        raise PlacedError(f"{place_text(place)}{between}{said}", place) from error
+        argument = str(error.path[0]) if error.path else ""
+        if argument in _PLACES:
+            raise error.at(_PLACES[argument]) from error
+        if argument and argument != "grading":
+            raise error.at(("motion", *error.path)) from error
+        raise InputError(str(error)).at(("object" if argument else "motion",)) from error

@@ -161,8 +161,10 @@ class DescribedTouch:
             laid = population_of(asked, asked.afferent, tissues, beside, "afferents", self.finger)
             if asked.noise > 0.0 and type(getattr(laid, "afferent", None)) is not Afferent:
                 raise InputError(
-                    "afferents.noise must be 0 for other types and mixed populations, because a soft "
-                    f"threshold is that of the default afferent alone: got {asked.noise:g}."
+                    "afferents.noise",
+                    "must be 0 for other types and mixed populations, because a soft threshold is that of "
+                    "the default afferent alone",
+                    f"{asked.noise:g}",
                 )
         with self.origin.located(), at("afferents", "windows_ms"):
             phases = self.touch.stimulus.phases
