@@ -1,12 +1,11 @@
 """Results that draw themselves and turn into tables: `plot`, a picture in a notebook, pandas and xarray.
 
-What draws and what makes tables lies in packages above; it is named here as text, and loaded when it is first
-used (docs/decisions/results-that-draw.md).
+What draws and what makes tables lies in packages above, and is loaded when it is first used: the two imports
+upwards that the contracts of pyproject.toml allow (docs/decisions/results-that-draw.md).
 """
 
 from __future__ import annotations
 
-from pkgutil import resolve_name
 from typing import TYPE_CHECKING, Any
 
 from fingerpad.core.keywords import check_methods
@@ -15,12 +14,6 @@ if TYPE_CHECKING:
     import pandas
     import xarray
     from matplotlib.axes import Axes
-
-DRAWING = "fingerpad.report.drawing"
-"""Module that draws."""
-
-TABLES = "fingerpad.export.result_tables"
-"""Module that makes tables and data sets."""
 
 
 class Displayed:
@@ -47,13 +40,15 @@ class Displayed:
         InputError
             If there is no such drawing.
         """
-        drawn: Axes = resolve_name(f"{DRAWING}:plot")(self, axes, what, **options)
-        return drawn
+        from fingerpad.report.drawing import plot
+
+        return plot(self, axes, what, **options)
 
     def _repr_html_(self) -> str:
         """Return a small picture and the line of `repr`, for notebooks."""
-        shown: str = resolve_name(f"{DRAWING}:html")(self)
-        return shown
+        from fingerpad.report.drawing import html
+
+        return html(self)
 
 
 class Result(Displayed):
@@ -72,8 +67,9 @@ class Result(Displayed):
         InputError
             Without the extra `fingerpad[netcdf]`, which brings pandas.
         """
-        made: pandas.DataFrame = resolve_name(f"{TABLES}:table")(self)
-        return made
+        from fingerpad.export.result_tables import table
+
+        return table(self)
 
     def to_xarray(self) -> xarray.Dataset:
         """Return this result as a labelled data set; every variable has an attribute `units`.
@@ -83,5 +79,6 @@ class Result(Displayed):
         InputError
             Without the extra `fingerpad[netcdf]`, which brings xarray.
         """
-        made: xarray.Dataset = resolve_name(f"{TABLES}:dataset")(self)
-        return made
+        from fingerpad.export.result_tables import dataset
+
+        return dataset(self)

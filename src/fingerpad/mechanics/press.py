@@ -5,7 +5,6 @@ from __future__ import annotations
 import logging
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
-from importlib import import_module
 
 import numpy as np
 from scipy.optimize import brentq
@@ -562,7 +561,8 @@ def _with_jumps(
 ) -> Iterator[_Moment]:
     """Solved and interpolated times of a motion with many equal cycles."""
     # Loaded when it is asked for: most presses have no cycles.
-    CycleJumps = import_module("fingerpad.mechanics.cycles").CycleJumps
+    from fingerpad.mechanics.cycles import CycleJumps
+
     body = job.body
     first, last = np.searchsorted(times, [cycle_times[0, 0], cycle_times[-1, -1]])
     jumps = CycleJumps(cycle_times, tolerance, where, body.table, body.mesh.layer, job.step, job.stopped)

@@ -6,12 +6,12 @@ import hashlib
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
-from pkgutil import resolve_name
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any, Protocol, cast
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+import fingerpad
 from fingerpad.core.checks import FloatArray, float_array, increasing, instance, one_of
 from fingerpad.core.displayed import Result
 from fingerpad.core.errors import InputError
@@ -29,6 +29,7 @@ from fingerpad.skin.surface_motion import SURFACE_QUANTITIES, SurfaceMotion
 if TYPE_CHECKING:
     import xarray
 
+    from fingerpad.geometry.free_mesh import FreeMesh
     from fingerpad.mechanics.press import Deformation
     from fingerpad.skin.indentation import Touch
 
@@ -187,8 +188,7 @@ class SkinResponse(Result):
         InputError
             Without the extra `fingerpad[netcdf]`.
         """
-        made: xarray.Dataset = resolve_name("fingerpad.export.dataset:touch_dataset")(self, response)
-        return made
+        return fingerpad.touch_dataset(self, response)
 
     def with_fields(self, **fields: FloatArray) -> SkinResponse:
         """Return the same response with other values of some fields."""
@@ -419,8 +419,9 @@ def receptors_of(mesh: Mesh) -> Receptors:
     if mesh.is_grid:
         return ReceptorSheet(mesh)
     # Loaded for those who have a mesh of their own.
-    free: Receptors = resolve_name("fingerpad.skin.free_receptors:FreeReceptors")(mesh)
-    return free
+    from fingerpad.skin.free_receptors import FreeReceptors
+
+    return FreeReceptors(cast("FreeMesh", mesh))
 
 
 def places_below(receptors: Receptors, sites: ArrayLike) -> Any:

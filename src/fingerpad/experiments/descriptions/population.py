@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
-from pkgutil import resolve_name
 
 import numpy as np
 
@@ -84,9 +83,10 @@ def _laid(
     settings: PopulationSettings, afferent: AnyAfferent, place: str, finger: Finger | None
 ) -> Population:
     """Lay out the afferents of one type."""
-    # Only what needs them loads the modules that unroll the skin.
-    lay = _grid if settings.layout == GRID else resolve_name(f"{__package__}.skin_layouts:lay")
-    laid: Population = lay(settings, afferent, place, finger or Fingertip())
+    lay = _grid
+    if settings.layout != GRID:  # only what needs them loads the modules that unroll the skin
+        from fingerpad.experiments.descriptions.skin_layouts import lay
+    laid = lay(settings, afferent, place, finger or Fingertip())
     if settings.sensitivity_spread == 0.0:
         return laid
     return replace(laid, sensitivity=sensitivities(len(laid), settings.sensitivity_spread, settings.seed))

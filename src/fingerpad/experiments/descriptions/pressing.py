@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 from fingerpad.core.checks import number_in
 from fingerpad.core.errors import InputError
@@ -17,6 +17,7 @@ from fingerpad.geometry.indenters import Indenter
 from fingerpad.geometry.mesh_files import MESH_FILES, read_finger
 from fingerpad.geometry.motion import ForceRampAndHold, Motion, RampAndHold
 from fingerpad.geometry.names import INDENTERS
+from fingerpad.geometry.trajectory_files import recorded
 
 RAMP_AND_HOLD = "ramp_and_hold"
 MEASURED = "measured"
@@ -54,39 +55,41 @@ def ramp_and_hold(
 FINGERS: dict[str, Callable[..., Finger] | str] = {
     MEASURED: Fingertip.of,
     "outline": Fingertip,
-    "mesh": "fingerpad.geometry.mesh_files:read_finger",
+    "mesh": "read_finger",
 }
 """How a finger can be given, by kind."""
 
 OBJECTS: dict[str, Callable[..., Indenter] | str] = {
     **INDENTERS,
-    "dots": "fingerpad.geometry.dots:Dots",
-    "braille": "fingerpad.geometry.dots:braille",
-    "embossed": "fingerpad.geometry.embossed:Embossed",
-    "embossed_text": "fingerpad.geometry.embossed:embossed_text",
-    "ridges": "fingerpad.geometry.composed:ridges",
-    "surface": "fingerpad.geometry.surface_files:read_surface",
-    "height_map": "fingerpad.geometry.surface_files:read_height_map",
+    "dots": "Dots",
+    "braille": "braille",
+    "embossed": "Embossed",
+    "embossed_text": "embossed_text",
+    "ridges": "ridges",
+    "surface": "read_surface",
+    "height_map": "read_height_map",
 }
-"""What can be pressed in, by kind; by name where only a file with it needs the module."""
+"""What can be pressed in, by kind; by its public name where only a file with it needs the module."""
 
 MOTIONS: dict[str, Callable[..., Motion] | str] = {
     RAMP_AND_HOLD: ramp_and_hold,
-    **{
-        kind: f"fingerpad.geometry.motions:{kind}"
-        for kind in ("sine", "chirp", "repeated", "staircase", "stroke")
-    },
-    "recorded": "fingerpad.geometry.trajectory_files:recorded",
-    "trajectory": "fingerpad.geometry.trajectory:Trajectory",
+    **{kind: kind for kind in ("sine", "chirp", "repeated", "staircase", "stroke")},
+    "recorded": recorded,
+    "trajectory": "Trajectory",
 }
 """How it can move, by kind."""
 
 _WITHOUT: Mapping[str, Sequence[str]] = {"trajectory": ("phases", "cycles")}
 """Parameters that a file does not have."""
 
-FingerPart = one_of_kinds(FINGERS, default=MEASURED, text=Text)
-ObjectPart = one_of_kinds(OBJECTS, text=Text)
-MotionPart = one_of_kinds(MOTIONS, default=RAMP_AND_HOLD, without=_WITHOUT)
+if TYPE_CHECKING:
+    FingerPart: TypeAlias = Any
+    ObjectPart: TypeAlias = Any
+    MotionPart: TypeAlias = Any
+else:
+    FingerPart = one_of_kinds(FINGERS, default=MEASURED, text=Text)
+    ObjectPart = one_of_kinds(OBJECTS, text=Text)
+    MotionPart = one_of_kinds(MOTIONS, default=RAMP_AND_HOLD, without=_WITHOUT)
 
 
 def finger_of(part: Any, beside: Path = Path()) -> Finger:

@@ -11,8 +11,8 @@ import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from importlib import import_module
 from pathlib import Path
-from pkgutil import resolve_name
 from types import MappingProxyType
 from typing import Annotated, Any, ClassVar, Literal, Union, get_args, get_origin, get_type_hints
 
@@ -124,13 +124,13 @@ class LateKind:
     kind: str
     """Value of the key `kind`."""
     makes: Callable[..., Any] | str
-    """As of `made_by`, or its name as module and name."""
+    """As of `made_by`, or its public name."""
     without: Sequence[str] = ()
     """As of `made_by`."""
 
     @cached_property
     def part(self) -> type[Made]:
-        makes = resolve_name(self.makes) if isinstance(self.makes, str) else self.makes
+        makes = getattr(import_module("fingerpad"), self.makes) if isinstance(self.makes, str) else self.makes
         return made_by(self.kind, makes, self.without)
 
     def __get_pydantic_core_schema__(self, *_: Any) -> CoreSchema:

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from pkgutil import resolve_name
-from typing import Any
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -29,19 +27,6 @@ from fingerpad.inference.rate_problem import RateProblem
 from fingerpad.inference.recordings import PHASES, RateRecordings, SpikeRecordings
 from fingerpad.neuron.afferent import PARAMETER_NAMES, PARAMETER_UNITS
 from fingerpad.neuron.rate_windows import Windows
-
-_PARTS = {
-    "posterior": "fingerpad.experiments.fit.posterior:rate_posterior",
-    "profiles": "fingerpad.experiments.fit.posterior:profiled",
-    "sensitivity": "fingerpad.experiments.fit.rate_uncertainty:fss_sensitivity",
-}
-"""What computes a part of the uncertainty of a fit; its module is loaded when the part is asked for."""
-
-
-def _part(name: str) -> Callable[..., Any]:
-    """Return the function of one of `_PARTS`."""
-    found: Callable[..., Any] = resolve_name(_PARTS[name])
-    return found
 
 
 @known_keywords
@@ -127,6 +112,16 @@ def fit_recordings(
     four = identifiable(prepared.six(best.parameters))
     covariance = prepared.covariance(best, validation)
     errors = np.full(len(IDENTIFIABLE_NAMES), np.nan) if covariance is None else np.sqrt(np.diag(covariance))
+    posterior = profiles = sensitivity = None
+    if with_posterior or with_profiles:
+        from fingerpad.experiments.fit.posterior import profiled, rate_posterior
+
+        posterior = rate_posterior(model, rates, four, seed, positions_mm) if with_posterior else None
+        profiles = profiled(model, rates, four, positions_mm) if with_profiles else None
+    if with_sensitivity:
+        from fingerpad.experiments.fit.rate_uncertainty import fss_sensitivity
+
+        sensitivity = fss_sensitivity(RateProblem(four_number_model(model), rates), four, seed)
     return FitResult(
         method=method,
         source=rates.source,
@@ -146,13 +141,9 @@ def fit_recordings(
         phases=_phases(prepared.problem, rates, best.parameters, validation),
         folds=_folds(prepared, rates, validation),
         spikes=prepared.spikes(best, validation),
-        posterior=_part("posterior")(model, rates, four, seed, positions_mm) if with_posterior else None,
-        profiles=_part("profiles")(model, rates, four, positions_mm) if with_profiles else None,
-        sensitivity=(
-            _part("sensitivity")(RateProblem(four_number_model(model), rates), four, seed)
-            if with_sensitivity
-            else None
-        ),
+        posterior=posterior,
+        profiles=profiles,
+        sensitivity=sensitivity,
         offset=None if beside is None else fit_offset(beside, rates, folds, method, windows_ms, seed),
     )
 

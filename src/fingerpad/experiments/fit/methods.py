@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from pkgutil import resolve_name
 
 import numpy as np
 
@@ -109,10 +108,9 @@ def prepare(
     one_of("method", method, METHODS)
     if method == "likelihood":
         # Only this method loads the module and its kernels.
-        prepared: Prepared = resolve_name("fingerpad.experiments.fit.spike_method:prepare_spikes")(
-            model, recordings, rates, seed
-        )
-        return prepared
+        from fingerpad.experiments.fit.spike_method import prepare_spikes
+
+        return prepare_spikes(model, recordings, rates, seed)
     if method == "response_surface":
         return Prepared(RateProblem(model, rates), response_surface(), lambda six: six)
     problem = four_number_problem(model, rates)
