@@ -51,7 +51,6 @@ def elements(kind: str, name: str, numbers: IntArray, corners: IntArray) -> list
 
 
 def node_set(name: str, numbers: IntArray) -> list[str]:
-    """Card of a set of nodes."""
     return [f"*NSET, NSET={name}", *data(map(str, numbers))]
 
 
@@ -91,7 +90,6 @@ def body_elements(
 
 
 def law(material: Material, factor: float, moduli: str = "") -> list[str]:
-    """Card of a material's strain energy."""
     energy = material.law
     if isinstance(energy, Polynomial):
         return _polynomial(energy, factor, moduli)
@@ -124,5 +122,4 @@ def _polynomial(energy: Polynomial, factor: float, moduli: str) -> list[str]:
 
 
 def text(lines: Sequence[str]) -> str:
-    """Whole deck."""
     return "\n".join([*lines, ""])

@@ -157,11 +157,6 @@ def touch_dataset(
     xarray.Dataset
         What is at nodes and elements is in single precision, all else in double.
 
-    Raises
-    ------
-    InputError
-        If xarray is missing, a quantity is unknown, or one needs the deformation and there is none.
-
     Examples
     --------
     >>> import fingerpad as fp
@@ -217,15 +212,8 @@ def write_touch(
     skin, response, quantities, seed
         As in `touch_dataset`.
 
-    Returns
-    -------
-    tuple of Path
-        The file or folder.
-
     Raises
     ------
-    InputError
-        If the name has another ending, or as `touch_dataset`.
     StoreError
         If it cannot be written.
 
@@ -258,17 +246,12 @@ def write_touch(
 
 @known_keywords
 def read_touch(path: str | Path) -> xarray.Dataset:
-    """Read the result of a touch, and check it.
+    """Read the result of a touch into memory, and check it.
 
     Parameters
     ----------
     path : str or Path
         A file or folder of `write_touch`, or a folder that holds `touch.nc` or `touch.zarr`.
-
-    Returns
-    -------
-    xarray.Dataset
-        As `touch_dataset` makes it, in memory.
 
     Raises
     ------
@@ -352,7 +335,6 @@ def _field_attributes(field: Field) -> Attributes:
 
 
 def _mesh_values(mesh: Mesh) -> dict[str, np.ndarray]:
-    """Values of `MESH_PARTS`."""
     numbers = {
         "element_nodes": mesh.elements,
         "layer": mesh.layer,
@@ -396,7 +378,6 @@ def _face(body: Indenter, reach_mm: Sequence[float]) -> tuple[np.ndarray, np.nda
 
 
 def part_variable(name: str, value: np.ndarray) -> tuple[tuple[str, ...], np.ndarray, Attributes]:
-    """Dimensions, values and attributes of one of `PARTS`."""
     part = PARTS[name]
     attributes: Attributes = {"long_name": part.long_name}
     attributes |= {"units": part.unit} if part.unit else {}
@@ -404,7 +385,6 @@ def part_variable(name: str, value: np.ndarray) -> tuple[tuple[str, ...], np.nda
 
 
 def response_values(response: ResponseMap) -> dict[str, np.ndarray]:
-    """Values of `RESPONSE_PARTS`."""
     return {
         "receptor_mm": response.positions_mm,
         "dynamic_rate_hz": response.dynamic_rate_hz,
@@ -571,13 +551,11 @@ def unit_of_name(name: str) -> str:
 
 
 def field_dimensions(field: Field) -> tuple[str, ...]:
-    """Dimensions of a field as it is stored."""
     time = ("time",) if field.stored is Times.ALL else ()
     return (*time, *_PLACES[field.place], *_COMPONENTS[field.components])
 
 
 def first_line(error: Exception) -> str:
-    """First line of what a library says."""
     return (str(error).strip().splitlines() or [type(error).__name__])[0].strip().rstrip(".")[:200]
 
 

@@ -62,11 +62,6 @@ def export_touch(
     -------
     tuple of Path
         The files; open the first one.
-
-    Raises
-    ------
-    InputError
-        If the format is unknown or cannot express this indentation.
     """
     check_format(format_name, elastic_moduli)  # first, since solving takes its time
     if format_name in RESULTS:

@@ -55,17 +55,8 @@ def write_responses_nwb(
     started : datetime, optional
         Begin of the session, with its time zone. Default: now.
 
-    Returns
-    -------
-    Path
-        The file.
-
     Raises
     ------
-    InputError
-        If the file has another ending, there is no indentation, receptors differ between indentations, a
-        duration is not valid, a spike is later than `duration_ms`, `started` has no time zone, or pynwb is
-        not installed.
     StoreError
         If the file cannot be written.
 
@@ -170,7 +161,6 @@ def read_responses_nwb(path: Path) -> dict[str, ResponseMap | MixedResponse]:
 
 
 def _responses(session: Any) -> dict[str, ResponseMap | MixedResponse]:
-    """Responses to all trials of a session."""
     units, trials = session.units, session.trials
     places = PLACES[3 if "y_mm" in units.colnames else 2]
     known = {"spike_times", "obs_intervals", TYPE, PITCH, *places}

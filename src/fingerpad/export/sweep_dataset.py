@@ -195,7 +195,6 @@ class SweepFile:
 
     @property
     def observed(self) -> bool:
-        """Whether there are hit rates."""
         return HIT_RATE in self._arrays
 
     def responses(self) -> dict[str, np.ndarray]:
@@ -297,11 +296,6 @@ def open_sweep(path: str | Path) -> xarray.Dataset:
     -------
     xarray.Dataset
         With dimensions named by the fields that vary; `status` is 1 where a setting is done.
-
-    Raises
-    ------
-    InputError
-        If it cannot be read, another program wrote it, or its format has another version.
     """
     xarray, _ = library("xarray"), library("zarr")
     check_format(path, _opened(path_of("path", path)).attrs.asdict())
@@ -310,7 +304,6 @@ def open_sweep(path: str | Path) -> xarray.Dataset:
 
 
 def check_sweep_data(data: xarray.Dataset) -> None:
-    """Raise `InputError` if this is no data set of a sweep."""
     if not isinstance(data, library("xarray").Dataset) or "sweep" not in data.attrs or "status" not in data:
         raise InputError(f"data must be a data set from open_sweep: got {shown(data)}.")
 
@@ -332,11 +325,6 @@ def observe_sweep(data: xarray.Dataset, observer: Content, grid: Content | None 
     -------
     xarray.DataArray
         With the dimensions of the sweep, then those of the observer; NaN for the standard. [0-1]
-
-    Raises
-    ------
-    InputError
-        If the observer has an unknown or unfit key.
     """
     check_sweep_data(data)
     content = json.loads(data.attrs["sweep"])
@@ -357,7 +345,6 @@ def _of_observer(field: str) -> bool:
 
 
 def sweep_settings(data: xarray.Dataset) -> Sweep:
-    """Return the sweep that a data set is of."""
     check_sweep_data(data)
     return sweep_of(json.loads(data.attrs["sweep"]), data.attrs.get("source", "sweep"))
 

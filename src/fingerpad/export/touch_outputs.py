@@ -109,11 +109,6 @@ def run_touch(
     command : str, optional
         The command line, for the manifest.
 
-    Returns
-    -------
-    PressedTouch
-        With `skin`, `response` and `summary`.
-
     Raises
     ------
     InputError
@@ -147,7 +142,6 @@ def run_touch(
 
 
 def as_described(touch: str | Path | Content | TouchDescription | DescribedTouch) -> DescribedTouch:
-    """Return what `run_touch` takes as a `DescribedTouch`."""
     if isinstance(touch, DescribedTouch):
         return touch
     if isinstance(touch, TouchDescription):

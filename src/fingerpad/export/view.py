@@ -104,16 +104,8 @@ def save_view(
     progress : Progress, optional
         Shown how many pictures of a film are drawn, such as `fp.notebook_progress()`.
 
-    Returns
-    -------
-    tuple of Path
-        The file.
-
     Raises
     ------
-    InputError
-        If a library is missing, the ending, field or time is unknown, or the inside is to be shown at a time
-        at which the data set does not have it.
     StoreError
         If the file cannot be written.
 
@@ -159,7 +151,6 @@ def save_view(
 
 
 def _pictures(view: _View, times_ms: list[float], advance: Callable[[], None]) -> Iterator[Image.Image]:
-    """Draw the pictures of a film one after the other."""
     for time_ms in times_ms:
         yield Image.open(io.BytesIO(view.png(time_ms))).convert("RGB")
         advance()
@@ -200,7 +191,6 @@ class _View:
     variable: str
 
     def checked(self, time_ms: float) -> float:
-        """Return a time at which the touch can be shown."""
         times = self.data["time"].values
         if not 0.0 <= finite("time_ms", time_ms, "ms") <= times[-1]:
             raise InputError(f"time_ms must lie within 0 ... {times[-1]:g} ms: got {time_ms:g} ms.")
@@ -277,7 +267,6 @@ class _View:
         return self._screen(points - self._camera[0]) + 0.5 * np.array(PIXELS)
 
     def png(self, time_ms: float) -> bytes:
-        """Render the picture of a time."""
         buffer = io.BytesIO()
         with matplotlib.rc_context(STYLE):
             self.figure(time_ms).savefig(buffer, format="png", metadata={"Software": None})
@@ -529,7 +518,6 @@ def _printed(unit: str) -> str:
 
 
 def _gif(pictures: Iterator[Image.Image]) -> bytes:
-    """Film that repeats itself."""
     first, *others = (picture.quantize(128) for picture in pictures)
     buffer = io.BytesIO()
     first.save(
@@ -540,7 +528,6 @@ def _gif(pictures: Iterator[Image.Image]) -> bytes:
 
 
 def _mp4(pictures: Iterator[Image.Image]) -> bytes:
-    """Film that the program ffmpeg encodes."""
     with TemporaryDirectory() as folder:
         for number, picture in enumerate(pictures):
             width, height = (size // 2 * 2 for size in picture.size)  # encoders ask for even sizes

@@ -86,11 +86,6 @@ def read_vtu_series(path: str | Path) -> VtuSeries:
     ----------
     path : str or Path
         The PVD file.
-
-    Raises
-    ------
-    InputError
-        If VTK is not installed, or a file is missing or no VTU.
     """
     require_vtk()
     from vtkmodules.util.numpy_support import vtk_to_numpy
@@ -172,7 +167,6 @@ def _node_sets(mesh: Mesh) -> dict[str, np.ndarray]:
 
 
 def cells_of(mesh: Mesh) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return VTK's cells of a mesh."""
     wedges = wedge_nodes(mesh)
     is_wedge = wedges[:, 0] >= 0
     sizes = np.where(is_wedge, 6, 8)
@@ -183,7 +177,6 @@ def cells_of(mesh: Mesh) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 
 def _grid(mesh: Mesh) -> Any:
-    """Undeformed points and cells."""
     from vtkmodules.util.numpy_support import numpy_to_vtk, numpy_to_vtkIdTypeArray
     from vtkmodules.vtkCommonCore import vtkPoints
     from vtkmodules.vtkCommonDataModel import vtkCellArray, vtkUnstructuredGrid

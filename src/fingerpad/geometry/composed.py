@@ -121,7 +121,6 @@ class Union(Indenter):
         return with_rounded_edges(self._sharp, points_mm, self.edge_radius_mm)
 
     def _sharp(self, points_mm: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Gap and normal with the edges that the parts have. [mm]"""
         gap, normal = self.parts[0].gap(points_mm - np.array(self.at_mm[0]))
         for part, at in zip(self.parts[1:], self.at_mm[1:], strict=True):
             gap, normal = self._joined(gap, normal, *part.gap(points_mm - np.array(at)))
@@ -155,11 +154,6 @@ def ridges(
         Radius of the edges. [mm]
     height_mm : float
         Height of the ridges above the plate. [mm]
-
-    Returns
-    -------
-    Union
-        Bars and a plate.
 
     Examples
     --------

@@ -93,7 +93,7 @@ class Dots(Indenter):
 
 @known_keywords
 def braille(text: str, along_finger: bool = True) -> Dots:
-    """Braille of some lower-case letters, its middle on the indenter's axis.
+    """Braille of some lower-case letters, dots 0.48 mm high, its middle on the indenter's axis.
 
     Parameters
     ----------
@@ -102,16 +102,6 @@ def braille(text: str, along_finger: bool = True) -> Dots:
     along_finger : bool
         Whether the columns of a cell run along the finger, as it lies on a line of text that runs across;
         otherwise the line of text runs along the finger.
-
-    Returns
-    -------
-    Dots
-        Standard dots, 0.48 mm high.
-
-    Raises
-    ------
-    InputError
-        If there is no letter, or a character is not known.
 
     Examples
     --------

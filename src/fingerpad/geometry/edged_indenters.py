@@ -111,11 +111,6 @@ class Gap(Indenter):
         Radius of the two lips of the gap, if the gap is at least twice as wide; `lip_radius_mm` is another
         name of it. [mm]
 
-    Raises
-    ------
-    InputError
-        If a size is negative, or gap, lips and fillets leave no flat ridge.
-
     References
     ----------
     Johnson & Phillips 1981: discrimination of stimuli with and without a gap, of one overall size that is
@@ -300,7 +295,6 @@ class Grating(Indenter):
         return Bar(self.ridge_mm, self.lip_mm)
 
     def _beside_ridge(self, points_mm: FloatArray) -> FloatArray:
-        """Points in the frame of the ridge next to each."""
         beside = points_mm.copy()
         beside[:, 0] -= self.period_mm * np.round(points_mm[:, 0] / self.period_mm)
         return beside

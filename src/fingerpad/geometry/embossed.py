@@ -43,11 +43,6 @@ class Embossed(Indenter):
     edge_radius_mm : float
         Radius of the edges, at most the height and at most half of the narrowest stroke. [mm]
 
-    Raises
-    ------
-    InputError
-        If an outline has fewer than three corners, outlines cross, or a size does not fit.
-
     Examples
     --------
     >>> square = [(-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)]
@@ -185,11 +180,6 @@ def embossed_text(
     -------
     Embossed
         The outlines of the font that matplotlib brings along; its curves are straight pieces.
-
-    Raises
-    ------
-    InputError
-        If there is no letter, or the font does not have a character.
 
     Examples
     --------

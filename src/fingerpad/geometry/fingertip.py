@@ -106,7 +106,6 @@ class Profile:
         return spline(inside) + slope(inside) * (s - inside), slope(inside)
 
     def at(self, x_mm: ArrayLike) -> FloatArray:
-        """Value of the profile at `x_mm`, 0 at the tip and beyond [mm]."""
         s = np.sqrt(np.maximum(1.0 - np.asarray(x_mm, dtype=np.float64) / self.length_mm, 0.0))
         return s * self.over_s(s)[0]
 
@@ -171,11 +170,6 @@ class Fingertip(Displayed, Finger):
         Proximal and distal end of the nail. [mm]
     nail_half_width_mm : float
         Extent of the nail to either side. [mm]
-
-    Raises
-    ------
-    InputError
-        If a value is out of its range or bone and layers do not fit into the outline.
 
     Examples
     --------
@@ -281,11 +275,6 @@ class Fingertip(Displayed, Finger):
             Largest width from side to side and largest height from pad to back, from that crease on. [mm]
         stratum_corneum_mm, living_epidermis_mm, dermis_mm : float, optional
             Thicknesses of the layers. [mm]
-
-        Raises
-        ------
-        InputError
-            If the preset is unknown, a measure is in another unit, or bone and layers do not fit.
 
         Examples
         --------
@@ -408,10 +397,6 @@ class Fingertip(Displayed, Finger):
         ----------
         points_mm : array (..., 3)
             x, y and z. [mm]
-
-        Returns
-        -------
-        array (...)
         """
         return self._level_and_gradient(np.asarray(points_mm, dtype=np.float64))[0]
 
@@ -442,22 +427,12 @@ class Fingertip(Displayed, Finger):
         return gradient / np.linalg.norm(gradient, axis=-1, keepdims=True)
 
     def skin_point(self, x_mm: ArrayLike, z_mm: ArrayLike) -> FloatArray:
-        """Point of the volar skin at each (x, z).
+        """Points (..., 3) of the volar skin at each (x, z). [mm]
 
         Parameters
         ----------
         x_mm, z_mm : array (...)
             Position seen from the volar side. [mm]
-
-        Returns
-        -------
-        array (..., 3)
-            Points of the skin. [mm]
-
-        Raises
-        ------
-        InputError
-            If a position lies beside the finger.
 
         Examples
         --------
@@ -484,11 +459,6 @@ class Fingertip(Displayed, Finger):
     def depth_available_mm(self, x_mm: ArrayLike, z_mm: ArrayLike) -> FloatArray:
         """Distance along y from the volar skin at (x, z) to the bone or, beside it, the dorsal skin [mm].
 
-        Raises
-        ------
-        InputError
-            If a position lies beside the finger.
-
         Examples
         --------
         >>> float(Fingertip().depth_available_mm(17.37, 0.0).round(1))
@@ -503,22 +473,12 @@ class Fingertip(Displayed, Finger):
         return np.where(square > 0.0, bone_y - y, through)
 
     def skin_distance_mm(self, origins_mm: FloatArray, directions: FloatArray) -> FloatArray:
-        """Distance from points inside to the skin along unit directions: Newton's method in a bracket.
+        """Distance (...) from points inside to the skin along unit directions, by Newton's method. [mm]
 
         Parameters
         ----------
         origins_mm, directions : array (..., 3)
             Rays; every origin lies inside the skin. [mm], [1]
-
-        Returns
-        -------
-        array (...)
-            Distance to the skin. [mm]
-
-        Raises
-        ------
-        InputError
-            If an origin lies outside.
         """
         if (self.level(origins_mm) >= 0.0).any():
             raise InputError("Every origin of a ray must lie inside the skin: at least one does not.")
@@ -539,17 +499,12 @@ class Fingertip(Displayed, Finger):
         return distance
 
     def bone_distance_mm(self, origins_mm: FloatArray, directions: FloatArray) -> FloatArray:
-        """Distance from points of the bone's axis to its surface along unit directions, closed form.
+        """Distance (...) from the bone's axis to its surface along unit directions, closed form. [mm]
 
         Parameters
         ----------
         origins_mm, directions : array (..., 3)
             Rays at right angles to the axis, or from its end in any distal direction. [mm], [1]
-
-        Returns
-        -------
-        array (...)
-            Distance to the surface of the bone. [mm]
         """
         cap_mm = self.bone_tip_x_mm - self.spine_end_x_mm
         length = np.where(origins_mm[..., 0] < self.spine_end_x_mm, np.inf, cap_mm)
@@ -581,7 +536,6 @@ def _paper() -> Fingertip:
 
 
 def _aged() -> Fingertip:
-    """Thinner living epidermis and dermis."""
     finger, decades = _paper(), fingers.AGED_DECADES.value
     return replace(
         finger,

@@ -39,17 +39,14 @@ class FreeMesh(Mesh):
 
     @property
     def is_grid(self) -> bool:
-        """No."""
         return False
 
     @cached_property
     def skin_faces(self) -> IntArray:
-        """Corners of the faces on the skin, (n_faces, 4)."""
         return self.skin_grid
 
     @property
     def skin_elements(self) -> IntArray:
-        """Element of each of `skin_faces`."""
         return self.outer_elements
 
     @cached_property

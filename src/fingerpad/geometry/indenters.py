@@ -157,7 +157,6 @@ class Indenter(metaclass=KnownKeywords):
 
 
 def _content(body: Indenter) -> tuple[object, ...]:
-    """Fields of a body as values that compare."""
     values: list[object] = [getattr(body, part.name) for part in fields(body)] if is_dataclass(body) else []
     return tuple(
         (value.shape, value.dtype.str, (value + 0).tobytes()) if isinstance(value, np.ndarray) else value
@@ -208,7 +207,6 @@ def rounded(
 
 
 def _of_diameter(radius_mm: float) -> dict[str, float]:
-    """Diameter of a round body from its radius."""
     return {"diameter_mm": 2 * positive("radius_mm", radius_mm, "mm")}
 
 

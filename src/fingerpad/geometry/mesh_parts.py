@@ -207,7 +207,6 @@ class _Making:
         return np.unique(place[there])
 
     def layers(self) -> IntArray:
-        """Layer of every element."""
         layer = np.full(len(self.parts.elements), -1, dtype=np.int64)
         for number, name in enumerate(LAYERS):
             members = self.found(name, self.parts.element_sets)
@@ -439,7 +438,6 @@ def _skin_up(elements: IntArray, faces: IntArray, owners: IntArray) -> IntArray:
 
 
 def _above_dermis(mesh: FreeMesh) -> IntArray:
-    """Elements of the living epidermis that stand on the dermis."""
     faces = np.sort(mesh.elements[:, FACES], axis=2)
     above, below = (np.flatnonzero(mesh.layer == LAYERS.index(name)) for name in LAYERS[1:3])
     standing = {tuple(face) for element in faces[below].tolist() for face in element if len(set(face)) > 2}

@@ -44,7 +44,6 @@ def scaled_jacobian(mesh: Mesh) -> FloatArray:
 
 
 def element_place(mesh: Mesh, element: int) -> str:
-    """Describe an element by its number, layer and middle."""
     layer = int(mesh.layer[element])
     name = LAYERS[layer] if 0 <= layer < len(LAYERS) else f"layer {layer}"
     x, y, z = mesh.nodes_mm[mesh.elements[element]].mean(axis=0)

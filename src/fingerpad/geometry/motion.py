@@ -216,11 +216,6 @@ class RampAndHold(_OneRamp):
     hold_ms : float
         Duration of the hold. [ms]
 
-    Raises
-    ------
-    InputError
-        If a value is not a finite number above zero.
-
     Examples
     --------
     >>> motion = RampAndHold(depth_mm=1.0, ramp_ms=50.0, hold_ms=950.0)
@@ -251,11 +246,6 @@ class ForceRampAndHold(_OneRamp):
         Duration of the ramp. [ms]
     hold_ms : float
         Duration of the hold. [ms]
-
-    Raises
-    ------
-    InputError
-        If a value is not a finite number above zero.
 
     Examples
     --------

@@ -61,11 +61,6 @@ def sampled(
     phases : sequence of Phase, optional
         As of `Trajectory`.
 
-    Raises
-    ------
-    InputError
-        If a function jumps or does not return a finite number, or the trajectory cannot be.
-
     Examples
     --------
     >>> motion = sampled(1000.0, lambda t: min(t / 80.0, 1.0))

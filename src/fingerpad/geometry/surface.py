@@ -308,16 +308,6 @@ def height_surface(
     smooth_below_deg, edge_radius_mm : float
         As of `Surface`. [degrees], [mm]
 
-    Returns
-    -------
-    Surface
-        Two triangles per cell, and walls below the border.
-
-    Raises
-    ------
-    InputError
-        If there are fewer than 2 by 2 heights or more than 2,000,000, or one is not finite.
-
     Examples
     --------
     >>> ripples = 0.2 * np.cos(np.arange(-5, 5.01, 0.1) * 2 * np.pi / 2.5) * np.ones((101, 1))

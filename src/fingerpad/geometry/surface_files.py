@@ -72,11 +72,6 @@ def read_surface(
         Where the middle of the body's extent lies, along and across the finger, from the indenter's axis.
     smooth_below_deg : float
         Hollow creases between triangles of a smaller angle are rounded; see `Surface`. [degrees]
-
-    Raises
-    ------
-    InputError
-        If the file cannot be read as triangles, has vertices that are not finite, or is of an unlikely size.
     """
     file = path_of("path", path)
     factor = UNITS_MM[one_of("unit", unit, tuple(UNITS_MM))] * positive("scale", scale)
@@ -128,7 +123,7 @@ def read_height_map(
     smooth_below_deg: float = SMOOTH_BELOW_DEG,
     edge_radius_mm: float = 0.0,
 ) -> Surface:
-    """Read a map of heights towards the skin, centred on the indenter's axis.
+    """Read a map of heights towards the skin, without sides or back, centred on the indenter's axis.
 
     Rows run across the finger and columns along it.
 
@@ -144,17 +139,6 @@ def read_height_map(
         images, whichever of them is stored as 0. [mm]
     smooth_below_deg : float
         Hollow creases between triangles of a smaller angle are rounded; see `Surface`. [degrees]
-
-    Returns
-    -------
-    Surface
-        Open: it has no sides and no back.
-
-    Raises
-    ------
-    InputError
-        If the file cannot be read, is no plane of finite numbers, holds points x, y, z, has more than
-        2,000,000 heights, or all are equal.
     """
     file = path_of("path", path)
     positive("pitch_mm", pitch_mm, "mm")

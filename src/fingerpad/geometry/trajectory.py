@@ -180,7 +180,6 @@ class Trajectory(Motion):
             self._check_cycles(self.cycles)
 
     def _check_cycles(self, cycles: Cycles) -> None:
-        """Check that every cycle has the same samples."""
         times, near = np.array(self.times_ms), SAME_SPEED * cycles.period_ms
         inside = (times > cycles.start_ms + near) & (times < cycles.end_ms + near)
         if inside.any() and inside.sum() % cycles.count == 0 and np.isclose(times, cycles.start_ms).any():
@@ -271,7 +270,6 @@ class Trajectory(Motion):
 
     @property
     def _course(self) -> FloatArray:
-        """`course_at` of all samples, (n_samples, 5)."""
         ways = np.array([pose.way for pose in self.poses])
         prescribed = np.array(self.prescribed) / self.largest
         return np.column_stack([prescribed, np.broadcast_to(ways, (prescribed.size, 4))])

@@ -62,12 +62,6 @@ def read_trajectory(
         All samples; `reduced` leaves out those that are not needed. Before contact a recording has noise: a
         first depth or force of up to 2 % of the largest is taken as 0, and so is a force as far below 0.
 
-    Raises
-    ------
-    InputError
-        If the file cannot be read, a column or its unit is unknown, an entry is missing or no finite number,
-        times do not increase or leave a gap, or the motion cannot be; with the line and the column.
-
     Examples
     --------
     >>> from tempfile import TemporaryDirectory
@@ -111,11 +105,6 @@ def recorded(file: Path, first_touch_mm: float = 0.0, tolerance: float = TOLERAN
         Reading of the depth at first touch. [mm]
     tolerance : float, optional
         Samples this close to a line, relative to the extent of the motion, are left out; 0 keeps all.
-
-    Raises
-    ------
-    InputError
-        As of `read_trajectory`.
     """
     motion = read_trajectory(file, first_touch_mm=first_touch_mm)
     return reduced(motion, tolerance) if tolerance else motion

@@ -55,7 +55,6 @@ def _text(content: bytes) -> str:
 
 
 def _numbers(words: Any, place: str) -> FloatArray:
-    """Rows of words as rows of numbers."""
     try:
         return np.array(words, dtype=np.float64)
     except ValueError as error:
@@ -185,7 +184,6 @@ _Element = tuple[str, int, list[tuple[str, str, str]]]
 
 
 def _ply_header(text: str) -> tuple[str | None, list[_Element]]:
-    """Order of the bytes, None for text, and the elements."""
     orders = {"ascii": None, "binary_little_endian": "<", "binary_big_endian": ">"}
     order: str | None = ""
     elements: list[_Element] = []

@@ -48,12 +48,10 @@ MOST_EVALUATIONS = 600
 
 
 def fitted_four(numbers: FloatArray) -> FloatArray:
-    """Return the four identifiable parameters of the four numbers of a fit."""
     return np.array([numbers[0] / numbers[3], *numbers[1:]])
 
 
 def fitted_six(numbers: FloatArray) -> FloatArray:
-    """Return the six parameters of the four numbers of a fit."""
     return six_parameters(fitted_four(numbers))
 
 
@@ -82,12 +80,10 @@ def bounds_of(*drives: Drive) -> Bounds:
 
 
 def and_offset(bounds: Bounds, low_mm: float = OFFSETS_MM[0], high_mm: float = OFFSETS_MM[-1]) -> Bounds:
-    """Return the bounds of the same parameters and the offset of the receptor. [mm]"""
     return bounds.and_one(OFFSET_SCALE_MM, low_mm, high_mm)
 
 
 def by_differences(bounds: Bounds) -> LeastSquares:
-    """Make the method of least squares from starts within the bounds, with differences."""
     return LeastSquares(bounds.spread(N_STARTS), bounds, n_refined=N_REFINED)
 
 

@@ -35,7 +35,6 @@ IDENTIFIABLE_UNITS = ("1/ms", "1/kPa", "1/(kPa ms)", "ms")
 
 
 def identifiable(parameters: ArrayLike) -> FloatArray:
-    """Return the four identifiable parameters."""
     six = _rows("parameters", parameters, PARAMETER_NAMES)
     scale = six[..., 4:5] * six[..., 5:6]
     if (six[..., 4:] <= 0.0).any():

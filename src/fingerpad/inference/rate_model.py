@@ -107,12 +107,6 @@ class AfferentModel(metaclass=KnownKeywords):
     initial_mv : float, optional
         Potential at the start, as of `Afferent`: that at rest by default. [mV]
 
-    Raises
-    ------
-    InputError
-        If a stimulus ends before a window does, windows are not given where the phases of the stimuli differ,
-        or the refractory period is negative.
-
     Examples
     --------
     >>> short = SedTraces([0.0, 50.0, 1000.0], [[0.0], [2.0], [2.0]], kinks_ms=[50.0])
@@ -178,11 +172,6 @@ class AfferentModel(metaclass=KnownKeywords):
             consecutively.
         windows_ms, refractory_ms, initial_mv
             As of the class.
-
-        Raises
-        ------
-        InputError
-            As the class, or if the traces differ in the quantity of the dynamic term.
         """
         traces = [sed] if isinstance(sed, SedTraces) else list(sed)
         quantities = sorted({f"{trace.dynamic_quantity} and {trace.static_quantity}" for trace in traces})
@@ -261,7 +250,6 @@ class Reparametrised:
         return self.model.n_stimuli
 
     def evaluate(self, parameters: FloatArray) -> Rates:
-        """Rates (n_stimuli,) for one set of the new parameters. [spikes/s]"""
         return self.model.evaluate(self.transform(parameters))
 
     def evaluate_batch(self, points: FloatArray) -> Rates:

@@ -65,7 +65,6 @@ class RatesAndHitRates:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Names of the parameters."""
         return self.rates.names
 
     @property

@@ -23,7 +23,6 @@ PREDICTED_PRESENTATIONS = 20
 
 
 def soft_membrane(driven: Drive, parameters: FloatArray) -> tuple[EscapeRate, CurrentTraces]:
-    """Return the membrane and the current of an afferent with a soft threshold."""
     afferent = Afferent.from_parameters(six_parameters(parameters[:4]))
     return EscapeRate(afferent.membrane, float(parameters[4])), afferent.transduction.current(driven)
 
@@ -54,7 +53,6 @@ class SoftAfferent:
 
     @property
     def n_stimuli(self) -> int:
-        """Number of columns of the drive."""
         return self.drive.n_sites
 
     def evaluate(self, parameters: FloatArray) -> Rates:

@@ -93,8 +93,6 @@ def fit_spikes(recorded: SpikeLikelihood, start: ArrayLike, most_steps: int = 10
 
     Raises
     ------
-    InputError
-        If there are fewer spikes than parameters, or the start is invalid.
     ConvergenceError
         If the fit does not converge or has no maximum: perfectly regular spikes determine no width, and equal
         stimuli do not determine all gains.

@@ -66,11 +66,6 @@ class SpikeLikelihood:
     escape_ms : float, optional
         tau_e, a convention. [ms]
 
-    Raises
-    ------
-    InputError
-        If shapes disagree, a spike is outside of its recording, or two are closer than the refractory period.
-
     Examples
     --------
     Without a stimulus, with an intercept that keeps the potential at the threshold: 1 spike per tau_e.
@@ -136,11 +131,6 @@ class SpikeLikelihood:
         parameters : array_like (5,)
             beta/(C v) [1/ms], k_d/(C v) [1/kPa], k_s/(C v) [1/(kPa ms)], tau [ms] and the width of the
             threshold over the threshold [1].
-
-        Raises
-        ------
-        InputError
-            If there are not five finite numbers, or tau or the width is not positive.
         """
         return self.derivatives(parameters)[0]
 
@@ -159,11 +149,6 @@ class SpikeLikelihood:
             With respect to the parameters, per unit of each.
         information : array (5, 5)
             Fisher information given the spikes; its inverse estimates the covariance of a fit.
-
-        Raises
-        ------
-        InputError
-            As in `log_likelihood`.
         """
         natural = checked_spike_parameters(parameters)
         value, gradient, information = self.canonical_derivatives(canonical(natural))
@@ -185,7 +170,7 @@ class SpikeLikelihood:
         return value, gradient, half + np.triu(half, 1).T
 
     def operational_times(self, parameters: ArrayLike) -> FloatArray:
-        """Integral of the hazard up to each spike, over all trains in sequence.
+        """Integral (n_spikes,) of the hazard up to each spike, over all trains in sequence.
 
         Under the true parameters these are the events of a Poisson process of rate 1: their differences are
         independent and exponential with mean 1, also across the ends of recordings.
@@ -194,21 +179,11 @@ class SpikeLikelihood:
         ----------
         parameters : array_like (5,)
             As in `log_likelihood`.
-
-        Returns
-        -------
-        array (n_spikes,)
-
-        Raises
-        ------
-        InputError
-            As in `log_likelihood`.
         """
         numbers = canonical(checked_spike_parameters(parameters))
         return operational_times(*self._part(slice(0, len(self.trains))), numbers, float(self.escape_ms))
 
     def _part(self, trains: slice) -> tuple[FloatArray, np.ndarray]:
-        """Intervals of some trains."""
         values, flags, offsets = self._intervals
         intervals = slice(offsets[trains.start], offsets[trains.stop])
         return values[intervals], flags[intervals]
@@ -236,11 +211,6 @@ def time_rescaling(recorded: SpikeLikelihood, parameters: ArrayLike) -> TimeResc
         The trains.
     parameters : array_like (5,)
         As in `SpikeLikelihood.log_likelihood`.
-
-    Raises
-    ------
-    InputError
-        If there is no spike, or the parameters are invalid.
 
     Examples
     --------

@@ -42,11 +42,9 @@ class TypedModel:
 
     @property
     def n_stimuli(self) -> int:
-        """Number of stimuli, one per column of the traces."""
         return sum(traces.n_sites for traces in self.traces)
 
     def at(self, parameters: FloatArray) -> AnyAfferent:
-        """Return the afferent with other numbers."""
         factors = zip(self.names, np.exp(parameters).tolist(), strict=True)
         numbers: dict[str, Any] = {name: getattr(self.afferent, name) * factor for name, factor in factors}
         return cast(AnyAfferent, replace(cast(Any, self.afferent), **numbers))
@@ -122,11 +120,6 @@ def fit_afferent(
         Fold of each stimulus from 0; by default in turn to six, or one per stimulus where there are fewer.
     windows_ms : ((float, float), (float, float)), optional
         Windows of the dynamic and of the static rate; by default those of `rate_windows_ms`. [ms]
-
-    Raises
-    ------
-    InputError
-        If the afferent has no such number, it is not above 0, or traces and recordings differ in size.
 
     Examples
     --------

@@ -225,7 +225,6 @@ def _chain(inner, value, first, second, result):  # type: ignore[no-untyped-def]
 
 @njit(cache=True)
 def _product(left, right, result):  # type: ignore[no-untyped-def]
-    """Write left * right."""
     result[0] = left[0] * right[0]
     for k in range(4):
         result[1 + k] = left[0] * right[1 + k] + right[0] * left[1 + k]

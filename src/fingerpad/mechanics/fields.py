@@ -60,7 +60,6 @@ class ElementFields:
     """
 
     def of(self, elements: np.ndarray) -> ElementFields:
-        """Return the fields of some of the elements, by their numbers in the mesh."""
         order = np.argsort(self.elements)
         rows = order[np.searchsorted(self.elements, elements, sorter=order)]
         return ElementFields(
@@ -212,7 +211,6 @@ class Watched:
 def cauchy_stress(
     mesh: Mesh, displacement_mm: FloatArray, table: MaterialTable, history: StressHistory
 ) -> FloatArray:
-    """Mean Cauchy stress of all elements of a mesh."""
     n = len(mesh.elements)
     stress, gradient = np.empty((n, 6)), np.empty((n, 3, 3))
     # Writable copies, as those of `Watched`: Numba then compiles one signature for both.

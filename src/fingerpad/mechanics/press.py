@@ -158,13 +158,11 @@ class _Press:
     newton_steps: int = 0
 
     def contact_at(self, time_ms: float) -> Contact:
-        """Contact with the indenter where it stands at a time."""
         if self.stimulus.stays:
             return self.contact
         return replace(self.contact, placement=self.contact.placement.moved(self.stimulus.pose_at(time_ms)))
 
     def unloaded(self) -> _Moment:
-        """Return the moment before the first step."""
         mesh, table = self.body.mesh, self.body.table
         nowhere, no_force = np.zeros_like(mesh.nodes_mm), np.zeros(self.contact.stiffness.size)
         touch = self.contact.state(self.contact.points_mm(mesh.nodes_mm), 0.0, no_force)
@@ -378,7 +376,6 @@ class _Press:
 
 
 def length_ms(start_ms: float, end_ms: float) -> float:
-    """Length of a step. [ms]"""
     return round(end_ms - start_ms, SAME_DIGITS)
 
 
@@ -394,7 +391,6 @@ def press(
     friction: float = 0.0,
     finest_mm: float = np.inf,
 ) -> Deformation:
-    """Solve a whole ramp and hold."""
     settings = settings or PressSettings()
     check_mesh(mesh, len(materials))
     _check_bone(mesh, indenter, placement, stimulus)
@@ -512,7 +508,6 @@ def _moments(job: _Press, settings: PressSettings, times: FloatArray) -> Iterato
 
 
 def _solved(job: _Press, settings: PressSettings, times: FloatArray, start: _Moment) -> Iterator[_Moment]:
-    """Solved times after a moment."""
     stimulus, mesh = job.stimulus, job.body.mesh
     receptors = mesh.living_epidermis.ravel()
     where = receptors if receptors.size else np.arange(len(mesh.elements))

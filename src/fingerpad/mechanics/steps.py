@@ -150,7 +150,6 @@ def _adapt(
     step: Step[Reached],
     stop: Stop[Reached],
 ) -> Iterator[Reached]:
-    """Choose the steps of one phase."""
     # The first two are equal and judged together: it takes three moments to see a curvature, and the speed
     # changes at the start of a phase.
     whole_ms = phase.end_ms - start.time_ms

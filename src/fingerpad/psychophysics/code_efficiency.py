@@ -72,11 +72,6 @@ def noisy_presentations(
         Standard deviation sigma_1 of the multiplicative noise, above 0.
     seed, session : int
         Of the random numbers.
-
-    Returns
-    -------
-    list of Presentation
-        One per comparison.
     """
     standard, *comparisons = (multiplied_responses(row, noise_sigma, SMALLEST_SPREAD) for row in table)
     return [present(standard, comparison, seed, EFFICIENCY_TRIALS, session) for comparison in comparisons]

@@ -100,7 +100,6 @@ class Experiment:
 
     @property
     def sums_per_sphere(self) -> tuple[int, int]:
-        """Distributions per sphere, and gradient sums behind each of them."""
         if self.criterion_sigma > 0.0:
             return 1, self.presentations_varied
         return self.distributions, self.presentations
@@ -140,12 +139,6 @@ def discriminate_gradient_sum(
     -------
     HitRates
         One mean and standard deviation per comparison, mu_3 and sigma_3.
-
-    Raises
-    ------
-    InputError
-        If there are fewer than two spheres, no receptor responds, neighbours are not receptors, the noise,
-        the seed or the session is negative, or a response is not finite and no `silent_value` is given.
 
     Examples
     --------

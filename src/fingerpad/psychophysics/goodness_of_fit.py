@@ -58,8 +58,6 @@ def goodness_of_fit(fit: PsychometricFit, seed: int, n_replicates: int = 1000) -
 
     Raises
     ------
-    InputError
-        If a number is not whole or not positive.
     ConvergenceError
         If a replicate cannot be fitted.
 

@@ -70,11 +70,6 @@ def discriminability(standard: ArrayLike, comparison: ArrayLike) -> Discriminabi
     Discriminability
         The standard error is that of DeLong, DeLong & Clarke-Pearson 1988.
 
-    Raises
-    ------
-    InputError
-        If there are fewer than two values for a stimulus.
-
     Examples
     --------
     >>> discriminability([1.0, 2.0, 3.0, 4.0], [2.5, 3.5, 4.5, 5.5]).proportion_correct
@@ -150,11 +145,6 @@ def present(
     session : int, optional
         Sessions of one seed share no random number.
 
-    Raises
-    ------
-    InputError
-        If the numbers of receptors differ, or there are fewer than two trials.
-
     Examples
     --------
     >>> from fingerpad.psychophysics.response_models import multiplied_responses
@@ -219,7 +209,7 @@ def efficiency(code: Discriminability, ideal: Discriminability) -> tuple[float, 
 def gaussian_information(
     responses: ArrayLike, slopes: ArrayLike, noise_sigma: float, smallest_spread: float = 0.0
 ) -> float:
-    """Fisher information of responses with the paper's noise, the limit of the ideal observer.
+    """Fisher information J with the paper's noise, the limit of the ideal observer. [1/unit of x squared]
 
         V_i = (sigma_1 mu_i)^2 + s^2
         J = sum_i mu_i'^2 / V_i + 2 (sigma_1^2 mu_i mu_i' / V_i)^2,    d' -> dx sqrt J,  dx > 0
@@ -237,16 +227,6 @@ def gaussian_information(
         Standard deviation sigma_1 of the multiplicative noise.
     smallest_spread : float, optional
         Noise floor s. [unit of `responses`]
-
-    Returns
-    -------
-    float
-        J. [1/unit of x squared]
-
-    Raises
-    ------
-    InputError
-        If sizes differ, the noise is not positive, the floor negative, or a response zero without a floor.
 
     Examples
     --------

@@ -62,7 +62,6 @@ class Model:
 
     @property
     def free(self) -> np.ndarray:
-        """Free parameters (5,)."""
         return self.upper > self.lower
 
     def proportions(self, points: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:

@@ -39,7 +39,6 @@ def session_trials(session: int, *shape: int) -> IntArray:
 def noisy_responses(
     responses: FloatArray, noise_sigma: float, seed: int, trials: IntArray, presentations: int
 ) -> FloatArray:
-    """Sample noisy presentations of every stimulus, step (a)."""
     draws = normals(seed, trials, responses.shape[1], Purpose.RESPONSE, presentations)
     return responses[:, np.newaxis] * (1.0 + noise_sigma * draws.transpose(0, 2, 1))
 
@@ -120,7 +119,6 @@ def _fill_shared(values, pairs, sigma, standard_normals, sums):  # type: ignore[
 
 @njit(cache=True, nogil=True)
 def _multiply(responses, sigma, draws, noisy):  # type: ignore[no-untyped-def]
-    """Write noisy responses (n_receptors, n_draws) (a)."""
     for receptor in range(responses.size):
         for k in range(draws.shape[1]):
             noisy[receptor, k] = responses[receptor] * (1.0 + sigma * draws[receptor, k])

@@ -51,11 +51,6 @@ class GaussianResponses:
     covariance : array (n_receptors, n_receptors)
         S. [unit squared]
 
-    Raises
-    ------
-    InputError
-        If shapes do not match or the covariance is not positive definite.
-
     Examples
     --------
     >>> one = GaussianResponses([0.0], [[1.0]])

@@ -64,11 +64,6 @@ def sensitivity(
     spread_ratio : float, optional
         s, standard deviation without the signal over that with it: 1 gives d', others d_a.
 
-    Raises
-    ------
-    InputError
-        If counts are not possible, the correction is unknown, or it is "none" and a rate is 0 or 1.
-
     Examples
     --------
     >>> found = sensitivity(84, 100, 16, 100, correction="none")

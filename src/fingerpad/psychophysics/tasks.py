@@ -33,22 +33,12 @@ _REACH, _POINTS = 9.0, 361
 
 
 def yes_no(d_prime: float) -> float:
-    """Return the proportion correct in yes-no: one look is judged "standard" or "comparison".
+    """Proportion correct in yes-no: one look is judged "standard" or "comparison". [0.5-1]
 
     Parameters
     ----------
     d_prime : float
         Not negative. [standard deviations]
-
-    Returns
-    -------
-    float
-        [0.5-1]
-
-    Raises
-    ------
-    InputError
-        If d' is negative.
 
     Examples
     --------
@@ -59,7 +49,7 @@ def yes_no(d_prime: float) -> float:
 
 
 def forced_choice(d_prime: float, alternatives: int = 2) -> float:
-    """Return the proportion correct in forced choice: one of several looks is the comparison.
+    """Proportion correct in forced choice: one of several looks is the comparison. [1/m-1]
 
     Parameters
     ----------
@@ -67,16 +57,6 @@ def forced_choice(d_prime: float, alternatives: int = 2) -> float:
         Not negative. [standard deviations]
     alternatives : int, optional
         m, two or more.
-
-    Returns
-    -------
-    float
-        [1/m-1]
-
-    Raises
-    ------
-    InputError
-        If d' is negative or there are fewer than two alternatives.
 
     Examples
     --------
@@ -92,7 +72,7 @@ def forced_choice(d_prime: float, alternatives: int = 2) -> float:
 
 
 def same_different_by_difference(d_prime: float, criterion: float | None = None) -> float:
-    """Return the proportion correct in "same or different?" by the difference of the two looks.
+    """Proportion correct in "same or different?" by the difference of the two looks. [0.5-1 at the best k]
 
     The observer says "different" if the looks differ by more than k, either way.
 
@@ -102,16 +82,6 @@ def same_different_by_difference(d_prime: float, criterion: float | None = None)
         Not negative. [standard deviations]
     criterion : float, optional
         k. Default: the optimum, at which both responses are equally likely. [standard deviations]
-
-    Returns
-    -------
-    float
-        Mean of the rates correct for equal and for different pairs. [0.5-1 at the best criterion]
-
-    Raises
-    ------
-    InputError
-        If d' or k is negative.
 
     Examples
     --------
@@ -145,7 +115,7 @@ _SMALL = 1e-12
 
 
 def same_different_by_looks(d_prime: float) -> float:
-    """Return the proportion correct in "same or different?" where each look is judged by itself.
+    """Proportion correct in "same or different?" where each look is judged by itself. [0.5-1]
 
     This is optimal if the two stimuli are the same in every trial.
 
@@ -153,16 +123,6 @@ def same_different_by_looks(d_prime: float) -> float:
     ----------
     d_prime : float
         Not negative. [standard deviations]
-
-    Returns
-    -------
-    float
-        [0.5-1]
-
-    Raises
-    ------
-    InputError
-        If d' is negative.
 
     Examples
     --------
@@ -184,7 +144,7 @@ TASKS: dict[str, Callable[[float], float]] = {
 
 @known_keywords
 def d_prime_of_proportion(proportion_correct: float, task: Callable[[float], float] = forced_choice) -> float:
-    """Return the d' for which a task has a proportion correct.
+    """Return the d' for which a task has a proportion correct. [standard deviations]
 
     Parameters
     ----------
@@ -192,16 +152,6 @@ def d_prime_of_proportion(proportion_correct: float, task: Callable[[float], flo
         At least the chance level, below 1. [0-1]
     task : callable, optional
         One of `TASKS`, or any increasing function of d'.
-
-    Returns
-    -------
-    float
-        [standard deviations]
-
-    Raises
-    ------
-    InputError
-        If the proportion is below chance, or so near 1 that d' exceeds `LARGEST_D_PRIME`.
 
     Examples
     --------

@@ -79,15 +79,6 @@ class FunctionCloud:
             "threshold" is where F is one half.
         probability : float, optional
             Coverage of the true value. [0-1]
-
-        Returns
-        -------
-        (float, float)
-
-        Raises
-        ------
-        InputError
-            If there is no such parameter, or the probability is not within 0 ... 1.
         """
         one_of("parameter", parameter, PARAMETERS)
         return self._central(self.values[:, PARAMETERS.index(parameter)], probability)
@@ -108,11 +99,6 @@ class FunctionCloud:
         -------
         (float, float)
             An end is infinite if too many of the functions do not reach that value.
-
-        Raises
-        ------
-        InputError
-            If the proportion or the probability is not within 0 ... 1.
         """
         return self._central(self.thresholds(proportion_correct), probability)
 
@@ -125,7 +111,7 @@ class FunctionCloud:
         return level_at(self.shape, wanted, threshold, width, guess, lapse)
 
     def band(self, levels: ArrayLike, probability: float = 0.95) -> FloatArray:
-        """Central interval of the curve at each level.
+        """Central interval (2, n_levels) of the curve at each level. [0-1]
 
         Parameters
         ----------
@@ -133,16 +119,6 @@ class FunctionCloud:
             [unit of the levels]
         probability : float, optional
             Coverage of the true proportion, level by level. [0-1]
-
-        Returns
-        -------
-        array (2, n_levels)
-            Lower and upper end. [0-1]
-
-        Raises
-        ------
-        InputError
-            If a level does not suit the sigmoid, or the probability is not within 0 ... 1.
         """
         x = checked_levels(levels, self.sigmoid)
         threshold, width, guess, lapse, _ = self.values.T
@@ -181,7 +157,7 @@ def weighted_quantiles(values: ArrayLike, weights: ArrayLike, shares: ArrayLike)
 
 
 def bootstrap(fit: PsychometricFit, seed: int, n_replicates: int = 1000) -> FunctionCloud:
-    """Sample counts from a fit and fit them again, many times.
+    """Sample counts from a fit and fit them again, many times: functions of equal weight.
 
     Parameters
     ----------
@@ -192,15 +168,8 @@ def bootstrap(fit: PsychometricFit, seed: int, n_replicates: int = 1000) -> Func
     n_replicates : int, optional
         Number of repetitions.
 
-    Returns
-    -------
-    FunctionCloud
-        One function per replicate, all of equal weight.
-
     Raises
     ------
-    InputError
-        If a number is not whole or not positive.
     ConvergenceError
         If a replicate cannot be fitted, or the fit is a step: its replicates are steps at the same place.
 
@@ -224,7 +193,6 @@ def bootstrap(fit: PsychometricFit, seed: int, n_replicates: int = 1000) -> Func
 
 
 def drawn_counts(fit: PsychometricFit, seed: int, n_replicates: int) -> FloatArray:
-    """Sample counts (n_replicates, n_levels) from a fit."""
     instance("fit", fit, PsychometricFit)
     whole("n_replicates", n_replicates, at_least=1)
     expected = fit.predict(fit.counts.levels)
@@ -238,17 +206,12 @@ def drawn_counts(fit: PsychometricFit, seed: int, n_replicates: int) -> FloatArr
 
 
 def posterior(fit: PsychometricFit) -> FunctionCloud:
-    """Posterior of the fitted parameters, by Bayes' rule on a grid.
+    """Posterior of the fitted parameters, by Bayes' rule on a grid: functions with weights.
 
     Parameters
     ----------
     fit : PsychometricFit
         Counts, and the bounds of the flat priors.
-
-    Returns
-    -------
-    FunctionCloud
-        Functions of the grid, weighted by their posterior probability.
 
     Examples
     --------

@@ -73,8 +73,6 @@ def reduce_touch(
 
     Raises
     ------
-    InputError
-        If a pose cannot be pressed so deep, or there are too few touches for the error.
     ConvergenceError
         If a press cannot be solved.
 
@@ -191,7 +189,6 @@ def _relative(model: ReducedModel, rows: Iterable[_Row]) -> FloatArray:
 def streamed(
     model: ReducedModel, skin: SkinResponse, shape: Iterable[float] = ()
 ) -> tuple[FloatArray, FloatArray, bool]:
-    """Compare a reduced touch with a full one."""
     rows = list(_compared(model, skin, shape))
     wrong, known = (np.max([getattr(row, name) for row in rows], axis=0) for name in ("wrong", "known"))
     return wrong, known, bool((_relative(model, rows) <= model.error).all())

@@ -79,12 +79,6 @@ def read_reduced(path: str | Path, touch: Touch | None = None) -> ReducedModel:
         A file of `write_reduced` or of `fingerpad reduce`.
     touch : Touch, optional
         If given, its finger and tissues must be those of the file.
-
-    Raises
-    ------
-    InputError
-        If the file cannot be read, is none of these, is damaged, has another version, or holds another
-        finger or other tissues.
     """
     if touch is not None:
         instance("touch", touch, Touch)

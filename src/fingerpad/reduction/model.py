@@ -173,10 +173,6 @@ class ReducedModel(metaclass=KnownKeywords):
             Depth below first touch. [mm]
         behind_mm : array (n_levels,)
             How far the skin of each level stays behind. [mm]
-
-        Returns
-        -------
-        array (1 + n_branches, n_terms)
         """
         depth = np.array(depth_mm)
         once_of, relaxed_of = self._slope_changes
@@ -198,7 +194,6 @@ def fitted_model(
     responses: Sequence[Sequence[SkinResponse]],
     quantities: tuple[str, ...],
 ) -> ReducedModel:
-    """Fit a model to the presses of all poses."""
     touch = poses[0].touches[0]
     finger = cast(Fingertip, touch.finger)
     constants = np.unique([time for law in touch.tissues.layers for time in law.prony.times_ms])

@@ -61,7 +61,6 @@ class Springs:
         shares: FloatArray,
         kept: float = 1.0,
     ) -> Springs:
-        """Springs after a step."""
         a, b, gamma = (each[:, None] for each in filter_step(step_ms, times_ms))
         known = kept * (b * shares[:, None] * self.way_mm + gamma * self.relaxed_mm)
         now = a * shares[:, None]

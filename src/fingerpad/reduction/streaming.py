@@ -96,11 +96,6 @@ class ReducedTouch(metaclass=KnownKeywords):
         x and z of the end organs, as of `SkinResponse.sed`. [mm]
     parameter : float, optional
         The parameter of the indenter, if the model has one.
-
-    Raises
-    ------
-    InputError
-        If `receptors_mm` is no array of pairs, or the parameter is missing or out of range.
     """
 
     def __init__(self, model: ReducedModel, receptors_mm: ArrayLike, parameter: float | None = None):
@@ -138,7 +133,7 @@ class ReducedTouch(metaclass=KnownKeywords):
         z_mm: float = 0.0,
         tilt_deg: float = 0.0,
     ) -> ReducedSample:
-        """Go to a later time and pose, along a straight way from the last one.
+        """Go to a later time and pose, along a straight way, and return what is at the receptors then.
 
         Parameters
         ----------
@@ -148,11 +143,6 @@ class ReducedTouch(metaclass=KnownKeywords):
             Either the depth since first touch at the place of the touch, or the force. [mm, mN]
         x_mm, z_mm, tilt_deg : float
             The pose, as of a `Trajectory`.
-
-        Returns
-        -------
-        ReducedSample
-            What is at the receptors now.
 
         Raises
         ------

@@ -82,12 +82,6 @@ class ReducedRange(metaclass=KnownKeywords):
     values : (float, float), optional
         Its range.
 
-    Raises
-    ------
-    InputError
-        If the depth is not positive, a range is empty or does not hold 0, or one of `parameter` and `values`
-        is missing.
-
     Examples
     --------
     >>> [axis.name for axis in ReducedRange(1.5, x_mm=(-3.0, 3.0)).axes if axis.count > 1]
@@ -174,11 +168,6 @@ class ReducedTraining(metaclass=KnownKeywords):
         The poses.
     resolution : {"quick", "standard", "paper"}
         How fine the mesh is.
-
-    Raises
-    ------
-    InputError
-        If they do not fit each other.
     """
 
     touch: Touch

@@ -65,7 +65,6 @@ class Field:
     """Name in VTU files; empty if it is not exported."""
 
     def shape(self, mesh: Mesh, n_times: int) -> tuple[int, ...]:
-        """Shape of the stored array."""
         sizes = {
             Place.PRESS: (),
             Place.NODE: (len(mesh.nodes_mm),),
@@ -294,7 +293,6 @@ FIELDS: dict[str, Field] = {
 
 
 def stored_fields() -> tuple[Field, ...]:
-    """Fields that a stored indentation holds."""
     return tuple(field for field in FIELDS.values() if field.stored is not Times.NONE)
 
 

@@ -126,7 +126,6 @@ class FreeReceptors:
         return np.concatenate([middles, middles * [1.0, 1.0, -1.0]]), np.concatenate([rows, rows])
 
     def _around(self, organs: FloatArray, normals: FloatArray) -> Interpolation:
-        """Weights of the elements near each end organ."""
         middles, rows = self._middles
         count = min(_NEIGHBOURS, len(middles))
         away, near = cKDTree(middles).query(organs, k=count)

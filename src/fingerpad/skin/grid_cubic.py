@@ -125,7 +125,6 @@ def _add_near(known: FloatArray, first: int, at: int, along: Four, around: Four,
 
 
 def values_at(known: FloatArray, uv: FloatArray, padding: int) -> FloatArray:
-    """Interpolate."""
     return _interpolated(known, uv, padding)
 
 

@@ -215,8 +215,6 @@ class Touch(metaclass=KnownKeywords):
 
         Raises
         ------
-        InputError
-            If a force pushes the indenter deeper than `deepest_mm`, or there are fewer threads.
         ConvergenceError
             If a step cannot be solved.
         """
@@ -348,11 +346,6 @@ def touch_of(
         See `indent`.
     times_ms, whole, progress
         See `indent`; `Touch.solve` uses the last two.
-
-    Returns
-    -------
-    Touch
-        A value that can be solved, stored and compared.
     """
     one_of("resolution", resolution, RESOLUTIONS)
     x, z = _position(at_mm, instance("finger", finger, Finger))
@@ -439,15 +432,8 @@ def indent(
     progress : Progress, optional
         Shown how far the press is, such as `fp.notebook_progress()`.
 
-    Returns
-    -------
-    SkinResponse
-        Force, depth, contact, surface, energies and strain energy density over time.
-
     Raises
     ------
-    InputError
-        If an argument cannot be used: unknown name, depth beyond the finger, indenter beside it.
     ConvergenceError
         If the mechanics cannot be solved.
 
@@ -466,7 +452,6 @@ def indent(
 
 
 def settings_of(resolution: str) -> PressSettings:
-    """Return steps and tolerances of a named resolution."""
     ramp_steps, hold_steps = STEPS[resolution]
     return PressSettings(ramp_steps, hold_steps)
 

@@ -105,8 +105,6 @@ class ReceptorSheet:
         return uv
 
     def read(self, uv: FloatArray, values: FloatArray) -> FloatArray:
-        """Interpolate values of the sheet's elements."""
-
         def at_times(times: slice) -> FloatArray:
             some = np.asarray(values[times], dtype=np.float64).T
             known = some.reshape(*self.mesh.living_epidermis.shape, -1)
@@ -193,7 +191,6 @@ class ReceptorSheet:
 
     @cached_property
     def _closed(self) -> bool:
-        """Whether the columns go all around."""
         grid = self.mesh.skin_grid
         return bool((grid[:, 0] == grid[:, -1]).all())
 
@@ -213,7 +210,6 @@ class ReceptorSheet:
 
     @cached_property
     def _middles(self) -> FloatArray:
-        """(u, v) of all elements, (n_sheet, 2)."""
         return np.argwhere(np.full(self.mesh.living_epidermis.shape, True)).astype(np.float64)
 
     @cached_property
@@ -252,7 +248,6 @@ class ReceptorSheet:
         return self._control(middles, _MIRROR, nodes[-1, 0])
 
     def _wider(self, nodes: FloatArray) -> FloatArray:
-        """Nodes with one more column at either end."""
         if self._closed:
             return np.concatenate([nodes[:, -2:-1], nodes, nodes[:, 1:2]], axis=1)
         ends = [
@@ -265,7 +260,6 @@ class ReceptorSheet:
 
     @cached_property
     def _skin(self) -> Surface:
-        """Points S of the skin."""
         return _surface(self._padded_points(0))
 
     @cached_property
@@ -282,7 +276,6 @@ class ReceptorSheet:
         return _surface(self._padded_points(int(np.flatnonzero(self.mesh.grid[0, 0] == lower)[0])))
 
     def _outward(self, uv: FloatArray) -> FloatArray:
-        """Outward unit normal of the skin, (n, 3)."""
         point, by_u, by_v = self._skin(uv)
         normal = np.cross(by_u, by_v)
         inside_out = ((point - self._border(uv)[0]) * normal).sum(axis=1, keepdims=True) < 0.0
@@ -310,12 +303,10 @@ class ReceptorSheet:
 
 
 def _surface(control: FloatArray) -> Surface:
-    """Surface with these coefficients of its spline."""
     return partial(values_and_slopes_at, control, padding=_PADDING)
 
 
 def _nearest(points: FloatArray, targets: FloatArray) -> IntArray:
-    """Find the number of the nearest point to each target."""
     found: IntArray = cKDTree(points).query(targets, workers=current_threads())[1]
     return found
 

@@ -133,11 +133,6 @@ class SkinResponse(Result):
         What was solved: indenter, motion, tissues.
     onset_ms : float
         Time of first touch. [ms]
-
-    Raises
-    ------
-    InputError
-        If a field is not declared as stored, has the wrong shape or holds a value that is not finite.
     """
 
     mesh: Mesh
@@ -180,13 +175,7 @@ class SkinResponse(Result):
         )
 
     def to_xarray(self, response: ResponseMap | None = None) -> xarray.Dataset:
-        """Return this result, and the response of a population to it, as one labelled data set.
-
-        Raises
-        ------
-        InputError
-            Without the extra `fingerpad[netcdf]`.
-        """
+        """Return this result, and the response of a population to it, as one labelled data set."""
         made: xarray.Dataset = resolve_name("fingerpad.export.dataset:touch_dataset")(self, response)
         return made
 
@@ -295,11 +284,6 @@ class SkinResponse(Result):
         ----------
         time_index : int
             Index into `times_ms`; the last by default.
-
-        Returns
-        -------
-        SurfaceProfile
-            One entry per node of the midline, from proximal to distal.
         """
         row = np.searchsorted(self.mesh.skin_nodes, self.mesh.midline_nodes)
         distance = self.mesh.nodes_mm[self.mesh.midline_nodes, 0] - self.axis_x_mm
@@ -334,12 +318,6 @@ class SkinResponse(Result):
         -------
         SedTraces
             One column per site, with the end of the ramp as kink. [kPa]
-
-        Raises
-        ------
-        InputError
-            If `sites` is not an array of pairs or triples, a site is not on the skin, or the quantity is
-            unknown.
         """
         static, *dynamic = self._read(dict.fromkeys((static_quantity, dynamic_quantity)), sites)
         return SedTraces(
@@ -354,7 +332,7 @@ class SkinResponse(Result):
         )
 
     def sample(self, quantity: str, sites: ArrayLike) -> FloatArray:
-        """Sample a quantity that may drive an afferent, below points of the undeformed skin.
+        """Sample a quantity that may drive an afferent below points of the skin, (n_times, n_sites).
 
         The interpolation is that of `sed`; the stored energy density is one of the quantities.
 
@@ -368,17 +346,6 @@ class SkinResponse(Result):
             "skin_stretch" (largest tensile strain within the surface).
         sites : array (n_sites, 2) or (n_sites, 3)
             x and z of end organs on the volar side, or x, y and z of the skin above them on any side. [mm]
-
-        Returns
-        -------
-        array (n_times, n_sites)
-            Never negative.
-
-        Raises
-        ------
-        InputError
-            If the quantity is unknown, `sites` is not an array of pairs or triples, or a site is not on the
-            skin.
         """
         return self._read([quantity], sites)[0]
 

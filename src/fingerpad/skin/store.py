@@ -255,7 +255,6 @@ def _fault(path: Path) -> str | None:
 
 
 def _said(error: Exception) -> str:
-    """Tell what an error says, on one line."""
     if isinstance(error, OSError) and error.strerror:
         return error.strerror
     said = " ".join(str(error).split()).rstrip(".")
@@ -287,7 +286,6 @@ def _checksum(key: str, content: Mapping[str, np.ndarray]) -> str:
 
 
 def _packed(response: SkinResponse, key: str) -> bytes:
-    """Content of a stored file."""
     content: dict[str, np.ndarray] = {
         field.name: response.fields[field.name].astype(
             np.float64 if field.place is Place.PRESS else np.float32

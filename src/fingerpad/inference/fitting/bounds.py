@@ -34,7 +34,6 @@ class Bounds:
             object.__setattr__(self, name, value)
 
     def and_one(self, scale: float, low: float, high: float) -> Bounds:
-        """Return the bounds of the same parameters and one more."""
         further = ((self.scales, scale), (self.low, low), (self.high, high))
         return Bounds(*(np.append(side, entry) for side, entry in further))
 

@@ -29,7 +29,6 @@ class FoldFit:
 
     @property
     def score_train(self) -> float:
-        """Score on the training set."""
         return self.fit.score
 
 

@@ -69,7 +69,6 @@ class LeastSquares:
         return best_of((*(self._refined(problem, chosen, starts[row]) for row in order), scored))
 
     def _refined(self, problem: Problem, chosen: IntArray, start: FloatArray) -> Fit:
-        """Fit from one start, in units of the scales."""
         clock, scales = time.perf_counter(), self.bounds.scales
         low, high = self.bounds.low / scales, self.bounds.high / scales
         visited = _Visited(problem, chosen, scales)

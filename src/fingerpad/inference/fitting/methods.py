@@ -46,9 +46,7 @@ class Method(Protocol):
     """Contract of a method that fits any problem."""
 
     @property
-    def name(self) -> str:
-        """Name in tables."""
-        ...
+    def name(self) -> str: ...
 
     def fit(self, problem: Problem, chosen: IntArray) -> Fit:
         """Fit the chosen observations of a problem."""

@@ -129,7 +129,6 @@ class _Search:
         self.count = 0
 
     def heights(self, points: FloatArray) -> FloatArray:
-        """Log likelihoods of points."""
         self.count += len(points)
         values = np.asarray(self.log_likelihood(points), dtype=np.float64)
         if np.isnan(values).any():
@@ -138,7 +137,6 @@ class _Search:
         return values
 
     def height(self, point: FloatArray) -> float:
-        """Log likelihood of one point."""
         return float(self.heights(point[None])[0])
 
     def best_of(self, points: FloatArray) -> tuple[FloatArray, float]:
