@@ -75,11 +75,9 @@ class Dots(Indenter):
 
     @property
     def narrowest_mm(self) -> float:
-        """The same, which a mesh must resolve. [mm]"""
         return self.relief_mm
 
     def gap(self, points_mm: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Signed gap (n,) and outward normal (n, 3) at points (n, 3) of the indenter's frame. [mm]"""
         at, radius = np.array(self.at_mm), self.radius_mm
         beside = np.linalg.norm(points_mm[:, None, [0, 2]] - at, axis=2)
         nearest = at[beside.argmin(axis=1)]

@@ -86,12 +86,10 @@ class Embossed(Indenter):
 
     @property
     def relief_mm(self) -> float:
-        """Width of the narrowest stroke, hole or gap, which a mesh must resolve. [mm]"""
         return float(self._widths_mm.min())
 
     @property
     def narrowest_mm(self) -> float:
-        """The same. [mm]"""
         return self.relief_mm
 
     @property
@@ -100,7 +98,6 @@ class Embossed(Indenter):
         return float(self._widths_mm[0])
 
     def gap(self, points_mm: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Signed gap (n,) and outward normal (n, 3) at points (n, 3) of the indenter's frame. [mm]"""
         points_mm = np.ascontiguousarray(points_mm, dtype=np.float64)
         beyond, outward = np.empty(len(points_mm)), np.zeros((len(points_mm), 3))
         _beyond_outline(points_mm, self._pieces, self._normals, beyond, outward)

@@ -142,6 +142,7 @@ class Finger(metaclass=KnownKeywords):
 
     @property
     def own_mesh(self) -> Mesh | None:
+        """Mesh that a finger has already; None for a finger that is meshed."""
         return None
 
     def own_grading(self, x_mm: float, z_mm: float) -> Grading | None:
@@ -378,7 +379,6 @@ class Fingertip(Displayed, Finger):
 
     @property
     def layer_depths_mm(self) -> tuple[float, float, float]:
-        """Depth of the lower border of stratum corneum, living epidermis and dermis [mm]."""
         epidermis = self.stratum_corneum_mm + self.living_epidermis_mm
         return self.stratum_corneum_mm, epidermis, epidermis + self.dermis_mm
 
@@ -422,7 +422,6 @@ class Fingertip(Displayed, Finger):
         return level, gradient
 
     def skin_normal(self, points_mm: ArrayLike) -> FloatArray:
-        """Outward unit normal, (..., 3), of the level surface through each point of the skin."""
         gradient = self.level_gradient(points_mm)
         return gradient / np.linalg.norm(gradient, axis=-1, keepdims=True)
 

@@ -119,12 +119,10 @@ class FingerMesh(Finger):
 
     @property
     def contact_mm(self) -> tuple[float, float]:
-        """X and z of the middle of the pad [mm]."""
         return self.pad_mm
 
     @property
     def layer_depths_mm(self) -> tuple[float, float, float]:
-        """Depth of the lower borders of the outer three layers at the middle of the pad [mm]."""
         return self.borders_mm
 
     @property
@@ -134,7 +132,6 @@ class FingerMesh(Finger):
 
     @property
     def own_mesh(self) -> Mesh:
-        """The mesh."""
         return self.mesh
 
     @cached_property
@@ -170,7 +167,6 @@ class FingerMesh(Finger):
         return found
 
     def skin_point(self, x_mm: ArrayLike, z_mm: ArrayLike) -> FloatArray:
-        """Point of the volar skin at each (x, z); InputError beside the skin. [mm]"""
         x, z = np.broadcast_arrays(np.asarray(x_mm, dtype=np.float64), np.asarray(z_mm, dtype=np.float64))
         heights = self._heights(self._upright[0], x.ravel(), z.ravel())
         for here_x, here_z, height in zip(x.ravel(), z.ravel(), heights, strict=True):
@@ -183,12 +179,10 @@ class FingerMesh(Finger):
         return np.stack([x, y, z], axis=-1)
 
     def skin_normal(self, points_mm: ArrayLike) -> FloatArray:
-        """Outward unit normal of the skin closest to each point, (..., 3)."""
         points = np.asarray(points_mm, dtype=np.float64)
         return self.mesh.on_skin(points.reshape(-1, 3))[1].reshape(points.shape)
 
     def depth_available_mm(self, x_mm: ArrayLike, z_mm: ArrayLike) -> FloatArray:
-        """Distance along y from the volar skin at (x, z) to the bone or, beside it, the dorsal skin. [mm]"""
         below = self.skin_point(x_mm, z_mm)
         x, y, z = below.reshape(-1, 3).T
         bone, skin = (self._heights(triangles, x, z) for triangles in self._upright[::-1])
@@ -202,7 +196,6 @@ class FingerMesh(Finger):
         return np.where(depth > 0.0, depth, reach).reshape(below.shape[:-1])
 
     def own_grading(self, x_mm: float, z_mm: float) -> Grading:
-        """Sizes of the elements about a place of the skin, as they are."""
         sides = self.mesh.nodes_mm[self.mesh.skin_triangles]
         away = np.linalg.norm(sides.mean(axis=1) - self.skin_point(x_mm, z_mm), axis=1)
         near = sides[np.argsort(away)[:_NEAR_TRIANGLES]]

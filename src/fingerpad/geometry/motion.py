@@ -175,21 +175,17 @@ class _OneRamp(Motion):
 
     @property
     def end_ms(self) -> float:
-        """End of the hold. [ms]"""
         return self.ramp_ms + self.hold_ms
 
     @property
     def corners_ms(self) -> tuple[float, ...]:
-        """End of the ramp. [ms]"""
         return (self.ramp_ms,)
 
     @property
     def phases(self) -> tuple[Phase, ...]:
-        """Ramp and hold."""
         return ramp_and_hold_phases(self.ramp_ms, self.end_ms)
 
     def prescribed_at(self, times_ms: ArrayLike) -> FloatArray:
-        """Depth [mm] or force [mN] at `times_ms`, any shape: 0 at the start, the largest in the hold."""
         return self.largest * np.clip(np.asarray(times_ms, dtype=float) / self.ramp_ms, 0.0, 1.0)
 
     def step_times_ms(self, ramp_steps: int, hold_steps: int) -> FloatArray:
@@ -229,7 +225,6 @@ class RampAndHold(_OneRamp):
 
     @property
     def largest(self) -> float:
-        """Depth of the hold. [mm]"""
         return self.depth_mm
 
 
@@ -262,7 +257,6 @@ class ForceRampAndHold(_OneRamp):
 
     @property
     def largest(self) -> float:
-        """Force of the hold. [mN]"""
         return self.force_mn
 
 

@@ -212,17 +212,14 @@ class Trajectory(Motion):
 
     @property
     def largest(self) -> float:
-        """Largest depth [mm] or force [mN]."""
         return max(self.prescribed)
 
     @property
     def depths_mm(self) -> tuple[float, ...]:
-        """Prescribed depth in each of `poses`, the largest if there is only one. [mm]"""
         return (self.largest,) if self.stays else self.prescribed
 
     @property
     def end_ms(self) -> float:
-        """Last sample. [ms]"""
         return self.times_ms[-1]
 
     @property
@@ -262,7 +259,6 @@ class Trajectory(Motion):
         return times, np.column_stack([np.interp(times, given, column) for column in self._course.T])
 
     def pose_at(self, time_ms: float) -> Pose:
-        """Pose of the indenter at a time [ms]."""
         columns = (getattr(self, name) for name in POSE_COLUMNS)
         return Pose(
             *(0.0 if each is None else float(np.interp(time_ms, self.times_ms, each)) for each in columns)
@@ -354,7 +350,6 @@ class Trajectory(Motion):
         return HOLD if max(start[0], end[0]) > SAME_VALUE else "pause"
 
     def prescribed_at(self, times_ms: ArrayLike) -> FloatArray:
-        """Depth [mm] or force [mN] at `times_ms`, any shape."""
         return np.interp(np.asarray(times_ms, dtype=float), self.times_ms, self.prescribed)
 
     def step_times_ms(self, ramp_steps: int, hold_steps: int) -> FloatArray:
