@@ -17,7 +17,6 @@ NO_TERM = 1e20
 """D of a volumetric term that is absent: CalculiX silently replaces 0 by a stiffness of its own."""
 
 SKIN, INDENTER = "SKIN", "INDENTER"
-"""Names of surfaces in a deck."""
 
 
 def digits(value: float) -> str:

@@ -44,7 +44,6 @@ if TYPE_CHECKING:
     from fingerpad.skin.indentation import Touch
 
 FORMAT, FORMAT_VERSION = "fingerpad touch", 1
-"""What the attributes `format` and `format_version` of a file say."""
 
 FILE_NAMES = ("touch.nc", "touch.zarr")
 """Names under which a folder of results holds a touch."""
@@ -84,7 +83,6 @@ class Variable:
     unit: str
     """Unit, "1" for a pure number; empty for numbers of nodes or elements, which have none."""
     dims: tuple[str, ...]
-    """Its dimensions."""
     long_name: str
     points_into: str = ""
     """Dimension of which it holds numbers, from 0."""

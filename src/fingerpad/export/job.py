@@ -62,7 +62,6 @@ class Job:
     materials: tuple[Material, ...]
     """One per layer of the mesh."""
     indenter: Indenter
-    """The rigid body."""
     placement: Placement
     """Its position at first touch."""
     times_ms: FloatArray

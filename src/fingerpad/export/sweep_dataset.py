@@ -47,10 +47,8 @@ if TYPE_CHECKING:
     import xarray
 
 FORMAT, FORMAT_VERSION = "fingerpad sweep", 1
-"""What the attributes `format` and `format_version` say."""
 
 PENDING, DONE, FAILED, LEFT_OUT = range(4)
-"""Values of `status`."""
 
 MEANINGS = "pending done failed left_out"
 
@@ -74,7 +72,6 @@ class Variable:
     of_press: bool = False
     """Whether it has the dimensions that change the skin alone."""
     dtype: str = "f8"
-    """Type of its numbers."""
 
 
 def variables(fields: Sequence[str] = ()) -> dict[str, Variable]:
@@ -285,12 +282,7 @@ class SweepFile:
 
 @known_keywords
 def open_sweep(path: str | Path) -> xarray.Dataset:
-    """Open the results of a sweep; numbers are read when they are used.
-
-    Parameters
-    ----------
-    path : str or Path
-        The folder that `run_sweep` wrote.
+    """Open the data set that `run_sweep` wrote; numbers are read when they are used.
 
     Returns
     -------
@@ -351,15 +343,7 @@ def sweep_settings(data: xarray.Dataset) -> Sweep:
 
 @known_keywords
 def setting_touch(data: xarray.Dataset, **where: int) -> Content:
-    """Touch of one setting in the words of a file, for `run_touch`: figures, NWB, VTU and other files of it.
-
-    Parameters
-    ----------
-    data : xarray.Dataset
-        From `open_sweep`.
-    **where : int
-        Index of the setting along each dimension of the sweep.
-    """
+    """Touch of one setting, by its index along each dimension, in the words of a file for `run_touch`."""
     sweep = sweep_settings(data)
     return sweep.content(setting_number(sweep, where))
 

@@ -87,11 +87,6 @@ def write_sweep_table(data: xarray.Dataset, path: str | Path) -> Path:
 def read_sweep_table(path: str | Path) -> pandas.DataFrame:
     """Read a table that `write_sweep_table` wrote.
 
-    Parameters
-    ----------
-    path : str or Path
-        The file.
-
     Returns
     -------
     pandas.DataFrame

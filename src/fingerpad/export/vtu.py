@@ -80,13 +80,7 @@ class VtuSeries:
 
 @known_keywords
 def read_vtu_series(path: str | Path) -> VtuSeries:
-    """Read the files that `write_vtu_series` wrote.
-
-    Parameters
-    ----------
-    path : str or Path
-        The PVD file.
-    """
+    """Read the files that `write_vtu_series` wrote, by their PVD file."""
     require_vtk()
     from vtkmodules.util.numpy_support import vtk_to_numpy
     from vtkmodules.vtkIOXML import vtkXMLUnstructuredGridReader

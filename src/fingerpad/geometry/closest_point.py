@@ -26,7 +26,6 @@ SHARP_SHARE = 1.5
 """Distance from sharp edges from which on creases are blunted, over the radius."""
 
 _ON_SURFACE_MM = 1e-9
-"""Distance from which on its direction is known. [mm]"""
 
 
 @dataclass(frozen=True)

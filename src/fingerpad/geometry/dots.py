@@ -113,10 +113,7 @@ def braille(text: str, along_finger: bool = True) -> Dots:
         instead = f"; write {low!r}" if low != text and not set(low) - set(_LETTERS) - {" "} else ""
         raise InputError(f"text must have letters a to z and spaces: got {text!r}{instead}.")
     places = [
-        (
-            cell * BRAILLE_CELL_MM + (int(dot) > 3) * BRAILLE_PITCH_MM,
-            (int(dot) - 1) % 3 * BRAILLE_PITCH_MM,
-        )
+        (cell * BRAILLE_CELL_MM + (int(dot) > 3) * BRAILLE_PITCH_MM, (int(dot) - 1) % 3 * BRAILLE_PITCH_MM)
         for cell, letter in enumerate(text)
         for dot in _LETTERS.get(letter, "")
     ]

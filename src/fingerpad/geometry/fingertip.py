@@ -19,15 +19,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.interpolate import BSpline, make_smoothing_spline
 
-from fingerpad.core.checks import (
-    FloatArray,
-    finite,
-    float_array,
-    increasing,
-    not_negative,
-    one_of,
-    positive,
-)
+from fingerpad.core.checks import FloatArray, finite, float_array, increasing, not_negative, one_of, positive
 from fingerpad.core.displayed import Displayed
 from fingerpad.core.errors import InputError
 from fingerpad.core.keywords import KnownKeywords, known_keywords
@@ -306,11 +298,6 @@ class Fingertip(Displayed, Finger):
     def scaled(self, factor: float) -> Fingertip:
         """Return the same finger in another size: outline, layers, bone and nail times a factor.
 
-        Parameters
-        ----------
-        factor : float
-            Above 0.
-
         Examples
         --------
         >>> Fingertip().scaled(0.5).dermis_mm
@@ -392,11 +379,6 @@ class Fingertip(Displayed, Finger):
 
         Here s² = 1 - x / L; g is a / s (volar) or b / s (dorsal) for y and c / s for z, the profiles
         without their factor s.
-
-        Parameters
-        ----------
-        points_mm : array (..., 3)
-            x, y and z. [mm]
         """
         return self._level_and_gradient(np.asarray(points_mm, dtype=np.float64))[0]
 
@@ -427,11 +409,6 @@ class Fingertip(Displayed, Finger):
 
     def skin_point(self, x_mm: ArrayLike, z_mm: ArrayLike) -> FloatArray:
         """Points (..., 3) of the volar skin at each (x, z). [mm]
-
-        Parameters
-        ----------
-        x_mm, z_mm : array (...)
-            Position seen from the volar side. [mm]
 
         Examples
         --------

@@ -86,11 +86,7 @@ class _Making:
         raise InputError(f"{self.parts.source}: {sentence}")
 
     def finger(
-        self,
-        unit: str,
-        axes: str,
-        contact_mm: tuple[float, float] | None,
-        receptor_depth_mm: float | None,
+        self, unit: str, axes: str, contact_mm: tuple[float, float] | None, receptor_depth_mm: float | None
     ) -> FingerMesh:
         for name in instance("names", self.names, Mapping):
             one_of("names", name, SETS)

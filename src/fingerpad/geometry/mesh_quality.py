@@ -14,8 +14,7 @@ def _jacobians(mesh: Mesh, elements: IntArray, points: FloatArray) -> FloatArray
     """Jacobian matrices (n_elements, n_points, 3, 3), columns along the local axes, at local `points`."""
     factors = 1.0 + points[:, None, :] * CORNERS
     gradients = np.stack(
-        [CORNERS[:, axis] * np.delete(factors, axis, axis=2).prod(axis=2) / 8.0 for axis in range(3)],
-        axis=-1,
+        [CORNERS[:, axis] * np.delete(factors, axis, axis=2).prod(axis=2) / 8.0 for axis in range(3)], axis=-1
     )
     return np.einsum("mad,qac->mqdc", mesh.nodes_mm[elements], gradients, optimize=True)
 

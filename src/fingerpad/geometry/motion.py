@@ -22,7 +22,6 @@ PLAUSIBLE["hold_ms"] = PLAUSIBLE["ramp_ms"]
 """Smallest and largest peaks and times of a touch: an afferent answers to 1 mN, and pads are 10 mm thick."""
 
 MOTION_UNITS = {"depth_mm": "mm", "force_mn": "mN", "ramp_ms": "ms", "hold_ms": "ms"}
-"""Units of the parameters of motions."""
 
 
 @dataclass(frozen=True)
@@ -77,7 +76,6 @@ class Cycles(metaclass=KnownKeywords):
 
 
 STILL = Pose()
-"""The pose at first touch."""
 
 TURN_LIKE_MM = 10.0
 """Rotation that takes as many steps as all of the depth. [degrees]"""

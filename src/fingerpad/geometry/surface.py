@@ -37,7 +37,6 @@ SMOOTH_BELOW_DEG = 30.0
 """Angle of creases that are rounded where they are hollow, unless another is given. [degrees]"""
 
 LARGEST_SMOOTH_DEG = 90.0
-"""Largest such angle. [degrees]"""
 
 HOLLOW_MM = 0.1
 """Distance from hollow creases over which they are rounded; less where triangles are small. [mm]"""

@@ -23,7 +23,6 @@ from fingerpad.geometry.surface import (
 from fingerpad.geometry.triangle_files import read_triangles
 
 UNITS_MM = {"mm": 1.0, "um": 1e-3, "cm": 10.0, "m": 1000.0, "inch": 25.4}
-"""Units of length of a file. [mm]"""
 
 MESHES = (".stl", ".obj", ".ply")
 IMAGES = (".png", ".tif", ".tiff")
@@ -252,10 +251,7 @@ def _image(file: Path) -> FloatArray:
 
 def _shades(file: Path, pixels: FloatArray) -> FloatArray:
     """Shades of pixels (n_rows, n_columns, 4) that are red, green, blue and opacity, if they are grey."""
-    for what, wrong in (
-        ("opaque", pixels[..., 3] < 255.0),
-        ("grey", np.ptp(pixels[..., :3], axis=2) > 0.0),
-    ):
+    for what, wrong in (("opaque", pixels[..., 3] < 255.0), ("grey", np.ptp(pixels[..., :3], axis=2) > 0.0)):
         if wrong.any():
             row, column = np.argwhere(wrong)[0] + 1
             raise InputError(

@@ -13,9 +13,9 @@ from dataclasses import replace
 import numpy as np
 
 from fingerpad.core.checks import FloatArray
-from fingerpad.inference.fitting.bounds import Bounds
 from fingerpad.inference.fitting.covariance_adaptation import CovarianceAdaptation
 from fingerpad.inference.fitting.least_squares import LeastSquares
+from fingerpad.inference.fitting.methods import Bounds
 from fingerpad.inference.identifiable import IDENTIFIABLE_NAMES, LARGEST_RESTING_SHARE, six_parameters
 from fingerpad.inference.rate_model import RateModel, Rates, Reparametrised, SmoothRateModel
 from fingerpad.inference.rate_problem import RateProblem
@@ -37,14 +37,12 @@ and the static term under all stimuli [1/ms], and tau [ms]. A drive of 0.2/ms el
 three times the largest static rate."""
 
 OFFSET_SCALE_MM = 0.1
-"""Scale of the offset of the receptor. [mm]"""
 
 N_STARTS, N_REFINED = 32, 8
 """Starts that are scored, and starts from which least squares continues: two of them end up to 0.003 of FSS
 below the best, since intercept and time constant of a membrane at rest trade off along a valley."""
 
 MOST_EVALUATIONS = 600
-"""Most evaluations of CMA-ES."""
 
 
 def fitted_four(numbers: FloatArray) -> FloatArray:

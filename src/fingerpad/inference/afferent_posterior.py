@@ -181,7 +181,5 @@ def _constrained(points: FloatArray) -> FloatArray:
 def _constrained_chains(chains: Chains) -> Chains:
     """Transform draws to u; R-hat and effective sizes depend on ranks only and stay."""
     return replace(
-        chains,
-        draws=_constrained(chains.draws),
-        log_densities=chains.log_densities - chains.draws[..., 0],
+        chains, draws=_constrained(chains.draws), log_densities=chains.log_densities - chains.draws[..., 0]
     )

@@ -144,15 +144,7 @@ class AfferentModel(metaclass=KnownKeywords):
         refractory_ms: float = neuron.REFRACTORY.value,
         initial_mv: float | None = None,
     ) -> AfferentModel:
-        """Make the model for stimuli that share their times.
-
-        Parameters
-        ----------
-        driven : Drive
-            One column per stimulus.
-        windows_ms, refractory_ms, initial_mv
-            As of the class.
-        """
+        """Make the model for stimuli that share their times, one per column of a drive."""
         return cls((driven,), (np.arange(driven.n_sites),), windows_ms, refractory_ms, initial_mv)
 
     @classmethod
@@ -239,9 +231,7 @@ class Reparametrised:
     """A rate model in other parameters."""
 
     model: RateModel
-    """The model in its own parameters."""
     names: tuple[str, ...]
-    """Names of the new parameters."""
     transform: Callable[[FloatArray], FloatArray]
     """From the new parameters to those of `model`."""
 

@@ -9,9 +9,8 @@ import numpy as np
 from fingerpad.core.checks import FloatArray
 from fingerpad.core.random_streams import Presentations
 from fingerpad.core.signals import CurrentTraces, SpikeTrains
-from fingerpad.inference.identifiable import six_parameters
+from fingerpad.inference.identifiable import SPIKE_PARAMETER_NAMES, six_parameters
 from fingerpad.inference.rate_model import Rates, evaluate_rows
-from fingerpad.inference.spike_parameters import SPIKE_PARAMETER_NAMES
 from fingerpad.neuron.afferent import Afferent
 from fingerpad.neuron.escape_rate import EscapeRate
 from fingerpad.neuron.rate_windows import Windows

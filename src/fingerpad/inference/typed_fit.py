@@ -14,9 +14,9 @@ from fingerpad.core.errors import InputError
 from fingerpad.core.keywords import known_keywords
 from fingerpad.core.signals import INTERVAL, SedTraces
 from fingerpad.data import protocol
-from fingerpad.inference.fitting.bounds import Bounds
 from fingerpad.inference.fitting.cross_validation import cross_validate, interleaved_folds
 from fingerpad.inference.fitting.least_squares import LeastSquares
+from fingerpad.inference.fitting.methods import Bounds
 from fingerpad.inference.rate_model import Rates, evaluate_rows
 from fingerpad.inference.rate_problem import RateProblem
 from fingerpad.inference.recordings import RateRecordings
@@ -73,7 +73,6 @@ class TypedFit:
     afferent: AnyAfferent
     """With the fitted numbers."""
     free: tuple[str, ...]
-    """Names of these."""
     fss_in_sample: float
     fss_out_of_sample: float
     """Fractional sum of squares of the fit to all stimuli, and its mean over the stimuli left out of folds.

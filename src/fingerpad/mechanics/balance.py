@@ -77,7 +77,6 @@ class Entry(NamedTuple):
     """State and energies at the end of one step; the first is the unloaded body."""
 
     time_ms: float = 0.0
-    """End of the step. [ms]"""
     way: tuple[float, ...] = (0.0,) * 5
     force: tuple[float, ...] = (0.0,) * 5
     """The indenter's advance, ways along x and z [mm] and rotations [radians], and the forces [mN] and

@@ -149,7 +149,6 @@ class Contact:
     """Skin that may touch one placed indenter."""
 
     indenter: Indenter
-    """The rigid body."""
     placement: Placement
     """Where it stands at first touch."""
     nodes: np.ndarray

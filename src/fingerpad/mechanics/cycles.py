@@ -133,7 +133,6 @@ class CycleJumps:
     where: np.ndarray
     """Elements that count for it."""
     table: MaterialTable
-    """Laws."""
     layer: np.ndarray
     """Row of the table of each element, (n_elements,)."""
     step: Step[Moment]

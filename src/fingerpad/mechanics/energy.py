@@ -37,7 +37,6 @@ VARIABLES = (
 FUNCTIONS = ("log", "exp", "sqrt")
 MOST_OPERATIONS = 200
 LONGEST_FORMULA = 4000
-"""Characters of a formula."""
 
 
 VARIABLE, ADD, SUBTRACT, MULTIPLY, DIVIDE, SCALE, SHIFT, POWER, LOG, EXP = range(10)

@@ -119,9 +119,7 @@ class Friction:
     3). [mN/mm]
     """
     potential: float
-    """Sum of phi. [µJ]"""
     slip_mm: FloatArray
-    """g, (n, 3). [mm]"""
     pull_mn: FloatArray
     """t, the pull towards which the linearised law leads, within the limit, (n, 3). [mN]"""
 

@@ -128,17 +128,13 @@ class Equilibrium:
     """A converged configuration."""
 
     displacement_mm: FloatArray
-    """Displacements, (n_nodes, 3). [mm]"""
     depth_mm: float
     """How far the indenter has advanced since first touch. [mm]"""
     contact: ContactState
-    """Contact there."""
     multipliers_mn: FloatArray
     """Contact multipliers to start the next step from, (n_points,). [mN]"""
     iterations: int
-    """Newton steps taken."""
     balance: Balance
-    """Reaction of the supports."""
     anchors: Anchors | None = None
     """Where the skin holds on to the indenter when the next step starts."""
     slid_mm: FloatArray | None = None

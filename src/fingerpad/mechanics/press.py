@@ -30,20 +30,9 @@ from fingerpad.mechanics.balance import (
 )
 from fingerpad.mechanics.configuration import SMALLEST_FORCE_MN, Balance, Body, Load, Reached
 from fingerpad.mechanics.contact import Contact, Placement, check_friction
-from fingerpad.mechanics.fields import (
-    ElementFields,
-    FieldState,
-    Watched,
-    cauchy_stress,
-    fields_over_time,
-)
+from fingerpad.mechanics.fields import ElementFields, FieldState, Watched, cauchy_stress, fields_over_time
 from fingerpad.mechanics.friction import Anchors
-from fingerpad.mechanics.linear import (
-    NO_NODES,
-    LinearSolver,
-    choose_preconditioner,
-    free_degrees_of_freedom,
-)
+from fingerpad.mechanics.linear import NO_NODES, LinearSolver, choose_preconditioner, free_degrees_of_freedom
 from fingerpad.mechanics.materials import Material, MaterialTable
 from fingerpad.mechanics.mixed import MIXED_POISSON
 from fingerpad.mechanics.newton import FIRST_DEPTH_MM, Equilibrium, NewtonSettings, find_equilibrium
@@ -118,7 +107,6 @@ class Deformation:
     """Deepest penetration at any time. [mm]"""
     newton_steps: int
     factorisations: int
-    """Work done."""
     linear_solver: str
     """Which one was chosen, and why."""
 
@@ -296,12 +284,7 @@ class _Press:
         return round(float(np.clip(further / before, -MOST_CONTINUED, MOST_CONTINUED)), SAME_DIGITS)
 
     def entry(
-        self,
-        start: _Moment,
-        target_ms: float,
-        contact: Contact,
-        found: Equilibrium,
-        tissue: TissueEnergies,
+        self, start: _Moment, target_ms: float, contact: Contact, found: Equilibrium, tissue: TissueEnergies
     ) -> Entry:
         """Energies of the whole body at the end of a step, from those of the body as it is meshed."""
         parts = 2.0 if self.body.mesh.symmetry_nodes.size else 1.0

@@ -112,7 +112,6 @@ class Phase:
     """A part of the motion at constant speed, within which SED is smooth in time."""
 
     end_ms: float
-    """Its end, always reached exactly. [ms]"""
     first_ms: float
     """Length of the first step to try. [ms]"""
     loading: bool

@@ -164,7 +164,6 @@ class InstantaneousState(NamedTuple):
     (n_elements,). [kPa]
     """
     dilatation: FloatArray
-    """Jbar, (n_elements,)."""
 
 
 def instantaneous_state(mesh: Mesh, displacement: FloatArray, table: MaterialTable) -> InstantaneousState:

@@ -101,14 +101,7 @@ def code_statistic(
 
 @known_keywords
 def code_efficiency(shown: Presentation, statistic: Statistic) -> CodeEfficiency:
-    """Compare a code with the ideal observer.
-
-    Parameters
-    ----------
-    shown : Presentation
-        From `noisy_presentations`, or from `present` for other noise.
-    statistic : Statistic
-        Of the code, from `code_statistic`.
+    """Compare a code, by `code_statistic`, with the ideal observer of the same presentations.
 
     Examples
     --------

@@ -11,6 +11,10 @@ Letters in brackets are the steps of Figure 3. Choices where the paper gives no 
 
 Every random number has a key: seed, trial, receptor and purpose. Trials are numbered within a session, so
 sessions of one seed share no random number.
+
+    mu_2, sigma_2 = mean and standard deviation of many noisy values of one stimulus         (e)
+    point         = mu_standard + beta (mu_comparison - mu_standard)                        (h)
+    hit rate      = P(Normal(mu_comparison, sigma_comparison) lies beyond the point)        (h)
 """
 
 from __future__ import annotations
@@ -21,6 +25,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
+from scipy.special import ndtr
 
 from fingerpad.core.checks import FloatArray, IntArray, finite, float_array, not_negative, one_of, whole
 from fingerpad.core.errors import InputError
@@ -30,15 +35,7 @@ from fingerpad.core.signals import HitRates
 from fingerpad.core.values import converted
 from fingerpad.data import protocol, psychophysics
 from fingerpad.psychophysics.encoding import NORMS, check_neighbours, distance
-from fingerpad.psychophysics.noise import checked_noise
-from fingerpad.psychophysics.noisy_responses import noisy_gradient_sums, session_trials
-from fingerpad.psychophysics.signal_detection import (
-    decision_point,
-    hit_probability,
-    likelihood_point,
-    moments,
-    side,
-)
+from fingerpad.psychophysics.noisy_responses import checked_noise, noisy_gradient_sums, session_trials
 
 END_OF_STIMULUS_MS = protocol.RAMP.value + protocol.HOLD.value
 """A usual value for the latency of a silent receptor. [ms]"""
@@ -51,7 +48,6 @@ _NOISES_AT_ONCE = 32
 """Noises whose sums are held in memory together."""
 
 MOST_REPETITIONS = 1_000_000
-"""Largest number of repetitions of each kind."""
 
 _REPETITIONS = int(psychophysics.REPETITIONS.value)
 _REPETITIONS_VARIED = int(psychophysics.REPETITIONS_VARIED_CRITERION.value)
@@ -240,10 +236,7 @@ def compare_euclidean_observers(
             raise InputError(
                 "criterion_sigma must be 0 for Euclidean Distance: its decision point does not vary."
             )
-        sigma, sizes = (
-            checked_noise(noise_sigma),
-            (plan.hit_rates, plan.presentations, plan.pairs),
-        )
+        sigma, sizes = (checked_noise(noise_sigma), (plan.hit_rates, plan.presentations, plan.pairs))
         alike.setdefault(sizes, {}).setdefault(sigma, []).append(number)
     found: dict[int, HitRates] = {}
     for (repetitions, n_sets, n_pairs), by_sigma in alike.items():
@@ -359,3 +352,41 @@ def _picks(seed: int, trials: IntArray, shape: tuple[int, int], choices: int) ->
 def _mean_and_spread(hit_rates: FloatArray, seed: int, session: int) -> HitRates:
     """Return mean mu_3 and standard deviation sigma_3 over the repetitions (k)."""
     return HitRates(hit_rates.mean(axis=0), hit_rates.std(axis=0, ddof=1), seed, session)
+
+
+def moments(answers: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return mean mu_2 and standard deviation sigma_2 over the last axis, step (e)."""
+    return answers.mean(axis=-1), answers.std(axis=-1, ddof=1)
+
+
+def decision_point(standard: FloatArray, comparison: FloatArray, criterion: float | FloatArray) -> FloatArray:
+    """Return the point at the fraction beta of the distance from the standard's mean to the comparison's."""
+    return np.asarray(standard + criterion * (comparison - standard))
+
+
+def likelihood_point(
+    standard: FloatArray, comparison: FloatArray, variance: FloatArray, ratio: FloatArray
+) -> FloatArray:
+    """Return the point at which the comparison is `ratio` times as likely as the standard.
+
+    For two normal distributions of one variance s^2 the logarithm of the likelihood ratio is linear:
+
+        point = (mu_standard + mu_comparison)/2 + s^2 ln(ratio) / (mu_comparison - mu_standard)
+    """
+    shift = np.asarray(variance * np.log(np.maximum(ratio, np.finfo(float).tiny)))
+    distance = np.broadcast_to(comparison - standard, shift.shape)
+    away = np.divide(shift, distance, out=np.zeros_like(shift), where=distance != 0.0)
+    return decision_point(standard, comparison, 0.5) + away
+
+
+def side(means: FloatArray) -> FloatArray:
+    """Return the side of the standard on which each comparison lies."""
+    pooled = means.mean(axis=0)
+    return np.where(pooled[1:] < pooled[0], -1.0, 1.0)
+
+
+def hit_probability(point: FloatArray, mean: FloatArray, spread: FloatArray, side: FloatArray) -> FloatArray:
+    """Return the probability that Normal(mean, spread) lies beyond the decision point, step (h)."""
+    margin = np.asarray(side * (mean - point))
+    scaled = np.divide(margin, spread, out=np.zeros_like(margin), where=spread > 0.0)
+    return np.where(spread > 0.0, ndtr(scaled), np.heaviside(margin, 0.5))

@@ -183,13 +183,7 @@ class PsychometricFunction:
         return SIGMOIDS[self.sigmoid]
 
     def predict(self, levels: ArrayLike) -> FloatArray:
-        """Psi (n_levels,) at levels of the stimulus. [0-1]
-
-        Parameters
-        ----------
-        levels : array_like (n_levels,)
-            [unit of the levels]
-        """
+        """Psi (n_levels,) at levels of the stimulus. [0-1]"""
         return proportion(
             self.shape,
             checked_levels(levels, self.sigmoid),
@@ -218,12 +212,7 @@ class PsychometricFunction:
         return float(level_at(self.shape, wanted, self.threshold, self.width, self.guess, self.lapse))
 
     def slope(self, proportion_correct: float | None = None) -> float:
-        """Slope of psi, its derivative by the level, where psi has a value. [1/unit of the levels]
-
-        Parameters
-        ----------
-        proportion_correct : float, optional
-            As in `level_at`. [0-1]
+        """Slope of psi, its derivative by the level, as in `level_at`. [1/unit of the levels]
 
         Examples
         --------

@@ -26,8 +26,7 @@ from scipy.stats import rankdata
 from fingerpad.core.checks import FloatArray, float_array, not_negative, whole
 from fingerpad.core.errors import InputError
 from fingerpad.core.keywords import known_keywords
-from fingerpad.psychophysics.noise import checked_noise
-from fingerpad.psychophysics.noisy_responses import session_trials
+from fingerpad.psychophysics.noisy_responses import checked_noise, session_trials
 from fingerpad.psychophysics.response_models import ResponseModel
 
 Statistic = Callable[[FloatArray], FloatArray]

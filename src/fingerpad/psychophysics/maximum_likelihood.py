@@ -51,7 +51,6 @@ class Model:
     """
 
     sigmoid: Sigmoid
-    """Shape."""
     coordinates: FloatArray
     """c(x) of the levels, (n_levels,)."""
     n_trials: FloatArray

@@ -39,7 +39,6 @@ CHECKED_SITES = 9
 """Sites along and across at which errors are measured."""
 
 EXPONENTS = tuple(0.05 * n for n in range(17))
-"""Exponents of `relaxation` that are tried."""
 
 STREAM_MS = 5.0
 """Longest step of the stream while errors are measured. [ms]"""

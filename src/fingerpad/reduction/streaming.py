@@ -22,8 +22,7 @@ from fingerpad.core.keywords import KnownKeywords
 from fingerpad.core.units import with_unit
 from fingerpad.reduction.interpolation import weighted
 from fingerpad.reduction.model import GRID_POINTS, ReducedModel
-from fingerpad.reduction.relaxation import amplitudes, depth_scale, filter_step, lost
-from fingerpad.reduction.retreat import Springs
+from fingerpad.reduction.relaxation import Springs, amplitudes, depth_scale, filter_step, lost
 
 SHEET_MM = 0.8
 """Distance of the places that tell how far the skin below the contact has relaxed. [mm]"""
@@ -253,7 +252,6 @@ class _Press:
     kept: float
     """Part of the skin below the contact that is still there after the way aside."""
     step_ms: float
-    """Duration. [ms]"""
 
     @cached_property
     def factors(self) -> tuple[FloatArray, FloatArray, FloatArray]:

@@ -33,7 +33,6 @@ DEPTH_SHARES = (0.1, 0.25, 0.45, 0.7, 1.0)
 """Depths of the presses at one pose, over the largest."""
 
 RAMP_MS = 20.0
-"""Duration of the ramp of each press. [ms]"""
 
 RAMP_SHARES = 1.0 - (1.0 - np.arange(1, 13) / 12) ** 1.5
 """Samples of a ramp, as shares of it: denser where no other press at the pose adds to them."""

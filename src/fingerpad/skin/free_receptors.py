@@ -44,7 +44,6 @@ class FreeReceptors:
     """End organs of a mesh of one's own."""
 
     mesh: FreeMesh
-    """The undeformed body."""
 
     def below(self, sites_mm: FloatArray) -> Interpolation:
         """Find end organs below points of the skin, on any side; InputError if one is not on the skin."""

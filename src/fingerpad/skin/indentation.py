@@ -43,7 +43,6 @@ from fingerpad.skin.sampling import SkinResponse, places_below, receptors_of
 
 CONTACT_POINT_MM = (published.CONTACT_POINT.value[0], 0.0)
 STEPS = {"quick": (5, 5), "standard": (8, 8), "paper": (8, 8)}
-"""Steps in ramp and hold of each resolution."""
 
 LARGEST_TILT_DEG = 45.0
 
@@ -236,15 +235,7 @@ class Touch(metaclass=KnownKeywords):
         )
 
     def response(self, fields: Mapping[str, FloatArray], **solution: Any) -> SkinResponse:
-        """Return the response to this indentation, given its fields and how it was solved.
-
-        Parameters
-        ----------
-        fields : mapping of str to array
-            Stored fields by name.
-        **solution
-            The parameters of `SkinResponse` from `force_imbalance` on.
-        """
+        """Return the response to this indentation, given its fields and how it was solved."""
         return SkinResponse(
             mesh=self.mesh,
             kinks_ms=self.stimulus.corners_ms,
@@ -338,15 +329,7 @@ def touch_of(
     whole: bool = False,
     progress: Progress | None = None,
 ) -> Touch:
-    """Describe a touch without solving it: `indent` takes the same arguments and solves it.
-
-    Parameters
-    ----------
-    finger, indenter, stimulus, tissues, resolution, at_mm, tilt_deg, spin_deg, friction, grading, settings
-        See `indent`.
-    times_ms, whole, progress
-        See `indent`; `Touch.solve` uses the last two.
-    """
+    """Describe a touch without solving it: `indent` takes the same arguments and solves it."""
     one_of("resolution", resolution, RESOLUTIONS)
     x, z = _position(at_mm, instance("finger", finger, Finger))
     stimulus = instance("stimulus", stimulus or RampAndHold(), Motion)

@@ -278,13 +278,7 @@ class SkinResponse(Result):
         return "strain energy density", self.sed_kpa[-1]
 
     def surface_profile(self, time_index: int = -1) -> SurfaceProfile:
-        """Deflection along the midline of the volar skin (paper, section 2.2.1).
-
-        Parameters
-        ----------
-        time_index : int
-            Index into `times_ms`; the last by default.
-        """
+        """Deflection along the midline of the volar skin at one of `times_ms` (paper, section 2.2.1)."""
         row = np.searchsorted(self.mesh.skin_nodes, self.mesh.midline_nodes)
         distance = self.mesh.nodes_mm[self.mesh.midline_nodes, 0] - self.axis_x_mm
         return SurfaceProfile(distance, self.skin_displacement_mm[time_index, row] @ self.direction)
@@ -294,10 +288,7 @@ class SkinResponse(Result):
         return middle_section(self.mesh, self.displacement_mm)
 
     def sed(
-        self,
-        sites: ArrayLike,
-        dynamic_quantity: str = STORED_ENERGY,
-        static_quantity: str = STORED_ENERGY,
+        self, sites: ArrayLike, dynamic_quantity: str = STORED_ENERGY, static_quantity: str = STORED_ENERGY
     ) -> SedTraces:
         """Strain energy density in the living epidermis below points of the undeformed skin.
 

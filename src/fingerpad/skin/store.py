@@ -200,7 +200,6 @@ class StoredFile:
     path: Path
     """The file; its name is the key of the indentation."""
     size: int
-    """In bytes."""
     written_s: float
     """When it was written, in seconds since 1970."""
 

@@ -17,9 +17,7 @@ from scipy.optimize import least_squares
 
 from fingerpad.core.checks import FloatArray, IntArray, positive, whole
 from fingerpad.core.errors import InputError
-from fingerpad.inference.fitting.bounds import Bounds
-from fingerpad.inference.fitting.methods import Fit, FitStep, best_of
-from fingerpad.inference.fitting.problem import Problem
+from fingerpad.inference.fitting.methods import Bounds, Fit, FitStep, Problem, best_of
 
 Jacobian = Callable[[FloatArray, IntArray], FloatArray]
 

@@ -40,7 +40,6 @@ class ProfileLikelihood:
     """Profile likelihood of one parameter."""
 
     name: str
-    """Name of the parameter."""
     values: FloatArray
     """Its fixed values, increasing, (n_values,)."""
     losses: FloatArray
@@ -63,7 +62,6 @@ class ProfileLikelihoods:
     profiles: tuple[ProfileLikelihood, ...]
     """One per parameter."""
     n_evaluations: int
-    """Evaluations of the likelihood."""
 
 
 def profile_likelihoods(
@@ -200,12 +198,7 @@ class _Search:
 
 
 def _profile(
-    name: str,
-    index: int,
-    fits: list[tuple[FloatArray, float]],
-    highest: float,
-    level: float,
-    allowed: float,
+    name: str, index: int, fits: list[tuple[FloatArray, float]], highest: float, level: float, allowed: float
 ) -> ProfileLikelihood:
     points = np.array([point for point, _ in fits])
     order = np.argsort(points[:, index])
