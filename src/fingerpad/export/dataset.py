@@ -319,17 +319,13 @@ def _fields(
             place = ("element",) if field.place is Place.WATCHED else place
             values = values if len(values) == n_times else values[-1]
         assert values is not None
-        attributes = _field_attributes(field)
+        attributes: Attributes = {"long_name": field.long_name, "units": unit_of(field)}
         dims = (*place, *_COMPONENTS[field.components])
         if values.ndim > len(dims):
             dims = ("time", *dims)
         else:
             attributes["at_time_ms"] = float(skin.times_ms[-1])
         yield name, (dims, values if field.place is Place.PRESS else values.astype(np.float32), attributes)
-
-
-def _field_attributes(field: Field) -> Attributes:
-    return {"long_name": field.long_name, "units": unit_of(field)}
 
 
 def _mesh_values(mesh: Mesh) -> dict[str, np.ndarray]:
@@ -383,16 +379,12 @@ def part_variable(name: str, value: np.ndarray) -> tuple[tuple[str, ...], np.nda
 
 
 def response_values(response: ResponseMap) -> dict[str, np.ndarray]:
-    return {
+    others: dict[str, np.ndarray] = {
         "receptor_mm": response.positions_mm,
-        "dynamic_rate_hz": response.dynamic_rate_hz,
-        "static_rate_hz": response.static_rate_hz,
-        "dynamic_count_hz": response.dynamic_count_hz,
-        "static_count_hz": response.static_count_hz,
-        "first_spike_latency_ms": response.first_spike_latency_ms,
         "spike_count": response.spike_count.astype(np.int32),
         "spike_time_ms": response.spikes.times_ms,
     }
+    return {name: others[name] if name in others else getattr(response, name) for name in RESPONSE_PARTS}
 
 
 def _attributes(skin: SkinResponse, response: ResponseMap | None, seed: int | None) -> Attributes:
@@ -563,11 +555,12 @@ def require_netcdf() -> None:
         library(name)
 
 
-def library(name: str) -> Any:
-    """Import a library of the extra `netcdf`, or raise an `InputError` that says how to install it."""
+def library(name: str, needed: str = "", extra: str = "netcdf") -> Any:
+    """Import a library of an extra, or raise an `InputError` that says how to install it."""
     try:
         return import_module(name)
     except ImportError as error:
         raise InputError(
-            f"A labelled data set needs {name}: install the extra, pip install 'fingerpad[netcdf]'."
+            f"{needed or f'A labelled data set needs {name}'}: install the extra, pip install "
+            f"'fingerpad[{extra}]'."
         ) from error

@@ -20,6 +20,7 @@ from fingerpad.core.phases import Phase
 from fingerpad.core.signals import ResponseMap, SpikeTrains
 from fingerpad.core.units import MS_PER_S
 from fingerpad.experiments.recording_files import SUFFIXES_OF_NWB
+from fingerpad.export.dataset import library
 from fingerpad.export.responses import PITCH, PLACES, TYPE, by_type, pitches_mm
 from fingerpad.neuron.mixed_population import MixedResponse, one_map
 
@@ -227,8 +228,4 @@ def _durations(responses: Mapping[str, ResponseMap], duration_ms: float | None) 
 
 def require_pynwb() -> Any:
     """Return the package pynwb, or raise `InputError` if it is not installed."""
-    try:
-        import pynwb
-    except ImportError as error:
-        raise InputError("NWB files need pynwb: install the extra, pip install 'fingerpad[nwb]'.") from error
-    return pynwb
+    return library("pynwb", "NWB files need pynwb", "nwb")

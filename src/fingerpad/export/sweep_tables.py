@@ -227,9 +227,4 @@ def check_outputs(table: Path | None, spikes: Path | None) -> None:
 def _needs_parquet(path: Path) -> None:
     if path.suffix != ".parquet":
         raise InputError(f"A table of a sweep is written as .csv or .parquet: got {path.name}.")
-    try:
-        import pyarrow  # noqa: F401
-    except ImportError as error:
-        raise InputError(
-            "Parquet needs pyarrow, which is not installed: pip install 'fingerpad[tables]'."
-        ) from error
+    library("pyarrow", "Parquet needs pyarrow", "tables")

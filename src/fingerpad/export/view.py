@@ -16,7 +16,6 @@ import subprocess
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import cached_property
-from importlib import import_module
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
@@ -35,7 +34,7 @@ from fingerpad.core.errors import InputError
 from fingerpad.core.files import path_of, write_atomically
 from fingerpad.core.keywords import known_keywords
 from fingerpad.core.progress import NoProgress, Progress
-from fingerpad.export.dataset import check_touch, read_touch, spike_trains, touch_dataset
+from fingerpad.export.dataset import check_touch, library, read_touch, spike_trains, touch_dataset
 from fingerpad.report.style import BLACK, BLUE, STYLE, new_figure, say_nothing_to_draw
 from fingerpad.report.touch import BONE, DECADES, SKIN
 from fingerpad.skin.sampling import SkinResponse
@@ -126,17 +125,18 @@ def save_view(
         raise InputError(f"time_ms belongs to a picture: leave it out for {path.name}, or write a .png.")
     if path.suffix.lower() == ".mp4" and shutil.which("ffmpeg") is None:
         raise InputError("A film as .mp4 needs the program ffmpeg, which is not installed: write a .gif.")
-    require_pyvista()
+    _pyvista()
     if isinstance(touch, str | Path):
         data = read_touch(touch)
     elif isinstance(touch, SkinResponse):
         data = touch_dataset(touch)
     else:
-        data = instance("touch", touch, import_module("xarray").Dataset)
+        data = instance("touch", touch, library("xarray").Dataset)
         check_touch("touch", data)
     view = _View(data, _variable(data, field))
     if not film:
-        write_atomically(path, view.png(view.checked(_deepest_ms(data) if time_ms is None else time_ms)))
+        deepest_ms = float(data["time"].values[data["depth_mm"].values.argmax()])
+        write_atomically(path, view.png(view.checked(deepest_ms if time_ms is None else time_ms)))
         return (path,)
     if whole("frames", frames, at_least=2) > MOST_FRAMES:
         raise InputError(f"frames must be at most {MOST_FRAMES}: got {frames}.")
@@ -156,11 +156,6 @@ def _pictures(view: _View, times_ms: list[float], advance: Callable[[], None]) -
         advance()
 
 
-def require_pyvista() -> None:
-    """Raise `InputError` if PyVista is not installed."""
-    _pyvista()
-
-
 def fields_of(data: xarray.Dataset) -> tuple[str, ...]:
     """Names of the fields of a data set that can be shown, short ones where there are."""
     short = {name: alias for alias, name in SHORT_NAMES.items()}
@@ -177,10 +172,6 @@ def _can_be_shown(values: xarray.DataArray) -> bool:
 def _variable(data: xarray.Dataset, field: str) -> str:
     one_of("field", field, tuple(dict.fromkeys([*fields_of(data), *SHORT_NAMES.values()])))
     return SHORT_NAMES.get(field, field) if field not in data else field
-
-
-def _deepest_ms(data: xarray.Dataset) -> float:
-    return float(data["time"].values[data["depth_mm"].values.argmax()])
 
 
 @dataclass(frozen=True)
@@ -440,7 +431,8 @@ class _View:
             ScalarMappable(self.norm, self.colours), ax=scene, orientation="horizontal", shrink=0.6,
             aspect=30, pad=0.01, extend="min" if isinstance(self.norm, LogNorm) else "neither",
         )  # fmt: skip
-        bar.set_label(f"{values.long_name}{vector} [{_printed(values.units)}]")
+        unit = "-" if values.units == "1" else values.units
+        bar.set_label(f"{values.long_name}{vector} [{unit}]")
         bar.ax.xaxis.set_major_formatter("{x:g}")
         motion = figure.add_subplot(grid[0, 1])
         motion.plot(self.data["time"], self.data["depth_mm"], color=BLUE)
@@ -513,10 +505,6 @@ def _named(description: str) -> str:
         return "object"
 
 
-def _printed(unit: str) -> str:
-    return {"1": "-"}.get(unit, unit)
-
-
 def _gif(pictures: Iterator[Image.Image]) -> bytes:
     first, *others = (picture.quantize(128) for picture in pictures)
     buffer = io.BytesIO()
@@ -533,16 +521,9 @@ def _mp4(pictures: Iterator[Image.Image]) -> bytes:
             width, height = (size // 2 * 2 for size in picture.size)  # encoders ask for even sizes
             picture.crop((0, 0, width, height)).save(Path(folder) / f"{number:05d}.png")
         film = Path(folder) / "film.mp4"
-        command = [
-            "ffmpeg",
-            "-loglevel",
-            "error",
-            "-framerate",
-            str(FRAMES_PER_S),
-            "-i",
-            f"{folder}/%05d.png",
-        ]
-        done = subprocess.run([*command, "-pix_fmt", "yuv420p", str(film)], capture_output=True, check=False)
+        taken = ["-loglevel", "error", "-framerate", str(FRAMES_PER_S), "-i", f"{folder}/%05d.png"]
+        command = ["ffmpeg", *taken, "-pix_fmt", "yuv420p", str(film)]
+        done = subprocess.run(command, capture_output=True, check=False)
         if done.returncode or not film.exists():
             said = done.stderr.decode(errors="replace").strip().splitlines() or ["no reason given"]
             raise InputError(f"ffmpeg could not write the film ({said[-1].rstrip('.')}): write a .gif.")
@@ -551,13 +532,9 @@ def _mp4(pictures: Iterator[Image.Image]) -> bytes:
 
 def _pyvista() -> Any:
     """Return PyVista, which draws without a window and without messages about missing displays."""
-    try:
-        pyvista = import_module("pyvista")
-        logger = import_module("vtkmodules.vtkCommonCore").vtkLogger
-    except ImportError as error:
-        raise InputError(
-            "A view in three dimensions needs pyvista: install the extra, pip install 'fingerpad[view]'."
-        ) from error
+    needed = "A view in three dimensions needs pyvista", "view"
+    pyvista = library("pyvista", *needed)
+    logger = library("vtkmodules.vtkCommonCore", *needed).vtkLogger
     if not os.environ.get("DISPLAY"):
         logger.SetStderrVerbosity(logger.VERBOSITY_OFF)
     return pyvista

@@ -20,6 +20,7 @@ from fingerpad.core.checks import FloatArray
 from fingerpad.core.errors import InputError
 from fingerpad.core.files import path_of, read_text, write_atomically
 from fingerpad.core.keywords import known_keywords
+from fingerpad.export.dataset import library
 from fingerpad.export.job import wedge_nodes
 from fingerpad.geometry.mesh import Mesh
 from fingerpad.mechanics.press import Deformation
@@ -115,12 +116,7 @@ def read_vtu_series(path: str | Path) -> VtuSeries:
 
 def require_vtk() -> None:
     """Raise `InputError` if VTK is not installed; the parts that are used write files, none of them draws."""
-    try:
-        import vtkmodules.vtkIOXML  # noqa: F401
-    except ImportError as error:
-        raise InputError(
-            "VTU files need the package vtk, which is not installed: pip install 'fingerpad[vtk]'."
-        ) from error
+    library("vtkmodules.vtkIOXML", "VTU files need the package vtk", "vtk")
 
 
 def _exported(deformation: Deformation, mesh: Mesh) -> tuple[dict[str, np.ndarray], ...]:

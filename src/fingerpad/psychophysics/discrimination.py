@@ -20,8 +20,9 @@ sessions of one seed share no random number.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from operator import attrgetter
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -166,22 +167,29 @@ def compare_gradient_sum_observers(
     if not len(pairs):
         raise InputError("neighbours must hold at least one pair of receptors: got none.")
     whole("seed", seed, 0)
-    alike: dict[tuple[int, int], dict[float, list[int]]] = {}
-    for number, (noise_sigma, plan) in enumerate(observers):
-        sigma = checked_noise(noise_sigma)
-        alike.setdefault(plan.sums_per_sphere, {}).setdefault(sigma, []).append(number)
     found: dict[int, HitRates] = {}
-    for (distributions, presentations), by_sigma in alike.items():
+    for (distributions, presentations), sigmas, owners in _alike(observers, attrgetter("sums_per_sphere")):
         trials = session_trials(session, len(values), distributions)
+        measures = np.broadcast_to(values, (sigmas.size, *values.shape))
+        sums = noisy_gradient_sums(measures, pairs, sigmas, seed, trials, presentations)  # (a)-(f)
+        for numbers, of_sigma in zip(owners, sums, strict=True):
+            for number in numbers:
+                found[number] = hit_rates_of_sums(of_sigma, seed, observers[number][1], session)
+    return [found[number] for number in range(len(observers))]
+
+
+def _alike(
+    observers: Sequence[tuple[float, Experiment]], sizes: Callable[[Experiment], tuple[int, ...]]
+) -> Iterator[tuple[tuple[int, ...], FloatArray, list[list[int]]]]:
+    """Sizes that some observers share, some of their noises, and the numbers of the observers of each."""
+    alike: dict[tuple[int, ...], dict[float, list[int]]] = {}
+    for number, (noise_sigma, plan) in enumerate(observers):
+        alike.setdefault(sizes(plan), {}).setdefault(checked_noise(noise_sigma), []).append(number)
+    for shared, by_sigma in alike.items():
         sigmas = list(by_sigma)
         for first in range(0, len(sigmas), _NOISES_AT_ONCE):
-            some = np.array(sigmas[first : first + _NOISES_AT_ONCE])
-            measures = np.broadcast_to(values, (some.size, *values.shape))
-            sums = noisy_gradient_sums(measures, pairs, some, seed, trials, presentations)  # (a)-(f)
-            for sigma, of_sigma in zip(some.tolist(), sums, strict=True):
-                for number in by_sigma[sigma]:
-                    found[number] = hit_rates_of_sums(of_sigma, seed, observers[number][1], session)
-    return [found[number] for number in range(len(observers))]
+            some = sigmas[first : first + _NOISES_AT_ONCE]
+            yield shared, np.array(some), [by_sigma[sigma] for sigma in some]
 
 
 def hit_rates_of_sums(
@@ -230,28 +238,22 @@ def compare_euclidean_observers(
     """
     one_of("norm", norm, NORMS)
     values = checked_responses(responses, silent_value)
-    alike: dict[tuple[int, int, int], dict[float, list[int]]] = {}
-    for number, (noise_sigma, plan) in enumerate(observers):
+    for _, plan in observers:
         if plan.criterion_sigma > 0.0:
             raise InputError(
                 "criterion_sigma must be 0 for Euclidean Distance: its decision point does not vary."
             )
-        sigma, sizes = (checked_noise(noise_sigma), (plan.hit_rates, plan.presentations, plan.pairs))
-        alike.setdefault(sizes, {}).setdefault(sigma, []).append(number)
     found: dict[int, HitRates] = {}
-    for (repetitions, n_sets, n_pairs), by_sigma in alike.items():
+    sizes_of = attrgetter("hit_rates", "presentations", "pairs")
+    for (repetitions, n_sets, n_pairs), sigmas, owners in _alike(observers, sizes_of):
         trials = session_trials(session, repetitions, len(values))
-        sigmas = list(by_sigma)
-        for first in range(0, len(sigmas), _NOISES_AT_ONCE):
-            some = np.array(sigmas[first : first + _NOISES_AT_ONCE])
-            distances = np.stack(
-                [_noisy_distances(values, some, seed, trial, n_sets, n_pairs, norm) for trial in trials],
-                axis=1,
-            )
-            for sigma, of_sigma in zip(some.tolist(), distances, strict=True):
-                for number in by_sigma[sigma]:
-                    hit_rates = _rates_of_distances(of_sigma, observers[number][1])
-                    found[number] = _mean_and_spread(hit_rates, seed, session)
+        distances = np.stack(
+            [_noisy_distances(values, sigmas, seed, trial, n_sets, n_pairs, norm) for trial in trials], axis=1
+        )
+        for numbers, of_sigma in zip(owners, distances, strict=True):
+            for number in numbers:
+                hit_rates = _rates_of_distances(of_sigma, observers[number][1])
+                found[number] = _mean_and_spread(hit_rates, seed, session)
     return [found[number] for number in range(len(observers))]
 
 
