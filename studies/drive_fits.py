@@ -14,12 +14,10 @@ import numpy as np
 from fingerpad.core.checks import FloatArray, IntArray, whole
 from fingerpad.core.results import Number, Vector, result_class
 from fingerpad.data import protocol
-from fingerpad.inference.fitting.bounds import Bounds
 from fingerpad.inference.fitting.covariance_adaptation import CovarianceAdaptation
 from fingerpad.inference.fitting.cross_validation import cross_validate, interleaved_folds
 from fingerpad.inference.fitting.least_squares import LeastSquares
-from fingerpad.inference.fitting.methods import Fit, Method, best_of
-from fingerpad.inference.fitting.problem import Problem
+from fingerpad.inference.fitting.methods import Bounds, Fit, Method, Problem, best_of
 from fingerpad.inference.identifiable import identifiable, six_parameters
 from fingerpad.inference.rate_model import RateModel, Reparametrised
 from fingerpad.inference.rate_problem import RateProblem

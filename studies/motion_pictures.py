@@ -16,8 +16,8 @@ from fingerpad.core.signals import SedTraces, SpikeTrains
 from fingerpad.geometry.fingertip import Fingertip
 from fingerpad.geometry.indenters import Sphere
 from fingerpad.geometry.motions import chirp, repeated, sine, staircase, stroke
-from fingerpad.geometry.sampled_motions import reduced
 from fingerpad.geometry.trajectory import Trajectory
+from fingerpad.geometry.trajectory_files import reduced
 from fingerpad.neuron.afferent import Afferent
 from fingerpad.report.style import BLACK, BLUE, GREEN, GREY, ORANGE, new_figure, write_png
 from fingerpad.skin.indentation import CONTACT_POINT_MM, indent

@@ -33,9 +33,9 @@ from fingerpad.experiments.runner import Runner
 from fingerpad.geometry.motion import ForceRampAndHold, RampAndHold
 from fingerpad.neuron.afferent import Afferent
 from fingerpad.neuron.population import Population
+from fingerpad.psychophysics.discrimination import decision_point, hit_probability, moments, side
 from fingerpad.psychophysics.encoding import gradient_sum, neighbour_pairs
 from fingerpad.psychophysics.noise_fit import NOISE_DRAWS, fit_noise_sigma
-from fingerpad.psychophysics.signal_detection import decision_point, hit_probability, moments, side
 from fingerpad.skin.sampling import SkinResponse
 
 STANDARDS_PER_M = (144.0, 200.0, 287.0)

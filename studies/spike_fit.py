@@ -23,16 +23,16 @@ from fingerpad.data import protocol
 from fingerpad.experiments.conditions import Conditions
 from fingerpad.experiments.manifest import Manifest
 from fingerpad.experiments.runner import Runner
-from fingerpad.inference.identifiable import identifiable
+from fingerpad.inference.identifiable import (
+    SPIKE_PARAMETER_NAMES,
+    SPIKE_PARAMETER_UNITS,
+    identifiable,
+)
 from fingerpad.inference.soft_afferent import soft_membrane, soft_spikes
 from fingerpad.inference.spike_fit import SpikeFit, fit_spikes
 from fingerpad.inference.spike_likelihood import (
     SpikeLikelihood,
     time_rescaling,
-)
-from fingerpad.inference.spike_parameters import (
-    SPIKE_PARAMETER_NAMES,
-    SPIKE_PARAMETER_UNITS,
 )
 from fingerpad.inference.start_points import spike_start
 from fingerpad.neuron.afferent import Afferent

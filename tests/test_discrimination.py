@@ -19,6 +19,7 @@ from fingerpad.psychophysics.discrimination import (
     discriminate_euclidean,
     discriminate_gradient_sum,
     hit_rates_of_sums,
+    likelihood_point,
 )
 from fingerpad.psychophysics.encoding import distance, gradient_sum, neighbour_pairs
 from fingerpad.psychophysics.noise_fit import expected_hit_rates, fit_noise_sigma
@@ -30,7 +31,6 @@ from fingerpad.psychophysics.noisy_responses import (
     session_trials,
     shared_noise_gradient_sums,
 )
-from fingerpad.psychophysics.signal_detection import likelihood_point
 
 GRID = Population.grid()
 PAIRS = neighbour_pairs(GRID.positions_mm, GRID.pitch_mm)

@@ -7,11 +7,10 @@ import numpy as np
 import pytest
 
 from fingerpad.core.errors import InputError
-from fingerpad.geometry.embossed import MOST_CORNERS, Embossed, embossed_text
+from fingerpad.geometry.embossed import MOST_CORNERS, Embossed, embossed_text, joined_outlines
 from fingerpad.geometry.fingertip import Fingertip
 from fingerpad.geometry.grading import Grading
 from fingerpad.geometry.indenters import Bar, FlatPunch
-from fingerpad.geometry.outline_union import joined_outlines
 from fingerpad.geometry.probing import check_gap
 from fingerpad.skin.indentation import touch_of
 from fingerpad.skin.store import touch_key

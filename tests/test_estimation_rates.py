@@ -16,9 +16,9 @@ from fingerpad.inference.afferent_methods import (
     four_number_problem,
 )
 from fingerpad.inference.closed_form import ClosedFormModel, constant_drive_rate
-from fingerpad.inference.fitting.bounds import Bounds
 from fingerpad.inference.fitting.fractional_sum_of_squares import fractional_sum_of_squares
 from fingerpad.inference.fitting.least_squares import LeastSquares
+from fingerpad.inference.fitting.methods import Bounds
 from fingerpad.inference.identifiable import IDENTIFIABLE_NAMES, identifiable, six_parameters
 from fingerpad.inference.rate_model import AfferentModel, Reparametrised, four_number_model
 from fingerpad.inference.rate_problem import RateProblem

@@ -14,18 +14,18 @@ from fingerpad.core import threads
 from fingerpad.core.errors import ConvergenceError, InputError
 from fingerpad.core.random_streams import Presentations
 from fingerpad.core.signals import SedTraces, SpikeTrains
-from fingerpad.inference.identifiable import six_parameters
-from fingerpad.inference.spike_fit import SpikeFit, fit_spikes
-from fingerpad.inference.spike_likelihood import (
-    SpikeLikelihood,
-    time_rescaling,
-)
-from fingerpad.inference.spike_parameters import (
+from fingerpad.inference.identifiable import (
     SPIKE_PARAMETER_NAMES,
     SPIKE_PARAMETER_UNITS,
     canonical,
     canonical_jacobian,
     from_canonical,
+    six_parameters,
+)
+from fingerpad.inference.spike_fit import SpikeFit, fit_spikes
+from fingerpad.inference.spike_likelihood import (
+    SpikeLikelihood,
+    time_rescaling,
 )
 from fingerpad.neuron.escape_rate import EscapeRate
 from fingerpad.neuron.transduction import Drive, drive

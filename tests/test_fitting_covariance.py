@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from fingerpad.inference.fitting.covariance import jackknife_covariance
+from fingerpad.inference.fitting.cross_validation import jackknife_covariance
 
 
 def left_out(design, observed, n_groups):

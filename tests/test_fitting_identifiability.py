@@ -5,7 +5,7 @@ import pytest
 
 from fingerpad.core.errors import InputError
 from fingerpad.core.signals import SedTraces
-from fingerpad.inference.fitting.identifiability import identifiability, jacobian
+from fingerpad.inference.fitting.sensitivity import identifiability, jacobian
 from fingerpad.inference.identifiable import IDENTIFIABLE_NAMES, identifiable, six_parameters
 from fingerpad.inference.rate_model import AfferentModel
 from fingerpad.neuron.afferent import PARAMETER_NAMES

@@ -6,10 +6,9 @@ import numpy as np
 import pytest
 
 from fingerpad.core.errors import InputError
-from fingerpad.inference.fitting.bounds import Bounds
 from fingerpad.inference.fitting.covariance_adaptation import CovarianceAdaptation
 from fingerpad.inference.fitting.least_squares import LeastSquares
-from fingerpad.inference.fitting.methods import Fit, FitStep, best_of
+from fingerpad.inference.fitting.methods import Bounds, Fit, FitStep, best_of
 
 TIMES = np.linspace(0.0, 4.0, 24)
 TRUTH = np.array([2.0, 0.8])

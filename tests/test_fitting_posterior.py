@@ -5,8 +5,14 @@ import pytest
 
 from fingerpad.core.errors import ConvergenceError, InputError
 from fingerpad.core.threads import compiled_threads
-from fingerpad.inference.fitting.convergence import effective_size, effective_sizes, split_r_hat
-from fingerpad.inference.fitting.posterior import Chains, credible_band, sample
+from fingerpad.inference.fitting.posterior import (
+    Chains,
+    credible_band,
+    effective_size,
+    effective_sizes,
+    sample,
+    split_r_hat,
+)
 
 COVARIANCE = np.array([[4.0, 1.9, 0.0], [1.9, 1.0, 0.0], [0.0, 0.0, 0.01]])
 CENTRE = np.array([3.0, -1.0, 0.5])

@@ -16,9 +16,8 @@ from fingerpad.geometry.indenters import Sphere
 from fingerpad.geometry.motion import RampAndHold
 from fingerpad.geometry.motions import chirp, repeated, sine, staircase, stroke
 from fingerpad.geometry.paths import check_path
-from fingerpad.geometry.sampled_motions import reduced, sampled
 from fingerpad.geometry.trajectory import Trajectory
-from fingerpad.geometry.trajectory_files import read_trajectory
+from fingerpad.geometry.trajectory_files import read_trajectory, reduced, sampled
 from fingerpad.mechanics.press_settings import PressSettings
 from fingerpad.skin.indentation import touch_of
 

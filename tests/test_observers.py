@@ -32,7 +32,7 @@ from fingerpad.psychophysics.code_efficiency import (
     noisy_presentations,
 )
 from fingerpad.psychophysics.encoding import distance, gradient_sum, neighbour_pairs
-from fingerpad.psychophysics.tasks import best_difference
+from fingerpad.psychophysics.sensitivity import best_difference
 
 LOOKS = 400_000
 D_PRIMES = (0.5, 1.0, 2.0, 3.0)

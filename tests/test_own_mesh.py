@@ -16,7 +16,7 @@ from fingerpad.export.formats import export_touch
 from fingerpad.export.job import job_of
 from fingerpad.export.vtu import write_vtu_series
 from fingerpad.geometry.fingertip import Fingertip
-from fingerpad.geometry.free_mesh import FACES, FreeMesh
+from fingerpad.geometry.free_mesh import FACES, FreeMesh, closest_on_triangles
 from fingerpad.geometry.grading import Grading
 from fingerpad.geometry.indenters import Sphere
 from fingerpad.geometry.mesh import LAYERS
@@ -24,7 +24,6 @@ from fingerpad.geometry.mesh_files import _read_inp, _read_msh, read_finger
 from fingerpad.geometry.mesh_parts import MeshParts, finger_from
 from fingerpad.geometry.mesh_quality import jacobian_at_gauss
 from fingerpad.geometry.motion import RampAndHold
-from fingerpad.geometry.triangles import closest_on_triangles
 from fingerpad.mechanics.press_settings import PressSettings
 from fingerpad.skin.free_receptors import FreeReceptors
 from fingerpad.skin.indentation import touch_of

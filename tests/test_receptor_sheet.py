@@ -11,8 +11,7 @@ from fingerpad.core.errors import InputError
 from fingerpad.geometry.fingertip import Fingertip
 from fingerpad.geometry.grading import Grading, resolution_grading
 from fingerpad.geometry.mesh import block_mesh, finger_mesh
-from fingerpad.skin.grid_cubic import coefficients
-from fingerpad.skin.receptor_sheet import ReceptorSheet
+from fingerpad.skin.receptor_sheet import ReceptorSheet, coefficients
 
 FINGER = Fingertip()
 EVEN = Grading(

@@ -16,8 +16,16 @@ from fingerpad.neuron.mixed_population import types_of_afferents
 from fingerpad.reduction.building import joint_bounds, largest_errors
 from fingerpad.reduction.interpolation import Axis, chebyshev_points, lagrange
 from fingerpad.reduction.model import AT_ONCE
-from fingerpad.reduction.relaxation import amplitudes, depth_scale, filtered, lost
-from fingerpad.reduction.retreat import LEVELS, Springs, levels_mm, slope_changes
+from fingerpad.reduction.relaxation import (
+    LEVELS,
+    Springs,
+    amplitudes,
+    depth_scale,
+    filtered,
+    levels_mm,
+    lost,
+    slope_changes,
+)
 from fingerpad.reduction.streaming import read_local
 from fingerpad.reduction.training import ReducedRange, ReducedTraining, first_touch_mm
 

@@ -14,8 +14,8 @@ from fingerpad.geometry.indenters import Bar, FlatPunch, Sphere
 from fingerpad.geometry.mesh import block_mesh
 from fingerpad.geometry.motion import ForceRampAndHold, RampAndHold
 from fingerpad.geometry.motions import repeated, sine, stroke
-from fingerpad.geometry.sampled_motions import reduced, sampled
 from fingerpad.geometry.trajectory import Trajectory
+from fingerpad.geometry.trajectory_files import reduced, sampled
 from fingerpad.mechanics import newton
 from fingerpad.mechanics.contact import place
 from fingerpad.mechanics.materials import Material, Prony

@@ -9,10 +9,10 @@ import pytest
 from fingerpad.core.random_streams import Presentations
 from fingerpad.core.results import to_json
 from fingerpad.core.signals import SedTraces
-from fingerpad.inference.soft_afferent import soft_spikes
-from fingerpad.inference.spike_parameters import (
+from fingerpad.inference.identifiable import (
     SPIKE_PARAMETER_NAMES,
 )
+from fingerpad.inference.soft_afferent import soft_spikes
 from fingerpad.neuron.transduction import drive
 from fingerpad.report.style import png
 from sections import SED_DRIVEN as AFFERENT

@@ -25,7 +25,7 @@ def reduce_command(
     """Press a range of poses in full, and write a reduced touch that answers within a millisecond."""
     from fingerpad.experiments.descriptions.reduction import read_reduction, run_reduction
     from fingerpad.experiments.runner import Runner
-    from fingerpad.reduction.files import write_reduced
+    from fingerpad.reduction.model import write_reduced
 
     if out.suffix != ".npz":
         raise InputError(f"--out must be a file .npz: got {out}.")

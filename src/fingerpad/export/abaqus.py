@@ -48,7 +48,6 @@ def abaqus_deck(job: Job) -> str:
 
 
 def _layer(job: Job, layer: int, name: str) -> list[str]:
-    """Cards of one layer's elements and its material."""
     material = job.materials[layer]
     hybrid = "" if isinstance(material.law, Hyperfoam) else "H"
     lines = cards.body_elements(job, layer, f"C3D8{hybrid}", f"C3D6{hybrid}")

@@ -36,7 +36,6 @@ _WEDGE_EDGES = ((0, 1), (1, 2), (2, 0), (3, 4), (4, 5), (5, 3), (0, 3), (1, 4), 
 
 
 def calculix_deck(job: Job, elastic_moduli: str | None = None, element: str = "C3D8I") -> str:
-    """Text of a CalculiX input file."""
     one_of("element", element, tuple(ELEMENTS))
     points, bricks, wedges = _with_middle_nodes(job) if element == "C3D20R" else _of_mesh(job)
     first = len(points) + 1

@@ -17,7 +17,6 @@ NO_TERM = 1e20
 """D of a volumetric term that is absent: CalculiX silently replaces 0 by a stiffness of its own."""
 
 SKIN, INDENTER = "SKIN", "INDENTER"
-"""Names of surfaces in a deck."""
 
 
 def digits(value: float) -> str:
@@ -51,7 +50,6 @@ def elements(kind: str, name: str, numbers: IntArray, corners: IntArray) -> list
 
 
 def node_set(name: str, numbers: IntArray) -> list[str]:
-    """Card of a set of nodes."""
     return [f"*NSET, NSET={name}", *data(map(str, numbers))]
 
 
@@ -91,7 +89,6 @@ def body_elements(
 
 
 def law(material: Material, factor: float, moduli: str = "") -> list[str]:
-    """Card of a material's strain energy."""
     energy = material.law
     if isinstance(energy, Polynomial):
         return _polynomial(energy, factor, moduli)
@@ -124,5 +121,4 @@ def _polynomial(energy: Polynomial, factor: float, moduli: str) -> list[str]:
 
 
 def text(lines: Sequence[str]) -> str:
-    """Whole deck."""
     return "\n".join([*lines, ""])

@@ -44,7 +44,6 @@ if TYPE_CHECKING:
     from fingerpad.skin.indentation import Touch
 
 FORMAT, FORMAT_VERSION = "fingerpad touch", 1
-"""What the attributes `format` and `format_version` of a file say."""
 
 FILE_NAMES = ("touch.nc", "touch.zarr")
 """Names under which a folder of results holds a touch."""
@@ -84,7 +83,6 @@ class Variable:
     unit: str
     """Unit, "1" for a pure number; empty for numbers of nodes or elements, which have none."""
     dims: tuple[str, ...]
-    """Its dimensions."""
     long_name: str
     points_into: str = ""
     """Dimension of which it holds numbers, from 0."""
@@ -157,11 +155,6 @@ def touch_dataset(
     xarray.Dataset
         What is at nodes and elements is in single precision, all else in double.
 
-    Raises
-    ------
-    InputError
-        If xarray is missing, a quantity is unknown, or one needs the deformation and there is none.
-
     Examples
     --------
     >>> import fingerpad as fp
@@ -217,15 +210,8 @@ def write_touch(
     skin, response, quantities, seed
         As in `touch_dataset`.
 
-    Returns
-    -------
-    tuple of Path
-        The file or folder.
-
     Raises
     ------
-    InputError
-        If the name has another ending, or as `touch_dataset`.
     StoreError
         If it cannot be written.
 
@@ -258,17 +244,12 @@ def write_touch(
 
 @known_keywords
 def read_touch(path: str | Path) -> xarray.Dataset:
-    """Read the result of a touch, and check it.
+    """Read the result of a touch into memory, and check it.
 
     Parameters
     ----------
     path : str or Path
         A file or folder of `write_touch`, or a folder that holds `touch.nc` or `touch.zarr`.
-
-    Returns
-    -------
-    xarray.Dataset
-        As `touch_dataset` makes it, in memory.
 
     Raises
     ------
@@ -338,7 +319,7 @@ def _fields(
             place = ("element",) if field.place is Place.WATCHED else place
             values = values if len(values) == n_times else values[-1]
         assert values is not None
-        attributes = _field_attributes(field)
+        attributes: Attributes = {"long_name": field.long_name, "units": unit_of(field)}
         dims = (*place, *_COMPONENTS[field.components])
         if values.ndim > len(dims):
             dims = ("time", *dims)
@@ -347,12 +328,7 @@ def _fields(
         yield name, (dims, values if field.place is Place.PRESS else values.astype(np.float32), attributes)
 
 
-def _field_attributes(field: Field) -> Attributes:
-    return {"long_name": field.long_name, "units": unit_of(field)}
-
-
 def _mesh_values(mesh: Mesh) -> dict[str, np.ndarray]:
-    """Values of `MESH_PARTS`."""
     numbers = {
         "element_nodes": mesh.elements,
         "layer": mesh.layer,
@@ -396,7 +372,6 @@ def _face(body: Indenter, reach_mm: Sequence[float]) -> tuple[np.ndarray, np.nda
 
 
 def part_variable(name: str, value: np.ndarray) -> tuple[tuple[str, ...], np.ndarray, Attributes]:
-    """Dimensions, values and attributes of one of `PARTS`."""
     part = PARTS[name]
     attributes: Attributes = {"long_name": part.long_name}
     attributes |= {"units": part.unit} if part.unit else {}
@@ -404,17 +379,12 @@ def part_variable(name: str, value: np.ndarray) -> tuple[tuple[str, ...], np.nda
 
 
 def response_values(response: ResponseMap) -> dict[str, np.ndarray]:
-    """Values of `RESPONSE_PARTS`."""
-    return {
+    others: dict[str, np.ndarray] = {
         "receptor_mm": response.positions_mm,
-        "dynamic_rate_hz": response.dynamic_rate_hz,
-        "static_rate_hz": response.static_rate_hz,
-        "dynamic_count_hz": response.dynamic_count_hz,
-        "static_count_hz": response.static_count_hz,
-        "first_spike_latency_ms": response.first_spike_latency_ms,
         "spike_count": response.spike_count.astype(np.int32),
         "spike_time_ms": response.spikes.times_ms,
     }
+    return {name: others[name] if name in others else getattr(response, name) for name in RESPONSE_PARTS}
 
 
 def _attributes(skin: SkinResponse, response: ResponseMap | None, seed: int | None) -> Attributes:
@@ -571,13 +541,11 @@ def unit_of_name(name: str) -> str:
 
 
 def field_dimensions(field: Field) -> tuple[str, ...]:
-    """Dimensions of a field as it is stored."""
     time = ("time",) if field.stored is Times.ALL else ()
     return (*time, *_PLACES[field.place], *_COMPONENTS[field.components])
 
 
 def first_line(error: Exception) -> str:
-    """First line of what a library says."""
     return (str(error).strip().splitlines() or [type(error).__name__])[0].strip().rstrip(".")[:200]
 
 
@@ -587,11 +555,12 @@ def require_netcdf() -> None:
         library(name)
 
 
-def library(name: str) -> Any:
-    """Import a library of the extra `netcdf`, or raise an `InputError` that says how to install it."""
+def library(name: str, needed: str = "", extra: str = "netcdf") -> Any:
+    """Import a library of an extra, or raise an `InputError` that says how to install it."""
     try:
         return import_module(name)
     except ImportError as error:
         raise InputError(
-            f"A labelled data set needs {name}: install the extra, pip install 'fingerpad[netcdf]'."
+            f"{needed or f'A labelled data set needs {name}'}: install the extra, pip install "
+            f"'fingerpad[{extra}]'."
         ) from error

@@ -43,7 +43,6 @@ KINDS = ("hex8", "penta6")
 
 
 def febio_deck(job: Job) -> str:
-    """Text of an FEBio 4 input file."""
     root = xml.Element("febio_spec", version="4.0")
     _add(root, "Module", type="solid")
     _control(root, job)

@@ -62,7 +62,6 @@ class Job:
     materials: tuple[Material, ...]
     """One per layer of the mesh."""
     indenter: Indenter
-    """The rigid body."""
     placement: Placement
     """Its position at first touch."""
     times_ms: FloatArray
@@ -196,7 +195,6 @@ class Job:
 
     @property
     def touching_nodes(self) -> IntArray:
-        """Free nodes of the faces that may touch."""
         return np.setdiff1d(self.mesh.elements[self.touching_elements, 4:], self.mesh.fixed_nodes)
 
     @property
@@ -230,7 +228,6 @@ class Job:
 
     @property
     def summary(self) -> tuple[str, ...]:
-        """Comments at the top of every deck."""
         mesh, half = self.mesh, " of a body symmetric about z = 0 (forces are of this half)"
         return (
             f"Written by fingerpad {__version__}, mechanics {code_hash()}.",

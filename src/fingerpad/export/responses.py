@@ -56,15 +56,8 @@ def write_response_csv(path: Path, response: ResponseMap | MixedResponse) -> Pat
     response : ResponseMap or MixedResponse
         Responses of a population to one indentation.
 
-    Returns
-    -------
-    Path
-        The file.
-
     Raises
     ------
-    InputError
-        If `response` is neither.
     StoreError
         If the file cannot be written.
 

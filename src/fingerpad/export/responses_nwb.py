@@ -20,6 +20,7 @@ from fingerpad.core.phases import Phase
 from fingerpad.core.signals import ResponseMap, SpikeTrains
 from fingerpad.core.units import MS_PER_S
 from fingerpad.experiments.recording_files import SUFFIXES_OF_NWB
+from fingerpad.export.dataset import library
 from fingerpad.export.responses import PITCH, PLACES, TYPE, by_type, pitches_mm
 from fingerpad.neuron.mixed_population import MixedResponse, one_map
 
@@ -55,17 +56,8 @@ def write_responses_nwb(
     started : datetime, optional
         Begin of the session, with its time zone. Default: now.
 
-    Returns
-    -------
-    Path
-        The file.
-
     Raises
     ------
-    InputError
-        If the file has another ending, there is no indentation, receptors differ between indentations, a
-        duration is not valid, a spike is later than `duration_ms`, `started` has no time zone, or pynwb is
-        not installed.
     StoreError
         If the file cannot be written.
 
@@ -170,7 +162,6 @@ def read_responses_nwb(path: Path) -> dict[str, ResponseMap | MixedResponse]:
 
 
 def _responses(session: Any) -> dict[str, ResponseMap | MixedResponse]:
-    """Responses to all trials of a session."""
     units, trials = session.units, session.trials
     places = PLACES[3 if "y_mm" in units.colnames else 2]
     known = {"spike_times", "obs_intervals", TYPE, PITCH, *places}
@@ -237,8 +228,4 @@ def _durations(responses: Mapping[str, ResponseMap], duration_ms: float | None) 
 
 def require_pynwb() -> Any:
     """Return the package pynwb, or raise `InputError` if it is not installed."""
-    try:
-        import pynwb
-    except ImportError as error:
-        raise InputError("NWB files need pynwb: install the extra, pip install 'fingerpad[nwb]'.") from error
-    return pynwb
+    return library("pynwb", "NWB files need pynwb", "nwb")

@@ -15,7 +15,7 @@ from fingerpad.core.displayed import Result
 from fingerpad.core.signals import CurrentTraces, HitRates, ResponseMap, SedTraces, SpikeTrains
 from fingerpad.core.units import QUANTITY_UNITS
 from fingerpad.export.dataset import library, part_variable, response_values, touch_dataset, unit_of_name
-from fingerpad.inference.spike_parameters import SPIKE_PARAMETER_UNITS
+from fingerpad.inference.identifiable import SPIKE_PARAMETER_UNITS
 from fingerpad.skin.fields import Place, stored_fields
 
 if TYPE_CHECKING:

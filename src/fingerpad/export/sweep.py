@@ -52,7 +52,6 @@ class SweepOutcome:
 
     @property
     def lines(self) -> tuple[str, ...]:
-        """The outcome in words."""
         return (
             f"{self.done} of {self.settings - self.left_out} settings done, {self.failed} failed; "
             f"{self.pressed} pressed and {self.loaded} loaded in {self.wall_s:.1f} s."
@@ -179,7 +178,6 @@ def _settle(
 
 
 def _observe(file: SweepFile, progress: Progress) -> None:
-    """Compute and write the hit rates of all observers."""
     sweep = file.sweep
     along, _ = sweep.stimuli_axis(sweep.observers[0])
     with progress.stage("observers", sweep.size // sweep.shape[along]) as advance:

@@ -47,10 +47,8 @@ if TYPE_CHECKING:
     import xarray
 
 FORMAT, FORMAT_VERSION = "fingerpad sweep", 1
-"""What the attributes `format` and `format_version` say."""
 
 PENDING, DONE, FAILED, LEFT_OUT = range(4)
-"""Values of `status`."""
 
 MEANINGS = "pending done failed left_out"
 
@@ -74,7 +72,6 @@ class Variable:
     of_press: bool = False
     """Whether it has the dimensions that change the skin alone."""
     dtype: str = "f8"
-    """Type of its numbers."""
 
 
 def variables(fields: Sequence[str] = ()) -> dict[str, Variable]:
@@ -195,7 +192,6 @@ class SweepFile:
 
     @property
     def observed(self) -> bool:
-        """Whether there are hit rates."""
         return HIT_RATE in self._arrays
 
     def responses(self) -> dict[str, np.ndarray]:
@@ -286,22 +282,12 @@ class SweepFile:
 
 @known_keywords
 def open_sweep(path: str | Path) -> xarray.Dataset:
-    """Open the results of a sweep; numbers are read when they are used.
-
-    Parameters
-    ----------
-    path : str or Path
-        The folder that `run_sweep` wrote.
+    """Open the data set that `run_sweep` wrote; numbers are read when they are used.
 
     Returns
     -------
     xarray.Dataset
         With dimensions named by the fields that vary; `status` is 1 where a setting is done.
-
-    Raises
-    ------
-    InputError
-        If it cannot be read, another program wrote it, or its format has another version.
     """
     xarray, _ = library("xarray"), library("zarr")
     check_format(path, _opened(path_of("path", path)).attrs.asdict())
@@ -310,7 +296,6 @@ def open_sweep(path: str | Path) -> xarray.Dataset:
 
 
 def check_sweep_data(data: xarray.Dataset) -> None:
-    """Raise `InputError` if this is no data set of a sweep."""
     if not isinstance(data, library("xarray").Dataset) or "sweep" not in data.attrs or "status" not in data:
         raise InputError(f"data must be a data set from open_sweep: got {shown(data)}.")
 
@@ -332,11 +317,6 @@ def observe_sweep(data: xarray.Dataset, observer: Content, grid: Content | None 
     -------
     xarray.DataArray
         With the dimensions of the sweep, then those of the observer; NaN for the standard. [0-1]
-
-    Raises
-    ------
-    InputError
-        If the observer has an unknown or unfit key.
     """
     check_sweep_data(data)
     content = json.loads(data.attrs["sweep"])
@@ -357,22 +337,13 @@ def _of_observer(field: str) -> bool:
 
 
 def sweep_settings(data: xarray.Dataset) -> Sweep:
-    """Return the sweep that a data set is of."""
     check_sweep_data(data)
     return sweep_of(json.loads(data.attrs["sweep"]), data.attrs.get("source", "sweep"))
 
 
 @known_keywords
 def setting_touch(data: xarray.Dataset, **where: int) -> Content:
-    """Touch of one setting in the words of a file, for `run_touch`: figures, NWB, VTU and other files of it.
-
-    Parameters
-    ----------
-    data : xarray.Dataset
-        From `open_sweep`.
-    **where : int
-        Index of the setting along each dimension of the sweep.
-    """
+    """Touch of one setting, by its index along each dimension, in the words of a file for `run_touch`."""
     sweep = sweep_settings(data)
     return sweep.content(setting_number(sweep, where))
 

@@ -58,15 +58,8 @@ def write_sweep_table(data: xarray.Dataset, path: str | Path) -> Path:
     path : str or Path
         A file that ends in .csv, or in .parquet, which needs the extra `fingerpad[tables]`.
 
-    Returns
-    -------
-    Path
-        The file.
-
     Raises
     ------
-    InputError
-        If the ending is another one, nothing is done yet, or a package is not installed.
     StoreError
         If the file cannot be written.
     """
@@ -94,20 +87,10 @@ def write_sweep_table(data: xarray.Dataset, path: str | Path) -> Path:
 def read_sweep_table(path: str | Path) -> pandas.DataFrame:
     """Read a table that `write_sweep_table` wrote.
 
-    Parameters
-    ----------
-    path : str or Path
-        The file.
-
     Returns
     -------
     pandas.DataFrame
         With title, hash of the inputs and version of the program in its `attrs`.
-
-    Raises
-    ------
-    InputError
-        If it cannot be read, another program wrote it, or its format has another version.
     """
     path, pandas = path_of("path", path), library("pandas")
     try:
@@ -145,11 +128,6 @@ def setting_response(data: xarray.Dataset, **where: int) -> ResponseMap:
         From `open_sweep`.
     **where : int
         Index of the setting along each dimension of the sweep, as in `setting_touch`.
-
-    Raises
-    ------
-    InputError
-        If the setting has no result, or a dimension is missing.
     """
     sweep = sweep_settings(data)
     setting = setting_number(sweep, where)
@@ -196,8 +174,6 @@ def write_sweep_spikes(data: xarray.Dataset, path: str | Path, **where: int) -> 
 
     Raises
     ------
-    InputError
-        If no setting is done, receptors differ, a dimension is unknown, or pynwb is not installed.
     StoreError
         If the file cannot be written.
     """
@@ -251,9 +227,4 @@ def check_outputs(table: Path | None, spikes: Path | None) -> None:
 def _needs_parquet(path: Path) -> None:
     if path.suffix != ".parquet":
         raise InputError(f"A table of a sweep is written as .csv or .parquet: got {path.name}.")
-    try:
-        import pyarrow  # noqa: F401
-    except ImportError as error:
-        raise InputError(
-            "Parquet needs pyarrow, which is not installed: pip install 'fingerpad[tables]'."
-        ) from error
+    library("pyarrow", "Parquet needs pyarrow", "tables")

@@ -28,7 +28,6 @@ from fingerpad.report.touch import draw
 from fingerpad.report.touch_page import write_touch_page
 
 Write = Callable[[PressedTouch, Path], object]
-"""Writes one output into a folder."""
 
 RESULT = "touch.json"
 
@@ -69,7 +68,6 @@ WRITERS: dict[str, Write] = {
     **{name: _dataset(name) for name in ("netcdf", "zarr")},
     **{name: _deck(name) for name in DECKS},
 }
-"""How each output is written."""
 
 
 def check_described(described: DescribedTouch) -> None:
@@ -109,11 +107,6 @@ def run_touch(
     command : str, optional
         The command line, for the manifest.
 
-    Returns
-    -------
-    PressedTouch
-        With `skin`, `response` and `summary`.
-
     Raises
     ------
     InputError
@@ -147,7 +140,6 @@ def run_touch(
 
 
 def as_described(touch: str | Path | Content | TouchDescription | DescribedTouch) -> DescribedTouch:
-    """Return what `run_touch` takes as a `DescribedTouch`."""
     if isinstance(touch, DescribedTouch):
         return touch
     if isinstance(touch, TouchDescription):

@@ -16,7 +16,6 @@ import subprocess
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import cached_property
-from importlib import import_module
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Any
@@ -35,7 +34,7 @@ from fingerpad.core.errors import InputError
 from fingerpad.core.files import path_of, write_atomically
 from fingerpad.core.keywords import known_keywords
 from fingerpad.core.progress import NoProgress, Progress
-from fingerpad.export.dataset import check_touch, read_touch, spike_trains, touch_dataset
+from fingerpad.export.dataset import check_touch, library, read_touch, spike_trains, touch_dataset
 from fingerpad.report.style import BLACK, BLUE, STYLE, new_figure, say_nothing_to_draw
 from fingerpad.report.touch import BONE, DECADES, SKIN
 from fingerpad.skin.sampling import SkinResponse
@@ -104,16 +103,8 @@ def save_view(
     progress : Progress, optional
         Shown how many pictures of a film are drawn, such as `fp.notebook_progress()`.
 
-    Returns
-    -------
-    tuple of Path
-        The file.
-
     Raises
     ------
-    InputError
-        If a library is missing, the ending, field or time is unknown, or the inside is to be shown at a time
-        at which the data set does not have it.
     StoreError
         If the file cannot be written.
 
@@ -134,17 +125,18 @@ def save_view(
         raise InputError(f"time_ms belongs to a picture: leave it out for {path.name}, or write a .png.")
     if path.suffix.lower() == ".mp4" and shutil.which("ffmpeg") is None:
         raise InputError("A film as .mp4 needs the program ffmpeg, which is not installed: write a .gif.")
-    require_pyvista()
+    _pyvista()
     if isinstance(touch, str | Path):
         data = read_touch(touch)
     elif isinstance(touch, SkinResponse):
         data = touch_dataset(touch)
     else:
-        data = instance("touch", touch, import_module("xarray").Dataset)
+        data = instance("touch", touch, library("xarray").Dataset)
         check_touch("touch", data)
     view = _View(data, _variable(data, field))
     if not film:
-        write_atomically(path, view.png(view.checked(_deepest_ms(data) if time_ms is None else time_ms)))
+        deepest_ms = float(data["time"].values[data["depth_mm"].values.argmax()])
+        write_atomically(path, view.png(view.checked(deepest_ms if time_ms is None else time_ms)))
         return (path,)
     if whole("frames", frames, at_least=2) > MOST_FRAMES:
         raise InputError(f"frames must be at most {MOST_FRAMES}: got {frames}.")
@@ -159,15 +151,9 @@ def save_view(
 
 
 def _pictures(view: _View, times_ms: list[float], advance: Callable[[], None]) -> Iterator[Image.Image]:
-    """Draw the pictures of a film one after the other."""
     for time_ms in times_ms:
         yield Image.open(io.BytesIO(view.png(time_ms))).convert("RGB")
         advance()
-
-
-def require_pyvista() -> None:
-    """Raise `InputError` if PyVista is not installed."""
-    _pyvista()
 
 
 def fields_of(data: xarray.Dataset) -> tuple[str, ...]:
@@ -188,10 +174,6 @@ def _variable(data: xarray.Dataset, field: str) -> str:
     return SHORT_NAMES.get(field, field) if field not in data else field
 
 
-def _deepest_ms(data: xarray.Dataset) -> float:
-    return float(data["time"].values[data["depth_mm"].values.argmax()])
-
-
 @dataclass(frozen=True)
 class _View:
     """A data set and the variable of it that is shown."""
@@ -200,7 +182,6 @@ class _View:
     variable: str
 
     def checked(self, time_ms: float) -> float:
-        """Return a time at which the touch can be shown."""
         times = self.data["time"].values
         if not 0.0 <= finite("time_ms", time_ms, "ms") <= times[-1]:
             raise InputError(f"time_ms must lie within 0 ... {times[-1]:g} ms: got {time_ms:g} ms.")
@@ -277,7 +258,6 @@ class _View:
         return self._screen(points - self._camera[0]) + 0.5 * np.array(PIXELS)
 
     def png(self, time_ms: float) -> bytes:
-        """Render the picture of a time."""
         buffer = io.BytesIO()
         with matplotlib.rc_context(STYLE):
             self.figure(time_ms).savefig(buffer, format="png", metadata={"Software": None})
@@ -451,7 +431,8 @@ class _View:
             ScalarMappable(self.norm, self.colours), ax=scene, orientation="horizontal", shrink=0.6,
             aspect=30, pad=0.01, extend="min" if isinstance(self.norm, LogNorm) else "neither",
         )  # fmt: skip
-        bar.set_label(f"{values.long_name}{vector} [{_printed(values.units)}]")
+        unit = "-" if values.units == "1" else values.units
+        bar.set_label(f"{values.long_name}{vector} [{unit}]")
         bar.ax.xaxis.set_major_formatter("{x:g}")
         motion = figure.add_subplot(grid[0, 1])
         motion.plot(self.data["time"], self.data["depth_mm"], color=BLUE)
@@ -524,12 +505,7 @@ def _named(description: str) -> str:
         return "object"
 
 
-def _printed(unit: str) -> str:
-    return {"1": "-"}.get(unit, unit)
-
-
 def _gif(pictures: Iterator[Image.Image]) -> bytes:
-    """Film that repeats itself."""
     first, *others = (picture.quantize(128) for picture in pictures)
     buffer = io.BytesIO()
     first.save(
@@ -540,22 +516,14 @@ def _gif(pictures: Iterator[Image.Image]) -> bytes:
 
 
 def _mp4(pictures: Iterator[Image.Image]) -> bytes:
-    """Film that the program ffmpeg encodes."""
     with TemporaryDirectory() as folder:
         for number, picture in enumerate(pictures):
             width, height = (size // 2 * 2 for size in picture.size)  # encoders ask for even sizes
             picture.crop((0, 0, width, height)).save(Path(folder) / f"{number:05d}.png")
         film = Path(folder) / "film.mp4"
-        command = [
-            "ffmpeg",
-            "-loglevel",
-            "error",
-            "-framerate",
-            str(FRAMES_PER_S),
-            "-i",
-            f"{folder}/%05d.png",
-        ]
-        done = subprocess.run([*command, "-pix_fmt", "yuv420p", str(film)], capture_output=True, check=False)
+        taken = ["-loglevel", "error", "-framerate", str(FRAMES_PER_S), "-i", f"{folder}/%05d.png"]
+        command = ["ffmpeg", *taken, "-pix_fmt", "yuv420p", str(film)]
+        done = subprocess.run(command, capture_output=True, check=False)
         if done.returncode or not film.exists():
             said = done.stderr.decode(errors="replace").strip().splitlines() or ["no reason given"]
             raise InputError(f"ffmpeg could not write the film ({said[-1].rstrip('.')}): write a .gif.")
@@ -564,13 +532,9 @@ def _mp4(pictures: Iterator[Image.Image]) -> bytes:
 
 def _pyvista() -> Any:
     """Return PyVista, which draws without a window and without messages about missing displays."""
-    try:
-        pyvista = import_module("pyvista")
-        logger = import_module("vtkmodules.vtkCommonCore").vtkLogger
-    except ImportError as error:
-        raise InputError(
-            "A view in three dimensions needs pyvista: install the extra, pip install 'fingerpad[view]'."
-        ) from error
+    needed = "A view in three dimensions needs pyvista", "view"
+    pyvista = library("pyvista", *needed)
+    logger = library("vtkmodules.vtkCommonCore", *needed).vtkLogger
     if not os.environ.get("DISPLAY"):
         logger.SetStderrVerbosity(logger.VERBOSITY_OFF)
     return pyvista

@@ -20,6 +20,7 @@ from fingerpad.core.checks import FloatArray
 from fingerpad.core.errors import InputError
 from fingerpad.core.files import path_of, read_text, write_atomically
 from fingerpad.core.keywords import known_keywords
+from fingerpad.export.dataset import library
 from fingerpad.export.job import wedge_nodes
 from fingerpad.geometry.mesh import Mesh
 from fingerpad.mechanics.press import Deformation
@@ -80,18 +81,7 @@ class VtuSeries:
 
 @known_keywords
 def read_vtu_series(path: str | Path) -> VtuSeries:
-    """Read the files that `write_vtu_series` wrote.
-
-    Parameters
-    ----------
-    path : str or Path
-        The PVD file.
-
-    Raises
-    ------
-    InputError
-        If VTK is not installed, or a file is missing or no VTU.
-    """
+    """Read the files that `write_vtu_series` wrote, by their PVD file."""
     require_vtk()
     from vtkmodules.util.numpy_support import vtk_to_numpy
     from vtkmodules.vtkIOXML import vtkXMLUnstructuredGridReader
@@ -126,12 +116,7 @@ def read_vtu_series(path: str | Path) -> VtuSeries:
 
 def require_vtk() -> None:
     """Raise `InputError` if VTK is not installed; the parts that are used write files, none of them draws."""
-    try:
-        import vtkmodules.vtkIOXML  # noqa: F401
-    except ImportError as error:
-        raise InputError(
-            "VTU files need the package vtk, which is not installed: pip install 'fingerpad[vtk]'."
-        ) from error
+    library("vtkmodules.vtkIOXML", "VTU files need the package vtk", "vtk")
 
 
 def _exported(deformation: Deformation, mesh: Mesh) -> tuple[dict[str, np.ndarray], ...]:
@@ -172,7 +157,6 @@ def _node_sets(mesh: Mesh) -> dict[str, np.ndarray]:
 
 
 def cells_of(mesh: Mesh) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return VTK's cells of a mesh."""
     wedges = wedge_nodes(mesh)
     is_wedge = wedges[:, 0] >= 0
     sizes = np.where(is_wedge, 6, 8)
@@ -183,7 +167,6 @@ def cells_of(mesh: Mesh) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 
 def _grid(mesh: Mesh) -> Any:
-    """Undeformed points and cells."""
     from vtkmodules.util.numpy_support import numpy_to_vtk, numpy_to_vtkIdTypeArray
     from vtkmodules.vtkCommonCore import vtkPoints
     from vtkmodules.vtkCommonDataModel import vtkCellArray, vtkUnstructuredGrid

@@ -26,7 +26,6 @@ SHARP_SHARE = 1.5
 """Distance from sharp edges from which on creases are blunted, over the radius."""
 
 _ON_SURFACE_MM = 1e-9
-"""Distance from which on its direction is known. [mm]"""
 
 
 @dataclass(frozen=True)
@@ -192,7 +191,6 @@ def _to_triangle(p: FloatArray, corners: FloatArray) -> tuple[float, float, floa
 
 @njit(cache=True, nogil=True)
 def _to_box(p: FloatArray, low: FloatArray, high: FloatArray) -> float:
-    """Squared distance of a point to a box."""
     total = 0.0
     for axis in range(3):
         beyond = max(low[axis] - p[axis], p[axis] - high[axis], 0.0)
@@ -257,7 +255,6 @@ def _closest(
     begin: int,
     end: int,
 ) -> None:
-    """Signed distances of some of the points, and their gradients."""
     n_leaves = len(low) // 2
     stack = np.empty(64, dtype=np.int64)
     last = 0.0

@@ -69,25 +69,21 @@ class Union(Indenter):
 
     @property
     def half_width_mm(self) -> float:
-        """Half of the extent along x about the axis. [mm]"""
         return max(
             part.half_width_mm + abs(x) for part, (x, _, _) in zip(self.parts, self.at_mm, strict=True)
         )
 
     @property
     def relief_mm(self) -> float:
-        """Width of the narrowest dot, ridge or groove; infinite if all are wide or run across. [mm]"""
         found = min(part.relief_mm for part in self.parts)
         return found if self._swept else min(found, self._measured_mm)
 
     @property
     def narrowest_mm(self) -> float:
-        """Width of the narrowest dot, ridge or groove; infinite if all are wide. [mm]"""
         return min(self._measured_mm, *(min(part.relief_mm, part.narrowest_mm) for part in self.parts))
 
     @property
     def edge_reach_mm(self) -> float:
-        """Half-width about x = 0 of the finer mesh for narrow ridges across; 0 without. [mm]"""
         if not (self._swept and np.isfinite(self.narrowest_mm)):
             return 0.0
         reaches = (
@@ -115,13 +111,11 @@ class Union(Indenter):
         return np.maximum(height, height.max() - RELIEF_MM)
 
     def gap(self, points_mm: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Signed gap (n,) and outward normal (n, 3) at points (n, 3) of the indenter's frame. [mm]"""
         if self.edge_radius_mm == 0.0:
             return self._sharp(points_mm)
         return with_rounded_edges(self._sharp, points_mm, self.edge_radius_mm)
 
     def _sharp(self, points_mm: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Gap and normal with the edges that the parts have. [mm]"""
         gap, normal = self.parts[0].gap(points_mm - np.array(self.at_mm[0]))
         for part, at in zip(self.parts[1:], self.at_mm[1:], strict=True):
             gap, normal = self._joined(gap, normal, *part.gap(points_mm - np.array(at)))
@@ -155,11 +149,6 @@ def ridges(
         Radius of the edges. [mm]
     height_mm : float
         Height of the ridges above the plate. [mm]
-
-    Returns
-    -------
-    Union
-        Bars and a plate.
 
     Examples
     --------

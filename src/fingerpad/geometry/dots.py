@@ -75,11 +75,9 @@ class Dots(Indenter):
 
     @property
     def narrowest_mm(self) -> float:
-        """The same, which a mesh must resolve. [mm]"""
         return self.relief_mm
 
     def gap(self, points_mm: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Signed gap (n,) and outward normal (n, 3) at points (n, 3) of the indenter's frame. [mm]"""
         at, radius = np.array(self.at_mm), self.radius_mm
         beside = np.linalg.norm(points_mm[:, None, [0, 2]] - at, axis=2)
         nearest = at[beside.argmin(axis=1)]
@@ -93,7 +91,7 @@ class Dots(Indenter):
 
 @known_keywords
 def braille(text: str, along_finger: bool = True) -> Dots:
-    """Braille of some lower-case letters, its middle on the indenter's axis.
+    """Braille of some lower-case letters, dots 0.48 mm high, its middle on the indenter's axis.
 
     Parameters
     ----------
@@ -102,16 +100,6 @@ def braille(text: str, along_finger: bool = True) -> Dots:
     along_finger : bool
         Whether the columns of a cell run along the finger, as it lies on a line of text that runs across;
         otherwise the line of text runs along the finger.
-
-    Returns
-    -------
-    Dots
-        Standard dots, 0.48 mm high.
-
-    Raises
-    ------
-    InputError
-        If there is no letter, or a character is not known.
 
     Examples
     --------
@@ -125,10 +113,7 @@ def braille(text: str, along_finger: bool = True) -> Dots:
         instead = f"; write {low!r}" if low != text and not set(low) - set(_LETTERS) - {" "} else ""
         raise InputError(f"text must have letters a to z and spaces: got {text!r}{instead}.")
     places = [
-        (
-            cell * BRAILLE_CELL_MM + (int(dot) > 3) * BRAILLE_PITCH_MM,
-            (int(dot) - 1) % 3 * BRAILLE_PITCH_MM,
-        )
+        (cell * BRAILLE_CELL_MM + (int(dot) > 3) * BRAILLE_PITCH_MM, (int(dot) - 1) % 3 * BRAILLE_PITCH_MM)
         for cell, letter in enumerate(text)
         for dot in _LETTERS.get(letter, "")
     ]

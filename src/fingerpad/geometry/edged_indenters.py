@@ -70,23 +70,18 @@ class Edge(Indenter):
 
     @property
     def edge_reach_mm(self) -> float:
-        """Half-width about x = 0 within which skin bends about the edge. [mm]"""
         return self.fillet_mm + BESIDE_EDGE_MM
 
     def edges_mm(self, reach_mm: float) -> tuple[tuple[float, float], ...]:
-        """Place along x and radius of the edge. [mm]"""
         return ((0.0, self.fillet_mm),)
 
     def rounded_to(self, radius_mm: float) -> Edge:
-        """Return the body with an edge of at least this radius. [mm]"""
         return replace(self, fillet_mm=max(self.fillet_mm, radius_mm))
 
     def front(self, points_mm: FloatArray) -> FloatArray:
-        """Height y of the body's face above the x and z of points (n, 3), -inf beside it. [mm]"""
         return round_front(points_mm[:, 0] + self.fillet_mm, self.fillet_mm)
 
     def gap(self, points_mm: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Signed gap (n,) and outward normal (n, 3) at points (n, 3) of the indenter's frame. [mm]"""
         x, y = points_mm[:, 0], points_mm[:, 1]
         return _corner(x, y, self.fillet_mm, _along_x(np.ones_like(x)))
 
@@ -110,11 +105,6 @@ class Gap(Indenter):
     lip_mm : float
         Radius of the two lips of the gap, if the gap is at least twice as wide; `lip_radius_mm` is another
         name of it. [mm]
-
-    Raises
-    ------
-    InputError
-        If a size is negative, or gap, lips and fillets leave no flat ridge.
 
     References
     ----------
@@ -163,27 +153,22 @@ class Gap(Indenter):
 
     @property
     def half_width_mm(self) -> float:
-        """Half of the full width. [mm]"""
         return self.width_mm / 2
 
     @property
     def edge_reach_mm(self) -> float:
-        """Half-width about x = 0 within which skin bends about the lips; 0 without a gap. [mm]"""
         return self.gap_mm / 2 + BESIDE_EDGE_MM if self.gap_mm > 0.0 else 0.0
 
     @property
     def narrowest_mm(self) -> float:
-        """Width of the gap; infinite without one. [mm]"""
         return self.gap_mm if self.gap_mm > 0.0 else np.inf
 
     def edges_mm(self, reach_mm: float) -> tuple[tuple[float, float], ...]:
-        """Place along x and radius of the lips, if there is a gap, and of the outer edges. [mm]"""
         half, lip = self.width_mm / 2, self.gap_mm / 2
         lips = ((-lip, self.lip_radius_mm), (lip, self.lip_radius_mm)) if self.gap_mm > 0.0 else ()
         return ((-half, self.fillet_mm), *lips, (half, self.fillet_mm))
 
     def front(self, points_mm: FloatArray) -> FloatArray:
-        """Height y of the body's face above the x and z of points (n, 3), -inf beside and in the gap. [mm]"""
         u = np.abs(points_mm[:, 0])
         face = round_front(u - self.width_mm / 2 + self.fillet_mm, self.fillet_mm)
         if self.gap_mm == 0.0:
@@ -191,7 +176,6 @@ class Gap(Indenter):
         return np.minimum(face, round_front(self.gap_mm / 2 - u + self.lip_radius_mm, self.lip_radius_mm))
 
     def gap(self, points_mm: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Signed gap (n,) and outward normal (n, 3) at points (n, 3) of the indenter's frame. [mm]"""
         if self.gap_mm == 0.0:
             return Bar(self.width_mm, self.fillet_mm).gap(points_mm)
         x, y = points_mm[:, 0], points_mm[:, 1]
@@ -266,16 +250,13 @@ class Grating(Indenter):
 
     @property
     def edge_reach_mm(self) -> float:
-        """Half-width about x = 0 within which skin bends about edges: infinite."""
         return np.inf
 
     @property
     def narrowest_mm(self) -> float:
-        """Smaller of the widths of ridge and groove. [mm]"""
         return min(self.ridge_mm, self.groove_mm)
 
     def edges_mm(self, reach_mm: float) -> tuple[tuple[float, float], ...]:
-        """Place along x and radius of the edges of all ridges within reach. [mm]"""
         last = int(reach_mm / self.period_mm) + 1
         return tuple(
             (ridge * self.period_mm + side * self.ridge_mm / 2, self.lip_mm)
@@ -284,15 +265,12 @@ class Grating(Indenter):
         )
 
     def rounded_to(self, radius_mm: float) -> Grating:
-        """Return the grating with lips of at least this radius [mm], at most half of a ridge."""
         return replace(self, lip_mm=max(self.lip_mm, min(radius_mm, self.ridge_mm / 2)))
 
     def front(self, points_mm: FloatArray) -> FloatArray:
-        """Height y of the body's face above the x and z of points (n, 3), -inf over a groove. [mm]"""
         return self._ridge.front(self._beside_ridge(points_mm))
 
     def gap(self, points_mm: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Signed gap (n,) and outward normal (n, 3) at points (n, 3) of the indenter's frame. [mm]"""
         return self._ridge.gap(self._beside_ridge(points_mm))
 
     @property
@@ -300,7 +278,6 @@ class Grating(Indenter):
         return Bar(self.ridge_mm, self.lip_mm)
 
     def _beside_ridge(self, points_mm: FloatArray) -> FloatArray:
-        """Points in the frame of the ridge next to each."""
         beside = points_mm.copy()
         beside[:, 0] -= self.period_mm * np.round(points_mm[:, 0] / self.period_mm)
         return beside

@@ -19,15 +19,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.interpolate import BSpline, make_smoothing_spline
 
-from fingerpad.core.checks import (
-    FloatArray,
-    finite,
-    float_array,
-    increasing,
-    not_negative,
-    one_of,
-    positive,
-)
+from fingerpad.core.checks import FloatArray, finite, float_array, increasing, not_negative, one_of, positive
 from fingerpad.core.displayed import Displayed
 from fingerpad.core.errors import InputError
 from fingerpad.core.keywords import KnownKeywords, known_keywords
@@ -106,7 +98,6 @@ class Profile:
         return spline(inside) + slope(inside) * (s - inside), slope(inside)
 
     def at(self, x_mm: ArrayLike) -> FloatArray:
-        """Value of the profile at `x_mm`, 0 at the tip and beyond [mm]."""
         s = np.sqrt(np.maximum(1.0 - np.asarray(x_mm, dtype=np.float64) / self.length_mm, 0.0))
         return s * self.over_s(s)[0]
 
@@ -143,6 +134,7 @@ class Finger(metaclass=KnownKeywords):
 
     @property
     def own_mesh(self) -> Mesh | None:
+        """Mesh that a finger has already; None for a finger that is meshed."""
         return None
 
     def own_grading(self, x_mm: float, z_mm: float) -> Grading | None:
@@ -171,11 +163,6 @@ class Fingertip(Displayed, Finger):
         Proximal and distal end of the nail. [mm]
     nail_half_width_mm : float
         Extent of the nail to either side. [mm]
-
-    Raises
-    ------
-    InputError
-        If a value is out of its range or bone and layers do not fit into the outline.
 
     Examples
     --------
@@ -282,11 +269,6 @@ class Fingertip(Displayed, Finger):
         stratum_corneum_mm, living_epidermis_mm, dermis_mm : float, optional
             Thicknesses of the layers. [mm]
 
-        Raises
-        ------
-        InputError
-            If the preset is unknown, a measure is in another unit, or bone and layers do not fit.
-
         Examples
         --------
         >>> narrow = Fingertip.of(length_mm=22.0, width_mm=16.0)
@@ -315,11 +297,6 @@ class Fingertip(Displayed, Finger):
 
     def scaled(self, factor: float) -> Fingertip:
         """Return the same finger in another size: outline, layers, bone and nail times a factor.
-
-        Parameters
-        ----------
-        factor : float
-            Above 0.
 
         Examples
         --------
@@ -389,7 +366,6 @@ class Fingertip(Displayed, Finger):
 
     @property
     def layer_depths_mm(self) -> tuple[float, float, float]:
-        """Depth of the lower border of stratum corneum, living epidermis and dermis [mm]."""
         epidermis = self.stratum_corneum_mm + self.living_epidermis_mm
         return self.stratum_corneum_mm, epidermis, epidermis + self.dermis_mm
 
@@ -403,15 +379,6 @@ class Fingertip(Displayed, Finger):
 
         Here s² = 1 - x / L; g is a / s (volar) or b / s (dorsal) for y and c / s for z, the profiles
         without their factor s.
-
-        Parameters
-        ----------
-        points_mm : array (..., 3)
-            x, y and z. [mm]
-
-        Returns
-        -------
-        array (...)
         """
         return self._level_and_gradient(np.asarray(points_mm, dtype=np.float64))[0]
 
@@ -437,27 +404,11 @@ class Fingertip(Displayed, Finger):
         return level, gradient
 
     def skin_normal(self, points_mm: ArrayLike) -> FloatArray:
-        """Outward unit normal, (..., 3), of the level surface through each point of the skin."""
         gradient = self.level_gradient(points_mm)
         return gradient / np.linalg.norm(gradient, axis=-1, keepdims=True)
 
     def skin_point(self, x_mm: ArrayLike, z_mm: ArrayLike) -> FloatArray:
-        """Point of the volar skin at each (x, z).
-
-        Parameters
-        ----------
-        x_mm, z_mm : array (...)
-            Position seen from the volar side. [mm]
-
-        Returns
-        -------
-        array (..., 3)
-            Points of the skin. [mm]
-
-        Raises
-        ------
-        InputError
-            If a position lies beside the finger.
+        """Points (..., 3) of the volar skin at each (x, z). [mm]
 
         Examples
         --------
@@ -484,11 +435,6 @@ class Fingertip(Displayed, Finger):
     def depth_available_mm(self, x_mm: ArrayLike, z_mm: ArrayLike) -> FloatArray:
         """Distance along y from the volar skin at (x, z) to the bone or, beside it, the dorsal skin [mm].
 
-        Raises
-        ------
-        InputError
-            If a position lies beside the finger.
-
         Examples
         --------
         >>> float(Fingertip().depth_available_mm(17.37, 0.0).round(1))
@@ -503,22 +449,12 @@ class Fingertip(Displayed, Finger):
         return np.where(square > 0.0, bone_y - y, through)
 
     def skin_distance_mm(self, origins_mm: FloatArray, directions: FloatArray) -> FloatArray:
-        """Distance from points inside to the skin along unit directions: Newton's method in a bracket.
+        """Distance (...) from points inside to the skin along unit directions, by Newton's method. [mm]
 
         Parameters
         ----------
         origins_mm, directions : array (..., 3)
             Rays; every origin lies inside the skin. [mm], [1]
-
-        Returns
-        -------
-        array (...)
-            Distance to the skin. [mm]
-
-        Raises
-        ------
-        InputError
-            If an origin lies outside.
         """
         if (self.level(origins_mm) >= 0.0).any():
             raise InputError("Every origin of a ray must lie inside the skin: at least one does not.")
@@ -539,17 +475,12 @@ class Fingertip(Displayed, Finger):
         return distance
 
     def bone_distance_mm(self, origins_mm: FloatArray, directions: FloatArray) -> FloatArray:
-        """Distance from points of the bone's axis to its surface along unit directions, closed form.
+        """Distance (...) from the bone's axis to its surface along unit directions, closed form. [mm]
 
         Parameters
         ----------
         origins_mm, directions : array (..., 3)
             Rays at right angles to the axis, or from its end in any distal direction. [mm], [1]
-
-        Returns
-        -------
-        array (...)
-            Distance to the surface of the bone. [mm]
         """
         cap_mm = self.bone_tip_x_mm - self.spine_end_x_mm
         length = np.where(origins_mm[..., 0] < self.spine_end_x_mm, np.inf, cap_mm)
@@ -581,7 +512,6 @@ def _paper() -> Fingertip:
 
 
 def _aged() -> Fingertip:
-    """Thinner living epidermis and dermis."""
     finger, decades = _paper(), fingers.AGED_DECADES.value
     return replace(
         finger,

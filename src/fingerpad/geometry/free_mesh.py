@@ -7,13 +7,13 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike
+from scipy.spatial import cKDTree
 
 from fingerpad.core.checks import FloatArray, IntArray
 from fingerpad.core.errors import InputError
 from fingerpad.geometry.fingertip import Finger
 from fingerpad.geometry.grading import Grading
 from fingerpad.geometry.mesh import Mesh
-from fingerpad.geometry.triangles import closest_on_triangles
 
 FACES = np.array([[0, 3, 2, 1], [4, 5, 6, 7], [0, 1, 5, 4], [1, 2, 6, 5], [2, 3, 7, 6], [3, 0, 4, 7]])
 """Corners of the faces of a brick, counter-clockwise seen from outside."""
@@ -39,17 +39,14 @@ class FreeMesh(Mesh):
 
     @property
     def is_grid(self) -> bool:
-        """No."""
         return False
 
     @cached_property
     def skin_faces(self) -> IntArray:
-        """Corners of the faces on the skin, (n_faces, 4)."""
         return self.skin_grid
 
     @property
     def skin_elements(self) -> IntArray:
-        """Element of each of `skin_faces`."""
         return self.outer_elements
 
     @cached_property
@@ -122,12 +119,10 @@ class FingerMesh(Finger):
 
     @property
     def contact_mm(self) -> tuple[float, float]:
-        """X and z of the middle of the pad [mm]."""
         return self.pad_mm
 
     @property
     def layer_depths_mm(self) -> tuple[float, float, float]:
-        """Depth of the lower borders of the outer three layers at the middle of the pad [mm]."""
         return self.borders_mm
 
     @property
@@ -137,7 +132,6 @@ class FingerMesh(Finger):
 
     @property
     def own_mesh(self) -> Mesh:
-        """The mesh."""
         return self.mesh
 
     @cached_property
@@ -173,7 +167,6 @@ class FingerMesh(Finger):
         return found
 
     def skin_point(self, x_mm: ArrayLike, z_mm: ArrayLike) -> FloatArray:
-        """Point of the volar skin at each (x, z); InputError beside the skin. [mm]"""
         x, z = np.broadcast_arrays(np.asarray(x_mm, dtype=np.float64), np.asarray(z_mm, dtype=np.float64))
         heights = self._heights(self._upright[0], x.ravel(), z.ravel())
         for here_x, here_z, height in zip(x.ravel(), z.ravel(), heights, strict=True):
@@ -186,12 +179,10 @@ class FingerMesh(Finger):
         return np.stack([x, y, z], axis=-1)
 
     def skin_normal(self, points_mm: ArrayLike) -> FloatArray:
-        """Outward unit normal of the skin closest to each point, (..., 3)."""
         points = np.asarray(points_mm, dtype=np.float64)
         return self.mesh.on_skin(points.reshape(-1, 3))[1].reshape(points.shape)
 
     def depth_available_mm(self, x_mm: ArrayLike, z_mm: ArrayLike) -> FloatArray:
-        """Distance along y from the volar skin at (x, z) to the bone or, beside it, the dorsal skin. [mm]"""
         below = self.skin_point(x_mm, z_mm)
         x, y, z = below.reshape(-1, 3).T
         bone, skin = (self._heights(triangles, x, z) for triangles in self._upright[::-1])
@@ -205,7 +196,6 @@ class FingerMesh(Finger):
         return np.where(depth > 0.0, depth, reach).reshape(below.shape[:-1])
 
     def own_grading(self, x_mm: float, z_mm: float) -> Grading:
-        """Sizes of the elements about a place of the skin, as they are."""
         sides = self.mesh.nodes_mm[self.mesh.skin_triangles]
         away = np.linalg.norm(sides.mean(axis=1) - self.skin_point(x_mm, z_mm), axis=1)
         near = sides[np.argsort(away)[:_NEAR_TRIANGLES]]
@@ -215,3 +205,46 @@ class FingerMesh(Finger):
         )
         extent = np.ptp(self.mesh.nodes_mm, axis=0)
         return Grading(x_mm, extent[0], extent[2], size, size, float(extent.max()), full=self.mesh.full)
+
+
+_NEAREST = 24
+"""Triangles that are looked at: those whose corners or middles are nearest to a point."""
+
+
+def closest_on_triangles(points_mm: FloatArray, corners_mm: FloatArray) -> tuple[IntArray, FloatArray]:
+    """Closest point on a surface of triangles of similar size."""
+    count = min(_NEAREST, len(corners_mm))
+    _, near = cKDTree(corners_mm.mean(axis=1)).query(points_mm, k=count)
+    near = near.reshape(len(points_mm), count)
+    weights = _weights(points_mm[:, None], corners_mm[near])
+    found = (weights[..., None] * corners_mm[near]).sum(axis=2)
+    best = np.linalg.norm(found - points_mm[:, None], axis=2).argmin(axis=1)
+    rows = np.arange(len(points_mm))
+    return near[rows, best], weights[rows, best]
+
+
+def _weights(points: FloatArray, corners: FloatArray) -> FloatArray:
+    """Weights (..., 3) of the closest point of each triangle (..., 3, 3): on its face or an edge."""
+    a, b, c = corners[..., 0, :], corners[..., 1, :], corners[..., 2, :]
+    ab, ac, ap = b - a, c - a, points - a
+    d00, d01, d11 = (ab * ab).sum(-1), (ab * ac).sum(-1), (ac * ac).sum(-1)
+    d20, d21 = (ap * ab).sum(-1), (ap * ac).sum(-1)
+    area = d00 * d11 - d01 * d01
+    safe = np.where(area > 0.0, area, 1.0)
+    v, w = (d11 * d20 - d01 * d21) / safe, (d00 * d21 - d01 * d20) / safe
+    inside = np.stack([1.0 - v - w, v, w], axis=-1)
+    on_face = (area > 0.0) & (inside >= 0.0).all(axis=-1)
+    nearest = np.full(on_face.shape, np.inf)
+    chosen = inside
+    for first, second in ((0, 1), (1, 2), (2, 0)):
+        start, end = corners[..., first, :], corners[..., second, :]
+        way = end - start
+        square = (way * way).sum(-1)
+        t = np.clip(((points - start) * way).sum(-1) / np.where(square > 0.0, square, 1.0), 0.0, 1.0)
+        away = np.linalg.norm(points - start - t[..., None] * way, axis=-1)
+        edge = np.zeros_like(inside)
+        edge[..., first], edge[..., second] = 1.0 - t, t
+        closer = ~on_face & (away < nearest)
+        chosen = np.where(closer[..., None], edge, chosen)
+        nearest = np.where(closer, away, nearest)
+    return chosen

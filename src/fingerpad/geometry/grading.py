@@ -56,12 +56,6 @@ class Grading(metaclass=KnownKeywords):
     finer_along, finer_across : tuple of (from, to, size)
         Strips with even smaller elements, about a small body or an edge: x on the volar midline of its
         two sides or, across, z; and the largest size in it. Sizes grow from there by `growth`. [mm]
-
-    Raises
-    ------
-    InputError
-        If a value is out of its range, the core is not a part of the fine zone with smaller elements, or a
-        strip ends before it begins.
     """
 
     centre_mm: float
@@ -150,7 +144,6 @@ def resolution_grading(
     half_width_mm: float = 1.0,
     finger_size: float = 1.0,
 ) -> Grading:
-    """Grading of a named resolution."""
     one_of("resolution", resolution, RESOLUTIONS)
     k = min(positive("finger_size", finger_size), 1.0)
     zone = Grading(centre_mm, half_length_mm, half_width_mm, 0.25 * k, 0.25 * k, largest_mm=3.0 * k)
@@ -206,7 +199,6 @@ def covering(gradings: Sequence[Grading]) -> Grading:
 
 
 def _joined(strips: Iterable[tuple[Strip, ...]]) -> tuple[Strip, ...]:
-    """Return the strips of several gradings, each once."""
     return tuple(dict.fromkeys(strip for each in strips for strip in each))
 
 

@@ -157,7 +157,6 @@ class Indenter(metaclass=KnownKeywords):
 
 
 def _content(body: Indenter) -> tuple[object, ...]:
-    """Fields of a body as values that compare."""
     values: list[object] = [getattr(body, part.name) for part in fields(body)] if is_dataclass(body) else []
     return tuple(
         (value.shape, value.dtype.str, (value + 0).tobytes()) if isinstance(value, np.ndarray) else value
@@ -208,7 +207,6 @@ def rounded(
 
 
 def _of_diameter(radius_mm: float) -> dict[str, float]:
-    """Diameter of a round body from its radius."""
     return {"diameter_mm": 2 * positive("radius_mm", radius_mm, "mm")}
 
 
@@ -244,20 +242,16 @@ class Cylinder(Indenter):
 
     @property
     def half_width_mm(self) -> float:
-        """Half of the body's extent along x. [mm]"""
         return self.diameter_mm / 2
 
     @property
     def tip_radius_mm(self) -> float:
-        """Radius. [mm]"""
         return self.diameter_mm / 2
 
     def front(self, points_mm: FloatArray) -> FloatArray:
-        """Height y of the body's face above the x and z of points (n, 3), -inf beside it. [mm]"""
         return round_front(np.abs(points_mm[:, 0]), self.diameter_mm / 2)
 
     def gap(self, points_mm: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Signed gap (n,) and outward normal (n, 3) at points (n, 3) of the indenter's frame. [mm]"""
         radius = self.diameter_mm / 2
         centred = (points_mm + np.array([0.0, radius, 0.0])) * [1.0, 1.0, 0.0]
         return _rod_end(centred, centred * [1.0, 0.0, 0.0], radius)
@@ -291,16 +285,13 @@ class Line(Indenter):
 
     @property
     def grips(self) -> bool:
-        """The skin under the wire does not slide along the finger."""
         return True
 
     @property
     def half_width_mm(self) -> float:
-        """Half of the body's extent along x. [mm]"""
         return self.diameter_mm / 2
 
     def front(self, points_mm: FloatArray) -> FloatArray:
-        """Height y of the blade's edge above the x and z of points (n, 3), -inf beside it. [mm]"""
         return np.where(np.abs(points_mm[:, 0]) <= self.diameter_mm / 2, 0.0, -np.inf)
 
     def may_touch(self, undeformed_mm: FloatArray) -> np.ndarray:
@@ -365,20 +356,16 @@ class Sphere(Indenter):
 
     @property
     def half_width_mm(self) -> float:
-        """Half of the body's extent along x. [mm]"""
         return self.radius_mm
 
     @property
     def tip_radius_mm(self) -> float:
-        """Radius. [mm]"""
         return self.radius_mm
 
     def front(self, points_mm: FloatArray) -> FloatArray:
-        """Height y of the body's face above the x and z of points (n, 3), -inf beside it. [mm]"""
         return round_front(np.hypot(points_mm[:, 0], points_mm[:, 2]), self.radius_mm)
 
     def gap(self, points_mm: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Signed gap (n,) and outward normal (n, 3) at points (n, 3) of the indenter's frame. [mm]"""
         centred = points_mm + np.array([0.0, self.radius_mm, 0.0])
         return _rod_end(centred, centred * [1.0, 0.0, 1.0], self.radius_mm)
 
@@ -419,28 +406,22 @@ class Bar(Indenter):
 
     @property
     def half_width_mm(self) -> float:
-        """Half of the width. [mm]"""
         return self.width_mm / 2
 
     @property
     def edge_reach_mm(self) -> float:
-        """Half-width about x = 0 within which skin bends about the edges. [mm]"""
         return self.width_mm / 2 + BESIDE_EDGE_MM
 
     def edges_mm(self, reach_mm: float) -> tuple[tuple[float, float], ...]:
-        """Place along x and radius of the two edges. [mm]"""
         return ((-self.width_mm / 2, self.fillet_mm), (self.width_mm / 2, self.fillet_mm))
 
     def rounded_to(self, radius_mm: float) -> Bar:
-        """Return the bar with edges of at least this radius [mm], at most half of its width."""
         return replace(self, fillet_mm=max(self.fillet_mm, min(radius_mm, self.width_mm / 2)))
 
     def front(self, points_mm: FloatArray) -> FloatArray:
-        """Height y of the body's face above the x and z of points (n, 3), -inf beside it. [mm]"""
         return round_front(np.abs(points_mm[:, 0]) - self.width_mm / 2 + self.fillet_mm, self.fillet_mm)
 
     def gap(self, points_mm: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Signed gap (n,) and outward normal (n, 3) at points (n, 3) of the indenter's frame. [mm]"""
         x, y = points_mm[:, 0], points_mm[:, 1]
         outward = np.zeros_like(points_mm)
         outward[:, 0] = np.where(x < 0.0, -1.0, 1.0)
@@ -491,26 +472,21 @@ class FlatPunch(Indenter):
 
     @property
     def half_width_mm(self) -> float:
-        """Half of the diameter. [mm]"""
         return self.diameter_mm / 2
 
     @property
     def rim_mm(self) -> tuple[float, float]:
-        """Radius of the face and of its rim. [mm]"""
         return self.diameter_mm / 2, self.fillet_mm
 
     def rounded_to(self, radius_mm: float) -> FlatPunch:
-        """Return the punch with a rim of at least this radius [mm], at most half of its diameter."""
         return replace(self, fillet_mm=max(self.fillet_mm, min(radius_mm, self.diameter_mm / 2)))
 
     def front(self, points_mm: FloatArray) -> FloatArray:
-        """Height y of the body's face above the x and z of points (n, 3), -inf beside it. [mm]"""
         return round_front(
             np.hypot(points_mm[:, 0], points_mm[:, 2]) - self.diameter_mm / 2 + self.fillet_mm, self.fillet_mm
         )
 
     def gap(self, points_mm: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Signed gap (n,) and outward normal (n, 3) at points (n, 3) of the indenter's frame. [mm]"""
         radial, outward = _norm_and_direction(points_mm * [1.0, 0.0, 1.0])
         # On the axis any radial direction serves; x is taken, since y would not be radial.
         outward = np.where(radial[:, None] > 0.0, outward, [1.0, 0.0, 0.0])
@@ -525,11 +501,9 @@ class Plate(Indenter):
     symmetry_deg = None
 
     def front(self, points_mm: FloatArray) -> FloatArray:
-        """Height y of the body's face above the x and z of points (n, 3), -inf beside it. [mm]"""
         return np.zeros(len(points_mm))
 
     def gap(self, points_mm: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Signed gap (n,) and outward normal (n, 3) at points (n, 3) of the indenter's frame. [mm]"""
         return points_mm[:, 1].copy(), np.broadcast_to([0.0, 1.0, 0.0], points_mm.shape).copy()
 
 

@@ -92,7 +92,6 @@ class Mesh:
 
     @property
     def skin_elements(self) -> IntArray:
-        """Element of each of `skin_faces`, (n_faces,)."""
         return np.arange(len(self.elements)).reshape(self.shape)[:, :, 0].ravel()
 
     @cached_property
@@ -277,7 +276,6 @@ def _strips(strips: Sequence[Strip], place_mm: FloatArray, arc_mm: FloatArray) -
 
 
 def _mirrored(strips: Sequence[Strip]) -> list[Strip]:
-    """Return strips across on the other side of the midline."""
     return [(-end, -begin, size) for begin, end, size in strips]
 
 

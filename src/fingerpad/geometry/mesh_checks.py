@@ -26,7 +26,6 @@ _RIGID_MOTIONS = 6
 
 
 def check_mesh(mesh: Mesh, n_materials: int = len(LAYERS)) -> None:
-    """Raise an error if a mesh cannot be solved."""
     _check_arrays(mesh)
     _check_elements(mesh, n_materials)
     _check_sets(mesh)
@@ -40,7 +39,6 @@ def _node_place(mesh: Mesh, node: int) -> str:
 
 
 def _check_arrays(mesh: Mesh) -> None:
-    """Shapes of the arrays, and finite coordinates."""
     nodes, elements = mesh.nodes_mm, mesh.elements
     if nodes.ndim != 2 or nodes.shape[1] != 3 or not len(nodes):
         raise InputError(f"nodes_mm needs one row of x, y and z per node: got shape {nodes.shape}.")
@@ -153,7 +151,6 @@ def _check_plane(mesh: Mesh) -> None:
 
 
 def _check_jacobians(mesh: Mesh) -> None:
-    """Check that Jacobians are positive at the Gauss points."""
     smallest = jacobian_at_gauss(mesh).min(axis=1)
     inverted = np.flatnonzero(~(smallest > 0.0))
     if inverted.size:

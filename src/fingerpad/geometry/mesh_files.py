@@ -44,7 +44,7 @@ def read_finger(
     contact_mm: tuple[float, float] | None = None,
     receptor_depth_mm: float | None = None,
 ) -> FingerMesh:
-    """Read a finger from a file of a mesh.
+    """Read a finger from a file of a mesh; it takes the place of a `Fingertip`.
 
     The mesh consists of bricks and wedges. Sets of nodes are "skin", what is fixed ("bone" and "nail", or
     "fixed") and, for half a finger at z >= 0, "symmetry"; sets of elements are the layers "stratum corneum",
@@ -73,11 +73,6 @@ def read_finger(
     receptor_depth_mm : float, optional
         Depth of the end organs below the skin; by default that of the border between living epidermis and
         dermis at the middle of the pad or, without these layers, the paper's. [mm]
-
-    Returns
-    -------
-    FingerMesh
-        It takes the place of a `Fingertip`.
 
     Raises
     ------
@@ -123,7 +118,6 @@ class _Read:
         raise InputError(f"{self.source}{where}: {sentence}.")
 
     def parts(self) -> MeshParts:
-        """Return the same with rows for numbers."""
         if not self.elements:
             self.wrong(f"the mesh has no bricks or wedges; {_REFUSED}")
         for what, numbers in (("node", self.node_numbers), ("element", self.element_numbers)):
@@ -157,7 +151,6 @@ class _Read:
         }
 
     def _rows(self, owner: str, members: IntArray, numbers: list[int], what: str) -> IntArray:
-        """Rows of numbered nodes or elements."""
         known = np.array(numbers, dtype=np.int64)
         order = np.argsort(known, kind="stable")
         place = np.minimum(np.searchsorted(known[order], members), max(known.size - 1, 0))
@@ -283,7 +276,6 @@ def _inp_elements(read: _Read, number: int, options: Mapping[str, str], rows: Se
 def _inp_members(
     read: _Read, options: Mapping[str, str], rows: Sequence[Row], sets: Mapping[str, list[int]]
 ) -> Iterator[int]:
-    """Members of a set: numbers, ranges with GENERATE, or names of other sets."""
     for line, words in rows:
         if "GENERATE" in options:
             first, last, *step = (_whole(read, line, word) for word in words)
@@ -297,7 +289,6 @@ def _inp_members(
 
 
 def _inp_surface(read: _Read, name: str, faces: Sequence[tuple[str, str]]) -> list[int]:
-    """Nodes of a surface of elements."""
     rows = dict(zip(read.element_numbers, read.elements, strict=True))
     found: set[int] = set()
     for owner, side in faces:
@@ -347,7 +338,6 @@ def _text_of(read: _Read, file: Path) -> str:
 
 
 def _sections(read: _Read, text: str) -> dict[str, list[Row]]:
-    """Lines of each section $Name ... $EndName."""
     found: dict[str, list[Row]] = {}
     inside: list[Row] | None = None
     for number, raw in enumerate(text.splitlines(), start=1):

@@ -86,11 +86,7 @@ class _Making:
         raise InputError(f"{self.parts.source}: {sentence}")
 
     def finger(
-        self,
-        unit: str,
-        axes: str,
-        contact_mm: tuple[float, float] | None,
-        receptor_depth_mm: float | None,
+        self, unit: str, axes: str, contact_mm: tuple[float, float] | None, receptor_depth_mm: float | None
     ) -> FingerMesh:
         for name in instance("names", self.names, Mapping):
             one_of("names", name, SETS)
@@ -207,7 +203,6 @@ class _Making:
         return np.unique(place[there])
 
     def layers(self) -> IntArray:
-        """Layer of every element."""
         layer = np.full(len(self.parts.elements), -1, dtype=np.int64)
         for number, name in enumerate(LAYERS):
             members = self.found(name, self.parts.element_sets)
@@ -439,7 +434,6 @@ def _skin_up(elements: IntArray, faces: IntArray, owners: IntArray) -> IntArray:
 
 
 def _above_dermis(mesh: FreeMesh) -> IntArray:
-    """Elements of the living epidermis that stand on the dermis."""
     faces = np.sort(mesh.elements[:, FACES], axis=2)
     above, below = (np.flatnonzero(mesh.layer == LAYERS.index(name)) for name in LAYERS[1:3])
     standing = {tuple(face) for element in faces[below].tolist() for face in element if len(set(face)) > 2}

@@ -14,8 +14,7 @@ def _jacobians(mesh: Mesh, elements: IntArray, points: FloatArray) -> FloatArray
     """Jacobian matrices (n_elements, n_points, 3, 3), columns along the local axes, at local `points`."""
     factors = 1.0 + points[:, None, :] * CORNERS
     gradients = np.stack(
-        [CORNERS[:, axis] * np.delete(factors, axis, axis=2).prod(axis=2) / 8.0 for axis in range(3)],
-        axis=-1,
+        [CORNERS[:, axis] * np.delete(factors, axis, axis=2).prod(axis=2) / 8.0 for axis in range(3)], axis=-1
     )
     return np.einsum("mad,qac->mqdc", mesh.nodes_mm[elements], gradients, optimize=True)
 
@@ -44,7 +43,6 @@ def scaled_jacobian(mesh: Mesh) -> FloatArray:
 
 
 def element_place(mesh: Mesh, element: int) -> str:
-    """Describe an element by its number, layer and middle."""
     layer = int(mesh.layer[element])
     name = LAYERS[layer] if 0 <= layer < len(LAYERS) else f"layer {layer}"
     x, y, z = mesh.nodes_mm[mesh.elements[element]].mean(axis=0)

@@ -22,7 +22,6 @@ PLAUSIBLE["hold_ms"] = PLAUSIBLE["ramp_ms"]
 """Smallest and largest peaks and times of a touch: an afferent answers to 1 mN, and pads are 10 mm thick."""
 
 MOTION_UNITS = {"depth_mm": "mm", "force_mn": "mN", "ramp_ms": "ms", "hold_ms": "ms"}
-"""Units of the parameters of motions."""
 
 
 @dataclass(frozen=True)
@@ -77,7 +76,6 @@ class Cycles(metaclass=KnownKeywords):
 
 
 STILL = Pose()
-"""The pose at first touch."""
 
 TURN_LIKE_MM = 10.0
 """Rotation that takes as many steps as all of the depth. [degrees]"""
@@ -175,21 +173,17 @@ class _OneRamp(Motion):
 
     @property
     def end_ms(self) -> float:
-        """End of the hold. [ms]"""
         return self.ramp_ms + self.hold_ms
 
     @property
     def corners_ms(self) -> tuple[float, ...]:
-        """End of the ramp. [ms]"""
         return (self.ramp_ms,)
 
     @property
     def phases(self) -> tuple[Phase, ...]:
-        """Ramp and hold."""
         return ramp_and_hold_phases(self.ramp_ms, self.end_ms)
 
     def prescribed_at(self, times_ms: ArrayLike) -> FloatArray:
-        """Depth [mm] or force [mN] at `times_ms`, any shape: 0 at the start, the largest in the hold."""
         return self.largest * np.clip(np.asarray(times_ms, dtype=float) / self.ramp_ms, 0.0, 1.0)
 
     def step_times_ms(self, ramp_steps: int, hold_steps: int) -> FloatArray:
@@ -216,11 +210,6 @@ class RampAndHold(_OneRamp):
     hold_ms : float
         Duration of the hold. [ms]
 
-    Raises
-    ------
-    InputError
-        If a value is not a finite number above zero.
-
     Examples
     --------
     >>> motion = RampAndHold(depth_mm=1.0, ramp_ms=50.0, hold_ms=950.0)
@@ -234,7 +223,6 @@ class RampAndHold(_OneRamp):
 
     @property
     def largest(self) -> float:
-        """Depth of the hold. [mm]"""
         return self.depth_mm
 
 
@@ -252,11 +240,6 @@ class ForceRampAndHold(_OneRamp):
     hold_ms : float
         Duration of the hold. [ms]
 
-    Raises
-    ------
-    InputError
-        If a value is not a finite number above zero.
-
     Examples
     --------
     >>> motion = ForceRampAndHold(force_mn=100.0, ramp_ms=50.0, hold_ms=950.0)
@@ -272,7 +255,6 @@ class ForceRampAndHold(_OneRamp):
 
     @property
     def largest(self) -> float:
-        """Force of the hold. [mN]"""
         return self.force_mn
 
 

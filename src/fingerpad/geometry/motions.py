@@ -55,12 +55,6 @@ def sine(
         With 20 samples per cycle and the phases "ramp", "hold" and "vibration". A press solves some of more
         than 10 cycles and interpolates the others within a tolerance (`PressSettings.cycle_tolerance`).
 
-    Raises
-    ------
-    InputError
-        If not exactly one of depth and force is given with its amplitude, a value is not above 0, or a force
-        would fall below 0.
-
     Examples
     --------
     >>> motion = sine(0.8, 0.1, 20.0, cycles=2, hold_ms=100.0)
@@ -105,11 +99,6 @@ def chirp(
     -------
     Trajectory
         With 20 samples per cycle and the phases "ramp", "hold" and "sweep".
-
-    Raises
-    ------
-    InputError
-        As of `sine`, or if the sweep is shorter than one cycle.
 
     Examples
     --------
@@ -199,11 +188,6 @@ def staircase(
     Trajectory
         With the phases "ramp", "hold", "ramp 2", "hold 2" and so on, or "release" for a step down.
 
-    Raises
-    ------
-    InputError
-        If not exactly one of the two is given, or the trajectory cannot be.
-
     Examples
     --------
     >>> steps = staircase(depths_mm=[0.5, 1.0, 0.2], ramp_ms=50.0, hold_ms=300.0)
@@ -254,11 +238,6 @@ def stroke(
     -------
     Trajectory
         With the phases "ramp", "hold", "stroke", "stroke 2" and so on.
-
-    Raises
-    ------
-    InputError
-        If not exactly one of depth and force is given, or there is no way.
 
     Examples
     --------

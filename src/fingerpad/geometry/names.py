@@ -19,7 +19,6 @@ INDENTERS: dict[str, type[Indenter]] = {
     "gap": Gap,
     "grating": Grating,
 }
-"""Classes of indenters by name."""
 
 _FIELDS = {
     name: [size.name for size in fields(kind)]  # type: ignore[arg-type]

@@ -37,7 +37,6 @@ SMOOTH_BELOW_DEG = 30.0
 """Angle of creases that are rounded where they are hollow, unless another is given. [degrees]"""
 
 LARGEST_SMOOTH_DEG = 90.0
-"""Largest such angle. [degrees]"""
 
 HOLLOW_MM = 0.1
 """Distance from hollow creases over which they are rounded; less where triangles are small. [mm]"""
@@ -152,12 +151,10 @@ class Surface(Indenter):
 
     @property
     def half_width_mm(self) -> float:
-        """Half of the extent along x about the axis; infinite if it exceeds the finger. [mm]"""
         reach = float(np.abs(self.vertices_mm[self.faces, 0]).max())
         return reach if reach < 2 * REACH_MM else np.inf
 
     def mirrors(self, spin_deg: float) -> bool:
-        """Whether the surface, turned by `spin_deg` about y, is its own mirror image across z = 0."""
         found: dict[float, bool] = self.__dict__.setdefault("_mirrors", {})
         if spin_deg not in found:
             found[spin_deg] = super().mirrors(spin_deg)
@@ -238,12 +235,10 @@ class Surface(Indenter):
         return height, spacing
 
     def front(self, points_mm: FloatArray) -> FloatArray:
-        """Height y of the face above the x and z of points (n, 3), -inf beside it. [mm]"""
         height = np.max([layer.heights(points_mm) for layer in self._layers], axis=0)
         return traced_front(self.gap, points_mm, np.where(np.isfinite(height), height + HOLLOW_MM, -np.inf))
 
     def gap(self, points_mm: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Signed gap (n,) and outward normal (n, 3) at points (n, 3) of the indenter's frame. [mm]"""
         if self.edge_radius_mm == 0.0:
             return self._sharp_gap(points_mm)
         return with_rounded_edges(self._sharp_gap, points_mm, self.edge_radius_mm)
@@ -307,16 +302,6 @@ def height_surface(
         Distance between neighbouring heights. [mm]
     smooth_below_deg, edge_radius_mm : float
         As of `Surface`. [degrees], [mm]
-
-    Returns
-    -------
-    Surface
-        Two triangles per cell, and walls below the border.
-
-    Raises
-    ------
-    InputError
-        If there are fewer than 2 by 2 heights or more than 2,000,000, or one is not finite.
 
     Examples
     --------

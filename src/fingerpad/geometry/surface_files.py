@@ -23,7 +23,6 @@ from fingerpad.geometry.surface import (
 from fingerpad.geometry.triangle_files import read_triangles
 
 UNITS_MM = {"mm": 1.0, "um": 1e-3, "cm": 10.0, "m": 1000.0, "inch": 25.4}
-"""Units of length of a file. [mm]"""
 
 MESHES = (".stl", ".obj", ".ply")
 IMAGES = (".png", ".tif", ".tiff")
@@ -72,11 +71,6 @@ def read_surface(
         Where the middle of the body's extent lies, along and across the finger, from the indenter's axis.
     smooth_below_deg : float
         Hollow creases between triangles of a smaller angle are rounded; see `Surface`. [degrees]
-
-    Raises
-    ------
-    InputError
-        If the file cannot be read as triangles, has vertices that are not finite, or is of an unlikely size.
     """
     file = path_of("path", path)
     factor = UNITS_MM[one_of("unit", unit, tuple(UNITS_MM))] * positive("scale", scale)
@@ -128,7 +122,7 @@ def read_height_map(
     smooth_below_deg: float = SMOOTH_BELOW_DEG,
     edge_radius_mm: float = 0.0,
 ) -> Surface:
-    """Read a map of heights towards the skin, centred on the indenter's axis.
+    """Read a map of heights towards the skin, without sides or back, centred on the indenter's axis.
 
     Rows run across the finger and columns along it.
 
@@ -144,17 +138,6 @@ def read_height_map(
         images, whichever of them is stored as 0. [mm]
     smooth_below_deg : float
         Hollow creases between triangles of a smaller angle are rounded; see `Surface`. [degrees]
-
-    Returns
-    -------
-    Surface
-        Open: it has no sides and no back.
-
-    Raises
-    ------
-    InputError
-        If the file cannot be read, is no plane of finite numbers, holds points x, y, z, has more than
-        2,000,000 heights, or all are equal.
     """
     file = path_of("path", path)
     positive("pitch_mm", pitch_mm, "mm")
@@ -268,10 +251,7 @@ def _image(file: Path) -> FloatArray:
 
 def _shades(file: Path, pixels: FloatArray) -> FloatArray:
     """Shades of pixels (n_rows, n_columns, 4) that are red, green, blue and opacity, if they are grey."""
-    for what, wrong in (
-        ("opaque", pixels[..., 3] < 255.0),
-        ("grey", np.ptp(pixels[..., :3], axis=2) > 0.0),
-    ):
+    for what, wrong in (("opaque", pixels[..., 3] < 255.0), ("grey", np.ptp(pixels[..., :3], axis=2) > 0.0)):
         if wrong.any():
             row, column = np.argwhere(wrong)[0] + 1
             raise InputError(

@@ -154,7 +154,6 @@ def _labels(a: IntArray, b: IntArray, count: int) -> IntArray:
 
 
 def _volumes(vertices: FloatArray, faces: IntArray) -> FloatArray:
-    """Signed volume below each triangle."""
     first, second, third = (vertices - vertices.mean(axis=0))[faces].transpose(1, 0, 2)
     return (np.cross(first, second) * third).sum(axis=1) / 6.0
 
@@ -176,7 +175,6 @@ def _with_area(vertices: FloatArray, faces: IntArray) -> IntArray:
 def _nested(
     vertices: FloatArray, faces: IntArray, part: IntArray, closed: np.ndarray, side: FloatArray
 ) -> np.ndarray:
-    """Whether each closed part lies within another one."""
     low, high = _boxes(vertices, faces, part)
     found = np.zeros(len(closed), dtype=bool)
     for outer in np.flatnonzero(closed):

@@ -180,7 +180,6 @@ class Trajectory(Motion):
             self._check_cycles(self.cycles)
 
     def _check_cycles(self, cycles: Cycles) -> None:
-        """Check that every cycle has the same samples."""
         times, near = np.array(self.times_ms), SAME_SPEED * cycles.period_ms
         inside = (times > cycles.start_ms + near) & (times < cycles.end_ms + near)
         if inside.any() and inside.sum() % cycles.count == 0 and np.isclose(times, cycles.start_ms).any():
@@ -213,17 +212,14 @@ class Trajectory(Motion):
 
     @property
     def largest(self) -> float:
-        """Largest depth [mm] or force [mN]."""
         return max(self.prescribed)
 
     @property
     def depths_mm(self) -> tuple[float, ...]:
-        """Prescribed depth in each of `poses`, the largest if there is only one. [mm]"""
         return (self.largest,) if self.stays else self.prescribed
 
     @property
     def end_ms(self) -> float:
-        """Last sample. [ms]"""
         return self.times_ms[-1]
 
     @property
@@ -263,7 +259,6 @@ class Trajectory(Motion):
         return times, np.column_stack([np.interp(times, given, column) for column in self._course.T])
 
     def pose_at(self, time_ms: float) -> Pose:
-        """Pose of the indenter at a time [ms]."""
         columns = (getattr(self, name) for name in POSE_COLUMNS)
         return Pose(
             *(0.0 if each is None else float(np.interp(time_ms, self.times_ms, each)) for each in columns)
@@ -271,7 +266,6 @@ class Trajectory(Motion):
 
     @property
     def _course(self) -> FloatArray:
-        """`course_at` of all samples, (n_samples, 5)."""
         ways = np.array([pose.way for pose in self.poses])
         prescribed = np.array(self.prescribed) / self.largest
         return np.column_stack([prescribed, np.broadcast_to(ways, (prescribed.size, 4))])
@@ -356,7 +350,6 @@ class Trajectory(Motion):
         return HOLD if max(start[0], end[0]) > SAME_VALUE else "pause"
 
     def prescribed_at(self, times_ms: ArrayLike) -> FloatArray:
-        """Depth [mm] or force [mN] at `times_ms`, any shape."""
         return np.interp(np.asarray(times_ms, dtype=float), self.times_ms, self.prescribed)
 
     def step_times_ms(self, ramp_steps: int, hold_steps: int) -> FloatArray:

@@ -28,7 +28,6 @@ _PLY_NUMBERS = {
     **{"int8": "i1", "uint8": "u1", "int16": "i2", "uint16": "u2", "int32": "i4", "uint32": "u4"},
     **{"float": "f4", "double": "f8", "float32": "f4", "float64": "f8"},
 }
-"""Types of numbers in a PLY file."""
 
 _CODES = {"i1": "b", "u1": "B", "i2": "h", "u2": "H", "i4": "i", "u4": "I", "f4": "f", "f8": "d"}
 """The same for `struct`."""
@@ -55,7 +54,6 @@ def _text(content: bytes) -> str:
 
 
 def _numbers(words: Any, place: str) -> FloatArray:
-    """Rows of words as rows of numbers."""
     try:
         return np.array(words, dtype=np.float64)
     except ValueError as error:
@@ -185,7 +183,6 @@ _Element = tuple[str, int, list[tuple[str, str, str]]]
 
 
 def _ply_header(text: str) -> tuple[str | None, list[_Element]]:
-    """Order of the bytes, None for text, and the elements."""
     orders = {"ascii": None, "binary_little_endian": "<", "binary_big_endian": ">"}
     order: str | None = ""
     elements: list[_Element] = []

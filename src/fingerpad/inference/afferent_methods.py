@@ -13,9 +13,9 @@ from dataclasses import replace
 import numpy as np
 
 from fingerpad.core.checks import FloatArray
-from fingerpad.inference.fitting.bounds import Bounds
 from fingerpad.inference.fitting.covariance_adaptation import CovarianceAdaptation
 from fingerpad.inference.fitting.least_squares import LeastSquares
+from fingerpad.inference.fitting.methods import Bounds
 from fingerpad.inference.identifiable import IDENTIFIABLE_NAMES, LARGEST_RESTING_SHARE, six_parameters
 from fingerpad.inference.rate_model import RateModel, Rates, Reparametrised, SmoothRateModel
 from fingerpad.inference.rate_problem import RateProblem
@@ -37,23 +37,19 @@ and the static term under all stimuli [1/ms], and tau [ms]. A drive of 0.2/ms el
 three times the largest static rate."""
 
 OFFSET_SCALE_MM = 0.1
-"""Scale of the offset of the receptor. [mm]"""
 
 N_STARTS, N_REFINED = 32, 8
 """Starts that are scored, and starts from which least squares continues: two of them end up to 0.003 of FSS
 below the best, since intercept and time constant of a membrane at rest trade off along a valley."""
 
 MOST_EVALUATIONS = 600
-"""Most evaluations of CMA-ES."""
 
 
 def fitted_four(numbers: FloatArray) -> FloatArray:
-    """Return the four identifiable parameters of the four numbers of a fit."""
     return np.array([numbers[0] / numbers[3], *numbers[1:]])
 
 
 def fitted_six(numbers: FloatArray) -> FloatArray:
-    """Return the six parameters of the four numbers of a fit."""
     return six_parameters(fitted_four(numbers))
 
 
@@ -82,12 +78,10 @@ def bounds_of(*drives: Drive) -> Bounds:
 
 
 def and_offset(bounds: Bounds, low_mm: float = OFFSETS_MM[0], high_mm: float = OFFSETS_MM[-1]) -> Bounds:
-    """Return the bounds of the same parameters and the offset of the receptor. [mm]"""
     return bounds.and_one(OFFSET_SCALE_MM, low_mm, high_mm)
 
 
 def by_differences(bounds: Bounds) -> LeastSquares:
-    """Make the method of least squares from starts within the bounds, with differences."""
     return LeastSquares(bounds.spread(N_STARTS), bounds, n_refined=N_REFINED)
 
 

@@ -48,7 +48,6 @@ _START = identifiable(
 
 
 def to_coordinates(four: ArrayLike) -> FloatArray:
-    """Transform the four identifiable parameters (..., 4) to the coordinates (..., 4)."""
     numbers = np.asarray(four, dtype=np.float64)
     if numbers.shape[-1:] != (4,) or not (numbers[..., 1:] > 0.0).all():
         raise InputError(
@@ -60,7 +59,6 @@ def to_coordinates(four: ArrayLike) -> FloatArray:
 
 
 def from_coordinates(points: ArrayLike) -> FloatArray:
-    """Transform the coordinates (..., 4) to the four identifiable parameters (..., 4)."""
     coordinates = np.asarray(points, dtype=np.float64)
     positive_three = np.exp(coordinates[..., 1:])
     return np.concatenate([coordinates[..., :1] / positive_three[..., 2:], positive_three], axis=-1)
@@ -95,13 +93,11 @@ class AfferentPrior:
 
     @property
     def centre(self) -> FloatArray:
-        """Means in the coordinates (4,)."""
         medians = (self.dynamic_gain_per_kpa, self.static_gain_per_kpa_ms, self.time_constant_ms)
         return np.array([0.0, *np.log(medians)])
 
     @property
     def spread(self) -> FloatArray:
-        """Standard deviations in the coordinates (4,)."""
         gain, time_constant = np.log(self.gain_factor), np.log(self.time_constant_factor)
         return np.array([self.resting_share_sd, gain, gain, time_constant])
 
@@ -128,7 +124,6 @@ class AfferentPosterior:
 
 
 def log_posterior(likelihood: RateLikelihood, prior: AfferentPrior) -> LogDensity:
-    """Log posterior density of rows of coordinates, up to a constant."""
     if likelihood.model.names != IDENTIFIABLE_NAMES:
         raise InputError(
             f"likelihood needs a model of {', '.join(IDENTIFIABLE_NAMES)}, as four_number_model makes it: "
@@ -152,7 +147,6 @@ def afferent_posterior(
     prior: AfferentPrior | None = None,
     **settings: Any,
 ) -> AfferentPosterior:
-    """Sample the posterior of the four identifiable parameters."""
     density, centre = log_posterior(likelihood, prior or AfferentPrior()), to_coordinates(start)
     centre[0] = min(centre[0], 1.0 - SMALLEST_MARGIN)
 
@@ -187,7 +181,5 @@ def _constrained(points: FloatArray) -> FloatArray:
 def _constrained_chains(chains: Chains) -> Chains:
     """Transform draws to u; R-hat and effective sizes depend on ranks only and stay."""
     return replace(
-        chains,
-        draws=_constrained(chains.draws),
-        log_densities=chains.log_densities - chains.draws[..., 0],
+        chains, draws=_constrained(chains.draws), log_densities=chains.log_densities - chains.draws[..., 0]
     )

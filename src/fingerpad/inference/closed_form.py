@@ -77,7 +77,6 @@ class ClosedFormModel:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """The four identifiable parameters."""
         return IDENTIFIABLE_NAMES
 
     @property
@@ -85,7 +84,6 @@ class ClosedFormModel:
         return self.stimuli.n_stimuli
 
     def evaluate(self, parameters: FloatArray) -> Rates:
-        """Rates (n_stimuli,) for the four parameters. [spikes/s]"""
         dynamic, static = (self._window(parameters, window)[0] for window in self.stimuli.used_windows_ms)
         return dynamic, static
 

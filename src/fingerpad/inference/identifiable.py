@@ -1,4 +1,4 @@
-"""The four identifiable parameters of an afferent with six.
+"""The four identifiable parameters of an afferent with six, and the five of one with a soft threshold.
 
 A spike occurs when the potential reaches the threshold, u = v. Divided by v, Eqs. 1 and 5 read
 
@@ -7,14 +7,23 @@ A spike occurs when the potential reaches the threshold, u = v. Divided by v, Eq
 and neither C nor v appears alone. beta, k_d, k_s, C and v are therefore determined only up to a common scale:
 if C or v and the three gains are multiplied by the same number, no spike changes. Recordings determine the
 three gains over C v, and tau (docs/decisions/four-identifiable-parameters.md).
+
+A soft threshold has a width as a fifth parameter. With a, b, c = (beta, k_d, k_s)/(C v), tau and the width w
+of the threshold over the threshold,
+
+    A = a/w,    B = b/w,    C = c/w,    G = 1/w,    ln tau
+
+are parameters in which the logarithm of the hazard is linear, except for tau.
 """
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from numpy.typing import ArrayLike
 
-from fingerpad.core.checks import FloatArray, positive
+from fingerpad.core.checks import FloatArray, float_array, positive
 from fingerpad.core.errors import InputError
 from fingerpad.data import neuron
 from fingerpad.neuron.afferent import PARAMETER_NAMES
@@ -31,11 +40,9 @@ LARGEST_RESTING_SHARE = 0.95
 """Largest potential at rest over the threshold in fits, beta tau/(C v): docs/decisions/silent-at-rest.md."""
 
 IDENTIFIABLE_UNITS = ("1/ms", "1/kPa", "1/(kPa ms)", "ms")
-"""Units of the four parameters."""
 
 
 def identifiable(parameters: ArrayLike) -> FloatArray:
-    """Return the four identifiable parameters."""
     six = _rows("parameters", parameters, PARAMETER_NAMES)
     scale = six[..., 4:5] * six[..., 5:6]
     if (six[..., 4:] <= 0.0).any():
@@ -80,3 +87,44 @@ def _rows(name: str, values: ArrayLike, names: tuple[str, ...]) -> FloatArray:
     if not np.isfinite(array).all():
         raise InputError(f"{name} must hold finite numbers only: {(~np.isfinite(array)).sum()} are not.")
     return array
+
+
+SPIKE_PARAMETER_NAMES = (*IDENTIFIABLE_NAMES, "escape_width")
+"""The four identifiable parameters, and the width of the threshold over the threshold."""
+
+SPIKE_PARAMETER_UNITS = (*IDENTIFIABLE_UNITS, "1")
+
+N_PARAMETERS = len(SPIKE_PARAMETER_NAMES)
+
+
+def canonical(parameters: FloatArray) -> FloatArray:
+    """Return (A, B, C, G, ln tau) of (a, b, c, tau, w)."""
+    width = parameters[4]
+    return np.array([*(parameters[:3] / width), 1.0 / width, math.log(parameters[3])])
+
+
+def from_canonical(numbers: FloatArray) -> FloatArray:
+    """Return (a, b, c, tau, w) of (A, B, C, G, ln tau): the inverse of `canonical`."""
+    sharpness = numbers[3]
+    return np.array([*(numbers[:3] / sharpness), math.exp(numbers[4]), 1.0 / sharpness])
+
+
+def canonical_jacobian(parameters: FloatArray) -> FloatArray:
+    a, b, c, tau, width = parameters
+    jacobian = np.zeros((N_PARAMETERS, N_PARAMETERS))
+    jacobian[[0, 1, 2], [0, 1, 2]] = 1.0 / width
+    jacobian[:4, 4] = -np.array([a, b, c, 1.0]) / width**2
+    jacobian[4, 3] = 1.0 / tau
+    return jacobian
+
+
+def checked_spike_parameters(parameters: ArrayLike) -> FloatArray:
+    """Return five finite parameters with positive tau and width, else raise `InputError`."""
+    numbers = float_array("parameters", parameters, 1)
+    if numbers.size != N_PARAMETERS:
+        raise InputError(
+            f"parameters must hold {', '.join(SPIKE_PARAMETER_NAMES)}: got {numbers.size} numbers."
+        )
+    positive(SPIKE_PARAMETER_NAMES[3], numbers[3], "ms")
+    positive(SPIKE_PARAMETER_NAMES[4], numbers[4])
+    return numbers

@@ -45,7 +45,6 @@ class CorrelatedResiduals:
     """Distribution of residuals along a line, whose deviation and correlation length are integrated out."""
 
     n_residuals: int
-    """How many."""
     positions_mm: FloatArray | None = None
     """Their places along a line; default: independent residuals, (n_residuals,). [mm]"""
     lengths_mm: tuple[float, ...] = LENGTHS_MM

@@ -107,12 +107,6 @@ class AfferentModel(metaclass=KnownKeywords):
     initial_mv : float, optional
         Potential at the start, as of `Afferent`: that at rest by default. [mV]
 
-    Raises
-    ------
-    InputError
-        If a stimulus ends before a window does, windows are not given where the phases of the stimuli differ,
-        or the refractory period is negative.
-
     Examples
     --------
     >>> short = SedTraces([0.0, 50.0, 1000.0], [[0.0], [2.0], [2.0]], kinks_ms=[50.0])
@@ -150,15 +144,7 @@ class AfferentModel(metaclass=KnownKeywords):
         refractory_ms: float = neuron.REFRACTORY.value,
         initial_mv: float | None = None,
     ) -> AfferentModel:
-        """Make the model for stimuli that share their times.
-
-        Parameters
-        ----------
-        driven : Drive
-            One column per stimulus.
-        windows_ms, refractory_ms, initial_mv
-            As of the class.
-        """
+        """Make the model for stimuli that share their times, one per column of a drive."""
         return cls((driven,), (np.arange(driven.n_sites),), windows_ms, refractory_ms, initial_mv)
 
     @classmethod
@@ -178,11 +164,6 @@ class AfferentModel(metaclass=KnownKeywords):
             consecutively.
         windows_ms, refractory_ms, initial_mv
             As of the class.
-
-        Raises
-        ------
-        InputError
-            As the class, or if the traces differ in the quantity of the dynamic term.
         """
         traces = [sed] if isinstance(sed, SedTraces) else list(sed)
         quantities = sorted({f"{trace.dynamic_quantity} and {trace.static_quantity}" for trace in traces})
@@ -250,9 +231,7 @@ class Reparametrised:
     """A rate model in other parameters."""
 
     model: RateModel
-    """The model in its own parameters."""
     names: tuple[str, ...]
-    """Names of the new parameters."""
     transform: Callable[[FloatArray], FloatArray]
     """From the new parameters to those of `model`."""
 
@@ -261,7 +240,6 @@ class Reparametrised:
         return self.model.n_stimuli
 
     def evaluate(self, parameters: FloatArray) -> Rates:
-        """Rates (n_stimuli,) for one set of the new parameters. [spikes/s]"""
         return self.model.evaluate(self.transform(parameters))
 
     def evaluate_batch(self, points: FloatArray) -> Rates:

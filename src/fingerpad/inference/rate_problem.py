@@ -44,7 +44,6 @@ class RateProblem:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Names of the model's parameters."""
         return self.model.names
 
     @property

@@ -17,15 +17,9 @@ import numpy as np
 
 from fingerpad.core.checks import FloatArray, IntArray, float_array, positive
 from fingerpad.core.errors import InputError
-from fingerpad.inference.afferent_methods import (
-    bounds_of,
-    by_differences,
-    fitted_six,
-    four_number_problem,
-)
+from fingerpad.inference.afferent_methods import bounds_of, by_differences, fitted_six, four_number_problem
 from fingerpad.inference.fitting.covariance_adaptation import CovarianceAdaptation
-from fingerpad.inference.fitting.methods import Continued, Fit, FitStep
-from fingerpad.inference.fitting.problem import Problem
+from fingerpad.inference.fitting.methods import Continued, Fit, FitStep, Problem
 from fingerpad.inference.rate_model import AfferentModel, RateModel
 from fingerpad.inference.rate_problem import RateProblem
 from fingerpad.psychophysics.noise_fit import expected_euclidean_hit_rates, expected_hit_rates
@@ -46,7 +40,7 @@ class RatesAndHitRates:
 
     Notes
     -----
-    The contract of `fingerpad.inference.fitting.problem.Problem`. All hit rates enter whichever rates are
+    The contract of `fingerpad.inference.fitting.methods.Problem`. All hit rates enter whichever rates are
     chosen, so that a cross validation leaves out rates only.
     """
 
@@ -65,7 +59,6 @@ class RatesAndHitRates:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Names of the parameters."""
         return self.rates.names
 
     @property
@@ -98,7 +91,6 @@ class SphereHitRates:
     neighbours: np.ndarray
     """Pairs of the Gradient Sum, (n_pairs, 2)."""
     noise_sigma: float
-    """Standard deviation of the multiplicative noise."""
     standard_normals: FloatArray
     """Common random presentations of the Gradient Sum, (n_draws, n_receptors)."""
 
@@ -136,7 +128,6 @@ class ToRatesAndHitRates:
     seed: int = 0
     """Of CMA-ES."""
     name: str = "rates and hit rates"
-    """Name in tables."""
 
     def fit(self, problem: Problem, chosen: IntArray) -> Fit:
         """Fit the chosen rates, and all hit rates."""

@@ -64,7 +64,6 @@ class ReceptorOffset:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """The six parameters of an afferent, then the offset."""
         return (*PARAMETER_NAMES, OFFSET_NAME)
 
     @property
@@ -72,7 +71,6 @@ class ReceptorOffset:
         return self.models[0].n_stimuli
 
     def at(self, offset_mm: float) -> AfferentModel:
-        """Return the model of a receptor at this offset."""
         offset = finite(OFFSET_NAME, offset_mm, "mm")
         if not self.offsets_mm[0] <= offset <= self.offsets_mm[-1]:
             raise InputError(
@@ -87,7 +85,6 @@ class ReceptorOffset:
         )
 
     def evaluate(self, parameters: FloatArray) -> Rates:
-        """Rates (n_stimuli,) for six parameters and the offset. [spikes/s]"""
         return self.at(parameters[-1]).evaluate(parameters[:-1])
 
     def evaluate_batch(self, points: FloatArray) -> Rates:

@@ -37,11 +37,6 @@ class RateRecordings(metaclass=KnownKeywords):
     source : str
         Origin of the recordings.
 
-    Raises
-    ------
-    InputError
-        If a stimulus is repeated, a rate is negative or not finite, sizes disagree or no phase was recorded.
-
     Examples
     --------
     >>> recordings = RateRecordings(("flat", "edge"), [54.0, 212.0], [9.0, 61.0])
@@ -111,11 +106,6 @@ class SpikeRecordings(metaclass=KnownKeywords):
     source : str
         Origin of the recordings.
 
-    Raises
-    ------
-    InputError
-        If sizes disagree, or a spike is outside of its recording.
-
     Examples
     --------
     >>> trains = SpikeTrains.from_lists([[10.0, 40.0, 45.0], [12.0, 38.0, 42.0], [100.0]])
@@ -164,16 +154,6 @@ class SpikeRecordings(metaclass=KnownKeywords):
             the motion. [ms]
         measure : {"interval", "count"}
             What a rate is: one over the mean interval, or spikes over the length of the window.
-
-        Returns
-        -------
-        RateRecordings
-            Stimuli in the order of their first presentation.
-
-        Raises
-        ------
-        InputError
-            If a window does not end within a recording.
         """
         end = max(window[-1] for window in windows_ms)
         if self.duration_ms.size and end > self.duration_ms.min() + ROUNDING_MS:

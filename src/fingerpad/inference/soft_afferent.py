@@ -9,9 +9,8 @@ import numpy as np
 from fingerpad.core.checks import FloatArray
 from fingerpad.core.random_streams import Presentations
 from fingerpad.core.signals import CurrentTraces, SpikeTrains
-from fingerpad.inference.identifiable import six_parameters
+from fingerpad.inference.identifiable import SPIKE_PARAMETER_NAMES, six_parameters
 from fingerpad.inference.rate_model import Rates, evaluate_rows
-from fingerpad.inference.spike_parameters import SPIKE_PARAMETER_NAMES
 from fingerpad.neuron.afferent import Afferent
 from fingerpad.neuron.escape_rate import EscapeRate
 from fingerpad.neuron.rate_windows import Windows
@@ -23,7 +22,6 @@ PREDICTED_PRESENTATIONS = 20
 
 
 def soft_membrane(driven: Drive, parameters: FloatArray) -> tuple[EscapeRate, CurrentTraces]:
-    """Return the membrane and the current of an afferent with a soft threshold."""
     afferent = Afferent.from_parameters(six_parameters(parameters[:4]))
     return EscapeRate(afferent.membrane, float(parameters[4])), afferent.transduction.current(driven)
 
@@ -54,7 +52,6 @@ class SoftAfferent:
 
     @property
     def n_stimuli(self) -> int:
-        """Number of columns of the drive."""
         return self.drive.n_sites
 
     def evaluate(self, parameters: FloatArray) -> Rates:

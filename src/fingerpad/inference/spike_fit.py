@@ -1,7 +1,7 @@
 """Fit an afferent with a soft threshold to spike trains by maximum likelihood.
 
 Newton's method with the expected curvature (Fisher scoring) and Levenberg-Marquardt damping, in the
-parameters (A, B, C, G, ln tau) of `fingerpad.inference.spike_parameters`. For a given tau, log L is concave
+parameters (A, B, C, G, ln tau) of `fingerpad.inference.identifiable`. For a given tau, log L is concave
 in the other four, so the fit converges from a distant start.
 """
 
@@ -16,8 +16,7 @@ from fingerpad.core.checks import FloatArray, whole
 from fingerpad.core.displayed import Result
 from fingerpad.core.errors import ConvergenceError, InputError
 from fingerpad.core.keywords import known_keywords
-from fingerpad.inference.spike_likelihood import SpikeLikelihood
-from fingerpad.inference.spike_parameters import (
+from fingerpad.inference.identifiable import (
     N_PARAMETERS,
     SPIKE_PARAMETER_NAMES,
     canonical,
@@ -25,6 +24,7 @@ from fingerpad.inference.spike_parameters import (
     checked_spike_parameters,
     from_canonical,
 )
+from fingerpad.inference.spike_likelihood import SpikeLikelihood
 
 NARROWEST = 1.0e-3
 """Width below which the threshold is considered hard and log L unbounded."""
@@ -43,7 +43,7 @@ class SpikeFit(Result):
     Parameters
     ----------
     parameters : array (5,)
-        In the order of `fingerpad.inference.spike_parameters.SPIKE_PARAMETER_NAMES`.
+        In the order of `fingerpad.inference.identifiable.SPIKE_PARAMETER_NAMES`.
     covariance : array (5, 5)
         Inverse of the Fisher information.
     log_likelihood : float
@@ -93,8 +93,6 @@ def fit_spikes(recorded: SpikeLikelihood, start: ArrayLike, most_steps: int = 10
 
     Raises
     ------
-    InputError
-        If there are fewer spikes than parameters, or the start is invalid.
     ConvergenceError
         If the fit does not converge or has no maximum: perfectly regular spikes determine no width, and equal
         stimuli do not determine all gains.

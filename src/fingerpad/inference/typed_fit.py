@@ -14,9 +14,9 @@ from fingerpad.core.errors import InputError
 from fingerpad.core.keywords import known_keywords
 from fingerpad.core.signals import INTERVAL, SedTraces
 from fingerpad.data import protocol
-from fingerpad.inference.fitting.bounds import Bounds
 from fingerpad.inference.fitting.cross_validation import cross_validate, interleaved_folds
 from fingerpad.inference.fitting.least_squares import LeastSquares
+from fingerpad.inference.fitting.methods import Bounds
 from fingerpad.inference.rate_model import Rates, evaluate_rows
 from fingerpad.inference.rate_problem import RateProblem
 from fingerpad.inference.recordings import RateRecordings
@@ -42,11 +42,9 @@ class TypedModel:
 
     @property
     def n_stimuli(self) -> int:
-        """Number of stimuli, one per column of the traces."""
         return sum(traces.n_sites for traces in self.traces)
 
     def at(self, parameters: FloatArray) -> AnyAfferent:
-        """Return the afferent with other numbers."""
         factors = zip(self.names, np.exp(parameters).tolist(), strict=True)
         numbers: dict[str, Any] = {name: getattr(self.afferent, name) * factor for name, factor in factors}
         return cast(AnyAfferent, replace(cast(Any, self.afferent), **numbers))
@@ -75,7 +73,6 @@ class TypedFit:
     afferent: AnyAfferent
     """With the fitted numbers."""
     free: tuple[str, ...]
-    """Names of these."""
     fss_in_sample: float
     fss_out_of_sample: float
     """Fractional sum of squares of the fit to all stimuli, and its mean over the stimuli left out of folds.
@@ -122,11 +119,6 @@ def fit_afferent(
         Fold of each stimulus from 0; by default in turn to six, or one per stimulus where there are fewer.
     windows_ms : ((float, float), (float, float)), optional
         Windows of the dynamic and of the static rate; by default those of `rate_windows_ms`. [ms]
-
-    Raises
-    ------
-    InputError
-        If the afferent has no such number, it is not above 0, or traces and recordings differ in size.
 
     Examples
     --------

@@ -33,8 +33,7 @@ from fingerpad.geometry.fingertip import FINGERS
 from fingerpad.lab.answer import Answer, in_full, motion_of, reduced_answer
 from fingerpad.lab.state import LabState
 from fingerpad.mechanics.tissues import TISSUES
-from fingerpad.reduction.files import read_reduced, write_reduced
-from fingerpad.reduction.model import ReducedModel
+from fingerpad.reduction.model import ReducedModel, read_reduced, write_reduced
 from fingerpad.skin.code_hash import code_hash
 
 KEPT_ANSWERS = 16

@@ -82,7 +82,6 @@ class SmoothedAggregation:
         return vector[self._free]
 
     def multiply(self, direction: FloatArray) -> FloatArray:
-        """Product of the tangent and a vector."""
         return np.asarray(self._matrix @ direction)
 
     def apply(self, residual: FloatArray) -> FloatArray:

@@ -39,7 +39,6 @@ class Sparsity:
 
     @classmethod
     def of(cls, elements: np.ndarray, n_nodes: int) -> Sparsity:
-        """Pattern of a mesh of `elements` (n_elements, 8)."""
         shape, corners = (len(elements), n_nodes), elements.ravel()
         has = sparse.csr_matrix(
             (np.ones(corners.size, dtype=bool), corners, np.arange(0, corners.size + 1, N_NODES)), shape=shape
@@ -59,7 +58,6 @@ class Sparsity:
 
     @property
     def row(self) -> np.ndarray:
-        """Block row of each block (n_blocks,)."""
         return np.repeat(np.arange(self.n_nodes), np.diff(self.row_start))
 
     def blocks_of(self, rows: np.ndarray, columns: np.ndarray) -> np.ndarray:

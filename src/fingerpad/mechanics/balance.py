@@ -66,7 +66,6 @@ class EnergyBalance:
         return float(np.abs(self.imbalance_uj).max()) / largest if largest > 0.0 else 0.0
 
     def at(self, times_ms: FloatArray) -> EnergyBalance:
-        """Return the balance at some of its times. [ms]"""
         row = np.searchsorted(self.times_ms, times_ms)
         return EnergyBalance(
             self.times_ms[row], self.external_uj[row], self.stored_uj[row], self.dissipated_uj[row],
@@ -78,7 +77,6 @@ class Entry(NamedTuple):
     """State and energies at the end of one step; the first is the unloaded body."""
 
     time_ms: float = 0.0
-    """End of the step. [ms]"""
     way: tuple[float, ...] = (0.0,) * 5
     force: tuple[float, ...] = (0.0,) * 5
     """The indenter's advance, ways along x and z [mm] and rotations [radians], and the forces [mN] and
@@ -104,7 +102,6 @@ class TissueEnergies(NamedTuple):
 
 
 def energy_balance(entries: Sequence[Entry], kinks_ms: Sequence[float]) -> EnergyBalance:
-    """Balance of all steps of a press."""
     times, ways, forces, stored, dissipated, contact, _ = (
         np.array(column).T for column in zip(*entries, strict=True)
     )
@@ -172,7 +169,6 @@ class MeanRelaxed:
 
     @classmethod
     def of(cls, table: MaterialTable, step_ms: float) -> MeanRelaxed:
-        """Factors of a step of `step_ms`. [ms]"""
         x = step_ms / table.times_ms
         kept = -np.expm1(-x) / x
         # In short steps the terms of `new` cancel down to x/6; its series is then good to 12 digits.

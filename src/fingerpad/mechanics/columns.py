@@ -76,7 +76,6 @@ class ColumnGraph:
         return np.flatnonzero(self.column == self.neighbour)
 
     def sorted(self, order: np.ndarray) -> ColumnGraph:
-        """Return the same graph with columns in another order (n_columns,)."""
         place = np.argsort(order)
         pairs = place[self.column] * self.n_columns + place[self.neighbour]
         return ColumnGraph.of(np.sort(pairs), self.n_columns)
@@ -190,7 +189,6 @@ def _subtract_product(first, last, neighbour, matrix, x, r):  # type: ignore[no-
 
 @njit(cache=True, inline="always")
 def _solve_column(depth, lower, inverse, c, r):  # type: ignore[no-untyped-def]
-    """Replace r (3, at least depth) by T^-1 r, with the factors of column c."""
     x, y, z = r[0, 0], r[1, 0], r[2, 0]
     for k in range(1, depth):
         x, y, z = (

@@ -40,9 +40,7 @@ class Body:
     mesh: Mesh
     """Nodes, bricks and node sets."""
     table: MaterialTable
-    """Laws, one row per layer."""
     sparsity: Sparsity
-    """Pattern of the tangent."""
     free: np.ndarray
     """Degrees of freedom that move, (n_free,)."""
     is_mixed: bool = False
@@ -60,7 +58,6 @@ class Reached:
     force_mn: float = 0.0
     """Largest contact force on the body as it is meshed. [mN]"""
     depth_mm: float = 0.0
-    """Largest depth. [mm]"""
 
     @property
     def least_force_mn(self) -> float:
@@ -84,7 +81,6 @@ class Load:
     """What acts on the body in one time step."""
 
     contact: Contact
-    """The indenter."""
     depth_mm: float
     """How far it has advanced since first touch; under a given force, where its search begins. [mm]"""
     step: StepCoefficients
@@ -140,13 +136,11 @@ class Configuration:
     """A trial configuration; its tangent is in the blocks that `evaluate` was given."""
 
     displacement_mm: FloatArray
-    """Displacements, (n_nodes, 3). [mm]"""
     depth_mm: float
     """How far the indenter has advanced. [mm]"""
     positions_mm: FloatArray
     """Where the points are that may touch, (n_points, 3). [mm]"""
     contact: ContactState
-    """Contact there."""
     contact_stiffness: FloatArray
     """Its part of the tangent, (n_points, 3, 3). [mN/mm]"""
     potential_uj: float
@@ -162,7 +156,6 @@ class Configuration:
     relative_residual: float
     """This norm over the contact force."""
     has_tangent: bool
-    """Whether the tangent was assembled."""
     is_curved: bool
     """Whether the indenter's curvature is part of it."""
     pressures: Pressures | None = None

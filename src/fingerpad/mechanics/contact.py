@@ -57,7 +57,6 @@ class Placement:
         return self.origin_mm + depth_mm * self.axis
 
     def to_local(self, points_mm: FloatArray, depth_mm: float) -> FloatArray:
-        """Points (n, 3) in the frame of the indenter that has advanced by `depth_mm`. [mm]"""
         return (points_mm - self.origin_mm - depth_mm * self.axis) @ self.rotation
 
     def moved(self, pose: Pose) -> Placement:
@@ -129,12 +128,10 @@ class ContactState:
 
     @property
     def friction_mn(self) -> FloatArray:
-        """Friction on each point, (n, 3). [mN]"""
         return self.force_mn - self.pressed_mn[:, None] * self.normal
 
     @property
     def penetration_mm(self) -> float:
-        """Deepest penetration of any point. [mm]"""
         return float(max(0.0, -self.gap_mm.min()))
 
     @property
@@ -152,7 +149,6 @@ class Contact:
     """Skin that may touch one placed indenter."""
 
     indenter: Indenter
-    """The rigid body."""
     placement: Placement
     """Where it stands at first touch."""
     nodes: np.ndarray
@@ -175,7 +171,6 @@ class Contact:
 
     @property
     def stick_stiffness(self) -> FloatArray:
-        """Stiffness of every point that sticks, (n,). [mN/mm]"""
         return self.stick_penalty * self._points_mm2
 
     @cached_property
@@ -305,5 +300,4 @@ class Contact:
         return apart[:, None, None] * state.normal[:, :, None] * state.normal[:, None, :]
 
     def augmented(self, state: ContactState) -> FloatArray:
-        """Multipliers after an augmentation: the pressures found. [mN]"""
         return state.pressed_mn

@@ -76,7 +76,6 @@ class PronyCycle:
         return self._sums(cycles)[1] * drift
 
     def _sums(self, cycles: int) -> tuple[FloatArray, FloatArray]:
-        """Return A and B."""
         lost = -np.expm1(-self.period_over_tau)
         per_cycle = -np.expm1(-cycles * self.period_over_tau) / lost
         return per_cycle, (cycles - (1.0 - lost) * per_cycle) / lost
@@ -134,7 +133,6 @@ class CycleJumps:
     where: np.ndarray
     """Elements that count for it."""
     table: MaterialTable
-    """Laws."""
     layer: np.ndarray
     """Row of the table of each element, (n_elements,)."""
     step: Step[Moment]
@@ -142,7 +140,6 @@ class CycleJumps:
     """Solve a step; make the final error, as in `steps_at`."""
 
     def moments(self, start: Moment) -> Iterator[Moment]:
-        """Solve or interpolate all cycles."""
         count, gap = len(self.times_ms), 1
         prony = PronyCycle.of(self.table, self.layer, self.times_ms[1, -1] - self.times_ms[0, -1])
         before, last = None, self.solved(0, start, prony)
@@ -180,7 +177,6 @@ class CycleJumps:
             before, last = last, found
 
     def solved(self, number: int, start: Moment, prony: PronyCycle) -> _Cycle:
-        """Solve all steps of one cycle."""
         moments = tuple(steps_at(start, self.times_ms[number], self.step, self.stop))
         return _Cycle(number, start, moments, prony.added(start.history.relaxed, moments[-1].history.relaxed))
 

@@ -157,7 +157,6 @@ def _polynomial_points(law, first, second, b, b2, energies, stresses):  # type: 
 
 @njit(cache=True)
 def _formula_points(law, b, dilatation, logs, axes, derivatives):  # type: ignore[no-untyped-def]
-    """Evaluate a formula at the points of one element, in the instantaneous state."""
     # From the isochoric b~ (6, 8) it writes `logs` (8, 4), `axes` (8, 3, 3) and `derivatives` (8, 15) of W,
     # and returns the volumetric energy. Unless shape and volume are coupled, that is no part of W, but its
     # derivatives are kept.
@@ -305,7 +304,6 @@ EQUAL_STRETCHES = 1e-5
 
 @njit(cache=True, forceinline=True)
 def _point_forces(q, weight, jacobian, local, tau, present, forces, dilatation):  # type: ignore[no-untyped-def]
-    """Add the forces of point q."""
     # Writes G = dN/dx (3, 8), and adds w tau G to `forces` and w J G to `dilatation`, both (3, 8).
     for node in range(N_NODES):
         u, v, w = BY_NODE[q, 0, node], BY_NODE[q, 1, node], BY_NODE[q, 2, node]
@@ -375,7 +373,6 @@ def _add_rows(slopes, products, packed):  # type: ignore[no-untyped-def]
 
 @njit(cache=True, forceinline=True)
 def add_tangent(packed, position, blocks):  # type: ignore[no-untyped-def]
-    """Add the tangent of one element to blocks."""
     for a in range(N_NODES):
         for b in range(N_NODES):
             target, low, high = position[a, b], min(a, b), max(a, b)  # K_ii is symmetric but for round-off
@@ -394,7 +391,6 @@ def add_tangent(packed, position, blocks):  # type: ignore[no-untyped-def]
 def element_system(  # type: ignore[no-untyped-def]
     reference, displacement, law, s, history, with_tangent, force, tangent, formulas=True
 ):
-    """Energy, internal force and tangent of one element."""
     weights, jacobians, scales = small_array((N_POINTS,)), small_array((N_POINTS,)), small_array((N_POINTS,))
     local, onto = small_array((3, 3, N_POINTS)), small_array((3, 3, N_POINTS))  # dxi/dX and dxi/dx
     gradients, inverse = small_array((3, 3, N_POINTS)), small_array((3, 3, N_POINTS))

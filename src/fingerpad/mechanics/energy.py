@@ -37,7 +37,6 @@ VARIABLES = (
 FUNCTIONS = ("log", "exp", "sqrt")
 MOST_OPERATIONS = 200
 LONGEST_FORMULA = 4000
-"""Characters of a formula."""
 
 
 VARIABLE, ADD, SUBTRACT, MULTIPLY, DIVIDE, SCALE, SHIFT, POWER, LOG, EXP = range(10)
@@ -225,7 +224,6 @@ def _chain(inner, value, first, second, result):  # type: ignore[no-untyped-def]
 
 @njit(cache=True)
 def _product(left, right, result):  # type: ignore[no-untyped-def]
-    """Write left * right."""
     result[0] = left[0] * right[0]
     for k in range(4):
         result[1 + k] = left[0] * right[1 + k] + right[0] * left[1 + k]

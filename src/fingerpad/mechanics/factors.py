@@ -36,7 +36,6 @@ class SuperLuFactor:
         self._size = size
 
     def renew(self, values: np.ndarray) -> None:
-        """Factor the matrix of these values."""
         chosen = values.ravel()[self._entries].astype(np.float64)
         shape = (self._size, self._size)
         matrix = sparse.csc_matrix((chosen, self._row, self._column_start), shape=shape)
@@ -53,5 +52,4 @@ class SuperLuFactor:
             raise NotPositiveDefiniteError
 
     def solve(self, right: np.ndarray) -> FloatArray:
-        """Solve for a right-hand side (n,)."""
         return self._factor.solve(right)

@@ -46,7 +46,6 @@ class ElementFields:
     """Stress, strain and energies of some elements over time."""
 
     elements: np.ndarray
-    """Numbers of the elements in their mesh, (n_elements,)."""
     gradient: FloatArray
     """Mean deformation gradient, its determinant the dilatation of the element, (n_times, n_elements, 3, 3).
     """
@@ -60,7 +59,6 @@ class ElementFields:
     """
 
     def of(self, elements: np.ndarray) -> ElementFields:
-        """Return the fields of some of the elements, by their numbers in the mesh."""
         order = np.argsort(self.elements)
         rows = order[np.searchsorted(self.elements, elements, sorter=order)]
         return ElementFields(
@@ -140,9 +138,7 @@ class FieldState:
     """State of the watched elements at one time, from which the work of the next step is computed."""
 
     values: FieldValues
-    """Fields of the elements."""
     displacement_mm: FloatArray
-    """Displacements of all nodes, (n_nodes, 3). [mm]"""
     convected_kpa: FloatArray
     """S0 - sum S_i, the relaxing stress in the convected frame, (n_elements, 8, 6). [kPa]"""
     pressure_kpa: FloatArray
@@ -173,11 +169,9 @@ class Watched:
     nodes_mm: FloatArray
     """Reference nodes of the whole mesh, (n_nodes, 3). [mm]"""
     corners: np.ndarray
-    """Their nodes, (n_elements, 8)."""
     layer: np.ndarray
     """Their row of the material table, (n_elements,)."""
     table: MaterialTable
-    """Laws."""
 
     def after(
         self,
@@ -212,7 +206,6 @@ class Watched:
 def cauchy_stress(
     mesh: Mesh, displacement_mm: FloatArray, table: MaterialTable, history: StressHistory
 ) -> FloatArray:
-    """Mean Cauchy stress of all elements of a mesh."""
     n = len(mesh.elements)
     stress, gradient = np.empty((n, 6)), np.empty((n, 3, 3))
     # Writable copies, as those of `Watched`: Numba then compiles one signature for both.

@@ -52,7 +52,6 @@ class Approach:
         return cls(local_mm, skin_mm, np.zeros_like(skin_mm), tip_mm, np.zeros(3))
 
     def after(self, local_mm: FloatArray, skin_mm: FloatArray, tip_mm: FloatArray) -> Approach:
-        """Return the approach after one more step."""
         return Approach(local_mm, skin_mm, skin_mm - self.skin_mm, tip_mm, tip_mm - self.tip_mm)
 
     def expected_mm(self, tip_mm: FloatArray) -> FloatArray:
@@ -86,7 +85,6 @@ class Anchors:
 
     @classmethod
     def none_held(cls, approach: Approach) -> Anchors:
-        """No contact yet."""
         n, zero = len(approach.local_mm), np.zeros_like(approach.local_mm)
         return cls(approach.local_mm, zero, np.zeros(n), zero, np.zeros(n, dtype=bool), approach)
 
@@ -121,9 +119,7 @@ class Friction:
     3). [mN/mm]
     """
     potential: float
-    """Sum of phi. [µJ]"""
     slip_mm: FloatArray
-    """g, (n, 3). [mm]"""
     pull_mn: FloatArray
     """t, the pull towards which the linearised law leads, within the limit, (n, 3). [mN]"""
 

@@ -54,7 +54,6 @@ def _young_at_once_kpa(material: Material) -> float:
 
 
 def fastest_hz(motion: Motion) -> float:
-    """Frequency of the sine that is as fast as the fastest part of a motion. [Hz]"""
     return float(_strokes(motion)[0].max(initial=0.0))
 
 

@@ -48,9 +48,7 @@ class Law(Protocol):
         """The law as a formula."""
         ...
 
-    def scaled(self, factor: float) -> Law:
-        """Return the same law with its energy times a factor."""
-        ...
+    def scaled(self, factor: float) -> Law: ...
 
 
 @dataclass(frozen=True)
@@ -111,7 +109,6 @@ class Energy(metaclass=KnownKeywords):
 
     @property
     def _said(self) -> str:
-        """The formula in an error."""
         return shown(self.formula)
 
     @property
@@ -191,11 +188,6 @@ class Polynomial(_OfModuli):
         Coefficients of the isochoric energy. [kPa]
     bulk_linear, bulk_cubic : float
         1/D1 and 1/D2 of the volumetric energy; half the bulk modulus is 1/D1. [kPa]
-
-    Raises
-    ------
-    InputError
-        If a coefficient is not finite, or the initial shear or bulk modulus is not above zero.
 
     Examples
     --------
@@ -292,11 +284,6 @@ class Ogden(_Powers):
     bulk_kpa : float
         Bulk modulus K. [kPa]
 
-    Raises
-    ------
-    InputError
-        If there are none or more than three terms, or a modulus is not above zero.
-
     Examples
     --------
     >>> Ogden(moduli_kpa=(8.0, 2.0), exponents=(2.0, 8.0), bulk_kpa=240.0).shear_modulus_kpa
@@ -334,12 +321,6 @@ class Hyperfoam(_Powers):
         alpha_i, none of them 0.
     poisson : float
         nu; beta = nu / (1 - 2 nu).
-
-    Raises
-    ------
-    InputError
-        If there are none or more than three terms, the initial shear modulus is not above zero, or nu is out
-        of its range.
 
     Examples
     --------

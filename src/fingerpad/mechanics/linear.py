@@ -66,9 +66,7 @@ class Preconditioner(Protocol):
         """Values of the free degrees of freedom of such a vector."""
         ...
 
-    def multiply(self, direction: np.ndarray) -> np.ndarray:
-        """Product of the tangent and a vector."""
-        ...
+    def multiply(self, direction: np.ndarray) -> np.ndarray: ...
 
     def apply(self, residual: np.ndarray) -> np.ndarray:
         """Approximate solution for a vector."""
@@ -167,7 +165,6 @@ class LinearSolver:
 
     @property
     def number_type(self) -> type[np.floating]:
-        """Type of the numbers that a tangent should have."""
         return self.approximate.number_type
 
     def multiply(self, direction: FloatArray) -> FloatArray:

@@ -52,11 +52,6 @@ class Prony(metaclass=KnownKeywords):
     times_ms : tuple of float
         tau_i, each above 0. [ms]
 
-    Raises
-    ------
-    InputError
-        If a share or time is out of range or their numbers differ.
-
     Examples
     --------
     >>> Prony(shares=(0.148, 0.252), times_ms=(2123.0, 9371.0)).long_term_share
@@ -97,11 +92,6 @@ class Material(metaclass=KnownKeywords):
         Relaxation.
     moduli : {"long_term", "instantaneous"}
         Which state the coefficients of the law describe; the paper's solver takes long-term by default.
-
-    Raises
-    ------
-    InputError
-        If a part is of the wrong kind.
 
     Warns
     -----
@@ -271,11 +261,6 @@ class Tissues(metaclass=KnownKeywords):
         factor : float
             Above 0; Poisson's ratios and relaxation are kept.
 
-        Raises
-        ------
-        InputError
-            If the factor is not above 0.
-
         Examples
         --------
         >>> tissue = Material.neo_hooke(10.0, 0.4)
@@ -300,7 +285,6 @@ class MaterialTable:
 
     @classmethod
     def of(cls, materials: Sequence[Material]) -> MaterialTable:
-        """Table of a sequence of materials."""
         n_terms = max(len(material.prony.shares) for material in materials)
         rows = [_row(material) for material in materials]
         law = np.zeros((len(materials), max(row.size for row in rows)))
@@ -315,7 +299,6 @@ class MaterialTable:
 
 
 def _row(material: Material) -> FloatArray:
-    """One row of `MaterialTable.law`."""
     row = np.zeros(N_COEFFICIENTS)
     row[7], row[9] = material.prony.long_term_share, material.instantaneous_factor
     law = material.law

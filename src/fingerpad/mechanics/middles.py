@@ -35,7 +35,6 @@ class Middles:
 
     @classmethod
     def none(cls) -> Middles:
-        """Contact at nodes alone."""
         shape = (0, N_CORNERS)
         return cls(np.empty(shape, np.int64), np.empty((*shape, N_CORNERS), np.int64), np.empty(0), 0.0)
 

@@ -86,7 +86,6 @@ class Transfer:
 
     @classmethod
     def of(cls, graph: ColumnGraph, parent: np.ndarray, weight: FloatArray) -> Transfer:
-        """Transfer for a fine grid with neighbours `graph`."""
         n_coarse = int(parent.max()) + 1
         fine, corner = np.nonzero(weight)
         child_start, child, child_weight = _grouped(
@@ -286,7 +285,6 @@ class _Level:
         )  # fmt: skip
 
     def sweep_backward(self) -> None:
-        """Improve `x`."""
         self._sweep(self.colours[::-1], self.graph.start[:-1], self.graph.start[1:], keeps=True)
 
     def _sweep(self, colours: list[Chunk], begin: np.ndarray, end: np.ndarray, keeps: bool) -> None:

@@ -128,17 +128,13 @@ class Equilibrium:
     """A converged configuration."""
 
     displacement_mm: FloatArray
-    """Displacements, (n_nodes, 3). [mm]"""
     depth_mm: float
     """How far the indenter has advanced since first touch. [mm]"""
     contact: ContactState
-    """Contact there."""
     multipliers_mn: FloatArray
     """Contact multipliers to start the next step from, (n_points,). [mN]"""
     iterations: int
-    """Newton steps taken."""
     balance: Balance
-    """Reaction of the supports."""
     anchors: Anchors | None = None
     """Where the skin holds on to the indenter when the next step starts."""
     slid_mm: FloatArray | None = None
@@ -160,7 +156,6 @@ def find_equilibrium(
     settings: NewtonSettings,
     before_mm: FloatArray | None = None,
 ) -> Equilibrium:
-    """Newton's method from a guess."""
     search = _Search(body, load, solver, Lagging(multipliers_mn, load.anchors), settings.persistent)
     try:
         return search.run(guess_mm, settings, before_mm)
@@ -243,7 +238,6 @@ class _Search:
         return self.persistent and (self.shift > 0.0 or len(self.history) > PATIENCE)
 
     def beginning(self, displacement_mm: FloatArray) -> Configuration:
-        """Return the configuration that the search starts from, with its tangent."""
         load, where = self.load, (displacement_mm, self.load.depth_mm)
         return evaluate(self.body, load, *where, self.lagging, self.blocks, pressure_kpa=load.pressure_kpa)
 

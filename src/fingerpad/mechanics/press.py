@@ -29,20 +29,9 @@ from fingerpad.mechanics.balance import (
 )
 from fingerpad.mechanics.configuration import SMALLEST_FORCE_MN, Balance, Body, Load, Reached
 from fingerpad.mechanics.contact import Contact, Placement, check_friction
-from fingerpad.mechanics.fields import (
-    ElementFields,
-    FieldState,
-    Watched,
-    cauchy_stress,
-    fields_over_time,
-)
+from fingerpad.mechanics.fields import ElementFields, FieldState, Watched, cauchy_stress, fields_over_time
 from fingerpad.mechanics.friction import Anchors
-from fingerpad.mechanics.linear import (
-    NO_NODES,
-    LinearSolver,
-    choose_preconditioner,
-    free_degrees_of_freedom,
-)
+from fingerpad.mechanics.linear import NO_NODES, LinearSolver, choose_preconditioner, free_degrees_of_freedom
 from fingerpad.mechanics.materials import Material, MaterialTable
 from fingerpad.mechanics.mixed import MIXED_POISSON
 from fingerpad.mechanics.newton import FIRST_DEPTH_MM, Equilibrium, NewtonSettings, find_equilibrium
@@ -117,7 +106,6 @@ class Deformation:
     """Deepest penetration at any time. [mm]"""
     newton_steps: int
     factorisations: int
-    """Work done."""
     linear_solver: str
     """Which one was chosen, and why."""
 
@@ -157,13 +145,11 @@ class _Press:
     newton_steps: int = 0
 
     def contact_at(self, time_ms: float) -> Contact:
-        """Contact with the indenter where it stands at a time."""
         if self.stimulus.stays:
             return self.contact
         return replace(self.contact, placement=self.contact.placement.moved(self.stimulus.pose_at(time_ms)))
 
     def unloaded(self) -> _Moment:
-        """Return the moment before the first step."""
         mesh, table = self.body.mesh, self.body.table
         nowhere, no_force = np.zeros_like(mesh.nodes_mm), np.zeros(self.contact.stiffness.size)
         touch = self.contact.state(self.contact.points_mm(mesh.nodes_mm), 0.0, no_force)
@@ -297,12 +283,7 @@ class _Press:
         return round(float(np.clip(further / before, -MOST_CONTINUED, MOST_CONTINUED)), SAME_DIGITS)
 
     def entry(
-        self,
-        start: _Moment,
-        target_ms: float,
-        contact: Contact,
-        found: Equilibrium,
-        tissue: TissueEnergies,
+        self, start: _Moment, target_ms: float, contact: Contact, found: Equilibrium, tissue: TissueEnergies
     ) -> Entry:
         """Energies of the whole body at the end of a step, from those of the body as it is meshed."""
         parts = 2.0 if self.body.mesh.symmetry_nodes.size else 1.0
@@ -377,7 +358,6 @@ class _Press:
 
 
 def length_ms(start_ms: float, end_ms: float) -> float:
-    """Length of a step. [ms]"""
     return round(end_ms - start_ms, SAME_DIGITS)
 
 
@@ -393,7 +373,6 @@ def press(
     friction: float = 0.0,
     finest_mm: float = np.inf,
 ) -> Deformation:
-    """Solve a whole ramp and hold."""
     settings = settings or PressSettings()
     check_mesh(mesh, len(materials))
     _check_bone(mesh, indenter, placement, stimulus)
@@ -511,7 +490,6 @@ def _moments(job: _Press, settings: PressSettings, times: FloatArray) -> Iterato
 
 
 def _solved(job: _Press, settings: PressSettings, times: FloatArray, start: _Moment) -> Iterator[_Moment]:
-    """Solved times after a moment."""
     stimulus, mesh = job.stimulus, job.body.mesh
     receptors = mesh.living_epidermis.ravel()
     where = receptors if receptors.size else np.arange(len(mesh.elements))

@@ -46,11 +46,6 @@ class PressSettings(metaclass=KnownKeywords):
         Of a motion with more than `MOST_SOLVED` equal cycles, only so many are solved as this bound on the
         error of SED asks for, and the others are interpolated (see `cycles`). It is relative to the largest
         SED, at the same places. None solves all of them, as do friction and `sed_tolerance`.
-
-    Raises
-    ------
-    InputError
-        If a number is out of its range, or the times do not increase from above 0.
     """
 
     ramp_steps: int = 8
@@ -73,13 +68,7 @@ class PressSettings(metaclass=KnownKeywords):
                 raise InputError(f"{name} must be below 1: got {tolerance!r}.")
 
     def steps_ms(self, motion: Motion) -> FloatArray:
-        """List the times to solve a motion at, from 0, without a tolerance of SED. [ms]
-
-        Raises
-        ------
-        InputError
-            If a wanted time lies beyond the end of the motion.
-        """
+        """List the times to solve a motion at, from 0, without a tolerance of SED. [ms]"""
         return self._with_wanted(motion, motion.step_times_ms(self.ramp_steps, self.hold_steps))
 
     def smooth_ends_ms(self, motion: Motion) -> FloatArray:

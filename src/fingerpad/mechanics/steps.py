@@ -112,7 +112,6 @@ class Phase:
     """A part of the motion at constant speed, within which SED is smooth in time."""
 
     end_ms: float
-    """Its end, always reached exactly. [ms]"""
     first_ms: float
     """Length of the first step to try. [ms]"""
     loading: bool
@@ -150,7 +149,6 @@ def _adapt(
     step: Step[Reached],
     stop: Stop[Reached],
 ) -> Iterator[Reached]:
-    """Choose the steps of one phase."""
     # The first two are equal and judged together: it takes three moments to see a curvature, and the speed
     # changes at the start of a phase.
     whole_ms = phase.end_ms - start.time_ms

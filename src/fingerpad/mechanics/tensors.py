@@ -27,7 +27,6 @@ WIDEST_ROOT = 5.0
 
 @njit(cache=True, forceinline=True, error_model="numpy")
 def invert(matrices, inverses, determinants):  # type: ignore[no-untyped-def]
-    """Write the inverses of matrices (3, 3, n) and their determinants (n,)."""
     for q in range(determinants.size):
         a, b, c = matrices[0, 0, q], matrices[0, 1, q], matrices[0, 2, q]
         d, e, f = matrices[1, 0, q], matrices[1, 1, q], matrices[1, 2, q]
@@ -46,7 +45,6 @@ def invert(matrices, inverses, determinants):  # type: ignore[no-untyped-def]
 
 @njit(cache=True, forceinline=True)
 def find_determinants(matrices, determinants):  # type: ignore[no-untyped-def]
-    """Write the determinants (n,) of matrices (3, 3, n)."""
     for q in range(determinants.size):
         a, b, c = matrices[0, 0, q], matrices[0, 1, q], matrices[0, 2, q]
         d, e, f = matrices[1, 0, q], matrices[1, 1, q], matrices[1, 2, q]
@@ -56,7 +54,6 @@ def find_determinants(matrices, determinants):  # type: ignore[no-untyped-def]
 
 @njit(cache=True, forceinline=True)
 def multiply_matrices(left, right, products):  # type: ignore[no-untyped-def]
-    """Write the products of matrices (3, 3, n)."""
     for q in range(left.shape[2]):
         for i in range(3):
             x, y, z = left[i, 0, q], left[i, 1, q], left[i, 2, q]

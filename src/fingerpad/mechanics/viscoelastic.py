@@ -47,7 +47,6 @@ class StepCoefficients:
 
     @classmethod
     def of(cls, table: MaterialTable, step_ms: float) -> StepCoefficients:
-        """Coefficients of a step of `step_ms`. [ms]"""
         decay = np.exp(-step_ms / table.times_ms)
         average = table.times_ms / step_ms * (1.0 - decay)
         new, old = (1.0 - average) * table.shares, (average - decay) * table.shares
@@ -65,7 +64,6 @@ class StressHistory:
 
     @classmethod
     def unloaded(cls, n_elements: int, n_terms: int) -> StressHistory:
-        """Stress-free state."""
         return cls(np.zeros((n_elements, N_POINTS, 6)), np.zeros((n_terms, n_elements, N_POINTS, 6)))
 
     def carried(self, step: StepCoefficients, layer: np.ndarray) -> FloatArray:
@@ -166,11 +164,9 @@ class InstantaneousState(NamedTuple):
     (n_elements,). [kPa]
     """
     dilatation: FloatArray
-    """Jbar, (n_elements,)."""
 
 
 def instantaneous_state(mesh: Mesh, displacement: FloatArray, table: MaterialTable) -> InstantaneousState:
-    """State of all elements at given displacements (n_nodes, 3). [mm]"""
     n = len(mesh.elements)
     state = InstantaneousState(
         np.empty((n, N_POINTS, 6)), np.empty((n, N_POINTS, 2)), np.empty(n), np.empty(n), np.empty(n)

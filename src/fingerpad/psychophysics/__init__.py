@@ -8,7 +8,6 @@ from fingerpad.psychophysics.code_efficiency import (
 )
 from fingerpad.psychophysics.counts import JudgementCounts
 from fingerpad.psychophysics.functions import PsychometricFunction
-from fingerpad.psychophysics.goodness_of_fit import GoodnessOfFit, goodness_of_fit
 from fingerpad.psychophysics.ideal_observer import (
     Discriminability,
     Presentation,
@@ -19,24 +18,24 @@ from fingerpad.psychophysics.ideal_observer import (
     present,
 )
 from fingerpad.psychophysics.psychometric import PsychometricFit, fit_psychometric
-from fingerpad.psychophysics.response_models import (
-    GaussianResponses,
-    ResponseModel,
-    multiplied_responses,
-)
+from fingerpad.psychophysics.response_models import GaussianResponses, ResponseModel, multiplied_responses
 from fingerpad.psychophysics.sensitivity import (
-    Sensitivity,
-    sensitivity,
-)
-from fingerpad.psychophysics.tasks import (
     TASKS,
+    Sensitivity,
     d_prime_of_proportion,
     forced_choice,
     same_different_by_difference,
     same_different_by_looks,
+    sensitivity,
     yes_no,
 )
-from fingerpad.psychophysics.uncertainty import FunctionCloud, bootstrap, posterior
+from fingerpad.psychophysics.uncertainty import (
+    FunctionCloud,
+    GoodnessOfFit,
+    bootstrap,
+    goodness_of_fit,
+    posterior,
+)
 
 __all__ = [
     "TASKS",

@@ -72,11 +72,6 @@ def noisy_presentations(
         Standard deviation sigma_1 of the multiplicative noise, above 0.
     seed, session : int
         Of the random numbers.
-
-    Returns
-    -------
-    list of Presentation
-        One per comparison.
     """
     standard, *comparisons = (multiplied_responses(row, noise_sigma, SMALLEST_SPREAD) for row in table)
     return [present(standard, comparison, seed, EFFICIENCY_TRIALS, session) for comparison in comparisons]
@@ -106,14 +101,7 @@ def code_statistic(
 
 @known_keywords
 def code_efficiency(shown: Presentation, statistic: Statistic) -> CodeEfficiency:
-    """Compare a code with the ideal observer.
-
-    Parameters
-    ----------
-    shown : Presentation
-        From `noisy_presentations`, or from `present` for other noise.
-    statistic : Statistic
-        Of the code, from `code_statistic`.
+    """Compare a code, by `code_statistic`, with the ideal observer of the same presentations.
 
     Examples
     --------

@@ -40,12 +40,6 @@ class JudgementCounts:
     n_correct, n_trials : array (n_levels,)
         Whole numbers.
 
-    Raises
-    ------
-    InputError
-        If they differ in length, levels do not increase, or counts are not whole or not within
-        0 ... n_trials.
-
     Examples
     --------
     >>> JudgementCounts([296.0, 365.0], [58, 95], [100, 100]).proportion.tolist()

@@ -11,16 +11,22 @@ Letters in brackets are the steps of Figure 3. Choices where the paper gives no 
 
 Every random number has a key: seed, trial, receptor and purpose. Trials are numbered within a session, so
 sessions of one seed share no random number.
+
+    mu_2, sigma_2 = mean and standard deviation of many noisy values of one stimulus         (e)
+    point         = mu_standard + beta (mu_comparison - mu_standard)                        (h)
+    hit rate      = P(Normal(mu_comparison, sigma_comparison) lies beyond the point)        (h)
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from operator import attrgetter
 
 import numpy as np
 from numpy.typing import ArrayLike
+from scipy.special import ndtr
 
 from fingerpad.core.checks import FloatArray, IntArray, finite, float_array, not_negative, one_of, whole
 from fingerpad.core.errors import InputError
@@ -30,15 +36,7 @@ from fingerpad.core.signals import HitRates
 from fingerpad.core.values import converted
 from fingerpad.data import protocol, psychophysics
 from fingerpad.psychophysics.encoding import NORMS, check_neighbours, distance
-from fingerpad.psychophysics.noise import checked_noise
-from fingerpad.psychophysics.noisy_responses import noisy_gradient_sums, session_trials
-from fingerpad.psychophysics.signal_detection import (
-    decision_point,
-    hit_probability,
-    likelihood_point,
-    moments,
-    side,
-)
+from fingerpad.psychophysics.noisy_responses import checked_noise, noisy_gradient_sums, session_trials
 
 END_OF_STIMULUS_MS = protocol.RAMP.value + protocol.HOLD.value
 """A usual value for the latency of a silent receptor. [ms]"""
@@ -51,7 +49,6 @@ _NOISES_AT_ONCE = 32
 """Noises whose sums are held in memory together."""
 
 MOST_REPETITIONS = 1_000_000
-"""Largest number of repetitions of each kind."""
 
 _REPETITIONS = int(psychophysics.REPETITIONS.value)
 _REPETITIONS_VARIED = int(psychophysics.REPETITIONS_VARIED_CRITERION.value)
@@ -100,7 +97,6 @@ class Experiment:
 
     @property
     def sums_per_sphere(self) -> tuple[int, int]:
-        """Distributions per sphere, and gradient sums behind each of them."""
         if self.criterion_sigma > 0.0:
             return 1, self.presentations_varied
         return self.distributions, self.presentations
@@ -141,12 +137,6 @@ def discriminate_gradient_sum(
     HitRates
         One mean and standard deviation per comparison, mu_3 and sigma_3.
 
-    Raises
-    ------
-    InputError
-        If there are fewer than two spheres, no receptor responds, neighbours are not receptors, the noise,
-        the seed or the session is negative, or a response is not finite and no `silent_value` is given.
-
     Examples
     --------
     Two receptors whose difference is 10 for the standard, 10 and 14 for the comparisons:
@@ -177,22 +167,29 @@ def compare_gradient_sum_observers(
     if not len(pairs):
         raise InputError("neighbours must hold at least one pair of receptors: got none.")
     whole("seed", seed, 0)
-    alike: dict[tuple[int, int], dict[float, list[int]]] = {}
-    for number, (noise_sigma, plan) in enumerate(observers):
-        sigma = checked_noise(noise_sigma)
-        alike.setdefault(plan.sums_per_sphere, {}).setdefault(sigma, []).append(number)
     found: dict[int, HitRates] = {}
-    for (distributions, presentations), by_sigma in alike.items():
+    for (distributions, presentations), sigmas, owners in _alike(observers, attrgetter("sums_per_sphere")):
         trials = session_trials(session, len(values), distributions)
+        measures = np.broadcast_to(values, (sigmas.size, *values.shape))
+        sums = noisy_gradient_sums(measures, pairs, sigmas, seed, trials, presentations)  # (a)-(f)
+        for numbers, of_sigma in zip(owners, sums, strict=True):
+            for number in numbers:
+                found[number] = hit_rates_of_sums(of_sigma, seed, observers[number][1], session)
+    return [found[number] for number in range(len(observers))]
+
+
+def _alike(
+    observers: Sequence[tuple[float, Experiment]], sizes: Callable[[Experiment], tuple[int, ...]]
+) -> Iterator[tuple[tuple[int, ...], FloatArray, list[list[int]]]]:
+    """Sizes that some observers share, some of their noises, and the numbers of the observers of each."""
+    alike: dict[tuple[int, ...], dict[float, list[int]]] = {}
+    for number, (noise_sigma, plan) in enumerate(observers):
+        alike.setdefault(sizes(plan), {}).setdefault(checked_noise(noise_sigma), []).append(number)
+    for shared, by_sigma in alike.items():
         sigmas = list(by_sigma)
         for first in range(0, len(sigmas), _NOISES_AT_ONCE):
-            some = np.array(sigmas[first : first + _NOISES_AT_ONCE])
-            measures = np.broadcast_to(values, (some.size, *values.shape))
-            sums = noisy_gradient_sums(measures, pairs, some, seed, trials, presentations)  # (a)-(f)
-            for sigma, of_sigma in zip(some.tolist(), sums, strict=True):
-                for number in by_sigma[sigma]:
-                    found[number] = hit_rates_of_sums(of_sigma, seed, observers[number][1], session)
-    return [found[number] for number in range(len(observers))]
+            some = sigmas[first : first + _NOISES_AT_ONCE]
+            yield shared, np.array(some), [by_sigma[sigma] for sigma in some]
 
 
 def hit_rates_of_sums(
@@ -241,31 +238,22 @@ def compare_euclidean_observers(
     """
     one_of("norm", norm, NORMS)
     values = checked_responses(responses, silent_value)
-    alike: dict[tuple[int, int, int], dict[float, list[int]]] = {}
-    for number, (noise_sigma, plan) in enumerate(observers):
+    for _, plan in observers:
         if plan.criterion_sigma > 0.0:
             raise InputError(
                 "criterion_sigma must be 0 for Euclidean Distance: its decision point does not vary."
             )
-        sigma, sizes = (
-            checked_noise(noise_sigma),
-            (plan.hit_rates, plan.presentations, plan.pairs),
-        )
-        alike.setdefault(sizes, {}).setdefault(sigma, []).append(number)
     found: dict[int, HitRates] = {}
-    for (repetitions, n_sets, n_pairs), by_sigma in alike.items():
+    sizes_of = attrgetter("hit_rates", "presentations", "pairs")
+    for (repetitions, n_sets, n_pairs), sigmas, owners in _alike(observers, sizes_of):
         trials = session_trials(session, repetitions, len(values))
-        sigmas = list(by_sigma)
-        for first in range(0, len(sigmas), _NOISES_AT_ONCE):
-            some = np.array(sigmas[first : first + _NOISES_AT_ONCE])
-            distances = np.stack(
-                [_noisy_distances(values, some, seed, trial, n_sets, n_pairs, norm) for trial in trials],
-                axis=1,
-            )
-            for sigma, of_sigma in zip(some.tolist(), distances, strict=True):
-                for number in by_sigma[sigma]:
-                    hit_rates = _rates_of_distances(of_sigma, observers[number][1])
-                    found[number] = _mean_and_spread(hit_rates, seed, session)
+        distances = np.stack(
+            [_noisy_distances(values, sigmas, seed, trial, n_sets, n_pairs, norm) for trial in trials], axis=1
+        )
+        for numbers, of_sigma in zip(owners, distances, strict=True):
+            for number in numbers:
+                hit_rates = _rates_of_distances(of_sigma, observers[number][1])
+                found[number] = _mean_and_spread(hit_rates, seed, session)
     return [found[number] for number in range(len(observers))]
 
 
@@ -366,3 +354,41 @@ def _picks(seed: int, trials: IntArray, shape: tuple[int, int], choices: int) ->
 def _mean_and_spread(hit_rates: FloatArray, seed: int, session: int) -> HitRates:
     """Return mean mu_3 and standard deviation sigma_3 over the repetitions (k)."""
     return HitRates(hit_rates.mean(axis=0), hit_rates.std(axis=0, ddof=1), seed, session)
+
+
+def moments(answers: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return mean mu_2 and standard deviation sigma_2 over the last axis, step (e)."""
+    return answers.mean(axis=-1), answers.std(axis=-1, ddof=1)
+
+
+def decision_point(standard: FloatArray, comparison: FloatArray, criterion: float | FloatArray) -> FloatArray:
+    """Return the point at the fraction beta of the distance from the standard's mean to the comparison's."""
+    return np.asarray(standard + criterion * (comparison - standard))
+
+
+def likelihood_point(
+    standard: FloatArray, comparison: FloatArray, variance: FloatArray, ratio: FloatArray
+) -> FloatArray:
+    """Return the point at which the comparison is `ratio` times as likely as the standard.
+
+    For two normal distributions of one variance s^2 the logarithm of the likelihood ratio is linear:
+
+        point = (mu_standard + mu_comparison)/2 + s^2 ln(ratio) / (mu_comparison - mu_standard)
+    """
+    shift = np.asarray(variance * np.log(np.maximum(ratio, np.finfo(float).tiny)))
+    distance = np.broadcast_to(comparison - standard, shift.shape)
+    away = np.divide(shift, distance, out=np.zeros_like(shift), where=distance != 0.0)
+    return decision_point(standard, comparison, 0.5) + away
+
+
+def side(means: FloatArray) -> FloatArray:
+    """Return the side of the standard on which each comparison lies."""
+    pooled = means.mean(axis=0)
+    return np.where(pooled[1:] < pooled[0], -1.0, 1.0)
+
+
+def hit_probability(point: FloatArray, mean: FloatArray, spread: FloatArray, side: FloatArray) -> FloatArray:
+    """Return the probability that Normal(mean, spread) lies beyond the decision point, step (h)."""
+    margin = np.asarray(side * (mean - point))
+    scaled = np.divide(margin, spread, out=np.zeros_like(margin), where=spread > 0.0)
+    return np.where(spread > 0.0, ndtr(scaled), np.heaviside(margin, 0.5))

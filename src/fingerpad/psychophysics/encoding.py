@@ -35,7 +35,7 @@ _LATTICE_NEIGHBOURS = {"rectangular": 8, "hexagonal": 6}
 
 @known_keywords
 def neighbour_pairs(positions_mm: ArrayLike, pitch_mm: float, count: int = 8) -> np.ndarray:
-    """Find the pairs of neighbours in a lattice.
+    """Find the pairs (n_pairs, 2) of neighbours in a lattice, each once, the lower index first.
 
     Receptors are neighbours when they lie less than 1.5 pitches apart: in x and z each (8 neighbours,
     diagonals included), or in the sum of both (4 neighbours). On a square lattice these are exactly the
@@ -50,16 +50,6 @@ def neighbour_pairs(positions_mm: ArrayLike, pitch_mm: float, count: int = 8) ->
         Distance between neighbours of the layout. [mm]
     count : {8, 4, 6}, optional
         Neighbours of a receptor inside a lattice; at the edges there are fewer.
-
-    Returns
-    -------
-    int array (n_pairs, 2)
-        Every pair of neighbours once, the lower index first.
-
-    Raises
-    ------
-    InputError
-        If the positions are not pairs, the pitch is not positive or the count is not 8, 4 or 6.
 
     Examples
     --------
@@ -146,16 +136,6 @@ def gradient_sum(values: ArrayLike, neighbours: np.ndarray) -> FloatArray:
         Response measure of every receptor. [any unit]
     neighbours : int array (n_pairs, 2)
         From `neighbour_pairs`.
-
-    Returns
-    -------
-    array (...)
-        One sum per population. [unit of `values`]
-
-    Raises
-    ------
-    InputError
-        If a pair contains an index outside the population, or a value is not finite.
 
     Examples
     --------

@@ -150,12 +150,6 @@ class PsychometricFunction:
     sigmoid : {"normal", "logistic", "weibull", "gumbel"}
         Shape of F.
 
-    Raises
-    ------
-    InputError
-        If a number is not finite, the width (or the threshold of "weibull") is not positive, or guess and
-        lapse are negative or sum to 1 or more.
-
     Examples
     --------
     >>> judged = PsychometricFunction(threshold=319.0, width=80.0, guess=0.5, lapse=0.02)
@@ -189,23 +183,7 @@ class PsychometricFunction:
         return SIGMOIDS[self.sigmoid]
 
     def predict(self, levels: ArrayLike) -> FloatArray:
-        """Psi at levels of the stimulus.
-
-        Parameters
-        ----------
-        levels : array_like (n_levels,)
-            [unit of the levels]
-
-        Returns
-        -------
-        array (n_levels,)
-            [0-1]
-
-        Raises
-        ------
-        InputError
-            If a level is not finite, or not positive for "weibull".
-        """
+        """Psi (n_levels,) at levels of the stimulus. [0-1]"""
         return proportion(
             self.shape,
             checked_levels(levels, self.sigmoid),
@@ -216,22 +194,12 @@ class PsychometricFunction:
         )
 
     def level_at(self, proportion_correct: float | None = None) -> float:
-        """Level at which psi has a value.
+        """Level at which psi has a value. [unit of the levels]
 
         Parameters
         ----------
         proportion_correct : float, optional
             Between guess and 1 - lapse; by default half-way between them, where the threshold is. [0-1]
-
-        Returns
-        -------
-        float
-            [unit of the levels]
-
-        Raises
-        ------
-        InputError
-            If psi does not reach that value.
         """
         if proportion_correct is None:
             return self.threshold
@@ -244,22 +212,7 @@ class PsychometricFunction:
         return float(level_at(self.shape, wanted, self.threshold, self.width, self.guess, self.lapse))
 
     def slope(self, proportion_correct: float | None = None) -> float:
-        """Slope of psi, its derivative by the level, where psi has a value.
-
-        Parameters
-        ----------
-        proportion_correct : float, optional
-            As in `level_at`. [0-1]
-
-        Returns
-        -------
-        float
-            [1/unit of the levels]
-
-        Raises
-        ------
-        InputError
-            If psi does not reach that value.
+        """Slope of psi, its derivative by the level, as in `level_at`. [1/unit of the levels]
 
         Examples
         --------

@@ -26,8 +26,7 @@ from scipy.stats import rankdata
 from fingerpad.core.checks import FloatArray, float_array, not_negative, whole
 from fingerpad.core.errors import InputError
 from fingerpad.core.keywords import known_keywords
-from fingerpad.psychophysics.noise import checked_noise
-from fingerpad.psychophysics.noisy_responses import session_trials
+from fingerpad.psychophysics.noisy_responses import checked_noise, session_trials
 from fingerpad.psychophysics.response_models import ResponseModel
 
 Statistic = Callable[[FloatArray], FloatArray]
@@ -69,11 +68,6 @@ def discriminability(standard: ArrayLike, comparison: ArrayLike) -> Discriminabi
     -------
     Discriminability
         The standard error is that of DeLong, DeLong & Clarke-Pearson 1988.
-
-    Raises
-    ------
-    InputError
-        If there are fewer than two values for a stimulus.
 
     Examples
     --------
@@ -150,11 +144,6 @@ def present(
     session : int, optional
         Sessions of one seed share no random number.
 
-    Raises
-    ------
-    InputError
-        If the numbers of receptors differ, or there are fewer than two trials.
-
     Examples
     --------
     >>> from fingerpad.psychophysics.response_models import multiplied_responses
@@ -219,7 +208,7 @@ def efficiency(code: Discriminability, ideal: Discriminability) -> tuple[float, 
 def gaussian_information(
     responses: ArrayLike, slopes: ArrayLike, noise_sigma: float, smallest_spread: float = 0.0
 ) -> float:
-    """Fisher information of responses with the paper's noise, the limit of the ideal observer.
+    """Fisher information J with the paper's noise, the limit of the ideal observer. [1/unit of x squared]
 
         V_i = (sigma_1 mu_i)^2 + s^2
         J = sum_i mu_i'^2 / V_i + 2 (sigma_1^2 mu_i mu_i' / V_i)^2,    d' -> dx sqrt J,  dx > 0
@@ -237,16 +226,6 @@ def gaussian_information(
         Standard deviation sigma_1 of the multiplicative noise.
     smallest_spread : float, optional
         Noise floor s. [unit of `responses`]
-
-    Returns
-    -------
-    float
-        J. [1/unit of x squared]
-
-    Raises
-    ------
-    InputError
-        If sizes differ, the noise is not positive, the floor negative, or a response zero without a floor.
 
     Examples
     --------

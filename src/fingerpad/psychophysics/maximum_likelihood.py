@@ -51,7 +51,6 @@ class Model:
     """
 
     sigmoid: Sigmoid
-    """Shape."""
     coordinates: FloatArray
     """c(x) of the levels, (n_levels,)."""
     n_trials: FloatArray
@@ -62,7 +61,6 @@ class Model:
 
     @property
     def free(self) -> np.ndarray:
-        """Free parameters (5,)."""
         return self.upper > self.lower
 
     def proportions(self, points: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:

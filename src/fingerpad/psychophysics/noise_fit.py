@@ -13,11 +13,15 @@ from scipy.special import ndtr
 from fingerpad.core.checks import FloatArray, finite, float_array, positive
 from fingerpad.core.errors import ConvergenceError, InputError
 from fingerpad.data import psychophysics
-from fingerpad.psychophysics.discrimination import checked_responses
+from fingerpad.psychophysics.discrimination import (
+    checked_responses,
+    decision_point,
+    hit_probability,
+    moments,
+    side,
+)
 from fingerpad.psychophysics.encoding import check_neighbours
-from fingerpad.psychophysics.noise import checked_noise
-from fingerpad.psychophysics.noisy_responses import shared_noise_gradient_sums
-from fingerpad.psychophysics.signal_detection import decision_point, hit_probability, moments, side
+from fingerpad.psychophysics.noisy_responses import checked_noise, shared_noise_gradient_sums
 
 NOISE_DRAWS = 4000
 """Common random presentations in the fit of the noise; its sampling error is one per cent."""

@@ -13,7 +13,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from fingerpad.core.checks import FloatArray, IntArray, whole
+from fingerpad.core.checks import FloatArray, IntArray, not_negative, positive, whole
 from fingerpad.core.errors import InputError
 from fingerpad.core.philox import four_normals
 from fingerpad.core.random_streams import LARGEST_SEED, Purpose, normals
@@ -39,7 +39,6 @@ def session_trials(session: int, *shape: int) -> IntArray:
 def noisy_responses(
     responses: FloatArray, noise_sigma: float, seed: int, trials: IntArray, presentations: int
 ) -> FloatArray:
-    """Sample noisy presentations of every stimulus, step (a)."""
     draws = normals(seed, trials, responses.shape[1], Purpose.RESPONSE, presentations)
     return responses[:, np.newaxis] * (1.0 + noise_sigma * draws.transpose(0, 2, 1))
 
@@ -120,7 +119,6 @@ def _fill_shared(values, pairs, sigma, standard_normals, sums):  # type: ignore[
 
 @njit(cache=True, nogil=True)
 def _multiply(responses, sigma, draws, noisy):  # type: ignore[no-untyped-def]
-    """Write noisy responses (n_receptors, n_draws) (a)."""
     for receptor in range(responses.size):
         for k in range(draws.shape[1]):
             noisy[receptor, k] = responses[receptor] * (1.0 + sigma * draws[receptor, k])
@@ -133,3 +131,17 @@ def _add_gradients(noisy, pairs, sums):  # type: ignore[no-untyped-def]
         one, other = noisy[pairs[pair, 0]], noisy[pairs[pair, 1]]
         for k in range(sums.size):
             sums[k] += 2.0 * abs(one[k] - other[k])
+
+
+LARGEST_NOISE = 1000.0
+"""Largest standard deviation of noise over the response: with less than this every answer is a guess."""
+
+
+def checked_noise(noise_sigma: float, above_zero: bool = False) -> float:
+    """Return the standard deviation of multiplicative noise, over the response, as a float."""
+    sigma = (positive if above_zero else not_negative)("noise_sigma", noise_sigma)
+    if sigma > LARGEST_NOISE:
+        raise InputError(
+            f"noise_sigma must be at most {LARGEST_NOISE:g} times the response: got {noise_sigma:g}."
+        )
+    return sigma

@@ -157,9 +157,6 @@ def fit_psychometric(
 
     Raises
     ------
-    InputError
-        If counts or a given parameter are not possible, or there are fewer levels than fitted parameters of
-        position and slope.
     ConvergenceError
         If the maximum-likelihood threshold lies on its bound, or one proportion explains all counts as well:
         the levels do not determine a threshold.

@@ -19,7 +19,7 @@ from fingerpad.core.checks import FloatArray, IntArray, float_array, not_negativ
 from fingerpad.core.errors import InputError
 from fingerpad.core.random_streams import Purpose, normals
 from fingerpad.core.values import converted
-from fingerpad.psychophysics.noise import checked_noise
+from fingerpad.psychophysics.noisy_responses import checked_noise
 
 
 class ResponseModel(Protocol):
@@ -50,11 +50,6 @@ class GaussianResponses:
         mu. [any unit]
     covariance : array (n_receptors, n_receptors)
         S. [unit squared]
-
-    Raises
-    ------
-    InputError
-        If shapes do not match or the covariance is not positive definite.
 
     Examples
     --------

@@ -4,19 +4,34 @@
     d_a = sqrt(2 / (1 + s^2)) (z(H) - s z(F))   spread of no signal over that of signal, s
     c  = -(z(H) + z(F)) / 2                     criterion, from midway
 
-H and F are the rates of hits and false alarms, z the inverse of the normal distribution. Source: Macmillan &
-Creelman 2005, Detection Theory, chapters 1 and 3.
+H and F are the rates of hits and false alarms, z the inverse of the normal distribution. The proportion
+correct in a task, for an observer without bias, is
+
+    yes-no                                 Phi(d'/2)
+    one of two (2AFC)                      Phi(d'/sqrt 2)
+    one of m (mAFC)                        integral of phi(x - d') Phi(x)^(m - 1) dx
+    same-different, two looks compared     (Phi((d' - k)/sqrt 2) + Phi((-d' - k)/sqrt 2)
+      (differencing)                        + 2 Phi(k/sqrt 2) - 1) / 2,    k the best
+    same-different, each look judged       Phi(d'/2)^2 + Phi(-d'/2)^2
+      (independent observations)
+
+Phi and phi are the normal distribution and its density. Source: Macmillan & Creelman 2005, Detection Theory,
+chapters 1, 3, 7, 9 and 10.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 
-from scipy.special import ndtri
+import numpy as np
+from scipy.optimize import brentq
+from scipy.special import ndtr, ndtri
 
-from fingerpad.core.checks import one_of, positive, whole
+from fingerpad.core.checks import finite, not_negative, one_of, positive, whole
 from fingerpad.core.errors import InputError
+from fingerpad.core.keywords import known_keywords
 
 CORRECTIONS = ("log-linear", "half", "none")
 
@@ -64,11 +79,6 @@ def sensitivity(
     spread_ratio : float, optional
         s, standard deviation without the signal over that with it: 1 gives d', others d_a.
 
-    Raises
-    ------
-    InputError
-        If counts are not possible, the correction is unknown, or it is "none" and a rate is 0 or 1.
-
     Examples
     --------
     >>> found = sensitivity(84, 100, 16, 100, correction="none")
@@ -101,3 +111,132 @@ def _rate(of: str, count: int, among: str, total: int, correction: str) -> float
             f"{of} is {k} of {n}, for which d' is infinite: choose the correction 'log-linear' or 'half'."
         )
     return k / n
+
+
+LARGEST_D_PRIME = 20.0
+"""Above it the proportion correct is 1 in double precision."""
+
+_REACH, _POINTS = 9.0, 361
+"""Of the integral: the error of the trapezium rule on a normal density is below round-off."""
+
+
+def yes_no(d_prime: float) -> float:
+    """Proportion correct in yes-no: one look is judged "standard" or "comparison". [0.5-1]
+
+    Examples
+    --------
+    >>> round(yes_no(2.0), 4)
+    0.8413
+    """
+    return float(ndtr(0.5 * not_negative("d_prime", d_prime)))
+
+
+def forced_choice(d_prime: float, alternatives: int = 2) -> float:
+    """Proportion correct in forced choice: one of m alternatives is the comparison. [1/m-1]
+
+    Examples
+    --------
+    >>> round(forced_choice(1.0), 4), round(forced_choice(0.0, 4), 4)
+    (0.7602, 0.25)
+    """
+    d, m = not_negative("d_prime", d_prime), whole("alternatives", alternatives, 2)
+    if m == 2:
+        return float(ndtr(d / math.sqrt(2.0)))
+    around = np.linspace(-_REACH, _REACH, _POINTS)
+    density = np.exp(-0.5 * np.square(around)) / math.sqrt(2.0 * math.pi)
+    return float(np.trapezoid(density * ndtr(around + d) ** (m - 1), around))
+
+
+def same_different_by_difference(d_prime: float, criterion: float | None = None) -> float:
+    """Proportion correct in "same or different?" by the difference of the two looks. [0.5-1 at the best k]
+
+    The observer says "different" if the looks differ by more than k, either way.
+
+    Parameters
+    ----------
+    d_prime : float
+        Not negative. [standard deviations]
+    criterion : float, optional
+        k. Default: the optimum, at which both responses are equally likely. [standard deviations]
+
+    Examples
+    --------
+    >>> round(same_different_by_difference(2.0), 3)
+    0.68
+    """
+    d = not_negative("d_prime", d_prime)
+    k = best_difference(d) if criterion is None else not_negative("criterion", criterion)
+    if math.isinf(k):
+        return 0.5
+    root = math.sqrt(2.0)
+    hits = ndtr((d - k) / root) + ndtr((-d - k) / root)
+    correct_rejections = 2.0 * ndtr(k / root) - 1.0
+    return float(0.5 * (hits + correct_rejections))
+
+
+def best_difference(d_prime: float) -> float:
+    """Return the difference k above which "different" is more likely.
+
+    exp(-d'^2 / 4) cosh(d' k / 2) = 1,    k = (2 / d') arcosh(exp(d'^2 / 4))
+    """
+    d = not_negative("d_prime", d_prime)
+    exponent = 0.25 * d * d
+    if exponent < _SMALL:
+        return math.sqrt(2.0)
+    # ln(e^x + sqrt(e^2x - 1)) without overflow.
+    return 2.0 / d * (exponent + math.log1p(math.sqrt(-math.expm1(-2.0 * exponent))))
+
+
+_SMALL = 1e-12
+
+
+def same_different_by_looks(d_prime: float) -> float:
+    """Proportion correct in "same or different?" where each look is judged by itself. [0.5-1]
+
+    This is optimal if the two stimuli are the same in every trial.
+
+    Examples
+    --------
+    >>> round(same_different_by_looks(2.0), 3)
+    0.733
+    """
+    right = yes_no(d_prime)
+    return right**2 + (1.0 - right) ** 2
+
+
+TASKS: dict[str, Callable[[float], float]] = {
+    "yes-no": yes_no,
+    "2afc": forced_choice,
+    "same-different by difference": same_different_by_difference,
+    "same-different by looks": same_different_by_looks,
+}
+"""Proportion correct of d', by the name of the task."""
+
+
+@known_keywords
+def d_prime_of_proportion(proportion_correct: float, task: Callable[[float], float] = forced_choice) -> float:
+    """Return the d' for which a task has a proportion correct. [standard deviations]
+
+    Parameters
+    ----------
+    proportion_correct : float
+        At least the chance level, below 1. [0-1]
+    task : callable, optional
+        One of `TASKS`, or any increasing function of d'.
+
+    Examples
+    --------
+    >>> round(d_prime_of_proportion(0.75), 4), round(d_prime_of_proportion(0.75, yes_no), 4)
+    (0.9539, 1.349)
+    """
+    wanted = finite("proportion_correct", proportion_correct)
+    guessing, never_failed = task(0.0), task(LARGEST_D_PRIME)
+    if not guessing - _SMALL <= wanted < never_failed:
+        raise InputError(
+            f"proportion_correct must lie between the chance level, {guessing:g}, and 1: got {wanted:g}."
+        )
+    if wanted <= guessing:
+        return 0.0
+    if task is forced_choice:
+        return float(math.sqrt(2.0) * ndtri(wanted))
+    return float(brentq(lambda d: task(d) - wanted, 0.0, LARGEST_D_PRIME, xtol=1e-12))

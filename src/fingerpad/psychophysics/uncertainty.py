@@ -1,13 +1,20 @@
-"""Uncertainty of a fitted psychometric function: parametric bootstrap, and posterior.
+"""Uncertainty of a fitted psychometric function: parametric bootstrap, posterior, goodness of fit.
 
-Both are a weighted sample of functions, from which intervals of a parameter, a threshold or the curve are
-computed.
+Bootstrap and posterior are a weighted sample of functions, from which intervals of a parameter, a threshold
+or the curve are computed.
 
 - Bootstrap: counts are sampled from the fitted function repeatedly, and fitted in the same way.
 - Posterior: Bayes' rule on a grid over the fitted parameters, with a prior flat in the threshold, the
   logarithm of the width, guess, lapse and overdispersion, within the bounds of the fit; the width may be
   smaller, so that a step between two levels may lie anywhere between them. A coarse grid finds the region of
   the posterior, a fine grid covers it; no random numbers are used.
+
+The goodness of fit compares the deviance
+
+    D = 2 sum_i [ln P(k_i | k_i / n_i) - ln P(k_i | psi(x_i))]
+
+with that of data simulated from the fit: with the trials of an experiment D has no chi-square distribution.
+Counts from the fit are fitted again (Wichmann & Hill 2001).
 """
 
 from __future__ import annotations
@@ -79,15 +86,6 @@ class FunctionCloud:
             "threshold" is where F is one half.
         probability : float, optional
             Coverage of the true value. [0-1]
-
-        Returns
-        -------
-        (float, float)
-
-        Raises
-        ------
-        InputError
-            If there is no such parameter, or the probability is not within 0 ... 1.
         """
         one_of("parameter", parameter, PARAMETERS)
         return self._central(self.values[:, PARAMETERS.index(parameter)], probability)
@@ -108,11 +106,6 @@ class FunctionCloud:
         -------
         (float, float)
             An end is infinite if too many of the functions do not reach that value.
-
-        Raises
-        ------
-        InputError
-            If the proportion or the probability is not within 0 ... 1.
         """
         return self._central(self.thresholds(proportion_correct), probability)
 
@@ -125,25 +118,7 @@ class FunctionCloud:
         return level_at(self.shape, wanted, threshold, width, guess, lapse)
 
     def band(self, levels: ArrayLike, probability: float = 0.95) -> FloatArray:
-        """Central interval of the curve at each level.
-
-        Parameters
-        ----------
-        levels : array_like (n_levels,)
-            [unit of the levels]
-        probability : float, optional
-            Coverage of the true proportion, level by level. [0-1]
-
-        Returns
-        -------
-        array (2, n_levels)
-            Lower and upper end. [0-1]
-
-        Raises
-        ------
-        InputError
-            If a level does not suit the sigmoid, or the probability is not within 0 ... 1.
-        """
+        """Central interval (2, n_levels) of the curve at each level, level by level. [0-1]"""
         x = checked_levels(levels, self.sigmoid)
         threshold, width, guess, lapse, _ = self.values.T
         ends = [
@@ -181,26 +156,10 @@ def weighted_quantiles(values: ArrayLike, weights: ArrayLike, shares: ArrayLike)
 
 
 def bootstrap(fit: PsychometricFit, seed: int, n_replicates: int = 1000) -> FunctionCloud:
-    """Sample counts from a fit and fit them again, many times.
-
-    Parameters
-    ----------
-    fit : PsychometricFit
-        The fit to sample from.
-    seed : int
-        Of the random numbers; keyed by replicate and level.
-    n_replicates : int, optional
-        Number of repetitions.
-
-    Returns
-    -------
-    FunctionCloud
-        One function per replicate, all of equal weight.
+    """Sample counts from a fit and fit them again, `n_replicates` times: functions of equal weight.
 
     Raises
     ------
-    InputError
-        If a number is not whole or not positive.
     ConvergenceError
         If a replicate cannot be fitted, or the fit is a step: its replicates are steps at the same place.
 
@@ -224,7 +183,6 @@ def bootstrap(fit: PsychometricFit, seed: int, n_replicates: int = 1000) -> Func
 
 
 def drawn_counts(fit: PsychometricFit, seed: int, n_replicates: int) -> FloatArray:
-    """Sample counts (n_replicates, n_levels) from a fit."""
     instance("fit", fit, PsychometricFit)
     whole("n_replicates", n_replicates, at_least=1)
     expected = fit.predict(fit.counts.levels)
@@ -238,17 +196,7 @@ def drawn_counts(fit: PsychometricFit, seed: int, n_replicates: int) -> FloatArr
 
 
 def posterior(fit: PsychometricFit) -> FunctionCloud:
-    """Posterior of the fitted parameters, by Bayes' rule on a grid.
-
-    Parameters
-    ----------
-    fit : PsychometricFit
-        Counts, and the bounds of the flat priors.
-
-    Returns
-    -------
-    FunctionCloud
-        Functions of the grid, weighted by their posterior probability.
+    """Posterior of the fitted parameters, by Bayes' rule on a grid: functions with weights.
 
     Examples
     --------
@@ -331,3 +279,62 @@ def _share(name: str, value: float) -> float:
     if not 0.0 < finite(name, value) < 1.0:
         raise InputError(f"{name} must lie between 0 and 1: got {value!r}.")
     return float(value)
+
+
+@dataclass(frozen=True)
+class GoodnessOfFit:
+    """Deviance of a fit, and its p-value from simulated data.
+
+    Parameters
+    ----------
+    deviance : float
+        D of the observed counts; about the number of levels minus the fitted parameters for a good fit.
+    p_value : float
+        Share of the simulated data sets with at least that deviance; a small one rejects the function. [0-1]
+    residuals : array (n_levels,)
+        Root of each level's share of D, with the sign of observed minus predicted.
+    drawn_deviances : array (n_replicates,)
+        Of the simulated data sets.
+    seed : int
+        Of the random numbers.
+    """
+
+    deviance: float
+    p_value: float
+    residuals: FloatArray
+    drawn_deviances: FloatArray
+    seed: int
+
+
+def goodness_of_fit(fit: PsychometricFit, seed: int, n_replicates: int = 1000) -> GoodnessOfFit:
+    """Compare the deviance of a fit with those of `n_replicates` data sets simulated from it.
+
+    Raises
+    ------
+    ConvergenceError
+        If a replicate cannot be fitted.
+
+    Examples
+    --------
+    >>> from fingerpad.psychophysics.psychometric import fit_psychometric
+    >>> good = fit_psychometric([1, 2, 3, 4, 5], [52, 60, 76, 91, 98], [100] * 5, lapse=0.0)
+    >>> bad = fit_psychometric([1, 2, 3, 4, 5], [52, 90, 60, 99, 80], [100] * 5, lapse=0.0)
+    >>> goodness_of_fit(good, 1, 200).p_value > 0.05 > goodness_of_fit(bad, 1, 200).p_value
+    True
+    """
+    drawn = drawn_counts(fit, seed, n_replicates)
+    points, heights = maximise_likelihood(fit.model, drawn)
+    rho = points[:, OVERDISPERSION, None] if fit.overdispersion > 0.0 else 0.0
+    perfect = log_probability(drawn, fit.counts.n_trials, drawn / fit.counts.n_trials, rho).sum(axis=1)
+    deviances = 2.0 * (perfect - heights)
+    # The observed set counts as one of the sets, so p is never 0.
+    p_value = (1.0 + np.count_nonzero(deviances >= fit.deviance)) / (1.0 + n_replicates)
+    return GoodnessOfFit(fit.deviance, float(p_value), _residuals(fit), deviances, seed)
+
+
+def _residuals(fit: PsychometricFit) -> FloatArray:
+    counts = fit.counts
+    expected = fit.predict(counts.levels)
+    of_perfect = log_probability(counts.n_correct, counts.n_trials, counts.proportion, fit.overdispersion)
+    of_fit = log_probability(counts.n_correct, counts.n_trials, expected, fit.overdispersion)
+    return np.sign(counts.proportion - expected) * np.sqrt(2.0 * np.maximum(of_perfect - of_fit, 0.0))

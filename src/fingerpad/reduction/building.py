@@ -39,7 +39,6 @@ CHECKED_SITES = 9
 """Sites along and across at which errors are measured."""
 
 EXPONENTS = tuple(0.05 * n for n in range(17))
-"""Exponents of `relaxation` that are tried."""
 
 STREAM_MS = 5.0
 """Longest step of the stream while errors are measured. [ms]"""
@@ -73,8 +72,6 @@ def reduce_touch(
 
     Raises
     ------
-    InputError
-        If a pose cannot be pressed so deep, or there are too few touches for the error.
     ConvergenceError
         If a press cannot be solved.
 
@@ -191,7 +188,6 @@ def _relative(model: ReducedModel, rows: Iterable[_Row]) -> FloatArray:
 def streamed(
     model: ReducedModel, skin: SkinResponse, shape: Iterable[float] = ()
 ) -> tuple[FloatArray, FloatArray, bool]:
-    """Compare a reduced touch with a full one."""
     rows = list(_compared(model, skin, shape))
     wrong, known = (np.max([getattr(row, name) for row in rows], axis=0) for name in ("wrong", "known"))
     return wrong, known, bool((_relative(model, rows) <= model.error).all())

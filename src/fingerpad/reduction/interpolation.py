@@ -48,7 +48,6 @@ def _lagrange(points, at):  # type: ignore[no-untyped-def]
 
 
 def weighted(weights: FloatArray, values: FloatArray) -> FloatArray:
-    """Sum of values (n, ...) by weights (n,)."""
     return np.asarray((weights @ values.reshape(weights.size, -1)).reshape(values.shape[1:]))
 
 

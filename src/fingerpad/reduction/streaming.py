@@ -22,8 +22,7 @@ from fingerpad.core.keywords import KnownKeywords
 from fingerpad.core.units import with_unit
 from fingerpad.reduction.interpolation import weighted
 from fingerpad.reduction.model import GRID_POINTS, ReducedModel
-from fingerpad.reduction.relaxation import amplitudes, depth_scale, filter_step, lost
-from fingerpad.reduction.retreat import Springs
+from fingerpad.reduction.relaxation import Springs, amplitudes, depth_scale, filter_step, lost
 
 SHEET_MM = 0.8
 """Distance of the places that tell how far the skin below the contact has relaxed. [mm]"""
@@ -96,11 +95,6 @@ class ReducedTouch(metaclass=KnownKeywords):
         x and z of the end organs, as of `SkinResponse.sed`. [mm]
     parameter : float, optional
         The parameter of the indenter, if the model has one.
-
-    Raises
-    ------
-    InputError
-        If `receptors_mm` is no array of pairs, or the parameter is missing or out of range.
     """
 
     def __init__(self, model: ReducedModel, receptors_mm: ArrayLike, parameter: float | None = None):
@@ -138,7 +132,7 @@ class ReducedTouch(metaclass=KnownKeywords):
         z_mm: float = 0.0,
         tilt_deg: float = 0.0,
     ) -> ReducedSample:
-        """Go to a later time and pose, along a straight way from the last one.
+        """Go to a later time and pose, along a straight way, and return what is at the receptors then.
 
         Parameters
         ----------
@@ -148,11 +142,6 @@ class ReducedTouch(metaclass=KnownKeywords):
             Either the depth since first touch at the place of the touch, or the force. [mm, mN]
         x_mm, z_mm, tilt_deg : float
             The pose, as of a `Trajectory`.
-
-        Returns
-        -------
-        ReducedSample
-            What is at the receptors now.
 
         Raises
         ------
@@ -263,7 +252,6 @@ class _Press:
     kept: float
     """Part of the skin below the contact that is still there after the way aside."""
     step_ms: float
-    """Duration. [ms]"""
 
     @cached_property
     def factors(self) -> tuple[FloatArray, FloatArray, FloatArray]:

@@ -33,7 +33,6 @@ DEPTH_SHARES = (0.1, 0.25, 0.45, 0.7, 1.0)
 """Depths of the presses at one pose, over the largest."""
 
 RAMP_MS = 20.0
-"""Duration of the ramp of each press. [ms]"""
 
 RAMP_SHARES = 1.0 - (1.0 - np.arange(1, 13) / 12) ** 1.5
 """Samples of a ramp, as shares of it: denser where no other press at the pose adds to them."""
@@ -81,12 +80,6 @@ class ReducedRange(metaclass=KnownKeywords):
         A parameter of the indenter that varies, such as "curvature_per_m" of a `Sphere`.
     values : (float, float), optional
         Its range.
-
-    Raises
-    ------
-    InputError
-        If the depth is not positive, a range is empty or does not hold 0, or one of `parameter` and `values`
-        is missing.
 
     Examples
     --------
@@ -174,11 +167,6 @@ class ReducedTraining(metaclass=KnownKeywords):
         The poses.
     resolution : {"quick", "standard", "paper"}
         How fine the mesh is.
-
-    Raises
-    ------
-    InputError
-        If they do not fit each other.
     """
 
     touch: Touch

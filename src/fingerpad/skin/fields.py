@@ -44,11 +44,9 @@ class Field:
     name: str
     """Name in `SkinResponse.fields` and in stored files."""
     unit: str
-    """Unit; empty for a pure number."""
     long_name: str
     """What it is, in words for an axis or a legend."""
     place: Place
-    """Where it has values."""
     of: Callable[[Deformation, Mesh], FloatArray]
     """Computes it from a `Deformation` and its mesh: array (n_times, n_places, n_components), without an axis
     of places for `Place.PRESS` and without one of components for a scalar.
@@ -65,7 +63,6 @@ class Field:
     """Name in VTU files; empty if it is not exported."""
 
     def shape(self, mesh: Mesh, n_times: int) -> tuple[int, ...]:
-        """Shape of the stored array."""
         sizes = {
             Place.PRESS: (),
             Place.NODE: (len(mesh.nodes_mm),),
@@ -290,11 +287,9 @@ FIELDS: dict[str, Field] = {
         _watched("pressure", "kPa", "mean compressive stress", "pressure_kpa"),
     )
 }
-"""All fields by their names."""
 
 
 def stored_fields() -> tuple[Field, ...]:
-    """Fields that a stored indentation holds."""
     return tuple(field for field in FIELDS.values() if field.stored is not Times.NONE)
 
 

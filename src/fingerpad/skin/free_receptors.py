@@ -44,7 +44,6 @@ class FreeReceptors:
     """End organs of a mesh of one's own."""
 
     mesh: FreeMesh
-    """The undeformed body."""
 
     def below(self, sites_mm: FloatArray) -> Interpolation:
         """Find end organs below points of the skin, on any side; InputError if one is not on the skin."""
@@ -126,7 +125,6 @@ class FreeReceptors:
         return np.concatenate([middles, middles * [1.0, 1.0, -1.0]]), np.concatenate([rows, rows])
 
     def _around(self, organs: FloatArray, normals: FloatArray) -> Interpolation:
-        """Weights of the elements near each end organ."""
         middles, rows = self._middles
         count = min(_NEIGHBOURS, len(middles))
         away, near = cKDTree(middles).query(organs, k=count)

@@ -43,7 +43,6 @@ from fingerpad.skin.sampling import SkinResponse, places_below, receptors_of
 
 CONTACT_POINT_MM = (published.CONTACT_POINT.value[0], 0.0)
 STEPS = {"quick": (5, 5), "standard": (8, 8), "paper": (8, 8)}
-"""Steps in ramp and hold of each resolution."""
 
 LARGEST_TILT_DEG = 45.0
 
@@ -215,8 +214,6 @@ class Touch(metaclass=KnownKeywords):
 
         Raises
         ------
-        InputError
-            If a force pushes the indenter deeper than `deepest_mm`, or there are fewer threads.
         ConvergenceError
             If a step cannot be solved.
         """
@@ -238,15 +235,7 @@ class Touch(metaclass=KnownKeywords):
         )
 
     def response(self, fields: Mapping[str, FloatArray], **solution: Any) -> SkinResponse:
-        """Return the response to this indentation, given its fields and how it was solved.
-
-        Parameters
-        ----------
-        fields : mapping of str to array
-            Stored fields by name.
-        **solution
-            The parameters of `SkinResponse` from `force_imbalance` on.
-        """
+        """Return the response to this indentation, given its fields and how it was solved."""
         return SkinResponse(
             mesh=self.mesh,
             kinks_ms=self.stimulus.corners_ms,
@@ -340,20 +329,7 @@ def touch_of(
     whole: bool = False,
     progress: Progress | None = None,
 ) -> Touch:
-    """Describe a touch without solving it: `indent` takes the same arguments and solves it.
-
-    Parameters
-    ----------
-    finger, indenter, stimulus, tissues, resolution, at_mm, tilt_deg, spin_deg, friction, grading, settings
-        See `indent`.
-    times_ms, whole, progress
-        See `indent`; `Touch.solve` uses the last two.
-
-    Returns
-    -------
-    Touch
-        A value that can be solved, stored and compared.
-    """
+    """Describe a touch without solving it: `indent` takes the same arguments and solves it."""
     one_of("resolution", resolution, RESOLUTIONS)
     x, z = _position(at_mm, instance("finger", finger, Finger))
     stimulus = instance("stimulus", stimulus or RampAndHold(), Motion)
@@ -439,15 +415,8 @@ def indent(
     progress : Progress, optional
         Shown how far the press is, such as `fp.notebook_progress()`.
 
-    Returns
-    -------
-    SkinResponse
-        Force, depth, contact, surface, energies and strain energy density over time.
-
     Raises
     ------
-    InputError
-        If an argument cannot be used: unknown name, depth beyond the finger, indenter beside it.
     ConvergenceError
         If the mechanics cannot be solved.
 
@@ -466,7 +435,6 @@ def indent(
 
 
 def settings_of(resolution: str) -> PressSettings:
-    """Return steps and tolerances of a named resolution."""
     ramp_steps, hold_steps = STEPS[resolution]
     return PressSettings(ramp_steps, hold_steps)
 

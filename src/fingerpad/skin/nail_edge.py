@@ -47,11 +47,6 @@ class NailEdge(metaclass=KnownKeywords):
     reach_mm : float
         Largest distance from the nail's edge. [mm]
 
-    Raises
-    ------
-    InputError
-        If the reach is not positive or the nail is as wide as the finger.
-
     Examples
     --------
     >>> nail = NailEdge()
@@ -82,22 +77,12 @@ class NailEdge(metaclass=KnownKeywords):
         return np.interp(distances, _STEP_MM * np.arange(arcs.shape[1]), arcs[-1])
 
     def points(self, places_mm: ArrayLike) -> FloatArray:
-        """Points of the skin.
+        """Points (n, 3) of the skin. [mm]
 
         Parameters
         ----------
         places_mm : array_like (n, 2)
             `along`, whose sign z has, and `distance`. [mm]
-
-        Returns
-        -------
-        array (n, 3)
-            x, y and z. [mm]
-
-        Raises
-        ------
-        InputError
-            If a place lies beyond the edge's ends or farther away than the reach.
         """
         places = float_array("places_mm", places_mm, 2)
         if places.shape[1] != 2:
@@ -135,11 +120,6 @@ class NailEdge(metaclass=KnownKeywords):
         ----------
         width_mm : float
             Its width from the edge, at most the reach. [mm]
-
-        Raises
-        ------
-        InputError
-            If the width is not positive or beyond the reach.
         """
         distances = np.linspace(0.0, self._within_reach("width_mm", width_mm), 33)
         side = np.stack([self.half_length_mm(distances), distances], axis=1)
@@ -155,16 +135,6 @@ class NailEdge(metaclass=KnownKeywords):
         density_per_cm2 : float
             Receptors per area; the distance of rows is 1/sqrt(density), that of receptors in a row as close
             to it as whole numbers allow. [1/cm²]
-
-        Returns
-        -------
-        Layout
-            Row by row from the nail outwards.
-
-        Raises
-        ------
-        InputError
-            If there is no row, the density is not positive, or the rows go beyond the reach.
 
         Examples
         --------

@@ -2,9 +2,9 @@
 
 The sheet of living epidermis is one element thick and has rows along the finger and columns around it. The
 coordinates (u, v) count them and are whole numbers at the middles of the elements. One cubic spline
-(`fingerpad.skin.grid_cubic`) interpolates all quantities over (u, v): the values f of the elements, their
-middles M, the points S of the skin above them, and the points B of the epidermal-dermal border below. Because
-one spline serves all, values that are linear in space are interpolated exactly.
+interpolates all quantities over (u, v): the values f of the elements, their middles M, the points S of the
+skin above them, and the points B of the epidermal-dermal border below. Because one spline serves all, values
+that are linear in space are interpolated exactly.
 
 - An end organ given by its x and z lies where M(u, v) has this x and z, on the volar side.
 - A point of the skin has the (u, v) at which S(u, v) meets it. The end organ below lies where the normal n of
@@ -14,22 +14,142 @@ Its value is f(u, v) or f(u', v').
 
 Beyond the rim of the sheet the spline is continued: by mirroring where the body is halved, around it where it
 is closed, through the pole at the tip, and otherwise along a straight line.
+
+The spline is, with whole numbers u and v at the middles,
+
+    f(u, v) = sum over i and j of b(u - i) b(v - j) c_ij,
+
+where b is the cubic B-spline: for t within 0 ... 1 past a point, the coefficients at -1, 0, 1 and 2 have the
+weights
+
+    ((1 - t)^3,  4 - 6 t^2 + 3 t^3,  1 + 3 t + 3 t^2 - 3 t^3,  t^3)/6.
+
+The coefficients c follow from the values f_ij (`coefficients`): the spline passes through all of them. It has
+continuous slopes and curvatures, is exact for cubics and of fourth order. Source: de Boor 1978; Unser 1999.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property, partial
 
 import numpy as np
+from numba import njit
 from scipy.spatial import cKDTree
 
 from fingerpad.core.checks import FloatArray, IntArray
 from fingerpad.core.errors import InputError
 from fingerpad.core.threads import current_threads, in_blocks
 from fingerpad.geometry.mesh import Mesh
-from fingerpad.skin.grid_cubic import coefficients, values_and_slopes_at, values_at
+
+Four = tuple[float, float, float, float]
+
+
+def coefficients(values: FloatArray) -> FloatArray:
+    """Coefficients of the spline through values on a grid.
+
+    The influence of a value falls to 27 % from one point to the next. At the ends the slope is 0, so a grid
+    is continued by some 20 points beyond the range of interest first.
+    """
+    n_rows, n_columns, n_quantities = values.shape
+    found = np.array(values, dtype=np.float64, order="C")
+    _solve_along(found.reshape(1, n_rows, n_columns * n_quantities))
+    _solve_along(found)
+    return found
+
+
+@njit(cache=True, error_model="numpy", nogil=True)
+def _solve_along(lines: FloatArray) -> None:
+    """Solve (c_(i-1) + 4 c_i + c_(i+1))/6 = f_i along lines (n_sets, n_points, n_lines), in place."""
+    # The slope is 0 at the ends. Gaussian elimination, point after point for all lines of a set.
+    n_sets, n_points, n_lines = lines.shape
+    upper = np.empty(n_points)
+    upper[0] = 0.5
+    for i in range(1, n_points):
+        upper[i] = 1.0 / (4.0 - upper[i - 1])
+    last = 1.0 / (4.0 - 2.0 * upper[n_points - 2])
+    for k in range(n_sets):
+        line = lines[k]
+        for j in range(n_lines):
+            line[0, j] *= 1.5
+        for i in range(1, n_points - 1):
+            for j in range(n_lines):
+                line[i, j] = (6.0 * line[i, j] - line[i - 1, j]) * upper[i]
+        for j in range(n_lines):
+            line[-1, j] = (6.0 * line[-1, j] - 2.0 * line[-2, j]) * last
+        for i in range(n_points - 2, -1, -1):
+            for j in range(n_lines):
+                line[i, j] -= upper[i] * line[i + 1, j]
+
+
+@njit(cache=True, nogil=True)
+def _weights(t: float) -> Four:
+    square, cube, rest = t * t, t * t * t, (1.0 - t) ** 3
+    return (
+        rest / 6.0,
+        (4.0 - 6.0 * square + 3.0 * cube) / 6.0,
+        (1.0 + 3.0 * (t + square - cube)) / 6.0,
+        cube / 6.0,
+    )
+
+
+@njit(cache=True, nogil=True)
+def _slopes(t: float) -> Four:
+    square = t * t
+    return (-0.5 * (1.0 - t) ** 2, 1.5 * square - 2.0 * t, 0.5 + t - 1.5 * square, 0.5 * square)
+
+
+@njit(cache=True, nogil=True)
+def _interpolated(known: FloatArray, uv: FloatArray, padding: int) -> FloatArray:
+    """Values (n_places, n_quantities)."""
+    found = np.zeros((len(uv), known.shape[2]))
+    for n in range(len(uv)):
+        row, column = math.floor(uv[n, 0]), math.floor(uv[n, 1])
+        _add_near(
+            known, row + padding - 1, column + padding - 1, _weights(uv[n, 0] - row),
+            _weights(uv[n, 1] - column), found[n],
+        )  # fmt: skip
+    return found
+
+
+@njit(cache=True, nogil=True)
+def _with_slopes(known: FloatArray, uv: FloatArray, padding: int) -> FloatArray:
+    """Values and their derivatives by u and by v, (3, n_places, n_quantities)."""
+    found = np.zeros((3, len(uv), known.shape[2]))
+    for n in range(len(uv)):
+        row, column = math.floor(uv[n, 0]), math.floor(uv[n, 1])
+        u, v = uv[n, 0] - row, uv[n, 1] - column
+        along, around = _weights(u), _weights(v)
+        first, at = row + padding - 1, column + padding - 1
+        _add_near(known, first, at, along, around, found[0, n])
+        _add_near(known, first, at, _slopes(u), around, found[1, n])
+        _add_near(known, first, at, along, _slopes(v), found[2, n])
+    return found
+
+
+@njit(cache=True, nogil=True)
+def _add_near(known: FloatArray, first: int, at: int, along: Four, around: Four, total: FloatArray) -> None:
+    """Add up the 16 coefficients about a place, by their weights."""
+    for i in range(4):
+        near = known[first + i]
+        a, b, c, d = near[at], near[at + 1], near[at + 2], near[at + 3]
+        wa, wb, wc, wd = (
+            along[i] * around[0], along[i] * around[1], along[i] * around[2], along[i] * around[3],
+        )  # fmt: skip
+        for k in range(total.size):
+            total[k] = total[k] + wa * a[k] + wb * b[k] + wc * c[k] + wd * d[k]
+
+
+def values_at(known: FloatArray, uv: FloatArray, padding: int) -> FloatArray:
+    return _interpolated(known, uv, padding)
+
+
+def values_and_slopes_at(known: FloatArray, uv: FloatArray, padding: int) -> FloatArray:
+    """Interpolate, and differentiate by u and by v."""
+    return _with_slopes(known, uv, padding)
+
 
 _PADDING = 24
 """Rows and columns beyond the rim. The end of a spline acts 0.27 as strongly one element further on."""
@@ -62,7 +182,6 @@ class ReceptorSheet:
     """The elements just above the epidermal-dermal border, and coordinates on them."""
 
     mesh: Mesh
-    """The undeformed body."""
 
     def __post_init__(self) -> None:
         shape = self.mesh.living_epidermis.shape
@@ -105,8 +224,6 @@ class ReceptorSheet:
         return uv
 
     def read(self, uv: FloatArray, values: FloatArray) -> FloatArray:
-        """Interpolate values of the sheet's elements."""
-
         def at_times(times: slice) -> FloatArray:
             some = np.asarray(values[times], dtype=np.float64).T
             known = some.reshape(*self.mesh.living_epidermis.shape, -1)
@@ -193,7 +310,6 @@ class ReceptorSheet:
 
     @cached_property
     def _closed(self) -> bool:
-        """Whether the columns go all around."""
         grid = self.mesh.skin_grid
         return bool((grid[:, 0] == grid[:, -1]).all())
 
@@ -213,7 +329,6 @@ class ReceptorSheet:
 
     @cached_property
     def _middles(self) -> FloatArray:
-        """(u, v) of all elements, (n_sheet, 2)."""
         return np.argwhere(np.full(self.mesh.living_epidermis.shape, True)).astype(np.float64)
 
     @cached_property
@@ -252,7 +367,6 @@ class ReceptorSheet:
         return self._control(middles, _MIRROR, nodes[-1, 0])
 
     def _wider(self, nodes: FloatArray) -> FloatArray:
-        """Nodes with one more column at either end."""
         if self._closed:
             return np.concatenate([nodes[:, -2:-1], nodes, nodes[:, 1:2]], axis=1)
         ends = [
@@ -265,7 +379,6 @@ class ReceptorSheet:
 
     @cached_property
     def _skin(self) -> Surface:
-        """Points S of the skin."""
         return _surface(self._padded_points(0))
 
     @cached_property
@@ -282,7 +395,6 @@ class ReceptorSheet:
         return _surface(self._padded_points(int(np.flatnonzero(self.mesh.grid[0, 0] == lower)[0])))
 
     def _outward(self, uv: FloatArray) -> FloatArray:
-        """Outward unit normal of the skin, (n, 3)."""
         point, by_u, by_v = self._skin(uv)
         normal = np.cross(by_u, by_v)
         inside_out = ((point - self._border(uv)[0]) * normal).sum(axis=1, keepdims=True) < 0.0
@@ -310,12 +422,10 @@ class ReceptorSheet:
 
 
 def _surface(control: FloatArray) -> Surface:
-    """Surface with these coefficients of its spline."""
     return partial(values_and_slopes_at, control, padding=_PADDING)
 
 
 def _nearest(points: FloatArray, targets: FloatArray) -> IntArray:
-    """Find the number of the nearest point to each target."""
     found: IntArray = cKDTree(points).query(targets, workers=current_threads())[1]
     return found
 

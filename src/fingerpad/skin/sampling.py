@@ -134,11 +134,6 @@ class SkinResponse(Result):
         What was solved: indenter, motion, tissues.
     onset_ms : float
         Time of first touch. [ms]
-
-    Raises
-    ------
-    InputError
-        If a field is not declared as stored, has the wrong shape or holds a value that is not finite.
     """
 
     mesh: Mesh
@@ -181,13 +176,7 @@ class SkinResponse(Result):
         )
 
     def to_xarray(self, response: ResponseMap | None = None) -> xarray.Dataset:
-        """Return this result, and the response of a population to it, as one labelled data set.
-
-        Raises
-        ------
-        InputError
-            Without the extra `fingerpad[netcdf]`.
-        """
+        """Return this result, and the response of a population to it, as one labelled data set."""
         return fingerpad.touch_dataset(self, response)
 
     def with_fields(self, **fields: FloatArray) -> SkinResponse:
@@ -289,18 +278,7 @@ class SkinResponse(Result):
         return "strain energy density", self.sed_kpa[-1]
 
     def surface_profile(self, time_index: int = -1) -> SurfaceProfile:
-        """Deflection along the midline of the volar skin (paper, section 2.2.1).
-
-        Parameters
-        ----------
-        time_index : int
-            Index into `times_ms`; the last by default.
-
-        Returns
-        -------
-        SurfaceProfile
-            One entry per node of the midline, from proximal to distal.
-        """
+        """Deflection along the midline of the volar skin at one of `times_ms` (paper, section 2.2.1)."""
         row = np.searchsorted(self.mesh.skin_nodes, self.mesh.midline_nodes)
         distance = self.mesh.nodes_mm[self.mesh.midline_nodes, 0] - self.axis_x_mm
         return SurfaceProfile(distance, self.skin_displacement_mm[time_index, row] @ self.direction)
@@ -310,10 +288,7 @@ class SkinResponse(Result):
         return middle_section(self.mesh, self.displacement_mm)
 
     def sed(
-        self,
-        sites: ArrayLike,
-        dynamic_quantity: str = STORED_ENERGY,
-        static_quantity: str = STORED_ENERGY,
+        self, sites: ArrayLike, dynamic_quantity: str = STORED_ENERGY, static_quantity: str = STORED_ENERGY
     ) -> SedTraces:
         """Strain energy density in the living epidermis below points of the undeformed skin.
 
@@ -334,12 +309,6 @@ class SkinResponse(Result):
         -------
         SedTraces
             One column per site, with the end of the ramp as kink. [kPa]
-
-        Raises
-        ------
-        InputError
-            If `sites` is not an array of pairs or triples, a site is not on the skin, or the quantity is
-            unknown.
         """
         static, *dynamic = self._read(dict.fromkeys((static_quantity, dynamic_quantity)), sites)
         return SedTraces(
@@ -354,7 +323,7 @@ class SkinResponse(Result):
         )
 
     def sample(self, quantity: str, sites: ArrayLike) -> FloatArray:
-        """Sample a quantity that may drive an afferent, below points of the undeformed skin.
+        """Sample a quantity that may drive an afferent below points of the skin, (n_times, n_sites).
 
         The interpolation is that of `sed`; the stored energy density is one of the quantities.
 
@@ -368,17 +337,6 @@ class SkinResponse(Result):
             "skin_stretch" (largest tensile strain within the surface).
         sites : array (n_sites, 2) or (n_sites, 3)
             x and z of end organs on the volar side, or x, y and z of the skin above them on any side. [mm]
-
-        Returns
-        -------
-        array (n_times, n_sites)
-            Never negative.
-
-        Raises
-        ------
-        InputError
-            If the quantity is unknown, `sites` is not an array of pairs or triples, or a site is not on the
-            skin.
         """
         return self._read([quantity], sites)[0]
 

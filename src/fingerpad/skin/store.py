@@ -200,7 +200,6 @@ class StoredFile:
     path: Path
     """The file; its name is the key of the indentation."""
     size: int
-    """In bytes."""
     written_s: float
     """When it was written, in seconds since 1970."""
 
@@ -255,7 +254,6 @@ def _fault(path: Path) -> str | None:
 
 
 def _said(error: Exception) -> str:
-    """Tell what an error says, on one line."""
     if isinstance(error, OSError) and error.strerror:
         return error.strerror
     said = " ".join(str(error).split()).rstrip(".")
@@ -287,7 +285,6 @@ def _checksum(key: str, content: Mapping[str, np.ndarray]) -> str:
 
 
 def _packed(response: SkinResponse, key: str) -> bytes:
-    """Content of a stored file."""
     content: dict[str, np.ndarray] = {
         field.name: response.fields[field.name].astype(
             np.float64 if field.place is Place.PRESS else np.float32

@@ -26,7 +26,6 @@ class SurfaceMotion:
     """How the faces of the skin move and deform: arrays (n_times, n_faces), never negative."""
 
     mesh: Mesh
-    """The undeformed body."""
     displacement_mm: FloatArray
     """Displacement of `mesh.skin_nodes`, (n_times, n_skin_nodes, 3). [mm]"""
 

@@ -103,11 +103,6 @@ class UnrolledSkin(metaclass=KnownKeywords):
         x of the point of the volar midline at which `along` is 0, distal positive; by default the middle of
         the pad, `Fingertip.contact_mm`. [mm]
 
-    Raises
-    ------
-    InputError
-        If the origin does not lie on the finger.
-
     Examples
     --------
     >>> skin = UnrolledSkin()
@@ -140,22 +135,12 @@ class UnrolledSkin(metaclass=KnownKeywords):
         return self._around(s, np.full(s.shape, np.pi))
 
     def points(self, places_mm: ArrayLike) -> FloatArray:
-        """Points of the skin.
+        """Points (n, 3) of the skin. [mm]
 
         Parameters
         ----------
         places_mm : array_like (n, 2)
             `along` and `around`; z has the sign of `around`. [mm]
-
-        Returns
-        -------
-        array (n, 3)
-            x, y and z. [mm]
-
-        Raises
-        ------
-        InputError
-            If a place lies beyond the ends of the finger or the dorsal midline.
         """
         places = float_array("places_mm", places_mm, 2)
         if places.shape[1] != 2:
@@ -175,23 +160,13 @@ class UnrolledSkin(metaclass=KnownKeywords):
         return self._point(s, np.copysign(self._phi(s, np.minimum(around, half_girth)), places[:, 1]))
 
     def places(self, points_mm: ArrayLike) -> FloatArray:
-        """Convert points of the skin to the plane.
+        """Convert points of the skin to the plane: `along` and `around`, (n, 2). [mm]
 
         Parameters
         ----------
         points_mm : array_like (n, 3)
             x, y and z of points on the skin. Another point is projected onto the skin along its ray from the
             middle of the section. [mm]
-
-        Returns
-        -------
-        array (n, 2)
-            `along` and `around`. [mm]
-
-        Raises
-        ------
-        InputError
-            If the points are not triples of finite numbers or lie beyond the finger's ends.
         """
         points = float_array("points_mm", points_mm, 2)
         if points.shape[1] != 3:
@@ -213,11 +188,6 @@ class UnrolledSkin(metaclass=KnownKeywords):
             Its proximal and distal end on the midline; by default in proportion to the finger's length. [mm]
         faces_deg : float, optional
             Largest angle between its normals and the volar direction, above 0 and at most 90. [degrees]
-
-        Raises
-        ------
-        InputError
-            If the ends are not in order on the finger or the angle is out of its range.
 
         Examples
         --------
@@ -263,7 +233,6 @@ class UnrolledSkin(metaclass=KnownKeywords):
         return _Quarter(a, a_slope, c, c_slope, x_slope), _Quarter(b, b_slope, c, c_slope, x_slope)
 
     def _midline_slope(self, s: FloatArray) -> FloatArray:
-        """|du/ds| on the volar midline. [mm]"""
         volar, _ = self._quarters(s)
         return np.hypot(volar.x_slope, volar.a_slope)
 

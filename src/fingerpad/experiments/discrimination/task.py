@@ -29,7 +29,7 @@ from fingerpad.experiments.descriptions.values import (
 )
 from fingerpad.psychophysics.discrimination import CRITERION_MOVES, Experiment
 from fingerpad.psychophysics.functions import SIGMOIDS
-from fingerpad.psychophysics.noise import LARGEST_NOISE
+from fingerpad.psychophysics.noisy_responses import LARGEST_NOISE
 
 IDEAL = "ideal"
 CODES = ("gradient_sum", "euclidean", IDEAL)

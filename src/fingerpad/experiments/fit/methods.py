@@ -20,15 +20,12 @@ from fingerpad.inference.afferent_methods import (
     search_from,
 )
 from fingerpad.inference.closed_form import ClosedFormModel
-from fingerpad.inference.fitting.bounds import Bounds
-from fingerpad.inference.fitting.covariance import jackknife_covariance
-from fingerpad.inference.fitting.cross_validation import CrossValidation
-from fingerpad.inference.fitting.methods import Continued, Fit, Method
-from fingerpad.inference.identifiable import identifiable
+from fingerpad.inference.fitting.cross_validation import CrossValidation, jackknife_covariance
+from fingerpad.inference.fitting.methods import Bounds, Continued, Fit, Method
+from fingerpad.inference.identifiable import SPIKE_PARAMETER_NAMES, identifiable
 from fingerpad.inference.rate_model import AfferentModel
 from fingerpad.inference.rate_problem import RateProblem
 from fingerpad.inference.recordings import RateRecordings, SpikeRecordings
-from fingerpad.inference.spike_parameters import SPIKE_PARAMETER_NAMES
 from fingerpad.inference.start_points import response_surface
 
 Recordings = RateRecordings | SpikeRecordings

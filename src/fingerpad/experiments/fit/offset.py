@@ -23,8 +23,7 @@ from fingerpad.inference.afferent_methods import (
     four_number_problem,
     search_from,
 )
-from fingerpad.inference.fitting.covariance import jackknife_covariance
-from fingerpad.inference.fitting.cross_validation import cross_validate
+from fingerpad.inference.fitting.cross_validation import cross_validate, jackknife_covariance
 from fingerpad.inference.fitting.least_squares import LeastSquares
 from fingerpad.inference.fitting.methods import Continued, Method
 from fingerpad.inference.identifiable import IDENTIFIABLE_NAMES

@@ -13,8 +13,7 @@ from fingerpad.core.signals import SpikeTrains
 from fingerpad.experiments.fit.methods import Prepared, Recordings, check_spikes
 from fingerpad.experiments.fit.results import SpikeFitSummary
 from fingerpad.inference.fitting.cross_validation import CrossValidation
-from fingerpad.inference.fitting.methods import Fit
-from fingerpad.inference.fitting.problem import Problem
+from fingerpad.inference.fitting.methods import Fit, Problem
 from fingerpad.inference.identifiable import six_parameters
 from fingerpad.inference.rate_model import AfferentModel
 from fingerpad.inference.rate_problem import RateProblem

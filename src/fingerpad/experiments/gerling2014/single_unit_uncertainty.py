@@ -15,8 +15,8 @@ from fingerpad.experiments.fit.rate_uncertainty import LEVEL, SEEDS_OF_PROFILES,
 from fingerpad.experiments.fit.results import FssSensitivity, ParameterProfile
 from fingerpad.experiments.gerling2014 import single_unit
 from fingerpad.inference.afferent_posterior import AfferentPosterior, afferent_posterior
-from fingerpad.inference.fitting.identifiability import identifiability
 from fingerpad.inference.fitting.posterior import credible_band
+from fingerpad.inference.fitting.sensitivity import identifiability
 from fingerpad.inference.identifiable import IDENTIFIABLE_NAMES, IDENTIFIABLE_UNITS, identifiable
 from fingerpad.inference.rate_likelihood import INDEPENDENT, RateLikelihood, ResidualDraws
 from fingerpad.inference.rate_model import AfferentModel, four_number_model

@@ -39,7 +39,7 @@ from fingerpad.experiments.descriptions.values import (
     choice_of,
 )
 from fingerpad.experiments.discrimination.task import CODES, IDEAL, MEASURES, ExperimentSettings
-from fingerpad.psychophysics.noise import LARGEST_NOISE
+from fingerpad.psychophysics.noisy_responses import LARGEST_NOISE
 from fingerpad.skin.fields import stored_fields
 
 AFFERENTS = "afferents"

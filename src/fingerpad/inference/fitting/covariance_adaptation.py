@@ -9,9 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from fingerpad.core.checks import IntArray, positive, whole
-from fingerpad.inference.fitting.bounds import Bounds
-from fingerpad.inference.fitting.methods import Fit, FitStep
-from fingerpad.inference.fitting.problem import Problem
+from fingerpad.inference.fitting.methods import Bounds, Fit, FitStep, Problem
 
 
 @dataclass(frozen=True)

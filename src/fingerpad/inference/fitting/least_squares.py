@@ -17,9 +17,7 @@ from scipy.optimize import least_squares
 
 from fingerpad.core.checks import FloatArray, IntArray, positive, whole
 from fingerpad.core.errors import InputError
-from fingerpad.inference.fitting.bounds import Bounds
-from fingerpad.inference.fitting.methods import Fit, FitStep, best_of
-from fingerpad.inference.fitting.problem import Problem
+from fingerpad.inference.fitting.methods import Bounds, Fit, FitStep, Problem, best_of
 
 Jacobian = Callable[[FloatArray, IntArray], FloatArray]
 
@@ -69,7 +67,6 @@ class LeastSquares:
         return best_of((*(self._refined(problem, chosen, starts[row]) for row in order), scored))
 
     def _refined(self, problem: Problem, chosen: IntArray, start: FloatArray) -> Fit:
-        """Fit from one start, in units of the scales."""
         clock, scales = time.perf_counter(), self.bounds.scales
         low, high = self.bounds.low / scales, self.bounds.high / scales
         visited = _Visited(problem, chosen, scales)

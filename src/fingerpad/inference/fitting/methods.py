@@ -1,4 +1,7 @@
-"""Methods of fitting with one interface: a method has its settings as fields and returns a `Fit`."""
+"""Methods of fitting with one interface, the contract of the problems that they fit, and bounds.
+
+A method has its settings as fields and returns a `Fit`.
+"""
 
 from __future__ import annotations
 
@@ -7,9 +10,79 @@ from dataclasses import dataclass, replace
 from typing import Protocol
 
 import numpy as np
+from numpy.typing import ArrayLike
+from scipy.stats import qmc
 
-from fingerpad.core.checks import FloatArray, IntArray
-from fingerpad.inference.fitting.problem import Problem
+from fingerpad.core.checks import FloatArray, IntArray, float_array
+from fingerpad.core.errors import InputError
+
+
+@dataclass(frozen=True)
+class Bounds:
+    """Bounds and scales of the parameters of a fit."""
+
+    scales: FloatArray
+    """Typical changes of the parameters, the units of the steps of a method, (n_parameters,)."""
+    low: FloatArray = -np.inf  # type: ignore[assignment]
+    high: FloatArray = np.inf  # type: ignore[assignment]
+    """Limits; -inf and inf for none, (n_parameters,)."""
+
+    def __post_init__(self) -> None:
+        scales = float_array("scales", self.scales, 1)
+        low, high = (np.broadcast_to(side, scales.shape) for side in (self.low, self.high))
+        if (scales <= 0.0).any() or not (low < high).all():
+            raise InputError(
+                "Bounds need scales above 0 and lower limits below the upper ones: "
+                f"got scales {scales.tolist()}, limits {low.tolist()} and {high.tolist()}."
+            )
+        for name, value in (("scales", scales), ("low", low), ("high", high)):
+            object.__setattr__(self, name, value)
+
+    def and_one(self, scale: float, low: float, high: float) -> Bounds:
+        further = ((self.scales, scale), (self.low, low), (self.high, high))
+        return Bounds(*(np.append(side, entry) for side, entry in further))
+
+    def spread(self, number: int) -> FloatArray:
+        """Points of a Halton sequence between the bounds, (number, n_parameters); deterministic."""
+        shares = qmc.Halton(self.scales.size, scramble=False).random(number + 1)[1:]  # the first is a corner
+        return self.low + shares * (self.high - self.low)
+
+    def rows(self, name: str, points: ArrayLike) -> FloatArray:
+        """Return points (n_points, n_parameters), or raise `InputError` if they have other parameters."""
+        rows = float_array(name, points, 2)
+        if rows.shape[1:] != self.scales.shape:
+            raise InputError(
+                f"{name} must have one entry per scale: got {rows.shape[1]} for {self.scales.size}."
+            )
+        return rows
+
+
+class Problem(Protocol):
+    """A model and the observations to which it is fitted.
+
+    Notes
+    -----
+    `score = 1 - residuals @ residuals` up to round-off, so a method may maximise the score or minimise the
+    residuals.
+    """
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the parameters, in their order."""
+        ...
+
+    @property
+    def n_observations(self) -> int:
+        """Number of observed stimuli; `chosen` are their numbers from 0."""
+        ...
+
+    def residuals(self, parameters: FloatArray, chosen: IntArray) -> FloatArray:
+        """Scaled differences between observations and predictions under the chosen stimuli."""
+        ...
+
+    def score(self, parameters: FloatArray, chosen: IntArray) -> float:
+        """Goodness of fit over the chosen stimuli, 1 if it is perfect; larger is better."""
+        ...
 
 
 @dataclass(frozen=True)
@@ -17,7 +90,6 @@ class FitStep:
     """One step of a fit."""
 
     parameters: FloatArray
-    """Parameters at the step, (n_parameters,)."""
     score: float
     """Score of the chosen observations."""
 
@@ -27,7 +99,6 @@ class Fit:
     """Result of a method: parameters, score, effort and history."""
 
     parameters: FloatArray
-    """The best parameters, (n_parameters,)."""
     score: float
     """Their score over the chosen observations."""
     n_evaluations: int
@@ -46,9 +117,7 @@ class Method(Protocol):
     """Contract of a method that fits any problem."""
 
     @property
-    def name(self) -> str:
-        """Name in tables."""
-        ...
+    def name(self) -> str: ...
 
     def fit(self, problem: Problem, chosen: IntArray) -> Fit:
         """Fit the chosen observations of a problem."""
@@ -80,7 +149,6 @@ class Continued:
     first_problem: Problem | None = None
     """Problem of the first method, if it is a simpler one with the same observations."""
     name: str = "continued"
-    """Name in tables."""
 
     def fit(self, problem: Problem, chosen: IntArray) -> Fit:
         """Fit with the first method, then with the second from its result; the effort is that of both."""

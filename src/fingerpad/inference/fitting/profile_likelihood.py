@@ -40,7 +40,6 @@ class ProfileLikelihood:
     """Profile likelihood of one parameter."""
 
     name: str
-    """Name of the parameter."""
     values: FloatArray
     """Its fixed values, increasing, (n_values,)."""
     losses: FloatArray
@@ -63,7 +62,6 @@ class ProfileLikelihoods:
     profiles: tuple[ProfileLikelihood, ...]
     """One per parameter."""
     n_evaluations: int
-    """Evaluations of the likelihood."""
 
 
 def profile_likelihoods(
@@ -129,7 +127,6 @@ class _Search:
         self.count = 0
 
     def heights(self, points: FloatArray) -> FloatArray:
-        """Log likelihoods of points."""
         self.count += len(points)
         values = np.asarray(self.log_likelihood(points), dtype=np.float64)
         if np.isnan(values).any():
@@ -138,7 +135,6 @@ class _Search:
         return values
 
     def height(self, point: FloatArray) -> float:
-        """Log likelihood of one point."""
         return float(self.heights(point[None])[0])
 
     def best_of(self, points: FloatArray) -> tuple[FloatArray, float]:
@@ -202,12 +198,7 @@ class _Search:
 
 
 def _profile(
-    name: str,
-    index: int,
-    fits: list[tuple[FloatArray, float]],
-    highest: float,
-    level: float,
-    allowed: float,
+    name: str, index: int, fits: list[tuple[FloatArray, float]], highest: float, level: float, allowed: float
 ) -> ProfileLikelihood:
     points = np.array([point for point, _ in fits])
     order = np.argsort(points[:, index])

@@ -17,8 +17,7 @@ from numpy.typing import ArrayLike
 
 from fingerpad.core.checks import FloatArray, IntArray, finite, float_array, not_negative, whole
 from fingerpad.core.errors import ConvergenceError, InputError
-from fingerpad.inference.fitting.methods import Fit, FitStep, best_of
-from fingerpad.inference.fitting.problem import Problem
+from fingerpad.inference.fitting.methods import Fit, FitStep, Problem, best_of
 
 Objective = Callable[[FloatArray], float]
 Restriction = Callable[[FloatArray], FloatArray]
