@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from fingerpad.experiments.gerling2014.claim_row import ClaimRow, Group, Verdict
-from fingerpad.experiments.gerling2014.statements import ABSENT, Statement
+from fingerpad.experiments.gerling2014.claim_row import ABSENT, ClaimRow, Group, Statement, Verdict
 from fingerpad.report.formatting import joined
 from fingerpad.report.parts import COLUMNS, Row, Table
 

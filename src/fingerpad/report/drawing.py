@@ -20,7 +20,7 @@ from fingerpad.core.signals import COUNT, CurrentTraces, HitRates, ResponseMap, 
 from fingerpad.core.units import with_unit
 from fingerpad.experiments.discrimination.analysis import TaskResult
 from fingerpad.experiments.fit.results import FitResult
-from fingerpad.report.discrimination_task_figures import draw_curves_of_measure, main_decoding
+from fingerpad.report.discrimination_task import draw_curves_of_measure, main_decoding
 from fingerpad.report.mixed_responses import (
     MAP_AXES,
     draw_map_by_type,

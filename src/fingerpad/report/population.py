@@ -14,7 +14,7 @@ from matplotlib.patches import Rectangle
 
 from fingerpad.core.checks import FloatArray
 from fingerpad.data import protocol
-from fingerpad.experiments.gerling2014.response_maps import PopulationMaps, RestingResponse
+from fingerpad.experiments.gerling2014.three_levels import PopulationMaps, RestingResponse
 from fingerpad.report.formatting import number
 from fingerpad.report.style import COLUMN_IN, GREY, PALE, new_figure, say_nothing_to_draw
 

@@ -9,41 +9,50 @@ from inspect import signature
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from matplotlib.figure import Figure
 
-from fingerpad.data import STATUSES
+from fingerpad.data import STATUSES, paper, psychophysics
 from fingerpad.experiments.gerling2014.reproduction import PublishedNumber, ReproductionResult
+from fingerpad.experiments.gerling2014.skin_deflection import SkinDeflectionResult
 from fingerpad.report.comparison import comparison_tables, notes_table, statement_table, verdict_table
 from fingerpad.report.curvature_thresholds import caption_thresholds, draw_thresholds, threshold_tables
 from fingerpad.report.discrimination import (
     caption_criterion,
     caption_noise,
     caption_observers,
+    caption_steps,
     discrimination_tables,
     draw_criterion,
     draw_noise,
     draw_observers,
+    draw_people,
+    draw_steps,
 )
-from fingerpad.report.discrimination_steps import caption_steps, draw_steps
-from fingerpad.report.first_screen import first_screen
-from fingerpad.report.formatting import plain
+from fingerpad.report.formatting import fixed, joined, number, plain
 from fingerpad.report.manifest import edition, manifest_chapter
 from fingerpad.report.mesh_picture import caption_mesh, draw_mesh
 from fingerpad.report.nail import caption_nail, draw_nail
 from fingerpad.report.page import write_html
 from fingerpad.report.parts import COLUMNS, Chapter, Drawing, Page, Paragraph, Part, Row, Table
 from fingerpad.report.population import caption_population, draw_population
-from fingerpad.report.single_unit import caption_single_unit, draw_single_unit, single_unit_tables
-from fingerpad.report.single_unit_uncertainty import (
+from fingerpad.report.single_unit import (
+    ALONG,
+    caption_single_unit,
     caption_uncertainty,
+    draw_single_unit,
     draw_uncertainty,
+    single_unit_tables,
     uncertainty_tables,
 )
 from fingerpad.report.skin_deflection import (
+    CYLINDER,
     caption_skin_deflection,
+    draw_profiles,
     draw_skin_deflection,
     skin_deflection_tables,
 )
+from fingerpad.report.style import BLUE, ORANGE, draw_observed_rates, new_figure
 from fingerpad.report.three_levels import caption_levels, draw_levels
 from fingerpad.report.tissues import tissue_table
 
@@ -244,3 +253,77 @@ def input_tables(inputs: Sequence[PublishedNumber]) -> list[Table]:
         Table("Status of a number", ("status", "meaning", "numbers"), meanings),
         Table("Published numbers", ("number", "value", "unit", "status", "source"), listed),
     ]
+
+
+SIZE_IN = (4.6, 3.0)
+LINES = ((BLUE, "-"), (ORANGE, "--"))
+"""Colour and dashes of the two sets."""
+
+IN_THE_PAPER = "Trial 3"
+"""The trial that is closest to the observed deflection in the paper."""
+
+
+def first_screen(result: ReproductionResult) -> list[Drawing]:
+    """Return a picture of each level, both sets in it, with its result as the caption."""
+    fits = [f"`{name}` {fixed(getattr(result, name).single_unit.fss_out_of_sample, 2)}" for name in COLUMNS]
+    noises = [f"`{name}` {number(getattr(result, name).discrimination.noise_sigma)}" for name in COLUMNS]
+    afferent = (
+        f"Afferent: FSS out of sample {joined(fits)}; the paper {fixed(paper.FSS_OUT_OF_SAMPLE.value, 2)}."
+    )
+    percept = (
+        f"Percept: noise that fits people's hit rates {joined(noises)}; the paper "
+        f"{number(psychophysics.NOISE_SIGMA.value)}."
+    )
+    return [
+        Drawing("level_1_skin", "Skin", partial(_draw_skin, result), _skin(result.skin_deflection)),
+        Drawing("level_2_afferent", "Afferent", partial(_draw_afferent, result), afferent),
+        Drawing("level_3_percept", "Percept", partial(_draw_percept, result), percept),
+    ]
+
+
+def _draw_skin(result: ReproductionResult) -> Figure:
+    """Draw the deflection under the cylinder, downwards."""
+    figure = new_figure(*SIZE_IN)
+    axes = figure.subplots()
+    draw_profiles(axes, result.skin_deflection, CYLINDER)
+    axes.set(title="Level 1: skin", xlabel="distance from the axis, distal [mm]", ylabel="deflection [mm]")
+    handles, labels = axes.get_legend_handles_labels()
+    axes.legend(handles[:4], [label.replace(", R²", "\nR²") for label in labels[:4]], fontsize=7.0)
+    axes.invert_yaxis()
+    return figure
+
+
+def _draw_afferent(result: ReproductionResult) -> Figure:
+    """Draw the rates of the ramp over the place of the bar."""
+    figure = new_figure(*SIZE_IN)
+    axes = figure.subplots()
+    for name, (colour, dashes) in zip(COLUMNS, LINES, strict=True):
+        unit = getattr(result, name).single_unit
+        axes.plot(-unit.shift_mm, unit.dynamic_rate_hz, color=colour, linestyle=dashes, label=name)
+    draw_observed_rates(axes, -unit.shift_mm, unit.observed_dynamic_rate_hz)
+    axes.set(title="Level 2: afferent", xlabel=ALONG, ylabel="rate in the ramp [spikes/s]")
+    axes.set_ylim(0.0, 1.25 * axes.get_ylim()[1])
+    axes.legend(loc="upper center", ncols=3, fontsize=8.0)
+    return figure
+
+
+def _draw_percept(result: ReproductionResult) -> Figure:
+    """Draw the hit rates of the static Gradient Sum over the middle of the receptors."""
+    figure = new_figure(*SIZE_IN)
+    axes = figure.subplots()
+    for name, (colour, dashes) in zip(COLUMNS, LINES, strict=True):
+        section = getattr(result, name).discrimination
+        rates = section.gradient_sum["static"].hit_rate
+        axes.plot(section.curvature_per_m[1:], rates, color=colour, linestyle=dashes, marker="o", label=name)
+    draw_people(axes, section.goodwin)
+    axes.set(title="Level 3: percept", xlabel="curvature of the sphere [1/m]", ylabel="hit rate [fraction]")
+    axes.set_ylim(top=1.02)
+    axes.legend(loc="lower right", fontsize=8.0)
+    return figure
+
+
+def _skin(section: SkinDeflectionResult) -> str:
+    fits = [trial.cylinder.r2 for trial in (section.trial1, section.trial2, section.trial3)]
+    best = f"Trial {1 + int(np.argmax(fits))}"
+    said = ", as in the paper." if best == IN_THE_PAPER else f"; in the paper {IN_THE_PAPER} is."
+    return f"Skin: {best} is closest to the observed deflection{said}"

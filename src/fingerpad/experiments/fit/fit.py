@@ -14,8 +14,7 @@ from fingerpad.core.errors import InputError
 from fingerpad.core.keywords import known_keywords
 from fingerpad.core.signals import SedTraces
 from fingerpad.data import protocol
-from fingerpad.experiments.fit.methods import Prepared, prepare
-from fingerpad.experiments.fit.offset import Beside, check_beside, fit_offset
+from fingerpad.experiments.fit.methods import Beside, Prepared, check_beside, fit_offset, prepare
 from fingerpad.experiments.fit.results import FitResult, FittedFold, PhaseRates
 from fingerpad.inference.fitting.cross_validation import CrossValidation, cross_validate, interleaved_folds
 from fingerpad.inference.fitting.fractional_sum_of_squares import fractional_sum_of_squares
@@ -31,8 +30,8 @@ from fingerpad.neuron.afferent import PARAMETER_NAMES, PARAMETER_UNITS
 from fingerpad.neuron.rate_windows import Windows
 
 _PARTS = {
-    "posterior": "fingerpad.experiments.fit.posterior:rate_posterior",
-    "profiles": "fingerpad.experiments.fit.posterior:profiled",
+    "posterior": "fingerpad.experiments.fit.rate_uncertainty:rate_posterior",
+    "profiles": "fingerpad.experiments.fit.rate_uncertainty:profiled",
     "sensitivity": "fingerpad.experiments.fit.rate_uncertainty:fss_sensitivity",
 }
 """What computes a part of the uncertainty of a fit; its module is loaded when the part is asked for."""

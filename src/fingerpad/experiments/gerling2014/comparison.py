@@ -16,11 +16,13 @@ from fingerpad.experiments.gerling2014.claim_row import (
 )
 from fingerpad.experiments.gerling2014.curvature_thresholds import CurvatureThresholds
 from fingerpad.experiments.gerling2014.discrimination_claims import discrimination_claims
-from fingerpad.experiments.gerling2014.firing_course import FiringCourse
 from fingerpad.experiments.gerling2014.nail_border import NailBorder
-from fingerpad.experiments.gerling2014.single_unit import SingleUnitResult
-from fingerpad.experiments.gerling2014.skin_deflection import IndenterDeflection, SkinDeflectionResult
-from fingerpad.experiments.gerling2014.skin_force import SkinForce
+from fingerpad.experiments.gerling2014.single_unit import FiringCourse, SingleUnitResult
+from fingerpad.experiments.gerling2014.skin_deflection import (
+    IndenterDeflection,
+    SkinDeflectionResult,
+    SkinForce,
+)
 from fingerpad.experiments.gerling2014.sphere_discrimination import SphereDiscrimination
 from fingerpad.inference.fitting.response_surface import ResponseSurface
 from fingerpad.inference.rates_and_hit_rates import ToRatesAndHitRates

@@ -18,7 +18,7 @@ from fingerpad.core.errors import ConvergenceError
 from fingerpad.core.results import Matrix, Number, Vector, WholeVector, result_class
 from fingerpad.data import protocol, psychophysics
 from fingerpad.experiments.gerling2014 import goodwin
-from fingerpad.experiments.gerling2014.discrimination_sessions import CRITERION_SIGMAS, Measured
+from fingerpad.experiments.gerling2014.discrimination_statistics import CRITERION_SIGMAS, Measured
 from fingerpad.psychophysics.discrimination import (
     CRITERION_MOVES,
     END_OF_STIMULUS_MS,

@@ -16,15 +16,13 @@ from fingerpad.experiments.gerling2014.discrepancy import (
     discrepancy_analysis,
     expected_of_measure,
 )
-from fingerpad.experiments.gerling2014.discrimination_sessions import (
+from fingerpad.experiments.gerling2014.discrimination_statistics import (
     SESSIONS,
+    DiscriminationStatistics,
     Measured,
     Observers,
-    observe,
-)
-from fingerpad.experiments.gerling2014.discrimination_statistics import (
-    DiscriminationStatistics,
     discrimination_statistics,
+    observe,
 )
 from fingerpad.experiments.gerling2014.goodwin import (
     GoodwinHitRates,
