@@ -8,12 +8,7 @@ from fingerpad.experiments.gerling2014.claim_row import ABSENT, ClaimRow, Group,
 from fingerpad.report.formatting import joined
 from fingerpad.report.parts import COLUMNS, Row, Table
 
-SIGNS = {
-    Verdict.MET: "✓",
-    Verdict.MISSED: "✗",
-    Verdict.NOT_DECIDABLE: "?",
-    Verdict.NOT_APPLICABLE: "–",
-}
+SIGNS = {Verdict.MET: "✓", Verdict.MISSED: "✗", Verdict.NOT_DECIDABLE: "?", Verdict.NOT_APPLICABLE: "–"}
 """Sign of each verdict; they differ without colour."""
 
 TITLES = {
@@ -56,7 +51,7 @@ def _side_by_side(both: Sequence[ClaimRow | None]) -> tuple[ClaimRow, Row]:
     told = dict.fromkeys("; ".join(text for text in (row.fitted_to, row.note) if text) for row in known)
     # A number that one set was fitted to is shown as fitted.
     first = min(known, key=lambda row: row.group is not Group.FITTED)
-    return first, Row((*cells, " | ".join(told)))
+    return first, Row.of(*cells, " | ".join(told))
 
 
 def comparison_tables(paper: Sequence[ClaimRow], human: Sequence[ClaimRow]) -> list[Table]:
@@ -79,7 +74,7 @@ def notes_table(paper: Sequence[ClaimRow], human: Sequence[ClaimRow]) -> Table:
     return Table(
         "How the statements are judged",
         ("statement", "note"),
-        [Row((quantity, "; ".join(notes))) for quantity, notes in rows.items()],
+        [Row.of(quantity, "; ".join(notes)) for quantity, notes in rows.items()],
         MEANINGS[Group.STATEMENT],
     )
 
@@ -111,7 +106,7 @@ def statement_table(statements: Sequence[Statement]) -> Table:
     return Table(
         TITLES[Group.STATEMENT],
         ("section", "statement", "the paper", "`paper`", "", "`human`", ""),
-        [Row((each.section, *statement_cells(each))) for each in statements],
+        [Row.of(each.section, *statement_cells(each)) for each in statements],
         SETS,
     )
 
@@ -121,9 +116,9 @@ def verdict_table(statements: Sequence[Statement]) -> Table:
     rows = []
     for each in statements:
         paper, human = statement_cells(each)[3::2]
-        rows.append(Row((f"{each.section} {each.statement}", paper, human)))
+        rows.append(Row.of(f"{each.section} {each.statement}", paper, human))
     met = (sum(getattr(each, f"verdict_{name}") is Verdict.MET for each in statements) for name in COLUMNS)
-    rows.append(Row(("met", *(f"{count} of {len(statements)}" for count in met)), "final"))
+    rows.append(Row.of("met", *(f"{count} of {len(statements)}" for count in met), kind="final"))
     return Table("", ("section and statement of the paper", *(f"`{name}`" for name in COLUMNS)), rows, SETS)
 
 

@@ -133,17 +133,15 @@ def caption_thresholds(section: CurvatureThresholds) -> str:
 def threshold_tables(section: CurvatureThresholds) -> list[Table]:
     """Return thresholds by standard."""
     thresholds = [
-        Row(
-            (
-                _layout(population),
-                fixed(population.noise_sigma, 3),
-                number(entry.standard_per_m),
-                fixed(entry.jnd_per_m, 1),
-                _per_cent(entry.weber_fraction),
-                f"{_per_cent(entry.fitted_weber_fraction)} "
-                f"({_per_cent(entry.fitted_interval[0])} to {_per_cent(entry.fitted_interval[1])})",
-                _per_cent(entry.ideal_weber_fraction),
-            )
+        Row.of(
+            _layout(population),
+            fixed(population.noise_sigma, 3),
+            number(entry.standard_per_m),
+            fixed(entry.jnd_per_m, 1),
+            _per_cent(entry.weber_fraction),
+            f"{_per_cent(entry.fitted_weber_fraction)} "
+            f"({_per_cent(entry.fitted_interval[0])} to {_per_cent(entry.fitted_interval[1])})",
+            _per_cent(entry.ideal_weber_fraction),
         )
         for population in section.populations
         for entry in population.standards
@@ -163,7 +161,7 @@ def threshold_tables(section: CurvatureThresholds) -> list[Table]:
             ),
             thresholds,
             " ".join(missed),
-        ),
+        )
     ]
 
 

@@ -241,7 +241,7 @@ def discrimination_tables(section: SphereDiscrimination) -> list[Table]:
 
 def _hit_rates(section: SphereDiscrimination) -> Table:
     rows = [
-        Row((title.replace("\n", ", "), place, *map(with_error, means, spreads)))
+        Row.of(title.replace("\n", ", "), place, *map(with_error, means, spreads))
         for title, rates in (*observer_panels(section), *criterion_panels(section))
         if rates is not None
         for place, means, spreads in (
@@ -264,7 +264,7 @@ def criterion_table(bars: CriterionErrorBars) -> Table:
         "Error bars by what the varied criterion multiplies",
         ("Normal(1, σ) multiplies", *(f"σ = {number(sigma)}" for sigma in bars.criterion_sigma)),
         [
-            Row((name, *(fixed(bar, 4) for bar in found)), "final" if "(used)" in name else "")
+            Row.of(name, *(fixed(bar, 4) for bar in found), kind="final" if "(used)" in name else "")
             for name, found in rows.items()
         ],
         "Mean standard deviation of a hit rate over the six spheres at 0.0 mm, static Gradient Sum.",
@@ -273,15 +273,13 @@ def criterion_table(bars: CriterionErrorBars) -> Table:
 
 def _interpretations(section: SphereDiscrimination) -> Table:
     rows = [
-        Row(
-            (
-                one.reading,
-                " / ".join(number(count) for count in one.receptors),
-                " / ".join(fixed(rise, 3) for rise in one.rise),
-                *(fixed(value, 3) for value in (one.largest_shift, one.noise_sigma, one.misfit)),
-                fixed(one.own_largest_shift, 3),
-            ),
-            "final" if "(used)" in one.reading else "",
+        Row.of(
+            one.reading,
+            " / ".join(number(count) for count in one.receptors),
+            " / ".join(fixed(rise, 3) for rise in one.rise),
+            *(fixed(value, 3) for value in (one.largest_shift, one.noise_sigma, one.misfit)),
+            fixed(one.own_largest_shift, 3),
+            kind="final" if "(used)" in one.reading else "",
         )
         for one in section.reasons.readings
     ]

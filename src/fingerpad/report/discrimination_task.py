@@ -123,7 +123,7 @@ def _interval(ends: Sequence[float] | None) -> str:
 
 def _thresholds(found: TaskResult) -> Table:
     rows = [
-        Row((titled(decoding), side.side, *_threshold_cells(side)))
+        Row.of(titled(decoding), side.side, *_threshold_cells(side))
         for decoding in found.decodings
         for side in decoding.curves
     ]
@@ -156,7 +156,7 @@ def _threshold_cells(side: SideCurve) -> tuple[str, ...]:
 
 def _hit_rates(found: TaskResult) -> Table:
     rows = [
-        Row((titled(decoding), *map(_with_error, decoding.hit_rate, decoding.hit_rate_sd)))
+        Row.of(titled(decoding), *map(_with_error, decoding.hit_rate, decoding.hit_rate_sd))
         for decoding in found.decodings
         if decoding.hit_rate is not None and decoding.hit_rate_sd is not None
     ]
@@ -178,7 +178,7 @@ def _forced_choices(found: TaskResult) -> Table:
         for name, share, d_prime in zip(found.stimulus[1:], shares, d_primes, strict=True):
             within = (" … ".join(fixed(end, 3) for end in share[1:]), _interval(d_prime[1:]))
             cells = (fixed(share[0], 3), within[0], number(d_prime[0]), within[1])
-            rows.append(Row((titled(decoding), name, *cells)))
+            rows.append(Row.of(titled(decoding), name, *cells))
     columns = ("decoding", "comparison", "proportion correct", "95 %", "d′", "95 %")
     note = (
         "Each trial presents the standard and the comparison once. Intervals: exact, of an experiment with "
@@ -189,7 +189,7 @@ def _forced_choices(found: TaskResult) -> Table:
 
 def _efficiencies(found: TaskResult) -> Table:
     rows = [
-        Row((titled(decoding), *map(_with_error, decoding.efficiency, decoding.efficiency_error)))
+        Row.of(titled(decoding), *map(_with_error, decoding.efficiency, decoding.efficiency_error))
         for decoding in found.decodings
         if decoding.efficiency is not None and decoding.efficiency_error is not None
     ]
@@ -373,11 +373,7 @@ def _curve(axes: Axes, found: TaskResult, decoding: Decoding, style: Any) -> Non
         axes.fill_between(curve.level, curve.low, curve.high, color=colour, alpha=0.15, linewidth=0.0)
         axes.plot(curve.level, curve.proportion, color=colour, linestyle=line, linewidth=1.5)
         axes.plot(
-            [threshold.level] * 2,
-            [0.4, threshold.proportion],
-            color=colour,
-            linewidth=0.9,
-            linestyle=":",
+            [threshold.level] * 2, [0.4, threshold.proportion], color=colour, linewidth=0.9, linestyle=":"
         )
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from typing import Literal, TypeVar
@@ -33,13 +33,17 @@ class Row:
     kind: Kind = ""
     """How the row is marked."""
 
+    @classmethod
+    def of(cls, *cells: str, kind: Kind = "") -> Row:
+        """Return a row of these cells."""
+        return cls(cells, kind)
+
 
 @dataclass(frozen=True)
 class Table:
     """A table."""
 
     title: str
-    """Its heading."""
     columns: Sequence[str]
     """Headings with units; all empty where the table lists names and values."""
     rows: Sequence[Row]
@@ -57,9 +61,7 @@ class Drawing:
     title: str
     """A few words."""
     draw: Callable[[], Figure]
-    """Makes the figure."""
     caption: str
-    """What it shows."""
     number: int | None = None
     """Figures up to 9 of a reproduction have the paper's numbers; others go on from 10."""
     human: Callable[[], Figure] | None = None
@@ -77,6 +79,11 @@ class Drawing:
     def label(self) -> str:
         """Number and title."""
         return self.title if self.number is None else f"Figure {self.number}. {self.title}"
+
+
+def listed(title: str, values: Mapping[str, str], columns: Sequence[str] = ("", ""), note: str = "") -> Table:
+    """Return a table of names and values."""
+    return Table(title, columns, [Row(each) for each in values.items()], note)
 
 
 Part = Paragraph | Table | Drawing
@@ -105,7 +112,6 @@ class Chapter:
     title: str
     """The heading; empty for parts that follow the introduction directly."""
     parts: Sequence[Part]
-    """In order."""
     folded: Sequence[Part] = ()
     """What stands below them behind a fold."""
 
@@ -143,7 +149,6 @@ class Page:
     paragraphs: Sequence[str]
     """Summary; links and code as in `Paragraph`."""
     chapters: Sequence[Chapter]
-    """In order."""
     opening: Sequence[Drawing] = ()
     """Small figures after the summary, each with one sentence as its caption."""
     verdicts: Table | None = None

@@ -70,13 +70,7 @@ def with_round_ticks(bar: Colorbar, scale: Normalize) -> None:
 
 
 def _surface(
-    axes: Any,
-    x: FloatArray,
-    z: FloatArray,
-    values: FloatArray,
-    label: str,
-    colours: str,
-    scale: Normalize,
+    axes: Any, x: FloatArray, z: FloatArray, values: FloatArray, label: str, colours: str, scale: Normalize
 ) -> None:
     along, lateral = np.meshgrid(x, z, indexing="ij")
     # Surfaces have no logarithmic axis: the heights are logarithms, and the ticks show the values.

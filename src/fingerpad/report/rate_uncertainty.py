@@ -69,13 +69,11 @@ def draw_indices(axes: Axes, found: FssSensitivity) -> None:
 def sensitivity_table(found: FssSensitivity, units: Mapping[str, str]) -> Table:
     """Return Sobol's indices of the four numbers and the ranges that they belong to."""
     rows = [
-        Row(
-            (
-                f"{symbol} [{units[name]}]",
-                f"{number(found.lower[index])} … {number(found.upper[index])}",
-                f"{fixed(found.first[index], 2)} ± {fixed(found.first_half_width[index], 2)}",
-                f"{fixed(found.total[index], 2)} ± {fixed(found.total_half_width[index], 2)}",
-            )
+        Row.of(
+            f"{symbol} [{units[name]}]",
+            f"{number(found.lower[index])} … {number(found.upper[index])}",
+            f"{fixed(found.first[index], 2)} ± {fixed(found.first_half_width[index], 2)}",
+            f"{fixed(found.total[index], 2)} ± {fixed(found.total_half_width[index], 2)}",
         )
         for index, (name, symbol) in enumerate(IDENTIFIABLE_SYMBOLS.items())
     ]

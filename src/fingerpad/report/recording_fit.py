@@ -117,14 +117,7 @@ def caption_fit_residuals(found: FitResult) -> str:
 def fit_tables(found: FitResult) -> list[Table]:
     """Return scores, parameters in both forms, folds and rates."""
     spikes = [_spikes(found.spikes)] if found.spikes else []
-    return [
-        _scores(found),
-        *spikes,
-        _identifiable(found),
-        _parameters(found),
-        _folds(found),
-        _rates(found),
-    ]
+    return [_scores(found), *spikes, _identifiable(found), _parameters(found), _folds(found), _rates(found)]
 
 
 def _chapters(found: FitResult) -> list[Chapter]:
@@ -234,7 +227,7 @@ def _scores(found: FitResult) -> Table:
         "all stimuli, dynamic rates": found.phases["dynamic"].fss_in_sample,
         "all stimuli, static rates": found.phases["static"].fss_in_sample,
     }
-    rows = [Row((over, fixed(score, 3))) for over, score in scores.items()]
+    rows = [Row.of(over, fixed(score, 3)) for over, score in scores.items()]
     return Table("Fractional sum of squares (FSS)", ("over", "FSS"), rows)
 
 
@@ -248,21 +241,19 @@ def _spikes(found: SpikeFitSummary) -> Table:
         "Kolmogorov-Smirnov distance of rescaled intervals": found.time_rescaling_distance,
         "probability of a larger distance": found.time_rescaling_p_value,
     }
-    rows = [Row((name, number(value))) for name, value in values.items()]
+    rows = [Row.of(name, number(value)) for name, value in values.items()]
     return Table("Fit of a soft threshold to the spikes", ("", ""), rows)
 
 
 def _identifiable(found: FitResult) -> Table:
     posterior = found.posterior
     rows = [
-        Row(
-            (
-                symbol,
-                number(found.identifiable[name]),
-                number(found.identifiable_standard_error[name]),
-                *([" … ".join(number(end) for end in posterior.interval[name])] if posterior else []),
-                found.identifiable_units[name],
-            )
+        Row.of(
+            symbol,
+            number(found.identifiable[name]),
+            number(found.identifiable_standard_error[name]),
+            *([" … ".join(number(end) for end in posterior.interval[name])] if posterior else []),
+            found.identifiable_units[name],
         )
         for name, symbol in IDENTIFIABLE.items()
     ]
@@ -278,7 +269,7 @@ def _identifiable(found: FitResult) -> Table:
 
 def _parameters(found: FitResult) -> Table:
     rows = [
-        Row((PARAMETER_SYMBOLS[name], number(value), found.units[name]))
+        Row.of(PARAMETER_SYMBOLS[name], number(value), found.units[name])
         for name, value in found.parameters.items()
     ]
     note = "One of the many sets of six with the same firing."
@@ -287,16 +278,14 @@ def _parameters(found: FitResult) -> Table:
 
 def _folds(found: FitResult) -> Table:
     rows = [
-        Row(
-            (
-                plain(fold.fold),
-                ", ".join(fold.stimuli),
-                fixed(fold.fss_train, 3),
-                fixed(fold.fss_test, 3),
-                *(number(fold.identifiable[name]) for name in IDENTIFIABLE),
-                number(fold.n_evaluations),
-                fixed(fold.seconds, 2),
-            )
+        Row.of(
+            plain(fold.fold),
+            ", ".join(fold.stimuli),
+            fixed(fold.fss_train, 3),
+            fixed(fold.fss_test, 3),
+            *(number(fold.identifiable[name]) for name in IDENTIFIABLE),
+            number(fold.n_evaluations),
+            fixed(fold.seconds, 2),
         )
         for fold in found.folds
     ]
@@ -311,17 +300,15 @@ def _folds(found: FitResult) -> Table:
 def _rates(found: FitResult) -> Table:
     recorded = _recorded(found)
     rows = [
-        Row(
-            (
-                name,
-                plain(int(found.fold[row])),
-                number(found.presentations[row]) if found.presentations else ABSENT,
-                *(
-                    fixed(value, 1)
-                    for _, rates, observed_hz in recorded
-                    for value in (observed_hz[row], rates.fitted_hz[row], rates.out_of_sample_hz[row])
-                ),
-            )
+        Row.of(
+            name,
+            plain(int(found.fold[row])),
+            number(found.presentations[row]) if found.presentations else ABSENT,
+            *(
+                fixed(value, 1)
+                for _, rates, observed_hz in recorded
+                for value in (observed_hz[row], rates.fitted_hz[row], rates.out_of_sample_hz[row])
+            ),
         )
         for row, name in enumerate(found.stimulus)
     ]
@@ -364,12 +351,10 @@ def caption_profiles(found: FitResult) -> str:
 def profile_tables(found: FitResult) -> list[Table]:
     """Tables of the intervals of the profiles."""
     rows = [
-        Row(
-            (
-                f"{IDENTIFIABLE_SYMBOLS[profile.name]} [{found.identifiable_units[profile.name]}]",
-                number(found.identifiable[profile.name]),
-                profile_ends(profile),
-            )
+        Row.of(
+            f"{IDENTIFIABLE_SYMBOLS[profile.name]} [{found.identifiable_units[profile.name]}]",
+            number(found.identifiable[profile.name]),
+            profile_ends(profile),
         )
         for profile in _present(found.profiles)
     ]
@@ -407,12 +392,7 @@ def draw_offset(found: FitResult) -> Figure:
     axes.axvline(0.0, color=GREY, linewidth=1.0)
     axes.plot(offset.held.offset_mm, offset.held.fss_in_sample, "o-", color=BLACK, label="held there")
     axes.plot(
-        [offset.offset_mm],
-        [offset.fss_in_sample],
-        "D",
-        color=ORANGE,
-        markersize=7.0,
-        label="fitted to all",
+        [offset.offset_mm], [offset.fss_in_sample], "D", color=ORANGE, markersize=7.0, label="fitted to all"
     )
     low = axes.get_ylim()[0]
     axes.plot(
@@ -458,8 +438,8 @@ def offset_tables(found: FitResult) -> list[Table]:
     at_zero = cells(found, [found.phases[phase].fss_in_sample for phase in phases])
     fitted = cells(offset, [offset.fss_by_phase.get(phase) for phase in phases])
     rows = [
-        Row(("at 0 mm", number(0.0), ABSENT, *at_zero)),
-        Row(("offset fitted", number(offset.offset_mm), number(offset.standard_error_mm), *fitted)),
+        Row.of("at 0 mm", number(0.0), ABSENT, *at_zero),
+        Row.of("offset fitted", number(offset.offset_mm), number(offset.standard_error_mm), *fitted),
     ]
     columns = (
         "receptor",

@@ -162,7 +162,7 @@ def _scores(section: SingleUnitResult) -> Table:
     return Table(
         "Fractional sum of squares (FSS)",
         ("over", "paper", "this run"),
-        [Row((name, fixed(printed, 2), fixed(ours, 3))) for name, printed, ours in rows],
+        [Row.of(name, fixed(printed, 2), fixed(ours, 3)) for name, printed, ours in rows],
         SPECIES,
     )
 
@@ -170,13 +170,11 @@ def _scores(section: SingleUnitResult) -> Table:
 def _parameters(section: SingleUnitResult, start_points: Sequence[Mapping[str, float]]) -> Table:
     """Return the fitted parameters beside the paper's start points, where the fit begins with these."""
     rows = [
-        Row(
-            (
-                PARAMETER_SYMBOLS.get(name, spelled(name)),
-                *(number(start.get(name)) for start in start_points),
-                number(value),
-                section.units.get(name, ""),
-            )
+        Row.of(
+            PARAMETER_SYMBOLS.get(name, spelled(name)),
+            *(number(start.get(name)) for start in start_points),
+            number(value),
+            section.units.get(name, ""),
         )
         for name, value in section.parameters.items()
     ]
@@ -186,14 +184,12 @@ def _parameters(section: SingleUnitResult, start_points: Sequence[Mapping[str, f
 
 def _folds(folds: Sequence[FoldResult]) -> Table:
     rows = [
-        Row(
-            (
-                str(fold.fold),
-                ", ".join(f"{shift:+.1f}".replace("-", "−") for shift in fold.testing_shift_mm),
-                str(fold.start),
-                fixed(fold.fss_train, 3),
-                fixed(fold.fss_test, 3),
-            )
+        Row.of(
+            str(fold.fold),
+            ", ".join(f"{shift:+.1f}".replace("-", "−") for shift in fold.testing_shift_mm),
+            str(fold.start),
+            fixed(fold.fss_train, 3),
+            fixed(fold.fss_test, 3),
         )
         for fold in folds
     ]
@@ -203,16 +199,14 @@ def _folds(folds: Sequence[FoldResult]) -> Table:
 
 def _searches(folds: Sequence[FoldResult]) -> Table:
     rows = [
-        Row(
-            (
-                f"{fold.fold}, {search.start}",
-                fixed(search.history[0].fss, 3),
-                fixed(search.fss_train, 3),
-                fixed(search.fss_test, 3),
-                str(len(search.history) - 1),
-                number(search.runs),
-            ),
-            "final" if search.start == fold.start else "",
+        Row.of(
+            f"{fold.fold}, {search.start}",
+            fixed(search.history[0].fss, 3),
+            fixed(search.fss_train, 3),
+            fixed(search.fss_test, 3),
+            str(len(search.history) - 1),
+            number(search.runs),
+            kind="final" if search.start == fold.start else "",
         )
         for fold in folds
         for search in fold.climbs
@@ -233,9 +227,11 @@ def _steps(search: Search, section: SingleUnitResult, as_printed: bool) -> Table
     """Return the steps of one search, beside the paper's session if it has the same start point."""
     names = list(search.history[0].parameters)
     rows = [
-        Row(
-            (str(step.iteration), fixed(step.fss, 3), *(number(step.parameters[name]) for name in names)),
-            "final" if step is search.history[-1] else "",
+        Row.of(
+            str(step.iteration),
+            fixed(step.fss, 3),
+            *(number(step.parameters[name]) for name in names),
+            kind="final" if step is search.history[-1] else "",
         )
         for step in search.history
     ]
@@ -261,14 +257,12 @@ def _steps(search: Search, section: SingleUnitResult, as_printed: bool) -> Table
 
 def _modulation(modulation: RateModulation) -> Table:
     rows = [
-        Row(
-            (
-                f"{phase}, {source}",
-                number(found.maximum_hz),
-                number(found.minimum_hz),
-                number(found.difference_hz),
-                number(found.index),
-            )
+        Row.of(
+            f"{phase}, {source}",
+            number(found.maximum_hz),
+            number(found.minimum_hz),
+            number(found.difference_hz),
+            number(found.index),
         )
         for phase, both in (("dynamic", modulation.dynamic), ("static", modulation.static))
         for source, found in (("observed", both.observed), ("this run", both.ours))
@@ -283,11 +277,7 @@ def _modulation(modulation: RateModulation) -> Table:
     return Table("Modulation at the edge of the bar (the paper's Table 5)", columns, rows, note)
 
 
-GAINS = {
-    "intercept_ma": ("β", "mA"),
-    "dynamic_gain": ("k_d", "mA ms/kPa"),
-    "static_gain": ("k_s", "mA/kPa"),
-}
+GAINS = {"intercept_ma": ("β", "mA"), "dynamic_gain": ("k_d", "mA ms/kPa"), "static_gain": ("k_s", "mA/kPa")}
 
 
 def draw_uncertainty(section: UncertaintyResult) -> Figure:
@@ -346,21 +336,19 @@ def uncertainty_tables(section: UncertaintyResult) -> list[Table]:
 def _determined(section: UncertaintyResult) -> Table:
     profiles = {profile.name: profile for profile in section.profiles}
     rows = [
-        Row(
-            (
-                f"{symbol} [{section.units[name]}]",
-                number(section.fit[name]),
-                *_interval(section.posterior[name]),
-                profile_ends(profiles[name]),
-            )
+        Row.of(
+            f"{symbol} [{section.units[name]}]",
+            number(section.fit[name]),
+            *_interval(section.posterior[name]),
+            profile_ends(profiles[name]),
         )
         for name, symbol in IDENTIFIABLE_SYMBOLS.items()
     ]
     rows += [
-        Row((f"{symbol} [{unit}]", ABSENT, *_interval(section.posterior[name]), ABSENT))
+        Row.of(f"{symbol} [{unit}]", ABSENT, *_interval(section.posterior[name]), ABSENT)
         for name, (symbol, unit) in GAINS.items()
     ]
-    rows.append(Row(("β τ/(C v) [1]", ABSENT, *_interval(section.posterior["resting_share"]), ABSENT)))
+    rows.append(Row.of("β τ/(C v) [1]", ABSENT, *_interval(section.posterior["resting_share"]), ABSENT))
     level = whole_percent(section.level)
     rank = section.identifiability.rank
     smallest = section.identifiability.relative_singular_values
@@ -381,14 +369,12 @@ def _interval(found: CredibleInterval) -> tuple[str, str]:
 
 def _residuals(section: UncertaintyResult) -> Table:
     rows = [
-        Row(
-            (
-                PHASE_LABELS[phase],
-                *_interval(rates.residual_deviation_hz),
-                *_interval(rates.residual_length_mm),
-                number(rates.probability_of_independence, 2),
-                fixed(rates.share_within_new, 2),
-            )
+        Row.of(
+            PHASE_LABELS[phase],
+            *_interval(rates.residual_deviation_hz),
+            *_interval(rates.residual_length_mm),
+            number(rates.probability_of_independence, 2),
+            fixed(rates.share_within_new, 2),
         )
         for phase, rates in section.rates.items()
     ]

@@ -17,11 +17,7 @@ from fingerpad.report.parts import Row, Table
 from fingerpad.report.style import BLACK, BLUE, GREEN, GREY, ORANGE, new_figure
 
 UM_PER_MM = 1000.0
-TRIAL_STYLES = {
-    "Trial 1": (BLUE, (0, (5, 2))),
-    "Trial 2": (ORANGE, (0, (1, 1.2))),
-    "Trial 3": (GREEN, "-"),
-}
+TRIAL_STYLES = {"Trial 1": (BLUE, (0, (5, 2))), "Trial 2": (ORANGE, (0, (1, 1.2))), "Trial 3": (GREEN, "-")}
 LINE = f"{protocol.LINE_DIAMETER.value * UM_PER_MM:.0f} µm line"
 CYLINDER = f"{protocol.CYLINDER_DIAMETER.value} mm cylinder"
 ALONG = "distance from the indenter's axis, distal [mm]"

@@ -62,7 +62,7 @@ def caption_validation(results: ValidationFile) -> str:
     return (
         "Each observation over the prediction for its condition. Lines join the lowest and the highest "
         "observation of a condition. R² is computed about the solid line."
-        + (f" {left_out} row(s) without a prediction are not drawn." if left_out else "")
+        + (f" {left_out} Row.of(s) without a prediction are not drawn." if left_out else "")
     )
 
 
@@ -107,7 +107,7 @@ def validation_summary(results: ValidationFile) -> list[str]:
     reasons = dict.fromkeys(row.reason for row in results.predictions if row.reason)
     if reasons:
         failed = results.n_rows - results.n_predicted
-        said.append(f"{failed} row(s) have no prediction. The first reason: {next(iter(reasons))}")
+        said.append(f"{failed} Row.of(s) have no prediction. The first reason: {next(iter(reasons))}")
     return said
 
 
@@ -120,7 +120,7 @@ def _scores(results: ValidationFile) -> Table:
         "gain": results.gain,
         "share of conditions inside their observed range": results.share_inside,
     }
-    rows = [Row((name, number(value))) for name, value in values.items() if np.isfinite(value)]
+    rows = [Row.of(name, number(value)) for name, value in values.items() if np.isfinite(value)]
     return Table("Scores", ("", ""), rows)
 
 
@@ -130,15 +130,13 @@ def _conditions(results: ValidationFile) -> Table:
     for row in results.predictions:
         unique.setdefault(tuple(getattr(row, column) for column in conditions), []).append(row)
     rows = [
-        Row(
-            (
-                *(plain(value) for value in condition),
-                plain(len(same)),
-                " … ".join(dict.fromkeys((number(same[0].observed_low), number(same[0].observed_high)))),
-                number(same[0].predicted),
-                ABSENT if same[0].inside_range is None else plain(same[0].inside_range),
-                same[0].reason or "",
-            )
+        Row.of(
+            *(plain(value) for value in condition),
+            plain(len(same)),
+            " … ".join(dict.fromkeys((number(same[0].observed_low), number(same[0].observed_high)))),
+            number(same[0].predicted),
+            ABSENT if same[0].inside_range is None else plain(same[0].inside_range),
+            same[0].reason or "",
         )
         for condition, same in list(unique.items())[:LONGEST_TABLE]
     ]
