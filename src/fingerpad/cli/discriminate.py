@@ -18,8 +18,7 @@ def discriminate_command(
     task: Annotated[
         str | None,
         typer.Argument(
-            metavar="TASK",
-            help="YAML file (format: docs/discriminate.md), or the name of an example task.",
+            metavar="TASK", help="YAML file (format: docs/discriminate.md), or the name of an example task."
         ),
     ] = None,
     out: Annotated[

@@ -28,12 +28,7 @@ from fingerpad.experiments.discrimination.decoding import (
     silent_stimuli,
     task_statistic,
 )
-from fingerpad.experiments.discrimination.task import (
-    FITTED,
-    IDEAL,
-    DiscriminationTask,
-    ObservedPoint,
-)
+from fingerpad.experiments.discrimination.task import FITTED, IDEAL, DiscriminationTask, ObservedPoint
 from fingerpad.experiments.discrimination.task_stimuli import stimulus_index
 from fingerpad.neuron.mixed_population import MixedPopulation, one_map
 from fingerpad.neuron.population import Population
@@ -135,9 +130,7 @@ def forced_choice_of(d_prime: FloatArray, trials: int) -> ForcedChoice:
     proportions = np.array([proportion, *binomial_interval(proportion, trials)])
     d_primes = np.sqrt(2.0) * ndtri(proportions)
     return ForcedChoice(
-        trials=trials,
-        proportions=proportions,
-        d_primes=np.where(np.isfinite(d_primes), d_primes, np.nan),
+        trials=trials, proportions=proportions, d_primes=np.where(np.isfinite(d_primes), d_primes, np.nan)
     )
 
 
@@ -452,12 +445,7 @@ def _decodings(
 
 
 def _decoding(
-    prepared: PreparedTask,
-    code: str,
-    measure: str,
-    encoded: Encoded,
-    sigma: float,
-    shown: list[Presentation],
+    prepared: PreparedTask, code: str, measure: str, encoded: Encoded, sigma: float, shown: list[Presentation]
 ) -> Decoding:
     """Hit rates of one code, their statistic, efficiency and psychometric curves."""
     settings, (table, neighbours) = prepared.task.experiment, encoded

@@ -16,11 +16,7 @@ from fingerpad.experiments.descriptions.reading import Origin, at
 from fingerpad.experiments.descriptions.stimuli import touches_of
 from fingerpad.experiments.discrimination.analysis import PreparedTask, TaskResult, analyse
 from fingerpad.experiments.discrimination.task import DiscriminationTask
-from fingerpad.experiments.discrimination.task_stimuli import (
-    task_conditions,
-    task_population,
-    task_stimuli,
-)
+from fingerpad.experiments.discrimination.task_stimuli import task_conditions, task_population, task_stimuli
 from fingerpad.experiments.manifest import Manifest
 from fingerpad.experiments.runner import Runner
 from fingerpad.neuron.mixed_population import MixedPopulation

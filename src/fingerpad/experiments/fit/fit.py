@@ -18,11 +18,7 @@ from fingerpad.experiments.fit.methods import Beside, Prepared, check_beside, fi
 from fingerpad.experiments.fit.results import FitResult, FittedFold, PhaseRates
 from fingerpad.inference.fitting.cross_validation import CrossValidation, cross_validate, interleaved_folds
 from fingerpad.inference.fitting.fractional_sum_of_squares import fractional_sum_of_squares
-from fingerpad.inference.identifiable import (
-    IDENTIFIABLE_NAMES,
-    IDENTIFIABLE_UNITS,
-    identifiable,
-)
+from fingerpad.inference.identifiable import IDENTIFIABLE_NAMES, IDENTIFIABLE_UNITS, identifiable
 from fingerpad.inference.rate_model import AfferentModel, four_number_model
 from fingerpad.inference.rate_problem import RateProblem
 from fingerpad.inference.recordings import PHASES, RateRecordings, SpikeRecordings

@@ -289,10 +289,7 @@ def run_fit(
         dynamic_quantity=request.quantities[0],
         static_quantity=request.quantities[1],
         manifest=runner.manifest(
-            request.conditions,
-            {"stimuli": next(iter(skins.values())).mesh},
-            command=command,
-            inputs=inputs,
+            request.conditions, {"stimuli": next(iter(skins.values())).mesh}, command=command, inputs=inputs
         ),
     )
 

@@ -43,7 +43,6 @@ class ClaimRow:
     """A claim of the paper beside this run."""
 
     group: Group
-    """What the row can show."""
     section: str = ""
     """Section of the paper; empty for our own additions."""
     quantity: str
@@ -54,11 +53,8 @@ class ClaimRow:
     status: str = ""
     """How far the inputs can be trusted."""
     verdict: Verdict
-    """Whether the claim is met."""
     fitted_to: str = ""
-    """What was fitted to the observed number, or chosen by it. Rows of the group `FITTED` have it, and no
-    others.
-    """
+    """What was fitted to the observed number, or chosen by it; in rows of the group `FITTED` alone."""
     note: str = ""
     """How it was judged."""
 
@@ -80,8 +76,32 @@ def two_digits(value: float) -> str:
     return "–" if value != value else f"{float(f'{value:.2g}'):g}"
 
 
-def measured_row(
-    group: Group,
+def claim(
+    section: str,
+    quantity: str,
+    paper: str,
+    ours: str,
+    verdict: Verdict | bool,
+    note: str = "",
+    status: str = MATERIALS,
+    group: Group = Group.STATEMENT,
+    fitted_to: str = "",
+) -> ClaimRow:
+    """Return a row; what something was fitted to is in the group of the fitted."""
+    return ClaimRow(
+        group=Group.FITTED if fitted_to else group,
+        section=section,
+        quantity=quantity,
+        paper=paper,
+        ours=ours,
+        status=status,
+        verdict=verdict if isinstance(verdict, Verdict) else judged(verdict),
+        fitted_to=fitted_to,
+        note=note,
+    )
+
+
+def measured(
     section: str,
     quantity: str,
     published: Published[float],
@@ -93,17 +113,11 @@ def measured_row(
 ) -> ClaimRow:
     """Return the row of a number that the paper prints: met from it on, or close to it."""
     difference = ours - published.value
+    met = bool(difference >= 0.0 if at_least else abs(difference) <= CLOSE * published.value)
     criterion = "judged: at least the paper's" if at_least else f"judged: within {CLOSE:.0%}"
-    return ClaimRow(
-        group=group,
-        section=section,
-        quantity=quantity,
-        paper=f"{published.value:g}",
-        ours=two_digits(ours),
-        status=status,
-        verdict=judged(bool(difference >= 0.0 if at_least else abs(difference) <= CLOSE * published.value)),
-        fitted_to=fitted_to,
-        note="; ".join(text for text in (criterion, note) if text),
+    told = "; ".join(text for text in (criterion, note) if text)
+    return claim(
+        section, quantity, f"{published.value:g}", two_digits(ours), met, told, status, fitted_to=fitted_to
     )
 
 
@@ -115,21 +129,17 @@ class Statement:
     """A statement of the paper beside both sets."""
 
     section: str
-    """Where the paper says it."""
     statement: str
-    """What it says."""
     published: str
-    """As the paper prints it."""
+    """Where the paper says it, what it says, and the number that it prints."""
     paper: str
-    """Ours with the set `paper`."""
     human: str
-    """Ours with the set `human`."""
+    """Ours, by the set."""
     verdict_paper: Verdict
     verdict_human: Verdict
     fitted_paper: str
-    """What was fitted to it with the set `paper`; empty where nothing was."""
     fitted_human: str
-    """The same with the set `human`."""
+    """What was fitted to it; empty where nothing was."""
 
 
 def paired(paper: Sequence[ClaimRow], human: Sequence[ClaimRow]) -> tuple[Statement, ...]:

@@ -187,10 +187,7 @@ def reproduce(run: Reproduction, progress: Progress | None = None) -> Reproducti
     )
     return ReproductionResult(
         summary=Summaries(
-            paper=of_paper,
-            human=of_human,
-            wall_s=manifest.wall_s,
-            peak_memory_mb=manifest.peak_memory_mb,
+            paper=of_paper, human=of_human, wall_s=manifest.wall_s, peak_memory_mb=manifest.peak_memory_mb
         ),
         statements=paired(paper.comparison, human.comparison),
         skin_deflection=deflection,

@@ -54,9 +54,7 @@ def bar_touches(conditions: Conditions) -> list[Touch]:
 
 
 def receptor_sed(
-    responses: list[SkinResponse],
-    dynamic_quantity: str = STORED_ENERGY,
-    static_quantity: str = STORED_ENERGY,
+    responses: list[SkinResponse], dynamic_quantity: str = STORED_ENERGY, static_quantity: str = STORED_ENERGY
 ) -> SedTraces:
     """Strain energy density at the one receptor, one column per shift of the bar."""
     quantities = (dynamic_quantity, static_quantity)

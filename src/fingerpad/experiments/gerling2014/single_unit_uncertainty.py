@@ -132,12 +132,7 @@ class UncertaintyResult:
 
 
 def uncertainty_result(
-    sed: SedTraces,
-    fitted: ArrayLike,
-    seed: int,
-    *,
-    quick: bool = False,
-    initial_mv: float | None = None,
+    sed: SedTraces, fitted: ArrayLike, seed: int, *, quick: bool = False, initial_mv: float | None = None
 ) -> UncertaintyResult:
     """Compute identifiability, posterior, profile likelihoods and sensitivity."""
     recordings, shift_mm = single_unit.bar_recordings(), bar_firing_rates().shift_mm

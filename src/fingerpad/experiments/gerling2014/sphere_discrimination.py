@@ -33,12 +33,7 @@ from fingerpad.inference.rate_model import AfferentModel
 from fingerpad.inference.rates_and_hit_rates import SphereHitRates, ToRatesAndHitRates
 from fingerpad.neuron.afferent import Afferent
 from fingerpad.neuron.population import Population
-from fingerpad.psychophysics.encoding import (
-    RESPONSE_MEASURES,
-    gradient_sum,
-    neighbour_pairs,
-    taking_part,
-)
+from fingerpad.psychophysics.encoding import RESPONSE_MEASURES, gradient_sum, neighbour_pairs, taking_part
 from fingerpad.psychophysics.noise_fit import NOISE_DRAWS
 from fingerpad.skin.sampling import SkinResponse
 
@@ -209,8 +204,5 @@ def _first_session(observers: Observers, name: str) -> ObserverHitRates:
     """Hit rates of one observer in the first session, at both positions."""
     (rate, shifted), (spread, spread_shifted) = observers.mean[name][0], observers.spread[name][0]
     return ObserverHitRates(
-        hit_rate=rate,
-        hit_rate_sd=spread,
-        hit_rate_shifted=shifted,
-        hit_rate_shifted_sd=spread_shifted,
+        hit_rate=rate, hit_rate_sd=spread, hit_rate_shifted=shifted, hit_rate_shifted_sd=spread_shifted
     )

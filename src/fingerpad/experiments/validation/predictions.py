@@ -143,9 +143,7 @@ def _plan(kind: Kind, given: Mapping[str, Value], model: FingertipModel) -> Plan
 
 
 def _value(
-    plan: Plan,
-    skins: Mapping[Touch, SkinResponse],
-    failed: Mapping[Touch, ConvergenceError | InputError],
+    plan: Plan, skins: Mapping[Touch, SkinResponse], failed: Mapping[Touch, ConvergenceError | InputError]
 ) -> tuple[float, str | None]:
     """Prediction of a condition; NaN and why where there is none."""
     try:
@@ -174,12 +172,7 @@ def _pressed_to(given: Mapping[str, Value], model: FingertipModel) -> Touch | No
         motion = replace(motion, ramp_ms=QUASI_STATIC_MS)
         settings = replace(settings, hold_steps=1)
     return touch_of(
-        conditions.finger,
-        indenter,
-        motion,
-        conditions.tissues,
-        conditions.resolution,
-        settings=settings,
+        conditions.finger, indenter, motion, conditions.tissues, conditions.resolution, settings=settings
     )
 
 
