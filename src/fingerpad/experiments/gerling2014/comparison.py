@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
 
 from fingerpad.data import paper, tissues
@@ -150,6 +152,7 @@ SESSION_START = 2
 
 FITTED_TO_RATES = "the afferent was fitted to the rates at all 36 shifts"
 RECORDED = MATERIALS + "; recordings read, from monkeys"
+_recorded = partial(claim, status=RECORDED)
 
 
 def _before_folds(materials: str, fitted_to_people: bool) -> str:
@@ -307,7 +310,7 @@ def _firing(unit: SingleUnitResult, found: FiringCourse) -> list[ClaimRow]:
             "mean of the population of 18 receptors",
         ),
     )
-    return [claim(*row, status=RECORDED) for row in rows]
+    return [_recorded(*row) for row in rows]
 
 
 def weber_claims(found: CurvatureThresholds) -> list[ClaimRow]:

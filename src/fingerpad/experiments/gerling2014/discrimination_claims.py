@@ -43,6 +43,7 @@ PLACES = ("0.0 mm", "0.2 mm")
 MEASURES = ("static", "dynamic", "latency")
 JUDGED_RISE = "judged against two Monte-Carlo errors, at both positions"
 NOISE_FITTED = "the noise was fitted to people's two hit rates"
+FITTED_BY_CODE = "the afferent was fitted to people's hit rates by this code, too"
 AFFERENT_FITTED = "the afferent to them at the paper's noise"
 
 
