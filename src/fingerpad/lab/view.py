@@ -42,46 +42,30 @@ class Shown:
     """Time, force with its error (0 if not measured), contact and largest strain energy density."""
     contact_mm: list[list[float]]
     """Middle x and z, half-axes and angle of an ellipse of the area of the contact. [mm, rad]"""
-    peak_kpa: float
-    """Value of the byte 254 of `frames`. [kPa]"""
-    frames_ms: list[float]
-    """Times of the map. [ms]"""
-    frames: str
-    """The map at these times, bytes (n_frames, nx, nz) in base 64."""
-    spikes: list[list[float]]
-    """Spike times of each afferent. [ms]"""
+    peak_kpa: float  # Value of the byte 254 of `frames`. [kPa]
+    frames_ms: list[float]  # Times of the map. [ms]
+    frames: str  # The map at these times, bytes (n_frames, nx, nz) in base 64.
+    spikes: list[list[float]]  # Spike times of each afferent. [ms]
 
 
 @dataclass(frozen=True)
 class View:
     """All that the page shows of a state."""
 
-    answer: Shown
-    """The answer of the reduced touch."""
+    answer: Shown  # The answer of the reduced touch.
     x_mm: list[float]
-    z_mm: list[float]
-    """Points of the map. [mm]"""
-    pad_mm: list[float]
-    """Place of the touch. [mm]"""
-    outline_mm: list[list[float]]
-    """x and half-width of the finger. [mm]"""
-    positions_mm: list[list[float]]
-    """Afferents. [mm]"""
-    order: list[int]
-    """Afferents by their distance from the contact."""
-    shown_ms: float
-    """End of the hold. [ms]"""
+    z_mm: list[float]  # Points of the map. [mm]
+    pad_mm: list[float]  # Place of the touch. [mm]
+    outline_mm: list[list[float]]  # x and half-width of the finger. [mm]
+    positions_mm: list[list[float]]  # Afferents. [mm]
+    order: list[int]  # Afferents by their distance from the contact.
+    shown_ms: float  # End of the hold. [ms]
     said: str
-    python: str
-    """What is pressed, and Python lines that reproduce it."""
+    python: str  # What is pressed, and Python lines that reproduce it.
     other: Shown | None = None
-    """The answer to the object that it is compared with."""
-    compared: str = ""
-    """What observers say of both."""
+    compared: str = ""  # What observers say of both.
     exact: Shown | None = None
-    """The full solution."""
-    difference: str = ""
-    """How far the reduced answer is from it."""
+    difference: str = ""  # How far the reduced answer is from it.
     making: Making | None = None
     """How far the reduced touch is, if the answer is the full solution because there is none yet."""
 

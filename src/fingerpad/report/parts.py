@@ -20,18 +20,15 @@ COLUMNS = ("paper", "human")
 class Paragraph:
     """A paragraph."""
 
-    text: str
-    """Plain text; links as `[text](address)` and code in backticks, as in Markdown."""
+    text: str  # Plain text; links as `[text](address)` and code in backticks, as in Markdown.
 
 
 @dataclass(frozen=True)
 class Row:
     """A row of a table."""
 
-    cells: Sequence[str]
-    """Finished texts, the first is the row's heading."""
-    kind: Kind = ""
-    """How the row is marked."""
+    cells: Sequence[str]  # Finished texts, the first is the row's heading.
+    kind: Kind = ""  # How the row is marked.
 
     @classmethod
     def of(cls, *cells: str, kind: Kind = "") -> Row:
@@ -44,22 +41,17 @@ class Table:
     """A table."""
 
     title: str
-    columns: Sequence[str]
-    """Headings with units; all empty where the table lists names and values."""
-    rows: Sequence[Row]
-    """One cell per column."""
-    note: str = ""
-    """A sentence below it."""
+    columns: Sequence[str]  # Headings with units; all empty where the table lists names and values.
+    rows: Sequence[Row]  # One cell per column.
+    note: str = ""  # A sentence below it.
 
 
 @dataclass(frozen=True)
 class Drawing:
     """A figure with its caption."""
 
-    name: str
-    """Name of the image file, without its ending."""
-    title: str
-    """A few words."""
+    name: str  # Name of the image file, without its ending.
+    title: str  # A few words.
     draw: Callable[[], Figure]
     caption: str
     number: int | None = None
@@ -109,11 +101,9 @@ def illustrated(
 class Chapter:
     """A heading and what stands below it."""
 
-    title: str
-    """The heading; empty for parts that follow the introduction directly."""
+    title: str  # The heading; empty for parts that follow the introduction directly.
     parts: Sequence[Part]
-    folded: Sequence[Part] = ()
-    """What stands below them behind a fold."""
+    folded: Sequence[Part] = ()  # What stands below them behind a fold.
 
     @property
     def anchor(self) -> str:
@@ -144,15 +134,11 @@ class Page:
     """A page."""
 
     heading: str
-    subtitle: str
-    """Title, and what the page is about."""
-    paragraphs: Sequence[str]
-    """Summary; links and code as in `Paragraph`."""
+    subtitle: str  # Title, and what the page is about.
+    paragraphs: Sequence[str]  # Summary; links and code as in `Paragraph`.
     chapters: Sequence[Chapter]
-    opening: Sequence[Drawing] = ()
-    """Small figures after the summary, each with one sentence as its caption."""
-    verdicts: Table | None = None
-    """What stands beside them."""
+    opening: Sequence[Drawing] = ()  # Small figures after the summary, each with one sentence as its caption.
+    verdicts: Table | None = None  # What stands beside them.
 
     @property
     def drawings(self) -> list[Drawing]:

@@ -43,20 +43,15 @@ class ClaimRow:
     """A claim of the paper beside this run."""
 
     group: Group
-    section: str = ""
-    """Section of the paper; empty for our own additions."""
+    section: str = ""  # Section of the paper; empty for our own additions.
     quantity: str
-    """What is compared."""
     paper: str
-    ours: str
-    """As they are printed."""
-    status: str = ""
-    """How far the inputs can be trusted."""
+    ours: str  # As they are printed.
+    status: str = ""  # How far the inputs can be trusted.
     verdict: Verdict
     fitted_to: str = ""
     """What was fitted to the observed number, or chosen by it; in rows of the group `FITTED` alone."""
     note: str = ""
-    """How it was judged."""
 
     def __post_init__(self) -> None:
         if (self.group is Group.FITTED) != bool(self.fitted_to):
@@ -130,16 +125,13 @@ class Statement:
 
     section: str
     statement: str
-    published: str
-    """Where the paper says it, what it says, and the number that it prints."""
+    published: str  # Where the paper says it, what it says, and the number that it prints.
     paper: str
-    human: str
-    """Ours, by the set."""
+    human: str  # Ours, by the set.
     verdict_paper: Verdict
     verdict_human: Verdict
     fitted_paper: str
-    fitted_human: str
-    """What was fitted to it; empty where nothing was."""
+    fitted_human: str  # What was fitted to it; empty where nothing was.
 
 
 def paired(paper: Sequence[ClaimRow], human: Sequence[ClaimRow]) -> tuple[Statement, ...]:

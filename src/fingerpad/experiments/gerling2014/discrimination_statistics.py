@@ -44,55 +44,43 @@ class Estimate:
 class NoiseEffect:
     """How the mean hit rate falls with the noise."""
 
-    noise_sigma: Vector
-    """Noise sigma_1, (n_levels,)."""
-    smallest_fall: Estimate
-    """From one level to the next. [0-1]"""
+    noise_sigma: Vector  # Noise sigma_1, (n_levels,).
+    smallest_fall: Estimate  # From one level to the next. [0-1]
 
 
 @result_class
 class ErrorBarChange:
     """How a variant of the protocol changes the error bars."""
 
-    ratio: Estimate
-    """Mean error bar over that of the reference. [1]"""
-    change: Estimate
-    """Largest change of a mean hit rate. [0-1]"""
+    ratio: Estimate  # Mean error bar over that of the reference. [1]
+    change: Estimate  # Largest change of a mean hit rate. [0-1]
 
 
 @result_class
 class MeanStability:
     """Standard deviation of a mean hit rate when the same sums are judged again."""
 
-    hit_rates: WholeVector
-    """Hit rates behind a mean, (2,)."""
+    hit_rates: WholeVector  # Hit rates behind a mean, (2,).
     few: Estimate
-    many: Estimate
-    """Standard deviation with either number. [0-1]"""
-    ratio: Estimate
-    """The first over the second. [1]"""
+    many: Estimate  # Standard deviation with either number. [0-1]
+    ratio: Estimate  # The first over the second. [1]
 
 
 @result_class
 class NoiseSweep:
     """Misfit of the static Gradient Sum over the noise."""
 
-    noise_sigma: Vector
-    """Noise sigma_1, (n_levels,)."""
-    misfit: tuple[tuple[Estimate, ...], ...]
-    """Root mean square distance to Goodwin's points. [0-1]"""
+    noise_sigma: Vector  # Noise sigma_1, (n_levels,).
+    misfit: tuple[tuple[Estimate, ...], ...]  # Root mean square distance to Goodwin's points. [0-1]
 
 
 @result_class
 class TargetDistances:
     """Static hit rates of one position beside people's."""
 
-    at_goodwin: tuple[Estimate, ...]
-    """Hit rates at Goodwin's spheres. [0-1]"""
-    from_line: tuple[Estimate, ...]
-    """Distance from the line in z. [0-1]"""
-    largest_from_line: Estimate
-    """Largest distance between Goodwin's points. [0-1]"""
+    at_goodwin: tuple[Estimate, ...]  # Hit rates at Goodwin's spheres. [0-1]
+    from_line: tuple[Estimate, ...]  # Distance from the line in z. [0-1]
+    largest_from_line: Estimate  # Largest distance between Goodwin's points. [0-1]
 
 
 @result_class
@@ -108,16 +96,11 @@ class DiscriminationStatistics:
     smallest_rise: dict[str, tuple[Estimate, ...]]
     """Smallest step of the hit rate from one sphere to the next. [0-1]"""
     noise_lowers: NoiseEffect
-    """More noise, lower hit rates."""
     ten_matrices: ErrorBarChange
-    criterion: ErrorBarChange
-    """10 noise matrices instead of 100; a criterion that varies more."""
-    unsteadiness: MeanStability
-    """Means of 10 and of 100 hit rates."""
+    criterion: ErrorBarChange  # 10 noise matrices instead of 100; a criterion that varies more.
+    unsteadiness: MeanStability  # Means of 10 and of 100 hit rates.
     sweep: NoiseSweep
-    """Misfit over the noise."""
     targets: tuple[TargetDistances, ...]
-    """Distances from people."""
 
 
 def estimate(by_session: FloatArray) -> Estimate:
@@ -238,10 +221,8 @@ _FIRST_SESSION = 1
 class Measured:
     """One response measure of the population at one position of the spheres."""
 
-    responses: FloatArray
-    """The standard in the first row, (n_spheres, n_receptors). [any unit]"""
-    neighbours: np.ndarray
-    """Pairs that the Gradient Sum goes over, (n_pairs, 2)."""
+    responses: FloatArray  # The standard in the first row, (n_spheres, n_receptors). [any unit]
+    neighbours: np.ndarray  # Pairs that the Gradient Sum goes over, (n_pairs, 2).
 
     def __post_init__(self) -> None:
         responses = checked_responses(self.responses)
@@ -257,8 +238,7 @@ class Observers:
     """Hit rates of every observer, session by session."""
 
     mean: dict[str, FloatArray]
-    spread: dict[str, FloatArray]
-    """mu_3 and sigma_3, by the name of the observer. [0-1]"""
+    spread: dict[str, FloatArray]  # mu_3 and sigma_3, by the name of the observer. [0-1]
     unsteadiness: dict[int, FloatArray]
     """Standard deviation of mu_3 when the judgements of the static Gradient Sum are repeated, by the number
     of hit rates behind it. [0-1]

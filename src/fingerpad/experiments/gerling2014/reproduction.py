@@ -55,11 +55,8 @@ class Reproduction:
     """A run of all parts of the paper with two sets of tissues."""
 
     folder: Path
-    """Where finished indentations are stored."""
-    resolution: str = "standard"
-    """How fine meshes and steps are."""
-    seed: int = 0
-    """Seed of the observers' noise."""
+    resolution: str = "standard"  # How fine meshes and steps are.
+    seed: int = 0  # Seed of the observers' noise.
     tissues: str = PAPER
     """Tissues of the column `paper`: a name whose afferent follows strain energy density. "paper" is Trial 3
     with a Poisson's ratio of 0.40, which is our reading; "trial3" is Trial 3 to the letter, 0.48.
@@ -96,14 +93,10 @@ class PublishedNumber:
     """A published number on which the results rest, as `fingerpad.data.all_published` lists it."""
 
     name: str
-    value: float | tuple[float, ...]
-    """In `unit`."""
-    unit: str
-    """"1" for pure numbers."""
-    source: str
-    """Where it was published."""
-    status: str
-    """How far it can be trusted; see `fingerpad.data.STATUSES`."""
+    value: float | tuple[float, ...]  # In `unit`.
+    unit: str  # "1" for pure numbers.
+    source: str  # Where it was published.
+    status: str  # How far it can be trusted; see `fingerpad.data.STATUSES`.
 
 
 @result_class
@@ -111,24 +104,19 @@ class SetResult:
     """What one set of tissues with its afferent gives on all levels."""
 
     tissues: str
-    """Name of the set."""
     mesh: MeshPicture
-    levels: ThreeLevels
-    """The mesh under the standard sphere, and that indentation on all levels."""
-    skin_force: SkinForce
-    """Level 1: deflection and force."""
+    levels: ThreeLevels  # The mesh under the standard sphere, and that indentation on all levels.
+    skin_force: SkinForce  # Level 1: deflection and force.
     single_unit: SingleUnitResult
     firing: FiringCourse
     """Level 2: rates under the bar and their fit; when the afferent fires, and what drives it."""
     discrimination: SphereDiscrimination
     population: PopulationMaps
     nail: NailBorder
-    """Level 3."""
     single_unit_uncertainty: UncertaintyResult | None = None
     curvature_thresholds: CurvatureThresholds | None = None
     """What goes beyond the paper, None where it was not asked for."""
-    comparison: tuple[ClaimRow, ...]
-    """The paper's numbers beside ours."""
+    comparison: tuple[ClaimRow, ...]  # The paper's numbers beside ours.
 
 
 @result_class
@@ -137,22 +125,16 @@ class ReproductionResult:
 
     format: Literal["fingerpad reproduction"] = "fingerpad reproduction"
     format_version: Literal[5] = 5
-    """Of the file."""
-    summary: Summaries
-    """A few plain numbers of both sets."""
+    summary: Summaries  # A few plain numbers of both sets.
     statements: tuple[Statement, ...]
     """Every statement of the paper that can fail, with our value and verdict of both sets."""
-    skin_deflection: SkinDeflectionResult
-    """Level 1: the paper's three trials."""
+    skin_deflection: SkinDeflectionResult  # Level 1: the paper's three trials.
     paper: SetResult
-    human: SetResult
-    """The paper's own system, and the set that serves all three levels."""
+    human: SetResult  # The paper's own system, and the set that serves all three levels.
     tissues: tuple[TissueLayer, ...]
     """Every named set of tissues, those of the run and of the trials among them."""
-    inputs: tuple[PublishedNumber, ...]
-    """Published numbers on which all of it rests."""
+    inputs: tuple[PublishedNumber, ...]  # Published numbers on which all of it rests.
     manifest: Manifest
-    """What ran."""
 
 
 def reproduce(run: Reproduction, progress: Progress | None = None) -> ReproductionResult:
@@ -294,8 +276,7 @@ def _method(conditions: Conditions, spheres: dict[tuple[float, float], SkinRespo
 class Summary:
     """One number per quantity, at the tissues, the afferent and the noise of the run."""
 
-    deflection_r2: Number
-    """R² of the deflection under the cylinder at 1.0 mm."""
+    deflection_r2: Number  # R² of the deflection under the cylinder at 1.0 mm.
     force_plate_1mm_n: Number
     force_plate_2mm_n: Number
     force_disc_1mm_n: Number
@@ -306,12 +287,9 @@ class Summary:
     dynamic_flat_hz: Number
     dynamic_max_hz: Number
     """Smallest dynamic rate under the flat face of the bar, and the largest. [spikes/s]"""
-    static_difference_hz: Number
-    """Largest static rate less the smallest under the flat face. [spikes/s]"""
-    resting_rate_hz: Number
-    """Rate without a touch. [spikes/s]"""
-    noise_sigma: Number
-    """Noise that fits people's two points best."""
+    static_difference_hz: Number  # Largest static rate less the smallest under the flat face. [spikes/s]
+    resting_rate_hz: Number  # Rate without a touch. [spikes/s]
+    noise_sigma: Number  # Noise that fits people's two points best.
     euclidean_rms_same_noise: Number
     """Root mean square distance of the Euclidean Distance to these points at that noise. [0-1]"""
     hit_rate_296: tuple[Number, Number]
@@ -321,8 +299,7 @@ class Summary:
     weber_287: Number
     """Curvature threshold at 75 % over the standard; NaN where it was not asked for or does not exist."""
     wall_s: float = 0.0
-    peak_memory_mb: float = 0.0
-    """Of the whole run, both sets. [s, MB]"""
+    peak_memory_mb: float = 0.0  # Of the whole run, both sets. [s, MB]
 
 
 @result_class

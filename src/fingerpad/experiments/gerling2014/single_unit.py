@@ -109,13 +109,9 @@ class Modulation:
     """Modulation of the rate at the edge of the bar (Eq. 11)."""
 
     maximum_hz: Number
-    """Largest rate. [spikes/s]"""
-    minimum_hz: Number
-    """Smallest rate with the flat face of the bar over the receptor. [spikes/s]"""
+    minimum_hz: Number  # Smallest rate with the flat face of the bar over the receptor. [spikes/s]
     difference_hz: Number
-    """Their difference. [spikes/s]"""
-    index: Number
-    """Modulation index; NaN if there are no spikes. [1]"""
+    index: Number  # Modulation index; NaN if there are no spikes. [1]
 
 
 @result_class
@@ -123,8 +119,7 @@ class PhaseModulation:
     """Modulation of the rates of one phase."""
 
     observed: Modulation
-    ours: Modulation
-    """Of the recorded and of the predicted rates."""
+    ours: Modulation  # Of the recorded and of the predicted rates.
 
 
 @result_class
@@ -132,35 +127,27 @@ class RateModulation:
     """Modulation of both rates."""
 
     dynamic: PhaseModulation
-    static: PhaseModulation
-    """During the ramp and during the hold."""
+    static: PhaseModulation  # During the ramp and during the hold.
 
 
 @result_class
 class SearchStep:
     """One iteration of the response-surface method."""
 
-    iteration: int
-    """From 0, the start point."""
-    fss: Number
-    """Fractional sum of squares of the training set. [1]"""
-    parameters: dict[str, Number]
-    """Six parameters, by name."""
+    iteration: int  # From 0, the start point.
+    fss: Number  # Fractional sum of squares of the training set. [1]
+    parameters: dict[str, Number]  # Six parameters, by name.
 
 
 @result_class
 class Search:
     """Search of one fold from one start point."""
 
-    start: int
-    """Number of the start point, from 1."""
+    start: int  # Number of the start point, from 1.
     fss_train: Number
-    fss_test: Number
-    """Fractional sum of squares of the training and of the testing set. [1]"""
-    runs: int
-    """Evaluations of the model."""
-    history: tuple[SearchStep, ...]
-    """Steps from the start point to the end."""
+    fss_test: Number  # Fractional sum of squares of the training and of the testing set. [1]
+    runs: int  # Evaluations of the model.
+    history: tuple[SearchStep, ...]  # Steps from the start point to the end.
 
 
 @result_class
@@ -168,19 +155,13 @@ class FoldResult:
     """One fold of the cross-validation."""
 
     fold: int
-    start: int
-    """Number of the fold and of the better start point, from 1."""
-    testing_shift_mm: Vector
-    """Shifts left out, (n_testing,). [mm]"""
-    fss_start: Vector
-    """Fractional sum of squares of the training set at the start points, (n_starts,). [1]"""
+    start: int  # Number of the fold and of the better start point, from 1.
+    testing_shift_mm: Vector  # Shifts left out, (n_testing,). [mm]
+    fss_start: Vector  # Fractional sum of squares of the training set at the start points, (n_starts,). [1]
     fss_train: Number
-    fss_test: Number
-    """Of the better search. [1]"""
-    parameters: dict[str, Number]
-    """Six parameters of the better search, by name."""
-    climbs: tuple[Search, ...]
-    """One per start point."""
+    fss_test: Number  # Of the better search. [1]
+    parameters: dict[str, Number]  # Six parameters of the better search, by name.
+    climbs: tuple[Search, ...]  # One per start point.
 
 
 @result_class
@@ -189,33 +170,22 @@ class SingleUnitResult:
 
     fss_in_sample: Number
     fss_in_sample_dynamic: Number
-    fss_in_sample_static: Number
-    """Fractional sum of squares over all shifts, weighted and by phase. [1]"""
+    fss_in_sample_static: Number  # Fractional sum of squares over all shifts, weighted and by phase. [1]
     fss_out_of_sample: Number
-    fss_training_mean: Number
-    """Mean over the folds, of the testing and of the training sets. [1]"""
+    fss_training_mean: Number  # Mean over the folds, of the testing and of the training sets. [1]
     method: str
-    """Name of the method of fitting."""
     dynamic_quantity: str
-    static_quantity: str
-    """What the two terms of the current follow, see `SkinResponse.sample`."""
+    static_quantity: str  # What the two terms of the current follow, see `SkinResponse.sample`.
     parameters: dict[str, Number]
-    units: dict[str, str]
-    """Six parameters fitted to all shifts, and their units, by name."""
-    shift_mm: Vector
-    """Shifts of the bar, proximal positive, (n_shifts,). [mm]"""
+    units: dict[str, str]  # Six parameters fitted to all shifts, and their units, by name.
+    shift_mm: Vector  # Shifts of the bar, proximal positive, (n_shifts,). [mm]
     dynamic_rate_hz: Vector
-    static_rate_hz: Vector
-    """Predicted rates, (n_shifts,). [spikes/s]"""
+    static_rate_hz: Vector  # Predicted rates, (n_shifts,). [spikes/s]
     observed_dynamic_rate_hz: Vector
-    observed_static_rate_hz: Vector
-    """Recorded rates, (n_shifts,). [spikes/s]"""
-    start_points: tuple[dict[str, Number], ...]
-    """Both start points, by name of the parameter."""
+    observed_static_rate_hz: Vector  # Recorded rates, (n_shifts,). [spikes/s]
+    start_points: tuple[dict[str, Number], ...]  # Both start points, by name of the parameter.
     folds: tuple[FoldResult, ...]
-    """Cross-validation."""
     modulation: RateModulation
-    """At the edge of the bar."""
     initial_mv: Number | None = None
     """Potential of the membrane at the start; that at rest if there is none. [mV]"""
 
@@ -309,16 +279,13 @@ class FiringCourse:
 
     peak_ms: Vector
     """End of the shortest interval between spikes, (n_shifts,); NaN with fewer than two spikes. [ms]"""
-    window_ms: tuple[float, float]
-    """The paper's window of the dynamic rate. [ms]"""
+    window_ms: tuple[float, float]  # The paper's window of the dynamic rate. [ms]
     dynamic_share_ramp: Vector
     """Share of the dynamic term in the charge of both terms in the ramp, (n_shifts,). [1]"""
-    dynamic_share_hold: Vector
-    """The same in the hold, (n_shifts,). [1]"""
+    dynamic_share_hold: Vector  # The same in the hold, (n_shifts,). [1]
     sed_r2: Number
     """R² of the line from SED in the middle of the static window to the observed static rates. [1]"""
-    depth_mm: Vector
-    """Depths of a flat plate, (n_depths,). [mm]"""
+    depth_mm: Vector  # Depths of a flat plate, (n_depths,). [mm]
     static_rate_by_depth_hz: Vector
     """Static rate at these depths, mean of the population, (n_depths,). [spikes/s]"""
 

@@ -30,20 +30,16 @@ class IndenterDeflection:
     deflection_mm: Vector
     """Profile along the midline: distance from the indenter's axis, proximal positive, (n_nodes,). [mm]"""
     force_mn: Number
-    peak_force_mn: Number
-    """Force at the end of the hold, and the largest force. [mN]"""
-    penetration_mm: Number
-    """Largest overlap of skin and indenter. [mm]"""
+    peak_force_mn: Number  # Force at the end of the hold, and the largest force. [mN]
+    penetration_mm: Number  # Largest overlap of skin and indenter. [mm]
 
 
 @result_class
 class CylinderDeflection(IndenterDeflection):
     """Deflection of the skin under the cylinder, compared with the observations."""
 
-    r2: Number
-    """Coefficient of determination, see `deflection_r2`."""
-    r2_mirrored: Number
-    """The same with proximal and distal exchanged."""
+    r2: Number  # Coefficient of determination, see `deflection_r2`.
+    r2_mirrored: Number  # The same with proximal and distal exchanged.
 
 
 @result_class
@@ -51,9 +47,7 @@ class TrialDeflection:
     """Deflections with the tissues of one trial."""
 
     line: IndenterDeflection
-    """Under the line load."""
     cylinder: CylinderDeflection
-    """Under the cylinder."""
 
 
 @result_class
@@ -61,10 +55,8 @@ class ObservedDeflection:
     """Observed deflection under the cylinder."""
 
     distance_mm: Vector
-    deflection_mm: Vector
-    """(n_points,)."""
-    is_artefact: TruthVector
-    """Points that R² leaves out, (n_points,)."""
+    deflection_mm: Vector  # (n_points,).
+    is_artefact: TruthVector  # Points that R² leaves out, (n_points,).
 
 
 @result_class
@@ -73,10 +65,8 @@ class SkinDeflectionResult:
 
     trial1: TrialDeflection
     trial2: TrialDeflection
-    trial3: TrialDeflection
-    """By the tissues of the paper's trials."""
+    trial3: TrialDeflection  # By the tissues of the paper's trials.
     observed: ObservedDeflection
-    """What they are compared with."""
 
 
 def deflection_touches(conditions: Conditions) -> dict[tuple[str, str], Touch]:
@@ -151,13 +141,10 @@ PLATE_DEPTHS_MM = (1.0, 2.0)
 class SkinForce:
     """Deflection and force with the tissues of the run."""
 
-    deflection_r2: Number
-    """R² of the deflection under the cylinder, see `deflection_r2`."""
+    deflection_r2: Number  # R² of the deflection under the cylinder, see `deflection_r2`.
     plate_1mm_n: Number
-    plate_2mm_n: Number
-    """Force of a flat plate at the end of the hold, 1.0 and 2.0 mm deep. [N]"""
-    disc_1mm_n: Number
-    """Force of a flat disc of 6.35 mm diameter at the end of the hold, 1.0 mm deep. [N]"""
+    plate_2mm_n: Number  # Force of a flat plate at the end of the hold, 1.0 and 2.0 mm deep. [N]
+    disc_1mm_n: Number  # Force of a flat disc of 6.35 mm diameter at the end of the hold, 1.0 mm deep. [N]
 
 
 def plate(depth_mm: float) -> str:

@@ -58,10 +58,8 @@ class ObserverHitRates:
 
     hit_rate: Vector
     hit_rate_sd: Vector
-    hit_rate_shifted: Vector
-    """Means with the spheres at 0.0 and at 0.2 mm, (n_comparisons,). [0-1]"""
-    hit_rate_shifted_sd: Vector
-    """Standard deviations, (n_comparisons,). [0-1]"""
+    hit_rate_shifted: Vector  # Means with the spheres at 0.0 and at 0.2 mm, (n_comparisons,). [0-1]
+    hit_rate_shifted_sd: Vector  # Standard deviations, (n_comparisons,). [0-1]
 
 
 @result_class
@@ -69,28 +67,20 @@ class SphereDiscrimination:
     """Hit rates of all observers at the noise that fits Goodwin's two points best."""
 
     seed: int
-    sessions: int
-    """Of all noise; repetitions of the protocol."""
-    curvature_per_m: Vector
-    """The spheres, the standard first, (7,). [1/m]"""
+    sessions: int  # Of all noise; repetitions of the protocol.
+    curvature_per_m: Vector  # The spheres, the standard first, (7,). [1/m]
     noise_sigma: float
     noise_fit_error: float
-    noise_sigma_paper: float
-    """Fitted noise, root mean square error of the fit [0-1], and the paper's noise."""
-    goodwin: GoodwinHitRates
-    """Of people."""
-    gradient_sums: dict[str, Matrix]
-    """Without noise, by measure, (n_positions, 7). [spikes/s or ms]"""
+    noise_sigma_paper: float  # Fitted noise, root mean square error of the fit [0-1], and the paper's noise.
+    goodwin: GoodwinHitRates  # Of people.
+    gradient_sums: dict[str, Matrix]  # Without noise, by measure, (n_positions, 7). [spikes/s or ms]
     gradient_sum: dict[str, ObserverHitRates]
     euclidean: dict[str, ObserverHitRates]
     variants: dict[str, ObserverHitRates]
     """First session: by measure for the two codes, and variants of the static Gradient Sum by name."""
-    silent: tuple[str, ...]
-    """Measures that are left out because the population stays silent."""
-    statistics: DiscriminationStatistics
-    """Behind the paper's statements."""
-    reasons: DiscrepancyAnalysis
-    """Why the numbers differ from the paper's."""
+    silent: tuple[str, ...]  # Measures that are left out because the population stays silent.
+    statistics: DiscriminationStatistics  # Behind the paper's statements.
+    reasons: DiscrepancyAnalysis  # Why the numbers differ from the paper's.
 
 
 def discrimination_touches(conditions: Conditions) -> dict[tuple[float, float], Touch]:

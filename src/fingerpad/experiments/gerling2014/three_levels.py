@@ -29,33 +29,23 @@ UNTIL_MS, POTENTIAL_STEP_MS = 200.0, 0.5
 class ThreeLevels:
     """Skin, one afferent and three afferents under the standard sphere (Figure 2)."""
 
-    curvature_per_m: float
-    """Of the sphere. [1/m]"""
-    centre_mm: tuple[float, float]
-    """x and y of its centre at the end of the hold. [mm]"""
-    ramp_ms: float
-    """Duration of the ramp. [ms]"""
+    curvature_per_m: float  # Of the sphere. [1/m]
+    centre_mm: tuple[float, float]  # x and y of its centre at the end of the hold. [mm]
+    ramp_ms: float  # Duration of the ramp. [ms]
     x_mm: Matrix
     y_mm: Matrix
     """Nodes of the plane z = 0 at the end of the hold, through from the skin to the bone, (n_outline + 1,
     n_through + 1). [mm]
     """
-    pressed: str
-    """Name of what the afferent follows, as it is known in all elements."""
-    pressed_kpa: Matrix
-    """Its values in the elements beside that plane, (n_outline, n_through). [kPa]"""
-    end_ms: float
-    """End of the hold. [ms]"""
-    offset_mm: Vector
-    """Positions of the afferents relative to the contact, (3,). [mm]"""
-    spikes_ms: tuple[Vector, ...]
-    """Spike times of each afferent. [ms]"""
+    pressed: str  # Name of what the afferent follows, as it is known in all elements.
+    pressed_kpa: Matrix  # Its values in the elements beside that plane, (n_outline, n_through). [kPa]
+    end_ms: float  # End of the hold. [ms]
+    offset_mm: Vector  # Positions of the afferents relative to the contact, (3,). [mm]
+    spikes_ms: tuple[Vector, ...]  # Spike times of each afferent. [ms]
     dynamic_rate_hz: Vector
-    static_rate_hz: Vector
-    """Their rates, (3,). [spikes/s]"""
+    static_rate_hz: Vector  # Their rates, (3,). [spikes/s]
     times_ms: Vector
-    until_ms: float
-    """Times of the next two, and their end, (n_times,). [ms]"""
+    until_ms: float  # Times of the next two, and their end, (n_times,). [ms]
     current_ma: Vector
     potential_mv: Vector
     """Current through the membrane of the first afferent, and its potential, (n_times,). [mA, mV]"""
@@ -155,8 +145,7 @@ class MeshPlane:
     right_mm: Matrix
     up_mm: Matrix
     """Coordinates in the plane, through from the skin to the bone, (n_outline, n_through + 1). [mm]"""
-    under_nail: TruthVector
-    """Whether the node on the skin lies under the nail, (n_outline,)."""
+    under_nail: TruthVector  # Whether the node on the skin lies under the nail, (n_outline,).
 
 
 @result_class
@@ -165,27 +154,18 @@ class MeshPicture:
 
     x_mm: Matrix
     y_mm: Matrix
-    z_mm: Matrix
-    """Nodes of the skin, (n_along + 1, n_around + 1). [mm]"""
-    under_nail: TruthMatrix
-    """Whether they lie under the nail, (n_along + 1, n_around + 1)."""
+    z_mm: Matrix  # Nodes of the skin, (n_along + 1, n_around + 1). [mm]
+    under_nail: TruthMatrix  # Whether they lie under the nail, (n_along + 1, n_around + 1).
     along: MeshPlane
     """Plane z = 0; right is x, up is y. The outline runs from the volar side over the tip to the back."""
-    across: MeshPlane
-    """Proximal end, beside the middle phalanx; right is z, up is y."""
-    half: bool
-    """Whether `across` is one half, whose other half is its mirror image."""
-    contact_mm: tuple[float, float]
-    """x and y of the skin at the contact. [mm]"""
-    layers: tuple[str, ...]
-    """From the skin inwards."""
-    layer: WholeVector
-    """Index into `layers` of each element through the skin, (n_through,)."""
-    receptor_depth_mm: float
-    """Of the end organs below the skin. [mm]"""
+    across: MeshPlane  # Proximal end, beside the middle phalanx; right is z, up is y.
+    half: bool  # Whether `across` is one half, whose other half is its mirror image.
+    contact_mm: tuple[float, float]  # x and y of the skin at the contact. [mm]
+    layers: tuple[str, ...]  # From the skin inwards.
+    layer: WholeVector  # Index into `layers` of each element through the skin, (n_through,).
+    receptor_depth_mm: float  # Of the end organs below the skin. [mm]
     nodes: int
-    elements: int
-    """Of the whole mesh."""
+    elements: int  # Of the whole mesh.
 
 
 def mesh_picture(mesh: Mesh, contact_x_mm: float) -> MeshPicture:
@@ -240,10 +220,8 @@ class RestingResponse:
     """Response of an afferent without any touch."""
 
     dynamic_rate_hz: float
-    static_rate_hz: float
-    """Rates in the windows of the ramp and the hold. [spikes/s]"""
-    first_spike_latency_ms: Number
-    """NaN without a spike. [ms]"""
+    static_rate_hz: float  # Rates in the windows of the ramp and the hold. [spikes/s]
+    first_spike_latency_ms: Number  # NaN without a spike. [ms]
 
 
 @result_class
@@ -251,25 +229,19 @@ class ResponseSheet:
     """Responses of a sheet of afferents as tables over x (rows) and z (columns)."""
 
     x_mm: Vector
-    z_mm: Vector
-    """Places of the afferents, (n_x,). [mm]"""
+    z_mm: Vector  # Places of the afferents, (n_x,). [mm]
     dynamic_rate_hz: Matrix
-    static_rate_hz: Matrix
-    """Rates, (n_x, n_z). [spikes/s]"""
-    first_spike_latency_ms: Matrix
-    """NaN without a spike, (n_x, n_z). [ms]"""
+    static_rate_hz: Matrix  # Rates, (n_x, n_z). [spikes/s]
+    first_spike_latency_ms: Matrix  # NaN without a spike, (n_x, n_z). [ms]
 
 
 @result_class
 class PopulationMaps(ResponseSheet):
     """Responses of a dense sheet of afferents under the standard sphere (Figure 6)."""
 
-    curvature_per_m: float
-    """Of the sphere. [1/m]"""
-    at_rest: RestingResponse
-    """Of the same afferent."""
-    receptors_mm: Matrix
-    """Places of the paper's receptors, (18, 2). [mm]"""
+    curvature_per_m: float  # Of the sphere. [1/m]
+    at_rest: RestingResponse  # Of the same afferent.
+    receptors_mm: Matrix  # Places of the paper's receptors, (18, 2). [mm]
 
 
 def population_maps(standard: SkinResponse, afferent: Afferent) -> PopulationMaps:
