@@ -11,7 +11,6 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.text import Text
 
-from fingerpad.core.checks import FloatArray
 from fingerpad.data import psychophysics
 from fingerpad.experiments.gerling2014.discrepancy import CriterionErrorBars
 from fingerpad.experiments.gerling2014.goodwin import GoodwinHitRates
@@ -26,6 +25,7 @@ from fingerpad.report.style import (
     GREY,
     ORANGE,
     PALE,
+    PEOPLE,
     LineStyle,
     new_figure,
     say_nothing_to_draw,
@@ -73,21 +73,15 @@ def draw_noise(section: SphereDiscrimination) -> Figure:
     codes.set_title("(a) each code, expected")
     swept = section.statistics.sweep
     for misfit, (style, label) in zip(swept.misfit, POSITION_STYLES, strict=True):
-        sweep.errorbar(
-            swept.noise_sigma,
-            [one.value for one in misfit],
-            yerr=np.nan_to_num([one.error for one in misfit]),
-            markersize=5.0,
-            capsize=3.0,
-            label=label.removeprefix("predicted, "),
-            **style,
-        )
+        means, errors = ([getattr(one, name) for one in misfit] for name in ("value", "error"))
+        label, bars = label.removeprefix("predicted, "), np.nan_to_num(errors)
+        sweep.errorbar(swept.noise_sigma, means, bars, markersize=5.0, capsize=3.0, label=label, **style)
     sweep.set_title("(b) static Gradient Sum")
     marked = {"paper's best": section.noise_sigma_paper, "our fit": section.noise_sigma}
     for axes in (codes, sweep):
         for (label, sigma), dashes in zip(marked.items(), ((6, 3), (1, 1)), strict=True):
             axes.axvline(sigma, color=GREY, linewidth=1.4, linestyle=(0, dashes), label=label)
-        axes.set_xlabel("noise σ₁ [fraction]")
+        axes.set(xlabel="noise σ₁ [fraction]")
         axes.set_ylim(bottom=0.0)
     codes.set_ylabel("distance to observed hit rates, rms [fraction]")
     sweep.set_xlim(left=0.0)
@@ -141,70 +135,37 @@ def _draw(section: SphereDiscrimination, panels: list[Panel]) -> Figure:
         axes.set_title(f"({'abcdefghijklmnop'[index]}) {title}", fontsize=10.0)
         if rates is None:
             say_nothing_to_draw(axes, "not computed")
-            continue
-        draw_hit_rates(axes, section, rates)
-    _label(figure, grid, len(panels))
+        else:
+            draw_hit_rates(axes, section, rates)
+        if index % 2 == 0:
+            axes.set_ylabel("hit rate [fraction]")
+        if index >= len(panels) - 2:
+            axes.set_xlabel("comparison curvature [1/m]")
+            axes.tick_params(labelbottom=True)
+    lowest, _ = grid[0, 0].get_ylim()
+    grid[0, 0].set_ylim(max(min(lowest, 0.4), 0.0), 1.0)
+    shared_legend(figure, grid.flat, columns=2)
     return figure
 
 
 def draw_hit_rates(axes: Axes, section: SphereDiscrimination, rates: ObserverHitRates) -> None:
     """Draw the hit rates of one observer at both positions, those of people, and chance."""
     axes.axhline(CHANCE, color=GREY, linewidth=1.0, linestyle=(0, (6, 3)), label="chance")
-    _curves(axes, section.curvature_per_m[1:], rates)
-    draw_people(axes, section.goodwin)
-
-
-def _curves(axes: Axes, comparison: FloatArray, rates: ObserverHitRates) -> None:
     both = (rates.hit_rate, rates.hit_rate_sd), (rates.hit_rate_shifted, rates.hit_rate_shifted_sd)
+    lines: Any = {"markersize": 4.0, "linewidth": 1.5, "elinewidth": 1.0, "capsize": 3.0, "clip_on": False}
     for (means, spreads), (style, label) in zip(both, POSITION_STYLES, strict=True):
         bars = np.nan_to_num(np.minimum(spreads, [means, 1.0 - means]))  # a hit rate lies within 0 and 1
-        axes.errorbar(
-            comparison,
-            means,
-            yerr=bars,
-            markersize=4.0,
-            linewidth=1.5,
-            elinewidth=1.0,
-            capsize=3.0,
-            label=label,
-            clip_on=False,
-            **style,
-        )
+        axes.errorbar(section.curvature_per_m[1:], means, bars, label=label, **style, **lines)
+    draw_people(axes, section.goodwin)
 
 
 def draw_people(axes: Axes, observed: GoodwinHitRates) -> None:
     """Draw the hit rates of people with their intervals."""
+    rate, label = observed.hit_rate, "observed (Goodwin et al. 1991)"
+    bars = [rate - observed.low, observed.high - rate]
     axes.errorbar(
-        observed.curvature_per_m,
-        observed.hit_rate,
-        yerr=[observed.hit_rate - observed.low, observed.high - observed.hit_rate],
-        fmt="D",
-        elinewidth=1.2,
-        capsize=4.0,
-        markersize=7.5,
-        color=BLACK,
-        markerfacecolor="none",
-        markeredgewidth=1.6,
-        zorder=5,
-        label="observed (Goodwin et al. 1991)",
+        observed.curvature_per_m, rate, bars, fmt="D", elinewidth=1.2, capsize=4.0, label=label, **PEOPLE
     )
-
-
-def _interval(observed: GoodwinHitRates) -> str:
-    """Explain the error bars of the observed hit rates."""
-    return f"binomial 95 % intervals of {number(observed.trials)} trials, an assumed number"
-
-
-def _label(figure: Figure, grid: np.ndarray, n_panels: int) -> None:
-    for axes in grid[:, 0]:
-        axes.set_ylabel("hit rate [fraction]")
-    for index, axes in enumerate(grid.flat):
-        if n_panels - grid.shape[1] <= index < n_panels:
-            axes.set_xlabel("comparison curvature [1/m]")
-            axes.tick_params(labelbottom=True)
-    lowest, _ = grid[0, 0].get_ylim()
-    grid[0, 0].set_ylim(max(min(lowest, 0.4), 0.0), 1.0)
-    shared_legend(figure, grid.flat, columns=2)
 
 
 def caption_observers(section: SphereDiscrimination) -> str:
@@ -213,14 +174,13 @@ def caption_observers(section: SphereDiscrimination) -> str:
         "Fraction of trials in which a sphere is discriminated from the standard of "
         f"{number(section.curvature_per_m[0])} 1/m; bars are one standard deviation over hit rates, within "
         "0 and 1. Blue, solid: predicted for a sphere over the middle of the receptors; orange, dotted: for "
-        "one 0.2 mm away. Diamonds: observed in people (Goodwin et al. 1991), with "
-        f"{_interval(section.goodwin)}. (a-c) Gradient Sum of static rates, dynamic rates and first-spike "
-        "latencies, (d) Euclidean Distance of static rates, all with the noise that was fitted to "
-        "the diamonds with the code of (a). (e, f) "
-        "The paper's noise on either side of its best; (g) 10 noise matrices in place of 100; (h) the "
-        "paper's best noise. In the paper the static Gradient Sum fits best and hardly depends on the shift, "
-        "dynamic rates and latencies depend on it, more noise lowers the curve, and fewer matrices widen the "
-        "bars."
+        "one 0.2 mm away. Diamonds: observed in people (Goodwin et al. 1991), with binomial 95 % intervals "
+        f"of {number(section.goodwin.trials)} trials, an assumed number. (a-c) Gradient Sum of static rates, "
+        "dynamic rates and first-spike latencies, (d) Euclidean Distance of static rates, all with the noise "
+        "that was fitted to the diamonds with the code of (a). (e, f) The paper's noise on either side of "
+        "its best; (g) 10 noise matrices in place of 100; (h) the paper's best noise. In the paper the static "
+        "Gradient Sum fits best and hardly depends on the shift, dynamic rates and latencies depend on it, "
+        "more noise lowers the curve, and fewer matrices widen the bars."
     )
 
 
@@ -236,10 +196,6 @@ def caption_criterion(_: SphereDiscrimination) -> str:
 
 def discrimination_tables(section: SphereDiscrimination) -> list[Table]:
     """Return the hit rates of Figures 7 and 8, and the alternative interpretations of the paper's steps."""
-    return [_hit_rates(section), _interpretations(section), criterion_table(section.reasons.criterion)]
-
-
-def _hit_rates(section: SphereDiscrimination) -> Table:
     rows = [
         Row.of(title.replace("\n", ", "), place, *map(with_error, means, spreads))
         for title, rates in (*observer_panels(section), *criterion_panels(section))
@@ -250,7 +206,9 @@ def _hit_rates(section: SphereDiscrimination) -> Table:
         )
     ]
     spheres = (f"{number(curvature)} 1/m" for curvature in section.curvature_per_m[1:])
-    return Table("Hit rates, mean ± standard deviation", ("observer", "sphere at [mm]", *spheres), rows)
+    columns = ("observer", "sphere at [mm]", *spheres)
+    hit_rates = Table("Hit rates, mean ± standard deviation", columns, rows)
+    return [hit_rates, _interpretations(section), criterion_table(section.reasons.criterion)]
 
 
 def criterion_table(bars: CriterionErrorBars) -> Table:
@@ -357,15 +315,14 @@ def _found(sets: Mapping[str, SphereDiscrimination], code: str) -> str:
     lines = []
     for name, section in sets.items():
         low, high = (f"{number(curvature)} 1/m" for curvature in section.curvature_per_m[[1, -1]])
-        found = [f"{measure} {_ends(rates)}" for measure, rates in getattr(section, code).items()]
+        found = [
+            f"{measure} {' and '.join(fixed(rates.hit_rate[end], 2) for end in (0, -1))}"
+            for measure, rates in getattr(section, code).items()
+        ]
         lines.append(
             f"{name}, {low} and {high}: {'; '.join(found) or 'no hit rates: the population is silent'}"
         )
     return "\n".join(lines)
-
-
-def _ends(rates: ObserverHitRates) -> str:
-    return " and ".join(fixed(rates.hit_rate[end], 2) for end in (0, -1))
 
 
 def _row(axes: Axes, texts: Sequence[str], places: Any, row: str, colour: str) -> list[Text]:

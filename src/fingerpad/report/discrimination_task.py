@@ -9,7 +9,6 @@ from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.collections import PathCollection
 from matplotlib.figure import Figure
 
 from fingerpad.core.checks import FloatArray
@@ -20,7 +19,7 @@ from fingerpad.report.formatting import ABSENT, fixed, joined, number, whole_per
 from fingerpad.report.manifest import edition, manifest_chapter
 from fingerpad.report.mixed_responses import MAP_AXES
 from fingerpad.report.page import write_html
-from fingerpad.report.parts import Chapter, Page, Row, Table, illustrated
+from fingerpad.report.parts import Chapter, Page, Row, Table, illustrated, listed
 from fingerpad.report.style import (
     BLACK,
     BLUE,
@@ -28,6 +27,7 @@ from fingerpad.report.style import (
     GREY,
     ORANGE,
     PALE,
+    PEOPLE,
     new_figure,
     say_nothing_to_draw,
     shared_legend,
@@ -39,14 +39,8 @@ SEVERAL = {"static": "static rates", "dynamic": "dynamic rates", "latency": "fir
 
 def task_tables(found: TaskResult) -> list[Table]:
     """Tables of thresholds, hit rates, efficiencies and the population."""
-    every = (
-        _thresholds(found),
-        _hit_rates(found),
-        _forced_choices(found),
-        _efficiencies(found),
-        _population(found),
-    )
-    return [table for table in every if table.rows]
+    every = (_thresholds, _hit_rates, _forced_choices, _efficiencies, _population)
+    return [table for make in every if (table := make(found)).rows]
 
 
 def write_task_page(results: DiscriminationFile, folder: Path) -> Path:
@@ -211,7 +205,7 @@ def _population(found: TaskResult) -> Table:
         if population.sensitivity is None
         else f"{number(population.sensitivity.min())} … {number(population.sensitivity.max())}",
     }
-    return Table("The population", ("", ""), [Row(fact) for fact in facts.items()])
+    return listed("The population", facts)
 
 
 _CHANCE = 0.5
@@ -239,33 +233,28 @@ def draw_task_responses(found: TaskResult) -> Figure:
     """Draw the responses to the standard and to comparisons, seen from the volar side."""
     measure = main_decoding(found).measure
     what, unit = MEASURE_LABELS[measure]
-    responses, places = found.responses[measure], found.population.positions_mm
-    shown = _shown(len(responses))
-    low, high = places[:, [0, -1]].min(axis=0) - MARGIN_MM, places[:, [0, -1]].max(axis=0) + MARGIN_MM
+    responses, places = found.responses[measure], found.population.positions_mm[:, [0, -1]]
+    shown, size = _shown(len(responses)), _marker_size(len(places))
+    low, high = places.min(axis=0) - MARGIN_MM, places.max(axis=0) + MARGIN_MM
     along, across = high - low
     height = float(np.clip(8.0 / len(shown) * across / along, 0.5, 4.0))
     figure = new_figure(10.0, 2.0 * height + 1.4)
     grid = figure.subplots(2, len(shown), sharex=True, sharey=True, squeeze=False)
     largest = float(np.nanmax(np.abs(responses[shown] - responses[0])))
-    for column, row in enumerate(shown):
+    colours: Any = {"cmap": "viridis", "vmin": np.nanmin(responses), "vmax": np.nanmax(responses)}
+    for (axes, beneath), row in zip(grid.T, shown, strict=True):
         name = found.stimulus[row]
-        picture = _responses(grid[0, column], places, responses[row], responses)
-        grid[0, column].set_title(f"{name}, standard" if row == 0 else name)
+        picture = axes.scatter(
+            places[:, 0], places[:, 1], c=responses[row], s=size, edgecolors=GREY, linewidths=0.5, **colours
+        )
+        axes.set_title(f"{name}, standard" if row == 0 else name)
         if row:
-            _differences(grid[1, column], places, responses[row] - responses[0], largest)
+            _differences(beneath, places, responses[row] - responses[0], largest)
     grid[1, 0].set_axis_off()
-    grid[1, 0].text(
-        0.5,
-        0.5,
-        f"less the standard:\n▲ more, ▼ less,\nlargest {number(largest)} {unit}",
-        ha="center",
-        va="center",
-        transform=grid[1, 0].transAxes,
-    )
+    text = f"less the standard:\n▲ more, ▼ less,\nlargest {number(largest)} {unit}"
+    grid[1, 0].text(0.5, 0.5, text, ha="center", va="center", transform=grid[1, 0].transAxes)
     for axes in grid.flat:
-        axes.set_aspect("equal")
-        axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]))
-        axes.set_facecolor(PALE)
+        axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), aspect="equal", facecolor=PALE)
     for axes in (grid[0, 0], grid[1, 1]):
         axes.set_ylabel(MAP_AXES["ylabel"])
         axes.tick_params(labelleft=True)
@@ -276,27 +265,12 @@ def draw_task_responses(found: TaskResult) -> Figure:
     return figure
 
 
-def _responses(axes: Axes, places: FloatArray, responses: FloatArray, of_all: FloatArray) -> PathCollection:
-    """Draw every afferent where it ends, coloured by its response."""
-    return axes.scatter(
-        places[:, 0],
-        places[:, -1],
-        c=responses,
-        s=_marker_size(len(places)),
-        cmap="viridis",
-        vmin=np.nanmin(of_all),
-        vmax=np.nanmax(of_all),
-        edgecolors=GREY,
-        linewidths=0.5,
-    )
-
-
 def _differences(axes: Axes, places: FloatArray, difference: FloatArray, largest: float) -> None:
     """Draw upright triangles where there is more, hanging ones where there is less, by area."""
     size = _marker_size(len(places)) * np.abs(np.nan_to_num(difference)) / (largest or 1.0)
     for sign, marker, colour in ((1.0, "^", ORANGE), (-1.0, "v", BLUE)):
         there = sign * difference > 0.0
-        axes.scatter(places[there, 0], places[there, -1], s=size[there], marker=marker, color=colour)
+        axes.scatter(places[there, 0], places[there, 1], s=size[there], marker=marker, color=colour)
 
 
 def draw_task_statistics(found: TaskResult) -> Figure:
@@ -311,7 +285,7 @@ def draw_task_statistics(found: TaskResult) -> Figure:
         if decoding.statistic is None:
             say_nothing_to_draw(axes, why_silent(decoding))
             continue
-        where, _ = _places(found)
+        where = _places(found)
         mean, spread = decoding.statistic.mean, decoding.statistic.sd
         axes.axhspan(mean[0] - spread[0], mean[0] + spread[0], color=GREY, alpha=0.25, linewidth=0.0)
         axes.errorbar(where, mean, spread, fmt="o", color=BLUE, markersize=4.5, capsize=3.0, elinewidth=1.2)
@@ -346,26 +320,17 @@ def draw_curves_of_measure(axes: Axes, found: TaskResult, measure: str) -> None:
         _curve(axes, found, decoding, style)
     _people(axes, found)
     _name_axis(axes, found)
-    axes.set_ylim(0.4, 1.03)
-    axes.set_ylabel("hit rate [fraction]")
+    axes.set(ylim=(0.4, 1.03), ylabel="hit rate [fraction]")
 
 
 def _curve(axes: Axes, found: TaskResult, decoding: Decoding, style: Any) -> None:
     if decoding.hit_rate is None or decoding.hit_rate_sd is None:
         return
     colour, marker, line = style
-    where, _ = _places(found)
-    axes.errorbar(
-        where[1:],
-        decoding.hit_rate,
-        np.nan_to_num(decoding.hit_rate_sd),
-        fmt=marker,
-        color=colour,
-        markersize=5.0,
-        capsize=3.0,
-        elinewidth=1.0,
-        label=CODE_LABELS[decoding.code],
-    )
+    where = _places(found)
+    marks: Any = {"fmt": marker, "color": colour, "markersize": 5.0, "capsize": 3.0, "elinewidth": 1.0}
+    bars = np.nan_to_num(decoding.hit_rate_sd)
+    axes.errorbar(where[1:], decoding.hit_rate, bars, label=CODE_LABELS[decoding.code], **marks)
     for side in decoding.curves:
         if side.fit is None:
             continue
@@ -379,25 +344,13 @@ def _curve(axes: Axes, found: TaskResult, decoding: Decoding, style: Any) -> Non
 
 def _people(axes: Axes, found: TaskResult) -> None:
     observed = found.observed
-    if observed is None:
-        return
-    points = [(point.level, point) for point in observed.points if point.level is not None]
-    if not points:
-        return
-    for level, point in points:
+    points = {point.level: point for point in observed.points if point.level is not None} if observed else {}
+    for level, point in points.items():
         if point.interval:
             axes.plot([level] * 2, point.interval, color=BLACK, linewidth=1.4, zorder=5)
-    axes.plot(
-        [level for level, _ in points],
-        [point.hit_rate for _, point in points],
-        "D",
-        color=BLACK,
-        markerfacecolor="none",
-        markersize=8.0,
-        markeredgewidth=1.5,
-        zorder=5,
-        label=f"observed ({observed.source})",
-    )
+    if observed and points:
+        rates = [point.hit_rate for point in points.values()]
+        axes.plot(list(points), rates, "D", label=f"observed ({observed.source})", **PEOPLE)
 
 
 def caption_task_responses(found: TaskResult) -> str:
@@ -426,14 +379,13 @@ def caption_task_curves(found: TaskResult) -> str:
         "Hit rate of each comparison against the standard; bars are one standard deviation over the "
         "repetitions of the paper's protocol."
     )
-    if fitted:
-        first = fitted[0]
-        said += (
-            f" Lines: psychometric functions ({first.sigmoid}) of the difference from the standard, with "
-            f"95 % credible bands for an experiment of {number(first.trials)} trials per comparison. "
-            f"Dotted: the threshold at {whole_percent(first.threshold.proportion)}."
-        )
-    return said
+    if not fitted:
+        return said
+    return (
+        f"{said} Lines: psychometric functions ({fitted[0].sigmoid}) of the difference from the standard, "
+        f"with 95 % credible bands for an experiment of {number(fitted[0].trials)} trials per comparison. "
+        f"Dotted: the threshold at {whole_percent(fitted[0].threshold.proportion)}."
+    )
 
 
 def main_decoding(found: TaskResult) -> Decoding:
@@ -463,17 +415,12 @@ def _marker_size(count: int) -> float:
     return float(np.clip(2500.0 / count, 4.0, 140.0))
 
 
-def _places(found: TaskResult) -> tuple[FloatArray, Sequence[str] | None]:
-    """Where each stimulus stands along an axis, and its name if that place has no meaning."""
-    if found.level is None:
-        return np.arange(len(found.stimulus), dtype=np.float64), found.stimulus
-    return found.level, None
+def _places(found: TaskResult) -> FloatArray:
+    """Where each stimulus stands along an axis; side by side if that place has no meaning."""
+    return np.arange(len(found.stimulus), dtype=np.float64) if found.level is None else found.level
 
 
 def _name_axis(axes: Axes, found: TaskResult) -> None:
-    where, names = _places(found)
-    if names is None:
-        axes.set_xlabel(found.axis)
-    else:
-        axes.set_xticks(where, names, rotation=30, ha="right")
-        axes.set_xlabel("stimulus")
+    if found.level is None:
+        axes.set_xticks(_places(found), found.stimulus, rotation=30, ha="right")
+    axes.set_xlabel("stimulus" if found.level is None else found.axis)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -26,7 +26,7 @@ from fingerpad.report.formatting import (
 )
 from fingerpad.report.manifest import edition, manifest_chapter
 from fingerpad.report.page import write_html
-from fingerpad.report.parts import Chapter, Page, Row, Table, illustrated
+from fingerpad.report.parts import Chapter, Page, Row, Table, illustrated, listed
 from fingerpad.report.rate_uncertainty import draw_indices, draw_profile, profile_ends, sensitivity_table
 from fingerpad.report.style import BLACK, BLUE, GREY, ORANGE, draw_rates, new_figure
 
@@ -72,21 +72,16 @@ def draw_phase(axes: Axes, found: FitResult, phase: str) -> None:
 
 def draw_fit_residuals(found: FitResult) -> Figure:
     """Draw the residuals: observed less predicted rates, in and out of sample."""
-    figure = new_figure(10.0, 4.0)
-    phases = _recorded(found)
-    where, order = _places(found)
-    for axes, (phase, rates, observed_hz) in zip(
-        np.ravel(figure.subplots(1, len(phases))), phases, strict=True
-    ):
-        observed = observed_hz[order]
-        left = observed - rates.fitted_hz[order]
-        left_out = observed - rates.out_of_sample_hz[order]
+    figure, phases, (where, order) = new_figure(10.0, 4.0), _recorded(found), _places(found)
+    panels = np.ravel(figure.subplots(1, len(phases)))
+    for axes, (phase, rates, observed_hz) in zip(panels, phases, strict=True):
+        left = (observed_hz - rates.fitted_hz)[order]
+        left_out = (observed_hz - rates.out_of_sample_hz)[order]
         axes.axhline(0.0, color=GREY, linewidth=1.0)
         axes.vlines(where, 0.0, left, color=BLUE, linewidth=1.2)
         axes.plot(where, left, "o", color=BLUE, markersize=4.0, label="fitted to all")
         axes.plot(where, left_out, "x", color=ORANGE, label="predicted without its fold")
-        axes.set_title(f"{PHASE_LABELS[phase]}, observed less predicted")
-        axes.set_ylabel("residual [spikes/s]")
+        axes.set(title=f"{PHASE_LABELS[phase]}, observed less predicted", ylabel="residual [spikes/s]")
         _name_places(axes, found)
     figure.legend(*axes.get_legend_handles_labels(), loc="outside lower center", ncols=2)
     return figure
@@ -122,48 +117,32 @@ def fit_tables(found: FitResult) -> list[Table]:
 
 def _chapters(found: FitResult) -> list[Chapter]:
     """Return the fit itself, and what was asked for beside it."""
-    chapters = {
-        "Fit": illustrated(
-            found,
-            fit_tables,
-            (1, "fit", "Observed and predicted rates", draw_fit, caption_fit),
-            (2, "residuals", "Residuals", draw_fit_residuals, caption_fit_residuals),
-        ),
-        "Profile likelihoods": illustrated(
-            found if found.profiles else None,
-            profile_tables,
-            (3, "profiles", "Profile likelihoods", draw_profiles, caption_profiles),
-        ),
-        "Sensitivity of the fit": illustrated(
-            found if found.sensitivity else None,
-            sensitivity_tables,
-            (4, "sensitivity", "Sobol indices", draw_sensitivity, caption_sensitivity),
-        ),
-        "Offset of the receptor": illustrated(
-            found if found.offset else None,
-            offset_tables,
-            (5, "offset", "FSS by offset of the receptor", draw_offset, caption_offset),
-        ),
-    }
-    return [Chapter(title, parts) for title, parts in chapters.items() if parts]
+    chapters = [
+        Chapter(
+            "Fit",
+            illustrated(
+                found,
+                fit_tables,
+                (1, "fit", "Observed and predicted rates", draw_fit, caption_fit),
+                (2, "residuals", "Residuals", draw_fit_residuals, caption_fit_residuals),
+            ),
+        )
+    ]
+    if found.profiles:
+        figure = (3, "profiles", "Profile likelihoods", draw_profiles, caption_profiles)
+        chapters.append(Chapter("Profile likelihoods", illustrated(found, profile_tables, figure)))
+    if found.sensitivity:
+        drawn = (4, "sensitivity", "Sobol indices", draw_sensitivity, caption_sensitivity)
+        chapters.append(Chapter("Sensitivity of the fit", illustrated(found, sensitivity_tables, drawn)))
+    if found.offset:
+        shown = (5, "offset", "FSS by offset of the receptor", draw_offset, caption_offset)
+        chapters.append(Chapter("Offset of the receptor", illustrated(found, offset_tables, shown)))
+    return chapters
 
 
 @known_keywords
 def write_fit_page(results: FitFile, folder: Path) -> Path:
-    """Write the page of a fit, `fit.html`, and its figures.
-
-    Parameters
-    ----------
-    results : FitFile
-        From `run_fit`.
-    folder : Path
-        Where; made if needed.
-
-    Returns
-    -------
-    Path
-        The page.
-    """
+    """Write the page of a fit from `run_fit`, `fit.html`, and its figures; return its path."""
     page = Page(
         "An afferent fitted to recordings",
         "A finite-element fingertip drives a leaky integrate-and-fire afferent, after Gerling et al. 2014: "
@@ -227,8 +206,8 @@ def _scores(found: FitResult) -> Table:
         "all stimuli, dynamic rates": found.phases["dynamic"].fss_in_sample,
         "all stimuli, static rates": found.phases["static"].fss_in_sample,
     }
-    rows = [Row.of(over, fixed(score, 3)) for over, score in scores.items()]
-    return Table("Fractional sum of squares (FSS)", ("over", "FSS"), rows)
+    cells = {over: fixed(score, 3) for over, score in scores.items()}
+    return listed("Fractional sum of squares (FSS)", cells, ("over", "FSS"))
 
 
 def _spikes(found: SpikeFitSummary) -> Table:
@@ -241,8 +220,7 @@ def _spikes(found: SpikeFitSummary) -> Table:
         "Kolmogorov-Smirnov distance of rescaled intervals": found.time_rescaling_distance,
         "probability of a larger distance": found.time_rescaling_p_value,
     }
-    rows = [Row.of(name, number(value)) for name, value in values.items()]
-    return Table("Fit of a soft threshold to the spikes", ("", ""), rows)
+    return listed("Fit of a soft threshold to the spikes", {name: number(values[name]) for name in values})
 
 
 def _identifiable(found: FitResult) -> Table:
@@ -330,9 +308,8 @@ def draw_profiles(found: FitResult) -> Figure:
     intervals = found.posterior.interval if found.posterior else {}
     panels = figure.subplots(1, len(_present(found.profiles)), sharey=True)
     for axes, profile in zip(panels, _present(found.profiles), strict=True):
-        name = profile.name
-        unit = found.identifiable_units[name]
-        draw_profile(axes, profile, unit, found.identifiable[name], intervals.get(name))
+        unit, fitted = found.identifiable_units[profile.name], found.identifiable[profile.name]
+        draw_profile(axes, profile, unit, fitted, intervals.get(profile.name))
     panels[0].set_ylabel("loss of log likelihood")
     return figure
 
@@ -395,19 +372,10 @@ def draw_offset(found: FitResult) -> Figure:
         [offset.offset_mm], [offset.fss_in_sample], "D", color=ORANGE, markersize=7.0, label="fitted to all"
     )
     low = axes.get_ylim()[0]
-    axes.plot(
-        offset.folds_mm,
-        [low] * len(offset.folds_mm),
-        "|",
-        color=BLUE,
-        markersize=14.0,
-        markeredgewidth=2.0,
-        label="fitted without a fold",
-        clip_on=False,
-    )
+    ticks: Any = {"color": BLUE, "markersize": 14.0, "markeredgewidth": 2.0, "clip_on": False}
+    axes.plot(offset.folds_mm, [low] * len(offset.folds_mm), "|", label="fitted without a fold", **ticks)
     axes.set_ylim(bottom=low)
-    axes.set_xlabel("offset of the receptor, distal positive [mm]")
-    axes.set_ylabel("FSS in sample [1]")
+    axes.set(xlabel="offset of the receptor, distal positive [mm]", ylabel="FSS in sample [1]")
     axes.legend()
     return figure
 
@@ -442,15 +410,9 @@ def offset_tables(found: FitResult) -> list[Table]:
         Row.of("offset fitted", number(offset.offset_mm), number(offset.standard_error_mm), *fitted),
     ]
     columns = (
-        "receptor",
-        "offset [mm]",
-        "standard error [mm]",
-        "FSS, all stimuli",
-        "dynamic",
-        "static",
-        "out of sample",
-        *(f"{symbol} [{units[name]}]" for name, symbol in IDENTIFIABLE_SYMBOLS.items()),
-    )
+        "receptor", "offset [mm]", "standard error [mm]", "FSS, all stimuli", "dynamic", "static",
+        "out of sample", *(f"{symbol} [{units[name]}]" for name, symbol in IDENTIFIABLE_SYMBOLS.items()),
+    )  # fmt: skip
     note = (
         "Standard error: from the scatter of the folds' fits. Offsets end at "
         f"{number(offset.held.offset_mm[0])} and {number(offset.held.offset_mm[-1])} mm, where the skin was "

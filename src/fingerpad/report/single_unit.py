@@ -31,7 +31,7 @@ from fingerpad.report.formatting import (
     spelled,
     whole_percent,
 )
-from fingerpad.report.parts import Row, Table
+from fingerpad.report.parts import Row, Table, listed
 from fingerpad.report.rate_uncertainty import draw_profile, profile_ends, sensitivity_table
 from fingerpad.report.style import BLACK, BLUE, COLUMN_IN, ORANGE, PALE, draw_rates, new_figure, shared_legend
 
@@ -52,26 +52,14 @@ PAPER_FOLD, PAPER_START = 3, 2
 def draw_single_unit(section: SingleUnitResult) -> Figure:
     """Draw Figure 5: dynamic rates on the left, static rates on the right."""
     figure = new_figure(COLUMN_IN, 4.0)
-    phases = (
-        (
-            "(a) dynamic ramp",
-            section.dynamic_rate_hz,
-            section.observed_dynamic_rate_hz,
-            section.fss_in_sample_dynamic,
-        ),
-        (
-            "(b) static hold",
-            section.static_rate_hz,
-            section.observed_static_rate_hz,
-            section.fss_in_sample_static,
-        ),
-    )
-    for axes, (title, predicted_hz, observed_hz, fss) in zip(figure.subplots(1, 2), phases, strict=True):
+    dynamic, static = figure.subplots(1, 2)
+    for axes, letter, phase in ((dynamic, "a", "dynamic"), (static, "b", "static")):
+        rate_hz, observed_hz = (getattr(section, f"{of}{phase}_rate_hz") for of in ("", "observed_"))
+        fss = fixed(getattr(section, f"fss_in_sample_{phase}"), 2)
         axes.axvspan(-BAR_HALF_WIDTH_MM, BAR_HALF_WIDTH_MM, color="#f3f1ea", zorder=0)
-        draw_rates(axes, -section.shift_mm, predicted_hz, observed_hz, FITTED)
-        axes.set_title(f"{title}, FSS = {fixed(fss, 2)}", fontsize=10.0)
+        draw_rates(axes, -section.shift_mm, rate_hz, observed_hz, FITTED)
+        axes.set_title(f"({letter}) {PHASE_LABELS[phase]}, FSS = {fss}", fontsize=10.0)
         axes.set_xlabel(ALONG)
-    dynamic, static = figure.axes
     _mark_dynamic_rates(dynamic, section.modulation.dynamic.observed)
     _mark_static_difference(static, section.modulation.static.ours.minimum_hz)
     shared_legend(figure, figure.axes, columns=2)
@@ -99,17 +87,11 @@ def _mark_dynamic_rates(axes: Axes, observed: Modulation) -> None:
 def _mark_static_difference(axes: Axes, lowest_hz: float) -> None:
     """Draw the difference that the paper predicts, from our lowest rate: it prints no static rates."""
     difference = paper.STATIC_RATE_DIFFERENCE.value
-    axes.errorbar(
-        STATIC_MARK_MM,
-        lowest_hz + 0.5 * difference,
-        yerr=0.5 * difference,
-        color=ORANGE,
-        capsize=5.0,
-        elinewidth=1.8,
-        label="difference predicted by the paper",
-    )
+    place, bar = (STATIC_MARK_MM, lowest_hz + 0.5 * difference), 0.5 * difference
+    label = "difference predicted by the paper"
+    axes.errorbar(*place, yerr=bar, color=ORANGE, capsize=5.0, elinewidth=1.8, label=label)
     text: Any = {"ha": "left", "va": "center", "color": ORANGE, "fontsize": 9.0}
-    axes.text(STATIC_MARK_MM, lowest_hz + 0.5 * difference, f" {number(difference)}", **text)
+    axes.text(*place, f" {number(difference)}", **text)
 
 
 def caption_single_unit(section: SingleUnitResult) -> str:
@@ -120,9 +102,8 @@ def caption_single_unit(section: SingleUnitResult) -> str:
         f"{protocol.DEPTH.value} mm at {section.shift_mm.size} positions relative to the centre of its "
         "receptive field; shaded: positions at which the bar covers the centre. Circles: observed in one "
         "afferent of a monkey (Phillips & Johnson 1981); the finger of the model is human. Blue line: rates "
-        "of the model, whose afferent was fitted to all of these circles. Fractional sum of squares (FSS, 1 "
-        "is perfect): that of the line is in the titles. (a) "
-        "Horizontal lines: lowest rate under the flat face and highest rate, "
+        "of the model, whose afferent was fitted to these circles; its fractional sum of squares (FSS, "
+        "1 is perfect) is in the titles. (a) Lines: lowest rate under the flat face and highest rate, "
         f"{number(paper.DYNAMIC_RATE_MINIMUM.value)} and {number(paper.DYNAMIC_RATE_MAXIMUM.value)} spikes/s "
         f"as the paper's model predicts them (dashed), and {number(observed.minimum_hz)} and "
         f"{number(observed.maximum_hz)} spikes/s as observed (dotted). (b) Bar: the difference of "
@@ -212,13 +193,8 @@ def _searches(folds: Sequence[FoldResult]) -> Table:
         for search in fold.climbs
     ]
     columns = (
-        "fold, start",
-        "FSS at the start",
-        "FSS, training",
-        "FSS, testing",
-        "iterations",
-        "evaluations",
-    )
+        "fold, start", "FSS at the start", "FSS, training", "FSS, testing", "iterations", "evaluations",
+    )  # fmt: skip
     note = "In bold: the better start on the training positions, which is the result of the fold."
     return Table("Searches of every fold", columns, rows, note)
 
@@ -286,16 +262,12 @@ def draw_uncertainty(section: UncertaintyResult) -> Figure:
     grid = figure.add_gridspec(3, 2)
     for column, (phase, rates) in enumerate(section.rates.items()):
         axes = figure.add_subplot(grid[0, column])
-        for label, low, high, colour, alpha in (
-            ("new recording", rates.new_low_hz, rates.new_high_hz, PALE, 1.0),
-            ("prediction", rates.low_hz, rates.high_hz, BLUE, 0.45),
-        ):
-            axes.fill_between(
-                -section.shift_mm, low, high, color=colour, alpha=alpha, linewidth=0.0, label=label
-            )
+        new: Any = {"color": PALE, "alpha": 1.0, "linewidth": 0.0, "label": "new recording"}
+        axes.fill_between(-section.shift_mm, rates.new_low_hz, rates.new_high_hz, **new)
+        band: Any = {"color": BLUE, "alpha": 0.45, "linewidth": 0.0, "label": "prediction"}
+        axes.fill_between(-section.shift_mm, rates.low_hz, rates.high_hz, **band)
         draw_rates(axes, -section.shift_mm, rates.median_hz, rates.observed_hz, "median")
-        axes.set_title(f"({'ab'[column]}) {PHASE_LABELS[phase]}")
-        axes.set_xlabel(ALONG)
+        axes.set(title=f"({'ab'[column]}) {PHASE_LABELS[phase]}", xlabel=ALONG)
         if column == 0:
             figure.legend(*axes.get_legend_handles_labels(), loc="outside upper center", ncols=4)
     for column, profile in enumerate(section.profiles):
@@ -401,4 +373,4 @@ def _convergence(found: PosteriorConvergence) -> Table:
         "smallest effective sample size of the tails": number(found.effective_draws_of_tails),
         "largest autocorrelation time, draws": number(found.draws_per_effective_draw),
     }
-    return Table("Convergence of the posterior", ("measure", "value"), [Row(fact) for fact in facts.items()])
+    return listed("Convergence of the posterior", facts, ("measure", "value"))
