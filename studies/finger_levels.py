@@ -19,7 +19,7 @@ from fingerpad.core.units import MN_PER_N
 from fingerpad.data import cylinder_deflection, neuron, protocol
 from fingerpad.experiments.conditions import RECEPTOR_X_MM, Conditions
 from fingerpad.experiments.gerling2014.single_unit_uncertainty import PIECES
-from fingerpad.experiments.gerling2014.skin_force import PLATE_DEPTHS_MM
+from fingerpad.experiments.gerling2014.skin_deflection import PLATE_DEPTHS_MM
 from fingerpad.experiments.gerling2014.sphere_discrimination import POSITIONS_MM
 from fingerpad.geometry.indenters import Cylinder
 from fingerpad.inference.rates_and_hit_rates import CHANCE

@@ -19,7 +19,7 @@ from fingerpad.core.units import MN_PER_N, MS_PER_S
 from fingerpad.data import paper, protocol, psychophysics
 from fingerpad.data.published import Published
 from fingerpad.experiments.conditions import RECEPTOR_X_MM, Conditions
-from fingerpad.experiments.gerling2014.skin_force import PLATE_DEPTHS_MM
+from fingerpad.experiments.gerling2014.skin_deflection import PLATE_DEPTHS_MM
 from fingerpad.experiments.manifest import Manifest
 from fingerpad.experiments.runner import Runner
 from fingerpad.experiments.validation.observations import KINDS, Observation, Observations, read_observations

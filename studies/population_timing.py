@@ -21,8 +21,8 @@ from fingerpad.core.results import Matrix, Number, Vector, WholeVector, result_c
 from fingerpad.core.signals import ResponseMap
 from fingerpad.data import protocol, psychophysics
 from fingerpad.experiments.conditions import RECEPTOR_X_MM, Conditions
-from fingerpad.experiments.gerling2014.response_maps import resting_response
 from fingerpad.experiments.gerling2014.sphere_discrimination import discrimination_touches
+from fingerpad.experiments.gerling2014.three_levels import resting_response
 from fingerpad.experiments.manifest import Manifest
 from fingerpad.experiments.runner import Runner
 from fingerpad.geometry.fingertip import Fingertip

@@ -13,13 +13,11 @@ from typing import TypeVar
 
 from fingerpad.core.errors import InputError, StoreError
 from fingerpad.core.results import Number, Vector, from_json, read_results, result_class
-from fingerpad.experiments.gerling2014.claim_row import ClaimRow, Group
+from fingerpad.experiments.gerling2014.claim_row import ClaimRow, Group, Statement
 from fingerpad.experiments.gerling2014.discrepancy import CriterionErrorBars
-from fingerpad.experiments.gerling2014.reproduction import ReproductionResult
+from fingerpad.experiments.gerling2014.reproduction import ReproductionResult, Summaries
 from fingerpad.experiments.gerling2014.single_unit import SingleUnitResult
 from fingerpad.experiments.gerling2014.sphere_discrimination import SphereDiscrimination
-from fingerpad.experiments.gerling2014.statements import Statement
-from fingerpad.experiments.gerling2014.summary import Summaries
 from fingerpad.report.comparison import (
     comparison_tables,
     count_sentence,

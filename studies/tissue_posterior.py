@@ -23,7 +23,7 @@ from fingerpad.experiments.gerling2014.single_unit_uncertainty import (
     CredibleInterval,
     PosteriorConvergence,
 )
-from fingerpad.experiments.gerling2014.skin_force import PLATE_DEPTHS_MM
+from fingerpad.experiments.gerling2014.skin_deflection import PLATE_DEPTHS_MM
 from fingerpad.experiments.manifest import Manifest
 from fingerpad.experiments.runner import Runner
 from fingerpad.experiments.scores import coefficient_of_determination

@@ -28,8 +28,7 @@ from fingerpad.experiments.gerling2014.curvature_thresholds import (
     interpolated,
     just_noticeable_difference,
 )
-from fingerpad.experiments.gerling2014.skin_deflection import deflection_r2
-from fingerpad.experiments.gerling2014.skin_force import PLATE_DEPTHS_MM
+from fingerpad.experiments.gerling2014.skin_deflection import PLATE_DEPTHS_MM, deflection_r2
 from fingerpad.experiments.gerling2014.sphere_discrimination import (
     FITTED_SPHERES,
     POSITIONS_MM,

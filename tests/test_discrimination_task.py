@@ -32,8 +32,8 @@ from fingerpad.psychophysics.discrimination import (
     discriminate_gradient_sum,
 )
 from fingerpad.psychophysics.encoding import gradient_sum, neighbour_pairs, taking_part
+from fingerpad.report import discrimination_task as figures
 from fingerpad.report import discrimination_task as report
-from fingerpad.report import discrimination_task_figures as figures
 
 ROOT = Path(__file__).parents[1]
 QUESTION = {

@@ -16,7 +16,7 @@ from fingerpad.export.result_tables import TABLES
 from fingerpad.inference.recordings import RateRecordings
 from fingerpad.inference.spike_fit import SpikeFit
 from fingerpad.psychophysics.psychometric import fit_psychometric
-from fingerpad.report.discrimination_task_figures import draw_task_responses
+from fingerpad.report.discrimination_task import draw_task_responses
 from fingerpad.report.drawing import DRAWINGS
 from fingerpad.report.responses import draw_responses
 from fingerpad.report.touch import draw_spikes

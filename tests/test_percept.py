@@ -15,17 +15,15 @@ from fingerpad.experiments.gerling2014.discrepancy import (
     expected_of_measure,
     rise_needed,
 )
-from fingerpad.experiments.gerling2014.discrimination_sessions import (
+from fingerpad.experiments.gerling2014.discrimination_statistics import (
     SWEPT_NOISE,
+    Estimate,
     Measured,
     Observers,
-    observe,
-)
-from fingerpad.experiments.gerling2014.discrimination_statistics import (
-    Estimate,
     discrimination_statistics,
     estimate,
     extreme,
+    observe,
 )
 from fingerpad.neuron.population import Population
 from fingerpad.psychophysics.counts import binomial_interval

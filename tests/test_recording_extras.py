@@ -10,8 +10,8 @@ from fingerpad.core.errors import InputError
 from fingerpad.core.signals import SedTraces
 from fingerpad.experiments.fit import rate_uncertainty
 from fingerpad.experiments.fit.fit import fit_recordings
-from fingerpad.experiments.fit.offset import check_offset, fit_offset
-from fingerpad.experiments.fit.posterior import profiled
+from fingerpad.experiments.fit.methods import check_offset, fit_offset
+from fingerpad.experiments.fit.rate_uncertainty import profiled
 from fingerpad.experiments.fit.results import ParameterProfile, RatePosterior
 from fingerpad.inference.identifiable import IDENTIFIABLE_NAMES, identifiable
 from fingerpad.inference.rate_likelihood import RateLikelihood
@@ -19,7 +19,7 @@ from fingerpad.inference.rate_model import AfferentModel, four_number_model
 from fingerpad.inference.rate_problem import RateProblem
 from fingerpad.inference.receptor_offset import ReceptorOffset
 from fingerpad.inference.recordings import RateRecordings
-from fingerpad.report import recording_extras as report
+from fingerpad.report import recording_fit as report
 from fingerpad.report.rate_uncertainty import ALLOWED_LOSS
 from fingerpad.report.style import png
 

@@ -29,7 +29,7 @@ from fingerpad.experiments.fit import fit as study
 from fingerpad.experiments.fit import posterior as recording_posterior
 from fingerpad.experiments.fit import session
 from fingerpad.experiments.fit.methods import METHODS, check_spikes
-from fingerpad.experiments.fit.posterior import rate_posterior
+from fingerpad.experiments.fit.rate_uncertainty import rate_posterior
 from fingerpad.experiments.fit.results import ParameterProfile, PhaseBands, RateBand, RatePosterior
 from fingerpad.experiments.gerling2014 import single_unit
 from fingerpad.experiments.manifest import sha256

@@ -16,16 +16,18 @@ from matplotlib.patches import Circle
 
 from fingerpad.core.results import schema_of, to_json
 from fingerpad.data import all_published
-from fingerpad.experiments.gerling2014.claim_row import Group, Verdict
-from fingerpad.experiments.gerling2014.mesh_picture import mesh_picture
+from fingerpad.experiments.gerling2014.claim_row import Group, Verdict, paired
 from fingerpad.experiments.gerling2014.nail_border import NailBorder
-from fingerpad.experiments.gerling2014.reproduction import PublishedNumber, ReproductionResult, SetResult
-from fingerpad.experiments.gerling2014.response_maps import PopulationMaps
+from fingerpad.experiments.gerling2014.reproduction import (
+    PublishedNumber,
+    ReproductionResult,
+    SetResult,
+    Summary,
+)
 from fingerpad.experiments.gerling2014.single_unit import SingleUnitResult
-from fingerpad.experiments.gerling2014.skin_force import SkinForce
+from fingerpad.experiments.gerling2014.skin_deflection import SkinForce
 from fingerpad.experiments.gerling2014.sphere_discrimination import SphereDiscrimination
-from fingerpad.experiments.gerling2014.statements import paired
-from fingerpad.experiments.gerling2014.summary import Summary
+from fingerpad.experiments.gerling2014.three_levels import PopulationMaps, mesh_picture
 from fingerpad.experiments.tissue_sets import tissue_layers
 from fingerpad.geometry.fingertip import Fingertip
 from fingerpad.geometry.grading import resolution_grading
@@ -43,7 +45,7 @@ from fingerpad.report import formatting as words
 from fingerpad.report import mesh_picture as mesh_picture_figure
 from fingerpad.report import page as page_module
 from fingerpad.report.comparison import MEANINGS, SIGNS, TITLES
-from fingerpad.report.discrimination_steps import draw_steps
+from fingerpad.report.discrimination import draw_steps
 from fingerpad.report.page import VERDICTS, write_html
 from fingerpad.report.parts import COLUMNS, Chapter, Drawing, Page, Paragraph, Row, Table
 from fingerpad.report.reproduction import reproduction_page, write_report

@@ -21,11 +21,10 @@ from fingerpad.experiments.gerling2014 import (
     skin_deflection,
     sphere_discrimination,
 )
-from fingerpad.experiments.gerling2014.claim_row import ClaimRow, Group, Verdict, two_digits
-from fingerpad.experiments.gerling2014.firing_course import FiringCourse, _dynamic_share, _peak_ms
-from fingerpad.experiments.gerling2014.skin_force import SkinForce
+from fingerpad.experiments.gerling2014.claim_row import ClaimRow, Group, Verdict, paired, two_digits
+from fingerpad.experiments.gerling2014.single_unit import FiringCourse, _dynamic_share, _peak_ms
+from fingerpad.experiments.gerling2014.skin_deflection import SkinForce
 from fingerpad.experiments.gerling2014.sphere_discrimination import SphereDiscrimination
-from fingerpad.experiments.gerling2014.statements import paired
 from fingerpad.geometry.fingertip import Fingertip
 from fingerpad.geometry.grading import Grading
 from fingerpad.geometry.indenters import Bar, Cylinder, Line, Sphere

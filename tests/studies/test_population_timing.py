@@ -7,7 +7,7 @@ import pytest
 
 from fingerpad.core.errors import InputError
 from fingerpad.experiments.conditions import RECEPTOR_X_MM, Conditions
-from fingerpad.experiments.gerling2014.response_maps import resting_response, sheet
+from fingerpad.experiments.gerling2014.three_levels import resting_response, sheet
 from fingerpad.experiments.runner import Runner
 from fingerpad.geometry.fingertip import Fingertip
 from sections import CURVATURE_PER_M, RESTLESS, SENSITIVE, SKINS, SphereSkin, typed

@@ -9,8 +9,7 @@ from typing import Annotated
 
 import typer
 
-from fingerpad.cli.choices import RESOLUTION_CHOICES
-from fingerpad.cli.options import Jobs, Scheduler
+from fingerpad.cli.options import RESOLUTION_CHOICES, Jobs, Scheduler
 from fingerpad.cli.running import engine, interruptible, make_writable, progress
 from fingerpad.core.errors import InputError
 
@@ -19,8 +18,7 @@ def discriminate_command(
     task: Annotated[
         str | None,
         typer.Argument(
-            metavar="TASK",
-            help="YAML file (format: docs/discriminate.md), or the name of an example task.",
+            metavar="TASK", help="YAML file (format: docs/discriminate.md), or the name of an example task."
         ),
     ] = None,
     out: Annotated[

@@ -7,8 +7,15 @@ from typing import Annotated
 
 import typer
 
-from fingerpad.cli.choices import DEFAULT_TISSUES, FINGER_CHOICES, FORMAT_CHOICES, INDENTER_CHOICES
-from fingerpad.cli.options import Resolution, Tissues, number_option
+from fingerpad.cli.options import (
+    DEFAULT_TISSUES,
+    FINGER_CHOICES,
+    FORMAT_CHOICES,
+    INDENTER_CHOICES,
+    Resolution,
+    Tissues,
+    number_option,
+)
 from fingerpad.cli.running import interruptible, make_writable
 from fingerpad.core.errors import InputError
 

@@ -9,15 +9,19 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from fingerpad.cli.choices import (
+from fingerpad.cli.options import (
     DEFAULT_TISSUES,
     FINGER_CHOICES,
     METHOD_CHOICES,
     QUANTITY_CHOICES,
     RESOLUTION_CHOICES,
     TISSUES_CHOICES,
+    Jobs,
+    Scheduler,
+    Seed,
+    integer_option,
+    number_option,
 )
-from fingerpad.cli.options import Jobs, Scheduler, Seed, integer_option, number_option
 from fingerpad.cli.running import engine, interruptible, make_writable, progress, write_examples
 from fingerpad.core.errors import InputError
 
@@ -133,8 +137,13 @@ def fit_command(
     from fingerpad.experiments import schemas
     from fingerpad.experiments.descriptions.pressing import finger_of, named_files
     from fingerpad.experiments.descriptions.reading import at
-    from fingerpad.experiments.fit.chosen_numbers import fit_chosen_numbers
-    from fingerpad.experiments.fit.session import EXAMPLE, FitRequest, example_recordings, run_fit
+    from fingerpad.experiments.fit.session import (
+        EXAMPLE,
+        FitRequest,
+        example_recordings,
+        fit_chosen_numbers,
+        run_fit,
+    )
     from fingerpad.experiments.manifest import sha256
     from fingerpad.experiments.recording_files import read_recordings
     from fingerpad.experiments.runner import Runner

@@ -9,8 +9,15 @@ from typing import Annotated
 
 import typer
 
-from fingerpad.cli.choices import DEFAULT_TISSUES, KIND_CHOICES, LOADING_CHOICES
-from fingerpad.cli.options import Jobs, Resolution, Scheduler, Tissues
+from fingerpad.cli.options import (
+    DEFAULT_TISSUES,
+    KIND_CHOICES,
+    LOADING_CHOICES,
+    Jobs,
+    Resolution,
+    Scheduler,
+    Tissues,
+)
 from fingerpad.cli.running import engine, interruptible, make_writable, progress, write_examples
 from fingerpad.core.errors import InputError
 

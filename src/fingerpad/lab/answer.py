@@ -64,15 +64,12 @@ class Answer:
     """Depth below the first touch of the range, force, what it lies within for 95 % of touches (0 in full,
     infinite if not measured), and undeformed skin in contact, (n_times,). [mm, mN, mN, mm²]
     """
-    middle_mm: FloatArray
-    """Middle of the contact, x and z, (n_times, 2). [mm]"""
+    middle_mm: FloatArray  # Middle of the contact, x and z, (n_times, 2). [mm]
     x_mm: FloatArray
-    z_mm: FloatArray
-    """Points of the map, (nx,). [mm]"""
+    z_mm: FloatArray  # Points of the map, (nx,). [mm]
     sed_kpa: FloatArray
     """Strain energy density at the depth of the end organs; NaN beside the pad, (n_times, nx, nz). [kPa]"""
-    response: ResponseMap
-    """Spikes and rates of the afferents."""
+    response: ResponseMap  # Spikes and rates of the afferents.
 
 
 def shape_of(described: DescribedReduction, size: float) -> tuple[float, ...]:

@@ -10,10 +10,19 @@ from typing import Any
 import numpy as np
 
 from fingerpad.core.checks import FloatArray
-from fingerpad.lab.answer import Answer, compared, finger_of, shape_of
+from fingerpad.lab.answer import (
+    COLUMNS,
+    ROWS,
+    Answer,
+    compared,
+    finger_of,
+    motion_of,
+    sample_times_ms,
+    shape_of,
+)
 from fingerpad.lab.laboratory import Laboratory, Making
-from fingerpad.lab.python_lines import python_lines
 from fingerpad.lab.state import LabState
+from fingerpad.reduction.model import ON_THE_PAD
 
 OFF_THE_PAD = 255
 """Byte of a point of the map that lies beside the pad; the others are shares of the peak, 0 to 254."""
@@ -33,46 +42,30 @@ class Shown:
     """Time, force with its error (0 if not measured), contact and largest strain energy density."""
     contact_mm: list[list[float]]
     """Middle x and z, half-axes and angle of an ellipse of the area of the contact. [mm, rad]"""
-    peak_kpa: float
-    """Value of the byte 254 of `frames`. [kPa]"""
-    frames_ms: list[float]
-    """Times of the map. [ms]"""
-    frames: str
-    """The map at these times, bytes (n_frames, nx, nz) in base 64."""
-    spikes: list[list[float]]
-    """Spike times of each afferent. [ms]"""
+    peak_kpa: float  # Value of the byte 254 of `frames`. [kPa]
+    frames_ms: list[float]  # Times of the map. [ms]
+    frames: str  # The map at these times, bytes (n_frames, nx, nz) in base 64.
+    spikes: list[list[float]]  # Spike times of each afferent. [ms]
 
 
 @dataclass(frozen=True)
 class View:
     """All that the page shows of a state."""
 
-    answer: Shown
-    """The answer of the reduced touch."""
+    answer: Shown  # The answer of the reduced touch.
     x_mm: list[float]
-    z_mm: list[float]
-    """Points of the map. [mm]"""
-    pad_mm: list[float]
-    """Place of the touch. [mm]"""
-    outline_mm: list[list[float]]
-    """x and half-width of the finger. [mm]"""
-    positions_mm: list[list[float]]
-    """Afferents. [mm]"""
-    order: list[int]
-    """Afferents by their distance from the contact."""
-    shown_ms: float
-    """End of the hold. [ms]"""
+    z_mm: list[float]  # Points of the map. [mm]
+    pad_mm: list[float]  # Place of the touch. [mm]
+    outline_mm: list[list[float]]  # x and half-width of the finger. [mm]
+    positions_mm: list[list[float]]  # Afferents. [mm]
+    order: list[int]  # Afferents by their distance from the contact.
+    shown_ms: float  # End of the hold. [ms]
     said: str
-    python: str
-    """What is pressed, and Python lines that reproduce it."""
+    python: str  # What is pressed, and Python lines that reproduce it.
     other: Shown | None = None
-    """The answer to the object that it is compared with."""
-    compared: str = ""
-    """What observers say of both."""
+    compared: str = ""  # What observers say of both.
     exact: Shown | None = None
-    """The full solution."""
-    difference: str = ""
-    """How far the reduced answer is from it."""
+    difference: str = ""  # How far the reduced answer is from it.
     making: Making | None = None
     """How far the reduced touch is, if the answer is the full solution because there is none yet."""
 
@@ -194,3 +187,74 @@ def _ellipse(answer: Answer, n: int) -> list[float]:
 
 def _plain(values: FloatArray) -> list[Any]:
     return np.round(values, 4).tolist()
+
+
+TEMPLATE = """import numpy as np
+
+import fingerpad as fp
+from fingerpad.experiments.descriptions.reduction import described_reduction
+
+# {title}
+described = described_reduction({content}, {source!r})
+training, shape = described.training, {shape}
+model = fp.read_reduced({path!r}, training.touch)
+motion = fp.Trajectory(
+    {times},
+    depth_mm={depth},
+    x_mm={x},
+    z_mm={z},
+    tilt_deg={tilt},
+)
+times_ms = {samples}
+
+# The reduced touch at the afferents, and what these fire.
+finger = training.touch.finger
+afferent = {afferent}
+grid_mm = fp.Population.grid(rows={rows}, columns={columns}, finger=finger).positions_mm
+inside_mm = grid_mm[(grid_mm[:, 0] > 1.0) & (grid_mm[:, 0] < finger.length_mm - 1.0)]
+sites_mm = inside_mm[np.abs(inside_mm[:, 1]) < {pad} * finger.section(inside_mm[:, 0])[2]]
+stream = fp.ReducedTouch(model, sites_mm, *shape)
+samples = []
+for time in times_ms:
+    pose, depth_mm = motion.pose_at(time), float(motion.prescribed_at(time))
+    samples.append(stream.step(time, depth_mm, None, pose.x_mm, pose.z_mm, pose.tilt_deg))
+force_mn = np.array([sample.force_mn for sample in samples])
+traces = fp.SedTraces(
+    times_ms,
+    np.array([sample.fields[afferent.static_quantity] for sample in samples]),
+    kinks_ms=motion.times_ms[1:-1],
+    dynamic_quantity=afferent.dynamic_quantity,
+    static_quantity=afferent.static_quantity,
+)
+spikes = afferent.spikes(traces)
+print(f"{{force_mn.max():.1f}} mN, {{sum(len(train) for train in spikes)}} spikes")
+
+# The full solution of the same touch; it takes seconds to a minute.
+exact = training.touch_with(shape, motion)
+# skin = exact.solve()
+"""
+
+
+def python_lines(laboratory: Laboratory, state: LabState, path: str = "") -> str:
+    """Write the lines; they read the file of the reduced touch, or `path`."""
+    described = laboratory.described(state)
+    motion, shape = motion_of(described, laboratory.model(state), state)
+    return TEMPLATE.format(
+        title=str(state),
+        content=described.description.model_dump(mode="json", exclude_unset=True),
+        source=laboratory.source(state).name if path else str(laboratory.source(state).resolve()),
+        shape=shape,
+        rows=ROWS,
+        columns=COLUMNS,
+        pad=ON_THE_PAD,
+        path=path or str(laboratory.path(state).resolve()),
+        times=motion.times_ms,
+        depth=motion.depth_mm,
+        x=motion.x_mm,
+        z=motion.z_mm,
+        tilt=motion.tilt_deg,
+        samples=[round(time, 6) for time in sample_times_ms(motion).tolist()],
+        afferent="fp.RA()"
+        if state.afferent == "RA"
+        else f"fp.Afferent.for_tissues({described.description.tissues!r})",
+    )

@@ -4,17 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from fingerpad.experiments.gerling2014.claim_row import ClaimRow, Group, Verdict
-from fingerpad.experiments.gerling2014.statements import ABSENT, Statement
+from fingerpad.experiments.gerling2014.claim_row import ABSENT, ClaimRow, Group, Statement, Verdict
 from fingerpad.report.formatting import joined
-from fingerpad.report.parts import COLUMNS, Row, Table
+from fingerpad.report.parts import COLUMNS, Row, Table, listed
 
-SIGNS = {
-    Verdict.MET: "✓",
-    Verdict.MISSED: "✗",
-    Verdict.NOT_DECIDABLE: "?",
-    Verdict.NOT_APPLICABLE: "–",
-}
+SIGNS = {Verdict.MET: "✓", Verdict.MISSED: "✗", Verdict.NOT_DECIDABLE: "?", Verdict.NOT_APPLICABLE: "–"}
 """Sign of each verdict; they differ without colour."""
 
 TITLES = {
@@ -46,18 +40,17 @@ def side_by_side(paper: Sequence[ClaimRow], human: Sequence[ClaimRow]) -> list[t
     by_name = [{row.quantity: row for row in rows} for rows in (paper, human)]
     stated = {row.quantity for row in (*paper, *human) if row.group is Group.STATEMENT}
     names = dict.fromkeys(row.quantity for row in (*paper, *human) if row.quantity not in stated)
-    return [_side_by_side([found.get(name) for found in by_name]) for name in names]
-
-
-def _side_by_side(both: Sequence[ClaimRow | None]) -> tuple[ClaimRow, Row]:
-    known = [row for row in both if row is not None]
-    cells = [known[0].quantity, known[0].paper]
-    for row in both:
-        cells += [ABSENT, ""] if row is None else [row.ours, _marked(row.verdict, row.fitted_to)]
-    told = dict.fromkeys("; ".join(text for text in (row.fitted_to, row.note) if text) for row in known)
-    # A number that one set was fitted to is shown as fitted.
-    first = min(known, key=lambda row: row.group is not Group.FITTED)
-    return first, Row((*cells, " | ".join(told)))
+    made = []
+    for both in ([found.get(name) for found in by_name] for name in names):
+        known = [row for row in both if row is not None]
+        cells = [known[0].quantity, known[0].paper]
+        for row in both:
+            cells += [ABSENT, ""] if row is None else [row.ours, _marked(row.verdict, row.fitted_to)]
+        told = dict.fromkeys("; ".join(text for text in (row.fitted_to, row.note) if text) for row in known)
+        # A number that one set was fitted to is shown as fitted.
+        first = min(known, key=lambda row: row.group is not Group.FITTED)
+        made.append((first, Row.of(*cells, " | ".join(told))))
+    return made
 
 
 def comparison_tables(paper: Sequence[ClaimRow], human: Sequence[ClaimRow]) -> list[Table]:
@@ -65,9 +58,7 @@ def comparison_tables(paper: Sequence[ClaimRow], human: Sequence[ClaimRow]) -> l
     rows = side_by_side(paper, human)
     found = {group: [row for first, row in rows if first.group is group] for group in TITLES}
     columns = ("quantity", "the paper", "`paper`", "", "`human`", "", "what was fitted, and how it is judged")
-    return [
-        Table(TITLES[group], columns, listed, MEANINGS[group]) for group, listed in found.items() if listed
-    ]
+    return [Table(TITLES[group], columns, each, MEANINGS[group]) for group, each in found.items() if each]
 
 
 def notes_table(paper: Sequence[ClaimRow], human: Sequence[ClaimRow]) -> Table:
@@ -77,12 +68,9 @@ def notes_table(paper: Sequence[ClaimRow], human: Sequence[ClaimRow]) -> Table:
         for row in found:
             if row.group is Group.STATEMENT:
                 rows.setdefault(row.quantity, []).append(f"{name}: {row.note}")
-    return Table(
-        "How the statements are judged",
-        ("statement", "note"),
-        [Row((quantity, "; ".join(notes))) for quantity, notes in rows.items()],
-        MEANINGS[Group.STATEMENT],
-    )
+    notes = {quantity: "; ".join(found) for quantity, found in rows.items()}
+    columns, meaning = ("statement", "note"), MEANINGS[Group.STATEMENT]
+    return listed("How the statements are judged", notes, columns, meaning)
 
 
 def count_sentence(statements: Sequence[Statement], name: str) -> str:
@@ -112,7 +100,7 @@ def statement_table(statements: Sequence[Statement]) -> Table:
     return Table(
         TITLES[Group.STATEMENT],
         ("section", "statement", "the paper", "`paper`", "", "`human`", ""),
-        [Row((each.section, *statement_cells(each))) for each in statements],
+        [Row.of(each.section, *statement_cells(each)) for each in statements],
         SETS,
     )
 
@@ -122,9 +110,9 @@ def verdict_table(statements: Sequence[Statement]) -> Table:
     rows = []
     for each in statements:
         paper, human = statement_cells(each)[3::2]
-        rows.append(Row((f"{each.section} {each.statement}", paper, human)))
+        rows.append(Row.of(f"{each.section} {each.statement}", paper, human))
     met = (sum(getattr(each, f"verdict_{name}") is Verdict.MET for each in statements) for name in COLUMNS)
-    rows.append(Row(("met", *(f"{count} of {len(statements)}" for count in met)), "final"))
+    rows.append(Row.of("met", *(f"{count} of {len(statements)}" for count in met), kind="final"))
     return Table("", ("section and statement of the paper", *(f"`{name}`" for name in COLUMNS)), rows, SETS)
 
 

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from itertools import cycle
+from typing import Any
+
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -17,7 +20,7 @@ from fingerpad.report.style import (
     GREY,
     ORANGE,
     PALE,
-    LineStyle,
+    PEOPLE,
     new_figure,
     say_nothing_to_draw,
 )
@@ -27,7 +30,7 @@ CHANCE = 50.0
 _TOP = 45.0
 """End of the axis of Weber fractions; an interval without an upper bound extends beyond it. [%]"""
 
-STYLES: tuple[LineStyle, ...] = (
+STYLES: tuple[Any, ...] = (
     {"color": BLACK, "linestyle": "-", "marker": "o"},
     {"color": BLUE, "linestyle": "--", "marker": "s"},
     {"color": ORANGE, "linestyle": "-.", "marker": "^"},
@@ -63,21 +66,10 @@ def _fractions(axes: Axes, section: CurvatureThresholds) -> None:
     best = [PER_CENT * entry.ideal_weber_fraction for entry in paper.standards]
     label = f"ideal observer, {_layout(paper)} receptors"
     axes.plot(at, best, color=GREY, linestyle=(0, (5, 2)), marker=".", label=label)
-    axes.plot(
-        people.standard_per_m,
-        PER_CENT * (people.comparison_per_m / people.standard_per_m - 1.0),
-        "D",
-        color=BLACK,
-        markerfacecolor="none",
-        markeredgewidth=1.6,
-        markersize=7.5,
-        zorder=5,
-        label="observed (Goodwin et al. 1991)",
-    )
-    axes.set_title("(a) difference threshold")
-    axes.set_xlabel("curvature of the standard [1/m]")
-    axes.set_ylabel("Weber fraction at 75 % [%]")
-    axes.set_ylim(0.0, _TOP)
+    observed = PER_CENT * (people.comparison_per_m / people.standard_per_m - 1.0)
+    axes.plot(people.standard_per_m, observed, "D", label="observed (Goodwin et al. 1991)", **PEOPLE)
+    axes.set(title="(a) difference threshold", ylim=(0.0, _TOP))
+    axes.set(xlabel="curvature of the standard [1/m]", ylabel="Weber fraction at 75 % [%]")
     axes.legend(loc="upper right", fontsize=8.0)
 
 
@@ -88,33 +80,15 @@ def _curves(axes: Axes, section: CurvatureThresholds) -> None:
         return
     axes.axhline(CHANCE, color=GREY, linewidth=1.0, linestyle=(0, (6, 3)))
     axes.axhline(PER_CENT * section.proportion, color=GREY, linewidth=0.8)
-    for entry, style in zip(standards, _cycled(len(standards)), strict=True):
-        axes.plot(
-            PER_CENT * entry.curve.step,
-            PER_CENT * entry.curve.hit_rate,
-            color=style["color"],
-            linestyle=style["linestyle"],
-        )
-        axes.plot(
-            PER_CENT * entry.step,
-            PER_CENT * entry.hit_rate,
-            color=style["color"],
-            marker=style["marker"],
-            linestyle=style["linestyle"],
-            linewidth=0.0,
-            markersize=5.0,
-        )
+    for entry, style in zip(standards, cycle(STYLES), strict=False):
+        curve, line = entry.curve, style | {"marker": ""}
+        axes.plot(PER_CENT * curve.step, PER_CENT * curve.hit_rate, **line)
+        axes.plot(PER_CENT * entry.step, PER_CENT * entry.hit_rate, linewidth=0.0, markersize=5.0, **style)
         # The legend shows line and marker together.
         axes.plot([], [], label=f"{number(entry.standard_per_m)} 1/m", markersize=5.0, **style)
-    axes.set_title("(b) hit rates of the Gradient Sum and Weibull functions")
-    axes.set_xlabel("comparison above the standard [%]")
-    axes.set_ylabel("hit rate [% of trials]")
-    axes.set_ylim(45.0, 102.0)
+    axes.set(title="(b) hit rates of the Gradient Sum and Weibull functions", ylim=(45.0, 102.0))
+    axes.set(xlabel="comparison above the standard [%]", ylabel="hit rate [% of trials]")
     axes.legend(title="standard", loc="upper left")
-
-
-def _cycled(count: int) -> list[LineStyle]:
-    return [STYLES[index % len(STYLES)] for index in range(count)]
 
 
 def caption_thresholds(section: CurvatureThresholds) -> str:
@@ -133,38 +107,25 @@ def caption_thresholds(section: CurvatureThresholds) -> str:
 def threshold_tables(section: CurvatureThresholds) -> list[Table]:
     """Return thresholds by standard."""
     thresholds = [
-        Row(
-            (
-                _layout(population),
-                fixed(population.noise_sigma, 3),
-                number(entry.standard_per_m),
-                fixed(entry.jnd_per_m, 1),
-                _per_cent(entry.weber_fraction),
-                f"{_per_cent(entry.fitted_weber_fraction)} "
-                f"({_per_cent(entry.fitted_interval[0])} to {_per_cent(entry.fitted_interval[1])})",
-                _per_cent(entry.ideal_weber_fraction),
-            )
+        Row.of(
+            _layout(population),
+            fixed(population.noise_sigma, 3),
+            number(entry.standard_per_m),
+            fixed(entry.jnd_per_m, 1),
+            _per_cent(entry.weber_fraction),
+            f"{_per_cent(entry.fitted_weber_fraction)} "
+            f"({_per_cent(entry.fitted_interval[0])} to {_per_cent(entry.fitted_interval[1])})",
+            _per_cent(entry.ideal_weber_fraction),
         )
         for population in section.populations
         for entry in population.standards
     ]
     missed = [entry.why_not for population in section.populations for entry in population.without_threshold]
-    return [
-        Table(
-            "Curvature thresholds",
-            (
-                "receptors",
-                "noise",
-                "standard [1/m]",
-                "JND [1/m]",
-                "Weber fraction",
-                "of an experiment, 95 %",
-                "ideal observer",
-            ),
-            thresholds,
-            " ".join(missed),
-        ),
-    ]
+    columns = (
+        "receptors", "noise", "standard [1/m]", "JND [1/m]", "Weber fraction", "of an experiment, 95 %",
+        "ideal observer",
+    )  # fmt: skip
+    return [Table("Curvature thresholds", columns, thresholds, " ".join(missed))]
 
 
 def _layout(population: PopulationThresholds) -> str:

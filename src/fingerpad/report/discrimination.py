@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
+from itertools import pairwise
+from typing import Any
+
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.text import Text
 
-from fingerpad.core.checks import FloatArray
 from fingerpad.data import psychophysics
 from fingerpad.experiments.gerling2014.discrepancy import CriterionErrorBars
 from fingerpad.experiments.gerling2014.goodwin import GoodwinHitRates
@@ -20,6 +24,8 @@ from fingerpad.report.style import (
     GREEN,
     GREY,
     ORANGE,
+    PALE,
+    PEOPLE,
     LineStyle,
     new_figure,
     say_nothing_to_draw,
@@ -67,21 +73,15 @@ def draw_noise(section: SphereDiscrimination) -> Figure:
     codes.set_title("(a) each code, expected")
     swept = section.statistics.sweep
     for misfit, (style, label) in zip(swept.misfit, POSITION_STYLES, strict=True):
-        sweep.errorbar(
-            swept.noise_sigma,
-            [one.value for one in misfit],
-            yerr=np.nan_to_num([one.error for one in misfit]),
-            markersize=5.0,
-            capsize=3.0,
-            label=label.removeprefix("predicted, "),
-            **style,
-        )
+        means, errors = ([getattr(one, name) for one in misfit] for name in ("value", "error"))
+        label, bars = label.removeprefix("predicted, "), np.nan_to_num(errors)
+        sweep.errorbar(swept.noise_sigma, means, bars, markersize=5.0, capsize=3.0, label=label, **style)
     sweep.set_title("(b) static Gradient Sum")
     marked = {"paper's best": section.noise_sigma_paper, "our fit": section.noise_sigma}
     for axes in (codes, sweep):
         for (label, sigma), dashes in zip(marked.items(), ((6, 3), (1, 1)), strict=True):
             axes.axvline(sigma, color=GREY, linewidth=1.4, linestyle=(0, dashes), label=label)
-        axes.set_xlabel("noise σ₁ [fraction]")
+        axes.set(xlabel="noise σ₁ [fraction]")
         axes.set_ylim(bottom=0.0)
     codes.set_ylabel("distance to observed hit rates, rms [fraction]")
     sweep.set_xlim(left=0.0)
@@ -135,70 +135,37 @@ def _draw(section: SphereDiscrimination, panels: list[Panel]) -> Figure:
         axes.set_title(f"({'abcdefghijklmnop'[index]}) {title}", fontsize=10.0)
         if rates is None:
             say_nothing_to_draw(axes, "not computed")
-            continue
-        draw_hit_rates(axes, section, rates)
-    _label(figure, grid, len(panels))
+        else:
+            draw_hit_rates(axes, section, rates)
+        if index % 2 == 0:
+            axes.set_ylabel("hit rate [fraction]")
+        if index >= len(panels) - 2:
+            axes.set_xlabel("comparison curvature [1/m]")
+            axes.tick_params(labelbottom=True)
+    lowest, _ = grid[0, 0].get_ylim()
+    grid[0, 0].set_ylim(max(min(lowest, 0.4), 0.0), 1.0)
+    shared_legend(figure, grid.flat, columns=2)
     return figure
 
 
 def draw_hit_rates(axes: Axes, section: SphereDiscrimination, rates: ObserverHitRates) -> None:
     """Draw the hit rates of one observer at both positions, those of people, and chance."""
     axes.axhline(CHANCE, color=GREY, linewidth=1.0, linestyle=(0, (6, 3)), label="chance")
-    _curves(axes, section.curvature_per_m[1:], rates)
-    draw_people(axes, section.goodwin)
-
-
-def _curves(axes: Axes, comparison: FloatArray, rates: ObserverHitRates) -> None:
     both = (rates.hit_rate, rates.hit_rate_sd), (rates.hit_rate_shifted, rates.hit_rate_shifted_sd)
+    lines: Any = {"markersize": 4.0, "linewidth": 1.5, "elinewidth": 1.0, "capsize": 3.0, "clip_on": False}
     for (means, spreads), (style, label) in zip(both, POSITION_STYLES, strict=True):
         bars = np.nan_to_num(np.minimum(spreads, [means, 1.0 - means]))  # a hit rate lies within 0 and 1
-        axes.errorbar(
-            comparison,
-            means,
-            yerr=bars,
-            markersize=4.0,
-            linewidth=1.5,
-            elinewidth=1.0,
-            capsize=3.0,
-            label=label,
-            clip_on=False,
-            **style,
-        )
+        axes.errorbar(section.curvature_per_m[1:], means, bars, label=label, **style, **lines)
+    draw_people(axes, section.goodwin)
 
 
 def draw_people(axes: Axes, observed: GoodwinHitRates) -> None:
     """Draw the hit rates of people with their intervals."""
+    rate, label = observed.hit_rate, "observed (Goodwin et al. 1991)"
+    bars = [rate - observed.low, observed.high - rate]
     axes.errorbar(
-        observed.curvature_per_m,
-        observed.hit_rate,
-        yerr=[observed.hit_rate - observed.low, observed.high - observed.hit_rate],
-        fmt="D",
-        elinewidth=1.2,
-        capsize=4.0,
-        markersize=7.5,
-        color=BLACK,
-        markerfacecolor="none",
-        markeredgewidth=1.6,
-        zorder=5,
-        label="observed (Goodwin et al. 1991)",
+        observed.curvature_per_m, rate, bars, fmt="D", elinewidth=1.2, capsize=4.0, label=label, **PEOPLE
     )
-
-
-def _interval(observed: GoodwinHitRates) -> str:
-    """Explain the error bars of the observed hit rates."""
-    return f"binomial 95 % intervals of {number(observed.trials)} trials, an assumed number"
-
-
-def _label(figure: Figure, grid: np.ndarray, n_panels: int) -> None:
-    for axes in grid[:, 0]:
-        axes.set_ylabel("hit rate [fraction]")
-    for index, axes in enumerate(grid.flat):
-        if n_panels - grid.shape[1] <= index < n_panels:
-            axes.set_xlabel("comparison curvature [1/m]")
-            axes.tick_params(labelbottom=True)
-    lowest, _ = grid[0, 0].get_ylim()
-    grid[0, 0].set_ylim(max(min(lowest, 0.4), 0.0), 1.0)
-    shared_legend(figure, grid.flat, columns=2)
 
 
 def caption_observers(section: SphereDiscrimination) -> str:
@@ -207,14 +174,13 @@ def caption_observers(section: SphereDiscrimination) -> str:
         "Fraction of trials in which a sphere is discriminated from the standard of "
         f"{number(section.curvature_per_m[0])} 1/m; bars are one standard deviation over hit rates, within "
         "0 and 1. Blue, solid: predicted for a sphere over the middle of the receptors; orange, dotted: for "
-        "one 0.2 mm away. Diamonds: observed in people (Goodwin et al. 1991), with "
-        f"{_interval(section.goodwin)}. (a-c) Gradient Sum of static rates, dynamic rates and first-spike "
-        "latencies, (d) Euclidean Distance of static rates, all with the noise that was fitted to "
-        "the diamonds with the code of (a). (e, f) "
-        "The paper's noise on either side of its best; (g) 10 noise matrices in place of 100; (h) the "
-        "paper's best noise. In the paper the static Gradient Sum fits best and hardly depends on the shift, "
-        "dynamic rates and latencies depend on it, more noise lowers the curve, and fewer matrices widen the "
-        "bars."
+        "one 0.2 mm away. Diamonds: observed in people (Goodwin et al. 1991), with binomial 95 % intervals "
+        f"of {number(section.goodwin.trials)} trials, an assumed number. (a-c) Gradient Sum of static rates, "
+        "dynamic rates and first-spike latencies, (d) Euclidean Distance of static rates, all with the "
+        "noise that was fitted to the diamonds with the code of (a). (e, f) The paper's noise on either side of "
+        "its best; (g) 10 noise matrices in place of 100; (h) the paper's best noise. In the paper the static "
+        "Gradient Sum fits best and hardly depends on the shift, dynamic rates and latencies depend on it, "
+        "more noise lowers the curve, and fewer matrices widen the bars."
     )
 
 
@@ -230,12 +196,8 @@ def caption_criterion(_: SphereDiscrimination) -> str:
 
 def discrimination_tables(section: SphereDiscrimination) -> list[Table]:
     """Return the hit rates of Figures 7 and 8, and the alternative interpretations of the paper's steps."""
-    return [_hit_rates(section), _interpretations(section), criterion_table(section.reasons.criterion)]
-
-
-def _hit_rates(section: SphereDiscrimination) -> Table:
     rows = [
-        Row((title.replace("\n", ", "), place, *map(with_error, means, spreads)))
+        Row.of(title.replace("\n", ", "), place, *map(with_error, means, spreads))
         for title, rates in (*observer_panels(section), *criterion_panels(section))
         if rates is not None
         for place, means, spreads in (
@@ -244,7 +206,9 @@ def _hit_rates(section: SphereDiscrimination) -> Table:
         )
     ]
     spheres = (f"{number(curvature)} 1/m" for curvature in section.curvature_per_m[1:])
-    return Table("Hit rates, mean ± standard deviation", ("observer", "sphere at [mm]", *spheres), rows)
+    columns = ("observer", "sphere at [mm]", *spheres)
+    hit_rates = Table("Hit rates, mean ± standard deviation", columns, rows)
+    return [hit_rates, _interpretations(section), criterion_table(section.reasons.criterion)]
 
 
 def criterion_table(bars: CriterionErrorBars) -> Table:
@@ -258,7 +222,7 @@ def criterion_table(bars: CriterionErrorBars) -> Table:
         "Error bars by what the varied criterion multiplies",
         ("Normal(1, σ) multiplies", *(f"σ = {number(sigma)}" for sigma in bars.criterion_sigma)),
         [
-            Row((name, *(fixed(bar, 4) for bar in found)), "final" if "(used)" in name else "")
+            Row.of(name, *(fixed(bar, 4) for bar in found), kind="final" if "(used)" in name else "")
             for name, found in rows.items()
         ],
         "Mean standard deviation of a hit rate over the six spheres at 0.0 mm, static Gradient Sum.",
@@ -267,15 +231,13 @@ def criterion_table(bars: CriterionErrorBars) -> Table:
 
 def _interpretations(section: SphereDiscrimination) -> Table:
     rows = [
-        Row(
-            (
-                one.reading,
-                " / ".join(number(count) for count in one.receptors),
-                " / ".join(fixed(rise, 3) for rise in one.rise),
-                *(fixed(value, 3) for value in (one.largest_shift, one.noise_sigma, one.misfit)),
-                fixed(one.own_largest_shift, 3),
-            ),
-            "final" if "(used)" in one.reading else "",
+        Row.of(
+            one.reading,
+            " / ".join(number(count) for count in one.receptors),
+            " / ".join(fixed(rise, 3) for rise in one.rise),
+            *(fixed(value, 3) for value in (one.largest_shift, one.noise_sigma, one.misfit)),
+            fixed(one.own_largest_shift, 3),
+            kind="final" if "(used)" in one.reading else "",
         )
         for one in section.reasons.readings
     ]
@@ -293,3 +255,104 @@ def _interpretations(section: SphereDiscrimination) -> Table:
         "together; hit rates are expected values, without sampling error."
     )
     return Table("Interpretations of steps that the paper leaves open", columns, rows, note)
+
+
+ROWS = {"gradient": 3.0, "start": 1.75, "euclidean": 0.5}
+"""Heights of the boxes of the two codes and of what they share."""
+
+GRADIENT = (
+    "(b) gradient of\neach receptor: sum of\n|differences| from\nits neighbours",
+    "(c) sum over the\n18 receptors:\none gradient sum",
+    "(d, e) 100 sums for\neach of 7 spheres:\n700 sums; μ₂ and σ₂\nof each sphere",
+    "(f) 100 times:\n100 pairs of μ₂, σ₂\nfor each sphere",
+    "(g, h) signal detection\nof a random pair against\none of the standard,\nβ = 0.5: one hit rate",
+    "(i, j) 100 hit rates for\neach of 6 spheres\n(k) μ₃ ± σ₃",
+)
+EUCLIDEAN = (
+    "(b*) one set:\n18 noisy values",
+    "(c*) 100 sets\nof one sphere",
+    "(d*) 700 sets,\n100 for each\nof 7 spheres",
+    "(e*) set of a sphere less\nset of the standard: sum\nof 18 |differences|",
+    "(f*) 100 sums of one sphere\n(g*) 700 sums, 100 for\neach of 7 spheres",
+    "(h*) hit or miss: side\nof the middle between\nthe two means;\n100 hit rates: μ₃ ± σ₃",
+)
+
+
+def draw_steps(sets: Mapping[str, SphereDiscrimination]) -> Figure:
+    """Draw Figure 3: what each code does, from left to right, and the hit rates of each set of tissues."""
+    figure = new_figure(12.4, 4.4)
+    figure.set_layout_engine("none")
+    axes = figure.add_axes((0.0, 0.0, 1.0, 1.0))
+    axes.set(xlim=(0.0, 12.4), ylim=(-0.45, 4.0))
+    axes.set_axis_off()
+    names = [f"σ₁ = {number(section.noise_sigma)} ({name})" for name, section in sets.items()]
+    x, y = np.meshgrid(np.linspace(0.4, 1.3, 6), np.linspace(2.45, 2.85, 3))
+    axes.scatter(x, y, s=45.0, facecolors=PALE, edgecolors=BLACK, linewidths=1.0)
+    axes.text(0.85, 3.2, "18 receptors,\n100 per cm²", ha="center", va="center", fontsize=8.5)
+    start = [
+        "static rate,\ndynamic rate or\nfirst-spike latency\nof each receptor,\n7 spheres",
+        "\n".join(["(a) each value times", "Normal(1, σ₁)", *names]),
+    ]
+    noisy = _row(axes, start, (0.85, 2.4), "start", BLACK)[-1]
+    for row, texts, places, colour in (
+        ("gradient", GRADIENT, (3.3, 4.95, 6.6, 8.25, 9.9, 11.6), BLUE),
+        ("euclidean", EUCLIDEAN, (3.3, 4.65, 6.0, 7.7, 9.6, 11.45), ORANGE),
+    ):
+        first = _row(axes, texts, places, row, colour)[0]
+        _arrow(axes, noisy, first)
+    for name, height, code, colour in (
+        ("Gradient Sum", 3.8, "gradient_sum", BLUE),
+        ("Euclidean Distance", -0.25, "euclidean", ORANGE),
+    ):
+        place: Any = {"va": "center", "color": colour}
+        axes.text(2.7, height, name, fontweight="bold", fontsize=11.0, **place)
+        axes.text(5.0, height, _found(sets, code), fontsize=8.5, **place)
+    return figure
+
+
+def _found(sets: Mapping[str, SphereDiscrimination], code: str) -> str:
+    """List the hit rates of the ends of the range, a line per set."""
+    lines = []
+    for name, section in sets.items():
+        low, high = (f"{number(curvature)} 1/m" for curvature in section.curvature_per_m[[1, -1]])
+        found = [
+            f"{measure} {' and '.join(fixed(rates.hit_rate[end], 2) for end in (0, -1))}"
+            for measure, rates in getattr(section, code).items()
+        ]
+        lines.append(
+            f"{name}, {low} and {high}: {'; '.join(found) or 'no hit rates: the population is silent'}"
+        )
+    return "\n".join(lines)
+
+
+def _row(axes: Axes, texts: Sequence[str], places: Any, row: str, colour: str) -> list[Text]:
+    """Draw boxes side by side, with an arrow from each to the next."""
+    box = {"boxstyle": "round,pad=0.4", "facecolor": PALE, "edgecolor": colour, "linewidth": 1.4}
+    boxes = [
+        axes.text(x, ROWS[row], text, ha="center", va="center", fontsize=7.5, bbox=box)
+        for x, text in zip(places, texts, strict=True)
+    ]
+    for before, after in pairwise(boxes):
+        _arrow(axes, before, after)
+    return boxes
+
+
+def _arrow(axes: Axes, start: Text, end: Text) -> None:
+    """Draw an arrow from the edge of one box to that of another."""
+    axes.annotate(
+        "", end.get_position(), start.get_position(),
+        arrowprops={
+            "arrowstyle": "-|>", "color": BLACK, "linewidth": 1.2, "shrinkA": 0.0, "shrinkB": 0.0,
+            "patchA": start.get_bbox_patch(), "patchB": end.get_bbox_patch(),
+        },
+    )  # fmt: skip
+
+
+def caption_steps(sets: Mapping[str, SphereDiscrimination]) -> str:
+    """Caption of Figure 3."""
+    standard = next(iter(sets.values())).curvature_per_m[0]
+    return (
+        "Steps from the responses of 18 receptors to hit rates, with the letters of the paper's section "
+        "2.2.3; its figure is not in the copy that we worked from. The standard has "
+        f"{number(standard)} 1/m. Numbers are of this run: spheres at 0.0 mm, first session."
+    )

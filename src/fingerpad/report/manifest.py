@@ -31,4 +31,4 @@ def edition(manifest: Manifest) -> str:
 def facts_table(title: str, facts: Mapping[str, object]) -> Table:
     """Return names and values as a table; what is None or empty is left out."""
     given = {name: value for name, value in facts.items() if value is not None and value not in ({}, ())}
-    return Table(title, ("", ""), [Row((spelled(name), plain(value))) for name, value in given.items()])
+    return Table(title, ("", ""), [Row.of(spelled(name), plain(value)) for name, value in given.items()])

@@ -13,7 +13,7 @@ from matplotlib.patches import Patch
 from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 
 from fingerpad.core.checks import FloatArray
-from fingerpad.experiments.gerling2014.mesh_picture import MeshPicture, MeshPlane
+from fingerpad.experiments.gerling2014.three_levels import MeshPicture, MeshPlane
 from fingerpad.report.formatting import number
 from fingerpad.report.style import BLACK, new_figure
 
@@ -22,7 +22,6 @@ LAYER_COLOURS = ("#2b1a3d", "#d9650a", "#f2b183", "#fbeee2")
 
 BONE, NAIL, SKIN = "#a9b4bd", "#0a5c99", "#f0d9c4"
 NAIL_WIDTH = 4.0
-EDGES = "#00000080"
 
 LIGHT = np.array([0.35, -0.75, 0.56])
 """Where the light comes from, in the order x, z, y."""
@@ -33,10 +32,10 @@ ENLARGED_MM, THIN_MM = (1.3, 2.0), 0.2
 
 def faces_of(right_mm: FloatArray, up_mm: FloatArray) -> FloatArray:
     """Corners of the faces between the nodes of a grid, (n_faces, 4, 2). [mm]"""
-    return _corners(np.stack([right_mm, up_mm], axis=-1))
+    return corners(np.stack([right_mm, up_mm], axis=-1))
 
 
-def _corners(points: np.ndarray) -> np.ndarray:
+def corners(points: np.ndarray) -> np.ndarray:
     """Return the four corners of each face of a grid of points, (n_faces, 4, ...)."""
     around = (points[:-1, :-1], points[1:, :-1], points[1:, 1:], points[:-1, 1:])
     return np.stack(around, axis=2).reshape(-1, 4, *points.shape[2:])
@@ -80,9 +79,9 @@ def _draw_solid(
 ) -> None:
     """Draw the skin and the nail in light, and a cut through the layers where one is given."""
     skin = np.stack([section.x_mm, section.z_mm, section.y_mm], axis=-1)
-    nailed = np.all(_corners(section.under_nail), axis=1, keepdims=True)
+    nailed = np.all(corners(section.under_nail), axis=1, keepdims=True)
     colours = np.where(nailed, to_rgb(NAIL), to_rgb(SKIN))
-    solid = [_corners(skin * [1.0, sign, 1.0]) for sign in halves]
+    solid = [corners(skin * [1.0, sign, 1.0]) for sign in halves]
     paint = [colours * _brightness(faces, sign)[:, None] for faces, sign in zip(solid, halves, strict=True)]
     if plane is not None:
         # A hair before the middle, so that it covers what lies behind.

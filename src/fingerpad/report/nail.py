@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from matplotlib import colormaps
 from matplotlib.axes import Axes
@@ -12,6 +14,7 @@ from matplotlib.figure import Figure
 from fingerpad.core.checks import FloatArray
 from fingerpad.experiments.gerling2014.nail_border import NailBorder, StressProfile
 from fingerpad.report.formatting import number
+from fingerpad.report.mesh_picture import corners
 from fingerpad.report.style import BLACK, BLUE, COLUMN_IN, GREY, ORANGE, PALE, new_figure
 
 DECADES = 4.0
@@ -29,28 +32,24 @@ def draw_nail(section: NailBorder) -> Figure:
     stress = section.von_mises_kpa.ravel()
     wide = _logarithmic(np.concatenate([stress, middle.von_mises_kpa]))
     near = Normalize(0.0, section.border_kpa or 1.0)
-    outlines = {"x": _corners(section.x_mm), "y": _corners(section.y_mm), "z": _corners(section.z_mm)}
-    both = [{**outlines, "z": sign * outlines["z"]} for sign in (1.0, -1.0)]
-
-    _seen(below, both, ("x", "z"), -outlines["y"], stress, wide)
+    x, y, z = (corners(grid) for grid in (section.x_mm, section.y_mm, section.z_mm))
+    both = np.concatenate([np.stack([x, sign * z], axis=-1) for sign in (1.0, -1.0)])
+    _seen(below, both, -y, stress, wide)
     _paint(cut, np.stack([middle.x_mm, middle.y_mm], axis=-1), middle.von_mises_kpa, wide)
-    _seen(above, both, ("x", "z"), outlines["y"], stress, near)
+    _seen(above, both, y, stress, near)
     for sign in (1.0, -1.0):
-        _border(above, nail[..., [0, 2]] * [1.0, sign])
+        edges = list(nail[..., [0, 2]] * [1.0, sign])
+        above.add_collection(LineCollection(edges, colors="white", linewidths=1.2))
     half = np.stack([across.z_mm, across.y_mm], axis=-1)
     _paint(beside, np.concatenate([half, half * [-1.0, 1.0]]), np.tile(across.von_mises_kpa, 2), near)
     _profiles(profile, section.profile)
+    beyond = f"(e) border of the nail: {number(section.ratio)} times the stress of skin 2 to 3 mm away"
     for axes, title, right, up in (
         (below, "(a) from below: the pad", "x, distal [mm]", "z, lateral [mm]"),
         (cut, "(b) middle section, z = 0", "x, distal [mm]", "y, dorsal [mm]"),
         (above, "(c) from above: the nail", "x, distal [mm]", "z, lateral [mm]"),
         (beside, f"(d) across, x = {number(across.x_mm)} mm", "z, lateral [mm]", "y, dorsal [mm]"),
-        (
-            profile,
-            f"(e) border of the nail: {number(section.ratio)} times the stress of skin 2 to 3 mm away",
-            "distance from the nail [mm]",
-            LABEL,
-        ),
+        (profile, beyond, "distance from the nail [mm]", LABEL),
     ):
         axes.set_title(title, fontsize=10.0)
         axes.set(xlabel=right, ylabel=up)
@@ -67,24 +66,10 @@ def _logarithmic(stress: FloatArray) -> LogNorm:
     return LogNorm(vmin=peak / 10.0**DECADES, vmax=peak, clip=True)
 
 
-def _corners(grid: FloatArray) -> FloatArray:
-    """Values at the four corners of each face of a grid, (n_faces, 4)."""
-    around = (grid[:-1, :-1], grid[1:, :-1], grid[1:, 1:], grid[:-1, 1:])
-    return np.stack(around, axis=-1).reshape(-1, 4)
-
-
-def _seen(
-    axes: Axes,
-    halves: list[dict[str, FloatArray]],
-    plane: tuple[str, str],
-    near: FloatArray,
-    stress: FloatArray,
-    scale: Normalize,
-) -> None:
+def _seen(axes: Axes, both: FloatArray, near: FloatArray, stress: FloatArray, scale: Normalize) -> None:
     """Draw the skin as seen from far away: nearer faces are drawn later and hide the others."""
-    outlines = np.concatenate([np.stack([half[plane[0]], half[plane[1]]], axis=-1) for half in halves])
-    order = np.argsort(np.tile(near.mean(axis=1), len(halves)), kind="stable")
-    _paint(axes, outlines[order], np.tile(stress, len(halves))[order], scale)
+    order = np.argsort(np.tile(near.mean(axis=1), 2), kind="stable")
+    _paint(axes, both[order], np.tile(stress, 2)[order], scale)
 
 
 def _paint(axes: Axes, outlines: FloatArray, stress: FloatArray, scale: Normalize) -> None:
@@ -104,11 +89,6 @@ def _paint(axes: Axes, outlines: FloatArray, stress: FloatArray, scale: Normaliz
     axes.grid(visible=False)
 
 
-def _border(axes: Axes, edges: FloatArray) -> None:
-    """Draw the outline of the nail."""
-    axes.add_collection(LineCollection(list(edges), colors="white", linewidths=1.2))
-
-
 def _profiles(axes: Axes, profile: StressProfile) -> None:
     """Stress over distance from the nail: median and middle 80 % of the sections that cross its border."""
     for stress_kpa, name, colour, style in (
@@ -120,16 +100,8 @@ def _profiles(axes: Axes, profile: StressProfile) -> None:
         axes.plot(profile.distance_mm, median, style, color=colour, label=name)
     axes.axvline(0.0, color=BLACK, linewidth=0.8)
     axes.set_ylim(bottom=0.0)
-    axes.text(
-        -0.1,
-        0.95,
-        "under\nthe nail",
-        transform=axes.get_xaxis_transform(),
-        color=BLACK,
-        ha="right",
-        va="top",
-        size=9,
-    )
+    place: Any = {"transform": axes.get_xaxis_transform(), "ha": "right", "va": "top"}
+    axes.text(-0.1, 0.95, "under\nthe nail", color=BLACK, size=9, **place)
     axes.legend(loc="upper right")
 
 
@@ -140,7 +112,6 @@ def caption_nail(section: NailBorder) -> str:
         "nothing here was observed: (a) in the outermost elements of the skin and (b) in the middle section, "
         f"on a logarithmic scale of {number(DECADES)} decades; (c) the back of the finger and (d) the "
         "section with the highest ratio, on a linear scale up to the highest stress at the border of the "
-        "nail (its outline in white); (e) median and middle 80 % of all sections that cross that "
-        "border. The paper "
-        "shows high stresses at the border of the nail."
+        "nail (its outline in white); (e) median and middle 80 % of all sections that cross that border. "
+        "The paper shows high stresses at the border of the nail."
     )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from typing import Literal, TypeVar
@@ -20,18 +20,20 @@ COLUMNS = ("paper", "human")
 class Paragraph:
     """A paragraph."""
 
-    text: str
-    """Plain text; links as `[text](address)` and code in backticks, as in Markdown."""
+    text: str  # Plain text; links as `[text](address)` and code in backticks, as in Markdown.
 
 
 @dataclass(frozen=True)
 class Row:
     """A row of a table."""
 
-    cells: Sequence[str]
-    """Finished texts, the first is the row's heading."""
-    kind: Kind = ""
-    """How the row is marked."""
+    cells: Sequence[str]  # Finished texts, the first is the row's heading.
+    kind: Kind = ""  # How the row is marked.
+
+    @classmethod
+    def of(cls, *cells: str, kind: Kind = "") -> Row:
+        """Return a row of these cells."""
+        return cls(cells, kind)
 
 
 @dataclass(frozen=True)
@@ -39,27 +41,19 @@ class Table:
     """A table."""
 
     title: str
-    """Its heading."""
-    columns: Sequence[str]
-    """Headings with units; all empty where the table lists names and values."""
-    rows: Sequence[Row]
-    """One cell per column."""
-    note: str = ""
-    """A sentence below it."""
+    columns: Sequence[str]  # Headings with units; all empty where the table lists names and values.
+    rows: Sequence[Row]  # One cell per column.
+    note: str = ""  # A sentence below it.
 
 
 @dataclass(frozen=True)
 class Drawing:
     """A figure with its caption."""
 
-    name: str
-    """Name of the image file, without its ending."""
-    title: str
-    """A few words."""
+    name: str  # Name of the image file, without its ending.
+    title: str  # A few words.
     draw: Callable[[], Figure]
-    """Makes the figure."""
     caption: str
-    """What it shows."""
     number: int | None = None
     """Figures up to 9 of a reproduction have the paper's numbers; others go on from 10."""
     human: Callable[[], Figure] | None = None
@@ -77,6 +71,11 @@ class Drawing:
     def label(self) -> str:
         """Number and title."""
         return self.title if self.number is None else f"Figure {self.number}. {self.title}"
+
+
+def listed(title: str, values: Mapping[str, str], columns: Sequence[str] = ("", ""), note: str = "") -> Table:
+    """Return a table of names and values."""
+    return Table(title, columns, [Row(each) for each in values.items()], note)
 
 
 Part = Paragraph | Table | Drawing
@@ -102,12 +101,9 @@ def illustrated(
 class Chapter:
     """A heading and what stands below it."""
 
-    title: str
-    """The heading; empty for parts that follow the introduction directly."""
+    title: str  # The heading; empty for parts that follow the introduction directly.
     parts: Sequence[Part]
-    """In order."""
-    folded: Sequence[Part] = ()
-    """What stands below them behind a fold."""
+    folded: Sequence[Part] = ()  # What stands below them behind a fold.
 
     @property
     def anchor(self) -> str:
@@ -138,16 +134,11 @@ class Page:
     """A page."""
 
     heading: str
-    subtitle: str
-    """Title, and what the page is about."""
-    paragraphs: Sequence[str]
-    """Summary; links and code as in `Paragraph`."""
+    subtitle: str  # Title, and what the page is about.
+    paragraphs: Sequence[str]  # Summary; links and code as in `Paragraph`.
     chapters: Sequence[Chapter]
-    """In order."""
-    opening: Sequence[Drawing] = ()
-    """Small figures after the summary, each with one sentence as its caption."""
-    verdicts: Table | None = None
-    """What stands beside them."""
+    opening: Sequence[Drawing] = ()  # Small figures after the summary, each with one sentence as its caption.
+    verdicts: Table | None = None  # What stands beside them.
 
     @property
     def drawings(self) -> list[Drawing]:

@@ -14,7 +14,7 @@ from matplotlib.patches import Rectangle
 
 from fingerpad.core.checks import FloatArray
 from fingerpad.data import protocol
-from fingerpad.experiments.gerling2014.response_maps import PopulationMaps, RestingResponse
+from fingerpad.experiments.gerling2014.three_levels import PopulationMaps, RestingResponse
 from fingerpad.report.formatting import number
 from fingerpad.report.style import COLUMN_IN, GREY, PALE, new_figure, say_nothing_to_draw
 
@@ -70,13 +70,7 @@ def with_round_ticks(bar: Colorbar, scale: Normalize) -> None:
 
 
 def _surface(
-    axes: Any,
-    x: FloatArray,
-    z: FloatArray,
-    values: FloatArray,
-    label: str,
-    colours: str,
-    scale: Normalize,
+    axes: Any, x: FloatArray, z: FloatArray, values: FloatArray, label: str, colours: str, scale: Normalize
 ) -> None:
     along, lateral = np.meshgrid(x, z, indexing="ij")
     # Surfaces have no logarithmic axis: the heights are logarithms, and the ticks show the values.

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
+import numpy as np
 from matplotlib.axes import Axes
 
 from fingerpad.experiments.fit.results import FssSensitivity, ParameterProfile
@@ -32,8 +33,7 @@ def draw_profile(
         axes.axvline(fitted, color=ORANGE, linestyle="-.", linewidth=1.4)
     if credible is not None:
         axes.plot(credible, [-0.25, -0.25], color=BLUE, linewidth=4.0, solid_capstyle="butt")
-    axes.set_ylim(-0.5, LARGEST_LOSS)
-    axes.set_xlabel(f"{IDENTIFIABLE_SYMBOLS[profile.name]} [{unit}]")
+    axes.set(ylim=(-0.5, LARGEST_LOSS), xlabel=f"{IDENTIFIABLE_SYMBOLS[profile.name]} [{unit}]")
 
 
 def profile_ends(profile: ParameterProfile) -> str:
@@ -43,25 +43,17 @@ def profile_ends(profile: ParameterProfile) -> str:
 
 def draw_indices(axes: Axes, found: FssSensitivity) -> None:
     """Draw first-order and total indices of each number, as bars with their confidence intervals."""
+    places = np.arange(len(IDENTIFIABLE_SYMBOLS))
     for indices, half_width, label, colour, side, hatch in (
         (found.total, found.total_half_width, "with others", BLUE, -0.19, ""),
         (found.first, found.first_half_width, "alone", "white", 0.19, "////"),
     ):
         axes.bar(
-            [place + side for place in range(len(IDENTIFIABLE_SYMBOLS))],
-            indices,
-            0.36,
-            yerr=half_width,
-            color=colour,
-            edgecolor=BLACK,
-            linewidth=0.8,
-            hatch=hatch,
-            error_kw={"elinewidth": 1.0, "ecolor": BLACK, "capsize": 3.0},
-            label=label,
-        )
-    axes.set_xticks(range(len(IDENTIFIABLE_SYMBOLS)), IDENTIFIABLE_SYMBOLS.values())
-    axes.set_xlabel("number")
-    axes.set_ylabel("share of the variance of FSS [1]")
+            places + side, indices, 0.36, yerr=half_width, color=colour, edgecolor=BLACK, linewidth=0.8,
+            hatch=hatch, error_kw={"elinewidth": 1.0, "ecolor": BLACK, "capsize": 3.0}, label=label,
+        )  # fmt: skip
+    axes.set_xticks(places, IDENTIFIABLE_SYMBOLS.values())
+    axes.set(xlabel="number", ylabel="share of the variance of FSS [1]")
     axes.axhline(0.0, color=BLACK, linewidth=0.8)
     axes.legend()
 
@@ -69,13 +61,11 @@ def draw_indices(axes: Axes, found: FssSensitivity) -> None:
 def sensitivity_table(found: FssSensitivity, units: Mapping[str, str]) -> Table:
     """Return Sobol's indices of the four numbers and the ranges that they belong to."""
     rows = [
-        Row(
-            (
-                f"{symbol} [{units[name]}]",
-                f"{number(found.lower[index])} … {number(found.upper[index])}",
-                f"{fixed(found.first[index], 2)} ± {fixed(found.first_half_width[index], 2)}",
-                f"{fixed(found.total[index], 2)} ± {fixed(found.total_half_width[index], 2)}",
-            )
+        Row.of(
+            f"{symbol} [{units[name]}]",
+            f"{number(found.lower[index])} … {number(found.upper[index])}",
+            f"{fixed(found.first[index], 2)} ± {fixed(found.first_half_width[index], 2)}",
+            f"{fixed(found.total[index], 2)} ± {fixed(found.total_half_width[index], 2)}",
         )
         for index, (name, symbol) in enumerate(IDENTIFIABLE_SYMBOLS.items())
     ]

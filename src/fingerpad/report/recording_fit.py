@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
+from typing import Any, TypeVar
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -11,7 +13,7 @@ from matplotlib.figure import Figure
 from fingerpad.core.checks import FloatArray
 from fingerpad.core.keywords import known_keywords
 from fingerpad.core.signals import STORED_ENERGY
-from fingerpad.experiments.fit.results import FitResult, PhaseRates, SpikeFitSummary
+from fingerpad.experiments.fit.results import FitResult, OffsetFit, PhaseRates, SpikeFitSummary
 from fingerpad.experiments.fit.session import FitFile
 from fingerpad.report.formatting import (
     ABSENT,
@@ -24,19 +26,9 @@ from fingerpad.report.formatting import (
 )
 from fingerpad.report.manifest import edition, manifest_chapter
 from fingerpad.report.page import write_html
-from fingerpad.report.parts import Chapter, Page, Row, Table, illustrated
-from fingerpad.report.recording_extras import (
-    caption_offset,
-    caption_profiles,
-    caption_sensitivity,
-    draw_offset,
-    draw_profiles,
-    draw_sensitivity,
-    offset_tables,
-    profile_tables,
-    sensitivity_tables,
-)
-from fingerpad.report.style import BLUE, GREY, ORANGE, draw_rates, new_figure
+from fingerpad.report.parts import Chapter, Page, Row, Table, illustrated, listed
+from fingerpad.report.rate_uncertainty import draw_indices, draw_profile, profile_ends, sensitivity_table
+from fingerpad.report.style import BLACK, BLUE, GREY, ORANGE, draw_rates, new_figure
 
 _PAGE = "fit.html"
 IDENTIFIABLE = IDENTIFIABLE_SYMBOLS | {"time_constant_ms": "time constant τ"}
@@ -80,21 +72,16 @@ def draw_phase(axes: Axes, found: FitResult, phase: str) -> None:
 
 def draw_fit_residuals(found: FitResult) -> Figure:
     """Draw the residuals: observed less predicted rates, in and out of sample."""
-    figure = new_figure(10.0, 4.0)
-    phases = _recorded(found)
-    where, order = _places(found)
-    for axes, (phase, rates, observed_hz) in zip(
-        np.ravel(figure.subplots(1, len(phases))), phases, strict=True
-    ):
-        observed = observed_hz[order]
-        left = observed - rates.fitted_hz[order]
-        left_out = observed - rates.out_of_sample_hz[order]
+    figure, phases, (where, order) = new_figure(10.0, 4.0), _recorded(found), _places(found)
+    panels = np.ravel(figure.subplots(1, len(phases)))
+    for axes, (phase, rates, observed_hz) in zip(panels, phases, strict=True):
+        left = (observed_hz - rates.fitted_hz)[order]
+        left_out = (observed_hz - rates.out_of_sample_hz)[order]
         axes.axhline(0.0, color=GREY, linewidth=1.0)
         axes.vlines(where, 0.0, left, color=BLUE, linewidth=1.2)
         axes.plot(where, left, "o", color=BLUE, markersize=4.0, label="fitted to all")
         axes.plot(where, left_out, "x", color=ORANGE, label="predicted without its fold")
-        axes.set_title(f"{PHASE_LABELS[phase]}, observed less predicted")
-        axes.set_ylabel("residual [spikes/s]")
+        axes.set(title=f"{PHASE_LABELS[phase]}, observed less predicted", ylabel="residual [spikes/s]")
         _name_places(axes, found)
     figure.legend(*axes.get_legend_handles_labels(), loc="outside lower center", ncols=2)
     return figure
@@ -125,60 +112,37 @@ def caption_fit_residuals(found: FitResult) -> str:
 def fit_tables(found: FitResult) -> list[Table]:
     """Return scores, parameters in both forms, folds and rates."""
     spikes = [_spikes(found.spikes)] if found.spikes else []
-    return [
-        _scores(found),
-        *spikes,
-        _identifiable(found),
-        _parameters(found),
-        _folds(found),
-        _rates(found),
-    ]
+    return [_scores(found), *spikes, _identifiable(found), _parameters(found), _folds(found), _rates(found)]
 
 
 def _chapters(found: FitResult) -> list[Chapter]:
     """Return the fit itself, and what was asked for beside it."""
-    chapters = {
-        "Fit": illustrated(
-            found,
-            fit_tables,
-            (1, "fit", "Observed and predicted rates", draw_fit, caption_fit),
-            (2, "residuals", "Residuals", draw_fit_residuals, caption_fit_residuals),
-        ),
-        "Profile likelihoods": illustrated(
-            found if found.profiles else None,
-            profile_tables,
-            (3, "profiles", "Profile likelihoods", draw_profiles, caption_profiles),
-        ),
-        "Sensitivity of the fit": illustrated(
-            found if found.sensitivity else None,
-            sensitivity_tables,
-            (4, "sensitivity", "Sobol indices", draw_sensitivity, caption_sensitivity),
-        ),
-        "Offset of the receptor": illustrated(
-            found if found.offset else None,
-            offset_tables,
-            (5, "offset", "FSS by offset of the receptor", draw_offset, caption_offset),
-        ),
-    }
-    return [Chapter(title, parts) for title, parts in chapters.items() if parts]
+    chapters = [
+        Chapter(
+            "Fit",
+            illustrated(
+                found,
+                fit_tables,
+                (1, "fit", "Observed and predicted rates", draw_fit, caption_fit),
+                (2, "residuals", "Residuals", draw_fit_residuals, caption_fit_residuals),
+            ),
+        )
+    ]
+    if found.profiles:
+        figure = (3, "profiles", "Profile likelihoods", draw_profiles, caption_profiles)
+        chapters.append(Chapter("Profile likelihoods", illustrated(found, profile_tables, figure)))
+    if found.sensitivity:
+        drawn = (4, "sensitivity", "Sobol indices", draw_sensitivity, caption_sensitivity)
+        chapters.append(Chapter("Sensitivity of the fit", illustrated(found, sensitivity_tables, drawn)))
+    if found.offset:
+        shown = (5, "offset", "FSS by offset of the receptor", draw_offset, caption_offset)
+        chapters.append(Chapter("Offset of the receptor", illustrated(found, offset_tables, shown)))
+    return chapters
 
 
 @known_keywords
 def write_fit_page(results: FitFile, folder: Path) -> Path:
-    """Write the page of a fit, `fit.html`, and its figures.
-
-    Parameters
-    ----------
-    results : FitFile
-        From `run_fit`.
-    folder : Path
-        Where; made if needed.
-
-    Returns
-    -------
-    Path
-        The page.
-    """
+    """Write the page of a fit from `run_fit`, `fit.html`, and its figures; return its path."""
     page = Page(
         "An afferent fitted to recordings",
         "A finite-element fingertip drives a leaky integrate-and-fire afferent, after Gerling et al. 2014: "
@@ -242,8 +206,8 @@ def _scores(found: FitResult) -> Table:
         "all stimuli, dynamic rates": found.phases["dynamic"].fss_in_sample,
         "all stimuli, static rates": found.phases["static"].fss_in_sample,
     }
-    rows = [Row((over, fixed(score, 3))) for over, score in scores.items()]
-    return Table("Fractional sum of squares (FSS)", ("over", "FSS"), rows)
+    cells = {over: fixed(score, 3) for over, score in scores.items()}
+    return listed("Fractional sum of squares (FSS)", cells, ("over", "FSS"))
 
 
 def _spikes(found: SpikeFitSummary) -> Table:
@@ -256,21 +220,18 @@ def _spikes(found: SpikeFitSummary) -> Table:
         "Kolmogorov-Smirnov distance of rescaled intervals": found.time_rescaling_distance,
         "probability of a larger distance": found.time_rescaling_p_value,
     }
-    rows = [Row((name, number(value))) for name, value in values.items()]
-    return Table("Fit of a soft threshold to the spikes", ("", ""), rows)
+    return listed("Fit of a soft threshold to the spikes", {name: number(values[name]) for name in values})
 
 
 def _identifiable(found: FitResult) -> Table:
     posterior = found.posterior
     rows = [
-        Row(
-            (
-                symbol,
-                number(found.identifiable[name]),
-                number(found.identifiable_standard_error[name]),
-                *([" … ".join(number(end) for end in posterior.interval[name])] if posterior else []),
-                found.identifiable_units[name],
-            )
+        Row.of(
+            symbol,
+            number(found.identifiable[name]),
+            number(found.identifiable_standard_error[name]),
+            *([" … ".join(number(end) for end in posterior.interval[name])] if posterior else []),
+            found.identifiable_units[name],
         )
         for name, symbol in IDENTIFIABLE.items()
     ]
@@ -286,7 +247,7 @@ def _identifiable(found: FitResult) -> Table:
 
 def _parameters(found: FitResult) -> Table:
     rows = [
-        Row((PARAMETER_SYMBOLS[name], number(value), found.units[name]))
+        Row.of(PARAMETER_SYMBOLS[name], number(value), found.units[name])
         for name, value in found.parameters.items()
     ]
     note = "One of the many sets of six with the same firing."
@@ -295,16 +256,14 @@ def _parameters(found: FitResult) -> Table:
 
 def _folds(found: FitResult) -> Table:
     rows = [
-        Row(
-            (
-                plain(fold.fold),
-                ", ".join(fold.stimuli),
-                fixed(fold.fss_train, 3),
-                fixed(fold.fss_test, 3),
-                *(number(fold.identifiable[name]) for name in IDENTIFIABLE),
-                number(fold.n_evaluations),
-                fixed(fold.seconds, 2),
-            )
+        Row.of(
+            plain(fold.fold),
+            ", ".join(fold.stimuli),
+            fixed(fold.fss_train, 3),
+            fixed(fold.fss_test, 3),
+            *(number(fold.identifiable[name]) for name in IDENTIFIABLE),
+            number(fold.n_evaluations),
+            fixed(fold.seconds, 2),
         )
         for fold in found.folds
     ]
@@ -319,17 +278,15 @@ def _folds(found: FitResult) -> Table:
 def _rates(found: FitResult) -> Table:
     recorded = _recorded(found)
     rows = [
-        Row(
-            (
-                name,
-                plain(int(found.fold[row])),
-                number(found.presentations[row]) if found.presentations else ABSENT,
-                *(
-                    fixed(value, 1)
-                    for _, rates, observed_hz in recorded
-                    for value in (observed_hz[row], rates.fitted_hz[row], rates.out_of_sample_hz[row])
-                ),
-            )
+        Row.of(
+            name,
+            plain(int(found.fold[row])),
+            number(found.presentations[row]) if found.presentations else ABSENT,
+            *(
+                fixed(value, 1)
+                for _, rates, observed_hz in recorded
+                for value in (observed_hz[row], rates.fitted_hz[row], rates.out_of_sample_hz[row])
+            ),
         )
         for row, name in enumerate(found.stimulus)
     ]
@@ -340,3 +297,131 @@ def _rates(found: FitResult) -> Table:
     )
     columns = ("stimulus", "fold", "presentations", *headings)
     return Table("Rates [spikes/s]", columns, rows)
+
+
+_Part = TypeVar("_Part")
+
+
+def draw_profiles(found: FitResult) -> Figure:
+    """Draw the profile of each of the four numbers."""
+    figure = new_figure(10.0, 3.2)
+    intervals = found.posterior.interval if found.posterior else {}
+    panels = figure.subplots(1, len(_present(found.profiles)), sharey=True)
+    for axes, profile in zip(panels, _present(found.profiles), strict=True):
+        unit, fitted = found.identifiable_units[profile.name], found.identifiable[profile.name]
+        draw_profile(axes, profile, unit, fitted, intervals.get(profile.name))
+    panels[0].set_ylabel("loss of log likelihood")
+    return figure
+
+
+def caption_profiles(found: FitResult) -> str:
+    beneath = ", the bar below it the credible interval" if found.posterior else ""
+    return (
+        "Loss of log likelihood with one parameter held and the others fitted again. Values below the dashed "
+        "line are within the 95 % interval; where the profile does not cross it the rates do not bound the "
+        f"parameter. The orange line is the fit{beneath}. The fit maximises FSS, which has other weights of "
+        "phases and neighbours than the likelihood, and may differ from the minimum. Profiles have local "
+        "minima, because rates are discontinuous where a spike enters a window."
+    )
+
+
+def profile_tables(found: FitResult) -> list[Table]:
+    """Tables of the intervals of the profiles."""
+    rows = [
+        Row.of(
+            f"{IDENTIFIABLE_SYMBOLS[profile.name]} [{found.identifiable_units[profile.name]}]",
+            number(found.identifiable[profile.name]),
+            profile_ends(profile),
+        )
+        for profile in _present(found.profiles)
+    ]
+    return [Table("Intervals by profile likelihood", ("number", "fitted", "95 % interval"), rows)]
+
+
+def draw_sensitivity(found: FitResult) -> Figure:
+    """Draw the Sobol indices of the four numbers."""
+    figure = new_figure(6.5, 3.8)
+    draw_indices(figure.subplots(), _present(found.sensitivity))
+    return figure
+
+
+def caption_sensitivity(found: FitResult) -> str:
+    """Caption of the Sobol indices."""
+    total = _present(found.sensitivity).total
+    most = max(zip(total, IDENTIFIABLE_SYMBOLS.values(), strict=True), key=lambda pair: pair[0])[1]
+    return (
+        "Share of the variance of FSS due to each parameter if all are uniform within a quarter of their "
+        f"fitted values: hatched, alone (first-order index); filled, with all interactions (total index). "
+        f"Whiskers are 95 % intervals of the estimate. The largest total index is that of {most}."
+    )
+
+
+def sensitivity_tables(found: FitResult) -> list[Table]:
+    """Tables of the indices and their ranges."""
+    return [sensitivity_table(_present(found.sensitivity), found.identifiable_units)]
+
+
+def draw_offset(found: FitResult) -> Figure:
+    """Draw the best FSS with the receptor held at each offset, and the offsets of the fit and the folds."""
+    offset = _present(found.offset)
+    figure = new_figure(6.5, 3.8)
+    axes = figure.subplots()
+    axes.axvline(0.0, color=GREY, linewidth=1.0)
+    axes.plot(offset.held.offset_mm, offset.held.fss_in_sample, "o-", color=BLACK, label="held there")
+    axes.plot(
+        [offset.offset_mm], [offset.fss_in_sample], "D", color=ORANGE, markersize=7.0, label="fitted to all"
+    )
+    low = axes.get_ylim()[0]
+    ticks: Any = {"color": BLUE, "markersize": 14.0, "markeredgewidth": 2.0, "clip_on": False}
+    axes.plot(offset.folds_mm, [low] * len(offset.folds_mm), "|", label="fitted without a fold", **ticks)
+    axes.set_ylim(bottom=low)
+    axes.set(xlabel="offset of the receptor, distal positive [mm]", ylabel="FSS in sample [1]")
+    axes.legend()
+    return figure
+
+
+def caption_offset(found: FitResult) -> str:
+    """Caption of the offset: which part of the residual it explains."""
+    offset = _present(found.offset)
+    residual = 1.0 - found.fss_in_sample
+    taken = (offset.fss_in_sample - found.fss_in_sample) / residual if residual > 0.0 else 0.0
+    return (
+        "The receptor's offset along the finger as one more parameter. Line: best FSS over all stimuli with "
+        f"the receptor held at each offset. The fitted offset is {number(offset.offset_mm)} mm; it explains "
+        f"{fixed(100.0 * taken, 0)} % of the residual in sample. Out of sample FSS is "
+        f"{fixed(offset.fss_out_of_sample, 3)} instead of {fixed(found.fss_out_of_sample, 3)}. A gain in "
+        "sample alone is no evidence for an offset."
+    )
+
+
+def offset_tables(found: FitResult) -> list[Table]:
+    """Tables of both fits side by side."""
+    offset, units, phases = _present(found.offset), found.identifiable_units, ("dynamic", "static")
+
+    def cells(fit: FitResult | OffsetFit, fss_by_phase: Sequence[float | None]) -> list[str]:
+        scores = (fit.fss_in_sample, *fss_by_phase, fit.fss_out_of_sample)
+        four = (number(fit.identifiable[name]) for name in IDENTIFIABLE_SYMBOLS)
+        return [*(fixed(score, 3) for score in scores), *four]
+
+    at_zero = cells(found, [found.phases[phase].fss_in_sample for phase in phases])
+    fitted = cells(offset, [offset.fss_by_phase.get(phase) for phase in phases])
+    rows = [
+        Row.of("at 0 mm", number(0.0), ABSENT, *at_zero),
+        Row.of("offset fitted", number(offset.offset_mm), number(offset.standard_error_mm), *fitted),
+    ]
+    columns = (
+        "receptor", "offset [mm]", "standard error [mm]", "FSS, all stimuli", "dynamic", "static",
+        "out of sample", *(f"{symbol} [{units[name]}]" for name, symbol in IDENTIFIABLE_SYMBOLS.items()),
+    )  # fmt: skip
+    note = (
+        "Standard error: from the scatter of the folds' fits. Offsets end at "
+        f"{number(offset.held.offset_mm[0])} and {number(offset.held.offset_mm[-1])} mm, where the skin was "
+        "sampled."
+    )
+    return [Table("Offset of the receptor", columns, rows, note)]
+
+
+def _present(part: _Part | None) -> _Part:
+    """Return a part of a fit; a chapter is only drawn where its part is there."""
+    assert part is not None
+    return part

@@ -1,54 +1,48 @@
-"""The page of a reproduction: summary, comparison with the paper, and a chapter per level."""
+"""The page of a reproduction: a first screen, a chapter per level, comparison with the paper."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
-from inspect import signature
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from fingerpad.data import STATUSES
+from fingerpad.data import STATUSES, paper, psychophysics
 from fingerpad.experiments.gerling2014.reproduction import PublishedNumber, ReproductionResult
-from fingerpad.report.comparison import comparison_tables, notes_table, statement_table, verdict_table
-from fingerpad.report.curvature_thresholds import caption_thresholds, draw_thresholds, threshold_tables
-from fingerpad.report.discrimination import (
-    caption_criterion,
-    caption_noise,
-    caption_observers,
-    discrimination_tables,
-    draw_criterion,
-    draw_noise,
-    draw_observers,
+from fingerpad.report import (
+    curvature_thresholds,
+    discrimination,
+    mesh_picture,
+    nail,
+    population,
+    single_unit,
+    skin_deflection,
+    three_levels,
 )
-from fingerpad.report.discrimination_steps import caption_steps, draw_steps
-from fingerpad.report.first_screen import first_screen
-from fingerpad.report.formatting import plain
+from fingerpad.report.comparison import comparison_tables, notes_table, statement_table, verdict_table
+from fingerpad.report.formatting import fixed, joined, number, plain
 from fingerpad.report.manifest import edition, manifest_chapter
-from fingerpad.report.mesh_picture import caption_mesh, draw_mesh
-from fingerpad.report.nail import caption_nail, draw_nail
 from fingerpad.report.page import write_html
 from fingerpad.report.parts import COLUMNS, Chapter, Drawing, Page, Paragraph, Part, Row, Table
-from fingerpad.report.population import caption_population, draw_population
-from fingerpad.report.single_unit import caption_single_unit, draw_single_unit, single_unit_tables
-from fingerpad.report.single_unit_uncertainty import (
-    caption_uncertainty,
-    draw_uncertainty,
-    uncertainty_tables,
-)
-from fingerpad.report.skin_deflection import (
-    caption_skin_deflection,
-    draw_skin_deflection,
-    skin_deflection_tables,
-)
-from fingerpad.report.three_levels import caption_levels, draw_levels
+from fingerpad.report.style import BLUE, ORANGE, LineStyle, draw_observed_rates, new_figure
 from fingerpad.report.tissues import tissue_table
 
 # Inputs are the record of what was used: nothing of them is rounded or left out.
 ALL_DIGITS, ALL_VALUES = 12, 1000
+
+LINES: dict[str, LineStyle] = {
+    "paper": {"color": BLUE, "linestyle": "-"},
+    "human": {"color": ORANGE, "linestyle": "--"},
+}
+"""How the two sets are drawn on the first screen."""
+
+IN_THE_PAPER = "Trial 3"
+"""The trial that is closest to the observed deflection in the paper."""
 
 
 def write_report(result: ReproductionResult, folder: Path) -> Path:
@@ -58,10 +52,11 @@ def write_report(result: ReproductionResult, folder: Path) -> Path:
 
 def reproduction_page(result: ReproductionResult) -> Page:
     """Return the page of a reproduction: `paper` in the first column of figures, `human` in the second."""
-    paper, human = result.paper, result.human
+    paper, human, deflection = result.paper, result.human, result.skin_deflection
+    sets = {name: getattr(result, name).discrimination for name in COLUMNS}
 
     def pair(
-        number: int,
+        figure: int,
         name: str,
         title: str,
         part: str,
@@ -69,9 +64,18 @@ def reproduction_page(result: ReproductionResult) -> Page:
         caption: Callable[..., str],
     ) -> Drawing:
         first, second = getattr(paper, part), getattr(human, part)
-        text = caption(first, second) if len(signature(caption).parameters) > 1 else caption(first)
-        name = f"figure_{number}_{name}"
-        return Drawing(name, title, partial(draw, first), text, number, partial(draw, second))
+        name, text = f"figure_{figure}_{name}", caption(first)
+        return Drawing(name, title, partial(draw, first), text, figure, partial(draw, second))
+
+    def single(
+        figure: int,
+        name: str,
+        title: str,
+        part: Any,
+        draw: Callable[..., Figure],
+        caption: Callable[..., str],
+    ) -> Drawing:
+        return Drawing(f"figure_{figure}_{name}", title, partial(draw, part), caption(part), figure)
 
     def tables(part: str, of: Callable[[Any], Sequence[Table]]) -> list[Table]:
         return [
@@ -80,139 +84,86 @@ def reproduction_page(result: ReproductionResult) -> Page:
             for table in of(getattr(getattr(result, name), part))
         ]
 
-    def single(
-        number: int, name: str, title: str, draw: Callable[..., Figure], part: Any, text: str
-    ) -> Drawing:
-        return Drawing(f"figure_{number}_{name}", title, partial(draw, part), text, number)
-
-    deflection, mesh = result.skin_deflection, paper.mesh
-    sets = {name: getattr(result, name).discrimination for name in COLUMNS}
+    mesh = single(
+        1, "mesh", "Mesh of the finger", paper.mesh, mesh_picture.draw_mesh, mesh_picture.caption_mesh
+    )
+    levels = pair(
+        2, "three_levels", "One sphere on three levels", "levels",
+        three_levels.draw_levels, three_levels.caption_levels,
+    )  # fmt: skip
+    steps = single(
+        3, "steps", "Steps to a hit rate", sets, discrimination.draw_steps, discrimination.caption_steps
+    )
+    skin = single(
+        4, "skin_deflection", "Deflection of the skin", deflection,
+        skin_deflection.draw_skin_deflection, skin_deflection.caption_skin_deflection,
+    )  # fmt: skip
+    rates = pair(
+        5, "single_unit", "Rates under a bar", "single_unit",
+        single_unit.draw_single_unit, single_unit.caption_single_unit,
+    )  # fmt: skip
+    maps = pair(
+        6, "population", "Rates and latencies under a sphere", "population",
+        population.draw_population, partial(population.caption_population, human=human.population),
+    )  # fmt: skip
+    observers = pair(
+        7, "discrimination", "Discrimination of spheres", "discrimination",
+        discrimination.draw_observers, discrimination.caption_observers,
+    )  # fmt: skip
+    criterion = pair(
+        8, "varied_criterion", "The same with a varied criterion", "discrimination",
+        discrimination.draw_criterion, discrimination.caption_criterion,
+    )  # fmt: skip
+    border = pair(9, "nail", "Stress at the border of the nail", "nail", nail.draw_nail, nail.caption_nail)
     more: list[Part] = []
-    beyond: list[Part] = [pair(10, "noise", "Amount of noise", "discrimination", draw_noise, caption_noise)]
+    beyond: list[Part] = [
+        pair(
+            10, "noise", "Amount of noise", "discrimination",
+            discrimination.draw_noise, discrimination.caption_noise,
+        )
+    ]  # fmt: skip
     if paper.single_unit_uncertainty is None:
         text = "uncertainty of the fit and curvature thresholds (`fingerpad reproduce --extended`)"
         more.append(Paragraph(f"Not run: {text}."))
     else:
         beyond += [
             pair(
-                11,
-                "uncertainty",
-                "Uncertainty of the fit",
-                "single_unit_uncertainty",
-                draw_uncertainty,
-                caption_uncertainty,
+                11, "uncertainty", "Uncertainty of the fit", "single_unit_uncertainty",
+                single_unit.draw_uncertainty, single_unit.caption_uncertainty,
             ),
-            *tables("single_unit_uncertainty", uncertainty_tables),
+            *tables("single_unit_uncertainty", single_unit.uncertainty_tables),
             pair(
-                12,
-                "curvature_thresholds",
-                "Thresholds of curvature",
-                "curvature_thresholds",
-                draw_thresholds,
-                caption_thresholds,
+                12, "curvature_thresholds", "Thresholds of curvature", "curvature_thresholds",
+                curvature_thresholds.draw_thresholds, curvature_thresholds.caption_thresholds,
             ),
-            *tables("curvature_thresholds", threshold_tables),
-        ]
-    chapters = [
-        Chapter(
-            "The finger",
-            [single(1, "mesh", "Mesh of the finger", draw_mesh, mesh, caption_mesh(mesh))],
-            [tissue_table(result.tissues)],
-        ),
-        Chapter(
-            "Three levels",
-            [pair(2, "three_levels", "One sphere on three levels", "levels", draw_levels, caption_levels)],
-        ),
-        Chapter(
-            "From rates to a percept",
-            [single(3, "steps", "Steps to a hit rate", draw_steps, sets, caption_steps(sets))],
-        ),
-        Chapter(
-            "Level 1: skin",
-            [
-                single(
-                    4,
-                    "skin_deflection",
-                    "Deflection of the skin",
-                    draw_skin_deflection,
-                    deflection,
-                    caption_skin_deflection(deflection),
-                )
-            ],
-            skin_deflection_tables(deflection),
-        ),
-        Chapter(
-            "Level 2: afferent",
-            [
-                pair(
-                    5,
-                    "single_unit",
-                    "Rates under a bar",
-                    "single_unit",
-                    draw_single_unit,
-                    caption_single_unit,
-                )
-            ],
-            tables("single_unit", single_unit_tables),
-        ),
-        Chapter(
-            "Level 3: population",
-            [
-                pair(
-                    6,
-                    "population",
-                    "Rates and latencies under a sphere",
-                    "population",
-                    draw_population,
-                    caption_population,
-                )
-            ],
-        ),
-        Chapter(
-            "Level 3: discrimination",
-            [
-                pair(
-                    7,
-                    "discrimination",
-                    "Discrimination of spheres",
-                    "discrimination",
-                    draw_observers,
-                    caption_observers,
-                ),
-                pair(
-                    8,
-                    "varied_criterion",
-                    "The same with a varied criterion",
-                    "discrimination",
-                    draw_criterion,
-                    caption_criterion,
-                ),
-            ],
-            tables("discrimination", discrimination_tables),
-        ),
-        Chapter(
-            "The border of the nail",
-            [pair(9, "nail", "Stress at the border of the nail", "nail", draw_nail, caption_nail)],
-        ),
-        Chapter("Beyond the paper", more, beyond),
-        Chapter(
-            "All numbers",
-            [],
-            [
-                statement_table(result.statements),
-                notes_table(paper.comparison, human.comparison),
-                *comparison_tables(paper.comparison, human.comparison),
-            ],
-        ),
-        Chapter("Published numbers used", [], input_tables(result.inputs)),
-        Chapter("Provenance", [], manifest_chapter(result.manifest).parts),
-    ]
+            *tables("curvature_thresholds", curvature_thresholds.threshold_tables),
+        ]  # fmt: skip
+    rows = paper.comparison, human.comparison
+    numbers = [statement_table(result.statements), notes_table(*rows), *comparison_tables(*rows)]
+    single_units = tables("single_unit", single_unit.single_unit_tables)
     return Page(
         "From a touch to a percept",
         "A finite-element fingertip, slowly adapting afferents and an observer, after Gerling et al. 2014. "
         f"{edition(result.manifest)}",
         [],
-        chapters,
+        [
+            Chapter("The finger", [mesh], [tissue_table(result.tissues)]),
+            Chapter("Three levels", [levels]),
+            Chapter("From rates to a percept", [steps]),
+            Chapter("Level 1: skin", [skin], skin_deflection.skin_deflection_tables(deflection)),
+            Chapter("Level 2: afferent", [rates], single_units),
+            Chapter("Level 3: population", [maps]),
+            Chapter(
+                "Level 3: discrimination",
+                [observers, criterion],
+                tables("discrimination", discrimination.discrimination_tables),
+            ),
+            Chapter("The border of the nail", [border]),
+            Chapter("Beyond the paper", more, beyond),
+            Chapter("All numbers", [], numbers),
+            Chapter("Published numbers used", [], input_tables(result.inputs)),
+            Chapter("Provenance", [], manifest_chapter(result.manifest).parts),
+        ],
         first_screen(result),
         verdict_table(result.statements),
     )
@@ -221,26 +172,86 @@ def reproduction_page(result: ReproductionResult) -> Page:
 def input_tables(inputs: Sequence[PublishedNumber]) -> list[Table]:
     """Return the meaning of each status, and every published number with its own."""
     meanings = [
-        Row(
-            (status, meaning, plain(sum(entry.status == status for entry in inputs))),
-            "assumed" if status == "assumed" else "",
+        Row.of(
+            status,
+            meaning,
+            plain(sum(entry.status == status for entry in inputs)),
+            kind="assumed" if status == "assumed" else "",
         )
         for status, meaning in STATUSES.items()
     ]
-    listed = [
-        Row(
-            (
-                entry.name,
-                plain(entry.value, digits=ALL_DIGITS, longest=ALL_VALUES),
-                "" if entry.unit == "1" else entry.unit,
-                entry.status,
-                entry.source,
-            ),
-            "assumed" if entry.status == "assumed" else "",
+    numbers = [
+        Row.of(
+            entry.name,
+            plain(entry.value, digits=ALL_DIGITS, longest=ALL_VALUES),
+            "" if entry.unit == "1" else entry.unit,
+            entry.status,
+            entry.source,
+            kind="assumed" if entry.status == "assumed" else "",
         )
         for entry in inputs
     ]
     return [
         Table("Status of a number", ("status", "meaning", "numbers"), meanings),
-        Table("Published numbers", ("number", "value", "unit", "status", "source"), listed),
+        Table("Published numbers", ("number", "value", "unit", "status", "source"), numbers),
     ]
+
+
+def first_screen(result: ReproductionResult) -> list[Drawing]:
+    """Return a picture of each level, both sets in it, with its result as the caption."""
+    fits = [f"`{name}` {fixed(getattr(result, name).single_unit.fss_out_of_sample, 2)}" for name in COLUMNS]
+    noises = [f"`{name}` {number(getattr(result, name).discrimination.noise_sigma)}" for name in COLUMNS]
+    deflection = result.skin_deflection
+    r2 = [trial.cylinder.r2 for trial in (deflection.trial1, deflection.trial2, deflection.trial3)]
+    best = f"Trial {1 + int(np.argmax(r2))}"
+    said = ", as in the paper." if best == IN_THE_PAPER else f"; in the paper {IN_THE_PAPER} is."
+    captions = {
+        "skin": f"Skin: {best} is closest to the observed deflection{said}",
+        "afferent": f"Afferent: FSS out of sample {joined(fits)}; the paper "
+        f"{fixed(paper.FSS_OUT_OF_SAMPLE.value, 2)}.",
+        "percept": f"Percept: noise that fits people's hit rates {joined(noises)}; the paper "
+        f"{number(psychophysics.NOISE_SIGMA.value)}.",
+    }
+    drawn = zip(captions.items(), (_draw_skin, _draw_afferent, _draw_percept), strict=True)
+    return [
+        Drawing(f"level_{level}_{name}", name.capitalize(), partial(_draw_level, result, draw), caption)
+        for level, ((name, caption), draw) in enumerate(drawn, start=1)
+    ]
+
+
+def _draw_level(result: ReproductionResult, draw: Callable[[Axes, ReproductionResult], None]) -> Figure:
+    figure = new_figure(4.6, 3.0)
+    draw(figure.subplots(), result)
+    return figure
+
+
+def _draw_skin(axes: Axes, result: ReproductionResult) -> None:
+    """Draw the deflection under the cylinder, downwards."""
+    skin_deflection.draw_profiles(axes, result.skin_deflection, skin_deflection.CYLINDER)
+    axes.set(title="Level 1: skin", xlabel="distance from the axis, distal [mm]", ylabel="deflection [mm]")
+    handles, labels = axes.get_legend_handles_labels()
+    axes.legend(handles[:4], [label.replace(", R²", "\nR²") for label in labels[:4]], fontsize=7.0)
+    axes.invert_yaxis()
+
+
+def _draw_afferent(axes: Axes, result: ReproductionResult) -> None:
+    """Draw the rates of the ramp over the place of the bar."""
+    for name, style in LINES.items():
+        unit = getattr(result, name).single_unit
+        axes.plot(-unit.shift_mm, unit.dynamic_rate_hz, label=name, **style)
+    draw_observed_rates(axes, -unit.shift_mm, unit.observed_dynamic_rate_hz)
+    axes.set(title="Level 2: afferent", xlabel=single_unit.ALONG, ylabel="rate in the ramp [spikes/s]")
+    axes.set_ylim(0.0, 1.25 * axes.get_ylim()[1])
+    axes.legend(loc="upper center", ncols=3, fontsize=8.0)
+
+
+def _draw_percept(axes: Axes, result: ReproductionResult) -> None:
+    """Draw the hit rates of the static Gradient Sum over the middle of the receptors."""
+    for name, style in LINES.items():
+        section = getattr(result, name).discrimination
+        rates = section.gradient_sum["static"].hit_rate
+        axes.plot(section.curvature_per_m[1:], rates, marker="o", label=name, **style)
+    discrimination.draw_people(axes, section.goodwin)
+    axes.set(title="Level 3: percept", xlabel="curvature of the sphere [1/m]", ylabel="hit rate [fraction]")
+    axes.set_ylim(top=1.02)
+    axes.legend(loc="lower right", fontsize=8.0)

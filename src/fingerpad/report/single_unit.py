@@ -16,9 +16,24 @@ from fingerpad.experiments.gerling2014.single_unit import (
     Search,
     SingleUnitResult,
 )
-from fingerpad.report.formatting import PARAMETER_SYMBOLS, fixed, number, spelled
-from fingerpad.report.parts import Row, Table
-from fingerpad.report.style import BLACK, COLUMN_IN, ORANGE, draw_rates, new_figure, shared_legend
+from fingerpad.experiments.gerling2014.single_unit_uncertainty import (
+    CredibleInterval,
+    PosteriorConvergence,
+    UncertaintyResult,
+)
+from fingerpad.report.formatting import (
+    ABSENT,
+    IDENTIFIABLE_SYMBOLS,
+    PARAMETER_SYMBOLS,
+    PHASE_LABELS,
+    fixed,
+    number,
+    spelled,
+    whole_percent,
+)
+from fingerpad.report.parts import Row, Table, listed
+from fingerpad.report.rate_uncertainty import draw_profile, profile_ends, sensitivity_table
+from fingerpad.report.style import BLACK, BLUE, COLUMN_IN, ORANGE, PALE, draw_rates, new_figure, shared_legend
 
 BAR_HALF_WIDTH_MM = protocol.BAR_WIDTH.value / 2.0
 STATIC_MARK_MM = 2.9
@@ -37,26 +52,14 @@ PAPER_FOLD, PAPER_START = 3, 2
 def draw_single_unit(section: SingleUnitResult) -> Figure:
     """Draw Figure 5: dynamic rates on the left, static rates on the right."""
     figure = new_figure(COLUMN_IN, 4.0)
-    phases = (
-        (
-            "(a) dynamic ramp",
-            section.dynamic_rate_hz,
-            section.observed_dynamic_rate_hz,
-            section.fss_in_sample_dynamic,
-        ),
-        (
-            "(b) static hold",
-            section.static_rate_hz,
-            section.observed_static_rate_hz,
-            section.fss_in_sample_static,
-        ),
-    )
-    for axes, (title, predicted_hz, observed_hz, fss) in zip(figure.subplots(1, 2), phases, strict=True):
+    dynamic, static = figure.subplots(1, 2)
+    for axes, letter, phase in ((dynamic, "a", "dynamic"), (static, "b", "static")):
+        rate_hz, observed_hz = (getattr(section, f"{of}{phase}_rate_hz") for of in ("", "observed_"))
+        fss = fixed(getattr(section, f"fss_in_sample_{phase}"), 2)
         axes.axvspan(-BAR_HALF_WIDTH_MM, BAR_HALF_WIDTH_MM, color="#f3f1ea", zorder=0)
-        draw_rates(axes, -section.shift_mm, predicted_hz, observed_hz, FITTED)
-        axes.set_title(f"{title}, FSS = {fixed(fss, 2)}", fontsize=10.0)
+        draw_rates(axes, -section.shift_mm, rate_hz, observed_hz, FITTED)
+        axes.set_title(f"({letter}) {PHASE_LABELS[phase]}, FSS = {fss}", fontsize=10.0)
         axes.set_xlabel(ALONG)
-    dynamic, static = figure.axes
     _mark_dynamic_rates(dynamic, section.modulation.dynamic.observed)
     _mark_static_difference(static, section.modulation.static.ours.minimum_hz)
     shared_legend(figure, figure.axes, columns=2)
@@ -84,17 +87,11 @@ def _mark_dynamic_rates(axes: Axes, observed: Modulation) -> None:
 def _mark_static_difference(axes: Axes, lowest_hz: float) -> None:
     """Draw the difference that the paper predicts, from our lowest rate: it prints no static rates."""
     difference = paper.STATIC_RATE_DIFFERENCE.value
-    axes.errorbar(
-        STATIC_MARK_MM,
-        lowest_hz + 0.5 * difference,
-        yerr=0.5 * difference,
-        color=ORANGE,
-        capsize=5.0,
-        elinewidth=1.8,
-        label="difference predicted by the paper",
-    )
+    place, bar = (STATIC_MARK_MM, lowest_hz + 0.5 * difference), 0.5 * difference
+    label = "difference predicted by the paper"
+    axes.errorbar(*place, yerr=bar, color=ORANGE, capsize=5.0, elinewidth=1.8, label=label)
     text: Any = {"ha": "left", "va": "center", "color": ORANGE, "fontsize": 9.0}
-    axes.text(STATIC_MARK_MM, lowest_hz + 0.5 * difference, f" {number(difference)}", **text)
+    axes.text(*place, f" {number(difference)}", **text)
 
 
 def caption_single_unit(section: SingleUnitResult) -> str:
@@ -105,9 +102,8 @@ def caption_single_unit(section: SingleUnitResult) -> str:
         f"{protocol.DEPTH.value} mm at {section.shift_mm.size} positions relative to the centre of its "
         "receptive field; shaded: positions at which the bar covers the centre. Circles: observed in one "
         "afferent of a monkey (Phillips & Johnson 1981); the finger of the model is human. Blue line: rates "
-        "of the model, whose afferent was fitted to all of these circles. Fractional sum of squares (FSS, 1 "
-        "is perfect): that of the line is in the titles. (a) "
-        "Horizontal lines: lowest rate under the flat face and highest rate, "
+        "of the model, whose afferent was fitted to these circles; its fractional sum of squares (FSS, "
+        "1 is perfect) is in the titles. (a) Lines: lowest rate under the flat face and highest rate, "
         f"{number(paper.DYNAMIC_RATE_MINIMUM.value)} and {number(paper.DYNAMIC_RATE_MAXIMUM.value)} spikes/s "
         f"as the paper's model predicts them (dashed), and {number(observed.minimum_hz)} and "
         f"{number(observed.maximum_hz)} spikes/s as observed (dotted). (b) Bar: the difference of "
@@ -147,7 +143,7 @@ def _scores(section: SingleUnitResult) -> Table:
     return Table(
         "Fractional sum of squares (FSS)",
         ("over", "paper", "this run"),
-        [Row((name, fixed(printed, 2), fixed(ours, 3))) for name, printed, ours in rows],
+        [Row.of(name, fixed(printed, 2), fixed(ours, 3)) for name, printed, ours in rows],
         SPECIES,
     )
 
@@ -155,13 +151,11 @@ def _scores(section: SingleUnitResult) -> Table:
 def _parameters(section: SingleUnitResult, start_points: Sequence[Mapping[str, float]]) -> Table:
     """Return the fitted parameters beside the paper's start points, where the fit begins with these."""
     rows = [
-        Row(
-            (
-                PARAMETER_SYMBOLS.get(name, spelled(name)),
-                *(number(start.get(name)) for start in start_points),
-                number(value),
-                section.units.get(name, ""),
-            )
+        Row.of(
+            PARAMETER_SYMBOLS.get(name, spelled(name)),
+            *(number(start.get(name)) for start in start_points),
+            number(value),
+            section.units.get(name, ""),
         )
         for name, value in section.parameters.items()
     ]
@@ -171,14 +165,12 @@ def _parameters(section: SingleUnitResult, start_points: Sequence[Mapping[str, f
 
 def _folds(folds: Sequence[FoldResult]) -> Table:
     rows = [
-        Row(
-            (
-                str(fold.fold),
-                ", ".join(f"{shift:+.1f}".replace("-", "−") for shift in fold.testing_shift_mm),
-                str(fold.start),
-                fixed(fold.fss_train, 3),
-                fixed(fold.fss_test, 3),
-            )
+        Row.of(
+            str(fold.fold),
+            ", ".join(f"{shift:+.1f}".replace("-", "−") for shift in fold.testing_shift_mm),
+            str(fold.start),
+            fixed(fold.fss_train, 3),
+            fixed(fold.fss_test, 3),
         )
         for fold in folds
     ]
@@ -188,28 +180,21 @@ def _folds(folds: Sequence[FoldResult]) -> Table:
 
 def _searches(folds: Sequence[FoldResult]) -> Table:
     rows = [
-        Row(
-            (
-                f"{fold.fold}, {search.start}",
-                fixed(search.history[0].fss, 3),
-                fixed(search.fss_train, 3),
-                fixed(search.fss_test, 3),
-                str(len(search.history) - 1),
-                number(search.runs),
-            ),
-            "final" if search.start == fold.start else "",
+        Row.of(
+            f"{fold.fold}, {search.start}",
+            fixed(search.history[0].fss, 3),
+            fixed(search.fss_train, 3),
+            fixed(search.fss_test, 3),
+            str(len(search.history) - 1),
+            number(search.runs),
+            kind="final" if search.start == fold.start else "",
         )
         for fold in folds
         for search in fold.climbs
     ]
     columns = (
-        "fold, start",
-        "FSS at the start",
-        "FSS, training",
-        "FSS, testing",
-        "iterations",
-        "evaluations",
-    )
+        "fold, start", "FSS at the start", "FSS, training", "FSS, testing", "iterations", "evaluations",
+    )  # fmt: skip
     note = "In bold: the better start on the training positions, which is the result of the fold."
     return Table("Searches of every fold", columns, rows, note)
 
@@ -218,9 +203,11 @@ def _steps(search: Search, section: SingleUnitResult, as_printed: bool) -> Table
     """Return the steps of one search, beside the paper's session if it has the same start point."""
     names = list(search.history[0].parameters)
     rows = [
-        Row(
-            (str(step.iteration), fixed(step.fss, 3), *(number(step.parameters[name]) for name in names)),
-            "final" if step is search.history[-1] else "",
+        Row.of(
+            str(step.iteration),
+            fixed(step.fss, 3),
+            *(number(step.parameters[name]) for name in names),
+            kind="final" if step is search.history[-1] else "",
         )
         for step in search.history
     ]
@@ -246,14 +233,12 @@ def _steps(search: Search, section: SingleUnitResult, as_printed: bool) -> Table
 
 def _modulation(modulation: RateModulation) -> Table:
     rows = [
-        Row(
-            (
-                f"{phase}, {source}",
-                number(found.maximum_hz),
-                number(found.minimum_hz),
-                number(found.difference_hz),
-                number(found.index),
-            )
+        Row.of(
+            f"{phase}, {source}",
+            number(found.maximum_hz),
+            number(found.minimum_hz),
+            number(found.difference_hz),
+            number(found.index),
         )
         for phase, both in (("dynamic", modulation.dynamic), ("static", modulation.static))
         for source, found in (("observed", both.observed), ("this run", both.ours))
@@ -266,3 +251,126 @@ def _modulation(modulation: RateModulation) -> Table:
     )
     columns = ("rates", "maximum", "minimum", "difference", "index, Eq. 11")
     return Table("Modulation at the edge of the bar (the paper's Table 5)", columns, rows, note)
+
+
+GAINS = {"intercept_ma": ("β", "mA"), "dynamic_gain": ("k_d", "mA ms/kPa"), "static_gain": ("k_s", "mA/kPa")}
+
+
+def draw_uncertainty(section: UncertaintyResult) -> Figure:
+    """Draw the bands of predicted rates and of new recordings, and the profile of each parameter."""
+    figure = new_figure(COLUMN_IN, 7.5)
+    grid = figure.add_gridspec(3, 2)
+    for column, (phase, rates) in enumerate(section.rates.items()):
+        axes = figure.add_subplot(grid[0, column])
+        new: Any = {"color": PALE, "alpha": 1.0, "linewidth": 0.0, "label": "new recording"}
+        axes.fill_between(-section.shift_mm, rates.new_low_hz, rates.new_high_hz, **new)
+        band: Any = {"color": BLUE, "alpha": 0.45, "linewidth": 0.0, "label": "prediction"}
+        axes.fill_between(-section.shift_mm, rates.low_hz, rates.high_hz, **band)
+        draw_rates(axes, -section.shift_mm, rates.median_hz, rates.observed_hz, "median")
+        axes.set(title=f"({'ab'[column]}) {PHASE_LABELS[phase]}", xlabel=ALONG)
+        if column == 0:
+            figure.legend(*axes.get_legend_handles_labels(), loc="outside upper center", ncols=4)
+    for column, profile in enumerate(section.profiles):
+        axes, name = figure.add_subplot(grid[1 + column // 2, column % 2]), profile.name
+        found = section.posterior[name]
+        draw_profile(axes, profile, section.units[name], section.fit[name], (found.low, found.high))
+        axes.set_title(f"({'cdef'[column]}) {IDENTIFIABLE_SYMBOLS[name]}")
+        if column % 2 == 0:
+            axes.set_ylabel("loss of log likelihood")
+    return figure
+
+
+def caption_uncertainty(section: UncertaintyResult) -> str:
+    """Describe the bands, the profiles and their marks."""
+    level = whole_percent(section.level)
+    return (
+        f"Uncertainty of one afferent given its rates under a bar {protocol.BAR_WIDTH.value} mm wide at "
+        f"{section.shift_mm.size} positions, observed in one afferent of a monkey (Phillips & Johnson 1981; "
+        f"circles). (a, b) {level} bands: blue, of the rates that the posterior "
+        "predicts; pale, of a new recording with residuals like those observed. "
+        "(c-f) Loss of log likelihood with one parameter held and the others "
+        f"fitted again; points below the dashed line are within the {level} interval, the bar below is that "
+        "of the posterior, and the orange line is the response-surface fit, with other weights of phases. "
+        "Profiles are not smooth, because rates are discontinuous where a spike enters a window."
+    )
+
+
+def uncertainty_tables(section: UncertaintyResult) -> list[Table]:
+    """Return the numbers in both forms, the residuals, the sensitivity and the convergence."""
+    return [
+        _determined(section),
+        _residuals(section),
+        sensitivity_table(section.sensitivity, section.units),
+        _convergence(section.convergence),
+    ]
+
+
+def _determined(section: UncertaintyResult) -> Table:
+    profiles = {profile.name: profile for profile in section.profiles}
+    rows = [
+        Row.of(
+            f"{symbol} [{section.units[name]}]",
+            number(section.fit[name]),
+            *_interval(section.posterior[name]),
+            profile_ends(profiles[name]),
+        )
+        for name, symbol in IDENTIFIABLE_SYMBOLS.items()
+    ]
+    rows += [
+        Row.of(f"{symbol} [{unit}]", ABSENT, *_interval(section.posterior[name]), ABSENT)
+        for name, (symbol, unit) in GAINS.items()
+    ]
+    rows.append(Row.of("β τ/(C v) [1]", ABSENT, *_interval(section.posterior["resting_share"]), ABSENT))
+    level = whole_percent(section.level)
+    rank = section.identifiability.rank
+    smallest = section.identifiability.relative_singular_values
+    note = (
+        "Spikes determine four parameters. β, k_d, k_s, C and v are known only up to a common scale; the "
+        f"gains are given for C = {number(section.capacitance_mf)} mF and v = {number(section.threshold_mv)} "
+        f"mV, as fitted. Of the six singular values of the rates' Jacobian {rank} are not zero; relative to "
+        f"the largest they are {', '.join(number(value, 2) for value in smallest[:rank])}, and the others at "
+        f"most {number(float(smallest[rank:].max()), 1) if rank < smallest.size else ABSENT}."
+    )
+    columns = ("number", "fit", "median", f"{level} credible interval", f"{level} by profile likelihood")
+    return Table("Numbers that the rates determine", columns, rows, note)
+
+
+def _interval(found: CredibleInterval) -> tuple[str, str]:
+    return number(found.median), f"{number(found.low)} … {number(found.high)}"
+
+
+def _residuals(section: UncertaintyResult) -> Table:
+    rows = [
+        Row.of(
+            PHASE_LABELS[phase],
+            *_interval(rates.residual_deviation_hz),
+            *_interval(rates.residual_length_mm),
+            number(rates.probability_of_independence, 2),
+            fixed(rates.share_within_new, 2),
+        )
+        for phase, rates in section.rates.items()
+    ]
+    columns = (
+        "phase", "standard deviation [spikes/s]", "interval", "correlation length [mm]", "interval",
+        "probability of independence", "observed within the band",
+    )  # fmt: skip
+    note = (
+        "Residuals of neighbouring positions may be correlated. This raises the largest log likelihood "
+        f"by {number(section.evidence_for_alike_residuals)}."
+    )
+    return Table("Residuals", columns, rows, note)
+
+
+def _convergence(found: PosteriorConvergence) -> Table:
+    facts = {
+        "independent ensembles": number(found.ensembles),
+        "walkers of each": number(found.walkers),
+        "draws kept": number(found.draws),
+        "evaluations of the model": number(found.evaluations),
+        "share of accepted proposals": number(found.acceptance),
+        "largest split R-hat": number(found.r_hat, 4),
+        "smallest effective sample size": number(found.effective_draws),
+        "smallest effective sample size of the tails": number(found.effective_draws_of_tails),
+        "largest autocorrelation time, draws": number(found.draws_per_effective_draw),
+    }
+    return listed("Convergence of the posterior", facts, ("measure", "value"))

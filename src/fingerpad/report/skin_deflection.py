@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
@@ -9,7 +11,6 @@ from fingerpad.data import protocol
 from fingerpad.experiments.gerling2014.skin_deflection import (
     CylinderDeflection,
     IndenterDeflection,
-    ObservedDeflection,
     SkinDeflectionResult,
 )
 from fingerpad.report.formatting import fixed
@@ -17,11 +18,7 @@ from fingerpad.report.parts import Row, Table
 from fingerpad.report.style import BLACK, BLUE, GREEN, GREY, ORANGE, new_figure
 
 UM_PER_MM = 1000.0
-TRIAL_STYLES = {
-    "Trial 1": (BLUE, (0, (5, 2))),
-    "Trial 2": (ORANGE, (0, (1, 1.2))),
-    "Trial 3": (GREEN, "-"),
-}
+TRIAL_STYLES = {"Trial 1": (BLUE, (0, (5, 2))), "Trial 2": (ORANGE, (0, (1, 1.2))), "Trial 3": (GREEN, "-")}
 LINE = f"{protocol.LINE_DIAMETER.value * UM_PER_MM:.0f} µm line"
 CYLINDER = f"{protocol.CYLINDER_DIAMETER.value} mm cylinder"
 ALONG = "distance from the indenter's axis, distal [mm]"
@@ -54,38 +51,20 @@ def draw_skin_deflection(section: SkinDeflectionResult) -> Figure:
 def draw_profiles(axes: Axes, section: SkinDeflectionResult, indenter: str) -> None:
     """Draw the deflection of each trial under an indenter, and what was observed under it."""
     for name, trial in _trials(section).items():
-        _draw_profile(axes, name, trial[indenter])
-    if indenter == CYLINDER:
-        _draw_observed(axes, section.observed)
-    axes.margins(x=0.01)
-
-
-def _draw_profile(axes: Axes, name: str, profile: IndenterDeflection) -> None:
-    colour, style = TRIAL_STYLES[name]
-    fit = f", R² = {fixed(profile.r2, 2)}" if isinstance(profile, CylinderDeflection) else ""
-    axes.plot(-profile.distance_mm, profile.deflection_mm, color=colour, linestyle=style, label=name + fit)
-
-
-def _draw_observed(axes: Axes, observed: ObservedDeflection) -> None:
-    distance, deflection, artefact = -observed.distance_mm, observed.deflection_mm, observed.is_artefact
-    axes.plot(
-        distance[~artefact],
-        deflection[~artefact],
-        "o",
-        markersize=4.5,
-        color=BLACK,
-        markerfacecolor="none",
-        label="observed",
-    )
-    if artefact.any():
+        profile, (colour, style) = trial[indenter], TRIAL_STYLES[name]
+        fit = f", R² = {fixed(profile.r2, 2)}" if isinstance(profile, CylinderDeflection) else ""
         axes.plot(
-            distance[artefact],
-            deflection[artefact],
-            "x",
-            markersize=6.0,
-            color=GREY,
-            label="observed, artefact (left out)",
+            -profile.distance_mm, profile.deflection_mm, color=colour, linestyle=style, label=name + fit
         )
+    if indenter == CYLINDER:
+        observed, artefact = section.observed, section.observed.is_artefact
+        x, y, kept = -observed.distance_mm, observed.deflection_mm, ~artefact
+        open_circle: Any = {"color": BLACK, "markerfacecolor": "none", "markersize": 4.5}
+        axes.plot(x[kept], y[kept], "o", label="observed", **open_circle)
+        if artefact.any():
+            label = "observed, artefact (left out)"
+            axes.plot(x[artefact], y[artefact], "x", color=GREY, markersize=6.0, label=label)
+    axes.margins(x=0.01)
 
 
 def caption_skin_deflection(_: SkinDeflectionResult) -> str:

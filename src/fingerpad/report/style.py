@@ -62,6 +62,12 @@ class LineStyle(TypedDict, total=False):
     marker: str
 
 
+PEOPLE: Any = {
+    "color": BLACK, "markerfacecolor": "none", "markeredgewidth": 1.6, "markersize": 7.5, "zorder": 5,
+}  # fmt: skip
+"""How observations of people are drawn: open diamonds before all else."""
+
+
 def numbers(values: Any) -> FloatArray:
     """Return nested lists of numbers as an array; None becomes NaN."""
     return np.array(values, dtype=np.float64)

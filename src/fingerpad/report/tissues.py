@@ -30,22 +30,20 @@ NOTE = (
 def tissue_table(layers: Sequence[TissueLayer]) -> Table:
     """Return one row per set and layer."""
     rows = [
-        Row(
-            (
-                layer.tissues,
-                layer.layer,
-                layer.law,
-                number(layer.shear_kpa),
-                number(layer.shear_at_once_kpa) if layer.prony_shares else ABSENT,
-                fixed(layer.poisson, 2),
-                fixed(layer.poisson_at_once, 2) if layer.prony_shares else ABSENT,
-                _prony(layer),
-                " / ".join(
-                    status or ABSENT
-                    for status in (layer.modulus_status, layer.poisson_status, layer.prony_status)
-                ),
-                layer.source,
+        Row.of(
+            layer.tissues,
+            layer.layer,
+            layer.law,
+            number(layer.shear_kpa),
+            number(layer.shear_at_once_kpa) if layer.prony_shares else ABSENT,
+            fixed(layer.poisson, 2),
+            fixed(layer.poisson_at_once, 2) if layer.prony_shares else ABSENT,
+            _prony(layer),
+            " / ".join(
+                status or ABSENT
+                for status in (layer.modulus_status, layer.poisson_status, layer.prony_status)
             ),
+            layer.source,
         )
         for layer in layers
     ]

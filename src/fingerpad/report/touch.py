@@ -55,10 +55,7 @@ class Joinable(Protocol):
 
 @known_keywords
 def save_figure(
-    path: str | Path,
-    skin: SkinResponse,
-    response: ResponseMap | Joinable,
-    indenter: Indenter | None = None,
+    path: str | Path, skin: SkinResponse, response: ResponseMap | Joinable, indenter: Indenter | None = None
 ) -> Path:
     """Draw a touch and save the picture: the finger, coloured by what the afferents follow, and the spikes.
 

@@ -31,11 +31,7 @@ def write_touch_page(result: TouchFile, draw: Callable[[], Figure], folder: Path
         touch_summary(result),
         [
             Chapter(
-                "Results",
-                [
-                    Drawing("touch", "The touch", draw, caption, 1),
-                    facts_table("In numbers", facts),
-                ],
+                "Results", [Drawing("touch", "The touch", draw, caption, 1), facts_table("In numbers", facts)]
             ),
             manifest_chapter(result.manifest),
         ],

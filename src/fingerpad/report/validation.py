@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -13,7 +12,7 @@ from fingerpad.experiments.validation.validation import Prediction, ValidationFi
 from fingerpad.report.formatting import ABSENT, fixed, number, plain
 from fingerpad.report.manifest import edition, facts_table, manifest_chapter
 from fingerpad.report.page import write_html
-from fingerpad.report.parts import Chapter, Drawing, Page, Part, Row, Table
+from fingerpad.report.parts import Chapter, Page, Row, Table, illustrated, listed
 from fingerpad.report.style import BLACK, BLUE, GREY, ORANGE, new_figure, say_nothing_to_draw
 
 _PAGE = "validate.html"
@@ -39,19 +38,17 @@ def draw_validation(results: ValidationFile) -> Figure:
     axes.axline((0.0, 0.0), slope=1.0, color=GREY, linewidth=1.0, label="observed as predicted")
     if np.isfinite(results.gain):
         axes.axline((0.0, 0.0), slope=results.gain, color=GREY, linestyle=":", label="after the gain")
-    for rows, colour, label in (
-        (~outside, BLUE, "range of a condition"),
-        (outside, ORANGE, "range without its prediction"),
-    ):
+    ranges = {BLUE: (~outside, "range of a condition"), ORANGE: (outside, "range without its prediction")}
+    for colour, (rows, label) in ranges.items():
         if (high - low)[rows].any():
             axes.vlines(predicted[rows], low[rows], high[rows], color=colour, label=label)
     observed = [row.observed for row in shown]
     axes.plot(predicted, observed, "o", color=BLACK, markerfacecolor="none", markersize=5, label="observed")
     ends = np.array([*predicted, *low, *high])
     margin = 0.05 * (float(np.ptp(ends)) or 1.0)
-    axes.set(xlim=(ends.min() - margin, ends.max() + margin), ylim=(ends.min() - margin, ends.max() + margin))
-    axes.set_xlabel(f"predicted {quantity} [{results.unit}]")
-    axes.set_ylabel(f"observed {quantity} [{results.unit}]")
+    limits = (ends.min() - margin, ends.max() + margin)
+    labels = (f"{side} {quantity} [{results.unit}]" for side in ("predicted", "observed"))
+    axes.set(xlim=limits, ylim=limits, xlabel=next(labels), ylabel=next(labels))
     figure.legend(*axes.get_legend_handles_labels(), loc="outside lower center", ncols=3)
     return figure
 
@@ -68,22 +65,11 @@ def caption_validation(results: ValidationFile) -> str:
 
 def write_validation_page(results: ValidationFile, folder: Path) -> Path:
     """Write the page of a validation, `validate.html`, and its figure."""
-    quantity = QUANTITIES[results.unit]
-    drawing = Drawing(
-        "validation",
-        f"Observed and predicted {quantity}",
-        partial(draw_validation, results),
-        caption_validation(results),
-        1,
-    )
-    parts: list[Part] = [
-        drawing,
-        _scores(results),
-        _conditions(results),
-        facts_table("Assumptions", _assumed(results)),
-    ]
+    title = f"Observed and predicted {QUANTITIES[results.unit]}"
+    figure = (1, "validation", title, draw_validation, caption_validation)
+    parts = illustrated(results, _tables, figure)
     page = Page(
-        f"Observed and predicted {quantity}",
+        title,
         f"Observations of the kind {results.kind}, predicted by a finite-element fingertip with the tissues "
         f"{results.tissues}. {edition(results.manifest)}",
         validation_summary(results),
@@ -111,7 +97,7 @@ def validation_summary(results: ValidationFile) -> list[str]:
     return said
 
 
-def _scores(results: ValidationFile) -> Table:
+def _tables(results: ValidationFile) -> list[Table]:
     values = {
         "R² of the predictions": results.r2,
         "R² after the gain": results.r2_after_gain,
@@ -120,8 +106,10 @@ def _scores(results: ValidationFile) -> Table:
         "gain": results.gain,
         "share of conditions inside their observed range": results.share_inside,
     }
-    rows = [Row((name, number(value))) for name, value in values.items() if np.isfinite(value)]
-    return Table("Scores", ("", ""), rows)
+    known = {name: number(value) for name, value in values.items() if np.isfinite(value)}
+    names = ("loading", "ramp_ms", "hold_ms", "static_window_ms", "receptor_depth_mm", "afferent")
+    assumed = facts_table("Assumptions", {name: getattr(results, name) for name in names})
+    return [listed("Scores", known), _conditions(results), assumed]
 
 
 def _conditions(results: ValidationFile) -> Table:
@@ -130,15 +118,13 @@ def _conditions(results: ValidationFile) -> Table:
     for row in results.predictions:
         unique.setdefault(tuple(getattr(row, column) for column in conditions), []).append(row)
     rows = [
-        Row(
-            (
-                *(plain(value) for value in condition),
-                plain(len(same)),
-                " … ".join(dict.fromkeys((number(same[0].observed_low), number(same[0].observed_high)))),
-                number(same[0].predicted),
-                ABSENT if same[0].inside_range is None else plain(same[0].inside_range),
-                same[0].reason or "",
-            )
+        Row.of(
+            *(plain(value) for value in condition),
+            plain(len(same)),
+            " … ".join(dict.fromkeys((number(same[0].observed_low), number(same[0].observed_high)))),
+            number(same[0].predicted),
+            ABSENT if same[0].inside_range is None else plain(same[0].inside_range),
+            same[0].reason or "",
         )
         for condition, same in list(unique.items())[:LONGEST_TABLE]
     ]
@@ -155,8 +141,3 @@ def _conditions(results: ValidationFile) -> Table:
         rows,
         f"{left} more are in validate.json." if left else "",
     )
-
-
-def _assumed(results: ValidationFile) -> dict[str, object]:
-    names = ("loading", "ramp_ms", "hold_ms", "static_window_ms", "receptor_depth_mm", "afferent")
-    return {name: getattr(results, name) for name in names}

@@ -28,12 +28,7 @@ from fingerpad.experiments.discrimination.decoding import (
     silent_stimuli,
     task_statistic,
 )
-from fingerpad.experiments.discrimination.task import (
-    FITTED,
-    IDEAL,
-    DiscriminationTask,
-    ObservedPoint,
-)
+from fingerpad.experiments.discrimination.task import FITTED, IDEAL, DiscriminationTask, ObservedPoint
 from fingerpad.experiments.discrimination.task_stimuli import stimulus_index
 from fingerpad.neuron.mixed_population import MixedPopulation, one_map
 from fingerpad.neuron.population import Population
@@ -73,18 +68,12 @@ Encoded = tuple[FloatArray, np.ndarray]
 class TaskPopulation:
     """The population of a task."""
 
-    layout: str
-    """How the afferents are laid out."""
+    layout: str  # How the afferents are laid out.
     n_receptors: int
-    """How many there are."""
-    pitch_mm: float
-    """Distance between neighbours. [mm]"""
-    density_per_cm2: float
-    """Afferents per area of skin. [1/cm2]"""
-    positions_mm: Matrix
-    """x and z, or x, y and z, (n_receptors, 2 or 3). [mm]"""
-    sensitivity: Vector | None
-    """Factor on the gains of each afferent, (n_receptors,)."""
+    pitch_mm: float  # Distance between neighbours. [mm]
+    density_per_cm2: float  # Afferents per area of skin. [1/cm2]
+    positions_mm: Matrix  # x and z, or x, y and z, (n_receptors, 2 or 3). [mm]
+    sensitivity: Vector | None  # Factor on the gains of each afferent, (n_receptors,).
 
 
 @result_class
@@ -92,33 +81,26 @@ class FittedNoise:
     """What the noise was fitted to."""
 
     code: str
-    measure: str
-    """The decoding that was brought closest to the observed hit rates."""
-    stimulus: tuple[str, ...]
-    """The comparisons that were observed."""
+    measure: str  # The decoding that was brought closest to the observed hit rates.
+    stimulus: tuple[str, ...]  # The comparisons that were observed.
     observed: Vector
-    hit_rate: Vector
-    """Hit rates of people and of the model, (n_observed,). [0-1]"""
+    hit_rate: Vector  # Hit rates of people and of the model, (n_observed,). [0-1]
 
 
 @result_class
 class TaskNoise:
     """The noise of a task."""
 
-    sigma: float
-    """Standard deviation of the multiplicative noise."""
-    fitted_to: FittedNoise | None = None
-    """Absent where the noise was given."""
-    root_mean_square_error: float | None = None
-    """Of the fitted hit rates."""
+    sigma: float  # Standard deviation of the multiplicative noise.
+    fitted_to: FittedNoise | None = None  # Absent where the noise was given.
+    root_mean_square_error: float | None = None  # Of the fitted hit rates.
 
 
 @result_class
 class ForcedChoice:
     """Two presentations per trial, one of them the comparison: how often it is identified."""
 
-    trials: int
-    """Trials per comparison behind the intervals, those of the task."""
+    trials: int  # Trials per comparison behind the intervals, those of the task.
     proportions: Matrix
     """Proportion correct, and the ends of the exact 95 % interval that so many trials leave about it, (3,
     n_comparisons). [0-1]
@@ -135,9 +117,7 @@ def forced_choice_of(d_prime: FloatArray, trials: int) -> ForcedChoice:
     proportions = np.array([proportion, *binomial_interval(proportion, trials)])
     d_primes = np.sqrt(2.0) * ndtri(proportions)
     return ForcedChoice(
-        trials=trials,
-        proportions=proportions,
-        d_primes=np.where(np.isfinite(d_primes), d_primes, np.nan),
+        trials=trials, proportions=proportions, d_primes=np.where(np.isfinite(d_primes), d_primes, np.nan)
     )
 
 
@@ -146,40 +126,30 @@ class Decoding:
     """One measure of the population, decoded by one code."""
 
     code: str
-    measure: str
-    """By the names of `CODES` and `MEASURES`."""
-    silent: tuple[str, ...] = ()
-    """Stimuli under which no afferent responds; there is no hit rate then."""
+    measure: str  # By the names of `CODES` and `MEASURES`.
+    silent: tuple[str, ...] = ()  # Stimuli under which no afferent responds; there is no hit rate then.
     hit_rate: Vector | None = None
-    hit_rate_sd: Vector | None = None
-    """Mean and standard deviation over repetitions, (n_comparisons,). [0-1]"""
+    hit_rate_sd: Vector | None = None  # Mean and standard deviation over repetitions, (n_comparisons,). [0-1]
     statistic: TaskStatistic | None = None
     """What the code computes for each stimulus; absent for the ideal observer."""
-    d_prime: Vector | None = None
-    """Discriminability; NaN where it is infinite, (n_comparisons,)."""
+    d_prime: Vector | None = None  # Discriminability; NaN where it is infinite, (n_comparisons,).
     forced_choice: ForcedChoice | None = None
     """The same as proportion correct, with intervals; absent without noise."""
     efficiency: Vector | None = None
     efficiency_error: Vector | None = None
     """Against the ideal observer; NaN where it cannot be estimated, (n_comparisons,)."""
-    curves: tuple[SideCurve, ...] = ()
-    """Psychometric curves above and below the standard."""
+    curves: tuple[SideCurve, ...] = ()  # Psychometric curves above and below the standard.
 
 
 @result_class
 class TaskObservation:
     """A hit rate of people."""
 
-    at: float | str
-    """Level or name of the stimulus, as the task gives it."""
-    level: float | None
-    """On the axis of the psychometric curve."""
-    hit_rate: float
-    """Fraction of trials. [0-1]"""
+    at: float | str  # Level or name of the stimulus, as the task gives it.
+    level: float | None  # On the axis of the psychometric curve.
+    hit_rate: float  # Fraction of trials. [0-1]
     trials: int | None
-    """How many there were."""
-    interval: tuple[float, float] | None
-    """Binomial interval, where the trials are known. [0-1]"""
+    interval: tuple[float, float] | None  # Binomial interval, where the trials are known. [0-1]
 
 
 @result_class
@@ -452,12 +422,7 @@ def _decodings(
 
 
 def _decoding(
-    prepared: PreparedTask,
-    code: str,
-    measure: str,
-    encoded: Encoded,
-    sigma: float,
-    shown: list[Presentation],
+    prepared: PreparedTask, code: str, measure: str, encoded: Encoded, sigma: float, shown: list[Presentation]
 ) -> Decoding:
     """Hit rates of one code, their statistic, efficiency and psychometric curves."""
     settings, (table, neighbours) = prepared.task.experiment, encoded

@@ -46,11 +46,9 @@ class TaskStatistic:
 class CurveThreshold:
     """Threshold of a psychometric curve."""
 
-    proportion: float
-    """Hit rate at the threshold. [0-1]"""
+    proportion: float  # Hit rate at the threshold. [0-1]
     difference: Number
-    level: Number
-    """From the standard, and on the axis. [unit of what varies]"""
+    level: Number  # From the standard, and on the axis. [unit of what varies]
     over_standard: float | None
     """Difference over the standard (Weber fraction); absent where the standard is 0."""
     bootstrap_interval: tuple[Number, Number] | None
@@ -76,34 +74,25 @@ class CurveFit:
     """A fitted psychometric curve."""
 
     sigmoid: str
-    """Its shape."""
-    trials: int
-    """Judgements per comparison behind the intervals."""
-    threshold: CurveThreshold
-    """At the proportion that the task asks for."""
+    trials: int  # Judgements per comparison behind the intervals.
+    threshold: CurveThreshold  # At the proportion that the task asks for.
     slope: Number
     """Of the hit rate at the threshold; NaN where no comparison lies on the rise. [1/unit of what varies]"""
-    lapse: float
-    """What is missing to 1 far above the threshold. [0-1]"""
-    at_bounds: tuple[str, ...]
-    """Parameters that ended at a bound."""
+    lapse: float  # What is missing to 1 far above the threshold. [0-1]
+    at_bounds: tuple[str, ...]  # Parameters that ended at a bound.
     curve: CurvePoints
-    """For figures."""
 
 
 @result_class
 class SideCurve:
     """Hit rates on one side of the standard, with their curve or the reason why there is none."""
 
-    side: str
-    """Of the standard."""
+    side: str  # Of the standard.
     difference: Vector
     hit_rate: Vector
     """Distance from the standard and hit rate. [unit of what varies],, (n_comparisons,). [0-1]"""
     fit: CurveFit | None = None
-    """The curve."""
-    why_not: str | None = None
-    """Why there is no curve."""
+    why_not: str | None = None  # Why there is no curve.
 
 
 def response_table(maps: Sequence[ResponseMap], measure: str, latest_ms: float | None = None) -> FloatArray:

@@ -16,11 +16,7 @@ from fingerpad.experiments.descriptions.reading import Origin, at
 from fingerpad.experiments.descriptions.stimuli import touches_of
 from fingerpad.experiments.discrimination.analysis import PreparedTask, TaskResult, analyse
 from fingerpad.experiments.discrimination.task import DiscriminationTask
-from fingerpad.experiments.discrimination.task_stimuli import (
-    task_conditions,
-    task_population,
-    task_stimuli,
-)
+from fingerpad.experiments.discrimination.task_stimuli import task_conditions, task_population, task_stimuli
 from fingerpad.experiments.manifest import Manifest
 from fingerpad.experiments.runner import Runner
 from fingerpad.neuron.mixed_population import MixedPopulation
@@ -34,31 +30,24 @@ class DiscriminationFile:
 
     format: Literal["fingerpad discrimination"] = "fingerpad discrimination"
     format_version: Literal[2] = 2
-    """By which a reader knows the file."""
     discrimination: TaskResult
-    """What was found."""
-    task: DiscriminationTask
-    """What was asked, defaults included."""
+    task: DiscriminationTask  # What was asked, defaults included.
     afferent: dict[str, float | str]
     """Parameters of the afferent; those of a mixed population begin with their type, as in "RA.threshold"."""
     manifest: Manifest
-    """What ran."""
 
 
 @dataclass(frozen=True)
 class DiscriminationRun:
     """A task with all that it takes to run it."""
 
-    task: DiscriminationTask
-    """From `task_files.read_task`."""
+    task: DiscriminationTask  # From `task_files.read_task`.
     folder: Path
-    """Where finished indentations are stored."""
     jobs: int | Engine = 1
     """Processes, or the engine that solves the indentations; the numbers do not depend on it."""
     source: str = "task"
     """File of the task: files that it names are searched beside it, and errors begin with it."""
-    text: str = ""
-    """Its content, for the lines of errors."""
+    text: str = ""  # Its content, for the lines of errors.
     population: Population | MixedPopulation | None = None
     """Afferents in the place of those of the task: of types of one's own, for example."""
 

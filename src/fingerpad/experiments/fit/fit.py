@@ -12,16 +12,11 @@ from fingerpad.core.errors import InputError
 from fingerpad.core.keywords import known_keywords
 from fingerpad.core.signals import SedTraces
 from fingerpad.data import protocol
-from fingerpad.experiments.fit.methods import Prepared, prepare
-from fingerpad.experiments.fit.offset import Beside, check_beside, fit_offset
+from fingerpad.experiments.fit.methods import Beside, Prepared, check_beside, fit_offset, prepare
 from fingerpad.experiments.fit.results import FitResult, FittedFold, PhaseRates
 from fingerpad.inference.fitting.cross_validation import CrossValidation, cross_validate, interleaved_folds
 from fingerpad.inference.fitting.fractional_sum_of_squares import fractional_sum_of_squares
-from fingerpad.inference.identifiable import (
-    IDENTIFIABLE_NAMES,
-    IDENTIFIABLE_UNITS,
-    identifiable,
-)
+from fingerpad.inference.identifiable import IDENTIFIABLE_NAMES, IDENTIFIABLE_UNITS, identifiable
 from fingerpad.inference.rate_model import AfferentModel, four_number_model
 from fingerpad.inference.rate_problem import RateProblem
 from fingerpad.inference.recordings import PHASES, RateRecordings, SpikeRecordings
@@ -113,15 +108,13 @@ def fit_recordings(
     covariance = prepared.covariance(best, validation)
     errors = np.full(len(IDENTIFIABLE_NAMES), np.nan) if covariance is None else np.sqrt(np.diag(covariance))
     posterior = profiles = sensitivity = None
-    if with_posterior or with_profiles:
-        from fingerpad.experiments.fit.posterior import profiled, rate_posterior
+    if with_posterior or with_profiles or with_sensitivity:
+        from fingerpad.experiments.fit.rate_uncertainty import fss_sensitivity, profiled, rate_posterior
 
+        problem = RateProblem(four_number_model(model), rates)
         posterior = rate_posterior(model, rates, four, seed, positions_mm) if with_posterior else None
         profiles = profiled(model, rates, four, positions_mm) if with_profiles else None
-    if with_sensitivity:
-        from fingerpad.experiments.fit.rate_uncertainty import fss_sensitivity
-
-        sensitivity = fss_sensitivity(RateProblem(four_number_model(model), rates), four, seed)
+        sensitivity = fss_sensitivity(problem, four, seed) if with_sensitivity else None
     return FitResult(
         method=method,
         source=rates.source,

@@ -2,31 +2,38 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from fingerpad.core.checks import FloatArray, one_of
+from fingerpad.core.checks import FloatArray, IntArray, one_of
 from fingerpad.core.errors import InputError
+from fingerpad.core.signals import SedTraces
 from fingerpad.data import neuron
-from fingerpad.experiments.fit.results import SpikeFitSummary
+from fingerpad.experiments.fit.results import HeldOffset, OffsetFit, SpikeFitSummary
 from fingerpad.inference.afferent_methods import (
     along_slopes,
+    and_offset,
     bounds_of,
     by_differences,
+    fitted_four,
     fitted_six,
+    five_number_problem,
     four_number_problem,
     search_from,
 )
 from fingerpad.inference.closed_form import ClosedFormModel
-from fingerpad.inference.fitting.cross_validation import CrossValidation, jackknife_covariance
+from fingerpad.inference.fitting.cross_validation import CrossValidation, cross_validate, jackknife_covariance
+from fingerpad.inference.fitting.least_squares import LeastSquares
 from fingerpad.inference.fitting.methods import Bounds, Continued, Fit, Method
-from fingerpad.inference.identifiable import SPIKE_PARAMETER_NAMES, identifiable
+from fingerpad.inference.identifiable import IDENTIFIABLE_NAMES, SPIKE_PARAMETER_NAMES, identifiable
 from fingerpad.inference.rate_model import AfferentModel
 from fingerpad.inference.rate_problem import RateProblem
+from fingerpad.inference.receptor_offset import ReceptorOffset
 from fingerpad.inference.recordings import RateRecordings, SpikeRecordings
 from fingerpad.inference.start_points import response_surface
+from fingerpad.neuron.rate_windows import Windows
 
 Recordings = RateRecordings | SpikeRecordings
 MethodOf = Callable[[AfferentModel, RateProblem, Bounds, int], Method]
@@ -36,12 +43,9 @@ MethodOf = Callable[[AfferentModel, RateProblem, Bounds, int], Method]
 class Prepared:
     """A problem, the method that fits it, and the meaning of its parameters."""
 
-    problem: RateProblem
-    """What is fitted, in the parameters of the method."""
+    problem: RateProblem  # What is fitted, in the parameters of the method.
     method: Method
-    """How."""
-    six: Callable[[FloatArray], FloatArray]
-    """From those parameters to the paper's six."""
+    six: Callable[[FloatArray], FloatArray]  # From those parameters to the paper's six.
 
     def covariance(self, fit: Fit, folds: CrossValidation) -> FloatArray | None:
         """Covariance (4, 4) of the identifiable numbers, from the fits of the folds; None for few folds."""
@@ -113,3 +117,87 @@ def prepare(
     problem = four_number_problem(model, rates)
     fitting = FOUR_NUMBER_METHODS[method](model, problem, bounds_of(*model.drives), seed)
     return Prepared(problem, fitting, fitted_six)
+
+
+Beside = Mapping[float, SedTraces | Sequence[SedTraces]]
+"""Strain energy density by offset from the believed place, distal positive [mm], one column per stimulus."""
+
+
+def check_offset(method: str, places_mm: Sequence[float]) -> None:
+    """Raise `InputError` if a receptor's offset cannot be determined."""
+    if method not in OFFSET_METHODS:
+        raise InputError(f"offset needs a method that fits it, {' or '.join(OFFSET_METHODS)}: got {method}.")
+    if len(set(places_mm)) < 2:
+        raise InputError(
+            "offset needs stimuli at several places along the finger, as those of the shifted bar are: all "
+            f"are at {places_mm[0]:g} mm, leave it out."
+        )
+
+
+def check_beside(beside: Beside) -> FloatArray:
+    """Return the places in order (n_places,) [mm], or raise `InputError` if they miss a side."""
+    beside_mm = np.array(sorted(beside), dtype=np.float64)
+    if not (beside_mm.size and beside_mm[0] < 0.0 < beside_mm[-1]):
+        raise InputError(
+            "beside needs energy density on both sides of the receptor, at offsets below and above 0 mm: "
+            f"got {', '.join(f'{offset:g}' for offset in beside_mm) or 'none'}."
+        )
+    return beside_mm
+
+
+def fit_offset(
+    beside: Beside,
+    rates: RateRecordings,
+    memberships: IntArray,
+    method: str,
+    windows_ms: Windows | None,
+    seed: int = 0,
+) -> OffsetFit:
+    """Fit the four numbers and the receptor's offset together, on the same folds."""
+    beside_mm = check_beside(beside)
+    roving = ReceptorOffset.of_traces({offset: beside[offset] for offset in beside_mm}, windows_ms)
+    problem, everything = five_number_problem(roving, rates), np.arange(roving.n_stimuli)
+    searching = _continued(roving, rates, one_of("method", method, tuple(OFFSET_METHODS)), seed)
+    best = searching.fit(problem, everything)
+    crossed = cross_validate(problem, searching, memberships)
+    four, offset_mm = fitted_four(best.parameters[:4]).tolist(), float(best.parameters[-1])
+    folds_mm = [float(fold.fit.parameters[-1]) for fold in crossed.folds]
+    error = jackknife_covariance(np.reshape(folds_mm, (-1, 1)))
+    held = [prepare(method, place, rates, rates, seed) for place in roving.models]
+    return OffsetFit(
+        offset_mm=offset_mm,
+        standard_error_mm=np.nan if error is None else np.sqrt(error[0, 0]),
+        folds_mm=np.array(folds_mm),
+        identifiable=dict(zip(IDENTIFIABLE_NAMES, four, strict=True)),
+        fss_in_sample=best.score,
+        fss_out_of_sample=crossed.score_test,
+        fss_by_phase=problem.score_by_phase(best.parameters, everything),
+        n_evaluations=best.n_evaluations,
+        seconds=best.seconds,
+        held=HeldOffset(
+            offset_mm=beside_mm,
+            fss_in_sample=np.array([one.method.fit(one.problem, everything).score for one in held]),
+        ),
+    )
+
+
+def _continued(roving: ReceptorOffset, rates: RateRecordings, method: str, seed: int) -> Continued:
+    """Fit a receptor in its place, then let it move from the best fit, which it can only improve."""
+    centre = roving.at(0.0)
+    problem, of_four = four_number_problem(centre, rates), bounds_of(*centre.drives)
+    low_mm, *inner_mm, high_mm = roving.offsets_mm.tolist()
+    bounds = and_offset(of_four, low_mm, high_mm)
+
+    def moving(begun: FloatArray) -> Method:
+        if method == "cma_es":
+            return search_from(np.append(begun, 0.0), bounds, seed)
+        within = np.clip(begun, of_four.low, of_four.high)  # round-off at a bound
+        starts = [np.append(within, offset) for offset in sorted({0.0, *inner_mm})]
+        return LeastSquares(starts, bounds, n_refined=2)
+
+    in_place = FOUR_NUMBER_METHODS[OFFSET_METHODS[method]](centre, problem, of_four, seed)
+    return Continued(in_place, moving, problem)
+
+
+OFFSET_METHODS = {"least_squares": "least_squares", "cma_es": "closed_form"}
+"""Methods that an offset can be added to, each with the method that first fits a receptor in its place."""

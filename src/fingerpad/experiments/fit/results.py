@@ -10,17 +10,13 @@ from fingerpad.core.results import Matrix, Number, Vector, WholeVector, result_c
 class SpikeFitSummary:
     """Maximum likelihood of spike trains under a soft threshold."""
 
-    n_spikes: int
-    """How many were fitted."""
+    n_spikes: int  # How many were fitted.
     log_likelihood: float
-    log_likelihood_out_of_sample: float
-    """Of all spikes, and of each fold's spikes fitted without it."""
+    log_likelihood_out_of_sample: float  # Of all spikes, and of each fold's spikes fitted without it.
     escape_width: float
-    escape_width_standard_error: Number
-    """Width of the threshold over the threshold."""
+    escape_width_standard_error: Number  # Width of the threshold over the threshold.
     time_rescaling_distance: float
-    time_rescaling_p_value: float
-    """Kolmogorov-Smirnov test of the rescaled intervals."""
+    time_rescaling_p_value: float  # Kolmogorov-Smirnov test of the rescaled intervals.
 
 
 @result_class
@@ -43,23 +39,17 @@ class PhaseBands:
 class RatePosterior:
     """Posterior of the four identifiable numbers."""
 
-    level: float
-    """Probability within each interval and band."""
-    seed: int
-    """Of the random numbers."""
+    level: float  # Probability within each interval and band.
+    seed: int  # Of the random numbers.
     n_draws: int
-    n_evaluations: int
-    """Draws that were kept, and evaluations of the likelihood."""
+    n_evaluations: int  # Draws that were kept, and evaluations of the likelihood.
     largest_r_hat: float
     smallest_effective_size: float
     """Convergence: split R-hat and effective number of draws, the worst of the four."""
     median: dict[str, float]
-    interval: dict[str, tuple[float, float]]
-    """Credible interval of each number."""
-    covariance: Matrix
-    """Of the draws, (4, 4)."""
+    interval: dict[str, tuple[float, float]]  # Credible interval of each number.
+    covariance: Matrix  # Of the draws, (4, 4).
     bands: dict[str, PhaseBands]
-    """By phase."""
 
 
 @result_class
@@ -67,13 +57,10 @@ class ParameterProfile:
     """Profile likelihood of one of the four identifiable numbers."""
 
     name: str
-    values: Vector
-    """Where it was held, (n_values,)."""
-    losses: Vector
-    """Loss of log likelihood there, the other three numbers fitted, (n_values,)."""
+    values: Vector  # Where it was held, (n_values,).
+    losses: Vector  # Loss of log likelihood there, the other three numbers fitted, (n_values,).
     low: float | None
-    high: float | None
-    """Ends of the interval, None where the rates set none."""
+    high: float | None  # Ends of the interval, None where the rates set none.
 
 
 @result_class
@@ -81,19 +68,14 @@ class FssSensitivity:
     """Sobol indices of FSS for the four identifiable numbers, in their order."""
 
     lower: Vector
-    upper: Vector
-    """Range of each number, (4,)."""
+    upper: Vector  # Range of each number, (4,).
     first: Vector
-    first_half_width: Vector
-    """First-order index and half of its confidence interval, (4,). [1]"""
+    first_half_width: Vector  # First-order index and half of its confidence interval, (4,). [1]
     total: Vector
-    total_half_width: Vector
-    """Total index and half of its confidence interval, (4,). [1]"""
+    total_half_width: Vector  # Total index and half of its confidence interval, (4,). [1]
     mean_fss: Number
-    deviation_fss: Number
-    """Mean and standard deviation of FSS over the ranges. [1]"""
+    deviation_fss: Number  # Mean and standard deviation of FSS over the ranges. [1]
     evaluations: int
-    """Of FSS."""
 
 
 @result_class
@@ -111,21 +93,14 @@ class OffsetFit:
     offset_mm: float
     standard_error_mm: Number
     """Offset along the finger, distal positive, and its standard error, NaN where it is not known. [mm]"""
-    folds_mm: Vector
-    """Offsets that the folds give, (n_folds,). [mm]"""
+    folds_mm: Vector  # Offsets that the folds give, (n_folds,). [mm]
     identifiable: dict[str, float]
-    """The four numbers."""
     fss_in_sample: float
-    fss_out_of_sample: float
-    """Fractional sum of squares over all stimuli, and mean over the folds."""
-    fss_by_phase: dict[str, float]
-    """In sample, "dynamic" and "static"."""
-    n_evaluations: int
-    """Evaluations of the model."""
-    seconds: float
-    """Time on the clock. [s]"""
-    held: HeldOffset
-    """Fits with the receptor held."""
+    fss_out_of_sample: float  # Fractional sum of squares over all stimuli, and mean over the folds.
+    fss_by_phase: dict[str, float]  # In sample, "dynamic" and "static".
+    n_evaluations: int  # Evaluations of the model.
+    seconds: float  # Time on the clock. [s]
+    held: HeldOffset  # Fits with the receptor held.
 
 
 @result_class
@@ -134,10 +109,8 @@ class PhaseRates:
 
     fss_in_sample: float | None
     """Fractional sum of squares over all stimuli; absent where the phase was not recorded."""
-    observed_hz: Vector | None
-    """Recorded rates, (n_stimuli,). [spikes/s]"""
-    fitted_hz: Vector
-    """Rates of the afferent that is fitted to all stimuli, (n_stimuli,). [spikes/s]"""
+    observed_hz: Vector | None  # Recorded rates, (n_stimuli,). [spikes/s]
+    fitted_hz: Vector  # Rates of the afferent that is fitted to all stimuli, (n_stimuli,). [spikes/s]
     out_of_sample_hz: Vector
     """Rates that the fit without the stimulus' fold predicts, (n_stimuli,). [spikes/s]"""
 
@@ -147,18 +120,13 @@ class FittedFold:
     """One fold of the cross validation."""
 
     fold: int
-    stimuli: tuple[str, ...]
-    """Left out of the fit."""
+    stimuli: tuple[str, ...]  # Left out of the fit.
     fss_train: float
-    fss_test: float
-    """Fractional sum of squares over the other stimuli and over these."""
-    n_evaluations: int
-    """Evaluations of the model."""
-    seconds: float
-    """Time on the clock. [s]"""
+    fss_test: float  # Fractional sum of squares over the other stimuli and over these.
+    n_evaluations: int  # Evaluations of the model.
+    seconds: float  # Time on the clock. [s]
     parameters: dict[str, float]
-    identifiable: dict[str, float]
-    """The paper's six parameters, and the four that rates identify."""
+    identifiable: dict[str, float]  # The paper's six parameters, and the four that rates identify.
 
 
 @result_class

@@ -15,15 +15,14 @@ from fingerpad.core.engine import Engine, engine_of
 from fingerpad.core.errors import InputError
 from fingerpad.core.keywords import KnownKeywords, known_keywords
 from fingerpad.core.progress import Progress
-from fingerpad.core.results import result_class
+from fingerpad.core.results import Vector, result_class
 from fingerpad.core.signals import INTERVAL
 from fingerpad.data.afferents import TYPES
 from fingerpad.data.observations import bar_firing_rates
 from fingerpad.experiments.conditions import Conditions
 from fingerpad.experiments.descriptions.stimuli import NamedStimulus
 from fingerpad.experiments.fit.fit import check_enough, fit_recordings, folds_in_turn
-from fingerpad.experiments.fit.methods import METHODS, check_spikes
-from fingerpad.experiments.fit.offset import check_offset
+from fingerpad.experiments.fit.methods import METHODS, check_offset, check_spikes
 from fingerpad.experiments.fit.results import FitResult
 from fingerpad.experiments.manifest import Manifest
 from fingerpad.experiments.recording_files import Recorded
@@ -32,6 +31,7 @@ from fingerpad.experiments.stimuli import Stimuli, along_skin
 from fingerpad.inference.afferent_methods import OFFSETS_MM
 from fingerpad.inference.identifiable import IDENTIFIABLE_NAMES
 from fingerpad.inference.recordings import RateRecordings
+from fingerpad.inference.typed_fit import fit_afferent
 from fingerpad.neuron.afferent import AnyAfferent
 from fingerpad.neuron.mixed_population import types_of_afferents
 from fingerpad.neuron.rate_windows import Window, Windows, common_rate_windows_ms
@@ -48,16 +48,12 @@ class FitFile:
 
     format: Literal["fingerpad fit"] = "fingerpad fit"
     format_version: Literal[2] = 2
-    """By which a reader knows the file."""
     fit: FitResult
-    """What was found."""
     windows_ms: tuple[tuple[float, ...], tuple[float, ...]]
     """Windows of the dynamic and of the static rate. [ms]"""
     dynamic_quantity: str
-    static_quantity: str
-    """Quantities of the two terms."""
+    static_quantity: str  # Quantities of the two terms.
     manifest: Manifest
-    """What ran."""
 
 
 @dataclass(frozen=True)
@@ -289,10 +285,7 @@ def run_fit(
         dynamic_quantity=request.quantities[0],
         static_quantity=request.quantities[1],
         manifest=runner.manifest(
-            request.conditions,
-            {"stimuli": next(iter(skins.values())).mesh},
-            command=command,
-            inputs=inputs,
+            request.conditions, {"stimuli": next(iter(skins.values())).mesh}, command=command, inputs=inputs
         ),
     )
 
@@ -315,3 +308,58 @@ def example_recordings() -> dict[str, bytes]:
         *(",".join(f"{value:g}" for value in row) for row in rows),
     ]
     return {EXAMPLE: ("\n".join(lines) + "\n").encode()}
+
+
+@result_class
+class ChosenNumbersFile:
+    """The file `fit.json` of a fit of chosen numbers; a touch takes its afferent by `afferent: fit.json`."""
+
+    format: Literal["fingerpad fit of chosen numbers"] = "fingerpad fit of chosen numbers"
+    format_version: Literal[1] = 1
+    type: str
+    fitted: dict[str, float]  # Numbers by their names, in the units of the type.
+    stimulus: tuple[str, ...]
+    dynamic_rate_hz: Vector
+    static_rate_hz: Vector  # Rates of the fitted afferent. [spikes/s]
+    observed_dynamic_rate_hz: Vector | None
+    observed_static_rate_hz: Vector | None
+    fss_in_sample: float
+    fss_out_of_sample: float
+    windows_ms: tuple[tuple[float, ...], tuple[float, ...]]
+    manifest: Manifest
+
+    def summary(self) -> list[str]:
+        """Return what a command prints: the numbers and the scores."""
+        numbers = ", ".join(f"{name} {value:.4g}" for name, value in self.fitted.items())
+        return [
+            f"{self.type} fitted to {len(self.stimulus)} stimuli: {numbers}. FSS {self.fss_in_sample:.3f} in "
+            f"sample, {self.fss_out_of_sample:.3f} out of sample."
+        ]
+
+
+def fit_chosen_numbers(
+    request: FitRequest, runner: Runner, command: str | None, inputs: dict[str, str]
+) -> ChosenNumbersFile:
+    """Indent with all stimuli, and fit the numbers `request.free` of its type of afferents."""
+    skins = runner.responses({"stimuli": request.touches})["stimuli"]
+    site = [request.conditions.finger.contact_mm]
+    traces = [skin.sed(site, *request.quantities) for skin in skins.values()]
+    rates, windows_ms = request.rates, request.used_windows_ms
+    with runner.stage("fit", 1) as advance:
+        found = fit_afferent(request.afferent, request.free, traces, rates, request.memberships, windows_ms)
+        advance()
+    return ChosenNumbersFile(
+        type=request.kind,
+        fitted={name: float(getattr(found.afferent, name)) for name in request.free},
+        stimulus=rates.stimuli,
+        dynamic_rate_hz=found.dynamic_rate_hz,
+        static_rate_hz=found.static_rate_hz,
+        observed_dynamic_rate_hz=rates.dynamic_rate_hz,
+        observed_static_rate_hz=rates.static_rate_hz,
+        fss_in_sample=found.fss_in_sample,
+        fss_out_of_sample=found.fss_out_of_sample,
+        windows_ms=windows_ms,
+        manifest=runner.manifest(
+            request.conditions, {"stimuli": next(iter(skins.values())).mesh}, command=command, inputs=inputs
+        ),
+    )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from enum import StrEnum
 
 from fingerpad.core.results import result_class
@@ -42,24 +43,15 @@ class ClaimRow:
     """A claim of the paper beside this run."""
 
     group: Group
-    """What the row can show."""
-    section: str = ""
-    """Section of the paper; empty for our own additions."""
+    section: str = ""  # Section of the paper; empty for our own additions.
     quantity: str
-    """What is compared."""
     paper: str
-    ours: str
-    """As they are printed."""
-    status: str = ""
-    """How far the inputs can be trusted."""
+    ours: str  # As they are printed.
+    status: str = ""  # How far the inputs can be trusted.
     verdict: Verdict
-    """Whether the claim is met."""
     fitted_to: str = ""
-    """What was fitted to the observed number, or chosen by it. Rows of the group `FITTED` have it, and no
-    others.
-    """
+    """What was fitted to the observed number, or chosen by it; in rows of the group `FITTED` alone."""
     note: str = ""
-    """How it was judged."""
 
     def __post_init__(self) -> None:
         if (self.group is Group.FITTED) != bool(self.fitted_to):
@@ -79,8 +71,32 @@ def two_digits(value: float) -> str:
     return "–" if value != value else f"{float(f'{value:.2g}'):g}"
 
 
-def measured_row(
-    group: Group,
+def claim(
+    section: str,
+    quantity: str,
+    paper: str,
+    ours: str,
+    verdict: Verdict | bool,
+    note: str = "",
+    status: str = MATERIALS,
+    group: Group = Group.STATEMENT,
+    fitted_to: str = "",
+) -> ClaimRow:
+    """Return a row; what something was fitted to is in the group of the fitted."""
+    return ClaimRow(
+        group=Group.FITTED if fitted_to else group,
+        section=section,
+        quantity=quantity,
+        paper=paper,
+        ours=ours,
+        status=status,
+        verdict=verdict if isinstance(verdict, Verdict) else judged(verdict),
+        fitted_to=fitted_to,
+        note=note,
+    )
+
+
+def measured(
     section: str,
     quantity: str,
     published: Published[float],
@@ -92,15 +108,54 @@ def measured_row(
 ) -> ClaimRow:
     """Return the row of a number that the paper prints: met from it on, or close to it."""
     difference = ours - published.value
+    met = bool(difference >= 0.0 if at_least else abs(difference) <= CLOSE * published.value)
     criterion = "judged: at least the paper's" if at_least else f"judged: within {CLOSE:.0%}"
-    return ClaimRow(
-        group=group,
-        section=section,
-        quantity=quantity,
-        paper=f"{published.value:g}",
-        ours=two_digits(ours),
-        status=status,
-        verdict=judged(bool(difference >= 0.0 if at_least else abs(difference) <= CLOSE * published.value)),
-        fitted_to=fitted_to,
-        note="; ".join(text for text in (criterion, note) if text),
+    told = "; ".join(text for text in (criterion, note) if text)
+    return claim(
+        section, quantity, f"{published.value:g}", two_digits(ours), met, told, status, fitted_to=fitted_to
+    )
+
+
+ABSENT = "–"
+
+
+@result_class
+class Statement:
+    """A statement of the paper beside both sets."""
+
+    section: str
+    statement: str
+    published: str  # Where the paper says it, what it says, and the number that it prints.
+    paper: str
+    human: str  # Ours, by the set.
+    verdict_paper: Verdict
+    verdict_human: Verdict
+    fitted_paper: str
+    fitted_human: str  # What was fitted to it; empty where nothing was.
+
+
+def paired(paper: Sequence[ClaimRow], human: Sequence[ClaimRow]) -> tuple[Statement, ...]:
+    """Join the rows of both sets that can fail with at least one of them, in the order of the sections."""
+    rows = [{row.quantity: row for row in rows} for rows in (paper, human)]
+    asked = [row.quantity for row in sorted((*paper, *human), key=_place) if row.group is Group.STATEMENT]
+    return tuple(_joined(*(found.get(quantity) for found in rows)) for quantity in dict.fromkeys(asked))
+
+
+def _place(row: ClaimRow) -> list[int]:
+    return [int(part) for part in row.section.split(".") if part]
+
+
+def _joined(paper: ClaimRow | None, human: ClaimRow | None) -> Statement:
+    known = paper or human
+    assert known is not None
+    return Statement(
+        section=known.section,
+        statement=known.quantity,
+        published=known.paper,
+        paper=paper.ours if paper else ABSENT,
+        human=human.ours if human else ABSENT,
+        verdict_paper=paper.verdict if paper else Verdict.NOT_APPLICABLE,
+        verdict_human=human.verdict if human else Verdict.NOT_APPLICABLE,
+        fitted_paper=paper.fitted_to if paper else "",
+        fitted_human=human.fitted_to if human else "",
     )

@@ -59,8 +59,7 @@ LEFT_OUT_PER_M = (296.0, 305.0, 316.0, 328.0, 340.0)
 class PsychometricCurve:
     """A psychometric function of the difference."""
 
-    step: Vector
-    """How much more curved than the standard, as a share of it, (n,)."""
+    step: Vector  # How much more curved than the standard, as a share of it, (n,).
     hit_rate: Vector
 
 
@@ -69,8 +68,7 @@ class CurvatureThreshold:
     """Threshold at one standard."""
 
     standard_per_m: float
-    jnd_per_m: float
-    """The standard and the just noticeable difference of the model. [1/m]"""
+    jnd_per_m: float  # The standard and the just noticeable difference of the model. [1/m]
     weber_fraction: float
     ideal_weber_fraction: float
     """Threshold over standard, and that of the ideal observer from Fisher's information."""
@@ -81,17 +79,14 @@ class CurvatureThreshold:
     fitted_interval: tuple[Number, Number]
     """Threshold of the Weibull function through the counts of that experiment, and its 95 % interval."""
     curve: PsychometricCurve
-    """That function."""
 
 
 @result_class
 class MissingThreshold:
     """A standard without a threshold."""
 
-    standard_per_m: float | None
-    """None stands for all standards. [1/m]"""
+    standard_per_m: float | None  # None stands for all standards. [1/m]
     why_not: str
-    """The reason."""
 
 
 @result_class
@@ -100,16 +95,11 @@ class PopulationThresholds:
 
     layout: str
     rows: int
-    columns: int
-    """Receptors along the finger and across."""
-    noise_sigma: Number
-    """Standard deviation of the multiplicative noise; NaN if none fits people."""
-    gradient_sum: Vector
-    """Of static rates, without noise, (n_spheres,). [spikes/s]"""
-    standards: tuple[CurvatureThreshold, ...]
-    """Standards with a threshold."""
+    columns: int  # Receptors along the finger and across.
+    noise_sigma: Number  # Standard deviation of the multiplicative noise; NaN if none fits people.
+    gradient_sum: Vector  # Of static rates, without noise, (n_spheres,). [spikes/s]
+    standards: tuple[CurvatureThreshold, ...]  # Standards with a threshold.
     without_threshold: tuple[MissingThreshold, ...]
-    """The others."""
 
 
 @result_class
@@ -117,43 +107,31 @@ class ThresholdsOfPeople:
     """Thresholds of people in the literature."""
 
     standard_per_m: Vector
-    comparison_per_m: Vector
-    """Standards and the comparisons at threshold, (n,). [1/m]"""
-    weber_fractions: Vector
-    """Smallest and largest reported fraction, (2,)."""
+    comparison_per_m: Vector  # Standards and the comparisons at threshold, (n,). [1/m]
+    weber_fractions: Vector  # Smallest and largest reported fraction, (2,).
 
 
 @result_class
 class InterpolationError:
     """Gradient Sum of a pressed sphere and of its interpolation from the others."""
 
-    curvature_per_m: float
-    """Of the sphere. [1/m]"""
+    curvature_per_m: float  # Of the sphere. [1/m]
     pressed: float
-    foretold: float
-    """The two sums. [spikes/s]"""
-    error_per_m: Number
-    """Difference as a curvature, by the slope of the sum. [1/m]"""
+    foretold: float  # The two sums. [spikes/s]
+    error_per_m: Number  # Difference as a curvature, by the slope of the sum. [1/m]
 
 
 @result_class
 class CurvatureThresholds:
     """Thresholds of the static Gradient Sum at several standards."""
 
-    seed: int
-    """Of the random numbers."""
-    proportion: float
-    """Hit rate at threshold. [0-1]"""
-    judgements: int
-    """Per comparison of an experiment."""
-    pressed_per_m: Vector
-    """Pressed spheres, (n_spheres,). [1/m]"""
-    populations: tuple[PopulationThresholds, ...]
-    """By layout, the paper's first."""
+    seed: int  # Of the random numbers.
+    proportion: float  # Hit rate at threshold. [0-1]
+    judgements: int  # Per comparison of an experiment.
+    pressed_per_m: Vector  # Pressed spheres, (n_spheres,). [1/m]
+    populations: tuple[PopulationThresholds, ...]  # By layout, the paper's first.
     literature: ThresholdsOfPeople
-    """To compare with."""
-    interpolation: tuple[InterpolationError, ...]
-    """Of the spheres in `LEFT_OUT_PER_M`."""
+    interpolation: tuple[InterpolationError, ...]  # Of the spheres in `LEFT_OUT_PER_M`.
 
 
 def threshold_touches(conditions: Conditions) -> dict[float, Touch]:

@@ -18,7 +18,7 @@ from fingerpad.core.errors import ConvergenceError
 from fingerpad.core.results import Matrix, Number, Vector, WholeVector, result_class
 from fingerpad.data import protocol, psychophysics
 from fingerpad.experiments.gerling2014 import goodwin
-from fingerpad.experiments.gerling2014.discrimination_sessions import CRITERION_SIGMAS, Measured
+from fingerpad.experiments.gerling2014.discrimination_statistics import CRITERION_SIGMAS, Measured
 from fingerpad.psychophysics.discrimination import (
     CRITERION_MOVES,
     END_OF_STIMULUS_MS,
@@ -53,14 +53,11 @@ class Interpretation:
     """One interpretation of the steps that the paper leaves open, and its hit rates."""
 
     reading: str
-    receptors: WholeVector
-    """Receptors that take part, (n_positions,)."""
+    receptors: WholeVector  # Receptors that take part, (n_positions,).
     rise: Vector
     """Share by which the Gradient Sum rises from the standard to the farthest sphere, (n_positions,)."""
-    hit_rate: Matrix
-    """With the noise of the study, (n_positions, n_comparisons). [0-1]"""
-    largest_shift: Number
-    """Largest change of these by the shift. [0-1]"""
+    hit_rate: Matrix  # With the noise of the study, (n_positions, n_comparisons). [0-1]
+    largest_shift: Number  # Largest change of these by the shift. [0-1]
     noise_sigma: Number = np.nan
     misfit: Number = np.nan
     own_largest_shift: Number = np.nan
@@ -73,8 +70,7 @@ class Interpretation:
 class CriterionErrorBars:
     """Mean error bar by the spread of the criterion, for three interpretations of what varies."""
 
-    criterion_sigma: Vector
-    """Standard deviation of the criterion, (n_spreads,)."""
+    criterion_sigma: Vector  # Standard deviation of the criterion, (n_spreads,).
     point: Vector
     fraction: Vector
     likelihood: Vector
@@ -87,10 +83,8 @@ class CriterionErrorBars:
 class MisfitCurve:
     """Expected root mean square distance to Goodwin's points over the noise."""
 
-    noise_sigma: Vector
-    """Noise sigma_1, (n_levels,)."""
-    misfit: dict[str, Vector]
-    """By code, (n_levels,). [0-1]"""
+    noise_sigma: Vector  # Noise sigma_1, (n_levels,).
+    misfit: dict[str, Vector]  # By code, (n_levels,). [0-1]
 
 
 @result_class
@@ -98,10 +92,8 @@ class EuclideanFit:
     """Noise that fits the Euclidean Distance to people, NaN and None if none does."""
 
     noise_sigma: Number = np.nan
-    misfit: Number = np.nan
-    """Root mean square distance to Goodwin's points. [0-1]"""
-    hit_rate: Matrix | None = None
-    """With that noise, (n_positions, n_comparisons). [0-1]"""
+    misfit: Number = np.nan  # Root mean square distance to Goodwin's points. [0-1]
+    hit_rate: Matrix | None = None  # With that noise, (n_positions, n_comparisons). [0-1]
 
 
 @result_class
@@ -114,14 +106,10 @@ class DiscrepancyAnalysis:
     """
     rise_for_paper_noise: dict[str, Vector]
     """Rise with which the paper's noise would give Goodwin's hit rate; NaN if none does, (n_positions,)."""
-    readings: tuple[Interpretation, ...]
-    """Interpretations of the steps that the paper leaves open."""
+    readings: tuple[Interpretation, ...]  # Interpretations of the steps that the paper leaves open.
     criterion: CriterionErrorBars
-    """Of a varied criterion."""
     misfit_curve: MisfitCurve
-    """Of every code."""
     euclidean: EuclideanFit
-    """With a noise of its own."""
 
 
 def expected_of_measure(

@@ -7,6 +7,9 @@ a difference counts if it exceeds two Monte-Carlo errors; closer to its bound a 
 from __future__ import annotations
 
 import math
+from functools import partial
+
+import numpy as np
 
 from fingerpad.data import psychophysics
 from fingerpad.experiments.gerling2014.claim_row import (
@@ -14,8 +17,9 @@ from fingerpad.experiments.gerling2014.claim_row import (
     ClaimRow,
     Group,
     Verdict,
+    claim,
     judged,
-    measured_row,
+    measured,
     two_digits,
 )
 from fingerpad.experiments.gerling2014.discrepancy import USED, DiscrepancyAnalysis, Interpretation
@@ -39,6 +43,7 @@ PLACES = ("0.0 mm", "0.2 mm")
 MEASURES = ("static", "dynamic", "latency")
 JUDGED_RISE = "judged against two Monte-Carlo errors, at both positions"
 NOISE_FITTED = "the noise was fitted to people's two hit rates"
+FITTED_BY_CODE = "the afferent was fitted to people's hit rates by this code, too"
 AFFERENT_FITTED = "the afferent to them at the paper's noise"
 
 
@@ -68,13 +73,9 @@ def _at_most(estimate: Estimate, bound: float) -> Verdict:
     return judged(estimate.value < bound)
 
 
-_OPPOSITE = {Verdict.MET: Verdict.MISSED, Verdict.MISSED: Verdict.MET}
-
-
 def _above(estimate: Estimate, bound: float) -> Verdict:
     """Verdict of a bound from below, as `_at_most`."""
-    verdict = _at_most(estimate, bound)
-    return _OPPOSITE.get(verdict, verdict)
+    return _at_most(Estimate(value=-estimate.value, error=estimate.error), -bound)
 
 
 def _all(*verdicts: Verdict) -> Verdict:
@@ -83,35 +84,14 @@ def _all(*verdicts: Verdict) -> Verdict:
     return min(verdicts, key=order.index)
 
 
-def _row(
-    section: str,
-    quantity: str,
-    paper: str,
-    ours: str,
-    verdict: Verdict,
-    note: str,
-    group: Group = Group.STATEMENT,
-    fitted_to: str = "",
-) -> ClaimRow:
-    """Return the row of a statement about discrimination; all rest on the same inputs."""
-    return ClaimRow(
-        group=group,
-        section=section,
-        quantity=quantity,
-        paper=paper,
-        ours=ours,
-        status=STATUS,
-        verdict=verdict,
-        fitted_to=fitted_to,
-        note=note,
-    )
+_row = partial(claim, status=STATUS)
+"""All rows rest on the same inputs."""
 
 
 def _noise(found: SphereDiscrimination, fitted_to: str) -> ClaimRow:
     rises, needed = (rise["static"] for rise in (found.reasons.rise, found.reasons.rise_for_paper_noise))
     expected = " and ".join(f"{rise:.0%}" if rise == rise else "none" for rise in needed)
-    return measured_row(
-        Group.FITTED,
+    return measured(
         "3.3",
         "Noise sigma_1 that fits Goodwin's two points",
         psychophysics.NOISE_SIGMA,
@@ -126,13 +106,23 @@ def _noise(found: SphereDiscrimination, fitted_to: str) -> ClaimRow:
 def _targets(found: SphereDiscrimination, fitted_to: str) -> list[ClaimRow]:
     people, places = found.goodwin, found.statistics.targets
     farthest = max((place.largest_from_line for place in places), key=lambda distance: distance.value)
-    return [
-        *(
-            _at_point(curvature, observed, [place.at_goodwin[index] for place in places], fitted_to)
-            for index, (curvature, observed) in enumerate(
-                zip(people.curvature_per_m, people.hit_rate, strict=True)
+    rows = []
+    for index, (curvature, observed) in enumerate(zip(people.curvature_per_m, people.hit_rate, strict=True)):
+        ours = [place.at_goodwin[index] for place in places]
+        away = [Estimate(value=abs(rate.value - observed), error=rate.error) for rate in ours]
+        rows.append(
+            _row(
+                "3.3",
+                f"Hit rate at {curvature:g} /m, static Gradient Sum at {' and '.join(PLACES)}, noise fitted",
+                f"{observed:g} (Goodwin)",
+                ", ".join(map(_brief, ours)),
+                _all(*(_at_most(each, CLOSE_POINTS) for each in away)),
+                f"judged: within {CLOSE_POINTS:g} at both positions, for which there is one noise",
+                fitted_to=fitted_to,
             )
-        ),
+        )
+    return [
+        *rows,
         _row(
             "",
             "Static hit rates between Goodwin's points, largest distance from their line in z",
@@ -146,28 +136,13 @@ def _targets(found: SphereDiscrimination, fitted_to: str) -> list[ClaimRow]:
     ]
 
 
-def _at_point(curvature_per_m: float, observed: float, ours: list[Estimate], fitted_to: str) -> ClaimRow:
-    away = [Estimate(value=rate.value - observed, error=rate.error) for rate in ours]
-    sizes = [Estimate(value=abs(each.value), error=each.error) for each in away]
-    return _row(
-        "3.3",
-        f"Hit rate at {curvature_per_m:g} /m, static Gradient Sum at {' and '.join(PLACES)}, noise fitted",
-        f"{observed:g} (Goodwin)",
-        ", ".join(map(_brief, ours)),
-        _all(*(_at_most(size, CLOSE_POINTS) for size in sizes)),
-        f"judged: within {CLOSE_POINTS:g} at both positions, for which there is one noise",
-        Group.FITTED,
-        fitted_to,
-    )
-
-
 def _fits_best(found: SphereDiscrimination, before: str) -> ClaimRow:
     """Judge the three measures at one noise, and each at the noise that fits it best."""
     misfit, above = found.statistics.misfit, found.statistics.misfit_above_static
     at_own = {name: reading for name in MEASURES if (reading := _used(found.reasons, name))}
     at_one_noise = _all(*(_above(above[name], 0.0) for name in MEASURES[1:] if name in above), Verdict.MET)
     # A measure that no noise fits has no misfit of its own, and fits worse than any other.
-    own = {name: _or_infinite(reading.misfit) for name, reading in at_own.items()}
+    own = {name: np.nan_to_num(reading.misfit, nan=np.inf) for name, reading in at_own.items()}
     at_own_noise = judged(all(own["static"] < own[name] for name in MEASURES[1:] if name in own))
     return _row(
         "3.3",
@@ -189,18 +164,17 @@ def _shift(statistics: DiscriminationStatistics, before: str) -> list[ClaimRow]:
     shift, above = statistics.shift, statistics.shift_above_static
     note = f"judged: at most {CLOSE_POINTS:g}; {before}"
     rows = [
-        _row(section, quantity, "robust", _brief(shift[name]), _at_most(shift[name], CLOSE_POINTS), note)
-        for section, quantity, name in (
-            (
-                "3.3",
-                "Robust to the 0.2 mm shift, static Gradient Sum, largest change of a hit rate",
-                "static",
-            ),
-            (
-                "4.2",
-                "Robust to the 0.2 mm shift, Euclidean Distance, largest change of a hit rate",
-                "euclidean",
-            ),
+        _row(
+            section,
+            f"Robust to the 0.2 mm shift, {code}, largest change of a hit rate",
+            "robust",
+            _brief(shift[name]),
+            _at_most(shift[name], CLOSE_POINTS),
+            note,
+        )
+        for section, code, name in (
+            ("3.3", "static Gradient Sum", "static"),
+            ("4.2", "Euclidean Distance", "euclidean"),
         )
     ]
     if "dynamic" in shift:
@@ -229,15 +203,11 @@ def _latency_shift(found: SphereDiscrimination) -> list[ClaimRow]:
     known = [shift for shift in shifts if not math.isnan(shift)] or [0.0]
     outcomes = {shift > CLOSE_POINTS for shift in known}
     told_apart = max(known) - min(known) > SAME
-    if told_apart and len(outcomes) == 1:
+    verdict, why = Verdict.NOT_DECIDABLE, "the reading of silent receptors decides"
+    if not told_apart:
+        why = "the reading of silent receptors could decide, but the readings cannot be told apart here"
+    elif len(outcomes) == 1:
         verdict, why = judged(outcomes == {True}), "all readings agree"
-    elif told_apart:
-        verdict, why = Verdict.NOT_DECIDABLE, "the reading of silent receptors decides"
-    else:
-        verdict, why = (
-            Verdict.NOT_DECIDABLE,
-            "the reading of silent receptors could decide, but the readings cannot be told apart here",
-        )
     listed = "; ".join(
         f"{reading.reading.removeprefix('latency').strip(' ,')} {_or_none(shift)}"
         for reading, shift in zip(readings, shifts, strict=True)
@@ -298,7 +268,7 @@ def _variants(statistics: DiscriminationStatistics) -> list[ClaimRow]:
             "3.3",
             "10 noise matrices instead of 100 widen the error bars",
             "wider",
-            f"{_text(few.ratio, 2)} times",
+            f"{_text(few.ratio)} times",
             _above(few.ratio, 1.0),
             f"largest change of a mean {_brief(few.change)}",
         ),
@@ -306,7 +276,7 @@ def _variants(statistics: DiscriminationStatistics) -> list[ClaimRow]:
             "3.3",
             "A criterion that varies by 0.02 instead of 0.01 widens the error bars",
             "wider",
-            f"{_text(wide.ratio, 2)} times",
+            f"{_text(wide.ratio)} times",
             _above(wide.ratio, 1.0),
             "the decision point varies; other readings: docs/decisions/decision-criterion.md",
         ),
@@ -327,26 +297,17 @@ def _variants(statistics: DiscriminationStatistics) -> list[ClaimRow]:
             "repeated judgements of the same sums",
         ),
     )
-    return [
-        _row(section, quantity, paper, ours, verdict, note, Group.DEFINITION)
-        for section, quantity, paper, ours, verdict, note in rows
-    ]
+    return [_row(*row, group=Group.DEFINITION) for row in rows]
 
 
 def _euclidean(
     statistics: DiscriminationStatistics, reasons: DiscrepancyAnalysis, fitted_to_people: bool
 ) -> ClaimRow:
-    misfit, own = statistics.misfit, reasons.euclidean
+    misfit, ours, own = statistics.misfit, statistics.misfit["euclidean"], reasons.euclidean
+    others = [misfit[name] for name in MEASURES[1:] if name in misfit]
     closer = [
-        _above(
-            Estimate(
-                value=misfit[name].value - misfit["euclidean"].value,
-                error=math.hypot(misfit[name].error, misfit["euclidean"].error),
-            ),
-            0.0,
-        )
-        for name in MEASURES[1:]
-        if name in misfit
+        _above(Estimate(value=each.value - ours.value, error=math.hypot(each.error, ours.error)), 0.0)
+        for each in others
     ]
     alone = (
         f"with a separate noise of {own.noise_sigma:.3f}: {own.misfit:.3f}"
@@ -357,11 +318,12 @@ def _euclidean(
         "4.2",
         "Euclidean Distance of static rates fits too, by root mean square distance to Goodwin's points",
         "fits",
-        _brief(misfit["euclidean"]),
-        _all(_at_most(misfit["euclidean"], FROM_LINE), *closer),
+        _brief(ours),
+        _all(_at_most(ours, FROM_LINE), *closer),
         f"judged: at most {FROM_LINE:g} and closer than dynamic rates and latencies; {alone}",
-        Group.FITTED if fitted_to_people else Group.STATEMENT,
-        "the afferent was fitted to people's hit rates by this code, too" if fitted_to_people else "",
+        fitted_to="the afferent was fitted to people's hit rates by this code, too"
+        if fitted_to_people
+        else "",
     )
 
 
@@ -370,16 +332,12 @@ def _used(reasons: DiscrepancyAnalysis, measure: str) -> Interpretation | None:
     return next((reading for reading in reasons.readings if reading.reading == USED[measure]), None)
 
 
-def _or_infinite(misfit: float) -> float:
-    return math.inf if math.isnan(misfit) else misfit
-
-
 def _or_none(value: float) -> str:
     return "none" if math.isnan(value) else two_digits(value)
 
 
-def _text(estimate: Estimate, digits: int = 2) -> str:
-    return f"{estimate.value:.{digits}f} ± {estimate.error:.{digits}f}"
+def _text(estimate: Estimate) -> str:
+    return f"{estimate.value:.2f} ± {estimate.error:.2f}"
 
 
 def _brief(estimate: Estimate) -> str:

@@ -26,14 +26,11 @@ SMALLEST_NOISE, LARGEST_NOISE = 1e-4, 2.0
 class GoodwinHitRates:
     """Hit rates of people."""
 
-    curvature_per_m: Vector
-    """Comparison spheres, (2,). [1/m]"""
+    curvature_per_m: Vector  # Comparison spheres, (2,). [1/m]
     hit_rate: Vector
-    trials: int
-    """Trials behind each fraction (assumed)."""
+    trials: int  # Trials behind each fraction (assumed).
     low: Vector
-    high: Vector
-    """Observed fractions and their binomial 95 % intervals, (2,). [0-1]"""
+    high: Vector  # Observed fractions and their binomial 95 % intervals, (2,). [0-1]
     line: Vector
     """Hit rates at the spheres of the study on the line that is straight in z, (n_comparisons,). [0-1]"""
 

@@ -37,11 +37,9 @@ ELEMENT_MM = {"quick": 0.8, "standard": 0.6, "paper": 0.6}
 class StressProfile:
     """Stress over distance from the nail, over the sections that cross its border."""
 
-    distance_mm: Vector
-    """From the nail, negative under it, (n,). [mm]"""
+    distance_mm: Vector  # From the nail, negative under it, (n,). [mm]
     surface_kpa: Matrix
-    living_epidermis_kpa: Matrix
-    """Quantiles 0.1, 0.5 and 0.9; NaN without an element, (n, 3). [kPa]"""
+    living_epidermis_kpa: Matrix  # Quantiles 0.1, 0.5 and 0.9; NaN without an element, (n, 3). [kPa]
 
 
 @result_class
@@ -49,23 +47,18 @@ class MiddleSection:
     """Deformed faces of the elements on the plane z = 0, and their stress."""
 
     x_mm: Matrix
-    y_mm: Matrix
-    """Corners, (n_faces, 4). [mm]"""
-    von_mises_kpa: Vector
-    """Stress of the element, (n_faces,). [kPa]"""
+    y_mm: Matrix  # Corners, (n_faces, 4). [mm]
+    von_mises_kpa: Vector  # Stress of the element, (n_faces,). [kPa]
 
 
 @result_class
 class CrossSection:
     """Deformed quadrilaterals in the middle of a section's elements, and their stress."""
 
-    x_mm: float
-    """Where the section lies. [mm]"""
+    x_mm: float  # Where the section lies. [mm]
     y_mm: Matrix
-    z_mm: Matrix
-    """Corners, (n_elements, 4). [mm]"""
-    von_mises_kpa: Vector
-    """Stress, (n_elements,). [kPa]"""
+    z_mm: Matrix  # Corners, (n_elements, 4). [mm]
+    von_mises_kpa: Vector  # Stress, (n_elements,). [kPa]
 
 
 @result_class
@@ -74,32 +67,23 @@ class NailBorder:
 
     x_mm: Matrix
     y_mm: Matrix
-    z_mm: Matrix
-    """Deformed corners of the faces of the skin, (n_along + 1, n_around + 1). [mm]"""
-    von_mises_kpa: Matrix
-    """Stress of the element below each face, (n_along, n_around). [kPa]"""
-    nail_mm: Stack
-    """Outline of the nail, (n_edges, 2, 3). [mm]"""
+    z_mm: Matrix  # Deformed corners of the faces of the skin, (n_along + 1, n_around + 1). [mm]
+    von_mises_kpa: Matrix  # Stress of the element below each face, (n_along, n_around). [kPa]
+    nail_mm: Stack  # Outline of the nail, (n_edges, 2, 3). [mm]
     ratio: Number
     ratio_range: tuple[Number, Number]
     """Stress of the skin at the border over that away from it: median and range over the sections."""
     ratio_living_epidermis: Number
-    ratio_energy: Number
-    """The same median in the living epidermis, for stress and for strain energy density."""
+    ratio_energy: Number  # The same median in the living epidermis, for stress and for strain energy density.
     border_kpa: Number
     far_kpa: Number
-    border_energy_kpa: Number
-    """Largest strain energy density at the border. [kPa]"""
+    border_energy_kpa: Number  # Largest strain energy density at the border. [kPa]
     peak_kpa: Number
     """Largest stress at the border, median stress away from it, largest stress anywhere. [kPa]"""
     text: str
-    """A sentence with these numbers."""
-    profile: StressProfile
-    """Stress over distance from the nail."""
+    profile: StressProfile  # Stress over distance from the nail.
     middle: MiddleSection
-    """The plane z = 0."""
-    across: CrossSection
-    """The section with the highest ratio."""
+    across: CrossSection  # The section with the highest ratio.
 
 
 def nail_touch(conditions: Conditions) -> Touch:

@@ -11,38 +11,29 @@ from typing import Any, Literal
 from fingerpad.core.checks import one_of
 from fingerpad.core.engine import Engine, Processes, engine_of
 from fingerpad.core.progress import Progress
-from fingerpad.core.results import result_class
+from fingerpad.core.results import Number, result_class
 from fingerpad.core.signals import STORED_ENERGY
 from fingerpad.data import all_published
 from fingerpad.data.neuron import PAPER_INITIAL
 from fingerpad.experiments.conditions import RECEPTOR_X_MM, Conditions, Touch
 from fingerpad.experiments.gerling2014 import (
     curvature_thresholds,
-    mesh_picture,
     nail_border,
-    response_maps,
     single_unit,
     single_unit_uncertainty,
     skin_deflection,
-    skin_force,
     sphere_discrimination,
     three_levels,
 )
-from fingerpad.experiments.gerling2014.claim_row import ClaimRow
+from fingerpad.experiments.gerling2014.claim_row import ClaimRow, Statement, paired
 from fingerpad.experiments.gerling2014.comparison import comparison
 from fingerpad.experiments.gerling2014.curvature_thresholds import CurvatureThresholds
-from fingerpad.experiments.gerling2014.firing_course import FiringCourse, firing_course
-from fingerpad.experiments.gerling2014.mesh_picture import MeshPicture
 from fingerpad.experiments.gerling2014.nail_border import NailBorder
-from fingerpad.experiments.gerling2014.response_maps import PopulationMaps
-from fingerpad.experiments.gerling2014.single_unit import SingleUnitResult
+from fingerpad.experiments.gerling2014.single_unit import FiringCourse, SingleUnitResult
 from fingerpad.experiments.gerling2014.single_unit_uncertainty import UncertaintyResult
-from fingerpad.experiments.gerling2014.skin_deflection import SkinDeflectionResult
-from fingerpad.experiments.gerling2014.skin_force import SkinForce
+from fingerpad.experiments.gerling2014.skin_deflection import SkinDeflectionResult, SkinForce
 from fingerpad.experiments.gerling2014.sphere_discrimination import SphereDiscrimination
-from fingerpad.experiments.gerling2014.statements import Statement, paired
-from fingerpad.experiments.gerling2014.summary import Summaries, Summary, summary
-from fingerpad.experiments.gerling2014.three_levels import ThreeLevels
+from fingerpad.experiments.gerling2014.three_levels import MeshPicture, PopulationMaps, ThreeLevels
 from fingerpad.experiments.manifest import Manifest, StageSummary
 from fingerpad.experiments.runner import Runner
 from fingerpad.experiments.tissue_sets import TissueLayer, tissue_layers
@@ -64,11 +55,8 @@ class Reproduction:
     """A run of all parts of the paper with two sets of tissues."""
 
     folder: Path
-    """Where finished indentations are stored."""
-    resolution: str = "standard"
-    """How fine meshes and steps are."""
-    seed: int = 0
-    """Seed of the observers' noise."""
+    resolution: str = "standard"  # How fine meshes and steps are.
+    seed: int = 0  # Seed of the observers' noise.
     tissues: str = PAPER
     """Tissues of the column `paper`: a name whose afferent follows strain energy density. "paper" is Trial 3
     with a Poisson's ratio of 0.40, which is our reading; "trial3" is Trial 3 to the letter, 0.48.
@@ -105,14 +93,10 @@ class PublishedNumber:
     """A published number on which the results rest, as `fingerpad.data.all_published` lists it."""
 
     name: str
-    value: float | tuple[float, ...]
-    """In `unit`."""
-    unit: str
-    """"1" for pure numbers."""
-    source: str
-    """Where it was published."""
-    status: str
-    """How far it can be trusted; see `fingerpad.data.STATUSES`."""
+    value: float | tuple[float, ...]  # In `unit`.
+    unit: str  # "1" for pure numbers.
+    source: str  # Where it was published.
+    status: str  # How far it can be trusted; see `fingerpad.data.STATUSES`.
 
 
 @result_class
@@ -120,24 +104,19 @@ class SetResult:
     """What one set of tissues with its afferent gives on all levels."""
 
     tissues: str
-    """Name of the set."""
     mesh: MeshPicture
-    levels: ThreeLevels
-    """The mesh under the standard sphere, and that indentation on all levels."""
-    skin_force: SkinForce
-    """Level 1: deflection and force."""
+    levels: ThreeLevels  # The mesh under the standard sphere, and that indentation on all levels.
+    skin_force: SkinForce  # Level 1: deflection and force.
     single_unit: SingleUnitResult
     firing: FiringCourse
     """Level 2: rates under the bar and their fit; when the afferent fires, and what drives it."""
     discrimination: SphereDiscrimination
     population: PopulationMaps
     nail: NailBorder
-    """Level 3."""
     single_unit_uncertainty: UncertaintyResult | None = None
     curvature_thresholds: CurvatureThresholds | None = None
     """What goes beyond the paper, None where it was not asked for."""
-    comparison: tuple[ClaimRow, ...]
-    """The paper's numbers beside ours."""
+    comparison: tuple[ClaimRow, ...]  # The paper's numbers beside ours.
 
 
 @result_class
@@ -146,22 +125,16 @@ class ReproductionResult:
 
     format: Literal["fingerpad reproduction"] = "fingerpad reproduction"
     format_version: Literal[5] = 5
-    """Of the file."""
-    summary: Summaries
-    """A few plain numbers of both sets."""
+    summary: Summaries  # A few plain numbers of both sets.
     statements: tuple[Statement, ...]
     """Every statement of the paper that can fail, with our value and verdict of both sets."""
-    skin_deflection: SkinDeflectionResult
-    """Level 1: the paper's three trials."""
+    skin_deflection: SkinDeflectionResult  # Level 1: the paper's three trials.
     paper: SetResult
-    human: SetResult
-    """The paper's own system, and the set that serves all three levels."""
+    human: SetResult  # The paper's own system, and the set that serves all three levels.
     tissues: tuple[TissueLayer, ...]
     """Every named set of tissues, those of the run and of the trials among them."""
-    inputs: tuple[PublishedNumber, ...]
-    """Published numbers on which all of it rests."""
+    inputs: tuple[PublishedNumber, ...]  # Published numbers on which all of it rests.
     manifest: Manifest
-    """What ran."""
 
 
 def reproduce(run: Reproduction, progress: Progress | None = None) -> ReproductionResult:
@@ -196,10 +169,7 @@ def reproduce(run: Reproduction, progress: Progress | None = None) -> Reproducti
     )
     return ReproductionResult(
         summary=Summaries(
-            paper=of_paper,
-            human=of_human,
-            wall_s=manifest.wall_s,
-            peak_memory_mb=manifest.peak_memory_mb,
+            paper=of_paper, human=of_human, wall_s=manifest.wall_s, peak_memory_mb=manifest.peak_memory_mb
         ),
         statements=paired(paper.comparison, human.comparison),
         skin_deflection=deflection,
@@ -215,7 +185,7 @@ def set_touches(conditions: Conditions, goes_beyond: bool = False) -> dict[str, 
     """Touches of one set of tissues, by the part of the paper that they belong to."""
     touches: dict[str, dict[Any, Touch]] = {
         "nail": {"nail": nail_border.nail_touch(conditions)},
-        "force": dict(skin_force.force_touches(conditions)),
+        "force": dict(skin_deflection.force_touches(conditions)),
         "bar, 36 shifts": dict(enumerate(single_unit.bar_touches(conditions))),
         "spheres": dict(sphere_discrimination.discrimination_touches(conditions)),
     }
@@ -262,8 +232,8 @@ def set_result(
     )
     discrimination = sphere_discrimination.discriminate_spheres(spheres, afferent, conditions.seed)
     unit = single_unit.single_unit_result(problem, best, folds, afferent, method.name)
-    course = firing_course(bar_sed, single_unit.receptor_sed(bars), afferent, responses["force"])
-    force = skin_force.skin_force(responses["force"])
+    course = single_unit.firing_course(bar_sed, single_unit.receptor_sed(bars), afferent, responses["force"])
+    force = skin_deflection.skin_force(responses["force"])
     nail = nail_border.nail_border(responses["nail"]["nail"])
     uncertainty: UncertaintyResult | None = None
     thresholds: CurvatureThresholds | None = None
@@ -280,13 +250,13 @@ def set_result(
     rows = comparison(tissues, deflection, force, unit, course, discrimination, nail, thresholds)
     made = SetResult(
         tissues=tissues,
-        mesh=mesh_picture.mesh_picture(standard.mesh, RECEPTOR_X_MM),
+        mesh=three_levels.mesh_picture(standard.mesh, RECEPTOR_X_MM),
         levels=three_levels.three_levels(standard, afferent),
         skin_force=force,
         single_unit=unit,
         firing=course,
         discrimination=discrimination,
-        population=response_maps.population_maps(standard, afferent),
+        population=three_levels.population_maps(standard, afferent),
         nail=nail,
         single_unit_uncertainty=uncertainty,
         curvature_thresholds=thresholds,
@@ -300,3 +270,82 @@ def _method(conditions: Conditions, spheres: dict[tuple[float, float], SkinRespo
     if conditions.quantity == STORED_ENERGY:
         return response_surface()
     return sphere_discrimination.to_rates_and_hit_rates(spheres, conditions.quantity)
+
+
+@result_class
+class Summary:
+    """One number per quantity, at the tissues, the afferent and the noise of the run."""
+
+    deflection_r2: Number  # R² of the deflection under the cylinder at 1.0 mm.
+    force_plate_1mm_n: Number
+    force_plate_2mm_n: Number
+    force_disc_1mm_n: Number
+    """Force at the end of the hold of a flat plate 1.0 and 2.0 mm deep, and of a disc of 6.35 mm. [N]"""
+    fss_out_of_sample: Number
+    fss_in_sample: Number
+    """Fractional sum of squares of the rates under the bar: mean of the folds, and all shifts."""
+    dynamic_flat_hz: Number
+    dynamic_max_hz: Number
+    """Smallest dynamic rate under the flat face of the bar, and the largest. [spikes/s]"""
+    static_difference_hz: Number  # Largest static rate less the smallest under the flat face. [spikes/s]
+    resting_rate_hz: Number  # Rate without a touch. [spikes/s]
+    noise_sigma: Number  # Noise that fits people's two points best.
+    euclidean_rms_same_noise: Number
+    """Root mean square distance of the Euclidean Distance to these points at that noise. [0-1]"""
+    hit_rate_296: tuple[Number, Number]
+    hit_rate_365: tuple[Number, Number]
+    """Hit rates of the static Gradient Sum at that noise, spheres at 0.0 and at 0.2 mm. [0-1]"""
+    weber_144: Number
+    weber_287: Number
+    """Curvature threshold at 75 % over the standard; NaN where it was not asked for or does not exist."""
+    wall_s: float = 0.0
+    peak_memory_mb: float = 0.0  # Of the whole run, both sets. [s, MB]
+
+
+@result_class
+class Summaries:
+    """Numbers of both sets, and time and memory of the whole run."""
+
+    paper: Summary
+    human: Summary
+    wall_s: float
+    peak_memory_mb: float
+
+
+def summary(
+    force: SkinForce,
+    unit: SingleUnitResult,
+    afferent: Afferent,
+    discrimination: SphereDiscrimination,
+    thresholds: CurvatureThresholds | None,
+) -> Summary:
+    """Collect the numbers of one set; time and memory are known when the run ends."""
+    dynamic, static = unit.modulation.dynamic.ours, unit.modulation.static.ours
+    centred, shifted = (place.at_goodwin for place in discrimination.statistics.targets)
+    at_296, at_365 = ((here.value, aside.value) for here, aside in zip(centred, shifted, strict=True))
+    return Summary(
+        deflection_r2=force.deflection_r2,
+        force_plate_1mm_n=force.plate_1mm_n,
+        force_plate_2mm_n=force.plate_2mm_n,
+        force_disc_1mm_n=force.disc_1mm_n,
+        fss_out_of_sample=unit.fss_out_of_sample,
+        fss_in_sample=unit.fss_in_sample,
+        dynamic_flat_hz=dynamic.minimum_hz,
+        dynamic_max_hz=dynamic.maximum_hz,
+        static_difference_hz=static.difference_hz,
+        resting_rate_hz=three_levels.resting_response(afferent).static_rate_hz,
+        noise_sigma=discrimination.noise_sigma,
+        euclidean_rms_same_noise=discrimination.statistics.misfit["euclidean"].value,
+        hit_rate_296=at_296,
+        hit_rate_365=at_365,
+        weber_144=weber_fraction(thresholds, 144.0),
+        weber_287=weber_fraction(thresholds, 287.0),
+    )
+
+
+def weber_fraction(thresholds: CurvatureThresholds | None, standard_per_m: float) -> float:
+    """Weber fraction of the paper's population at one standard, NaN without one."""
+    if thresholds is None:
+        return float("nan")
+    found = {one.standard_per_m: one.weber_fraction for one in thresholds.populations[0].standards}
+    return found.get(standard_per_m, float("nan"))

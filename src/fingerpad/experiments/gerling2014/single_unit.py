@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
 from numpy.typing import ArrayLike
+from scipy.interpolate import interp1d
 
 from fingerpad.core.checks import FloatArray
 from fingerpad.core.results import Number, Vector, result_class
-from fingerpad.core.signals import STORED_ENERGY, SedTraces, traces_below
+from fingerpad.core.signals import STORED_ENERGY, CurrentTraces, SedTraces, traces_below
 from fingerpad.data import bar_firing_rates, protocol
 from fingerpad.experiments.conditions import RECEPTOR_X_MM, Conditions, Touch
+from fingerpad.experiments.gerling2014.skin_deflection import PLATE_DEPTHS_MM, plate
 from fingerpad.geometry.indenters import Bar
 from fingerpad.inference.fitting.cross_validation import (
     CrossValidation,
@@ -25,6 +28,8 @@ from fingerpad.inference.rate_problem import RateProblem
 from fingerpad.inference.recordings import RateRecordings
 from fingerpad.inference.start_points import response_surface, start_points
 from fingerpad.neuron.afferent import PARAMETER_NAMES, PARAMETER_UNITS, Afferent
+from fingerpad.neuron.population import Population
+from fingerpad.neuron.rate_windows import PAPER_WINDOWS_MS
 from fingerpad.neuron.spikes import modulation_difference, modulation_index
 from fingerpad.skin.sampling import SkinResponse
 
@@ -49,9 +54,7 @@ def bar_touches(conditions: Conditions) -> list[Touch]:
 
 
 def receptor_sed(
-    responses: list[SkinResponse],
-    dynamic_quantity: str = STORED_ENERGY,
-    static_quantity: str = STORED_ENERGY,
+    responses: list[SkinResponse], dynamic_quantity: str = STORED_ENERGY, static_quantity: str = STORED_ENERGY
 ) -> SedTraces:
     """Strain energy density at the one receptor, one column per shift of the bar."""
     quantities = (dynamic_quantity, static_quantity)
@@ -106,13 +109,9 @@ class Modulation:
     """Modulation of the rate at the edge of the bar (Eq. 11)."""
 
     maximum_hz: Number
-    """Largest rate. [spikes/s]"""
-    minimum_hz: Number
-    """Smallest rate with the flat face of the bar over the receptor. [spikes/s]"""
+    minimum_hz: Number  # Smallest rate with the flat face of the bar over the receptor. [spikes/s]
     difference_hz: Number
-    """Their difference. [spikes/s]"""
-    index: Number
-    """Modulation index; NaN if there are no spikes. [1]"""
+    index: Number  # Modulation index; NaN if there are no spikes. [1]
 
 
 @result_class
@@ -120,8 +119,7 @@ class PhaseModulation:
     """Modulation of the rates of one phase."""
 
     observed: Modulation
-    ours: Modulation
-    """Of the recorded and of the predicted rates."""
+    ours: Modulation  # Of the recorded and of the predicted rates.
 
 
 @result_class
@@ -129,35 +127,27 @@ class RateModulation:
     """Modulation of both rates."""
 
     dynamic: PhaseModulation
-    static: PhaseModulation
-    """During the ramp and during the hold."""
+    static: PhaseModulation  # During the ramp and during the hold.
 
 
 @result_class
 class SearchStep:
     """One iteration of the response-surface method."""
 
-    iteration: int
-    """From 0, the start point."""
-    fss: Number
-    """Fractional sum of squares of the training set. [1]"""
-    parameters: dict[str, Number]
-    """Six parameters, by name."""
+    iteration: int  # From 0, the start point.
+    fss: Number  # Fractional sum of squares of the training set. [1]
+    parameters: dict[str, Number]  # Six parameters, by name.
 
 
 @result_class
 class Search:
     """Search of one fold from one start point."""
 
-    start: int
-    """Number of the start point, from 1."""
+    start: int  # Number of the start point, from 1.
     fss_train: Number
-    fss_test: Number
-    """Fractional sum of squares of the training and of the testing set. [1]"""
-    runs: int
-    """Evaluations of the model."""
-    history: tuple[SearchStep, ...]
-    """Steps from the start point to the end."""
+    fss_test: Number  # Fractional sum of squares of the training and of the testing set. [1]
+    runs: int  # Evaluations of the model.
+    history: tuple[SearchStep, ...]  # Steps from the start point to the end.
 
 
 @result_class
@@ -165,19 +155,13 @@ class FoldResult:
     """One fold of the cross-validation."""
 
     fold: int
-    start: int
-    """Number of the fold and of the better start point, from 1."""
-    testing_shift_mm: Vector
-    """Shifts left out, (n_testing,). [mm]"""
-    fss_start: Vector
-    """Fractional sum of squares of the training set at the start points, (n_starts,). [1]"""
+    start: int  # Number of the fold and of the better start point, from 1.
+    testing_shift_mm: Vector  # Shifts left out, (n_testing,). [mm]
+    fss_start: Vector  # Fractional sum of squares of the training set at the start points, (n_starts,). [1]
     fss_train: Number
-    fss_test: Number
-    """Of the better search. [1]"""
-    parameters: dict[str, Number]
-    """Six parameters of the better search, by name."""
-    climbs: tuple[Search, ...]
-    """One per start point."""
+    fss_test: Number  # Of the better search. [1]
+    parameters: dict[str, Number]  # Six parameters of the better search, by name.
+    climbs: tuple[Search, ...]  # One per start point.
 
 
 @result_class
@@ -186,33 +170,22 @@ class SingleUnitResult:
 
     fss_in_sample: Number
     fss_in_sample_dynamic: Number
-    fss_in_sample_static: Number
-    """Fractional sum of squares over all shifts, weighted and by phase. [1]"""
+    fss_in_sample_static: Number  # Fractional sum of squares over all shifts, weighted and by phase. [1]
     fss_out_of_sample: Number
-    fss_training_mean: Number
-    """Mean over the folds, of the testing and of the training sets. [1]"""
+    fss_training_mean: Number  # Mean over the folds, of the testing and of the training sets. [1]
     method: str
-    """Name of the method of fitting."""
     dynamic_quantity: str
-    static_quantity: str
-    """What the two terms of the current follow, see `SkinResponse.sample`."""
+    static_quantity: str  # What the two terms of the current follow, see `SkinResponse.sample`.
     parameters: dict[str, Number]
-    units: dict[str, str]
-    """Six parameters fitted to all shifts, and their units, by name."""
-    shift_mm: Vector
-    """Shifts of the bar, proximal positive, (n_shifts,). [mm]"""
+    units: dict[str, str]  # Six parameters fitted to all shifts, and their units, by name.
+    shift_mm: Vector  # Shifts of the bar, proximal positive, (n_shifts,). [mm]
     dynamic_rate_hz: Vector
-    static_rate_hz: Vector
-    """Predicted rates, (n_shifts,). [spikes/s]"""
+    static_rate_hz: Vector  # Predicted rates, (n_shifts,). [spikes/s]
     observed_dynamic_rate_hz: Vector
-    observed_static_rate_hz: Vector
-    """Recorded rates, (n_shifts,). [spikes/s]"""
-    start_points: tuple[dict[str, Number], ...]
-    """Both start points, by name of the parameter."""
+    observed_static_rate_hz: Vector  # Recorded rates, (n_shifts,). [spikes/s]
+    start_points: tuple[dict[str, Number], ...]  # Both start points, by name of the parameter.
     folds: tuple[FoldResult, ...]
-    """Cross-validation."""
     modulation: RateModulation
-    """At the edge of the bar."""
     initial_mv: Number | None = None
     """Potential of the membrane at the start; that at rest if there is none. [mV]"""
 
@@ -298,3 +271,70 @@ def edge_modulation(shift_mm: FloatArray, rate_hz: FloatArray) -> Modulation:
         difference_hz=float(modulation_difference(largest, smallest)),
         index=float(modulation_index(largest, smallest)) if largest > 0.0 else np.nan,
     )
+
+
+@result_class
+class FiringCourse:
+    """Course of the firing and of the current under the bar, shift by shift, and rates by depth."""
+
+    peak_ms: Vector
+    """End of the shortest interval between spikes, (n_shifts,); NaN with fewer than two spikes. [ms]"""
+    window_ms: tuple[float, float]  # The paper's window of the dynamic rate. [ms]
+    dynamic_share_ramp: Vector
+    """Share of the dynamic term in the charge of both terms in the ramp, (n_shifts,). [1]"""
+    dynamic_share_hold: Vector  # The same in the hold, (n_shifts,). [1]
+    sed_r2: Number
+    """R² of the line from SED in the middle of the static window to the observed static rates. [1]"""
+    depth_mm: Vector  # Depths of a flat plate, (n_depths,). [mm]
+    static_rate_by_depth_hz: Vector
+    """Static rate at these depths, mean of the population, (n_depths,). [spikes/s]"""
+
+    @property
+    def fires(self) -> np.ndarray:
+        """Shifts at which there are at least two spikes, (n_shifts,)."""
+        return np.isfinite(self.peak_ms)
+
+
+def firing_course(
+    drive: SedTraces, sed: SedTraces, afferent: Afferent, pressed: Mapping[str, SkinResponse]
+) -> FiringCourse:
+    """Read when the fitted afferent fires and what drives it."""
+    observed, (dynamic_ms, static_ms) = bar_firing_rates(), PAPER_WINDOWS_MS
+    population = Population.grid(afferent=afferent, centre_mm=(RECEPTOR_X_MM, 0.0))
+    in_hold = interp1d(sed.times_ms, sed.sed_kpa, axis=0)(0.5 * (static_ms[0] + static_ms[1]))
+    ramp_ms, end_ms = protocol.RAMP.value, float(drive.times_ms[-1])
+    return FiringCourse(
+        peak_ms=np.array([_peak_ms(train) for train in afferent.spikes(drive)]),
+        window_ms=(dynamic_ms[0], dynamic_ms[1]),
+        dynamic_share_ramp=_dynamic_share(drive, afferent, 0.0, ramp_ms),
+        dynamic_share_hold=_dynamic_share(drive, afferent, ramp_ms, end_ms),
+        sed_r2=float(np.corrcoef(in_hold, observed.static_rate_hz)[0, 1] ** 2),
+        depth_mm=np.array(PLATE_DEPTHS_MM),
+        static_rate_by_depth_hz=np.array(
+            [population.respond(pressed[plate(depth)]).static_rate_hz.mean() for depth in PLATE_DEPTHS_MM]
+        ),
+    )
+
+
+def _peak_ms(spikes_ms: FloatArray) -> float:
+    """End of the shortest interval between spikes, NaN with fewer than two spikes. [ms]"""
+    return float(spikes_ms[1 + np.diff(spikes_ms).argmin()]) if spikes_ms.size > 1 else np.nan
+
+
+def _dynamic_share(drive: SedTraces, afferent: Afferent, start_ms: float, end_ms: float) -> FloatArray:
+    """Share of the dynamic term in the charge of both terms from a start to an end, (n_sites,); 0 without."""
+    transduction = afferent.transduction
+    static, dynamic = (
+        _charge(replace(transduction, intercept_ma=0.0, **{other: 0.0}).current(drive), start_ms, end_ms)
+        for other in ("dynamic_gain", "static_gain")
+    )
+    both = static + dynamic
+    return np.divide(dynamic, both, out=np.zeros_like(both), where=both > 0.0)
+
+
+def _charge(current: CurrentTraces, start_ms: float, end_ms: float) -> FloatArray:
+    """Integral of a current whose knots include both times, (n_sites,). [mA ms]"""
+    first = np.searchsorted(current.times_ms, start_ms, side="right") - 1
+    last = np.searchsorted(current.times_ms, end_ms, side="left")
+    within = slice(first, last + 1)
+    return np.asarray(np.trapezoid(current.current_ma[within], current.times_ms[within], axis=0))

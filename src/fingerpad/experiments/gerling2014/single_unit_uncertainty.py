@@ -48,10 +48,8 @@ class CredibleInterval:
 class ParameterIdentifiability:
     """Directions of the six parameters that the rates determine."""
 
-    rank: int
-    """Singular values of the Jacobian of the rates that are not zero."""
-    relative_singular_values: Vector
-    """Over the largest, (6,). [1]"""
+    rank: int  # Singular values of the Jacobian of the rates that are not zero.
+    relative_singular_values: Vector  # Over the largest, (6,). [1]
     silent_directions: tuple[dict[str, Number], ...]
     """Directions that do not change the rates, by name of the parameter."""
 
@@ -61,20 +59,14 @@ class PosteriorConvergence:
     """Size and convergence of the MCMC ensembles."""
 
     ensembles: int
-    walkers: int
-    """Independent ensembles, and walkers of each."""
+    walkers: int  # Independent ensembles, and walkers of each.
     draws: int
-    evaluations: int
-    """Draws kept, and evaluations of the likelihood."""
-    acceptance: Number
-    """Share of accepted proposals. [1]"""
-    r_hat: Number
-    """Largest split R-hat. [1]"""
+    evaluations: int  # Draws kept, and evaluations of the likelihood.
+    acceptance: Number  # Share of accepted proposals. [1]
+    r_hat: Number  # Largest split R-hat. [1]
     effective_draws: Number
-    effective_draws_of_tails: Number
-    """Smallest effective sample sizes."""
-    draws_per_effective_draw: Number
-    """Largest autocorrelation time, in draws."""
+    effective_draws_of_tails: Number  # Smallest effective sample sizes.
+    draws_per_effective_draw: Number  # Largest autocorrelation time, in draws.
 
 
 @result_class
@@ -87,57 +79,38 @@ class PhasePrediction:
     high_hz: Vector
     """Observed rates; median and credible band of the predicted rates, (n_shifts,). [spikes/s]"""
     new_low_hz: Vector
-    new_high_hz: Vector
-    """Credible band of a new recording, (n_shifts,). [spikes/s]"""
-    share_within_new: Number
-    """Share of the observed rates within that band. [1]"""
+    new_high_hz: Vector  # Credible band of a new recording, (n_shifts,). [spikes/s]
+    share_within_new: Number  # Share of the observed rates within that band. [1]
     residual_deviation_hz: CredibleInterval
     residual_length_mm: CredibleInterval
     """Standard deviation and correlation length of the residuals. [spikes/s], [mm]"""
-    probability_of_independence: Number
-    """That residuals of neighbouring shifts are independent. [1]"""
+    probability_of_independence: Number  # That residuals of neighbouring shifts are independent. [1]
 
 
 @result_class
 class UncertaintyResult:
     """Uncertainty of the fit to the rates under the bar."""
 
-    level: Number
-    """Probability within each interval and band."""
-    seed: int
-    """Of the random numbers."""
-    names: tuple[str, ...]
-    """The four identifiable numbers."""
+    level: Number  # Probability within each interval and band.
+    seed: int  # Of the random numbers.
+    names: tuple[str, ...]  # The four identifiable numbers.
     units: dict[str, str]
     fit: dict[str, Number]
     capacitance_mf: Number
-    threshold_mv: Number
-    """Of the fit; they set the common scale of the gains in `posterior`. [mF], [mV]"""
-    identifiability: ParameterIdentifiability
-    """Of the six parameters."""
+    threshold_mv: Number  # Of the fit; they set the common scale of the gains in `posterior`. [mF], [mV]
+    identifiability: ParameterIdentifiability  # Of the six parameters.
     posterior: dict[str, CredibleInterval]
     """Of the four numbers, of the gains, and of the resting potential over the threshold, `resting_share`."""
     convergence: PosteriorConvergence
-    """Of the draws."""
-    shift_mm: Vector
-    """Shifts of the bar, (n_shifts,). [mm]"""
+    shift_mm: Vector  # Shifts of the bar, (n_shifts,). [mm]
     rates: dict[str, PhasePrediction]
-    """By phase."""
-    evidence_for_alike_residuals: Number
-    """Gain of the largest log likelihood by correlated residuals."""
-    profiles: tuple[ParameterProfile, ...]
-    """Of the four numbers."""
-    sensitivity: FssSensitivity
-    """Of FSS to the four numbers."""
+    evidence_for_alike_residuals: Number  # Gain of the largest log likelihood by correlated residuals.
+    profiles: tuple[ParameterProfile, ...]  # Of the four numbers.
+    sensitivity: FssSensitivity  # Of FSS to the four numbers.
 
 
 def uncertainty_result(
-    sed: SedTraces,
-    fitted: ArrayLike,
-    seed: int,
-    *,
-    quick: bool = False,
-    initial_mv: float | None = None,
+    sed: SedTraces, fitted: ArrayLike, seed: int, *, quick: bool = False, initial_mv: float | None = None
 ) -> UncertaintyResult:
     """Compute identifiability, posterior, profile likelihoods and sensitivity."""
     recordings, shift_mm = single_unit.bar_recordings(), bar_firing_rates().shift_mm

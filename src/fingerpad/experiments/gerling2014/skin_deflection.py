@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 
 from fingerpad.core.results import Number, TruthVector, Vector, result_class
-from fingerpad.data import cylinder_deflection
+from fingerpad.core.units import MN_PER_N
+from fingerpad.data import cylinder_deflection, protocol
 from fingerpad.experiments.conditions import Conditions, Touch
 from fingerpad.experiments.scores import coefficient_of_determination
-from fingerpad.geometry.indenters import Cylinder, Indenter, Line
+from fingerpad.geometry.indenters import Cylinder, FlatPunch, Indenter, Line, Plate
+from fingerpad.geometry.motion import RampAndHold
+from fingerpad.skin.indentation import touch_of
 from fingerpad.skin.sampling import SkinResponse, SurfaceProfile
 
 TRIALS = ("trial1", "trial2", "trial3")
@@ -25,20 +30,16 @@ class IndenterDeflection:
     deflection_mm: Vector
     """Profile along the midline: distance from the indenter's axis, proximal positive, (n_nodes,). [mm]"""
     force_mn: Number
-    peak_force_mn: Number
-    """Force at the end of the hold, and the largest force. [mN]"""
-    penetration_mm: Number
-    """Largest overlap of skin and indenter. [mm]"""
+    peak_force_mn: Number  # Force at the end of the hold, and the largest force. [mN]
+    penetration_mm: Number  # Largest overlap of skin and indenter. [mm]
 
 
 @result_class
 class CylinderDeflection(IndenterDeflection):
     """Deflection of the skin under the cylinder, compared with the observations."""
 
-    r2: Number
-    """Coefficient of determination, see `deflection_r2`."""
-    r2_mirrored: Number
-    """The same with proximal and distal exchanged."""
+    r2: Number  # Coefficient of determination, see `deflection_r2`.
+    r2_mirrored: Number  # The same with proximal and distal exchanged.
 
 
 @result_class
@@ -46,9 +47,7 @@ class TrialDeflection:
     """Deflections with the tissues of one trial."""
 
     line: IndenterDeflection
-    """Under the line load."""
     cylinder: CylinderDeflection
-    """Under the cylinder."""
 
 
 @result_class
@@ -56,10 +55,8 @@ class ObservedDeflection:
     """Observed deflection under the cylinder."""
 
     distance_mm: Vector
-    deflection_mm: Vector
-    """(n_points,)."""
-    is_artefact: TruthVector
-    """Points that R² leaves out, (n_points,)."""
+    deflection_mm: Vector  # (n_points,).
+    is_artefact: TruthVector  # Points that R² leaves out, (n_points,).
 
 
 @result_class
@@ -68,10 +65,8 @@ class SkinDeflectionResult:
 
     trial1: TrialDeflection
     trial2: TrialDeflection
-    trial3: TrialDeflection
-    """By the tissues of the paper's trials."""
+    trial3: TrialDeflection  # By the tissues of the paper's trials.
     observed: ObservedDeflection
-    """What they are compared with."""
 
 
 def deflection_touches(conditions: Conditions) -> dict[tuple[str, str], Touch]:
@@ -135,4 +130,53 @@ def _under_cylinder(skin: SkinResponse) -> CylinderDeflection:
         **vars(_under_indenter(skin)),
         r2=deflection_r2(profile),
         r2_mirrored=deflection_r2(profile, proximal_positive=False),
+    )
+
+
+PLATE_DEPTHS_MM = (1.0, 2.0)
+"""Depths of the flat plate, at which forces of people were observed. [mm]"""
+
+
+@result_class
+class SkinForce:
+    """Deflection and force with the tissues of the run."""
+
+    deflection_r2: Number  # R² of the deflection under the cylinder, see `deflection_r2`.
+    plate_1mm_n: Number
+    plate_2mm_n: Number  # Force of a flat plate at the end of the hold, 1.0 and 2.0 mm deep. [N]
+    disc_1mm_n: Number  # Force of a flat disc of 6.35 mm diameter at the end of the hold, 1.0 mm deep. [N]
+
+
+def plate(depth_mm: float) -> str:
+    """Name of the touch of the flat plate at one of `PLATE_DEPTHS_MM`."""
+    return f"plate {depth_mm:g} mm"
+
+
+def force_touches(conditions: Conditions) -> dict[str, Touch]:
+    """Touches of the cylinder, of the plate at both depths and of the disc, by name.
+
+    The flat indenters press straight down at the point of contact, as `fingerpad.indent` does.
+    """
+    cylinder = Cylinder()
+    flat = {plate(depth_mm): (Plate(), RampAndHold(depth_mm=depth_mm)) for depth_mm in PLATE_DEPTHS_MM} | {
+        "disc": (FlatPunch(), RampAndHold(depth_mm=protocol.DEPTH.value))
+    }
+    return {
+        "cylinder": conditions.touch(
+            cylinder, conditions.receptor_x_mm, conditions.deflection_grading(cylinder)
+        )
+    } | {
+        name: touch_of(conditions.finger, body, motion, conditions.tissues, conditions.resolution)
+        for name, (body, motion) in flat.items()
+    }
+
+
+def skin_force(responses: Mapping[str, SkinResponse]) -> SkinForce:
+    """Read deflection and forces."""
+    force_n = {name: float(skin.force_mn[-1]) / MN_PER_N for name, skin in responses.items()}
+    return SkinForce(
+        deflection_r2=deflection_r2(responses["cylinder"].surface_profile()),
+        plate_1mm_n=force_n[plate(1.0)],
+        plate_2mm_n=force_n[plate(2.0)],
+        disc_1mm_n=force_n["disc"],
     )

@@ -16,15 +16,13 @@ from fingerpad.experiments.gerling2014.discrepancy import (
     discrepancy_analysis,
     expected_of_measure,
 )
-from fingerpad.experiments.gerling2014.discrimination_sessions import (
+from fingerpad.experiments.gerling2014.discrimination_statistics import (
     SESSIONS,
+    DiscriminationStatistics,
     Measured,
     Observers,
-    observe,
-)
-from fingerpad.experiments.gerling2014.discrimination_statistics import (
-    DiscriminationStatistics,
     discrimination_statistics,
+    observe,
 )
 from fingerpad.experiments.gerling2014.goodwin import (
     GoodwinHitRates,
@@ -35,12 +33,7 @@ from fingerpad.inference.rate_model import AfferentModel
 from fingerpad.inference.rates_and_hit_rates import SphereHitRates, ToRatesAndHitRates
 from fingerpad.neuron.afferent import Afferent
 from fingerpad.neuron.population import Population
-from fingerpad.psychophysics.encoding import (
-    RESPONSE_MEASURES,
-    gradient_sum,
-    neighbour_pairs,
-    taking_part,
-)
+from fingerpad.psychophysics.encoding import RESPONSE_MEASURES, gradient_sum, neighbour_pairs, taking_part
 from fingerpad.psychophysics.noise_fit import NOISE_DRAWS
 from fingerpad.skin.sampling import SkinResponse
 
@@ -65,10 +58,8 @@ class ObserverHitRates:
 
     hit_rate: Vector
     hit_rate_sd: Vector
-    hit_rate_shifted: Vector
-    """Means with the spheres at 0.0 and at 0.2 mm, (n_comparisons,). [0-1]"""
-    hit_rate_shifted_sd: Vector
-    """Standard deviations, (n_comparisons,). [0-1]"""
+    hit_rate_shifted: Vector  # Means with the spheres at 0.0 and at 0.2 mm, (n_comparisons,). [0-1]
+    hit_rate_shifted_sd: Vector  # Standard deviations, (n_comparisons,). [0-1]
 
 
 @result_class
@@ -76,28 +67,20 @@ class SphereDiscrimination:
     """Hit rates of all observers at the noise that fits Goodwin's two points best."""
 
     seed: int
-    sessions: int
-    """Of all noise; repetitions of the protocol."""
-    curvature_per_m: Vector
-    """The spheres, the standard first, (7,). [1/m]"""
+    sessions: int  # Of all noise; repetitions of the protocol.
+    curvature_per_m: Vector  # The spheres, the standard first, (7,). [1/m]
     noise_sigma: float
     noise_fit_error: float
-    noise_sigma_paper: float
-    """Fitted noise, root mean square error of the fit [0-1], and the paper's noise."""
-    goodwin: GoodwinHitRates
-    """Of people."""
-    gradient_sums: dict[str, Matrix]
-    """Without noise, by measure, (n_positions, 7). [spikes/s or ms]"""
+    noise_sigma_paper: float  # Fitted noise, root mean square error of the fit [0-1], and the paper's noise.
+    goodwin: GoodwinHitRates  # Of people.
+    gradient_sums: dict[str, Matrix]  # Without noise, by measure, (n_positions, 7). [spikes/s or ms]
     gradient_sum: dict[str, ObserverHitRates]
     euclidean: dict[str, ObserverHitRates]
     variants: dict[str, ObserverHitRates]
     """First session: by measure for the two codes, and variants of the static Gradient Sum by name."""
-    silent: tuple[str, ...]
-    """Measures that are left out because the population stays silent."""
-    statistics: DiscriminationStatistics
-    """Behind the paper's statements."""
-    reasons: DiscrepancyAnalysis
-    """Why the numbers differ from the paper's."""
+    silent: tuple[str, ...]  # Measures that are left out because the population stays silent.
+    statistics: DiscriminationStatistics  # Behind the paper's statements.
+    reasons: DiscrepancyAnalysis  # Why the numbers differ from the paper's.
 
 
 def discrimination_touches(conditions: Conditions) -> dict[tuple[float, float], Touch]:
@@ -211,8 +194,5 @@ def _first_session(observers: Observers, name: str) -> ObserverHitRates:
     """Hit rates of one observer in the first session, at both positions."""
     (rate, shifted), (spread, spread_shifted) = observers.mean[name][0], observers.spread[name][0]
     return ObserverHitRates(
-        hit_rate=rate,
-        hit_rate_sd=spread,
-        hit_rate_shifted=shifted,
-        hit_rate_shifted_sd=spread_shifted,
+        hit_rate=rate, hit_rate_sd=spread, hit_rate_shifted=shifted, hit_rate_shifted_sd=spread_shifted
     )

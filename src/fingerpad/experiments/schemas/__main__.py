@@ -12,8 +12,7 @@ from fingerpad.experiments.descriptions.explained import explained_schema
 from fingerpad.experiments.descriptions.pressed import TouchFile
 from fingerpad.experiments.descriptions.touch import TouchDescription
 from fingerpad.experiments.discrimination.run import DiscriminationFile
-from fingerpad.experiments.fit.chosen_numbers import ChosenNumbersFile
-from fingerpad.experiments.fit.session import FitFile
+from fingerpad.experiments.fit.session import ChosenNumbersFile, FitFile
 from fingerpad.experiments.gerling2014.reproduction import ReproductionResult
 from fingerpad.experiments.schemas import TOUCH_SCHEMA, file_name
 from fingerpad.experiments.validation.validation import ValidationFile

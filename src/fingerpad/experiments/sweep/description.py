@@ -174,10 +174,8 @@ class SweepDescription(Part):
 class Axis:
     """One dimension of a sweep."""
 
-    name: str
-    """Of the dimension: that of its field with underscores, "zip" or "sample"."""
-    values: Mapping[str, list[Any]]
-    """Values by field, all of one length."""
+    name: str  # Of the dimension: that of its field with underscores, "zip" or "sample".
+    values: Mapping[str, list[Any]]  # Values by field, all of one length.
 
     def __len__(self) -> int:
         return len(next(iter(self.values.values())))
@@ -209,8 +207,7 @@ class Sweep:
     description: SweepDescription
     source: str = "sweep"
     """File of the description: files that it names are searched beside it, and errors begin with it."""
-    text: str = ""
-    """Content of that file, for the lines of errors."""
+    text: str = ""  # Content of that file, for the lines of errors.
 
     @property
     def origin(self) -> Origin:

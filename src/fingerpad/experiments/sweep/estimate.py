@@ -23,16 +23,12 @@ class SweepEstimate:
     """What a sweep will take if nothing of it is stored yet."""
 
     settings: int
-    presses: int
-    """How many, without those that are left out."""
-    looked_at: int
-    """Presses that the estimate is from."""
+    presses: int  # How many, without those that are left out.
+    looked_at: int  # Presses that the estimate is from.
     time_s: float
     memory_mb: float
-    disk_mb: float
-    """Time on the clock, memory of all processes, and stored indentations. [s], [MB], [MB]"""
-    processes: int
-    """How many press at a time."""
+    disk_mb: float  # Time on the clock, memory of all processes, and stored indentations. [s], [MB], [MB]
+    processes: int  # How many press at a time.
 
     @property
     def lines(self) -> tuple[str, ...]:

@@ -14,11 +14,7 @@ from fingerpad.experiments.sweep.description import ObserverSettings, Sweep
 from fingerpad.psychophysics.discrimination import compare_euclidean_observers, compare_gradient_sum_observers
 from fingerpad.psychophysics.encoding import taking_part
 
-MEASURED = {
-    "static": "static_rate_hz",
-    "dynamic": "dynamic_rate_hz",
-    "latency": "first_spike_latency_ms",
-}
+MEASURED = {"static": "static_rate_hz", "dynamic": "dynamic_rate_hz", "latency": "first_spike_latency_ms"}
 """Where a data set has each measure."""
 
 

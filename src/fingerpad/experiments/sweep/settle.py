@@ -41,13 +41,10 @@ class Case:
     """One press with the settings that are wanted of it."""
 
     text: str
-    source: str
-    """Description of the sweep in JSON, and its file."""
+    source: str  # Description of the sweep in JSON, and its file.
     press: int
-    settings: tuple[int, ...]
-    """Numbers of the settings, all of this press."""
-    store: Path
-    """Folder of stored indentations."""
+    settings: tuple[int, ...]  # Numbers of the settings, all of this press.
+    store: Path  # Folder of stored indentations.
 
 
 @dataclass(frozen=True)
@@ -55,14 +52,11 @@ class Settled:
     """What became of a case."""
 
     press: int
-    pressed: bool
-    """Whether it was pressed, and not loaded."""
-    seconds: float
-    """Time of the press. [s]"""
+    pressed: bool  # Whether it was pressed, and not loaded.
+    seconds: float  # Time of the press. [s]
     skin: Mapping[str, np.ndarray] = field(default_factory=dict)
     """Traces and fields of the skin by name; empty if it failed."""
-    responses: Mapping[int, ResponseMap] = field(default_factory=dict)
-    """By number of the setting."""
+    responses: Mapping[int, ResponseMap] = field(default_factory=dict)  # By number of the setting.
     failures: Mapping[int, str] = field(default_factory=dict)
     """Reason why there is no response, by number of the setting."""
 

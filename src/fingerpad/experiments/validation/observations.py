@@ -57,14 +57,10 @@ class Kind:
     """A kind of observation."""
 
     name: str
-    conditions: tuple[str, ...]
-    """Columns that say under what was observed."""
-    observed: str
-    """Column of what was observed."""
-    example: tuple[str, ...]
-    """Rows of an example file, with made-up numbers."""
-    axis: str = ""
-    """Condition that is a place along the finger, whose direction a source may leave open."""
+    conditions: tuple[str, ...]  # Columns that say under what was observed.
+    observed: str  # Column of what was observed.
+    example: tuple[str, ...]  # Rows of an example file, with made-up numbers.
+    axis: str = ""  # Condition that is a place along the finger, whose direction a source may leave open.
 
     @property
     def columns(self) -> tuple[str, ...]:
@@ -133,11 +129,9 @@ class Observation:
     """One row of a file."""
 
     line: int
-    """Line of the file."""
     condition: tuple[Value, ...]
     """Values of the kind's conditions, in their order; an indenter as it is written."""
     observed: float
-    """What was observed. [unit of the kind]"""
 
 
 @dataclass(frozen=True)
@@ -145,11 +139,8 @@ class Observations:
     """What a file holds."""
 
     kind: Kind
-    """One of `KINDS`."""
     rows: tuple[Observation, ...]
-    """In the order of the file."""
     source: str
-    """Name of the file."""
 
     @cached_property
     def observed(self) -> FloatArray:

@@ -76,8 +76,7 @@ class FingertipModel(metaclass=KnownKeywords):
 class Reading:
     """How the prediction of one row is obtained."""
 
-    touch: Touch | None
-    """What is pressed; None if nothing is, at depth or force 0."""
+    touch: Touch | None  # What is pressed; None if nothing is, at depth or force 0.
     of: Callable[[SkinResponse | None], float]
     """Reads the prediction from the response of the skin, None without a touch."""
 
@@ -92,14 +91,11 @@ Condition = tuple[Value, ...]
 class Predictions:
     """Predictions row by row."""
 
-    values: FloatArray
-    """In the unit of the observations; NaN where there is none, (n_rows,)."""
+    values: FloatArray  # In the unit of the observations; NaN where there is none, (n_rows,).
     mirrored: FloatArray | None
     """The same with proximal and distal exchanged, for kinds with an axis, (n_rows,)."""
-    reasons: Mapping[int, str]
-    """Why a row has no prediction."""
-    meshed: SkinResponse | None
-    """One of the responses, for its mesh."""
+    reasons: Mapping[int, str]  # Why a row has no prediction.
+    meshed: SkinResponse | None  # One of the responses, for its mesh.
 
 
 def predict(observations: Observations, model: FingertipModel, runner: Runner) -> Predictions:
@@ -143,9 +139,7 @@ def _plan(kind: Kind, given: Mapping[str, Value], model: FingertipModel) -> Plan
 
 
 def _value(
-    plan: Plan,
-    skins: Mapping[Touch, SkinResponse],
-    failed: Mapping[Touch, ConvergenceError | InputError],
+    plan: Plan, skins: Mapping[Touch, SkinResponse], failed: Mapping[Touch, ConvergenceError | InputError]
 ) -> tuple[float, str | None]:
     """Prediction of a condition; NaN and why where there is none."""
     try:
@@ -174,12 +168,7 @@ def _pressed_to(given: Mapping[str, Value], model: FingertipModel) -> Touch | No
         motion = replace(motion, ramp_ms=QUASI_STATIC_MS)
         settings = replace(settings, hold_steps=1)
     return touch_of(
-        conditions.finger,
-        indenter,
-        motion,
-        conditions.tissues,
-        conditions.resolution,
-        settings=settings,
+        conditions.finger, indenter, motion, conditions.tissues, conditions.resolution, settings=settings
     )
 
 
