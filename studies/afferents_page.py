@@ -27,12 +27,11 @@ from fingerpad.core.errors import InertiaWarning
 from fingerpad.core.regions import Ellipse
 from fingerpad.data import afferents as published
 from fingerpad.neuron.afferent import AnyAfferent
-from fingerpad.neuron.mixed_population import PUBLISHED_DENSITIES, types_of_afferents
+from fingerpad.neuron.mixed_population import types_of_afferents
 from fingerpad.neuron.tuning import tuning_curve
 from fingerpad.report.mixed_responses import STYLES, draw_mixed_responses
 from fingerpad.report.style import BLACK, BLUE, GREY, ORANGE, new_figure, write_png
 from fingerpad.skin.indentation import settings_of
-from fingerpad.skin.unrolled_skin import UnrolledSkin
 from studies.pages import DOCS, IMAGES, table, write_blocks
 
 PAGE = DOCS / "afferents.md"
@@ -325,35 +324,6 @@ def adaptation() -> None:
     _write_table("adaptation", ["type", *(f"{low:g}-{high:g} ms" for low, high in parts)], rows)
 
 
-def densities() -> None:
-    """Write the densities and the numbers on the pad, and draw them."""
-    pad = UnrolledSkin(fp.Fingertip())
-    population = fp.MixedPopulation.at_densities(pad.pad(), place=pad.points, seed=1)
-    area = pad.pad().area_mm2
-    rows = [
-        [
-            name,
-            f"{density:g}",
-            f"{len(population.parts[name])}",
-            f"{100.0 * len(population.parts[name]) / area:.1f}",
-        ]
-        for name, density in PUBLISHED_DENSITIES.items()
-    ]
-    rows.append(
-        [
-            "all",
-            f"{published.DENSITY_TOTAL.value:g}",
-            f"{len(population)}",
-            f"{100.0 * len(population) / area:.1f}",
-        ]
-    )
-    _write_table(
-        "densities",
-        ["type", "published [1/cm²]", f"afferents on {area:.0f} mm² of pad", "[1/cm²]"],
-        rows,
-    )
-
-
 def _micrometres(value: float) -> str:
     return "none" if not np.isfinite(value) else f"{value:.0f}" if value >= 20.0 else f"{value:.1f}"
 
@@ -471,7 +441,6 @@ PARTS = {
     "tuning": tuning,
     "fields": fields,
     "adaptation": adaptation,
-    "densities": densities,
     "vibration": vibration,
 }
 
