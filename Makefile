@@ -69,11 +69,7 @@ release: .venv/installed-for-tests
 
 results: .venv/installed
 	$(bin)/fingerpad reproduce $(ARGS)
-	$(bin)/python -m studies methods --resolution standard --out reproduction
-	$(bin)/python -m studies drives --resolution standard --out reproduction
-	$(bin)/python -m studies sed-readings --out reproduction
-	$(bin)/python -m studies results reproduction/results.json --methods reproduction/methods.json \
-		--drives reproduction/drives.json --readings reproduction/sed-readings.json
+	$(bin)/python -m studies results reproduction/results.json
 
 verification: .venv/installed-for-tests
 	$(bin)/python -m tests.verification $(ARGS)

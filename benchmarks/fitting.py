@@ -13,15 +13,16 @@ from benchmarks.measuring import Spread, run_job
 from benchmarks.results import Report, Table
 from fingerpad.core.signals import SedTraces
 from fingerpad.experiments.conditions import Conditions
+from fingerpad.experiments.fit.methods import FOUR_NUMBER_METHODS
 from fingerpad.experiments.gerling2014 import single_unit
-from fingerpad.inference.afferent_methods import four_number_problem
+from fingerpad.inference.afferent_methods import bounds_of, four_number_problem
 from fingerpad.inference.fitting.cross_validation import cross_validate, interleaved_folds
 from fingerpad.inference.fitting.methods import Method
+from fingerpad.inference.rate_model import AfferentModel
 from fingerpad.inference.rate_problem import RateProblem
 from fingerpad.inference.start_points import response_surface, start_points
 from fingerpad.neuron.transduction import drive
 from fingerpad.skin.store import Store, solve_missing
-from studies.fit_methods import methods
 
 JOBS, REPEATS = 2, 3
 RESOLUTION = "quick"
@@ -64,11 +65,12 @@ def fit(traces: str) -> dict[str, Any]:
     with np.load(traces) as stored:
         sed = SedTraces(stored["times_ms"], stored["sed_kpa"], stored["kinks_ms"])
     driven = drive(sed)
+    model, bounds = AfferentModel.of_drive(driven), bounds_of(driven)
     six = single_unit.rate_problem(sed)
     four = four_number_problem(six.model, six.recordings)
     folds = interleaved_folds(six.n_observations)
     cases: list[tuple[RateProblem, Method]] = [(six, response_surface())]
-    cases += [(four, method) for method in methods(four, driven)]
+    cases += [(four, method(model, four, bounds, 0)) for method in FOUR_NUMBER_METHODS.values()]
     start = start_points()[0]
     six.score(start, np.arange(six.n_observations))  # loads compiled kernels
     found: dict[str, Any] = {}

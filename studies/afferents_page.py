@@ -1,15 +1,16 @@
-"""Numbers and pictures of docs/afferents.md, docs/afferents-evidence.md and docs/decisions/sai-fields.md.
+"""Tables and pictures of docs/afferents.md and docs/vibration.md.
 
-`python -m studies.afferents_page` presses a probe, balls and a stroke, and writes them anew (ten minutes);
-with names of parts ("mixed", "tuning", "fields", "adaptation", "densities", "reach") only those.
+`python -m studies.afferents_page` presses a probe, balls, a stroke and vibrations, and writes them anew (half
+an hour); with the names of parts only those.
 """
 
 from __future__ import annotations
 
 import sys
+import time
 import warnings
-from collections.abc import Sequence
-from dataclasses import replace
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
 from functools import cache
 from itertools import product
 from pathlib import Path
@@ -17,24 +18,23 @@ from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
+from matplotlib.ticker import LogLocator
 from scipy.interpolate import interp1d
 
 import fingerpad as fp
 from fingerpad.core.checks import FloatArray
 from fingerpad.core.errors import InertiaWarning
-from fingerpad.core.files import write_atomically
-from fingerpad.core.patterns import poisson_disc
 from fingerpad.core.regions import Ellipse
 from fingerpad.data import afferents as published
 from fingerpad.neuron.afferent import AnyAfferent
-from fingerpad.neuron.mixed_population import PUBLISHED_DENSITIES, types_of_afferents
+from fingerpad.neuron.mixed_population import types_of_afferents
 from fingerpad.neuron.tuning import tuning_curve
 from fingerpad.report.mixed_responses import STYLES, draw_mixed_responses
-from fingerpad.report.style import BLACK, GREY, PALE, new_figure, write_png
-from fingerpad.skin.unrolled_skin import UnrolledSkin
-from studies.vibration_page import DOCS, table, with_table
+from fingerpad.report.style import BLACK, BLUE, GREY, ORANGE, new_figure, write_png
+from fingerpad.skin.indentation import settings_of
+from studies.pages import DOCS, IMAGES, table, write_blocks
 
-IMAGES, PAGE, DECISION = DOCS / "images", DOCS / "afferents-evidence.md", DOCS / "decisions" / "sai-fields.md"
+PAGE = DOCS / "afferents.md"
 X_MM = 17.37
 DISC = Ellipse(5.0, 5.0, centre_mm=(X_MM, 0.0))
 BALL, PROBE = fp.Sphere(curvature_per_m=287), fp.FlatPunch(diameter_mm=1.0, fillet_mm=0.2)
@@ -115,18 +115,15 @@ def tuning() -> None:
     for name, afferent in types_of_afferents().items():
         hold, per_um = linear_response(name, afferent)
         curves[name] = tuning_curve(afferent, FREQUENCIES_HZ, per_um, LIGHT.get(name, hold))
+    seen = {name: observed_um(name) for name in OBSERVED}
     for number, frequency_hz in enumerate(FREQUENCIES_HZ):
         cells = [f"{frequency_hz:g}"]
         for name, curve in curves.items():
-            cells.append(_micrometres(curve[number]))
-            if name in OBSERVED:
-                seen = observed_um(name)[number]
-                cells += ["–", "–"] if np.isnan(seen) else [f"{seen:g}", f"{curve[number] / seen:.2f}"]
+            known = name in seen and np.isfinite(seen[name][number])
+            ratio = f" ({curve[number] / seen[name][number]:.2f})" if known else ""
+            cells.append(f"{_micrometres(curve[number])}{ratio}")
         rows.append(cells)
-    head = ["frequency [Hz]"]
-    for name in curves:
-        head += [f"{name} [µm]", *(("recalled", "ratio") if name in OBSERVED else ())]
-    _write_table(PAGE, "tuning", head, rows)
+    _write_table("tuning", ["frequency [Hz]", *(f"{name} [µm]" for name in curves)], rows)
     write_png(draw_tuning, curves, IMAGES / "afferent_tuning.png")
 
 
@@ -234,7 +231,6 @@ def fields() -> None:
         observed = published.INDENTATION_THRESHOLDS.value[published.TYPES.index(name)]
         rows.append([name, *(_micrometres(each) for each in best), f"{observed:g}"])
     _write_table(
-        PAGE,
         "indentation",
         ["type", "4 mm/s [µm]", "20 mm/s [µm]", "100 mm/s [µm]", "median of units [µm]"],
         rows,
@@ -243,7 +239,7 @@ def fields() -> None:
     for name, units in (("RA", published.RA_VELOCITIES), ("PC", published.PC_VELOCITIES)):
         slowest = velocity_threshold(types_of_afferents()[name], SITES[name])
         rows.append([name, f"{slowest:.1f}", "{:g} to {:g}".format(*units.value)])
-    _write_table(PAGE, "velocity", ["type", "model [mm/s]", "units [mm/s]"], rows)
+    _write_table("velocity", ["type", "model [mm/s]", "units [mm/s]"], rows)
     rows, areas_of = [], {}
     for name, along in depths.items():
         low, high = (np.mean([field_area_mm2(each, times) for each in along]) for times in TIMES_THRESHOLD)
@@ -254,9 +250,7 @@ def fields() -> None:
             branched = f"{np.median(areas[0]):.0f} to {np.median(areas[1]):.0f}"
         observed = published.FIELD_AREAS.value[published.TYPES.index(name)]
         rows.append([name, f"{low:.1f} to {high:.1f}", branched, f"{observed:g}"])
-    _write_table(
-        PAGE, "fields", ["type", "one end organ [mm²]", "several [mm²]", "median of units [mm²]"], rows
-    )
+    _write_table("fields", ["type", "one end organ [mm²]", "several [mm²]", "median of units [mm²]"], rows)
     write_png(lambda found: draw_fields(*found), (depths, areas_of), IMAGES / "afferent_fields.png")
 
 
@@ -327,136 +321,119 @@ def adaptation() -> None:
         ]
         for name, train in found.items()
     ]
-    _write_table(PAGE, "adaptation", ["type", *(f"{low:g}-{high:g} ms" for low, high in parts)], rows)
-    write_png(draw_adaptation, found, IMAGES / "afferent_adaptation.png")
-
-
-def draw_adaptation(found: dict[str, FloatArray]) -> Figure:
-    """Draw instantaneous rates over time, ticks for the spikes."""
-    figure = new_figure(8.4, 3.6)
-    axes = figure.subplots()
-    for row, ((name, train), (colour, marker)) in enumerate(zip(found.items(), STYLES, strict=False)):
-        axes.loglog(train[1:], 1e3 / np.diff(train), marker, color=colour, markersize=3.5, label=name)
-        axes.plot(train, np.full(train.size, 1.25 + 0.35 * row), "|", color=colour, markersize=5.0)
-    axes.axvspan(1.0, 50.0, color=PALE, zorder=-1)
-    axes.set(
-        xlabel="time [ms], grey: ramp",
-        ylabel="1 / interval [spikes/s]",
-        ylim=(1.0, 1500.0),
-        xlim=(1.0, 14000.0),
-    )
-    train = found["SAI"]
-    first = np.count_nonzero((train > FIRST_MS[0]) & (train <= FIRST_MS[1]))
-    declined = first * (1.0 - np.mean(published.SAI_DECLINE.value))
-    axes.plot(LAST_MS[0], declined, "x", color=BLACK, markersize=9.0, label="SAI, published decline")
-    axes.legend(loc="upper right")
-    return figure
-
-
-def densities() -> None:
-    """Write the densities and the numbers on the pad, and draw them."""
-    pad = UnrolledSkin(fp.Fingertip())
-    population = fp.MixedPopulation.at_densities(pad.pad(), place=pad.points, seed=1)
-    area = pad.pad().area_mm2
-    rows = [
-        [
-            name,
-            f"{density:g}",
-            f"{len(population.parts[name])}",
-            f"{100.0 * len(population.parts[name]) / area:.1f}",
-        ]
-        for name, density in PUBLISHED_DENSITIES.items()
-    ]
-    rows.append(
-        [
-            "all",
-            f"{published.DENSITY_TOTAL.value:g}",
-            f"{len(population)}",
-            f"{100.0 * len(population) / area:.1f}",
-        ]
-    )
-    _write_table(
-        PAGE,
-        "densities",
-        ["type", "published [1/cm²]", f"afferents on {area:.0f} mm² of pad", "[1/cm²]"],
-        rows,
-    )
-    write_png(lambda found: draw_densities(found, area), population, IMAGES / "afferent_densities.png")
-
-
-def draw_densities(population: fp.MixedPopulation, area_mm2: float) -> Figure:
-    """Draw densities beside the published ones, and where the afferents lie in the unrolled pad."""
-    figure = new_figure(9.5, 3.6)
-    left, right = figure.subplots(1, 2)
-    for row, (name, part) in enumerate(population.parts.items()):
-        colour, marker = STYLES[row]
-        left.bar(row, 100.0 * len(part) / area_mm2, 0.6, color=colour, alpha=0.75)
-        left.plot(row, PUBLISHED_DENSITIES[name], "D", color=BLACK, markerfacecolor="white", markersize=7.0)
-        around, along = np.array(part.places_mm).T[::-1]
-        right.plot(around, along, marker, color=colour, markersize=3.0, label=f"{name}, {len(part)}")
-    left.set(
-        ylabel="afferents per cm²", title="bars: placed; marks: published",
-        xticks=range(len(population.parts)), xticklabels=list(population.parts),
-    )  # fmt: skip
-    right.set(
-        xlabel="around the finger [mm]",
-        ylabel="along the finger [mm]",
-        aspect="equal",
-        title="the pad, unrolled",
-    )
-    right.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
-    return figure
-
-
-REACH_FORCE_MN = 500.0
-REACH_OF = {
-    "human": ("human", fp.Afferent()),
-    "human, fp.SAI()": ("human", fp.SAI()),
-    "paper": ("paper", fp.Afferent.for_tissues("paper")),
-    "trial3": ("trial3", fp.Afferent.for_tissues("trial3")),
-    "trial3, raised": ("trial3", fp.Afferent.for_tissues("trial3").with_static_threshold(0.2)),
-}
-
-
-def reach() -> None:
-    """Write how far from a ball at 0.5 N SAI afferents fire in the hold."""
-    finger = fp.Fingertip()
-    pad = UnrolledSkin(finger)
-    layout = poisson_disc(pad.pad(), density_per_cm2=70.0, seed=1)
-    rows = []
-    for name, (tissues, afferent) in REACH_OF.items():
-        skin = indented(BALL, fp.ForceRampAndHold(force_mn=REACH_FORCE_MN), tissues)
-        population = fp.Population.of_layout(layout, pad.points, afferent)
-        response = population.respond(skin)
-        away = np.linalg.norm(population.positions_mm - finger.skin_point(X_MM, 0.0), axis=1)
-        fires = response.static_rate_hz > 0.0
-        quantity = skin.sample(afferent.static_quantity, population.positions_mm)[-1]
-        threshold = afferent.static_threshold
-        rows.append([
-            name, afferent.static_quantity, f"{threshold:.2g}", f"{threshold / quantity.max():.1%}",
-            f"{fires.sum()} of {fires.size}", f"{away[fires].max():.1f}",
-            f"{np.median(response.static_rate_hz[fires]):.0f}",
-        ])  # fmt: skip
-    head = [
-        "tissues",
-        "follows",
-        "threshold [kPa]",
-        "over the largest under the ball",
-        "fire in the hold",
-        "farthest [mm]",
-        "median rate [spikes/s]",
-    ]
-    _write_table(DECISION, "reach", head, rows)
+    _write_table("adaptation", ["type", *(f"{low:g}-{high:g} ms" for low, high in parts)], rows)
 
 
 def _micrometres(value: float) -> str:
     return "none" if not np.isfinite(value) else f"{value:.0f}" if value >= 20.0 else f"{value:.1f}"
 
 
-def _write_table(page: Path, name: str, head: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
-    content = table(head, rows)
-    print(content)
-    write_atomically(page, with_table(page.read_text(encoding="utf-8"), name, content).encode())
+def _write_table(name: str, head: Sequence[str], rows: Iterable[Sequence[str]], page: Path = PAGE) -> None:
+    write_blocks(page, {name: table(head, rows, rule="---:")})
+
+
+@dataclass(frozen=True)
+class Vibrated:
+    """One vibration and how it was solved."""
+
+    cycles: fp.Cycles
+    skin: fp.SkinResponse
+    seconds: float
+
+
+def vibrated(frequency_hz: float, amplitude_mm: float, cycles: int, all_cycles: bool = False) -> Vibrated:
+    """Press a sphere at quick and let it vibrate."""
+    motion = fp.sine(0.8, amplitude_mm, frequency_hz, cycles, hold_ms=450.0)
+    settings = settings_of("quick")
+    if all_cycles:
+        settings = replace(settings, cycle_tolerance=None)
+    started = time.perf_counter()
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", InertiaWarning)
+        skin = fp.touch_of(fp.Fingertip(), BALL, motion, settings=settings).solve()
+    assert motion.cycles is not None
+    return Vibrated(motion.cycles, skin, time.perf_counter() - started)
+
+
+def spikes_of(done: Vibrated) -> np.ndarray:
+    """Spike times of an afferent below the sphere during the vibration. [ms]"""
+    afferent = fp.Afferent()
+    spikes = afferent.spikes(
+        done.skin.sed([(X_MM, 0.0)], afferent.dynamic_quantity, afferent.static_quantity)
+    )[0]
+    return spikes[spikes > done.cycles.start_ms]
+
+
+def error_rows() -> Iterable[Sequence[str]]:
+    """Twelve cycles with some interpolated against all of them solved."""
+    for frequency, amplitude in ((20.0, 0.1), (100.0, 0.1), (100.0, 0.5)):
+        some, full = vibrated(frequency, amplitude, 12), vibrated(frequency, amplitude, 12, all_cycles=True)
+        errors = [
+            np.abs(got - expected).max() / np.abs(expected).max()
+            for got, expected in (
+                (getattr(some.skin, name), getattr(full.skin, name))
+                for name in ("sed_kpa", "force_mn", "contact_area_mm2")
+            )
+        ]
+        different = np.setdiff1d(spikes_of(some).round(1), spikes_of(full).round(1)).size
+        yield (
+            f"{frequency:g}", f"{1e3 * amplitude:g}", *(f"{error:.1e}" for error in errors),
+            f"{different} of {spikes_of(full).size}",
+        )  # fmt: skip
+
+
+def draw_vibrations(runs: Sequence[Vibrated]) -> Figure:
+    """Draw the loop of force over depth, energy density over time, spikes, and spikes per cycle."""
+    shown = runs[2]
+    figure = new_figure(8.0, 5.4)
+    (loop, density), (counts, raster) = figure.subplots(2, 2)
+    skin, cycles, afferent = shown.skin, shown.cycles, fp.Afferent()
+    vibrates = skin.times_ms >= cycles.start_ms
+    loop.plot(
+        skin.depth_mm[~vibrates], skin.force_mn[~vibrates], color=GREY, linestyle="--", label="ramp and hold"
+    )
+    loop.plot(skin.depth_mm[vibrates], skin.force_mn[vibrates], color=BLUE, label="vibration")
+    loop.set(xlabel="depth [mm]", ylabel="force [mN]")
+    loop.legend(loc="upper left")
+    traces = skin.sed([(X_MM, 0.0)], afferent.dynamic_quantity, afferent.static_quantity)
+    density.plot(skin.times_ms, skin.sed([(X_MM, 0.0)]).sed_kpa[:, 0], color=BLUE)
+    density.set(xlabel="time [ms]", ylabel="stored energy density [kPa]")
+    spikes = afferent.spikes(traces)[0]
+    for time_ms in spikes:
+        density.axvline(time_ms, ymax=0.06, color=BLACK, linewidth=0.6)
+    frequencies = [1e3 / run.cycles.period_ms for run in runs]
+    names = [f"{frequency:g}" for frequency in frequencies]
+    per_cycle = [spikes_of(run).size / run.cycles.count for run in runs]
+    counts.loglog(frequencies, per_cycle, color=ORANGE, marker="o")
+    counts.set(xlabel="frequency [Hz]", ylabel="spikes per cycle")
+    counts.set_xticks(frequencies, names)
+    counts.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+    counts.yaxis.set_major_formatter("{x:g}")
+    counts.minorticks_off()
+    for row, run in enumerate(runs):
+        period = run.cycles.period_ms
+        raster.plot(
+            (spikes_of(run) - run.cycles.start_ms) % period / period,
+            np.full(spikes_of(run).size, row), color=BLACK, marker="|", linestyle="none", markersize=9.0,
+        )  # fmt: skip
+    raster.set(xlabel="phase of the cycle", ylabel="frequency [Hz]", xlim=(0.0, 1.0))
+    raster.set_yticks(range(len(runs)), names)
+    return figure
+
+
+def vibration() -> None:
+    """Write the error of interpolated cycles, and the picture."""
+    head = (
+        "frequency [Hz]",
+        "amplitude [µm]",
+        "SED",
+        "force",
+        "contact area",
+        "spikes that differ by 0.1 ms",
+    )
+    _write_table("errors", head, error_rows(), DOCS / "vibration.md")
+    runs = [vibrated(frequency, 0.1, 12) for frequency in (5.0, 10.0, 20.0, 40.0, 100.0, 200.0)]
+    write_png(draw_vibrations, runs, IMAGES / "vibration.png")
 
 
 PARTS = {
@@ -464,8 +441,7 @@ PARTS = {
     "tuning": tuning,
     "fields": fields,
     "adaptation": adaptation,
-    "densities": densities,
-    "reach": reach,
+    "vibration": vibration,
 }
 
 

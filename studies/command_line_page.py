@@ -7,7 +7,7 @@ from typing import Any
 import typer
 
 from fingerpad.cli import app
-from studies.pages.markdown import markdown_table as table
+from studies.pages import table
 
 INTRODUCTION = """# Command line
 

@@ -93,14 +93,7 @@ def outputs_of(
 ) -> tuple[FloatArray, dict[str, FloatArray]]:
     """Read from one candidate's presses what the levels need.
 
-    Parameters
-    ----------
-    responses : mapping of SkinResponse
-        From `studies.tissue_search.touches`, the bar pressed once.
-    candidate : Candidate
-        What drives the afferent.
-    conditions : Conditions
-        Finger.
+    The responses are those of `studies.tissue_search.touches`, the bar pressed once.
 
     Returns
     -------
@@ -202,19 +195,10 @@ def sphere_rates(afferents: Afferents, times_ms: FloatArray, outputs: Outputs) -
 
 
 def gradient_hit_rates(static_hz: FloatArray, noise_sigma: FloatArray) -> FloatArray:
-    """Compute expected hit rates of the Gradient Sum.
+    """Compute expected hit rates of the Gradient Sum, (n_points, n_positions, n_spheres - 1).
 
-    Parameters
-    ----------
-    static_hz : array (n_points, n_positions, n_spheres, n_receptors)
-        Static rates, the standard first. [spikes/s]
-    noise_sigma : array (n_points,)
-        Noise of each point.
-
-    Returns
-    -------
-    array (n_points, n_positions, n_spheres - 1)
-        [0-1]
+    Static rates are (n_points, n_positions, n_spheres, n_receptors), the standard first [spikes/s]; the noise
+    is (n_points,).
     """
     return _hit_rates(
         static_hz,

@@ -1,7 +1,7 @@
 """One posterior of tissues, afferent and noise, given deflection, plate force, firing rates and hit rates.
 
 Tissues are pressed at the points of a design. An emulator interpolates what the levels need; afferent and
-observer are computed, not emulated. docs/decisions/posterior-over-tissues.md has the choices.
+observer are computed, not emulated. Arrays of parameters are (n_points, 11), in the order of `PARAMETERS`.
 """
 
 from __future__ import annotations
@@ -42,7 +42,6 @@ from studies.tissue_emulator import Emulator
 from studies.tissue_search import plate_range_n
 
 N_TISSUES = len(RANGES)
-
 PARAMETERS = (
     *(one.name for one in RANGES),
     "modulus of the subcutis [kPa]",
@@ -52,7 +51,9 @@ PARAMETERS = (
     "time constant [ms]",
     "noise of the percept",
 )
-"""What is inferred, in this order."""
+_SUBCUTIS, RESTING, _DYNAMIC, _STATIC, _TAU, _NOISE = range(N_TISSUES, len(PARAMETERS))
+LOGARITHMIC = [_SUBCUTIS, _DYNAMIC, _STATIC, _TAU, _NOISE]
+"""Numbers of the parameters with a log-normal prior."""
 
 SUBJECTS = 4
 """Subjects of whose forces the lowest and the highest are known."""
@@ -68,61 +69,30 @@ BETWEEN_SUBJECTS = tuple(np.geomspace(0.1, 1.2, 24).tolist())
 class Prior:
     """Prior of what is not in `RANGES`; tissues are uniform there.
 
-    The potential at rest is normal and stays below `LARGEST_RESTING_SHARE`; the others are log-normal. Two
-    thirds of their prior lie between the median divided and multiplied by the factor.
+    The potential at rest is normal about 0 and stays below `LARGEST_RESTING_SHARE`. The others are
+    log-normal: two thirds lie between the median divided and multiplied by the factor.
 
     Parameters
     ----------
-    subcutis_kpa : float
-        Median of the modulus; that of the set `human`. [kPa]
+    medians, factors : array (5,)
+        Of the modulus [kPa], both gains [1/kPa, 1/(kPa ms)], tau [ms] and the noise.
     resting_share_sd : float
-        Standard deviation of the potential at rest over the threshold, about 0. [1]
-    dynamic_gain, static_gain, time_constant_ms : float
-        Medians of k_d/(C v), k_s/(C v) and tau; those of the afferent of `human`. [1/kPa, 1/(kPa ms), ms]
-    noise_sigma : float
-        Median of the noise; the paper's.
-    subcutis_factor, gain_factor, time_constant_factor, noise_factor : float
-        Widths.
+        Standard deviation of the potential at rest over the threshold. [1]
     """
 
-    subcutis_kpa: float
-    resting_share_sd: float
-    dynamic_gain: float
-    static_gain: float
-    time_constant_ms: float
-    noise_sigma: float = psychophysics.NOISE_SIGMA.value
-    subcutis_factor: float = 3.0
-    gain_factor: float = 10.0
-    time_constant_factor: float = 2.0
-    noise_factor: float = 2.0
+    medians: FloatArray
+    factors: FloatArray
+    resting_share_sd: float = 1.0
 
     @classmethod
     def about_human(cls) -> Prior:
-        """Medians of the set `human` and of its afferent."""
-        _, dynamic, static, tau = identifiable(Afferent.for_tissues("human").parameters).tolist()
-        return cls(
-            subcutis_kpa=published.HUMAN_SUBCUTIS_SHEAR.value,
-            resting_share_sd=1.0,
-            dynamic_gain=dynamic,
-            static_gain=static,
-            time_constant_ms=tau,
-        )
-
-    @property
-    def medians(self) -> FloatArray:
-        """Of the log-normal parameters: modulus, both gains, tau, noise (5,)."""
-        return np.array(
-            [self.subcutis_kpa, self.dynamic_gain, self.static_gain, self.time_constant_ms, self.noise_sigma]
-        )
-
-    @property
-    def factors(self) -> FloatArray:
-        """Widths of the same parameters (5,)."""
-        gain = self.gain_factor
-        return np.array([self.subcutis_factor, gain, gain, self.time_constant_factor, self.noise_factor])
+        """Medians of the set `human` and of its afferent, and the paper's noise."""
+        _, *afferent = identifiable(Afferent.for_tissues("human").parameters).tolist()
+        medians = [published.HUMAN_SUBCUTIS_SHEAR.value, *afferent, psychophysics.NOISE_SIGMA.value]
+        return cls(np.array(medians), np.array([3.0, 10.0, 10.0, 2.0, 2.0]))
 
     def log_density(self, values: FloatArray) -> FloatArray:
-        """Log density of parameters (n_points, 11), per logarithm of the log-normal ones; -inf outside."""
+        """Log density of parameters, per logarithm of the log-normal ones; -inf outside."""
         shares, resting = shares_of(values[:, :N_TISSUES]), values[:, RESTING]
         scores = np.log(values[:, LOGARITHMIC] / self.medians) / np.log(self.factors)
         squares = np.square(scores).sum(axis=1) + np.square(resting / self.resting_share_sd)
@@ -130,20 +100,14 @@ class Prior:
         return np.where(possible, -0.5 * squares, -np.inf)
 
     def draw(self, n_draws: int, random: np.random.Generator) -> FloatArray:
-        """Draw parameters (n_draws, 11)."""
+        """Draw parameters."""
         values = np.empty((n_draws, len(PARAMETERS)))
         values[:, :N_TISSUES] = values_at(random.uniform(size=(n_draws, N_TISSUES)))
-        values[:, LOGARITHMIC] = self.medians * self.factors ** random.normal(
-            size=(n_draws, len(LOGARITHMIC))
-        )
+        scores = random.normal(size=(n_draws, len(LOGARITHMIC)))
+        values[:, LOGARITHMIC] = self.medians * self.factors**scores
         below = norm.cdf(LARGEST_RESTING_SHARE / self.resting_share_sd)
         values[:, RESTING] = self.resting_share_sd * norm.ppf(below * random.uniform(size=n_draws))
         return values
-
-
-_SUBCUTIS, RESTING, _DYNAMIC, _STATIC, _TAU, _NOISE = range(N_TISSUES, len(PARAMETERS))
-LOGARITHMIC = [_SUBCUTIS, _DYNAMIC, _STATIC, _TAU, _NOISE]
-"""Numbers of the parameters with a log-normal prior."""
 
 
 @dataclass(frozen=True)
@@ -159,9 +123,7 @@ class Observations:
     dynamic_hz, static_hz : array (n_shifts,)
         Rates under the bar. [spikes/s]
     hits : array (2,)
-        Hits with the comparison spheres.
-    trials : float
-        Of each comparison.
+        Hits with the comparison spheres, in `trials` each.
     """
 
     deflection_mm: FloatArray
@@ -175,43 +137,34 @@ class Observations:
     def published(cls) -> Observations:
         """Return those of people and of the paper's afferent."""
         observed, rates = cylinder_deflection(), bar_firing_rates()
-        trials = psychophysics.GOODWIN_TRIALS.value
         return cls(
             deflection_mm=observed.deflection_mm[~observed.is_artefact],
             plate_force_n=plate_range_n(),
             dynamic_hz=rates.dynamic_rate_hz,
             static_hz=rates.static_rate_hz,
-            hits=trials * np.array(psychophysics.GOODWIN_HIT_RATES.value),
+            hits=psychophysics.GOODWIN_TRIALS.value * np.array(psychophysics.GOODWIN_HIT_RATES.value),
         )
 
 
 @dataclass(frozen=True)
 class Finger:
-    """Predicts all levels from parameters.
-
-    Parameters
-    ----------
-    emulator : Emulator
-        Of the outputs of presses; its parameters are shares of `RANGES`.
-    times_ms : array (n_times,)
-        Times of the drives. [ms]
-    """
+    """Predicts all levels from parameters, with an emulator of presses and the times of the drives [ms]."""
 
     emulator: Emulator
     times_ms: FloatArray
 
     def outputs(self, values: FloatArray) -> dict[str, FloatArray]:
-        """Emulated outputs of presses for parameters (n_points, 11)."""
+        """Emulated outputs of presses."""
         return self.emulator.predict(shares_of(values[:, :N_TISSUES]))
 
     def predict(self, values: FloatArray, levels: Sequence[str] = LEVELS) -> Prediction:
-        """Predict some levels for parameters (n_points, 11)."""
+        """Predict some levels."""
         return prediction(values, self.outputs(values), self.times_ms, levels)
 
 
 @dataclass(frozen=True)
 class Prediction:
-    """Predicted observations; a level that was not asked for is empty.
+    """Predicted observations; rates and hit rates that were not asked for are empty.
 
     Parameters
     ----------
@@ -240,37 +193,21 @@ _EMPTY = np.empty(0)
 def prediction(
     values: FloatArray, outputs: Outputs, times_ms: FloatArray, levels: Sequence[str] = LEVELS
 ) -> Prediction:
-    """Predict levels from the outputs of presses, pressed or emulated.
-
-    Parameters
-    ----------
-    values : array (n_points, 11)
-        Parameters in the order of `PARAMETERS`.
-    outputs : Outputs
-        Of the same points.
-    times_ms : array (n_times,)
-        Times of the drives. [ms]
-    levels : sequence of str, optional
-        Which of `LEVELS`.
-
-    Returns
-    -------
-    Prediction
-    """
+    """Predict levels of parameters from the outputs of presses, pressed or emulated."""
     afferents = afferents_of(values, outputs)
-    firing, percept = "firing" in levels, "percept" in levels
+    percept = "percept" in levels
     spheres = sphere_rates(afferents, times_ms, outputs) if percept else _EMPTY
     return Prediction(
         deflection_mm=outputs["deflection"],
         plate_force_n=plate_force_n(outputs, values[:, _SUBCUTIS]),
-        bar_hz=bar_rates(afferents, times_ms, outputs) if firing else _EMPTY,
+        bar_hz=bar_rates(afferents, times_ms, outputs) if "firing" in levels else _EMPTY,
         sphere_hz=spheres,
         hit_rates=gradient_hit_rates(spheres, values[:, _NOISE]) if percept else _EMPTY,
     )
 
 
 def afferents_of(values: FloatArray, outputs: Outputs) -> Afferents:
-    """Afferents of parameters (n_points, 11), relative to the largest stress under the bar."""
+    """Afferents of parameters, relative to the largest stress under the bar."""
     stress = largest_stress_kpa(outputs, values[:, _SUBCUTIS])
     return Afferents(
         resting_share=values[:, RESTING],
@@ -282,13 +219,7 @@ def afferents_of(values: FloatArray, outputs: Outputs) -> Afferents:
 
 @dataclass(frozen=True)
 class Likelihood:
-    """Likelihood of every level, their residuals independent of each other.
-
-    Parameters
-    ----------
-    observed : Observations
-        What is observed.
-    """
+    """Likelihood of every level, their residuals independent of each other."""
 
     observed: Observations
 
@@ -304,13 +235,7 @@ class Likelihood:
 
     def of_levels(self, found: Prediction, levels: Sequence[str] = LEVELS) -> dict[str, FloatArray]:
         """Log likelihood (n_points,) of each of some levels, up to a constant."""
-        each = {
-            "deflection": self._deflection,
-            "force": self._force,
-            "firing": self._firing,
-            "percept": self._percept,
-        }
-        return {level: each[level](found) for level in levels}
+        return {level: getattr(self, f"_{level}")(found) for level in levels}
 
     def residual_draws(
         self, found: Prediction, random: np.random.Generator
@@ -330,13 +255,9 @@ class Likelihood:
         return log_extremes(np.log(self.observed.plate_force_n), np.log(found.plate_force_n))
 
     def _firing(self, found: Prediction) -> FloatArray:
-        observed = (self.observed.dynamic_hz, self.observed.static_hz)
-        return np.sum(
-            [
-                self._rates.log_likelihood(rates - predicted)
-                for rates, predicted in zip(observed, found.bar_hz, strict=True)
-            ],
-            axis=0,
+        dynamic, static = found.bar_hz
+        return self._rates.log_likelihood(self.observed.dynamic_hz - dynamic) + self._rates.log_likelihood(
+            self.observed.static_hz - static
         )
 
     def _percept(self, found: Prediction) -> FloatArray:
@@ -378,9 +299,7 @@ def log_extremes(
     True
     """
     deviation = np.array(deviations)[:, np.newaxis, np.newaxis]
-    low, high = (
-        (extremes[:, end] - centre) / deviation for end in range(2)
-    )  # (n_deviations, n_points, n_depths)
+    low, high = ((extremes[:, end] - centre) / deviation for end in range(2))
     between = np.maximum(norm.cdf(high) - norm.cdf(low), np.finfo(float).tiny)
     joint = (
         np.log(n_subjects * (n_subjects - 1))
@@ -396,7 +315,7 @@ def log_extremes(
 
 
 def to_coordinates(values: FloatArray, outputs: Outputs) -> FloatArray:
-    """Transform parameters (n_points, 11) to the coordinates of the sampler.
+    """Transform parameters to the coordinates of the sampler.
 
     They are unbounded, and most are normal under the prior: normal scores of the tissues, the logarithm of
     the plate's force at the greater depth for the modulus, ln(1 - u) for the potential at rest u, and
@@ -413,12 +332,12 @@ def to_coordinates(values: FloatArray, outputs: Outputs) -> FloatArray:
 
 
 def tissue_shares(points: FloatArray) -> FloatArray:
-    """Shares of `RANGES` (n_points, 5) at coordinates (n_points, 11)."""
+    """Shares of `RANGES` (n_points, 5) at coordinates."""
     return np.asarray(ndtr(points[:, :N_TISSUES]))
 
 
 def from_coordinates(points: FloatArray, outputs: Outputs) -> FloatArray:
-    """Parameters of coordinates (n_points, 11): the inverse of `to_coordinates`."""
+    """Parameters of coordinates: the inverse of `to_coordinates`."""
     values = np.empty_like(points)
     values[:, :N_TISSUES] = values_at(tissue_shares(points))
     values[:, RESTING] = 1.0 - np.exp(points[:, RESTING])
@@ -431,24 +350,7 @@ def from_coordinates(points: FloatArray, outputs: Outputs) -> FloatArray:
 def log_posterior(
     finger: Finger, likelihood: Likelihood, prior: Prior, levels: Sequence[str] = LEVELS
 ) -> LogDensity:
-    """Log posterior density of rows of coordinates, up to a constant.
-
-    Parameters
-    ----------
-    finger : Finger
-        Predicts the levels.
-    likelihood : Likelihood
-        Of the observations.
-    prior : Prior
-        Of the parameters.
-    levels : sequence of str, optional
-        Levels whose observations are used.
-
-    Returns
-    -------
-    callable
-        From points (n_points, 11) to log densities (n_points,).
-    """
+    """Log posterior density of rows of coordinates given some levels, up to a constant."""
 
     def log_density(points: FloatArray) -> FloatArray:
         outputs = finger.emulator.predict(tissue_shares(points))
@@ -472,21 +374,13 @@ def log_posterior(
 
 @dataclass(frozen=True)
 class Posterior:
-    """Draws of all parameters.
-
-    Parameters
-    ----------
-    chains : Chains
-        In the coordinates.
-    values : array (n_draws, 11)
-        The same draws in the order of `PARAMETERS`.
-    """
+    """Draws of all parameters: the chains in the coordinates, and the parameters (n_draws, 11)."""
 
     chains: Chains
     values: FloatArray
 
     def spread_out(self, n_draws: int) -> FloatArray:
-        """Return some of the draws (n_draws, 11), evenly spaced along the chains."""
+        """Return some of the draws, evenly spaced along the chains."""
         return self.values[np.linspace(0, len(self.values) - 1, n_draws).round().astype(np.int64)]
 
 
@@ -503,34 +397,16 @@ class Sampling:
 
 
 def draw_posterior(
-    finger: Finger,
-    likelihood: Likelihood,
-    prior: Prior,
-    seed: int,
-    settings: Sampling | None = None,
-    levels: Sequence[str] = LEVELS,
+    finger: Finger, likelihood: Likelihood, prior: Prior, seed: int, settings: Sampling | None = None
 ) -> Posterior:
-    """Sample the posterior given some levels.
-
-    Parameters
-    ----------
-    finger, likelihood, prior, levels
-        As of `log_posterior`.
-    seed : int
-        Of all random numbers.
-    settings : Sampling, optional
-        Of the sampler.
-
-    Returns
-    -------
-    Posterior
+    """Sample the posterior given all levels.
 
     Raises
     ------
     ConvergenceError
         If the draws have not converged.
     """
-    density = log_posterior(finger, likelihood, prior, levels)
+    density = log_posterior(finger, likelihood, prior)
     random = np.random.Generator(np.random.Philox([seed, 2]))
     first = prior.draw(N_TRIED, random)
     proposal = adapted(density, to_coordinates(first, finger.outputs(first)), random)
@@ -598,30 +474,16 @@ N_TRIED, N_BEST, N_SEARCHES, N_WEIGHTINGS = 800, 80, 5, 8
 """Search for the proposal: draws per round; the best that give the next centre and covariance; rounds of this
 kind; rounds in which all draws count by their weights."""
 
-
 WIDENED = 1.5
 """Factor on the spread of the best draws, which are closer to each other than the density is wide."""
 
 
 def adapted(density: LogDensity, points: FloatArray, random: np.random.Generator) -> Proposal:
-    """Adapt a proposal to a density by rounds of draws.
+    """Adapt a proposal to a density by rounds of draws, from first draws that are wider than the density.
 
     The first rounds keep the best draws. Then the draws of all further rounds are weighted by the density
     over the mixture of their proposals (Cornuet et al. 2012), and weights are truncated at the mean times the
     root of their number (Ionides 2008).
-
-    Parameters
-    ----------
-    density : callable
-        Log density of rows of coordinates.
-    points : array (n_points, n)
-        First draws, wider than the density.
-    random : Generator
-        Source of the random numbers.
-
-    Returns
-    -------
-    Proposal
 
     Raises
     ------
@@ -664,7 +526,7 @@ def adapted(density: LogDensity, points: FloatArray, random: np.random.Generator
 def synthetic(
     truth: Prediction, residuals: Mapping[str, tuple[float, float]], random: np.random.Generator
 ) -> Observations:
-    """Draw an experiment.
+    """Draw an experiment whose truth is the prediction of one point.
 
     Parameters
     ----------
@@ -683,10 +545,8 @@ def synthetic(
     """
     shifts = bar_firing_rates().shift_mm
     dynamic, static = truth.bar_hz[:, 0]
-    subjects = np.exp(
-        np.log(truth.plate_force_n[0])[:, np.newaxis]
-        + residuals["force"][0] * random.normal(size=(len(PLATE_DEPTHS_MM), SUBJECTS))
-    )
+    between = residuals["force"][0] * random.normal(size=(len(PLATE_DEPTHS_MM), SUBJECTS))
+    subjects = truth.plate_force_n[0][:, np.newaxis] * np.exp(between)
     template = Observations.published()
     return replace(
         template,

@@ -1,91 +1,79 @@
 """Predictions of a set of tissues that no search and no fit has used, against published facts.
 
 Numbers that can be cited are scored as `fingerpad validate` scores a file. What a source states in words is a
-check of the prediction's direction. Without numbers the prediction alone is given, in the columns of
-`fingerpad validate`, so that a file of observations can be scored in its place.
+check of the prediction's direction: the smallest of all changes must be above 0.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
 from fingerpad.core.checks import FloatArray
-from fingerpad.core.results import Matrix, Number, Vector, result_class
-from fingerpad.core.units import MN_PER_N, MS_PER_S
+from fingerpad.core.errors import ConvergenceError
+from fingerpad.core.random_streams import Purpose, normals
+from fingerpad.core.results import Number, result_class
+from fingerpad.core.units import MS_PER_S
 from fingerpad.data import paper, protocol, psychophysics
 from fingerpad.data.published import Published
 from fingerpad.experiments.conditions import RECEPTOR_X_MM, Conditions
+from fingerpad.experiments.gerling2014.curvature_thresholds import (
+    Observer,
+    interpolated,
+    just_noticeable_difference,
+)
 from fingerpad.experiments.gerling2014.skin_deflection import PLATE_DEPTHS_MM
 from fingerpad.experiments.manifest import Manifest
 from fingerpad.experiments.runner import Runner
 from fingerpad.experiments.validation.observations import KINDS, Observation, Observations, read_observations
-from fingerpad.experiments.validation.predictions import (
-    LOADINGS,
-    QUASI_STATIC,
-    RAMP_AND_HOLD,
-    Condition,
-    FingertipModel,
-    predict,
-)
+from fingerpad.experiments.validation.predictions import LOADINGS, Condition, FingertipModel, predict
 from fingerpad.experiments.validation.validation import ValidationRequest, validate
 from fingerpad.geometry.edged_indenters import Grating
 from fingerpad.geometry.indenters import FlatPunch, Indenter, Plate
 from fingerpad.geometry.mesh_quality import jacobian_at_gauss
-from fingerpad.geometry.motion import ForceRampAndHold, RampAndHold
+from fingerpad.geometry.motion import RampAndHold
 from fingerpad.mechanics.press_settings import PressSettings
 from fingerpad.neuron.afferent import Afferent
 from fingerpad.neuron.population import Population
 from fingerpad.neuron.spikes import firing_rate_hz, modulation_index
+from fingerpad.psychophysics.encoding import neighbour_pairs
+from fingerpad.psychophysics.noise_fit import NOISE_DRAWS, expected_hit_rates, fit_noise_sigma
+from fingerpad.report.formatting import ABSENT, fixed, number
+from fingerpad.report.manifest import edition
 from fingerpad.skin.indentation import Touch, touch_of
 from fingerpad.skin.sampling import SkinResponse
 from studies import held_out_facts as facts
-from studies import sphere_thresholds
-from studies.sphere_thresholds import SphereThresholds, ThresholdRow
+from studies.pages import joined, table
 
 Fact = Published[float] | Published[tuple[float, ...]]
-
 OBSERVATIONS = Path(__file__).with_name("observations")
 
-CHOSEN, PREDICTED, PARTLY = "chosen in sample", "predicted", "1 and 2 mm chosen in sample, others predicted"
+CHOSEN, PREDICTED, PARTLY = "chosen in sample", "predicted", "partly chosen"
 ROLES = {"plate_force": CHOSEN, "plate_force_mean": PARTLY, "cylinder_deflection": CHOSEN}
 """How the tissues `human` came to the observations of each file."""
 
 FORCE_DEPTHS_MM = (0.5, 1.0, 1.5, 2.0)
-FORCE_INDENTERS = ("plate", "punch:6.35", "cylinder:3.17", "sphere:287")
-DEFLECTED = (("cylinder:3.17", 0.5), ("cylinder:3.17", 1.0), ("cylinder:3.17", 2.0), ("line", 1.0))
-DISTANCES_MM = (0.0, 0.5, 1.0, 2.0, 3.0, 4.0, 6.0)
-
-SPHERE_FORCES_N = (0.2, facts.SPHERE_FORCES.value[0], facts.SPHERE_FORCES.value[-1])
-PROFILE_FORCE_N = 0.2
-PROFILES_PER_M = (172.0, 340.0, 694.0)
-POSITIONS_MM = tuple(np.arange(0.0, 5.01, 0.5).tolist())
-"""Places of the receptor from the middle of the sphere, towards the proximal end. [mm]"""
-
-RIDGES_MM = (0.5, 1.0, 1.5, 2.5, 3.0, 5.0)
-"""Width of the ridges of a grating, and of its grooves. [mm]"""
-
-TURNED_MM = (1.0, 3.0)
-"""Gratings that are also pressed with their ridges along the finger. [mm]"""
-
-IN_VIVO_MM = (3.0, 5.0)
-"""Gratings whose modulation index in vivo was published. [mm]"""
-
-FORCED_MM = (3.0,)
-GRATING_FORCES_N = (0.1, 0.2)
-PLACES_PER_PERIOD = 24
-
-WINDOWS_MS = ((50.0, 150.0), (150.0, 300.0), (300.0, 600.0), protocol.STATIC_WINDOW.value)
-"""Successive windows of the hold. [ms]"""
-
-DECLINE_STEPS = PressSettings(5, 10)
-VOLUME_DEPTHS_MM = (1.0, 2.0)
-VOLUME_INDENTERS: dict[str, Indenter] = {"plate": Plate(), "disc of 6.35 mm": FlatPunch()}
 PLATE_SHARES = (0.65, 1.44)
 """Smallest and largest force of a subject over the mean of the four, the wider of 1.0 and 2.0 mm."""
+
+SPHERE_FORCES_N = (0.2, facts.SPHERE_FORCES.value[0], facts.SPHERE_FORCES.value[-1])
+PROFILE_FORCE_N, PROFILES_PER_M = 0.2, (172.0, 340.0, 694.0)
+POSITIONS_MM = np.arange(0.0, 5.01, 0.5)
+"""Places of the receptor from the middle of the sphere, towards the proximal end. [mm]"""
+
+RIDGES_MM, TURNED_MM, IN_VIVO_MM = (0.5, 1.0, 1.5, 2.5, 3.0, 5.0), (1.0, 3.0), (3.0, 5.0)
+"""Width of the ridges of gratings and of their grooves; those that are also pressed with ridges along the
+finger; those whose modulation index in vivo was published. [mm]"""
+
+FORCED_MM, GRATING_FORCES_N, PLACES_PER_PERIOD = 3.0, (0.1, 0.2), 24
+VOLUME_DEPTHS_MM = (1.0, 2.0)
+VOLUME_INDENTERS: tuple[Indenter, ...] = (Plate(), FlatPunch())
+DECLINE_STEPS = PressSettings(5, 10)
+STANDARDS_PER_M = (144.0, 200.0, 287.0)
+PRESSED_PER_M = (144.0, 165.0, 190.0, 218.0, 250.0, psychophysics.SPHERE_287.value, 296.0, 328.0, 365.0)
 
 
 @result_class
@@ -94,10 +82,8 @@ class Check:
 
     Parameters
     ----------
-    subject : str
-        Force, deflection, spheres, gratings, adaptation, volume or percept.
-    statement : str
-        What is compared.
+    subject, statement : str
+        Force, spheres, gratings, adaptation, volume or percept; what is compared.
     source, status : str
         Where it was published, and the status of what we know of it.
     role : str
@@ -130,242 +116,31 @@ class Check:
 
 @result_class
 class Score:
-    """Scores of one file of observations, as `fingerpad validate` computes them.
-
-    Parameters
-    ----------
-    file, role, loading : str
-        Name of the file, how the tissues came to its observations, and how depths were reached.
-    n_rows, n_judged : int
-        Rows, and conditions with a range.
-    r2, correlation, gain, share_inside : float
-        As of `ValidationFile`.
-    inside_range : bool or None
-        Likewise.
-    """
+    """Scores of one file of observations as of `ValidationFile`, and how the tissues came to it."""
 
     file: str
     role: str
     loading: str
     n_rows: int
-    n_judged: int
     r2: Number
     correlation: Number
     gain: Number
-    share_inside: Number
     inside_range: bool | None
 
 
 @result_class
-class Forces:
-    """Force of indenters at depths, at the end of the hold.
-
-    Parameters
-    ----------
-    indenter : tuple of str
-        As in files of observations.
-    depth_mm : array (n_depths,)
-        [mm]
-    force_n : array (n_indenters, n_depths)
-        By the paper's motion. [N]
-    slow_plate_n : array (n_depths,)
-        Of the plate with relaxed tissues. [N]
-    people_n : array (n_depths,)
-        Mean of four subjects under the plate. [N]
-    people_range_n : array (n_depths, 2)
-        Smallest and largest of them; NaN where only the mean is known. [N]
-    """
-
-    indenter: tuple[str, ...]
-    depth_mm: Vector
-    force_n: Matrix
-    slow_plate_n: Vector
-    people_n: Vector
-    people_range_n: Matrix
-
-
-@result_class
-class Deflections:
-    """Predicted deflection of the skin, mean of both sides, over the depth.
-
-    Parameters
-    ----------
-    indenter : tuple of str
-        One per press.
-    depth_mm : array (n_presses,)
-        [mm]
-    distance_mm : array (n_distances,)
-        From the axis of the indenter. [mm]
-    share : array (n_presses, n_distances)
-        [1]
-    """
-
-    indenter: tuple[str, ...]
-    depth_mm: Vector
-    distance_mm: Vector
-    share: Matrix
-
-
-@result_class
-class SphereRates:
-    """Predicted static rates under spheres that a force presses.
-
-    Parameters
-    ----------
-    force_n : array (n_forces,)
-        [N]
-    curvature_per_m : array (n_curvatures,)
-        0 is a plate. [1/m]
-    rate_hz : array (n_forces, n_curvatures)
-        At the middle of the contact; NaN where the sphere would come too near to the bone. [spikes/s]
-    profile_force_n : float
-        Force of the profiles. [N]
-    profile_per_m : array (n_profiles,)
-        Their curvatures. [1/m]
-    position_mm : array (n_positions,)
-        Of the receptor from the middle of the sphere. [mm]
-    profile_hz : array (n_profiles, n_positions)
-        [spikes/s]
-    """
-
-    force_n: Vector
-    curvature_per_m: Vector
-    rate_hz: Matrix
-    profile_force_n: float
-    profile_per_m: Vector
-    position_mm: Vector
-    profile_hz: Matrix
-
-    def half_widths_mm(self) -> FloatArray:
-        """Distance at which each profile falls to half of its peak, (n_profiles,). [mm]"""
-        return np.array([_half_width(self.position_mm, profile) for profile in self.profile_hz])
-
-
-@result_class
-class GratingRates:
-    """Predicted rates over one period of gratings whose grooves are as wide as their ridges.
-
-    Parameters
-    ----------
-    ridge_mm : array (n_gratings,)
-        Width of ridges and grooves. [mm]
-    spin_deg : array (n_gratings,)
-        0 with ridges across the finger, 90 along it. [degrees]
-    static_hz : array (n_gratings, n_places)
-        1.0 mm deep, in the hold, at equal steps from a ridge's middle. [spikes/s]
-    static_index, dynamic_index : array (n_gratings,)
-        Modulation index, Eq. 11, in hold and ramp.
-    force_n : array (n_forces,)
-        Forces of the same gratings, those of `forced_ridge_mm`. [N]
-    forced_ridge_mm : array (n_forced,)
-        [mm]
-    forced_index : array (n_forces, n_forced)
-        Static modulation index.
-    """
-
-    ridge_mm: Vector
-    spin_deg: Vector
-    static_hz: Matrix
-    static_index: Vector
-    dynamic_index: Vector
-    force_n: Vector
-    forced_ridge_mm: Vector
-    forced_index: Matrix
-
-    def index_of(self, ridge_mm: float, spin_deg: float = 0.0) -> float:
-        """Return the static modulation index of one grating."""
-        chosen = (self.ridge_mm == ridge_mm) & (self.spin_deg == spin_deg)
-        return float(self.static_index[chosen][0])
-
-
-@result_class
-class Adaptation:
-    """Predicted rates in successive windows of a hold.
-
-    Parameters
-    ----------
-    name : str
-        What is pressed.
-    window_s : array (n_windows, 2)
-        Start and end of each window, after the start of the ramp. [s]
-    rate_hz : array (n_windows,)
-        Below the middle of the contact. [spikes/s]
-    """
-
-    name: str
-    window_s: Matrix
-    rate_hz: Vector
-
-    @property
-    def decline(self) -> float:
-        """Share by which the rate falls from the first to the last window."""
-        return float(1.0 - self.rate_hz[-1] / self.rate_hz[0]) if self.rate_hz[0] > 0.0 else np.nan
-
-
-@result_class
-class Volumes:
-    """Predicted relative decrease of the volume of the soft tissue, at the end of the hold.
-
-    Parameters
-    ----------
-    indenter : tuple of str
-        What is pressed.
-    depth_mm : array (n_depths,)
-        [mm]
-    decrease : array (n_indenters, n_depths)
-        Over the soft tissue of the modelled fingertip. [1]
-    """
-
-    indenter: tuple[str, ...]
-    depth_mm: Vector
-    decrease: Matrix
-
-
-@result_class
 class HeldOut:
-    """Result of `python -m studies held-out`.
-
-    Parameters
-    ----------
-    checks : tuple of Check
-        Published numbers and statements, each with its prediction.
-    scores : tuple of Score
-        Of the files of observations.
-    forces, deflections, spheres, gratings, volumes
-        Predictions.
-    adaptation : tuple of Adaptation
-        Predictions.
-    thresholds : SphereThresholds
-        Curvature thresholds by depth and by force.
-    manifest : Manifest
-        What ran.
-    """
+    """Result of `python -m studies held-out`: checks, scores of the files of observations, and what ran."""
 
     checks: tuple[Check, ...]
     scores: tuple[Score, ...]
-    forces: Forces
-    deflections: Deflections
-    spheres: SphereRates
-    gratings: GratingRates
-    adaptation: tuple[Adaptation, ...]
-    volumes: Volumes
-    thresholds: SphereThresholds
     manifest: Manifest
 
 
 def run(runner: Runner, conditions: Conditions) -> HeldOut:
-    """Press what is missing, predict, and compare.
+    """Press what is missing, predict, and compare; the afferent is the one that belongs to the tissues.
 
-    Parameters
-    ----------
-    runner : Runner
-        Stores the presses; a stopped run continues after the last one.
-    conditions : Conditions
-        Finger, tissues, resolution and seed; the afferent is the one that belongs to the tissues.
-
-    Returns
-    -------
-    HeldOut
+    A stopped run continues after the last stored press.
 
     Raises
     ------
@@ -375,30 +150,16 @@ def run(runner: Runner, conditions: Conditions) -> HeldOut:
         If a stored press is damaged or the folder cannot be written.
     """
     model = FingertipModel(conditions)
-    forces = indenter_forces(model, runner)
-    spheres = sphere_rates(model, runner)
-    gratings = grating_rates(model, runner)
-    adaptation = adaptations(model, runner)
-    volumes = volume_changes(conditions, runner)
-    thresholds = sphere_thresholds.run(runner, conditions, model.responding)
-    checks = (
-        *force_checks(forces),
-        *sphere_checks(spheres),
-        *grating_checks(gratings),
-        *adaptation_checks(adaptation),
-        *volume_checks(volumes),
-        *threshold_checks(thresholds.rows[:1]),
-    )
     return HeldOut(
-        checks=checks,
+        checks=(
+            *force_checks(plate_forces(model, runner)),
+            *sphere_checks(*sphere_rates(model, runner)),
+            *grating_checks(grating_rates(model, runner), forced_indices(model, runner)),
+            *adaptation_checks(declines(model, runner)),
+            *volume_checks(volume_decreases(conditions, runner)),
+            *threshold_checks(weber_fractions(model, runner)),
+        ),
         scores=tuple(scores(model, runner)),
-        forces=forces,
-        deflections=deflections(model, runner),
-        spheres=spheres,
-        gratings=gratings,
-        adaptation=adaptation,
-        volumes=volumes,
-        thresholds=thresholds,
         manifest=runner.manifest(conditions),
     )
 
@@ -416,11 +177,9 @@ def scores(model: FingertipModel, runner: Runner) -> Iterable[Score]:
                 role=ROLES.get(path.stem, PREDICTED),
                 loading=loading,
                 n_rows=found.n_rows,
-                n_judged=found.n_judged,
                 r2=found.r2,
                 correlation=found.correlation,
                 gain=found.gain,
-                share_inside=found.share_inside,
                 inside_range=found.inside_range,
             )
 
@@ -428,130 +187,30 @@ def scores(model: FingertipModel, runner: Runner) -> Iterable[Score]:
 def predicted(
     kind: str, conditions: Sequence[Condition], model: FingertipModel, runner: Runner
 ) -> FloatArray:
-    """Predict conditions of a kind of observation, without observations.
-
-    Parameters
-    ----------
-    kind : str
-        One of `KINDS`.
-    conditions : sequence of tuple (n,)
-        Values in the order of the kind's conditions.
-    model : FingertipModel
-        Finger, tissues, afferent.
-    runner : Runner
-        Stores the presses.
-
-    Returns
-    -------
-    array (n,)
-        In the unit of the kind; NaN where a press is impossible.
-    """
+    """Predict conditions of a kind of `KINDS` without observations; NaN where a press is impossible."""
     rows = tuple(Observation(line, condition, np.nan) for line, condition in enumerate(conditions))
     return predict(Observations(KINDS[kind], rows, "predictions"), model, runner).values
 
 
-def indenter_forces(model: FingertipModel, runner: Runner) -> Forces:
-    """Predict the forces of all indenters, and of the plate with relaxed tissues."""
-    wanted = [(body, depth) for body in FORCE_INDENTERS for depth in FORCE_DEPTHS_MM]
-    slow = [("plate", depth) for depth in FORCE_DEPTHS_MM]
-    means = read_observations(OBSERVATIONS / "plate_force_mean.csv").rows
-    ranges = read_observations(OBSERVATIONS / "plate_force.csv").rows
-    observed = {
-        depth: [row.observed for row in ranges if row.condition[1] == depth] for depth in FORCE_DEPTHS_MM
-    }
-    return Forces(
-        indenter=FORCE_INDENTERS,
-        depth_mm=np.array(FORCE_DEPTHS_MM),
-        force_n=predicted("force", wanted, model, runner).reshape(len(FORCE_INDENTERS), -1),
-        slow_plate_n=predicted("force", slow, replace(model, loading=QUASI_STATIC), runner),
-        people_n=np.array([
-            next(row.observed for row in means if row.condition[1] == depth) for depth in FORCE_DEPTHS_MM
-        ]),
-        people_range_n=np.array([
-            (min(found), max(found)) if found else (np.nan, np.nan) for found in observed.values()
-        ]),
-    )  # fmt: skip
-
-
-def force_checks(forces: Forces) -> Iterable[Check]:
-    """Compare the plate with people: ranges at 1 and 2 mm, and shares of the mean at other depths."""
-    source = "Dandekar 1995, as quoted in later public material; four subjects"
-    for loading, force_n in ((RAMP_AND_HOLD, forces.force_n[0]), (QUASI_STATIC, forces.slow_plate_n)):
-        for depth, force, mean, (low, high) in zip(
-            forces.depth_mm, force_n, forces.people_n, forces.people_range_n, strict=True
-        ):
-            ranged = depth in PLATE_DEPTHS_MM
-            how = "range of four" if ranged else "mean of four, with the relative range at 1 and 2 mm"
-            yield Check(
-                subject="force",
-                statement=f"plate at {depth:g} mm, {loading.replace('_', ' ')}: {how}",
-                source=source,
-                status="read",
-                role=CHOSEN if ranged else PREDICTED,
-                predicted=force,
-                unit="N",
-                low=low if ranged else PLATE_SHARES[0] * mean,
-                high=high if ranged else PLATE_SHARES[1] * mean,
-            )
-
-
-def deflections(model: FingertipModel, runner: Runner) -> Deflections:
-    """Predict profiles of cylinder and line, mean of the proximal and the distal side."""
-    distances = [sign * distance for distance in DISTANCES_MM for sign in (-1.0, 1.0)]
-    wanted = [(body, depth, distance) for body, depth in DEFLECTED for distance in distances]
-    found = predicted("deflection", wanted, model, runner).reshape(len(DEFLECTED), -1, 2).mean(axis=2)
-    depth_mm = np.array([depth for _, depth in DEFLECTED])
-    return Deflections(
-        indenter=tuple(body for body, _ in DEFLECTED),
-        depth_mm=depth_mm,
-        distance_mm=np.array(DISTANCES_MM),
-        share=found / depth_mm[:, None],
-    )
-
-
-def sphere_rates(model: FingertipModel, runner: Runner) -> SphereRates:
-    """Predict rates under spheres by force, against curvature and against position."""
-    curvatures = facts.SPHERE_CURVATURES.value
-    middle = [(force, curvature) for force in SPHERE_FORCES_N for curvature in curvatures]
-    beside = [
-        (PROFILE_FORCE_N, curvature, position) for curvature in PROFILES_PER_M for position in POSITIONS_MM
-    ]
-    return SphereRates(
-        force_n=np.array(SPHERE_FORCES_N),
-        curvature_per_m=np.array(curvatures),
-        rate_hz=predicted("rate_curvature", middle, model, runner).reshape(len(SPHERE_FORCES_N), -1),
-        profile_force_n=PROFILE_FORCE_N,
-        profile_per_m=np.array(PROFILES_PER_M),
-        position_mm=np.array(POSITIONS_MM),
-        profile_hz=predicted("rate_position", beside, model, runner).reshape(len(PROFILES_PER_M), -1),
-    )
-
-
-def _half_width(position_mm: FloatArray, rate_hz: FloatArray) -> float:
-    """Distance at which a profile first falls to half of its peak, linear between positions; NaN if never."""
-    half = rate_hz.max() / 2.0
-    below = np.flatnonzero(rate_hz < half)
-    after = [index for index in below if index > rate_hz.argmax()]
-    if not after:
-        return np.nan
-    last = after[0] - 1
-    share = (rate_hz[last] - half) / (rate_hz[last] - rate_hz[last + 1])
-    return float(position_mm[last] + share * (position_mm[last + 1] - position_mm[last]))
-
-
-def _direction(subject: str, statement: str, fact: Fact, smallest_change: float, unit: str) -> Check:
-    """Check of a direction: the smallest of several changes must be above 0."""
+def _check(
+    subject: str, statement: str, fact: Fact, value: float, unit: str, low: float, high: float
+) -> Check:
     return Check(
         subject=subject,
         statement=statement,
         source=fact.source,
         status=fact.status,
         role=PREDICTED,
-        predicted=smallest_change,
+        predicted=value,
         unit=unit,
-        low=np.nextafter(0.0, 1.0),
-        high=np.nan,
+        low=low,
+        high=high,
     )
+
+
+def _direction(subject: str, statement: str, fact: Fact, smallest_change: float, unit: str) -> Check:
+    """Check of a direction: the smallest of several changes must be above 0."""
+    return _check(subject, statement, fact, smallest_change, unit, np.nextafter(0.0, 1.0), np.nan)
 
 
 def _smallest_step(values: FloatArray, axis: int) -> float:
@@ -560,63 +219,116 @@ def _smallest_step(values: FloatArray, axis: int) -> float:
     return float(np.nanmin(steps)) if np.isfinite(steps).any() else np.nan
 
 
-def sphere_checks(spheres: SphereRates) -> Iterable[Check]:
-    """Compare with what was stated of human afferents under spheres."""
-    fact, force = facts.SPHERE_CURVATURES, facts.SPHERE_FORCES
-    applied = spheres.rate_hz[np.isin(spheres.force_n, force.value)]
-    yield Check(
-        subject="spheres",
-        statement="share of the spheres applied to people that stay away from the bone, "
-        + " and ".join(f"{newton:g} N" for newton in SPHERE_FORCES_N if newton in force.value),
-        source=force.source,
-        status=force.status,
-        role=PREDICTED,
-        predicted=float(np.isfinite(applied).mean()),
-        unit="1",
-        low=1.0,
-        high=np.nan,
+# Force
+
+
+def plate_forces(model: FingertipModel, runner: Runner) -> dict[str, FloatArray]:
+    """Force of the plate at `FORCE_DEPTHS_MM`, by the way to reach a depth. [N]"""
+    wanted = [("plate", depth) for depth in FORCE_DEPTHS_MM]
+    return {
+        loading: predicted("force", wanted, replace(model, loading=loading), runner) for loading in LOADINGS
+    }
+
+
+def force_checks(force_n: Mapping[str, FloatArray]) -> Iterable[Check]:
+    """Compare the plate with people: ranges at 1 and 2 mm, and shares of the mean at other depths."""
+    means, ranges = (
+        read_observations(OBSERVATIONS / name).rows for name in ("plate_force_mean.csv", "plate_force.csv")
     )
-    yield _direction(
-        "spheres",
-        "rate increases with curvature, smallest step at all forces",
-        fact,
-        _smallest_step(spheres.rate_hz, axis=1),
-        "spikes/s",
+    for loading, forces in force_n.items():
+        for depth, force in zip(FORCE_DEPTHS_MM, forces, strict=True):
+            mean = next(row.observed for row in means if row.condition[1] == depth)
+            subjects = [row.observed for row in ranges if row.condition[1] == depth]
+            yield Check(
+                subject="force",
+                statement=f"plate at {depth:g} mm, {loading.replace('_', ' ')}",
+                source="Dandekar 1995, as quoted in later public material; four subjects",
+                status="read",
+                role=CHOSEN if depth in PLATE_DEPTHS_MM else PREDICTED,
+                predicted=force,
+                unit="N",
+                low=min(subjects, default=PLATE_SHARES[0] * mean),
+                high=max(subjects, default=PLATE_SHARES[1] * mean),
+            )
+
+
+# Spheres
+
+
+def sphere_rates(model: FingertipModel, runner: Runner) -> tuple[FloatArray, FloatArray]:
+    """Predict static rates under spheres that a force presses. [spikes/s]
+
+    Returns
+    -------
+    array (n_forces, n_curvatures)
+        In the middle of the contact; NaN where the sphere would come too near to the bone.
+    array (n_profiles, n_positions)
+        Beside the middle.
+    """
+    curvatures = facts.SPHERE_CURVATURES.value
+    middle = [(force, curvature) for force in SPHERE_FORCES_N for curvature in curvatures]
+    beside = [
+        (PROFILE_FORCE_N, curvature, place) for curvature in PROFILES_PER_M for place in POSITIONS_MM.tolist()
+    ]
+    return (
+        predicted("rate_curvature", middle, model, runner).reshape(len(SPHERE_FORCES_N), -1),
+        predicted("rate_position", beside, model, runner).reshape(len(PROFILES_PER_M), -1),
     )
-    yield _direction(
+
+
+def half_width_mm(position_mm: FloatArray, rate_hz: FloatArray) -> float:
+    """Distance at which a profile first falls to half of its peak, linear between positions; NaN if never.
+
+    Examples
+    --------
+    >>> half_width_mm(np.array([0.0, 1.0, 2.0]), np.array([20.0, 15.0, 5.0]))
+    1.5
+    """
+    half = rate_hz.max() / 2.0
+    after = [index for index in np.flatnonzero(rate_hz < half) if index > rate_hz.argmax()]
+    if not after:
+        return np.nan
+    last = after[0] - 1
+    within = (rate_hz[last] - half) / (rate_hz[last] - rate_hz[last + 1])
+    return float(position_mm[last] + within * (position_mm[last + 1] - position_mm[last]))
+
+
+def sphere_checks(rate_hz: FloatArray, profile_hz: FloatArray) -> Iterable[Check]:
+    """Compare with what was stated of human afferents under spheres; the last two forces were applied."""
+    curvature, force = facts.SPHERE_CURVATURES, facts.SPHERE_FORCES
+    applied = float(np.isfinite(rate_hz[-2:]).mean())
+    widths = np.array([half_width_mm(POSITIONS_MM[: row.size], row) for row in profile_hz])
+    at = f"at {PROFILE_FORCE_N:g} N"
+    yield _check(
         "spheres",
-        "rate increases with force, smallest step at all curvatures",
+        "share of the applied spheres that stay away from the bone",
         force,
-        _smallest_step(spheres.rate_hz, axis=0),
-        "spikes/s",
+        applied,
+        "1",
+        1.0,
+        np.nan,
     )
-    yield _direction(
-        "spheres",
-        f"more curved, higher profile at {spheres.profile_force_n:g} N, smallest step of the peak",
-        fact,
-        _smallest_step(spheres.profile_hz.max(axis=1), axis=0),
-        "spikes/s",
-    )
-    yield _direction(
-        "spheres",
-        f"more curved, narrower profile at {spheres.profile_force_n:g} N, smallest loss of half-width",
-        fact,
-        _smallest_step(-spheres.half_widths_mm(), axis=0),
-        "mm",
-    )
+    for statement, fact, change, unit in (
+        ("rate increases with curvature", curvature, _smallest_step(rate_hz, 1), "spikes/s"),
+        ("rate increases with force", force, _smallest_step(rate_hz, 0), "spikes/s"),
+        (
+            f"more curved, higher profile {at}",
+            curvature,
+            _smallest_step(profile_hz.max(axis=1), 0),
+            "spikes/s",
+        ),
+        (f"more curved, narrower profile {at}", curvature, _smallest_step(-widths, 0), "mm"),
+    ):
+        yield _direction("spheres", statement, fact, change, unit)
+
+
+# Gratings
 
 
 def grating_touch(conditions: Conditions, ridge_mm: float, spin_deg: float = 0.0) -> Touch:
     """Grating pressed 1.0 mm deep along the skin's normal, a ridge above the receptor.
 
-    Parameters
-    ----------
-    conditions : Conditions
-        Finger, tissues and resolution.
-    ridge_mm : float
-        Width of ridges and grooves. [mm]
-    spin_deg : float, optional
-        Of the ridges from across the finger. [degrees]
+    Grooves are as wide as ridges; `spin_deg` turns the ridges from across the finger.
     """
     return touch_of(
         conditions.finger,
@@ -628,35 +340,26 @@ def grating_touch(conditions: Conditions, ridge_mm: float, spin_deg: float = 0.0
     )
 
 
-def grating_rates(model: FingertipModel, runner: Runner) -> GratingRates:
-    """Predict rates over one period of each grating, by depth and by force."""
+def grating_rates(model: FingertipModel, runner: Runner) -> dict[tuple[float, float], FloatArray]:
+    """Predict static rates over one period of gratings, by ridge and spin. [spikes/s]"""
     conditions = model.conditions
     gratings = [(ridge, 0.0) for ridge in RIDGES_MM] + [(ridge, 90.0) for ridge in TURNED_MM]
     touches = {grating: grating_touch(conditions, *grating) for grating in gratings}
     skins = runner.responses({"gratings": touches})["gratings"]
-    rates = [
-        period_rates_hz(skins[grating], model.responding, *grating, conditions.skin_tilt_deg)
+    return {
+        grating: period_rates_hz(skins[grating], model.responding, *grating, conditions.skin_tilt_deg)
         for grating in gratings
-    ]
-    static, dynamic = np.array([rate[1] for rate in rates]), np.array([rate[0] for rate in rates])
-    forced = [
-        (force, ridge, ridge, place)
+    }
+
+
+def forced_indices(model: FingertipModel, runner: Runner) -> FloatArray:
+    """Modulation index of one grating by force, (n_forces,)."""
+    wanted = [
+        (force, FORCED_MM, FORCED_MM, place)
         for force in GRATING_FORCES_N
-        for ridge in FORCED_MM
-        for place in _places_mm(ridge).tolist()
+        for place in _places_mm(FORCED_MM).tolist()
     ]
-    by_force = predicted("grating", forced, model, runner)
-    by_force = by_force.reshape(len(GRATING_FORCES_N), len(FORCED_MM), PLACES_PER_PERIOD)
-    return GratingRates(
-        ridge_mm=np.array([ridge for ridge, _ in gratings]),
-        spin_deg=np.array([spin for _, spin in gratings]),
-        static_hz=static,
-        static_index=_index(static),
-        dynamic_index=_index(dynamic),
-        force_n=np.array(GRATING_FORCES_N),
-        forced_ridge_mm=np.array(FORCED_MM),
-        forced_index=_index(by_force),
-    )
+    return _index(predicted("grating", wanted, model, runner).reshape(len(GRATING_FORCES_N), -1))
 
 
 def _places_mm(ridge_mm: float) -> FloatArray:
@@ -671,122 +374,51 @@ def _index(rates_hz: FloatArray) -> FloatArray:
 
 def period_rates_hz(
     skin: SkinResponse, afferent: Afferent, ridge_mm: float, spin_deg: float, tilt_deg: float
-) -> tuple[FloatArray, FloatArray]:
-    """Dynamic and static rates of receptors over one period of a grating, (PLACES_PER_PERIOD,) each.
-
-    Parameters
-    ----------
-    skin : SkinResponse
-        Under the grating.
-    afferent : Afferent
-        Of all receptors.
-    ridge_mm, spin_deg : float
-        Of the grating. [mm, degrees]
-    tilt_deg : float
-        Of the skin, along which receptors lie. [degrees]
-    """
+) -> FloatArray:
+    """Return static rates over one period of a grating along the skin, (PLACES_PER_PERIOD,). [spikes/s]"""
     places = _places_mm(ridge_mm)
     across = spin_deg == 0.0
     along = places * np.cos(np.deg2rad(tilt_deg)) if across else np.zeros_like(places)
     sites = np.stack([RECEPTOR_X_MM + along, np.zeros_like(places) if across else places], axis=1)
-    found = Population(sites, 1.0, afferent).respond(skin)
-    return found.dynamic_rate_hz, found.static_rate_hz
+    return Population(sites, 1.0, afferent).respond(skin).static_rate_hz
 
 
-def grating_checks(gratings: GratingRates) -> Iterable[Check]:
+def grating_checks(
+    static_hz: Mapping[tuple[float, float], FloatArray], forced_index: FloatArray
+) -> Iterable[Check]:
     """Compare with modulation in vivo, and with what was stated of gratings."""
-    across = gratings.spin_deg == 0.0
-    readings = [
-        (size, observed, read_as, ridge)
-        for size, observed in zip(IN_VIVO_MM, paper.GRATING_MODULATION_IN_VIVO.value, strict=True)
-        for read_as, ridge in (("width of a ridge", size), ("period", size / 2.0))
-    ]
-    for size, observed, read_as, ridge in readings:
-        yield Check(
-            subject="gratings",
-            statement=f"static modulation index, {size:g} mm read as the {read_as}, within 10 % of in vivo",
-            source=paper.GRATING_MODULATION_IN_VIVO.source,
-            status=paper.GRATING_MODULATION_IN_VIVO.status,
-            role=PREDICTED,
-            predicted=gratings.index_of(ridge),
-            unit="1",
-            low=0.9 * observed,
-            high=1.1 * observed,
-        )
-    fine = facts.FINEST_GRATING
-    finest = gratings.static_hz[across & (gratings.ridge_mm == fine.value)]
+    index = {grating: float(_index(rates)) for grating, rates in static_hz.items()}
+    in_vivo, fine, fact = paper.GRATING_MODULATION_IN_VIVO, facts.FINEST_GRATING, facts.GRATINGS
+    for size, observed in zip(IN_VIVO_MM, in_vivo.value, strict=True):
+        for read_as, ridge in (("width of a ridge", size), ("period", size / 2.0)):
+            yield _check(
+                "gratings",
+                f"static modulation index, {size:g} mm as the {read_as}, within 10 %",
+                in_vivo,
+                index[ridge, 0.0],
+                "1",
+                0.9 * observed,
+                1.1 * observed,
+            )
+    changes = float(np.ptp(static_hz[fine.value, 0.0]))
+    yield _direction("gratings", f"rate changes over grooves of {fine.value:g} mm", fine, changes, "spikes/s")
+    rising = _smallest_step(np.array([index[ridge, 0.0] for ridge in RIDGES_MM]), 0)
+    yield _direction("gratings", "index increases with the period", fact, rising, "1")
+    change = float(np.abs(np.diff(forced_index)).max())
+    yield _check("gratings", "index does not change from 0.1 to 0.2 N", fact, change, "1", np.nan, 0.05)
+    turned = min(index[ridge, 90.0] - index[ridge, 0.0] for ridge in TURNED_MM)
+    yield _direction("gratings", "ridges along the finger modulate more than across it", fact, turned, "1")
+    louder = min(float(static_hz[ridge, 90.0].mean() - static_hz[ridge, 0.0].mean()) for ridge in TURNED_MM)
     yield _direction(
-        "gratings",
-        f"rate changes over a grating with grooves of {fine.value:g} mm, static difference",
-        fine,
-        float(np.ptp(finest)),
-        "spikes/s",
-    )
-    fact = facts.GRATINGS
-    yield _direction(
-        "gratings",
-        "modulation index increases with the period, smallest step",
-        fact,
-        _smallest_step(gratings.static_index[across], axis=0),
-        "1",
-    )
-    change = np.abs(np.diff(gratings.forced_index, axis=0)).max()
-    yield Check(
-        subject="gratings",
-        statement="modulation index does not depend on amplitude: change from 0.1 to 0.2 N, below 0.05",
-        source=fact.source,
-        status=fact.status,
-        role=PREDICTED,
-        predicted=float(change),
-        unit="1",
-        low=np.nan,
-        high=0.05,
-    )
-    turned = [gratings.index_of(ridge, 90.0) - gratings.index_of(ridge) for ridge in TURNED_MM]
-    yield _direction(
-        "gratings", "ridges along the finger modulate more than across it, smallest difference", fact,
-        min(turned), "1",
-    )  # fmt: skip
-    louder = [
-        gratings.static_hz[(gratings.ridge_mm == ridge) & (gratings.spin_deg == spin)].mean()
-        for ridge in TURNED_MM
-        for spin in (0.0, 90.0)
-    ]
-    yield _direction(
-        "gratings", "ridges along the finger evoke more than across it, smallest difference of the mean rate",
-        fact, min(second - first for first, second in zip(louder[::2], louder[1::2], strict=True)),
-        "spikes/s",
-    )  # fmt: skip
-
-
-def adaptations(model: FingertipModel, runner: Runner) -> tuple[Adaptation, ...]:
-    """Predict rates in successive windows: the paper's hold by depth and by force, and a hold of 12 s."""
-    conditions = model.conditions
-    sphere = conditions.sphere_touch(sphere_thresholds.STANDARD_PER_M)
-    by_force = replace(sphere, stimulus=ForceRampAndHold(force_mn=MN_PER_N * sphere_thresholds.FORCES_N[0]))
-    named: dict[str, tuple[Touch, Sequence[Sequence[float]]]] = {
-        "sphere of 287 /m, 1.0 mm deep": (sphere, WINDOWS_MS),
-        f"sphere of 287 /m, {sphere_thresholds.FORCES_N[0]:g} N": (by_force, WINDOWS_MS),
-    }
-    for depth in facts.DECLINE_DEPTHS.value:
-        touch, windows = _steady(conditions, depth)
-        named[f"flat probe, {depth:g} mm deep"] = touch, windows
-    skins = runner.responses({"adaptation": {name: touch for name, (touch, _) in named.items()}})[
-        "adaptation"
-    ]
-    middle = Population(np.array([(RECEPTOR_X_MM, 0.0)]), 1.0, model.responding)
-    return tuple(
-        Adaptation(
-            name=name,
-            window_s=np.array(windows) / MS_PER_S,
-            rate_hz=windowed_rates_hz(middle, skins[name], windows),
-        )
-        for name, (_, windows) in named.items()
+        "gratings", "ridges along the finger evoke more than across it", fact, louder, "spikes/s"
     )
 
 
-def _steady(conditions: Conditions, depth_mm: float) -> tuple[Touch, list[tuple[float, float]]]:
-    """Slow ramp and hold of 12 s, with windows of its first and its last second."""
+# Adaptation
+
+
+def steady(conditions: Conditions, depth_mm: float) -> tuple[Touch, list[tuple[float, float]]]:
+    """Slow ramp and hold of 12 s, with windows of its first and its last second. [ms]"""
     ramp_ms = MS_PER_S * depth_mm / facts.DECLINE_SPEED.value
     hold_ms = MS_PER_S * facts.DECLINE_TIME.value
     touch = touch_of(
@@ -802,28 +434,30 @@ def _steady(conditions: Conditions, depth_mm: float) -> tuple[Touch, list[tuple[
     return touch, [(ramp_ms, ramp_ms + MS_PER_S), (end_ms - MS_PER_S, end_ms)]
 
 
-def windowed_rates_hz(
-    population: Population, skin: SkinResponse, windows_ms: Sequence[Sequence[float]]
-) -> FloatArray:
-    """Rate of the first receptor in each window, (n_windows,). [spikes/s]"""
+def declines(model: FingertipModel, runner: Runner) -> list[float]:
+    """Share by which the rate falls from the first to the last second of a hold, by depth."""
+    named = {depth: steady(model.conditions, depth) for depth in facts.DECLINE_DEPTHS.value}
+    skins = runner.responses({"adaptation": {depth: touch for depth, (touch, _) in named.items()}})
+    middle = Population(np.array([(RECEPTOR_X_MM, 0.0)]), 1.0, model.responding)
+    return [decline(middle, skins["adaptation"][depth], windows) for depth, (_, windows) in named.items()]
+
+
+def decline(population: Population, skin: SkinResponse, windows_ms: Sequence[tuple[float, float]]) -> float:
+    """Share by which the rate of the first receptor falls from first to last window; NaN if silent."""
     spikes = population.respond(skin).spikes
-    return np.array([firing_rate_hz(spikes, tuple(window))[0] for window in windows_ms])
+    first, *_, last = (firing_rate_hz(spikes, window)[0] for window in windows_ms)
+    return float(1.0 - last / first) if first > 0.0 else np.nan
 
 
-def adaptation_checks(adaptation: Sequence[Adaptation]) -> Iterable[Check]:
+def adaptation_checks(found: Sequence[float]) -> Iterable[Check]:
     """Compare the decline over 12 s with that of monkey afferents, within a quarter of it."""
-    for found, observed in zip(adaptation[-len(facts.DECLINES.value) :], facts.DECLINES.value, strict=True):
-        yield Check(
-            subject="adaptation",
-            statement=f"decline of the rate in 12 s, {found.name}, within a quarter of the observed one",
-            source=facts.DECLINES.source,
-            status=facts.DECLINES.status,
-            role=PREDICTED,
-            predicted=found.decline,
-            unit="1",
-            low=0.75 * observed,
-            high=1.25 * observed,
-        )
+    fact = facts.DECLINES
+    for depth, value, observed in zip(facts.DECLINE_DEPTHS.value, found, fact.value, strict=True):
+        statement = f"decline of the rate in 12 s, flat probe, {depth:g} mm, within a quarter"
+        yield _check("adaptation", statement, fact, value, "1", 0.75 * observed, 1.25 * observed)
+
+
+# Volume
 
 
 def volume_decrease(skin: SkinResponse) -> float:
@@ -843,58 +477,114 @@ def volume_decrease(skin: SkinResponse) -> float:
     return float(1.0 - jacobian_at_gauss(deformed).sum() / jacobian_at_gauss(mesh).sum())
 
 
-def volume_changes(conditions: Conditions, runner: Runner) -> Volumes:
-    """Predict the decrease of volume under plate and disc."""
+def volume_decreases(conditions: Conditions, runner: Runner) -> FloatArray:
+    """Decrease of the volume under plate and disc, (n_indenters, n_depths)."""
     touches = {
-        (name, depth): touch_of(
+        (number, depth): touch_of(
             conditions.finger, body, RampAndHold(depth), conditions.tissues, conditions.resolution
         )
-        for name, body in VOLUME_INDENTERS.items()
+        for number, body in enumerate(VOLUME_INDENTERS)
         for depth in VOLUME_DEPTHS_MM
     }
     skins = runner.responses({"volume": touches})["volume"]
-    found = [volume_decrease(skins[key]) for key in touches]
-    return Volumes(
-        indenter=tuple(VOLUME_INDENTERS),
-        depth_mm=np.array(VOLUME_DEPTHS_MM),
-        decrease=np.array(found).reshape(len(VOLUME_INDENTERS), -1),
-    )
+    return np.array([volume_decrease(skins[key]) for key in touches]).reshape(len(VOLUME_INDENTERS), -1)
 
 
-def volume_checks(volumes: Volumes) -> Iterable[Check]:
+def volume_checks(decrease: FloatArray) -> Iterable[Check]:
     """Compare with the largest change in vivo, and with what was stated of its causes."""
     fact = facts.VOLUME_CHANGE
-    for depth, decrease in zip(volumes.depth_mm, volumes.decrease[0], strict=True):
-        yield Check(
-            subject="volume",
-            statement=f"decrease under a plate at {depth:g} mm, at most about 5 %",
-            source=fact.source,
-            status=fact.status,
-            role=PREDICTED,
-            predicted=decrease,
-            unit="1",
-            low=0.0,
-            high=fact.value,
-        )
-    deeper, larger = np.diff(volumes.decrease, axis=1).min(), -np.diff(volumes.decrease, axis=0).max()
-    yield _direction("volume", "more at 2 mm than at 1 mm, smallest difference", fact, deeper, "1")
-    yield _direction("volume", "more under a plate than under a disc, smallest difference", fact, larger, "1")
+    for depth, value in zip(VOLUME_DEPTHS_MM, decrease[0], strict=True):
+        yield _check("volume", f"decrease under a plate at {depth:g} mm", fact, value, "1", 0.0, fact.value)
+    deeper, larger = np.diff(decrease, axis=1).min(), -np.diff(decrease, axis=0).max()
+    yield _direction("volume", "more at 2 mm than at 1 mm", fact, deeper, "1")
+    yield _direction("volume", "more under a plate than under a disc", fact, larger, "1")
 
 
-def threshold_checks(rows: Iterable[ThresholdRow]) -> Iterable[Check]:
+# Percept
+
+
+def weber_fractions(model: FingertipModel, runner: Runner) -> list[float]:
+    """Weber fraction at each of `STANDARDS_PER_M`, the noise fitted to people's hit rates at 287 /m."""
+    conditions = model.conditions
+    touches = {curvature: conditions.sphere_touch(curvature) for curvature in PRESSED_PER_M}
+    skins = runner.responses({"spheres": touches})["spheres"]
+    grid = Population.grid(centre_mm=(RECEPTOR_X_MM, 0.0), afferent=model.responding)
+    static_hz = np.array([grid.respond(skins[curvature]).static_rate_hz for curvature in PRESSED_PER_M])
+    return weber_fractions_of(grid, static_hz, conditions.seed)
+
+
+def weber_fractions_of(grid: Population, static_hz: FloatArray, seed: int) -> list[float]:
+    """Weber fractions from static rates under `PRESSED_PER_M`; NaN if no pressed sphere is discriminated."""
+    pairs = neighbour_pairs(grid.positions_mm, grid.pitch_mm)
+    draws = normals(seed, 1, len(grid), Purpose.RESPONSE, NOISE_DRAWS)[0].T
+    people = (psychophysics.SPHERE_287.value, *psychophysics.GOODWIN_CURVATURES.value)
+    rows = static_hz[[PRESSED_PER_M.index(curvature) for curvature in people]]
+    sigma = fit_noise_sigma(lambda noise: expected_hit_rates(rows, pairs, noise, draws)).noise_sigma
+    observer = Observer(interpolated(np.array(PRESSED_PER_M), static_hz), pairs, sigma, draws)
+    found = []
+    for standard in STANDARDS_PER_M:
+        try:
+            found.append(just_noticeable_difference(observer, standard) / standard)
+        except ConvergenceError:
+            found.append(np.nan)
+    return found
+
+
+def threshold_checks(fractions: Sequence[float]) -> Iterable[Check]:
     """Compare Weber fractions with people's, in whole per cent."""
     fact = psychophysics.WEBER_FRACTIONS
-    for row in rows:
-        for threshold in row.thresholds:
-            yield Check(
-                subject="percept",
-                statement=f"Weber fraction at {threshold.standard_per_m:g} /m; {row.pressed}; "
-                f"noise {row.noise}; {row.receptors}",
-                source=fact.source,
-                status=fact.status,
-                role=PREDICTED,
-                predicted=round(threshold.weber_fraction, 2),
-                unit="1",
-                low=fact.value[0],
-                high=fact.value[1],
-            )
+    for standard, fraction in zip(STANDARDS_PER_M, fractions, strict=True):
+        statement = f"Weber fraction at {standard:g} /m"
+        yield _check("percept", statement, fact, round(fraction, 2), "1", *fact.value)
+
+
+# Page
+
+
+def blocks(results: HeldOut) -> dict[str, str]:
+    """Return the blocks of docs/held-out.md."""
+    judged = [check for check in results.checks if check.role == PREDICTED and check.inside is not None]
+    inside = sum(bool(check.inside) for check in judged)
+    outside = ", ".join(sorted({check.subject for check in judged if not check.inside})) or "none"
+    sources = dict.fromkeys(f"{check.source} ({check.status})" for check in results.checks)
+    return {
+        "checks": joined(
+            f"{inside} of {len(judged)} predictions lie inside what was published. Outside are some of: "
+            f"{outside}. Written by `python -m studies held-out`: {edition(results.manifest)}, tissues "
+            f"`{results.manifest.materials}`.",
+            table(
+                ("of", "what", "predicted", "published", "verdict"), [_row(each) for each in results.checks]
+            ),
+            f"Sources (status): {'; '.join(sources)}.",
+        ),
+        "scores": table(
+            ("file", "loading", "role", "rows", "r2", "correlation", "gain", "inside"),
+            [
+                (
+                    f"`{each.file}.csv`",
+                    each.loading.replace("_", " "),
+                    each.role,
+                    str(each.n_rows),
+                    *(fixed(value, 2) for value in (each.r2, each.correlation, each.gain)),
+                    ABSENT if each.inside_range is None else str(each.inside_range).lower(),
+                )
+                for each in results.scores
+            ],
+        ),
+    }
+
+
+def _row(check: Check) -> tuple[str, ...]:
+    low, high = (number(value) if np.isfinite(value) else "" for value in (check.low, check.high))
+    if not high:
+        published = "above 0" if check.low < 1e-9 else f"from {low}"
+    else:
+        published = f"{low}–{high}" if low else f"up to {high}"
+    verdict = ABSENT if check.inside is None else "inside" if check.inside else "**outside**"
+    return (
+        check.subject,
+        check.statement,
+        f"{number(check.predicted)} {'' if check.unit == '1' else check.unit}".strip(),
+        published,
+        f"{verdict} (chosen)" if check.role == CHOSEN else verdict,
+    )

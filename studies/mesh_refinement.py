@@ -1,92 +1,71 @@
-"""Differences between meshes and a finer one: strain energy density (SED), firing rates, hit rates.
+"""Errors of the meshes of the paper's finger against finer ones: strain energy density (SED) and rates.
 
-The same bars and spheres are indented on a family of meshes. Afferent, noise and random numbers are the same
-on each, so that differences in rates and hit rates are errors of the mesh.
+The same bars and spheres are indented on a family of meshes. The afferent is the same on each, so that
+differences in rates are errors of the mesh.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+from scipy.optimize import brentq
 
-from fingerpad.core.checks import positive
+from fingerpad.core.checks import FloatArray, float_array, positive
+from fingerpad.core.errors import InputError
 from fingerpad.core.results import Number, Vector, result_class
-from fingerpad.data import protocol, psychophysics
+from fingerpad.data import bar_firing_rates, protocol, psychophysics
 from fingerpad.experiments.conditions import RECEPTOR_X_MM, Conditions
 from fingerpad.experiments.gerling2014 import single_unit, sphere_discrimination
 from fingerpad.experiments.runner import Runner
 from fingerpad.geometry.grading import Grading
-from fingerpad.mechanics.press_settings import PressSettings
+from fingerpad.inference.fitting.fractional_sum_of_squares import fractional_sum_of_squares
+from fingerpad.neuron.afferent import Afferent
 from fingerpad.neuron.population import Population
-from fingerpad.psychophysics.encoding import neighbour_pairs
+from fingerpad.neuron.spikes import firing_rate_hz
+from fingerpad.report.formatting import fixed, number
 from fingerpad.skin.code_hash import code_hash
 from fingerpad.skin.indentation import Touch
-from studies.mesh_errors import (
-    BarProfile,
-    HitRates,
-    LargestChanges,
-    MeshErrors,
-    MeshSize,
-    Reading,
-    compare,
-    goodness_of_fit,
-    hit_rates,
-    largest_changes,
-    observed_order,
-    read_stored,
-)
-from studies.study import TISSUES
+from fingerpad.skin.sampling import SkinResponse
+from studies.pages import joined, share, table
 
+TISSUES = "trial3"
 Sphere = tuple[float, float]
 """Position along the finger [mm] and curvature [1/m]."""
 
 SHIFTS_MM = protocol.BAR_SHIFTS.value
-EVERY_SHIFT = tuple(range(len(SHIFTS_MM)))
-EVERY_SPHERE: tuple[Sphere, ...] = tuple(
-    (position, curvature)
-    for position in sphere_discrimination.POSITIONS_MM
-    for curvature in sphere_discrimination.CURVATURES
-)
-
 CHOSEN_SHIFTS = tuple(
     SHIFTS_MM.index(shift) for shift in (-2.5, -1.9, -1.5, -1.3, -1.1, -0.9, -0.1, 0.9, 1.1, 1.3, 1.5, 1.7)
 )
 """Shifts for meshes that take minutes a press: flanks and peak at both edges, centre and far side."""
 
-CHOSEN_CURVATURES = (protocol.STANDARD_CURVATURE.value, *psychophysics.GOODWIN_CURVATURES.value)
-CHOSEN_SPHERES: tuple[Sphere, ...] = tuple((0.0, curvature) for curvature in CHOSEN_CURVATURES)
-"""The standard and the two comparisons with a published hit rate."""
-
-PEAK_SHIFT = SHIFTS_MM.index(1.3)
-"""Where strain energy density is largest."""
+CHOSEN_SPHERES: tuple[Sphere, ...] = tuple(
+    (0.0, curvature)
+    for curvature in (protocol.STANDARD_CURVATURE.value, *psychophysics.GOODWIN_CURVATURES.value)
+)
+EVERY_SPHERE: tuple[Sphere, ...] = tuple(
+    (position, curvature)
+    for position in sphere_discrimination.POSITIONS_MM
+    for curvature in sphere_discrimination.CURVATURES
+)
+LOWEST_ORDER, HIGHEST_ORDER = 0.3, 6.0
+"""A quantity that converges slower or faster is not taken to converge at all on these meshes."""
 
 
 @dataclass(frozen=True)
 class Level:
-    """One mesh and what is pressed into it.
+    """One mesh and what is pressed into it: shifts of the bar and spheres.
 
-    Parameters
-    ----------
-    name : str
-        What tables call it.
-    resolution : {"quick", "standard"}
-        Whose meshes and steps it starts from.
-    factor : float
-        By how much its elements are smaller, see `refined`.
-    shifts : tuple of int
-        Which of the bar's shifts are pressed.
-    spheres : tuple of (float, float)
-        Which spheres are pressed: position [mm] and curvature [1/m].
+    The factor makes the elements of the resolution smaller, see `refined`.
     """
 
     name: str
     resolution: str
     factor: float = 1.0
-    shifts: tuple[int, ...] = EVERY_SHIFT
+    shifts: tuple[int, ...] = tuple(range(len(SHIFTS_MM)))
     spheres: tuple[Sphere, ...] = EVERY_SPHERE
 
     def bars(self) -> dict[int, Touch]:
@@ -108,27 +87,7 @@ LEVELS = (
 )
 """From coarse to fine. All but quick are similar to each other, so that they show an order of convergence."""
 
-_EPIDERMIS = {"stratum_corneum": 8, "living_epidermis": 2}
-ONE_AT_A_TIME: dict[str, dict[str, dict[str, Any]]] = {
-    "bar": {
-        "half the size along the finger": {"size_x_mm": 0.05},
-        "half the size across the finger": {"size_z_mm": 0.25},
-        "twice the elements through the epidermis": _EPIDERMIS,
-        "twice the elements through the dermis": {"dermis": 8},
-        "twice the elements through the subcutis": {"subcutis": 8},
-        "twice the elements through dermis and subcutis": {"dermis": 8, "subcutis": 8},
-        "half the growth and the largest size": {"growth": 1.3**0.5, "largest_mm": 1.5},
-    },
-    "sphere": {
-        "two thirds of the size along and across": {"size_x_mm": 0.25 / 1.5, "size_z_mm": 0.25 / 1.5},
-        "twice the elements through the epidermis": _EPIDERMIS,
-        "twice the elements through dermis and subcutis": {"dermis": 8, "subcutis": 8},
-    },
-}
-"""Changes of the standard meshes, each on its own, under the bar at its highest peak and the first sphere."""
-
-STEPS = (8, 32)
-"""Steps in ramp and in hold that are compared, on the quick mesh."""
+FINEST = LEVELS[-1].name
 
 
 def refined(grading: Grading, factor: float) -> Grading:
@@ -136,22 +95,6 @@ def refined(grading: Grading, factor: float) -> Grading:
 
     Sizes are divided by the factor, numbers of elements through each layer multiplied and rounded up. Sizes
     grow by growth^(1/factor) from one element to the next, hence as fast with distance as before.
-
-    Parameters
-    ----------
-    grading : Grading
-        Where the mesh is fine.
-    factor : float
-        Above 1 for smaller elements.
-
-    Returns
-    -------
-    Grading
-
-    Raises
-    ------
-    InputError
-        If the factor is not a number above 0.
 
     Examples
     --------
@@ -177,106 +120,219 @@ def _at_factor(touch: Touch, factor: float) -> Touch:
     return touch if factor == 1.0 else replace(touch, grading=refined(touch.grading, factor))
 
 
-def single_changes() -> dict[str, dict[str, Touch]]:
-    """Return bar and sphere on standard meshes that differ from the preset in one thing."""
-    presets = _examples(Conditions("standard", tissues=TISSUES))
-    return {
-        name: {
-            change: replace(touch, grading=replace(touch.grading, **values))
-            for change, values in ONE_AT_A_TIME[name].items()
-        }
-        for name, touch in presets.items()
-    }
+@dataclass(frozen=True)
+class Reading:
+    """Responses of receptors on one mesh.
+
+    Parameters
+    ----------
+    touches : tuple
+        Numbers of the bar's shifts, or positions and curvatures of spheres.
+    sed_kpa, rate_hz : dict of arrays (n_touches, n_receptors)
+        SED at the end of the "ramp" and of the "hold" [kPa], "dynamic" and "static" firing rate [spikes/s].
+    """
+
+    touches: tuple[Any, ...]
+    sed_kpa: dict[str, FloatArray]
+    rate_hz: dict[str, FloatArray]
+
+    def only(self, touches: Sequence[Any]) -> Reading:
+        """Return the rows of some touches, in their order."""
+        rows = [self.touches.index(touch) for touch in touches]
+        sed, rates = (
+            {name: each[rows] for name, each in kind.items()} for kind in (self.sed_kpa, self.rate_hz)
+        )
+        return Reading(tuple(touches), sed, rates)
 
 
-def step_changes() -> dict[str, dict[int, Touch]]:
-    """Return bar and sphere on quick meshes, by number of steps."""
-    return {
-        name: {count: replace(touch, settings=PressSettings(count, count)) for count in STEPS}
-        for name, touch in _examples(Conditions("quick", tissues=TISSUES)).items()
-    }
+def over_thickness(skin: SkinResponse, sheets: int) -> SkinResponse:
+    """Give the lowest sheet of the living epidermis the mean SED of all its equally thick sheets.
+
+    A receptor samples the mean over the living epidermis, which is 0.1 mm thick. With one element through it,
+    this is the element's own mean. With more, the lowest sheet alone would be another sampling depth.
+    """
+    lowest = skin.mesh.living_epidermis
+    sed = skin.sed_kpa.copy()
+    # Elements are numbered from skin to bone, the last index running fastest.
+    sed[:, lowest] = np.mean([skin.sed_kpa[:, lowest - above] for above in range(sheets)], axis=0)
+    return skin.with_fields(sed_kpa=sed)
 
 
-def _examples(conditions: Conditions) -> dict[str, Touch]:
-    """Return the bar at its highest peak and the standard sphere."""
-    return {
-        "bar": single_unit.bar_touches(conditions)[PEAK_SHIFT],
-        "sphere": sphere_discrimination.discrimination_touches(conditions)[CHOSEN_SPHERES[0]],
-    }
+def read(responses: Mapping[Any, SkinResponse], receptors_mm: FloatArray, sheets: int) -> Reading:
+    """Return the responses of equal afferents at places (n_receptors, 2) to the touches of one mesh.
+
+    The mesh has `sheets` elements through the living epidermis.
+    """
+    traces = [over_thickness(skin, sheets).sed(receptors_mm) for skin in responses.values()]
+    ramp_ends = [int(np.argmin(np.abs(trace.times_ms - trace.kinks_ms[0]))) for trace in traces]
+    trains = [Afferent.for_tissues(TISSUES).spikes(trace) for trace in traces]
+    windows = {"dynamic": protocol.DYNAMIC_WINDOW.value, "static": protocol.STATIC_WINDOW.value}
+    return Reading(
+        tuple(responses),
+        {
+            "ramp": np.array([trace.sed_kpa[end] for trace, end in zip(traces, ramp_ends, strict=True)]),
+            "hold": np.array([trace.sed_kpa[-1] for trace in traces]),
+        },
+        {
+            name: np.array([firing_rate_hz(train, window) for train in trains])
+            for name, window in windows.items()
+        },
+    )
 
 
 @result_class
-class LevelMeshes:
-    """Meshes of a level, see `Level`: their sizes under bar and sphere."""
+class Differences:
+    """Largest absolute difference and root mean square between values and a reference."""
 
-    name: str
-    factor: float
-    resolution: str
-    bar: MeshSize
-    sphere: MeshSize
+    max: Number
+    rms: Number
+
+    @classmethod
+    def between(cls, values: FloatArray, reference: FloatArray, unit: float = 1.0) -> Differences:
+        """Summarise differences in multiples of a unit.
+
+        Examples
+        --------
+        >>> Differences.between(np.array([1.0, 5.0]), np.array([1.0, 2.0]), unit=2.0).max
+        1.5
+        """
+        difference = (values - reference) / unit
+        return cls(max=np.abs(difference).max(), rms=np.sqrt(np.square(difference).mean()))
 
 
 @result_class
-class AgainstFiner:
-    """One mesh against a finer one.
+class MeshErrors:
+    """Errors of one mesh at the touches that it shares with a finer one.
 
     Parameters
     ----------
     mesh, against : str
         Their names.
-    errors : MeshErrors
-        At the touches that both have.
-    fss, fss_against : float, optional
-        Weighted FSS of the rates under the bar on either mesh; NaN of spheres. [1]
+    touches : int
+        How many are shared.
+    sed : dict of Differences
+        At the end of the "ramp" and of the "hold", over the largest SED on the finer mesh. [1]
+    rate_hz : dict of Differences
+        "dynamic" and "static" firing rate. [spikes/s]
+    fss, fss_against : float
+        Weighted FSS of the rates under the bar on either mesh, no parameter fitted; NaN of spheres. [1]
     """
 
     mesh: str
     against: str
-    errors: MeshErrors
+    touches: int
+    sed: dict[str, Differences]
+    rate_hz: dict[str, Differences]
     fss: Number = float("nan")
     fss_against: Number = float("nan")
 
 
-@result_class
-class Convergence:
-    """Order of convergence of the largest SED of a touch at the end of the ramp.
+def compare(readings: Mapping[str, Reading], mesh: str, against: str, fss: bool = False) -> MeshErrors:
+    """Return the errors of one mesh at the touches that it shares with a finer one."""
+    reading, reference = readings[mesh], readings[against]
+    common = [touch for touch in reference.touches if touch in reading.touches]
+    ours, finer = reading.only(common), reference.only(common)
+    return MeshErrors(
+        mesh=mesh,
+        against=against,
+        touches=len(common),
+        sed={
+            phase: Differences.between(ours.sed_kpa[phase], values, float(values.max()))
+            for phase, values in finer.sed_kpa.items()
+        },
+        rate_hz={
+            phase: Differences.between(ours.rate_hz[phase], values) for phase, values in finer.rate_hz.items()
+        },
+        fss=goodness_of_fit(ours) if fss else math.nan,
+        fss_against=goodness_of_fit(finer) if fss else math.nan,
+    )
+
+
+def goodness_of_fit(reading: Reading) -> float:
+    """Return the weighted FSS (Eqs. 12-14) of the rates at the indented shifts; no parameter is fitted."""
+    observed = bar_firing_rates()
+    shifts = list(reading.touches)
+    dynamic, static = (
+        fractional_sum_of_squares(rates_hz[shifts], reading.rate_hz[phase][:, 0])
+        for phase, rates_hz in (("dynamic", observed.dynamic_rate_hz), ("static", observed.static_rate_hz))
+    )
+    return protocol.DYNAMIC_WEIGHT.value * dynamic + protocol.STATIC_WEIGHT.value * static
+
+
+def observed_order(values: Sequence[float], factors: Sequence[float]) -> tuple[float, float]:
+    """Order p and limit u of a quantity on three similar meshes, u_i = u + c f_i^-p (Richardson 1911).
 
     Parameters
     ----------
-    touch : str
-        Which.
-    sed_kpa : array (3,)
-        On the three similar meshes, from coarse to fine. [kPa]
-    order, limit_kpa : float
-        See `studies.mesh_errors.observed_order`; NaN without an order. [1, kPa]
+    values, factors : sequence of 3 floats
+        The quantity, and by how much elements are smaller, from coarse to fine.
+
+    Returns
+    -------
+    (float, float)
+        p and u; NaN unless the values approach a limit with an order from 0.3 to 6.
+
+    Raises
+    ------
+    InputError
+        If there are not three of each, or the factors do not increase from above 0.
+
+    Examples
+    --------
+    >>> order, limit = observed_order([2.0, 1.25, 1.0 + 1 / 9], [1.0, 2.0, 3.0])
+    >>> round(order, 6), round(limit, 6)
+    (2.0, 1.0)
+    >>> observed_order([1.0, 2.0, 1.0], [1.0, 2.0, 3.0])
+    (nan, nan)
+    """
+    u, f = float_array("values", values, 1), float_array("factors", factors, 1)
+    if u.size != 3 or f.size != 3 or not 0.0 < f[0] < f[1] < f[2]:
+        raise InputError(f"observed_order needs three values and three increasing factors: got {u}, {f}.")
+
+    def excess(order: float) -> float:
+        h = f**-order
+        return float((h[0] - h[1]) / (h[1] - h[2]) - (u[0] - u[1]) / (u[1] - u[2]))
+
+    if u[1] == u[2] or excess(LOWEST_ORDER) * excess(HIGHEST_ORDER) > 0.0:
+        return math.nan, math.nan
+    p = float(brentq(excess, LOWEST_ORDER, HIGHEST_ORDER, xtol=1e-12))
+    c = (u[1] - u[2]) / (f[1] ** -p - f[2] ** -p)
+    return p, float(u[2] - c * f[2] ** -p)
+
+
+@result_class
+class MeshSize:
+    """Nodes of a level's mesh under bar and sphere, and its elements under the bar along and across. [mm]"""
+
+    name: str
+    bar_nodes: int
+    sphere_nodes: int
+    size_x_mm: float
+    size_z_mm: float
+
+
+@result_class
+class BarProfile:
+    """Response of one receptor on one mesh to each shift of the bar, (n_shifts,). [mm, kPa, spikes/s]"""
+
+    shift_mm: Vector
+    sed_ramp_kpa: Vector
+    sed_hold_kpa: Vector
+    dynamic_rate_hz: Vector
+    static_rate_hz: Vector
+
+
+@result_class
+class Convergence:
+    """Largest SED of a touch at the end of the ramp on the similar meshes, and its order and limit.
+
+    SED is from coarse to fine [kPa]; order [1] and limit [kPa] are NaN where values do not settle.
     """
 
     touch: str
     sed_kpa: Vector
     order: Number
     limit_kpa: Number
-
-
-@result_class
-class RefinedBars:
-    """Bars: profiles by mesh, errors against finer meshes, orders of convergence."""
-
-    profiles: dict[str, BarProfile]
-    against_finer: tuple[AgainstFiner, ...]
-    convergence: tuple[Convergence, ...]
-
-
-@result_class
-class RefinedSpheres:
-    """Spheres: errors against finer meshes, orders of convergence, and hit rates by mesh.
-
-    Hit rates are of `comparisons_per_m` [1/m] at 0.0 mm, with the same random numbers.
-    """
-
-    against_finer: tuple[AgainstFiner, ...]
-    convergence: tuple[Convergence, ...]
-    comparisons_per_m: Vector
-    hit_rates: dict[str, HitRates]
 
 
 @result_class
@@ -287,134 +343,87 @@ class MeshRefinement:
     ----------
     code_hash : str
         Of the mechanics that solved the touches.
-    levels : tuple of LevelMeshes
+    meshes : tuple of MeshSize
         From coarse to fine.
-    bars : RefinedBars
-        One receptor under the shifted bar.
-    spheres : RefinedSpheres
-        The receptors of the population under spheres.
-    one_at_a_time : dict of dict of LargestChanges
-        By "bar" or "sphere", and by change of the standard mesh.
-    step_counts : (int, int)
-        Steps in ramp and in hold that are compared.
-    steps : dict of MeshErrors
-        Few steps against many, by "bar" or "sphere".
+    profiles : dict of BarProfile
+        By mesh.
+    bars, spheres : tuple of MeshErrors
+        One receptor under the shifted bar, and the receptors of the population under spheres.
+    convergence : tuple of Convergence
+        By touch.
     """
 
     code_hash: str
-    levels: tuple[LevelMeshes, ...]
-    bars: RefinedBars
-    spheres: RefinedSpheres
-    one_at_a_time: dict[str, dict[str, LargestChanges]]
-    step_counts: tuple[int, int]
-    steps: dict[str, MeshErrors]
+    meshes: tuple[MeshSize, ...]
+    profiles: dict[str, BarProfile]
+    bars: tuple[MeshErrors, ...]
+    spheres: tuple[MeshErrors, ...]
+    convergence: tuple[Convergence, ...]
 
 
-def run(runner: Runner) -> MeshRefinement:
-    """Solve every indentation that is not stored yet, and compare the meshes.
+def run(runner: Runner, conditions: Conditions) -> MeshRefinement:
+    """Solve every indentation that is not stored yet (an hour on one core), and compare the meshes.
 
-    About an hour on one core. Finished touches are stored one by one; a stopped run continues after them.
-
-    Parameters
-    ----------
-    runner : Runner
-        Where indentations are stored.
-
-    Returns
-    -------
-    MeshRefinement
+    The conditions are not used. A stopped run continues after the last stored touch.
 
     Raises
     ------
     ConvergenceError
         If an indentation cannot be solved.
     """
-    pressed = {level.name: (level.bars(), level.balls()) for level in LEVELS}
-    changes, steps = single_changes(), step_changes()
-    groups: dict[str, list[Touch]] = {
-        name: [*bars.values(), *balls.values()] for name, (bars, balls) in pressed.items()
+    receptors = {
+        "bars": np.array([[RECEPTOR_X_MM, 0.0]]),
+        "balls": Population.grid(centre_mm=(RECEPTOR_X_MM, 0.0)).positions_mm,
     }
-    groups["one at a time"] = [touch for each in changes.values() for touch in each.values()]
-    groups["steps"] = [touch for counts in steps.values() for touch in counts.values()]
-    for name, touches in groups.items():
-        runner.solve(touches, name)
-
-    population = Population.grid(centre_mm=(RECEPTOR_X_MM, 0.0))
-    receptors = {"bar": np.array([[RECEPTOR_X_MM, 0.0]]), "sphere": population.positions_mm}
-    bars = {name: read_stored(runner, touches, receptors["bar"]) for name, (touches, _) in pressed.items()}
-    balls = {
-        name: read_stored(runner, touches, receptors["sphere"]) for name, (_, touches) in pressed.items()
-    }
-    standard = {
-        "bar": bars["standard"].only([PEAK_SHIFT]),
-        "sphere": balls["standard"].only(CHOSEN_SPHERES[:1]),
-    }
-
-    def example(name: str, touch: Touch) -> Reading:
-        return read_stored(runner, {0: touch}, receptors[name])
-
+    readings: dict[str, dict[str, Reading]] = {"bars": {}, "balls": {}}
+    for level in LEVELS:
+        for kind, touches in (("bars", level.bars()), ("balls", level.balls())):
+            runner.solve(touches.values(), f"{level.name}: {kind}")
+            pressed = {key: runner.store.load(touch) for key, touch in touches.items()}
+            sheets = next(iter(touches.values())).grading.living_epidermis
+            readings[kind][level.name] = read(pressed, receptors[kind], sheets)
+    bars, balls = readings["bars"], readings["balls"]
+    pairs = [*((level.name, FINEST) for level in LEVELS[:-1]), ("quick", "standard")]
     return MeshRefinement(
         code_hash=code_hash(),
-        levels=tuple(_meshes(level) for level in LEVELS),
-        bars=_bars(bars),
-        spheres=_spheres(balls, neighbour_pairs(population.positions_mm, population.pitch_mm)),
-        one_at_a_time={
-            name: {
-                change: largest_changes(standard[name], example(name, touch))
-                for change, touch in each.items()
-            }
-            for name, each in changes.items()
-        },
-        step_counts=STEPS,
-        steps={
-            name: compare(*(example(name, counts[count]) for count in STEPS))
-            for name, counts in steps.items()
-        },
+        meshes=tuple(_size(level) for level in LEVELS),
+        profiles={name: profile(reading) for name, reading in bars.items()},
+        bars=tuple(compare(bars, *pair, fss=True) for pair in pairs),
+        spheres=tuple(compare(balls, *pair) for pair in pairs),
+        convergence=(*convergence(bars), *convergence(balls)),
     )
 
 
-def _meshes(level: Level) -> LevelMeshes:
-    return LevelMeshes(
+def _size(level: Level) -> MeshSize:
+    bar, ball = next(iter(level.bars().values())), next(iter(level.balls().values()))
+    return MeshSize(
         name=level.name,
-        factor=level.factor,
-        resolution=level.resolution,
-        bar=MeshSize.of(next(iter(level.bars().values()))),
-        sphere=MeshSize.of(next(iter(level.balls().values()))),
+        bar_nodes=len(bar.mesh.nodes_mm),
+        sphere_nodes=len(ball.mesh.nodes_mm),
+        size_x_mm=bar.grading.core_size_mm or bar.grading.size_x_mm,
+        size_z_mm=bar.grading.size_z_mm,
     )
 
 
-def _pairs(readings: Mapping[str, Reading]) -> list[tuple[str, str]]:
-    """Names of the meshes that are compared: each with the finest, then quick with standard."""
-    finest = LEVELS[-1].name
-    return [*((name, finest) for name in readings if name != finest), ("quick", "standard")]
-
-
-def _bars(readings: Mapping[str, Reading]) -> RefinedBars:
-    return RefinedBars(
-        profiles={name: reading.profile() for name, reading in readings.items()},
-        against_finer=tuple(
-            AgainstFiner(
-                mesh=name,
-                against=finer,
-                errors=compare(readings[name], readings[finer]),
-                fss=goodness_of_fit(readings[name].only(readings[finer].touches)),
-                fss_against=goodness_of_fit(readings[finer]),
-            )
-            for name, finer in _pairs(readings)
-        ),
-        convergence=_convergence(readings),
+def profile(reading: Reading) -> BarProfile:
+    """Return the responses of the first receptor to the bar."""
+    return BarProfile(
+        shift_mm=np.array([SHIFTS_MM[shift] for shift in reading.touches]),
+        sed_ramp_kpa=reading.sed_kpa["ramp"][:, 0],
+        sed_hold_kpa=reading.sed_kpa["hold"][:, 0],
+        dynamic_rate_hz=reading.rate_hz["dynamic"][:, 0],
+        static_rate_hz=reading.rate_hz["static"][:, 0],
     )
 
 
-def _convergence(readings: Mapping[str, Reading]) -> tuple[Convergence, ...]:
+def convergence(readings: Mapping[str, Reading]) -> tuple[Convergence, ...]:
     """Order and limit of each touch's largest SED at the end of the ramp, on the three similar meshes."""
     similar = [level for level in LEVELS if level.resolution == "standard"]
     rows = []
-    for touch in readings[similar[-1].name].touches:
+    for touch in readings[FINEST].touches:
         sed = np.array([readings[level.name].only([touch]).sed_kpa["ramp"][0] for level in similar])
         values = sed[:, sed[-1].argmax()]
-        found = observed_order(values.tolist(), [level.factor for level in similar])
-        order, limit = found or (np.nan, np.nan)
+        order, limit = observed_order(values.tolist(), [level.factor for level in similar])
         rows.append(Convergence(touch=_named(touch), sed_kpa=values, order=order, limit_kpa=limit))
     return tuple(rows)
 
@@ -430,15 +439,35 @@ def _named(touch: int | Sphere) -> str:
     return f"sphere {touch[1]:g} /m at {touch[0]:g} mm"
 
 
-def _spheres(readings: Mapping[str, Reading], neighbours: np.ndarray) -> RefinedSpheres:
-    return RefinedSpheres(
-        against_finer=tuple(
-            AgainstFiner(mesh=name, against=finer, errors=compare(readings[name], readings[finer]))
-            for name, finer in _pairs(readings)
-        ),
-        convergence=_convergence(readings),
-        comparisons_per_m=np.array(CHOSEN_CURVATURES[1:]),
-        hit_rates={
-            name: hit_rates(reading, 0.0, CHOSEN_CURVATURES, neighbours) for name, reading in readings.items()
-        },
+ERROR_COLUMNS = (
+    "under", "mesh", "nodes", "against", "SED, ramp: max", "RMS", "SED, hold: max", "RMS",
+    "dynamic rate: max [spikes/s]", "RMS", "static rate: max [spikes/s]", "RMS",
+)  # fmt: skip
+
+
+def blocks(results: MeshRefinement) -> dict[str, str]:
+    """Return the convergence table of docs/verification.md."""
+    nodes = {size.name: (size.bar_nodes, size.sphere_nodes) for size in results.meshes}
+    rows = [
+        (
+            under,
+            row.mesh,
+            number(nodes[row.mesh][kind]),
+            row.against,
+            *(share(value) for each in row.sed.values() for value in (each.max, each.rms)),
+            *(fixed(value, 1) for each in row.rate_hz.values() for value in (each.max, each.rms)),
+        )
+        for kind, (under, errors) in enumerate((("bar", results.bars), ("spheres", results.spheres)))
+        for row in errors
+    ]
+    orders = [row.order for row in results.convergence if math.isfinite(row.order)]
+    fits = "; ".join(
+        f"{row.mesh} {fixed(row.fss, 3)} ({row.against} {fixed(row.fss_against, 3)})" for row in results.bars
     )
+    below = (
+        "SED as a share of its largest value on the finer mesh. The largest SED of a touch settles with an "
+        f"order of {fixed(float(np.median(orders)), 1)} (median of {len(orders)} of "
+        f"{len(results.convergence)} touches). FSS at the common shifts, no parameter fitted: {fits}. "
+        f"`python -m studies mesh-refinement` computes this table; mechanical code {results.code_hash}."
+    )
+    return {"mesh-refinement": joined(table(ERROR_COLUMNS, rows), below)}

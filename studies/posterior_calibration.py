@@ -7,8 +7,7 @@ without the emulator test its error, too.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
-from typing import TypeVar
+from collections.abc import Iterable
 
 import numpy as np
 from scipy.stats import binomtest
@@ -18,25 +17,15 @@ from fingerpad.core.errors import InputError
 from fingerpad.core.results import Matrix, result_class
 
 LEVELS = (0.5, 0.95)
-"""Intervals whose coverage is told. [0-1]"""
+"""Intervals whose coverage is given. [0-1]"""
 
 SIGNIFICANT = 0.01
 """Probability below which a coverage counts as wrong, shared by all parameters."""
 
-Truth = TypeVar("Truth")
-
 
 @result_class
 class Calibration:
-    """Shares of draws below the truth.
-
-    Parameters
-    ----------
-    names : tuple of str
-        Of the parameters.
-    shares_below : array (n_replicates, n_parameters)
-        Share of the draws below the true value. [0-1]
-    """
+    """Shares of draws below the true value, (n_replicates, n_parameters), and names of the parameters."""
 
     names: tuple[str, ...]
     shares_below: Matrix
@@ -63,55 +52,27 @@ class Calibration:
         """
         n = len(self.shares_below)
         limit = SIGNIFICANT / (len(self.names) * len(LEVELS))
-        smallest = [
-            min(
-                binomtest(round(inside * n), n, level).pvalue
-                for inside, level in zip(both, LEVELS, strict=True)
-            )
-            for both in np.transpose([self.inside(level) for level in LEVELS])
-        ]
-        return tuple(name for name, p in zip(self.names, smallest, strict=True) if p < limit)
+        found = np.transpose([self.inside(level) for level in LEVELS])
+        return tuple(
+            name
+            for name, both in zip(self.names, found, strict=True)
+            if min(binomtest(round(x * n), n, p).pvalue for x, p in zip(both, LEVELS, strict=True)) < limit
+        )
 
 
-def calibrate(
-    names: tuple[str, ...],
-    replicates: Iterable[Truth],
-    draws_of: Callable[[Truth], tuple[FloatArray, FloatArray]],
-) -> Calibration:
-    """Repeat an experiment with known parameters.
-
-    Parameters
-    ----------
-    names : tuple of str
-        Of the parameters.
-    replicates : iterable
-        What each experiment needs.
-    draws_of : callable
-        From one of them to its true parameters (n_parameters,) and posterior draws (n_draws, n_parameters).
-
-    Returns
-    -------
-    Calibration
+def calibrate(names: tuple[str, ...], replicates: Iterable[tuple[FloatArray, FloatArray]]) -> Calibration:
+    """Compare true parameters (n_parameters,) with posterior draws (n_draws, n_parameters), by experiment.
 
     Raises
     ------
     InputError
         If there is no replicate, or truth and draws are not one number per name.
-
-    Examples
-    --------
-    >>> random = np.random.default_rng(1)
-    >>> def once(truth):
-    ...     return np.array([truth]), random.normal(truth + random.normal(), 1.0, (400, 1))
-    >>> calibrate(("mean",), np.zeros(100), once).wrong()
-    ()
     """
     shares = []
-    for replicate in replicates:
-        truth, draws = draws_of(replicate)
+    for truth, draws in replicates:
         if truth.shape != (len(names),) or draws.shape[1:] != truth.shape:
             raise InputError(
-                f"draws_of must return {len(names)} true parameters and draws of them: "
+                f"Each replicate must hold {len(names)} true parameters and draws of them: "
                 f"got {truth.shape} and {draws.shape}."
             )
         shares.append((draws < truth).mean(axis=0))

@@ -5,79 +5,21 @@ A number that several pages need is in these tables only; the other pages link t
 
 from __future__ import annotations
 
-import re
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from pathlib import Path
-from typing import TypeVar
 
-from fingerpad.core.errors import InputError, StoreError
-from fingerpad.core.results import Number, Vector, from_json, read_results, result_class
+from fingerpad.core.results import Number, Vector, read_results, result_class
 from fingerpad.experiments.gerling2014.claim_row import ClaimRow, Group, Statement
 from fingerpad.experiments.gerling2014.discrepancy import CriterionErrorBars
 from fingerpad.experiments.gerling2014.reproduction import ReproductionResult, Summaries
 from fingerpad.experiments.gerling2014.single_unit import SingleUnitResult
 from fingerpad.experiments.gerling2014.sphere_discrimination import SphereDiscrimination
-from fingerpad.report.comparison import (
-    comparison_tables,
-    count_sentence,
-    notes_table,
-    side_by_side,
-    statement_cells,
-    statement_table,
-)
-from fingerpad.report.discrimination import criterion_table
+from fingerpad.report.comparison import count_sentence, side_by_side, statement_cells, statement_table
 from fingerpad.report.formatting import ABSENT, fixed, number
-from fingerpad.report.parts import Chapter, Paragraph
-from fingerpad.report.single_unit import single_unit_tables
-from studies.drive_quantities import DriveResult
-from studies.drive_study import DriveStudy
-from studies.fit_methods import FitMethods, MethodsStudy
-from studies.pages.drive_quantities import QUANTITIES
-from studies.pages.markdown import markdown_blocks
-from studies.pages.markdown import markdown_table as table
-from studies.sed_readings import Reading, ReadingsStudy, readings_table
+from studies.pages import joined, replaced, table
 
 COMMAND = "python -m studies results"
-Kind = TypeVar("Kind")
 README_START, README_END = f"<!-- {COMMAND} writes this table -->", "<!-- end of the table -->"
-
-
-@result_class
-class Method:
-    """FSS of one method of fitting."""
-
-    method: str
-    free_numbers: int
-    fss_in_sample: Number
-    fss_training_mean: Number
-    fss_out_of_sample: Number
-    fss_test: Vector
-    runs: int
-
-
-@result_class
-class Model:
-    """FSS of one variant of the model; the offset of its receptor is 0 if it is not fitted. [mm]"""
-
-    model: str
-    fss_in_sample_dynamic: Number
-    fss_in_sample_static: Number
-    fss_in_sample: Number
-    fss_out_of_sample: Number
-    offset_mm: Number
-
-
-@result_class
-class Drive:
-    """FSS with one quantity in the static and one in the dynamic term."""
-
-    static: str
-    dynamic: str
-    fss_in_sample: Number
-    fss_out_of_sample: Number
-    fss_out_of_sample_dynamic: Number
-    fss_out_of_sample_static: Number
 
 
 @result_class
@@ -133,65 +75,23 @@ class Excerpt:
     statements: tuple[Statement, ...]
     comparison: dict[str, tuple[ClaimRow, ...]]
     single_unit: dict[str, SingleUnitResult]
-    methods: tuple[Method, ...]
-    models: tuple[Model, ...]
-    drives: tuple[Drive, ...]
-    readings: tuple[Reading, ...]
     percept: dict[str, Percept]
     criterion: dict[str, CriterionErrorBars]
 
 
-def read_excerpt(
-    path: Path,
-    methods: Path | None = None,
-    drives: Path | None = None,
-    readings: Path | None = None,
-    before: Excerpt | None = None,
-) -> Excerpt:
-    """Take from the results of `fingerpad reproduce --extended` what the pages show.
-
-    Parameters
-    ----------
-    path : Path
-        Its results.json.
-    methods : Path, optional
-        The methods.json of `python -m studies methods`.
-    drives : Path, optional
-        The drives.json of `python -m studies drives`.
-    readings : Path, optional
-        The sed-readings.json of `python -m studies sed-readings`.
-    before : Excerpt, optional
-        What the pages show now; they keep those of its rows that no file replaces.
+def read_excerpt(path: Path) -> Excerpt:
+    """Take from results.json of `fingerpad reproduce --extended` what the pages show.
 
     Raises
     ------
     StoreError
-        If a file cannot be read.
+        If the file cannot be read.
     """
-    results = read_results(path, ReproductionResult)
-    compared = None if methods is None else _studied(methods, MethodsStudy, "methods").methods
-    driven = None if drives is None else _studied(drives, DriveStudy, "drives").quantities
-    shown = excerpt(results, compared, driven)
-    if before is not None and compared is None:
-        shown = replace(shown, methods=before.methods, models=before.models)
-    if before is not None and driven is None:
-        shown = replace(shown, drives=before.drives)
-    if readings is not None:
-        return replace(shown, readings=_studied(readings, ReadingsStudy, "sed-readings").readings)
-    return shown if before is None else replace(shown, readings=before.readings)
+    return excerpt(read_results(path, ReproductionResult))
 
 
-def _studied(path: Path, kind: type[Kind], study: str) -> Kind:
-    try:
-        return from_json(kind, path.read_bytes())
-    except (OSError, InputError) as error:
-        raise StoreError(f"{path} must come from `python -m studies {study}`: {error}") from error
-
-
-def excerpt(
-    results: ReproductionResult, compared: FitMethods | None = None, drives: DriveResult | None = None
-) -> Excerpt:
-    """Pick from whole results what the pages show; what a run did not compute stays empty."""
+def excerpt(results: ReproductionResult) -> Excerpt:
+    """Pick from whole results what the pages show."""
     manifest, sets = results.manifest, {"paper": results.paper, "human": results.human}
     return Excerpt(
         version=manifest.version,
@@ -202,41 +102,6 @@ def excerpt(
         statements=results.statements,
         comparison={name: found.comparison for name, found in sets.items()},
         single_unit={name: found.single_unit for name, found in sets.items()},
-        methods=tuple(
-            Method(
-                method=row.method,
-                free_numbers=row.free_numbers,
-                fss_in_sample=row.fss_in_sample,
-                fss_training_mean=row.fss_training_mean,
-                fss_out_of_sample=row.fss_out_of_sample,
-                fss_test=row.fss_test,
-                runs=row.runs,
-            )
-            for row in (compared.methods if compared else ())
-        ),
-        models=tuple(
-            Model(
-                model=row.model,
-                fss_in_sample_dynamic=row.fss_in_sample_dynamic,
-                fss_in_sample_static=row.fss_in_sample_static,
-                fss_in_sample=row.fss_in_sample,
-                fss_out_of_sample=row.fss_out_of_sample,
-                offset_mm=row.parameters.get("offset_mm", 0.0),
-            )
-            for row in (compared.models if compared else ())
-        ),
-        drives=tuple(
-            Drive(
-                static=candidate.static,
-                dynamic=candidate.dynamic,
-                fss_in_sample=candidate.fit.fss_in_sample,
-                fss_out_of_sample=candidate.fit.fss_out_of_sample,
-                fss_out_of_sample_dynamic=candidate.fit.fss_out_of_sample_dynamic,
-                fss_out_of_sample_static=candidate.fit.fss_out_of_sample_static,
-            )
-            for candidate in (drives.candidates if drives else ())
-        ),
-        readings=(),
         percept={name: _percept(found.discrimination) for name, found in sets.items()},
         criterion={name: found.discrimination.reasons.criterion for name, found in sets.items()},
     )
@@ -263,76 +128,30 @@ def _percept(found: SphereDiscrimination) -> Percept:
 
 def results_page(shown: Excerpt) -> str:
     """Return docs/results.md."""
-    parts = [
+    noise = ", ".join(f"{fixed(each.noise_sigma, 3)} (`{name}`)" for name, each in shown.percept.items())
+    page = joined(
         "# Results of the reproduction",
-        "The numbers on this page come from one run of "
-        f"`fingerpad reproduce --resolution {shown.resolution} --extended` "
-        f"(fingerpad {shown.version}, seed {shown.seed}). "
-        f"`{COMMAND}` writes the page from `results.json`; do not edit it by hand. Other pages link to it. "
-        "The times are in the [benchmarks](../benchmarks/README.md).",
+        f"One run of `fingerpad reproduce --resolution {shown.resolution} --extended` (fingerpad "
+        f"{shown.version}, seed {shown.seed}, {sum(shown.indentations.values())} indentations). "
+        f"`{COMMAND}` writes this page from `results.json`. [Which sets and "
+        "why](decisions/paper-and-human.md); every number of the paper is on [the paper, section by "
+        "section](paper.md).",
         "## Summary of both sets",
-        "The paper's value, or that of people, beside each set with its own drive and its own fit "
-        "([which and why](decisions/paper-and-human.md)). The deflection and the force chose the moduli. The "
-        "noise and the hit rates chose the afferent of the set `human`.",
         _summaries(shown.summary),
-        "## Indentations",
-        _indentations(shown.indentations),
-        *map(
-            _linked,
-            markdown_blocks(
-                Chapter(
-                    "This run and the paper",
-                    [
-                        Paragraph(GROUPS),
-                        statement_table(shown.statements),
-                        notes_table(*shown.comparison.values()),
-                        *comparison_tables(*shown.comparison.values()),
-                    ],
-                )
-            ),
-        ),
-        *(
-            block
-            for name, unit in shown.single_unit.items()
-            for block in markdown_blocks(
-                Chapter(f"One afferent under the bar, `{name}`", single_unit_tables(unit))
-            )
-        ),
-        "## FSS by method of fitting",
-        "Fractional sum of squares (FSS, Eqs. 12-14) of one afferent under the bar. "
-        "Out of sample: mean of six folds. From `python -m studies methods`, on the same recordings. "
-        "[Settings of the methods](decisions/methods-of-fitting.md), "
-        "[limits of the fit](single-unit.md#what-limits-the-fit).",
-        _methods(shown.methods),
-        "## FSS by variant of the model, and the offset of the receptor",
-        "All fitted by CMA-ES. The offset is the distance of the receptor from its nominal position "
-        "along the finger ([decision](decisions/receptor-offset.md)).",
-        _models(shown.models),
-        "## FSS by the quantity that drives the afferent",
-        "All fitted by least squares, with `python -m studies drives` "
-        "([discussion](single-unit.md#quantities-that-drive-the-afferent)).",
-        _drives(shown.drives),
-        *markdown_blocks(Chapter("Readings of the border", [readings_table(shown.readings)])),
+        "## Statements of the paper that can fail",
+        _statements(shown.statements),
+        "## One afferent under the bar",
+        _single_units(shown.single_unit),
+        "FSS: fractional sum of squares, Eqs. 12-14; dynamic and static have weights 1:3. Rates in spikes/s.",
         "## Hit rates",
-        "Hit rate of each sphere against one of 287 /m. The noise is fitted to the two observed hit rates "
-        "with the static Gradient Sum ([decision](decisions/noise-fitted.md)); all codes use it.",
-        *(
-            f"### `{name}`, noise {fixed(percept.noise_sigma, 3)}\n\n{_hit_rates(percept)}"
-            for name, percept in shown.percept.items()
-        ),
-        *(
-            block
-            for name, bars in shown.criterion.items()
-            for block in markdown_blocks(Chapter(f"Varied criterion, `{name}`", [criterion_table(bars)]))
-        ),
-    ]
-    return "\n\n".join(part for part in parts if part) + "\n"
+        "Of each sphere against one of 287 /m, with the sphere at 0.0 and at 0.2 mm. The noise is fitted to "
+        f"people's two hit rates with the static Gradient Sum: {noise}.",
+        _hit_rates(shown.percept),
+        _criteria(shown.criterion),
+    )
+    return f"{page}\n"
 
 
-GROUPS = (
-    "Each row belongs to one group. A number that was fitted, or by which something was chosen, is never "
-    "counted as a met prediction. The report of a run also has the differences and the status of the inputs."
-)
 SUMMARY_ROWS = (
     ("deflection_r2", "deflection under the cylinder, R²", "later model 0.93", "chose the moduli", 3),
     (
@@ -352,8 +171,6 @@ SUMMARY_ROWS = (
     ("force_disc_1mm_n", "force of a disc of 6.35 mm 1.0 mm deep [N]", ABSENT, "predicted", 3),
     ("fss_out_of_sample", "FSS out of sample", "0.81", "predicted by folds", 3),
     ("fss_in_sample", "FSS in sample", "0.82 (fold 3)", "fitted", 3),
-    ("dynamic_flat_hz", "dynamic rate under the flat face [spikes/s]", "54", "fitted", 0),
-    ("dynamic_max_hz", "dynamic rate, largest [spikes/s]", "212", "fitted", 0),
     ("static_difference_hz", "static rate, difference [spikes/s]", "52", "fitted", 0),
     ("resting_rate_hz", "rate without a touch [spikes/s]", "0", "bound of the fit", 1),
     ("noise_sigma", "noise that fits people", "0.055", "fitted", 3),
@@ -390,85 +207,66 @@ def _summaries(summary: Summaries) -> str:
     return table(columns, rows)
 
 
-def _linked(text: str) -> str:
-    """Pages that a text names, as links from docs/."""
-    return re.sub(r"docs/(decisions/([\w-]+)\.md)", r"[\2](\1)", text)
+def _statements(statements: Sequence[Statement]) -> str:
+    found = statement_table(statements)
+    return table(tuple(found.columns), [tuple(row.cells) for row in found.rows])
 
 
-def _indentations(counts: Mapping[str, int]) -> str:
-    rows = [(name, str(count)) for name, count in counts.items()]
-    return table(("part of the run", "indentations"), [*rows, ("total", f"**{sum(counts.values())}**")])
+def _single_units(units: Mapping[str, SingleUnitResult]) -> str:
+    def modulation(phase: str, ours: bool) -> list[str]:
+        each = [getattr(unit.modulation, phase) for unit in units.values()]
+        found = [one.ours if ours else one.observed for one in each]
+        return [f"{number(one.maximum_hz)}, {number(one.minimum_hz)}, {number(one.index)}" for one in found]
 
-
-def _methods(rows: Sequence[Method]) -> str:
-    columns = ("method", "free parameters", "all shifts", "training", "out of sample", "fold by fold", "runs")
-    return table(
-        columns,
-        [
-            (
-                row.method,
-                str(row.free_numbers),
-                *(fixed(score, 3) for score in (row.fss_in_sample, row.fss_training_mean)),
-                f"**{fixed(row.fss_out_of_sample, 3)}**",
-                " ".join(fixed(score, 2) for score in row.fss_test),
-                str(row.runs),
-            )
-            for row in rows
-        ],
-    )
-
-
-def _models(rows: Sequence[Model]) -> str:
-    columns = ("model", "dynamic", "static", "all shifts", "out of sample", "offset [mm]")
-    return table(
-        columns,
-        [
-            (
-                row.model,
-                *(
-                    fixed(score, 3)
-                    for score in (row.fss_in_sample_dynamic, row.fss_in_sample_static, row.fss_in_sample)
-                ),
-                f"**{fixed(row.fss_out_of_sample, 3)}**",
-                fixed(row.offset_mm, 3) if row.offset_mm else ABSENT,
-            )
-            for row in rows
-        ],
-    )
-
-
-def _drives(rows: Sequence[Drive]) -> str:
-    columns = ("static term", "dynamic term", "in sample", "out of sample", "dynamic", "static")
-    return table(
-        columns,
-        [
-            (
-                *(QUANTITIES[term] for term in (row.static, row.dynamic)),
-                fixed(row.fss_in_sample, 3),
-                f"**{fixed(row.fss_out_of_sample, 3)}**",
-                *(fixed(score, 3) for score in (row.fss_out_of_sample_dynamic, row.fss_out_of_sample_static)),
-            )
-            for row in rows
-        ],
-    )
-
-
-def _hit_rates(percept: Percept) -> str:
-    columns = ("code", "sphere at [mm]", *(f"{number(each)} /m" for each in percept.curvature_per_m))
     rows = [
-        (code.code, place, *(fixed(rate, 2) for rate in rates))
+        ("FSS of the six folds", *(_folds(unit) for unit in units.values()), ""),
+        *(
+            (f"FSS of the {phase} rates", *_scores(units, f"fss_in_sample_{phase}"), "")
+            for phase in ("dynamic", "static")
+        ),
+        *(
+            (f"{phase} rate: largest, under the flat face, index (Eq. 11)",
+             *modulation(phase, ours=True), modulation(phase, ours=False)[0])
+            for phase in ("dynamic", "static")
+        ),
+    ]  # fmt: skip
+    return table(("quantity", *(f"`{name}`" for name in units), "recorded"), rows)
+
+
+def _folds(unit: SingleUnitResult) -> str:
+    return " ".join(fixed(fold.fss_test, 2) for fold in unit.folds)
+
+
+def _scores(units: Mapping[str, SingleUnitResult], name: str) -> list[str]:
+    return [fixed(getattr(unit, name), 3) for unit in units.values()]
+
+
+def _criteria(criterion: Mapping[str, CriterionErrorBars]) -> str:
+    bars = "; ".join(
+        f"`{name}` {fixed(each.point[0], 3)} and {fixed(each.point[1], 3)}"
+        for name, each in criterion.items()
+    )
+    sigma = " and ".join(number(each) for each in next(iter(criterion.values())).criterion_sigma)
+    return f"Mean error bar of a static hit rate with a decision point that varies by {sigma}: {bars}."
+
+
+def _hit_rates(percepts: Mapping[str, Percept]) -> str:
+    first = next(iter(percepts.values()))
+    people = dict(zip(first.people_curvature_per_m, first.people, strict=True))
+    rows = [
+        (f"`{name}`", code.code, *(f"{fixed(one, 2)} {fixed(other, 2)}" for one, other in both))
+        for name, percept in percepts.items()
         for code in percept.codes
-        for place, rates in (("0.0", code.hit_rate), ("0.2", code.hit_rate_shifted))
+        for both in [zip(code.hit_rate, code.hit_rate_shifted, strict=True)]
     ]
-    people = dict(zip(percept.people_curvature_per_m, percept.people, strict=True))
-    observed = (fixed(people.get(each), 2) for each in percept.curvature_per_m)
-    return table(columns, [*rows, ("observed (Goodwin et al.)", "", *observed)])
+    observed = (fixed(people.get(each), 2) for each in first.curvature_per_m)
+    columns = ("set", "code", *(f"{number(each)} /m" for each in first.curvature_per_m))
+    return table(columns, [*rows, ("people", "Goodwin et al.", *observed)])
 
 
 def readme_table(shown: Excerpt) -> str:
     """Return the table of the README: every statement that can fail, with both sets."""
-    found = statement_table(shown.statements)
-    return table(tuple(found.columns), [tuple(row.cells) for row in found.rows])
+    return _statements(shown.statements)
 
 
 SECTIONS = {
@@ -524,7 +322,7 @@ def paper_page(shown: Excerpt) -> str:
     ]
     for section, (title, told) in SECTIONS.items():
         parts += [f"## {section} {title}", told, table(columns, rows[section]) if rows[section] else ""]
-    return "\n\n".join(part for part in parts if part) + "\n"
+    return joined(*parts) + "\n"
 
 
 def _counts(statements: Sequence[Statement]) -> str:
@@ -532,14 +330,5 @@ def _counts(statements: Sequence[Statement]) -> str:
 
 
 def with_table(readme: str, shown: Excerpt) -> str:
-    """Return the README with its table written anew.
-
-    Raises
-    ------
-    InputError
-        If the marks around the table are missing.
-    """
-    start, end = readme.find(README_START), readme.find(README_END)
-    if start < 0 or end < start:
-        raise InputError(f"README.md must hold {README_START} and {README_END}, in this order: it does not.")
-    return readme[: start + len(README_START)] + f"\n{readme_table(shown)}\n" + readme[end:]
+    """Return the README with its table written anew."""
+    return replaced(readme, README_START, README_END, readme_table(shown))

@@ -1,8 +1,8 @@
-"""A study and the command that runs it: solve missing indentations, compute, write numbers and a page."""
+"""A study and the command that runs it: press what is missing, compute, write numbers and a page."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any
@@ -15,60 +15,40 @@ from fingerpad.core.files import write_atomically
 from fingerpad.core.results import to_json
 from fingerpad.experiments.conditions import Conditions
 from fingerpad.experiments.runner import Runner
-from fingerpad.report.parts import Page
-from studies.pages.markdown import write_markdown
+from studies.pages import DOCS, write_blocks
 
 Seed = Annotated[int, typer.Option(parser=to_whole, metavar="INTEGER", help="Seed of all random numbers.")]
-TISSUES = "trial3"
-"""Tissues of the studies: those with which their pages were made."""
-
-Out = Annotated[Path, typer.Option(help="Folder for page, figures, numbers and stored indentations.")]
+Out = Annotated[Path, typer.Option(help="Folder for page, numbers and stored indentations.")]
 
 
 @dataclass(frozen=True)
 class Study:
-    """A study: what it computes and how its page looks.
+    """A study: what it computes and which page shows it.
 
     Parameters
     ----------
-    name : str
-        Of the command and of the files.
-    help : str
-        What it does, in one line.
+    name, help : str
+        Of the command and of the files; what it does, in one line.
     run : callable
         From a runner and conditions to a result, an instance of a `result_class`.
-    page : callable
-        From that result to its page.
-    resolution : str or None, optional
-        Resolution by default; None for a study that has resolutions and random numbers of its own.
-    tissues : str, optional
-        Tissues by default.
+    blocks : callable
+        From that result to the blocks of the page, Markdown by name.
+    page : str
+        Page of docs/ that has these blocks.
+    has_conditions : bool
+        Whether resolution, seed and tissues can be chosen.
     """
 
     name: str
     help: str
     run: Callable[[Runner, Conditions], Any]
-    page: Callable[[Any], Page]
-    resolution: str | None = "quick"
-    tissues: str = TISSUES
+    blocks: Callable[[Any], Mapping[str, str]]
+    page: str
+    has_conditions: bool = True
 
 
 def run_study(study: Study, runner: Runner, conditions: Conditions) -> tuple[Path, Path]:
-    """Run a study, and write its numbers and its page.
-
-    Parameters
-    ----------
-    study : Study
-        Which.
-    runner : Runner
-        Files are written into its folder.
-    conditions : Conditions
-        Finger, tissues, accuracy and seed.
-
-    Returns
-    -------
-    (Path, Path)
-        `NAME.md` and `NAME.json`.
+    """Run a study, and write `NAME.md`, its page with new blocks, and `NAME.json`, its numbers.
 
     Raises
     ------
@@ -80,25 +60,26 @@ def run_study(study: Study, runner: Runner, conditions: Conditions) -> tuple[Pat
     result = study.run(runner, conditions)
     numbers = runner.folder / f"{study.name}.json"
     write_atomically(numbers, to_json(result) + b"\n")
-    return write_markdown(study.page(result), runner.folder / f"{study.name}.md"), numbers
+    page = runner.folder / f"{study.name}.md"
+    return write_blocks(DOCS / study.page, study.blocks(result), page), numbers
 
 
 def command_of(study: Study) -> Callable[..., None]:
-    """Return the command line of a study: folder, processes and, where it has them, resolution and seed."""
+    """Return the command line of a study."""
 
     def command(
-        resolution: Resolution = study.resolution or "",
+        resolution: Resolution = "quick",
         out: Out = Path(study.name),
         jobs: Jobs = None,
         seed: Seed = 0,
-        tissues: Tissues = study.tissues,
+        tissues: Tissues = "human",
     ) -> None:
         execute(study, Conditions(resolution, seed, tissues), out, jobs)
 
     def without_conditions(out: Out = Path(study.name), jobs: Jobs = None) -> None:
-        execute(study, Conditions(tissues=study.tissues), out, jobs)
+        execute(study, Conditions(), out, jobs)
 
-    chosen = command if study.resolution else without_conditions
+    chosen = command if study.has_conditions else without_conditions
     chosen.__doc__ = study.help
     return chosen
 

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import qmc
 
-from fingerpad.core.checks import FloatArray, float_array, whole
+from fingerpad.core.checks import FloatArray, float_array
 from fingerpad.core.errors import InputError
 from fingerpad.mechanics.materials import Prony, Tissues
 from fingerpad.mechanics.tissues import skin_prony
@@ -25,17 +25,7 @@ REFERENCE_KPA = 2.0
 
 @dataclass(frozen=True)
 class TissueRange:
-    """Range of one parameter of the tissues, in which its prior is uniform.
-
-    Parameters
-    ----------
-    name : str
-        As in tables, with its unit.
-    low, high : float
-        Ends of the range.
-    logarithmic : bool
-        Whether the logarithm is uniform.
-    """
+    """Range of one parameter of the tissues, in which its prior, or that of its logarithm, is uniform."""
 
     name: str
     low: float
@@ -67,21 +57,7 @@ the shares of their Prony series, whose times are those of skin."""
 
 
 def tissues_at(point: Sequence[float] | FloatArray) -> Tissues:
-    """Tissues of a point, with the subcutis of `REFERENCE_KPA`.
-
-    Parameters
-    ----------
-    point : array (5,)
-        Values of the parameters of `RANGES`.
-
-    Returns
-    -------
-    Tissues
-
-    Raises
-    ------
-    InputError
-        If there is another number of values.
+    """Tissues of a point (5,), values of the parameters of `RANGES`, with the subcutis of `REFERENCE_KPA`.
 
     Examples
     --------
@@ -95,12 +71,11 @@ def tissues_at(point: Sequence[float] | FloatArray) -> Tissues:
     if values.size != len(RANGES):
         raise InputError(f"point must have {len(RANGES)} values: got {values.size}.")
     outer, inner, deep, poisson, relaxing = values.tolist()
-    subcutis = REFERENCE_KPA
-    dermis = deep * subcutis
+    dermis = deep * REFERENCE_KPA
     epidermis = inner * dermis
     skin = skin_prony()
-    shares = tuple(share * relaxing / sum(skin.shares) for share in skin.shares)
-    moduli = (outer * epidermis, epidermis, dermis, subcutis)
+    shares = tuple(each * relaxing / sum(skin.shares) for each in skin.shares)
+    moduli = (outer * epidermis, epidermis, dermis, REFERENCE_KPA)
     return neo_hookean(moduli, poisson, Prony(shares, skin.times_ms))
 
 
@@ -117,51 +92,29 @@ def point_of(tissues: Tissues) -> FloatArray:
     return np.array([*(moduli[:-1] / moduli[1:]), inner.poisson, 1.0 - inner.prony.long_term_share])
 
 
-def design(n_points: int, seed: int = 0) -> FloatArray:
-    """Return scrambled Sobol points as shares of `RANGES`.
-
-    Parameters
-    ----------
-    n_points : int
-        A smaller number gives the first of the same points.
-    seed : int, optional
-        Of the scrambling.
-
-    Returns
-    -------
-    array (n_points, 5)
-        [0-1]
+def design(n_points: int) -> FloatArray:
+    """Return scrambled Sobol points as shares of `RANGES`, (n_points, 5); fewer are the first of the same.
 
     Examples
     --------
     >>> bool((design(8)[:4] == design(4)).all())
     True
     """
-    whole("n_points", n_points, at_least=1)
     bits = int(np.ceil(np.log2(n_points)))
-    return qmc.Sobol(len(RANGES), scramble=True, rng=seed).random_base2(bits)[:n_points]
+    return qmc.Sobol(len(RANGES), scramble=True, rng=0).random_base2(bits)[:n_points]
 
 
 def values_at(shares: FloatArray) -> FloatArray:
     """Values (..., 5) of the parameters at shares (..., 5) of their ranges."""
-    columns = [one.at(shares[..., number]) for number, one in enumerate(RANGES)]
-    return np.stack(columns, axis=-1)
+    return np.stack([one.at(shares[..., number]) for number, one in enumerate(RANGES)], axis=-1)
 
 
 def shares_of(values: FloatArray) -> FloatArray:
     """Shares (..., 5) of the ranges at values (..., 5): the inverse of `values_at`."""
-    columns = [one.share(values[..., number]) for number, one in enumerate(RANGES)]
-    return np.stack(columns, axis=-1)
+    return np.stack([one.share(values[..., number]) for number, one in enumerate(RANGES)], axis=-1)
 
 
-def design_candidates(n_points: int, seed: int = 0) -> list[Candidate]:
+def design_candidates(n_points: int) -> list[Candidate]:
     """Candidates of the design; both terms of their current follow compressive stress."""
-    return [
-        Candidate(
-            f"design {number}",
-            tissues_at(values),
-            STRESS,
-            "assumed ranges, scrambled Sobol points",
-        )
-        for number, values in enumerate(values_at(design(n_points, seed)))
-    ]
+    points = values_at(design(n_points))
+    return [Candidate(f"design {number}", tissues_at(values), STRESS) for number, values in enumerate(points)]

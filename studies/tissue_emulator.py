@@ -12,7 +12,7 @@ with weak priors on their logarithms.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -40,19 +40,8 @@ _LOG_SPREAD = {"linear": 1.0, "smooth": 1.0, "length": 0.8, "scatter": 1.5}
 class GaussianProcess:
     """A number as a smooth function of parameters, from its values at some points.
 
-    Parameters
-    ----------
-    points : array (n_points, n_parameters)
-        Where it is known.
-    values : array (n_points,)
-        What it is there.
-    logarithms : array (3 + n_parameters,)
-        Logarithms of a, s, n and the lengths.
-
-    Raises
-    ------
-    InputError
-        If numbers of points differ.
+    Values (n_points,) are known at points (n_points, n_parameters). The numbers of the covariance are the
+    logarithms of a, s, n and the lengths, (3 + n_parameters,).
 
     Examples
     --------
@@ -150,16 +139,8 @@ def _prior_variance(points: FloatArray, logarithms: FloatArray) -> FloatArray:
 class Components:
     """Principal components of an output, each a Gaussian process.
 
-    Parameters
-    ----------
-    shape : tuple of int
-        Of one output.
-    mean : array (n_values,)
-        Over the design.
-    directions : array (n_components, n_values)
-        Orthonormal.
-    processes : tuple of GaussianProcess
-        One per component.
+    An output of a shape has a mean (n_values,) over the design and orthonormal directions (n_components,
+    n_values).
     """
 
     shape: tuple[int, ...]
@@ -168,13 +149,13 @@ class Components:
     processes: tuple[GaussianProcess, ...]
 
     @classmethod
-    def fit(cls, points: FloatArray, values: FloatArray, kept: float = KEPT) -> Components:
+    def fit(cls, points: FloatArray, values: FloatArray) -> Components:
         """Decompose outputs (n_points, ...), and fit a process to each component that is kept."""
         rows = values.reshape(len(values), -1)
         mean = rows.mean(axis=0)
         _, sizes, directions = np.linalg.svd(rows - mean, full_matrices=False)
         shares = np.cumsum(np.square(sizes)) / max(float(np.square(sizes).sum()), np.finfo(float).tiny)
-        count = min(int(np.searchsorted(shares, kept)) + 1, MOST_COMPONENTS, len(sizes))
+        count = min(int(np.searchsorted(shares, KEPT)) + 1, MOST_COMPONENTS, len(sizes))
         scores = (rows - mean) @ directions[:count].T
         processes = tuple(GaussianProcess.fit(points, column) for column in scores.T)
         return cls(values.shape[1:], mean, directions[:count], processes)
@@ -187,12 +168,7 @@ class Components:
 
 @dataclass(frozen=True)
 class Emulator:
-    """Several outputs as functions of the same parameters.
-
-    Parameters
-    ----------
-    outputs : mapping of str to Components
-        By name.
+    """Several outputs, by name, as functions of the same parameters.
 
     Examples
     --------
@@ -206,17 +182,8 @@ class Emulator:
     outputs: Mapping[str, Components]
 
     @classmethod
-    def fit(cls, points: ArrayLike, outputs: Mapping[str, FloatArray], kept: float = KEPT) -> Emulator:
-        """Fit every output.
-
-        Parameters
-        ----------
-        points : array_like (n_points, n_parameters)
-            Each parameter from 0 to 1.
-        outputs : mapping of str to array (n_points, ...)
-            What was computed there.
-        kept : float, optional
-            Share of the variance that the components of each output keep.
+    def fit(cls, points: ArrayLike, outputs: Mapping[str, FloatArray]) -> Emulator:
+        """Fit every output (n_points, ...) at points (n_points, n_parameters), each parameter from 0 to 1.
 
         Raises
         ------
@@ -229,45 +196,17 @@ class Emulator:
         for name, values in outputs.items():
             if len(values) != len(at):
                 raise InputError(f"{name} needs one row per point: got {len(values)} for {len(at)}.")
-        return cls({name: Components.fit(at, values, kept) for name, values in outputs.items()})
+        return cls({name: Components.fit(at, values) for name, values in outputs.items()})
 
     def predict(self, points: FloatArray) -> dict[str, FloatArray]:
         """Return outputs (n, ...) at points (n, n_parameters), by name."""
         return {name: components.predict(points) for name, components in self.outputs.items()}
 
-    @property
-    def n_components(self) -> dict[str, int]:
-        """Number of components of every output."""
-        return {name: len(components.processes) for name, components in self.outputs.items()}
-
-
-def folds_of(n_points: int, n_folds: int) -> list[IntArray]:
-    """Deal numbers of points to folds in turn: every n-th point is left out at once.
-
-    Examples
-    --------
-    >>> [fold.tolist() for fold in folds_of(5, 2)]
-    [[0, 2, 4], [1, 3]]
-    """
-    return [np.arange(first, n_points, n_folds) for first in range(whole("n_folds", n_folds, at_least=2))]
-
 
 def left_out(
-    points: FloatArray,
-    outputs: Mapping[str, FloatArray],
-    n_folds: int,
-    fit: Callable[[FloatArray, Mapping[str, FloatArray]], Emulator] = Emulator.fit,
+    points: FloatArray, outputs: Mapping[str, FloatArray], n_folds: int
 ) -> tuple[list[Emulator], IntArray]:
-    """Fit one emulator per fold to the points outside of it.
-
-    Parameters
-    ----------
-    points, outputs
-        As of `Emulator.fit`.
-    n_folds : int
-        At least two.
-    fit : callable, optional
-        What fits an emulator.
+    """Fit one emulator per fold to the points outside of it; every n-th point is in the same fold.
 
     Returns
     -------
@@ -276,9 +215,9 @@ def left_out(
     int array (n_points,)
         Number of the emulator that has not seen a point.
     """
-    emulators, unseen = [], np.empty(len(points), dtype=np.int64)
-    for number, fold in enumerate(folds_of(len(points), n_folds)):
-        others = np.setdiff1d(np.arange(len(points)), fold)
-        emulators.append(fit(points[others], {name: values[others] for name, values in outputs.items()}))
-        unseen[fold] = number
+    unseen = np.arange(len(points)) % whole("n_folds", n_folds, at_least=2)
+    emulators = []
+    for number in range(n_folds):
+        others = unseen != number
+        emulators.append(Emulator.fit(points[others], {name: each[others] for name, each in outputs.items()}))
     return emulators, unseen

@@ -1,4 +1,4 @@
-"""The study of the posterior: presses of the design, draws, what each level informs, calibration, bands."""
+"""The study of the posterior: presses of the design, emulator, draws, targets, and synthetic experiments."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ import numpy as np
 
 from fingerpad.core.checks import FloatArray, IntArray
 from fingerpad.core.errors import ConvergenceError, InputError
-from fingerpad.core.results import Matrix, Number, Vector, result_class
-from fingerpad.data import bar_firing_rates, protocol
+from fingerpad.core.results import Number, result_class
+from fingerpad.data import protocol
 from fingerpad.experiments.conditions import Conditions
 from fingerpad.experiments.gerling2014.curvature_thresholds import (
     Observer,
@@ -23,7 +23,6 @@ from fingerpad.experiments.gerling2014.single_unit_uncertainty import (
     CredibleInterval,
     PosteriorConvergence,
 )
-from fingerpad.experiments.gerling2014.skin_deflection import PLATE_DEPTHS_MM
 from fingerpad.experiments.manifest import Manifest
 from fingerpad.experiments.runner import Runner
 from fingerpad.experiments.scores import coefficient_of_determination
@@ -31,14 +30,10 @@ from fingerpad.inference.fitting.fractional_sum_of_squares import fractional_sum
 from fingerpad.inference.fitting.posterior import Chains, credible_band
 from fingerpad.inference.identifiable import LARGEST_RESTING_SHARE, identifiable
 from fingerpad.neuron.afferent import Afferent
-from fingerpad.skin.indentation import Touch
-from fingerpad.skin.sampling import SkinResponse
 from studies.finger_levels import (
     SITES,
     Outputs,
-    deflection_distances_mm,
     euclidean_hit_rates,
-    gradient_hit_rates,
     largest_stress_kpa,
     outputs_of,
 )
@@ -50,7 +45,6 @@ from studies.finger_posterior import (
     Finger,
     Likelihood,
     Observations,
-    Posterior,
     Prediction,
     Prior,
     Sampling,
@@ -59,7 +53,7 @@ from studies.finger_posterior import (
     synthetic,
 )
 from studies.posterior_calibration import Calibration, calibrate
-from studies.tissue_candidates import HUMAN, LEVELS, Candidate
+from studies.tissue_candidates import HUMAN, Candidate
 from studies.tissue_design import (
     RANGES,
     design,
@@ -69,19 +63,13 @@ from studies.tissue_design import (
     values_at,
 )
 from studies.tissue_emulator import Emulator, left_out
-from studies.tissue_search import SPHERES_PER_M, Key, flat_and_largest, targets, touches
+from studies.tissue_search import SPHERES_PER_M, flat_and_largest, targets, touches
 
-N_TISSUES = 29
-"""Points of the design."""
+N_TISSUES, N_FOLDS = 29, 7
+"""Points of the design, and emulators that have not seen one of so many parts of it."""
 
-N_FOLDS = 7
-"""Emulators that have not seen a seventh of the design each; their error is told."""
-
-N_DRAWN = 300
-"""Draws behind bands and probabilities."""
-
-N_REPLICATES = 20
-"""Synthetic experiments of the calibration."""
+N_DRAWN, N_REPLICATES = 300, 20
+"""Draws behind probabilities, and synthetic experiments of the calibration."""
 
 SAMPLING = Sampling()
 REPEATED = Sampling(
@@ -92,10 +80,7 @@ REPEATED = Sampling(
     largest_r_hat=1.1,
     smallest_effective_size=30.0,
 )
-"""Of the posterior, and of those that leave out a level or belong to a synthetic experiment."""
-
-LEVEL, INNER_LEVEL = 0.95, 0.5
-"""Probabilities within the outer and the inner band."""
+"""Of the posterior, and of those of synthetic experiments."""
 
 TRUTH_FACTOR, TRUTH_RESTING_SD = 1.3, 0.3
 """Afferents, noise and modulus of synthetic experiments: two thirds within this factor of `human`, whose
@@ -111,37 +96,17 @@ WEBER_FRACTIONS, LARGEST_SHIFT_EFFECT = (0.09, 0.14), 0.03
 difference of the static ones [spikes/s]; Weber fraction at 287 /m; difference of a hit rate between the
 positions."""
 
-CURVATURES_PER_M = (290.0, 296.0, 305.0, 316.0, 328.0, 340.0, 352.0, 365.0)
-"""Comparisons of the bands of hit rates; between 287, 296 and 365 /m rates are interpolated."""
-
 STANDARD_PER_M = SPHERES_PER_M[0]
 
 
 @result_class
 class Marginal:
-    """Prior and posterior of one parameter.
-
-    Parameters
-    ----------
-    name : str
-        With its unit.
-    human : float
-        Value in the set `human`, for orientation.
-    prior, posterior : CredibleInterval
-        Medians and 95 % intervals.
-    width : float
-        Width of the posterior's interval over that of the prior's, of logarithms where the prior is
-        logarithmic. [1]
-    width_without : dict of float
-        The same without the observations of a level.
-    """
+    """Prior and posterior of one parameter, and its value in the set `human`, for orientation."""
 
     name: str
     human: float
     prior: CredibleInterval
     posterior: CredibleInterval
-    width: float
-    width_without: dict[str, float]
 
 
 @result_class
@@ -154,8 +119,6 @@ class EmulatorError:
         With its unit.
     rms, largest : float
         Over all points of the design.
-    human : float
-        Root mean square for the set `human`, from all points of the design.
     residual : float
         Deviation of the observations, in the same unit; NaN if nothing is observed.
     """
@@ -163,74 +126,12 @@ class EmulatorError:
     quantity: str
     rms: float
     largest: float
-    human: float
     residual: Number
 
 
 @result_class
-class Band:
-    """Predicted numbers over the draws.
-
-    Parameters
-    ----------
-    at : array (n,)
-        Where.
-    median, low, high, inner_low, inner_high : array (n,)
-        Median, and ends of the 95 % and of the 50 % interval.
-    """
-
-    at: Vector
-    median: Vector
-    low: Vector
-    high: Vector
-    inner_low: Vector
-    inner_high: Vector
-
-
-@result_class
-class Bands:
-    """Bands of all figures.
-
-    Parameters
-    ----------
-    deflection : Band
-        Under the cylinder [mm] over the distance [mm].
-    force : Band
-        Of the plate [N] over depth [mm].
-    dynamic, static : Band
-        Rates [spikes/s] over the shift of the bar [mm].
-    population : Band
-        Static rates of the middle row under the standard sphere [spikes/s] over the place across the finger
-        [mm].
-    gradient, euclidean : Band
-        Hit rates [0-1] of both codes over the curvature of the comparison [1/m], mean of both positions.
-    weber : Band
-        Weber fraction at the standard [1/m]; NaN where no draw has a threshold.
-    """
-
-    deflection: Band
-    force: Band
-    dynamic: Band
-    static: Band
-    population: Band
-    gradient: Band
-    euclidean: Band
-    weber: Band
-
-
-@result_class
 class Target:
-    """A target and how probable it is.
-
-    Parameters
-    ----------
-    name : str
-        What is wanted.
-    probability : float
-        Share of the draws that meet it.
-    interval : CredibleInterval
-        Of the number that is judged.
-    """
+    """A target, the share of the draws that meet it, and the number that is judged."""
 
     name: str
     probability: float
@@ -245,27 +146,16 @@ class TissuePosterior:
     ----------
     n_tissues, n_unsolved : int
         Points of the design that were pressed, and those of which a press could not be solved.
-    components : dict of int
-        Components of the emulator, by output.
     errors : tuple of EmulatorError
         Of the emulator.
     convergence : PosteriorConvergence
         Of the draws.
     marginals : tuple of Marginal
         One per parameter.
-    correlations : array (n_parameters, n_parameters)
-        Of the draws, of logarithms where the prior is logarithmic.
-    residuals : dict of (CredibleInterval, CredibleInterval)
-        Deviation [mm or spikes/s] and correlation length [mm] of deflection, dynamic and static rates.
-    effective_points : float
-        Independent points of the deflection that inform a common shift as well as all correlated ones, at
-        the median length.
     targets : tuple of Target
         Of the set `human`.
     all_targets : float
         Probability that all are met at once.
-    bands : Bands
-        For all figures.
     calibration : Calibration
         Of synthetic experiments with pressed tissues that the emulator has not seen.
     unsolved : int
@@ -276,22 +166,14 @@ class TissuePosterior:
 
     n_tissues: int
     n_unsolved: int
-    components: dict[str, int]
     errors: tuple[EmulatorError, ...]
     convergence: PosteriorConvergence
     marginals: tuple[Marginal, ...]
-    correlations: Matrix
-    residuals: dict[str, tuple[CredibleInterval, CredibleInterval]]
-    effective_points: Number
     targets: tuple[Target, ...]
     all_targets: float
-    bands: Bands
     calibration: Calibration
     unsolved: int
     manifest: Manifest
-
-
-# Presses
 
 
 def pressed(
@@ -300,15 +182,6 @@ def pressed(
     """Press what is missing of some candidates, and read what the levels need.
 
     A candidate of which a press cannot be solved is left out.
-
-    Parameters
-    ----------
-    runner : Runner
-        Where indentations are stored.
-    conditions : Conditions
-        Finger and resolution.
-    candidates : sequence of Candidate
-        Tissues.
 
     Returns
     -------
@@ -325,58 +198,26 @@ def pressed(
         If candidates have different times, or none was solved.
     """
     wanted = [touches(candidate, conditions) for candidate in candidates]
-    runner.solve(
-        [touch for one in wanted for touch in one.values()],
-        "tissues of the design",
-        lambda touch, error: None,
-    )
-    solved = [
-        number
-        for number, one in enumerate(wanted)
-        if all(runner.store.holds(touch) for touch in one.values())
-    ]
+    every = [touch for one in wanted for touch in one.values()]
+    runner.solve(every, "tissues of the design", lambda touch, error: None)
+    solved = [number for number, one in enumerate(wanted) if all(map(runner.store.holds, one.values()))]
     times, found = None, []
-    for candidate, one in ((candidates[number], wanted[number]) for number in solved):
-        own, outputs = outputs_of(_loaded(runner, one), candidate, conditions)
+    for number in solved:
+        responses = {key: runner.store.load(touch) for key, touch in wanted[number].items()}
+        own, outputs = outputs_of(responses, candidates[number], conditions)
         if times is not None and not np.array_equal(own, times):
             raise InputError("candidates must have the same times: they differ.")
         times = own
         found.append(outputs)
     if times is None:
         raise InputError("candidates must hold at least one that can be pressed: got none.")
-    outputs = {name: np.array([one[name] for one in found]) for name in found[0]}
-    return times, outputs, np.array(solved)
-
-
-def _loaded(runner: Runner, wanted: Mapping[Key, Touch]) -> dict[Key, SkinResponse]:
-    return {key: runner.store.load(touch) for key, touch in wanted.items()}
-
-
-def human_candidate() -> Candidate:
-    """`human`, the bar pressed once."""
-    return replace(HUMAN, finalist=False)
-
-
-# Emulator
+    return times, {name: np.array([one[name] for one in found]) for name in found[0]}, np.array(solved)
 
 
 def emulator_errors(
-    values: FloatArray,
-    true: Outputs,
-    emulated: Outputs,
-    times_ms: FloatArray,
+    values: FloatArray, true: Outputs, emulated: Outputs, times_ms: FloatArray
 ) -> dict[str, FloatArray]:
-    """Differences of all levels between two outputs of the same points, (n_points, ...) by quantity.
-
-    Parameters
-    ----------
-    values : array (n_points, 11)
-        Parameters; gains belong to the pressed stress.
-    true, emulated : Outputs
-        Pressed and emulated.
-    times_ms : array (n_times,)
-        Times of the drives. [ms]
-    """
+    """Differences of all levels between pressed and emulated outputs of the same points, by quantity."""
     exact, found = (prediction(values, outputs, times_ms) for outputs in (true, emulated))
     pairs = {
         "deflection [mm]": (exact.deflection_mm, found.deflection_mm),
@@ -387,6 +228,30 @@ def emulator_errors(
         "hit rate": (exact.hit_rates.mean(axis=1), found.hit_rates.mean(axis=1)),
     }
     return {name: second - first for name, (first, second) in pairs.items()}
+
+
+def error_table(
+    errors: Mapping[str, FloatArray], residuals: Mapping[str, tuple[float, float]], observed: Observations
+) -> tuple[EmulatorError, ...]:
+    """Sum up differences of all levels, beside the deviation of the observations."""
+    people = observed.hits / observed.trials
+    deviations = {
+        "deflection [mm]": residuals["deflection"][0],
+        "force of the plate [relative]": BETWEEN_SUBJECTS_SD / np.sqrt(SUBJECTS),
+        "dynamic rate [spikes/s]": residuals["dynamic"][0],
+        "static rate [spikes/s]": residuals["static"][0],
+        "static rate of the population [spikes/s]": np.nan,
+        "hit rate": float(np.sqrt(people * (1.0 - people) / observed.trials).mean()),
+    }
+    return tuple(
+        EmulatorError(
+            quantity=name,
+            rms=float(np.sqrt(np.square(each).mean())),
+            largest=np.abs(each).max(),
+            residual=deviations[name],
+        )
+        for name, each in errors.items()
+    )
 
 
 def like_human(
@@ -408,79 +273,18 @@ def like_human(
     values = np.empty((len(shares), len(PARAMETERS)))
     values[:, : len(RANGES)] = values_at(shares)
     values[:, LOGARITHMIC] = prior.medians
-    values[:, len(RANGES) + 1] = resting_share
+    values[:, RESTING] = resting_share
     modulus = values[:, len(RANGES)]
     stress = largest_stress_kpa(human, modulus[:1]) / largest_stress_kpa(outputs, modulus)
-    gains = [len(RANGES) + 2, len(RANGES) + 3]
+    gains = [RESTING + 1, RESTING + 2]
     values[:, gains] *= stress[:, np.newaxis]
     return values
 
 
-# Results
-
-
 def interval(draws: FloatArray) -> CredibleInterval:
     """Median and 95 % interval of draws (n_draws,)."""
-    low, high = credible_band(draws, LEVEL)
+    low, high = credible_band(draws, 0.95)
     return CredibleInterval(median=np.median(draws), low=low, high=high)
-
-
-def band(at: FloatArray, draws: FloatArray) -> Band:
-    """Band of draws (n_draws, n)."""
-    low, high = credible_band(draws, LEVEL)
-    inner_low, inner_high = credible_band(draws, INNER_LEVEL)
-    return Band(
-        at=at, median=np.median(draws, axis=0), low=low, high=high, inner_low=inner_low, inner_high=inner_high
-    )
-
-
-def scaled(values: FloatArray) -> FloatArray:
-    """Logarithms of the parameters (n_points, 11) whose prior is logarithmic, the others as they are."""
-    logarithmic = [*(number for number, one in enumerate(RANGES) if one.logarithmic), *LOGARITHMIC]
-    return np.where(np.isin(np.arange(len(PARAMETERS)), logarithmic), np.log(np.abs(values)), values)
-
-
-def widths(draws: FloatArray) -> FloatArray:
-    """Widths of the 95 % intervals of draws (n_draws, n_parameters), of logarithms where the prior is."""
-    low, high = credible_band(scaled(draws), LEVEL)
-    return high - low
-
-
-def marginals(
-    prior: FloatArray, posterior: FloatArray, without: Mapping[str, FloatArray], human: FloatArray
-) -> tuple[Marginal, ...]:
-    """Compare draws of the prior, of the posterior and of posteriors that leave out a level."""
-    wide = widths(prior)
-    ratios = {level: widths(draws) / wide for level, draws in without.items()}
-    narrow = widths(posterior) / wide
-    return tuple(
-        Marginal(
-            name=name,
-            human=human[number],
-            prior=interval(prior[:, number]),
-            posterior=interval(posterior[:, number]),
-            width=narrow[number],
-            width_without={level: float(ratio[number]) for level, ratio in ratios.items()},
-        )
-        for number, name in enumerate(PARAMETERS)
-    )
-
-
-def effective_points(positions_mm: FloatArray, length_mm: float) -> float:
-    """Return how many independent points determine a mean as well as points with correlated residuals.
-
-    Examples
-    --------
-    >>> effective_points(np.arange(10.0), 0.0)
-    10.0
-    >>> 1.0 < effective_points(np.arange(10.0), 5.0) < 3.0
-    True
-    """
-    if length_mm == 0.0:
-        return float(positions_mm.size)
-    correlation = np.exp(-np.abs(positions_mm[:, np.newaxis] - positions_mm) / length_mm)
-    ones = np.ones(positions_mm.size)
-    return float(ones @ np.linalg.solve(correlation, ones))
 
 
 def weber_fractions(static_hz: FloatArray, noise_sigma: FloatArray) -> FloatArray:
@@ -492,16 +296,11 @@ def weber_fractions(static_hz: FloatArray, noise_sigma: FloatArray) -> FloatArra
         Static rates under `SPHERES_PER_M`. [spikes/s]
     noise_sigma : array (n_points,)
         Noise.
-
-    Returns
-    -------
-    array (n_points,)
     """
     found = np.full(len(static_hz), np.nan)
-    for row, (table, sigma) in enumerate(zip(static_hz, noise_sigma.tolist(), strict=True)):
-        observer = Observer(
-            interpolated(np.array(SPHERES_PER_M), table), SITES.neighbours, sigma, SITES.draws
-        )
+    for row, (rates, sigma) in enumerate(zip(static_hz, noise_sigma.tolist(), strict=True)):
+        curve = interpolated(np.array(SPHERES_PER_M), rates)
+        observer = Observer(curve, SITES.neighbours, sigma, SITES.draws)
         try:
             found[row] = just_noticeable_difference(observer, STANDARD_PER_M) / STANDARD_PER_M
         except ConvergenceError:
@@ -509,57 +308,7 @@ def weber_fractions(static_hz: FloatArray, noise_sigma: FloatArray) -> FloatArra
     return found
 
 
-def interpolated_spheres(static_hz: FloatArray) -> FloatArray:
-    """Rates under the standard and `CURVATURES_PER_M`, from those under `SPHERES_PER_M`.
-
-    The last axis but one holds the spheres.
-    """
-    wanted = np.log([STANDARD_PER_M, *CURVATURES_PER_M])
-    by_sphere = np.moveaxis(static_hz, -2, 0)
-    return np.moveaxis(interpolated(np.array(SPHERES_PER_M), by_sphere)(wanted), 0, -2)
-
-
-def bands(found: Prediction, values: FloatArray) -> tuple[Bands, FloatArray]:
-    """Bands of all figures, and Weber fractions of the draws.
-
-    Parameters
-    ----------
-    found : Prediction
-        Of the draws.
-    values : array (n_draws, 11)
-        Their parameters.
-
-    Returns
-    -------
-    Bands
-    array (n_draws,)
-        Weber fractions.
-    """
-    shifts, noise = bar_firing_rates().shift_mm, values[:, -1]
-    across = SITES.population.positions_mm
-    middle = np.isclose(across[:, 0], np.median(across[:, 0]))
-    spheres = interpolated_spheres(found.sphere_hz)
-    weber = weber_fractions(found.sphere_hz[:, 0], noise)
-    curvatures = np.array(CURVATURES_PER_M)
-    known = weber[np.isfinite(weber)]
-    return (
-        Bands(
-            deflection=band(deflection_distances_mm(), found.deflection_mm),
-            force=band(np.array(PLATE_DEPTHS_MM), found.plate_force_n),
-            dynamic=band(shifts, found.bar_hz[0]),
-            static=band(shifts, found.bar_hz[1]),
-            population=band(across[middle, 1], found.sphere_hz[:, 0, 0][:, middle]),
-            gradient=band(curvatures, gradient_hit_rates(spheres, noise).mean(axis=1)),
-            euclidean=band(curvatures, euclidean_hit_rates(spheres, noise).mean(axis=1)),
-            weber=band(np.array([STANDARD_PER_M]), (known if known.size else weber)[:, np.newaxis]),
-        ),
-        weber,
-    )
-
-
-def judged(
-    found: Prediction, values: FloatArray, weber: FloatArray, observed: Observations
-) -> tuple[tuple[Target, ...], float]:
+def judged(found: Prediction, values: FloatArray, observed: Observations) -> tuple[tuple[Target, ...], float]:
     """Probability of each target of the set `human`, and of all at once.
 
     Parameters
@@ -568,33 +317,34 @@ def judged(
         Of the draws.
     values : array (n_draws, 11)
         Their parameters.
-    weber : array (n_draws,)
-        Weber fractions at the standard; NaN counts as missed.
     observed : Observations
         Of all levels.
-
-    Returns
-    -------
-    tuple of Target
-    float
     """
     wanted, noise = targets(), values[:, -1]
     dynamic, static = (np.array([flat_and_largest(row) for row in rates]) for rates in found.bar_hz)
-    people = observed.hits / observed.trials
-    euclidean = euclidean_hit_rates(found.sphere_hz, noise) - people
-    r2 = np.array([coefficient_of_determination(observed.deflection_mm, row) for row in found.deflection_mm])
+    euclidean = euclidean_hit_rates(found.sphere_hz, noise) - observed.hits / observed.trials
     shallow, deep = found.plate_force_n.T
-    fss = np.array([_fss(observed, *both) for both in zip(*found.bar_hz, strict=True)])
-    difference = static[:, 1] - static[:, 0]
-    (shallow_low, shallow_high), (deep_low, deep_high) = wanted.plate_force_n
+    ranges = wanted.plate_force_n
     numbers: list[tuple[str, FloatArray, float, float]] = [
-        ("R² under the cylinder", r2, wanted.r2, np.inf),
-        ("plate at 1.0 mm [N]", shallow, shallow_low, shallow_high),
-        ("plate at 2.0 mm [N]", deep, deep_low, deep_high),
-        ("FSS in sample", fss, wanted.fss, np.inf),
+        (
+            "R² under the cylinder",
+            np.array(
+                [coefficient_of_determination(observed.deflection_mm, row) for row in found.deflection_mm]
+            ),
+            wanted.r2,
+            np.inf,
+        ),
+        ("plate at 1.0 mm [N]", shallow, *ranges[0]),
+        ("plate at 2.0 mm [N]", deep, *ranges[1]),
+        (
+            "FSS in sample",
+            np.array([_fss(observed, *both) for both in zip(*found.bar_hz, strict=True)]),
+            wanted.fss,
+            np.inf,
+        ),
         ("dynamic rate under the flat face [spikes/s]", dynamic[:, 0], *DYNAMIC_FLAT_HZ),
         ("largest dynamic rate [spikes/s]", dynamic[:, 1], LEAST_DYNAMIC_HZ, np.inf),
-        ("static difference [spikes/s]", difference, *STATIC_DIFFERENCE_HZ),
+        ("static difference [spikes/s]", static[:, 1] - static[:, 0], *STATIC_DIFFERENCE_HZ),
         ("rate at 3.5 mm [spikes/s]", found.bar_hz[:, :, [0, -1]].max(axis=(0, 2)), 0.0, 0.0),
         ("noise", noise, *wanted.noise_sigma),
         (
@@ -609,12 +359,12 @@ def judged(
             0.0,
             wanted.euclidean_rms,
         ),
-        ("Weber fraction at 287 /m", weber, *WEBER_FRACTIONS),
+        ("Weber fraction at 287 /m", weber_fractions(found.sphere_hz[:, 0], noise), *WEBER_FRACTIONS),
     ]
     met = np.array([(low <= number) & (number <= high) for _, number, low, high in numbers])
     rows = tuple(
         Target(
-            name=f"{name}, wanted: {_wanted(low, high)}",
+            name=f"{name}: {_wanted(low, high)}",
             probability=each.mean(),
             interval=interval(number[np.isfinite(number)]),
         )
@@ -653,101 +403,48 @@ def convergence(chains: Chains) -> PosteriorConvergence:
     )
 
 
-# Repeated posteriors
+# Synthetic experiments
 
 
 @dataclass(frozen=True)
 class Case:
-    """One posterior that is drawn in a process of its own.
-
-    Parameters
-    ----------
-    finger : Finger
-        Predicts the levels.
-    observed : Observations
-        What is fitted.
-    prior : Prior
-        Of the parameters.
-    seed : int
-        Of all random numbers.
-    levels : tuple of str, optional
-        Levels whose observations are used.
-    truth : array (11,), optional
-        Parameters behind a synthetic experiment.
-    settings : Sampling, optional
-        Of the sampler.
-    """
+    """A synthetic experiment, whose posterior is drawn in a process of its own."""
 
     finger: Finger
     observed: Observations
     prior: Prior
     seed: int
-    levels: tuple[str, ...] = LEVELS
-    truth: FloatArray | None = None
-    settings: Sampling = REPEATED
+    truth: FloatArray
+    settings: Sampling
 
-    def draw(self) -> Posterior | None:
-        """Draw the posterior; None if it has not converged."""
+    def draw(self) -> FloatArray | None:
+        """Draw the posterior (n_draws, 11); None if it has not converged."""
+        likelihood = Likelihood(self.observed)
         try:
-            return draw_posterior(
-                self.finger, Likelihood(self.observed), self.prior, self.seed, self.settings, self.levels
-            )
+            return draw_posterior(self.finger, likelihood, self.prior, self.seed, self.settings).values
         except ConvergenceError:
             return None
 
 
-def _draw(case: Case) -> FloatArray | None:
-    found = case.draw()
-    return None if found is None else found.values
-
-
-def drawn(cases: Sequence[Case], runner: Runner, stage: str) -> list[FloatArray | None]:
-    """Draws (n_draws, 11) of some cases, on the runner's processes; None where they have not converged."""
-    with runner.stage(stage, len(cases)) as advance:
-        found = []
+def drawn(cases: Sequence[Case], runner: Runner) -> list[FloatArray | None]:
+    """Draws of some cases, on the runner's processes."""
+    found = []
+    with runner.stage("synthetic experiments", len(cases)) as advance:
         if runner.jobs == 1:
             for case in cases:
-                found.append(_draw(case))
+                found.append(case.draw())
                 advance()
             return found
         with ProcessPoolExecutor(runner.jobs, mp_context=get_context("spawn")) as pool:
-            for draws in pool.map(_draw, cases):
+            for draws in pool.map(Case.draw, cases):
                 found.append(draws)
                 advance()
-        return found
+    return found
 
 
-def without_each_level(
-    finger: Finger, observed: Observations, prior: Prior, seed: int, settings: Sampling
-) -> dict[str, Case]:
-    """Return the posteriors that leave out the observations of one level, by that level."""
-    return {
-        level: Case(
-            finger,
-            observed,
-            prior,
-            seed,
-            tuple(other for other in LEVELS if other != level),
-            settings=settings,
-        )
-        for level in LEVELS
-    }
-
-
-def synthetic_experiments(
-    shares: FloatArray,
-    outputs: Outputs,
-    times_ms: FloatArray,
-    centres: FloatArray,
-    emulators: Sequence[Emulator],
-    unseen: IntArray,
-    residuals: Mapping[str, tuple[float, float]],
-    prior: Prior,
-    n_replicates: int,
-    seed: int,
-    settings: Sampling,
-) -> list[Case]:
-    """Experiments with tissues of the design, computed from their presses.
+@dataclass(frozen=True)
+class Pressed:
+    """Pressed tissues of the design, and emulators that have not seen them.
 
     Parameters
     ----------
@@ -758,80 +455,78 @@ def synthetic_experiments(
     times_ms : array (n_times,)
         Times of the drives. [ms]
     centres : array (n_points, 11)
-        Parameters about which those of the afferent, the modulus and the noise are drawn.
+        Parameters with the afferent of `human`, from `like_human`.
     emulators, unseen
-        From `left_out`: the posterior uses the emulator that has not seen the tissue.
-    residuals
-        As of `synthetic`.
-    prior : Prior
-        Of the posterior.
-    n_replicates : int
-        At most one per point.
-    seed : int
-        Of truths, residuals and draws.
-    settings : Sampling
-        Of the sampler.
-
-    Returns
-    -------
-    list of Case
+        From `left_out`.
     """
-    random = np.random.Generator(np.random.Philox([seed, 3]))
-    cases = []
-    for number in random.permutation(len(shares))[:n_replicates].tolist():
-        truth = centres[number].copy()
-        truth[LOGARITHMIC] *= TRUTH_FACTOR ** random.normal(size=len(LOGARITHMIC))
-        truth[RESTING] = min(truth[RESTING] + TRUTH_RESTING_SD * random.normal(), LARGEST_RESTING_SHARE)
-        own = {name: rows[number : number + 1] for name, rows in outputs.items()}
-        observed = synthetic(prediction(truth[np.newaxis], own, times_ms), residuals, random)
-        finger = Finger(emulators[int(unseen[number])], times_ms)
-        cases.append(Case(finger, observed, prior, seed + 1 + number, truth=truth, settings=settings))
-    return cases
 
+    shares: FloatArray
+    outputs: Outputs
+    times_ms: FloatArray
+    centres: FloatArray
+    emulators: Sequence[Emulator]
+    unseen: IntArray
 
-def calibration(cases: Sequence[Case], draws: Sequence[FloatArray | None]) -> Calibration:
-    """Where the true parameters of synthetic experiments lie among their draws."""
-    converged = [(case, found) for case, found in zip(cases, draws, strict=True) if found is not None]
+    def emulated(self) -> dict[str, FloatArray]:
+        """Return outputs of every point by the emulator that has not seen it."""
+        found = {name: np.empty_like(rows) for name, rows in self.outputs.items()}
+        for number, one in enumerate(self.emulators):
+            rows = self.unseen == number
+            for name, values in one.predict(self.shares[rows]).items():
+                found[name][rows] = values
+        return found
 
-    def once(replicate: tuple[Case, FloatArray]) -> tuple[FloatArray, FloatArray]:
-        case, found = replicate
-        assert case.truth is not None
-        return case.truth, found
+    def experiments(
+        self,
+        residuals: Mapping[str, tuple[float, float]],
+        prior: Prior,
+        n_replicates: int,
+        seed: int,
+        settings: Sampling,
+    ) -> list[Case]:
+        """Draw experiments with tissues of the design, at most one per point.
 
-    return calibrate(PARAMETERS, converged, once)
+        Observations are computed from the presses, with residuals as of `synthetic`. The afferent, the
+        modulus and the noise are drawn about the centres. The posterior uses the emulator that has not seen
+        the tissue.
+        """
+        random = np.random.Generator(np.random.Philox([seed, 3]))
+        cases = []
+        for number in random.permutation(len(self.shares))[:n_replicates].tolist():
+            truth = self.centres[number].copy()
+            truth[LOGARITHMIC] *= TRUTH_FACTOR ** random.normal(size=len(LOGARITHMIC))
+            resting = truth[RESTING] + TRUTH_RESTING_SD * random.normal()
+            truth[RESTING] = min(resting, LARGEST_RESTING_SHARE)
+            own = {name: rows[number : number + 1] for name, rows in self.outputs.items()}
+            observed = synthetic(prediction(truth[np.newaxis], own, self.times_ms), residuals, random)
+            finger = Finger(self.emulators[int(self.unseen[number])], self.times_ms)
+            cases.append(Case(finger, observed, prior, seed + 1 + number, truth, settings))
+        return cases
 
 
 def run(runner: Runner, conditions: Conditions) -> TissuePosterior:
     """Press the design, draw the posterior, and test it with synthetic experiments.
 
-    Parameters
-    ----------
-    runner : Runner
-        Where indentations are stored; a stopped run continues after the last one.
-    conditions : Conditions
-        Finger, resolution and seed; its tissues are not used.
-
-    Returns
-    -------
-    TissuePosterior
+    A stopped run continues after the last stored press. The tissues of the conditions are not used.
 
     Raises
     ------
     ConvergenceError
-        If an indentation cannot be solved, or the draws have not converged.
+        If the draws have not converged.
     StoreError
         If a stored indentation is damaged or the folder cannot be written.
     """
-    seed = conditions.seed
-    times, human, _ = pressed(runner, conditions, [human_candidate()])
+    seed, prior, observed = conditions.seed, Prior.about_human(), Observations.published()
+    likelihood = Likelihood(observed)
+    times, human, _ = pressed(runner, conditions, [replace(HUMAN, finalist=False)])
     times, outputs, solved = pressed(runner, conditions, design_candidates(N_TISSUES))
     shares = design(N_TISSUES)[solved]
+    resting = float(np.prod(identifiable(Afferent.for_tissues("human").parameters)[[0, 3]]))
     with runner.stage("emulators", 1) as advance:
-        emulator = Emulator.fit(shares, outputs)
-        emulators, unseen = left_out(shares, outputs, N_FOLDS)
+        finger = Finger(Emulator.fit(shares, outputs), times)
+        centres = like_human(shares, outputs, human, prior, resting)
+        tissues = Pressed(shares, outputs, times, centres, *left_out(shares, outputs, N_FOLDS))
         advance()
-    finger, observed, prior = Finger(emulator, times), Observations.published(), Prior.about_human()
-    likelihood = Likelihood(observed)
     with runner.stage("posterior", 1) as advance:
         posterior = draw_posterior(finger, likelihood, prior, seed, SAMPLING)
         advance()
@@ -839,93 +534,34 @@ def run(runner: Runner, conditions: Conditions) -> TissuePosterior:
     found = finger.predict(some)
     random = np.random.Generator(np.random.Philox([seed, 1]))
     residuals = {
-        name: (interval(deviation), interval(length))
+        name: (float(np.median(deviation)), float(np.median(length)))
         for name, (deviation, length) in likelihood.residual_draws(found, random).items()
-    }
-    resting = float(np.prod(identifiable(Afferent.for_tissues("human").parameters)[[0, 3]]))
-    centres = like_human(shares, outputs, human, prior, resting)
+    } | {"force": (BETWEEN_SUBJECTS_SD, 0.0)}
+    experiments = tissues.experiments(residuals, prior, N_REPLICATES, seed, REPEATED)
+    repeated = drawn(experiments, runner)
+    pairs = [
+        (case.truth, draws) for case, draws in zip(experiments, repeated, strict=True) if draws is not None
+    ]
+    judgements, all_targets = judged(found, some, observed)
     own = like_human(shares_of(point_of(HUMAN.tissues))[np.newaxis], human, human, prior, resting)
-    without = without_each_level(finger, observed, prior, seed, REPEATED)
-    experiments = synthetic_experiments(
-        shares,
-        outputs,
-        times,
-        centres,
-        emulators,
-        unseen,
-        {name: (deviation.median, length.median) for name, (deviation, length) in residuals.items()}
-        | {"force": (BETWEEN_SUBJECTS_SD, 0.0)},
-        prior,
-        N_REPLICATES,
-        seed,
-        REPEATED,
-    )
-    draws = drawn([*without.values(), *experiments], runner, "repeated posteriors")
-    of_levels = dict(zip(without, draws, strict=False))
-    repeated = draws[len(without) :]
-    all_bands, weber = bands(found, some)
-    judgements, all_targets = judged(found, some, weber, observed)
-    left_outputs = {name: np.empty_like(rows) for name, rows in outputs.items()}
-    for number, one in enumerate(emulators):
-        rows = unseen == number
-        for name, values in one.predict(shares[rows]).items():
-            left_outputs[name][rows] = values
+    before = prior.draw(len(posterior.values), random)
     return TissuePosterior(
         n_tissues=len(shares),
         n_unsolved=N_TISSUES - len(shares),
-        components=emulator.n_components,
-        errors=error_table(
-            emulator_errors(centres, outputs, left_outputs, times),
-            emulator_errors(own, human, finger.outputs(own), times),
-            residuals,
-            observed,
-        ),
+        errors=error_table(emulator_errors(centres, outputs, tissues.emulated(), times), residuals, observed),
         convergence=convergence(posterior.chains),
-        marginals=marginals(
-            prior.draw(len(posterior.values), random),
-            posterior.values,
-            {level: values for level, values in of_levels.items() if values is not None},
-            own[0],
+        marginals=tuple(
+            Marginal(
+                name=name,
+                human=own[0, number],
+                prior=interval(before[:, number]),
+                posterior=interval(posterior.values[:, number]),
+            )
+            for number, name in enumerate(PARAMETERS)
         ),
-        correlations=np.array(np.corrcoef(scaled(posterior.values).T)),
-        residuals=residuals,
-        effective_points=effective_points(deflection_distances_mm(), residuals["deflection"][1].median),
         targets=judgements,
         all_targets=all_targets,
-        bands=all_bands,
-        calibration=calibration(experiments, repeated),
-        unsolved=sum(values is None for values in repeated),
+        calibration=calibrate(PARAMETERS, pairs),
+        unsolved=len(experiments) - len(pairs),
         manifest=runner.manifest(conditions),
     )
-
-
-def error_table(
-    errors: Mapping[str, FloatArray],
-    human: Mapping[str, FloatArray],
-    residuals: Mapping[str, tuple[CredibleInterval, CredibleInterval]],
-    observed: Observations,
-) -> tuple[EmulatorError, ...]:
-    """Sum up differences of all levels, beside the deviation of the observations."""
-    people = observed.hits / observed.trials
-    deviations = {
-        "deflection [mm]": residuals["deflection"][0].median,
-        "force of the plate [relative]": BETWEEN_SUBJECTS_SD / np.sqrt(SUBJECTS),
-        "dynamic rate [spikes/s]": residuals["dynamic"][0].median,
-        "static rate [spikes/s]": residuals["static"][0].median,
-        "static rate of the population [spikes/s]": np.nan,
-        "hit rate": float(np.sqrt(people * (1.0 - people) / observed.trials).mean()),
-    }
-    return tuple(
-        EmulatorError(
-            quantity=name,
-            rms=_rms(each),
-            largest=np.abs(each).max(),
-            human=_rms(human[name]),
-            residual=deviations[name],
-        )
-        for name, each in errors.items()
-    )
-
-
-def _rms(values: FloatArray) -> float:
-    return float(np.sqrt(np.square(values).mean()))

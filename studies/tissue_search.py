@@ -23,11 +23,6 @@ from fingerpad.core.units import MN_PER_N
 from fingerpad.data import protocol, psychophysics
 from fingerpad.experiments.conditions import RECEPTOR_X_MM, Conditions, Touch
 from fingerpad.experiments.gerling2014 import single_unit
-from fingerpad.experiments.gerling2014.curvature_thresholds import (
-    Observer,
-    interpolated,
-    just_noticeable_difference,
-)
 from fingerpad.experiments.gerling2014.skin_deflection import PLATE_DEPTHS_MM, deflection_r2
 from fingerpad.experiments.gerling2014.sphere_discrimination import (
     FITTED_SPHERES,
@@ -40,7 +35,6 @@ from fingerpad.experiments.validation.observations import read_observations
 from fingerpad.geometry.grading import Grading
 from fingerpad.geometry.indenters import Bar, Cylinder, Plate
 from fingerpad.geometry.motion import RampAndHold
-from fingerpad.inference.afferent_methods import bounds_of, by_differences, four_number_problem
 from fingerpad.inference.fitting.cross_validation import cross_validate, interleaved_folds
 from fingerpad.inference.rate_model import AfferentModel
 from fingerpad.inference.rate_problem import RateProblem
@@ -55,26 +49,15 @@ from fingerpad.psychophysics.noise_fit import (
     fit_noise_sigma,
 )
 from fingerpad.skin.sampling import SkinResponse
-from studies import trial_order
-from studies.drive_depths import borders_mm, read_in
-from studies.hyperfoam_fit import PolynomialOfFoam, polynomials
-from studies.tissue_candidates import HUMAN, LEVELS, Candidate, Reading, candidates, variations
-from studies.trial_order import TrialOrder
+from studies.tissue_candidates import LEVELS, Candidate, candidates
 
 SPHERES_PER_M = (psychophysics.SPHERE_287.value, *psychophysics.GOODWIN_CURVATURES.value)
-
-FURTHER_SPHERES_PER_M = (144.0, 165.0, 190.0, 445.0)
-"""Spheres with which finalists are pressed besides, for the Weber fractions: about the lower standard and
-beyond the upper one. [1/m]"""
 
 SITE_MARGIN_MM = 0.3
 """Fine zone of the one bar beyond its outermost shifted site. [mm]"""
 
 NOISE_SIGMA = psychophysics.NOISE_SIGMA.value
 PEOPLE = np.array(psychophysics.GOODWIN_HIT_RATES.value)
-STANDARDS_PER_M = (144.0, 287.0)
-"""Standards of the Weber fractions. [1/m]"""
-
 PLATE_OBSERVATIONS = Path(__file__).with_name("observations") / "plate_force.csv"
 
 Key = tuple[str, float, float]
@@ -84,18 +67,9 @@ Key = tuple[str, float, float]
 def touches(candidate: Candidate, conditions: Conditions) -> dict[Key, Touch]:
     """All presses of one candidate, with its moduli before the common factor.
 
-    Parameters
-    ----------
-    candidate : Candidate
-        Its tissues, and whether it is a finalist.
-    conditions : Conditions
-        Finger and resolution; its tissues are not used.
-
-    Returns
-    -------
-    dict of Touch
-        `("cylinder", diameter, 0)`, `("plate", depth, 0)`, `("bar", shift, 0)` and `("sphere", curvature,
-        position)`, in mm and 1/m; `ONE_BAR` for a bar that is read at shifted sites.
+    Keys are `("cylinder", diameter, 0)`, `("plate", depth, 0)`, `("bar", shift, 0)` and `("sphere",
+    curvature, position)`, in mm and 1/m; `ONE_BAR` for a bar that is read at shifted sites. The tissues of
+    the conditions are not used.
     """
     own, cylinder = replace(conditions, tissues=candidate.tissues), Cylinder()
     pressed: dict[Key, Touch] = {
@@ -111,13 +85,11 @@ def touches(candidate: Candidate, conditions: Conditions) -> dict[Key, Touch]:
         pressed |= {("bar", shift, 0.0): touch for shift, touch in bars}
     else:
         pressed[ONE_BAR] = own.touch(Bar(), RECEPTOR_X_MM, _wide_bar_grading(own), tilt_deg=own.skin_tilt_deg)
-    pressed |= {
+    return pressed | {
         ("sphere", curvature, position): own.sphere_touch(curvature, position)
         for position in POSITIONS_MM
         for curvature in SPHERES_PER_M
     }
-    further = FURTHER_SPHERES_PER_M if candidate.finalist else ()
-    return pressed | {("sphere", curvature, 0.0): own.sphere_touch(curvature) for curvature in further}
 
 
 ONE_BAR: Key = ("one bar", 0.0, 0.0)
@@ -139,40 +111,13 @@ def plate_range_n() -> FloatArray:
     return np.array([(min(forces), max(forces)) for forces in by_depth])
 
 
-def layer_at(skin: SkinResponse, depth_mm: float) -> int:
-    """Return the layer of elements that holds a depth below the receptor, counted from the skin, from 0."""
-    return int(np.searchsorted(borders_mm(skin.mesh), depth_mm, side="right")) - 1
-
-
-def read(skin: SkinResponse, reading: Reading, sites: FloatArray) -> SedTraces:
-    """Quantity that drives an afferent, raised to its exponent, in the place of SED.
-
-    Parameters
-    ----------
-    skin : SkinResponse
-        One press.
-    reading : Reading
-        What is read.
-    sites : array (n_sites, 2)
-        x and z of end organs. [mm]
-
-    Returns
-    -------
-    SedTraces
-        One column per site.
-    """
-    if reading.depth_mm is not None:
-        skin = read_in(skin, layer_at(skin, reading.depth_mm))
-    values = skin.sample(reading.quantity, sites) ** reading.exponent
-    return SedTraces(skin.times_ms, values, np.array(skin.kinks_ms))
-
-
 def driven(skin: SkinResponse, candidate: Candidate, sites: FloatArray) -> SedTraces:
-    """Traces that drive the afferents of a candidate at sites under one press; as of `read`."""
-    static = read(skin, candidate.reading, sites)
-    if candidate.dynamic is None:
-        return static
-    return single_unit.following(static, read(skin, candidate.dynamic, sites), candidate.dynamic.quantity)
+    """Quantity that drives the afferents of a candidate at sites (n_sites, 2) [mm], raised to its exponent.
+
+    It stands in the place of SED, one column per site.
+    """
+    values = skin.sample(candidate.reading.quantity, sites) ** candidate.reading.exponent
+    return SedTraces(skin.times_ms, values, np.array(skin.kinks_ms))
 
 
 def bar_traces(
@@ -257,13 +202,10 @@ class Deflection:
         Of the deflection under the cylinder. [1]
     plate_force_n : array (2,)
         Force of the plate at the depths of `PLATE_DEPTHS_MM`, at the end of the hold. [N]
-    factor_range : (float, float)
-        Common factors on all moduli with which both forces lie in people's ranges; NaN if there is none. [1]
     """
 
     r2: float
     plate_force_n: Vector
-    factor_range: tuple[Number, Number]
 
 
 @result_class
@@ -275,15 +217,12 @@ class Firing:
     fss, fss_out_of_sample : float
         FSS over all shifts, and mean over the six folds on the shifts left out, of the afferent fitted to
         rates and hit rates; NaN where no folds were fitted. [1]
-    fss_rates_alone : float
-        In sample, of the afferent fitted to the rates alone. [1]
     dynamic_hz, static_hz : (float, float)
         Smallest rate under the flat face of the bar, and largest rate. [spikes/s]
     """
 
     fss: float
     fss_out_of_sample: Number
-    fss_rates_alone: float
     dynamic_hz: tuple[float, float]
     static_hz: tuple[float, float]
 
@@ -301,40 +240,16 @@ class Percept:
     euclidean_rms : float
         Difference of the Euclidean Distance from people, root mean square over spheres and positions, at
         `noise_sigma`. [0-1]
-    euclidean_rms_paper : float
-        The same at the paper's noise. [0-1]
-    weber_fractions : array (2,)
-        At the standards of `STANDARDS_PER_M`, at `noise_sigma`; NaN if the standard was not pressed or no
-        pressed sphere is discriminated from it. [1]
     """
 
     noise_sigma: Number
     hit_rates: Matrix
     euclidean_rms: Number
-    euclidean_rms_paper: float
-    weber_fractions: Vector
-
-    @property
-    def shift_effect(self) -> float:
-        """Largest difference of a hit rate between the positions. [0-1]"""
-        return float(np.ptp(self.hit_rates, axis=0).max())
 
 
 @result_class
 class Levels:
-    """All levels of one candidate.
-
-    Parameters
-    ----------
-    deflection : Deflection
-        Cylinder and plate.
-    firing : Firing
-        Bar.
-    percept : Percept
-        Spheres.
-    parameters : dict of float
-        Six parameters of the afferent, by name.
-    """
+    """All levels of one candidate, and the six parameters of its afferent, by name."""
 
     deflection: Deflection
     firing: Firing
@@ -347,20 +262,8 @@ def evaluate(
 ) -> Levels:
     """Compute all levels of a candidate from its presses.
 
-    Parameters
-    ----------
-    candidate : Candidate
-        What drives the afferent, and the common factor on all moduli.
-    responses : mapping of SkinResponse
-        From `touches`.
-    conditions : Conditions
-        Finger and seed.
-    folds : bool, optional
-        Fit to the six folds, too: seven fits instead of one.
-
-    Returns
-    -------
-    Levels
+    Responses are those of `touches`. With folds the afferent is fitted to the six folds, too: seven fits
+    instead of one.
     """
     sites = Population.grid(centre_mm=(RECEPTOR_X_MM, 0.0)).positions_mm
     skins = Skins(
@@ -388,12 +291,9 @@ def deflection(responses: Mapping[Key, SkinResponse], factor: float = 1.0) -> De
         * factor
         / MN_PER_N
     )
-    low, high = (plate_range_n() / force_n[:, None]).T
-    within = (low.max(), high.min()) if low.max() <= high.min() else (np.nan, np.nan)
     return Deflection(
         r2=deflection_r2(responses["cylinder", Cylinder().diameter_mm, 0.0].surface_profile()),
         plate_force_n=force_n,
-        factor_range=within,
     )
 
 
@@ -402,13 +302,10 @@ def fitted(skins: Skins, folds: bool = True) -> tuple[Firing, FloatArray]:
     problem, everything = skins.problem, np.arange(skins.problem.n_observations)
     found = skins.method.fit(problem, everything)
     validated = cross_validate(problem, skins.method, interleaved_folds(everything.size)) if folds else None
-    four = four_number_problem(skins.model, problem.recordings)
-    alone = by_differences(bounds_of(*skins.model.drives)).fit(four, everything)
     dynamic, static = problem.model.evaluate(found.parameters)
     firing = Firing(
         fss=problem.score(found.parameters, everything),
         fss_out_of_sample=np.nan if validated is None else validated.score_test,
-        fss_rates_alone=alone.score,
         dynamic_hz=flat_and_largest(dynamic),
         static_hz=flat_and_largest(static),
     )
@@ -442,33 +339,12 @@ def percept(skins: Skins, six: FloatArray) -> Percept:
         noise_sigma=noise,
         hit_rates=gradient(NOISE_SIGMA),
         euclidean_rms=euclidean_rms(noise) if np.isfinite(noise) else np.nan,
-        euclidean_rms_paper=euclidean_rms(NOISE_SIGMA),
-        weber_fractions=_weber_fractions(skins, six, noise),
     )
 
 
 def _hit_rates(tables: Sequence[FloatArray], code: Callable[[FloatArray], FloatArray]) -> FloatArray:
     """Hit rates of a code for static rates at each position; an observer of silent receptors guesses."""
     return np.array([code(table) if table.any() else np.full(len(table) - 1, CHANCE) for table in tables])
-
-
-def _weber_fractions(skins: Skins, six: FloatArray, noise_sigma: float) -> FloatArray:
-    fractions = np.full(len(STANDARDS_PER_M), np.nan)
-    if not np.isfinite(noise_sigma):
-        return fractions
-    curvatures = sorted(curvature for curvature, position in skins.spheres if position == POSITIONS_MM[0])
-    static = skins.static_hz(six, curvatures, POSITIONS_MM[0])
-    observer = Observer(
-        interpolated(np.array(curvatures), static), skins.neighbours, noise_sigma, skins.draws
-    )
-    for number, standard in enumerate(STANDARDS_PER_M):
-        if standard < curvatures[0]:
-            continue
-        try:
-            fractions[number] = just_noticeable_difference(observer, standard) / standard
-        except ConvergenceError:
-            continue
-    return fractions
 
 
 @result_class
@@ -502,15 +378,7 @@ def targets() -> Targets:
 
 
 def met(levels: Levels, wanted: Targets) -> tuple[str, ...]:
-    """Return those of `LEVELS` that meet their targets; without folds FSS in sample decides.
-
-    Parameters
-    ----------
-    levels : Levels
-        Of one candidate.
-    wanted : Targets
-        What is asked of them.
-    """
+    """Return those of `LEVELS` that meet their targets; without folds FSS in sample decides."""
     found, firing, percept = levels.deflection, levels.firing, levels.percept
     low, high = wanted.plate_force_n.T
     fss = firing.fss_out_of_sample if np.isfinite(firing.fss_out_of_sample) else firing.fss
@@ -524,50 +392,16 @@ def met(levels: Levels, wanted: Targets) -> tuple[str, ...]:
     return tuple(level for level, reaches in zip(LEVELS, reached, strict=True) if reaches)
 
 
-MOVED_R2 = 0.005
-MOVED_FORCE = 0.2
-MOVED_FSS = 0.02
-MOVED_RATE_HZ = 10.0
-MOVED_NOISE = 0.01
-MOVED_EUCLIDEAN = 0.02
-"""Changes from which a parameter counts as moving a level: R², share of a force, FSS, smallest rate under the
-flat face or largest rate [spikes/s], noise, error of the Euclidean Distance."""
-
-
-def moved(base: Levels, changed: Levels) -> tuple[str, ...]:
-    """Return those of `LEVELS` that a change of one parameter moves, by the limits above."""
-    force = changed.deflection.plate_force_n / base.deflection.plate_force_n - 1.0
-    rates = np.subtract(
-        [*changed.firing.dynamic_hz, *changed.firing.static_hz],
-        [*base.firing.dynamic_hz, *base.firing.static_hz],
-    )
-    noise = changed.percept.noise_sigma - base.percept.noise_sigma
-    euclidean = changed.percept.euclidean_rms - base.percept.euclidean_rms
-    exceeds = (
-        abs(changed.deflection.r2 - base.deflection.r2) >= MOVED_R2,
-        np.abs(force).max() >= MOVED_FORCE,
-        abs(changed.firing.fss - base.firing.fss) >= MOVED_FSS or np.abs(rates).max() >= MOVED_RATE_HZ,
-        # Without a noise that meets people, the percept is another one.
-        not (abs(noise) < MOVED_NOISE and abs(euclidean) < MOVED_EUCLIDEAN),
-    )
-    return tuple(level for level, beyond in zip(LEVELS, exceeds, strict=True) if beyond)
-
-
 @result_class
 class Row:
     """One candidate and its levels.
 
     Parameters
     ----------
-    name, drive, basis : str
-        Of the candidate: tissues, what drives the afferent, and where the numbers come from.
-    shear_kpa, poisson : array (4,)
-        Initial long-term shear moduli, with the common factor, and Poisson's ratios, from the outside in.
-        [kPa]
-    long_term_share : float
-        Share of the deviatoric stress that does not relax, in the living epidermis. [1]
-    factor : float
-        Common factor on all moduli of the presses. [1]
+    name, drive : str
+        Of the candidate, and what drives the afferent.
+    shear_kpa : array (4,)
+        Initial long-term shear moduli, with the common factor, from the outside in. [kPa]
     chosen_by : tuple of str
         Levels whose observations were used to choose the candidate: in sample there.
     shifted_bars : bool
@@ -580,11 +414,7 @@ class Row:
 
     name: str
     drive: str
-    basis: str
     shear_kpa: Vector
-    poisson: Vector
-    long_term_share: float
-    factor: float
     chosen_by: tuple[str, ...]
     shifted_bars: bool
     levels: Levels | None
@@ -593,52 +423,17 @@ class Row:
 
 @result_class
 class TissueSearch:
-    """Result of `python -m studies tissue-search`.
-
-    Parameters
-    ----------
-    rows : tuple of Row
-        One per candidate.
-    base : Row
-        `human` with one bar, which the variations are compared with.
-    variations : tuple of Row
-        Changes of one parameter of `base` each, named by it.
-    targets : Targets
-        Of the levels.
-    order : TrialOrder
-        Of the paper's three trials.
-    polynomials : tuple of PolynomialOfFoam
-        Wu's tissues.
-    manifest : Manifest
-        What ran.
-    """
+    """Result of `python -m studies tissue-search`: rows of the candidates, targets, and what ran."""
 
     rows: tuple[Row, ...]
-    base: Row
-    variations: tuple[Row, ...]
     targets: Targets
-    order: TrialOrder
-    polynomials: tuple[PolynomialOfFoam, ...]
     manifest: Manifest
 
 
 def search_one(candidate: Candidate, runner: Runner, conditions: Conditions, folds: bool = True) -> Row:
     """Press what is missing of one candidate, and compute its levels.
 
-    Parameters
-    ----------
-    candidate : Candidate
-        Tissues and drive.
-    runner : Runner
-        Where indentations are stored: candidates with the same tissues share them.
-    conditions : Conditions
-        Finger, resolution and seed; its tissues are not used.
-    folds : bool, optional
-        As of `evaluate`.
-
-    Returns
-    -------
-    Row
+    Candidates with the same tissues share their presses. The tissues of the conditions are not used.
 
     Raises
     ------
@@ -652,15 +447,10 @@ def search_one(candidate: Candidate, runner: Runner, conditions: Conditions, fol
         levels = evaluate(candidate, responses, conditions, folds)
     except ConvergenceError as error:
         unsolved = str(error).splitlines()[0]
-    layers = candidate.tissues.layers
     return Row(
         name=candidate.name,
-        drive=candidate.drive,
-        basis=candidate.basis,
-        shear_kpa=candidate.factor * np.array([layer.shear_modulus_kpa for layer in layers]),
-        poisson=np.array([layer.poisson for layer in layers]),
-        long_term_share=candidate.tissues.living_epidermis.prony.long_term_share,
-        factor=candidate.factor,
+        drive=str(candidate.reading),
+        shear_kpa=candidate.factor * np.array([each.shear_modulus_kpa for each in candidate.tissues.layers]),
         chosen_by=candidate.chosen_by,
         shifted_bars=candidate.finalist,
         levels=levels,
@@ -669,36 +459,9 @@ def search_one(candidate: Candidate, runner: Runner, conditions: Conditions, fol
 
 
 def run(runner: Runner, conditions: Conditions) -> TissueSearch:
-    """Compare all candidates, the effect of each parameter of `human`, and the trials in their order.
-
-    Parameters
-    ----------
-    runner : Runner
-        Where indentations are stored; a stopped run continues after the last one.
-    conditions : Conditions
-        Finger, resolution and seed; its tissues are not used.
-
-    Returns
-    -------
-    TissueSearch
-
-    Raises
-    ------
-    ConvergenceError
-        If an indentation of the trials' order cannot be solved.
-    StoreError
-        If a stored indentation is damaged or the folder cannot be written.
-    """
-    rows = tuple(search_one(candidate, runner, conditions) for candidate in candidates())
-    base = search_one(replace(HUMAN, finalist=False), runner, conditions, folds=False)
-    varied = tuple(search_one(candidate, runner, conditions, folds=False) for candidate in variations())
-    order = runner.responses({"order of the trials": trial_order.touches(conditions)})
+    """Compare all candidates; a stopped run continues after the last stored press."""
     return TissueSearch(
-        rows=rows,
-        base=base,
-        variations=varied,
+        rows=tuple(search_one(candidate, runner, conditions) for candidate in candidates()),
         targets=targets(),
-        order=trial_order.result(order["order of the trials"]),
-        polynomials=polynomials(),
         manifest=runner.manifest(conditions),
     )

@@ -26,7 +26,6 @@ from fingerpad.experiments.afferent_files import fitted_afferent
 from fingerpad.experiments.conditions import RECEPTOR_X_MM, Conditions
 from fingerpad.experiments.descriptions.stimuli import NamedStimulus
 from fingerpad.experiments.fit import fit as study
-from fingerpad.experiments.fit import posterior as recording_posterior
 from fingerpad.experiments.fit import session
 from fingerpad.experiments.fit.methods import METHODS, check_spikes
 from fingerpad.experiments.fit.rate_uncertainty import rate_posterior
@@ -50,6 +49,7 @@ from fingerpad.neuron.afferent import Afferent
 from fingerpad.neuron.afferent_types import RA
 from fingerpad.neuron.rate_windows import PAPER_WINDOWS_MS
 from fingerpad.neuron.transduction import drive
+from fingerpad.psychophysics.uncertainty import posterior as recording_posterior
 from fingerpad.report import recording_fit as report
 from sections import sed_driven
 

@@ -51,7 +51,6 @@ from fingerpad.report.parts import COLUMNS, Chapter, Drawing, Page, Paragraph, R
 from fingerpad.report.reproduction import reproduction_page, write_report
 from fingerpad.report.style import BLUE, GREEN, ORANGE, RESOLUTION_DPI, new_figure
 from sections import CURVATURE_PER_M, discrimination_section, nail_section, typed
-from studies.pages.markdown import markdown, write_markdown
 
 SHIFT_MM = np.linspace(-3.5, 3.5, 36)
 PARAMETERS = {
@@ -468,22 +467,7 @@ def _page() -> Page:
     return Page("A title", "A subtitle.", ["A summary."], chapters)
 
 
-def test_one_page_is_written_as_html_and_as_markdown(tmp_path):
-    path = write_markdown(_page(), tmp_path / "page.md")
-    assert (tmp_path / "images" / "skin.png").read_bytes().startswith(b"\x89PNG")
-    assert path.read_text(encoding="utf-8") == markdown(_page())
-    assert markdown(_page()).split("\n\n") == [
-        "# A title",
-        "A subtitle.",
-        "A summary.",
-        "See [the decision](decisions/skin.md), `fp.press` & others.",
-        "## Level 1: skin",
-        "![Figure 4. Skin](images/skin.png)",
-        "It yields.",
-        "### Depths",
-        "| name | depth [mm] |\n| --- | --- |\n| **skin** | **1.0** |",
-        "Half of the finger.\n",
-    ]
+def test_a_page_is_written_as_html(tmp_path):
     text = write_html(_page(), tmp_path / "page.html").read_text(encoding="utf-8")
     assert (
         '<p>See <a href="decisions/skin.md">the decision</a>, <code>fp.press</code> &amp; others.</p>' in text

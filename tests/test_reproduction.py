@@ -21,16 +21,13 @@ from fingerpad import __version__
 from fingerpad.core.compilation import SHORT_NOTICE, SUBJECT
 from fingerpad.core.results import read_results, to_json
 from fingerpad.data import all_published
-from fingerpad.experiments.conditions import Conditions
 from fingerpad.experiments.discrimination.task_files import read_task
 from fingerpad.experiments.discrimination.task_stimuli import task_touches
-from fingerpad.experiments.gerling2014 import single_unit
 from fingerpad.experiments.gerling2014.claim_row import Group, Verdict
 from fingerpad.experiments.gerling2014.reproduction import Reproduction, ReproductionResult, reproduce
-from fingerpad.experiments.runner import STORE_FOLDER, Runner
+from fingerpad.experiments.runner import STORE_FOLDER
 from fingerpad.report.reproduction import reproduction_page
 from fingerpad.skin.store import Store
-from studies.drive_quantities import EXTENDED, PAPER, drive_result, quantity_traces
 from studies.results_page import excerpt, readme_table
 
 COMMAND = (sys.executable, "-W", "error", "-m", "fingerpad", "reproduce")
@@ -134,26 +131,6 @@ def second(first, tmp_path_factory):
     folder = tmp_path_factory.mktemp("second") / "out"
     shutil.copytree(first.folder, folder)
     return run(folder, "--extended")
-
-
-@pytest.fixture(scope="session")
-def studied(first, tmp_path_factory):
-    """Numbers of two studies on the same indentations, each run in a process whose warnings are errors."""
-    folder = tmp_path_factory.mktemp("studies") / "out"
-    shutil.copytree(first.folder / STORE_FOLDER, folder / STORE_FOLDER)
-
-    options = ("--out", str(folder), "--jobs", "2", "--tissues", "human")
-
-    def numbers_of(study):
-        subprocess.run(
-            [sys.executable, "-W", "error", "-m", "studies", study, *options],
-            check=True,
-            cwd=Path(__file__).parents[1],
-        )
-        assert (folder / f"{study}.md").is_file()
-        return json.loads((folder / f"{study}.json").read_text(encoding="utf-8"))
-
-    return numbers_of
 
 
 # From nothing
@@ -282,30 +259,6 @@ def test_what_goes_beyond_the_paper_comes_on_top(second):
     assert all(math.isfinite(number) for number in numbers(second.results))
     page = (second.folder / "report.html").read_text(encoding="utf-8")
     assert Links(page).tags.count("img") == images(second)
-
-
-def test_a_stress_in_the_dynamic_term_explains_the_dynamic_rates_better(first):
-    touches = dict(enumerate(single_unit.bar_touches(Conditions("quick", tissues="human"))))
-    bars = Runner(first.folder).responses({"bar": touches})["bar"]
-    found = drive_result(
-        quantity_traces(list(bars.values()), ("stored", "compressive_stress")),
-        single_unit.bar_recordings(),
-        np.random.default_rng(0),
-        (PAPER, EXTENDED),
-    )
-    paper, best = (candidate.fit for candidate in found.candidates)
-    assert best.fss_out_of_sample >= 0.92
-    assert best.fss_out_of_sample_dynamic > paper.fss_out_of_sample_dynamic + 0.03
-
-
-def test_the_nearest_step_is_the_skins_and_not_the_meshs(studied):
-    """Two more meshes of the same resolution; at quick, steps differ by 2 %."""
-    found = studied("mesh-noise")["mesh_noise"]
-    assert np.shape(found["static_sum"]) == (3, 2)
-    assert found["step"] == pytest.approx(np.diff(found["static_sum"]).ravel(), rel=1e-9)
-    assert min(found["step"]) > 0.0
-    assert len(set(found["step"])) == 3
-    assert found["largest_difference"] < found["limit"] == 0.1
 
 
 def test_discrimination_is_complete(of_set):

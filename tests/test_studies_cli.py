@@ -10,8 +10,8 @@ import typer
 import studies
 from fingerpad.core.results import result_class
 from fingerpad.experiments import runner
-from fingerpad.report.parts import Page
 from studies import __main__ as command
+from studies.pages import DOCS
 from studies.study import Study, command_of
 
 
@@ -30,15 +30,15 @@ class Found:
 
 
 @pytest.mark.parametrize(
-    ("resolution", "chosen", "conditions"),
+    ("has_conditions", "chosen", "conditions"),
     [
-        ("standard", ("--seed", "5"), ("standard", 5)),
-        ("standard", ("--resolution", "quick"), ("quick", 0)),
-        (None, (), ("standard", 0)),
+        (True, ("--seed", "5"), ("quick", 5)),
+        (True, ("--resolution", "standard"), ("standard", 0)),
+        (False, (), ("standard", 0)),
     ],
 )
 def test_a_study_is_run_with_what_was_asked_and_writes_page_and_numbers(
-    monkeypatch, capsys, tmp_path, resolution, chosen, conditions
+    monkeypatch, capsys, tmp_path, has_conditions, chosen, conditions
 ):
     asked = []
 
@@ -46,18 +46,23 @@ def test_a_study_is_run_with_what_was_asked_and_writes_page_and_numbers(
         asked.append((conditions.resolution, conditions.seed, runner.folder, runner.jobs))
         return Found(rate_hz=63.0)
 
-    def page(found):
-        return Page("Rates", f"{found.rate_hz:g} spikes/s.", [], [])
+    (tmp_path / "rates.md").write_text("# Rates\n\n<!-- begin rates -->\nold\n<!-- end rates -->\n")
+    monkeypatch.setattr("studies.study.DOCS", tmp_path)
 
+    def blocks(found):
+        return {"rates": f"{found.rate_hz:g} spikes/s"}
+
+    written = Study("rates", "Fire.", run, blocks, "rates.md", has_conditions)
     app = typer.Typer()
     app.callback()(lambda: None)  # otherwise the only command has no name
-    app.command("rates")(command_of(Study("rates", "Fire.", run, page, resolution)))
+    app.command("rates")(command_of(written))
     out = tmp_path / "found"
     monkeypatch.setattr(sys, "argv", ["studies", "rates", "--out", str(out), "--jobs", "2", *chosen])
     app(standalone_mode=False)
     assert asked == [(*conditions, out, 2)]
     assert capsys.readouterr().out == f"Page: {out / 'rates.md'}\nResults: {out / 'rates.json'}\n"
-    assert (out / "rates.md").read_text() == "# Rates\n\n63 spikes/s.\n"
+    page = "# Rates\n\n<!-- begin rates -->\n63 spikes/s\n<!-- end rates -->\n"
+    assert (out / "rates.md").read_text() == page
     assert json.loads((out / "rates.json").read_text()) == {"rate_hz": 63.0}
 
 
@@ -66,19 +71,21 @@ def test_every_study_has_a_command_and_a_line_of_help(call):
         patch.setenv("COLUMNS", "200")
         _, said, _ = call("--help")
     names = [study.name for study in command.STUDIES]
-    assert len(names) == len(set(names)) == 13
+    assert len(names) == len(set(names)) == 4
     assert all(f" {name} " in said for name in (*names, "results"))
     assert all(f"`{name}`" in studies.__doc__ for name in (*names, "results"))
+    for each in command.STUDIES:
+        assert "<!-- begin " in (DOCS / each.page).read_text(encoding="utf-8")
 
 
 @pytest.mark.parametrize(
     ("arguments", "named", "came"),
     [
-        (["drives", "--jobs", "0"], "jobs must be a whole number of at least 1", "0"),
-        (["drives", "--out", "--jobs", "2"], "'--out' requires an argument", "'--jobs'"),
-        (["drives", "--seed", "-1"], "seed must be a whole number of at least 0", "-1"),
-        (["drives", "--resolution", "fine"], "resolution must be one of quick, standard, paper", "'fine'"),
-        (["paper-size", "--jobs", "0"], "jobs must be a whole number of at least 1", "0"),
+        (["held-out", "--jobs", "0"], "jobs must be a whole number of at least 1", "0"),
+        (["held-out", "--out", "--jobs", "2"], "'--out' requires an argument", "'--jobs'"),
+        (["held-out", "--seed", "-1"], "seed must be a whole number of at least 0", "-1"),
+        (["held-out", "--resolution", "fine"], "resolution must be one of quick, standard, paper", "'fine'"),
+        (["mesh-refinement", "--jobs", "0"], "jobs must be a whole number of at least 1", "0"),
         (["mesh-refinement", "--resolution", "quick"], "No such option", "--resolution"),
         (["results", "none.json"], "none.json must be a file that can be read", "No such file"),
         (["meshes"], "No such command", "'meshes'"),

@@ -1,0 +1,51 @@
+"""`python -m studies results`: the pages that show the numbers of a reproduction."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from fingerpad.core.files import write_atomically
+from fingerpad.core.results import from_json, to_json
+from fingerpad.report.style import write_png
+from studies import chain_picture, results_page, tissue_page
+from studies.command_line_page import command_line_page
+from studies.pages import DOCS, IMAGES, write_blocks
+
+README, NUMBERS, PICTURE = DOCS.parent / "README.md", DOCS / "results.json", IMAGES / "chain.png"
+
+
+def results_command(
+    results: Annotated[
+        Path | None,
+        typer.Argument(help="results.json of `fingerpad reproduce --extended`. Default: docs/results.json."),
+    ] = None,
+    picture: Annotated[
+        bool, typer.Option(help="Also press the standard sphere and draw the README's picture.")
+    ] = True,
+) -> None:
+    """Write results, paper, command-line and tissues of docs, and table and picture of the README."""
+    shown = (
+        from_json(results_page.Excerpt, NUMBERS.read_bytes())
+        if results is None
+        else results_page.read_excerpt(results)
+    )
+    pages = {
+        README: results_page.with_table(README.read_text(encoding="utf-8"), shown),
+        DOCS / "results.md": results_page.results_page(shown),
+        DOCS / "paper.md": results_page.paper_page(shown),
+        DOCS / "command-line.md": command_line_page(),
+    }
+    write_atomically(NUMBERS, to_json(shown) + b"\n")
+    for path, text in pages.items():
+        write_atomically(path, text.encode())
+    written = [NUMBERS, *pages, write_blocks(DOCS / "tissues.md", tissue_page.set_blocks())]
+    if picture:
+        percept = shown.percept["human"]
+        skin, response = chain_picture.touched(percept.standard_per_m, shown.resolution)
+        write_png(lambda parts: chain_picture.draw(*parts), (skin, response, percept), PICTURE)
+        written.append(PICTURE)
+    for path in written:
+        typer.echo(f"Written: {path.relative_to(DOCS.parent)}")
