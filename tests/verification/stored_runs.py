@@ -56,7 +56,7 @@ def closing() -> str:
     steps = stored("mesh_refinement")["steps"]["bar"]["sed"]["ramp"]["max"]
     end = (
         f"\n\nWeighted FSS of the bar's shifts with unchanged parameters: {fss}. Eight steps against 32 in\n"
-        f"the ramp and in the hold change SED under the bar by {100 * steps:.1f} %. What follows for the choice\n"
-        "of a mesh is on [mesh resolutions](decisions/mesh-resolutions.md).\n"
+        f"the ramp and in the hold change SED under the bar by {100 * steps:.1f} %. Conclusions are on\n"
+        "[mesh resolutions](decisions/mesh-resolutions.md).\n"
     )
     return INTRODUCTION + "\n".join(lines) + end
