@@ -1,4 +1,4 @@
-"""Numbers and pictures of docs/afferents.md, docs/afferents-evidence.md and docs/decisions/sai-fields.md.
+"""Numbers and pictures of docs/afferents.md.
 
 `python -m studies.afferents_page` presses a probe, balls and a stroke, and writes them anew (ten minutes);
 with names of parts ("mixed", "tuning", "fields", "adaptation", "densities", "reach") only those.

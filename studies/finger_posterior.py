@@ -1,7 +1,7 @@
 """One posterior of tissues, afferent and noise, given deflection, plate force, firing rates and hit rates.
 
 Tissues are pressed at the points of a design. An emulator interpolates what the levels need; afferent and
-observer are computed, not emulated. docs/decisions/posterior-over-tissues.md has the choices.
+observer are computed, not emulated. docs/decisions.md#posterior-over-tissues has the choices.
 """
 
 from __future__ import annotations

@@ -9,7 +9,7 @@ Three sources of noise can be combined:
 The current noise is sampled at time steps with the exact distribution and interpolated within a step. The
 total current is then piecewise linear, and spikes are computed to round-off as without noise
 (`fingerpad.neuron.exact_spikes`). Without noise the spikes are those of `fingerpad.neuron.lif`. All random
-numbers have keys: docs/decisions/random-numbers.md.
+numbers have keys: docs/decisions.md#random-numbers.
 """
 
 from __future__ import annotations

@@ -303,12 +303,12 @@ def results_page(shown: Excerpt) -> str:
         "## FSS by method of fitting",
         "Fractional sum of squares (FSS, Eqs. 12-14) of one afferent under the bar. "
         "Out of sample: mean of six folds. From `python -m studies methods`, on the same recordings. "
-        "[Settings of the methods](decisions/methods-of-fitting.md), "
+        "[Settings of the methods](decisions.md#methods-of-fitting), "
         "[limits of the fit](single-unit.md#what-limits-the-fit).",
         _methods(shown.methods),
         "## FSS by variant of the model, and the offset of the receptor",
         "All fitted by CMA-ES. The offset is the distance of the receptor from its nominal position "
-        "along the finger ([decision](decisions/receptor-offset.md)).",
+        "along the finger ([decision](decisions.md#receptor-offset)).",
         _models(shown.models),
         "## FSS by the quantity that drives the afferent",
         "All fitted by least squares, with `python -m studies drives` "
@@ -317,7 +317,7 @@ def results_page(shown: Excerpt) -> str:
         *markdown_blocks(Chapter("Readings of the border", [readings_table(shown.readings)])),
         "## Hit rates",
         "Hit rate of each sphere against one of 287 /m. The noise is fitted to the two observed hit rates "
-        "with the static Gradient Sum ([decision](decisions/noise-fitted.md)); all codes use it.",
+        "with the static Gradient Sum ([decision](decisions.md#noise-fitted)); all codes use it.",
         *(
             f"### `{name}`, noise {fixed(percept.noise_sigma, 3)}\n\n{_hit_rates(percept)}"
             for name, percept in shown.percept.items()
@@ -394,7 +394,8 @@ def _summaries(summary: Summaries) -> str:
 
 def _linked(text: str) -> str:
     """Pages that a text names, as links from docs/."""
-    return re.sub(r"docs/(decisions/([\w-]+)\.md)", r"[\2](\1)", text)
+    page = r"docs/(decisions(?:/([\w-]+)\.md|\.md#([\w-]+)))"
+    return re.sub(page, lambda match: f"[{match[2] or match[3]}]({match[1]})", text)
 
 
 def _indentations(counts: Mapping[str, int]) -> str:

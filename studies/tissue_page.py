@@ -10,7 +10,7 @@ from studies.pages.markdown import markdown
 INTRODUCTION = (
     "Every set that `tissues` of `fingerpad.indent` and of the commands accepts by name. A report of "
     "`fingerpad reproduce` has the same table. `python -m studies results` writes this page. Reasons are on "
-    "[substitutes for the lost hyperelastic coefficients](decisions/lost-hyperelastic-coefficients.md) and "
+    "[substitutes for the lost hyperelastic coefficients](decisions.md#lost-hyperelastic-coefficients) and "
     "[two sets: paper and human](decisions/paper-and-human.md). Status: *paper*, printed there; *read*, in "
     "later public material; *recalled*, not checked against the publication; *assumed*, our stand-in."
 )

@@ -1,4 +1,4 @@
-"""Numbers and picture of docs/vibration.md and docs/decisions/inertia.md.
+"""Numbers and picture of docs/afferents.md and docs/decisions/inertia.md.
 
 `python -m studies.vibration_page` presses some forty vibrations (about 20 minutes) and writes them anew; with
 names of parts ("inertia", "range", "errors", "picture", "second") only those.

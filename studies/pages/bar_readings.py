@@ -25,8 +25,8 @@ def bar_readings_page(result: BarReadings) -> Page:
         f"Written by `python -m studies bar-readings --tissues {manifest.materials}` on "
         f"{manifest.started[:10]}: {edition(manifest)}, mechanical code {manifest.code_hash}. Rates of one "
         f"afferent at 36 shifts of the bar, driven by {QUANTITIES[result.quantity]}, by reading of what the "
-        "paper leaves open. Conclusions are on [intervals in windows](decisions/intervals-in-windows.md) and "
-        "[bar or ridge of a grating](decisions/bar-or-grating.md).",
+        "paper leaves open. Conclusions are on [intervals in windows](decisions.md#intervals-in-windows) and "
+        "[bar or ridge of a grating](decisions.md#bar-or-grating).",
         [],
         [Chapter("", [*tables(result), _drawing(result)])],
     )

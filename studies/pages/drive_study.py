@@ -242,7 +242,7 @@ def drives_page(result: DriveStudy) -> Page:
         "Which quantity drives the afferent",
         f"Written by `python -m studies drives` on {manifest.started[:10]}: {edition(manifest)}, mechanical "
         f"code {manifest.code_hash}. Conclusions are on "
-        "[quantity that drives the dynamic term](decisions/dynamic-term-quantity.md) and "
+        "[quantity that drives the dynamic term](decisions.md#dynamic-term-quantity) and "
         "[one afferent, fitted](single-unit.md).",
         [],
         [Chapter("", [*drawings, *tables(result)])],

@@ -281,7 +281,7 @@ def _thresholds(found: SphereThresholds) -> list[Part]:
         "times spread over elasticity. Noise independent of the rate is in units of 100 spikes/s. Between "
         "pressed spheres rates are interpolated; another choice of spheres moves a fraction by up to 0.02.",
         table(columns, [_threshold_row(found, row) for row in found.rows]),
-        "[Curvature thresholds](decisions/curvature-thresholds.md) has the conclusion.",
+        "[Curvature thresholds](decisions.md#curvature-thresholds) has the conclusion.",
     )
 
 

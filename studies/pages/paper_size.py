@@ -299,7 +299,7 @@ spheres at both positions. The meshes differ along the skin only. The standard m
 paper's size have the same elements through the depth; a mesh with twice as many elements through dermis
 and subcutis shows the remaining error. `python -m studies paper-size` computes these tables;
 the ones below come from mechanical code {code_hash}. The preset and the conclusions are on [the mesh of
-the paper's size](decisions/paper-size.md).""",
+the paper's size](decisions.md#paper-size).""",
     caption="Deflection, SED under the bar and hit rates on every mesh, and differences of the deflections",
     draw=draw,
     parts=parts,

@@ -58,7 +58,7 @@ def tissue_posterior_page(results: TissuePosterior) -> Page:
         "Posterior of tissues, afferent and noise",
         f"Written by `python -m studies tissue-posterior` on {manifest.started[:10]}: {edition(manifest)}, "
         f"mechanical code {manifest.code_hash}. "
-        "Choices are on [posterior over tissues](decisions/posterior-over-tissues.md).",
+        "Choices are on [posterior over tissues](decisions.md#posterior-over-tissues).",
         [_in_short(results)],
         [
             Chapter("", [drawing]),

@@ -82,9 +82,9 @@ def tissue_search_page(results: TissueSearch) -> Page:
         f"Written by `python -m studies tissue-search` on {manifest.started[:10]}: {edition(manifest)}, "
         f"mechanical code {manifest.code_hash}. Conclusions are on "
         "[two sets: paper and human](decisions/paper-and-human.md), "
-        "[substitutes for the lost hyperelastic coefficients](decisions/lost-hyperelastic-coefficients.md), "
-        "[order of the three trials in deflection](decisions/order-of-the-trials.md) and "
-        "[one material set for three levels](decisions/one-set-for-three-levels.md).",
+        "[substitutes for the lost hyperelastic coefficients](decisions.md#lost-hyperelastic-coefficients), "
+        "[order of the three trials in deflection](decisions.md#order-of-the-trials) and "
+        "[one material set for three levels](decisions.md#one-set-for-three-levels).",
         [_meet_all(results), ONE_BAR.format(comparison=_one_bar_error(results))],
         [
             Chapter("", [drawing]),

@@ -1,7 +1,7 @@
 """Results that draw themselves and turn into tables: `plot`, a picture in a notebook, pandas and xarray.
 
 What draws and what makes tables lies in packages above; it is named here as text, and loaded when it is first
-used (docs/decisions/results-that-draw.md).
+used (docs/decisions.md#results-that-draw).
 """
 
 from __future__ import annotations

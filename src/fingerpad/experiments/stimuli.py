@@ -99,7 +99,7 @@ class ShiftedBar:
 
     Examples
     --------
-    A positive shift lies on the proximal side, along the skin (docs/decisions/bar-shift.md).
+    A positive shift lies on the proximal side, along the skin (docs/decisions.md#bar-shift).
 
     >>> stimulus = ShiftedBar().named("1.50")
     >>> stimulus.name, round(stimulus.x_mm, 2)
