@@ -28,9 +28,9 @@ GUIDES = {
     "validate": "Format and scores: [validate.md](validate.md).",
     "export": "What is exported: [mechanics.md](mechanics.md#export).",
     "view": "Pictures and films: [view.md](view.md).",
-    "store": "What a store holds: [store.md](store.md).",
+    "store": "What a store holds: [stored presses](sweeps.md#stored-presses).",
     "reduce": "Format and use: [reduced.md](reduced.md).",
-    "lab": "Guide: [lab.md](lab.md).",
+    "lab": "Guide: [a laboratory in the browser](reduced.md#a-laboratory-in-the-browser).",
     "reproduce": "Results of a run: [results.md](results.md).",
 }
 """Pages that explain a command."""

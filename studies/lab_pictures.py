@@ -1,4 +1,4 @@
-"""Pictures of docs/lab.md: the laboratory in a real browser.
+"""Pictures of docs/reduced.md#a-laboratory-in-the-browser: the laboratory in a real browser.
 
 `python -m studies.lab_pictures FOLDER [RANGE]...` is `fingerpad lab [RANGE]... --folder FOLDER` (minutes if
 the folder is empty): it opens the page in Chromium, and writes docs/images/lab.png.

@@ -9,7 +9,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-import typer
 from scipy.special import ndtr, ndtri
 from scipy.stats import binom
 
@@ -542,14 +541,3 @@ def test_a_silent_population_writes_no_answer(call, tmp_path, monkeypatch):
     assert status == 2
     assert "is silent" in errors
     assert written(tmp_path / "discriminate") == set()
-
-
-def test_the_guide_names_every_option_and_shows_commands_that_parse():
-    command = typer.main.get_command(cli.app).commands["discriminate"]
-    options = {name for option in command.params for name in option.opts if name.startswith("--")}
-    page = (ROOT / "docs" / "discriminate.md").read_text(encoding="utf-8")
-    shown = set(re.findall(r"^\| `(--\w+)", page, re.MULTILINE))
-    assert shown == options
-    for line in re.findall(r"^fingerpad discriminate (.*)$", page, re.MULTILINE):
-        arguments = line.split(">")[0].split()
-        assert command.make_context("discriminate", arguments, resilient_parsing=True)

@@ -23,9 +23,11 @@ def named(page: Path) -> str:
 
 
 def anchors(page: Path) -> set[str]:
-    """The fragments that GitHub gives to the headings of a page."""
-    headings = re.findall(r"^#+ (.+)$", page.read_text(encoding="utf-8"), re.MULTILINE)
-    return {re.sub(r"[^\w\- ]", "", heading.lower()).replace(" ", "-") for heading in headings}
+    """The fragments of a page: its anchors, and those that GitHub gives to its headings."""
+    text = page.read_text(encoding="utf-8")
+    headings = re.findall(r"^#+ (.+)$", text, re.MULTILINE)
+    named = {re.sub(r"[^\w\- ]", "", heading.lower()).replace(" ", "-") for heading in headings}
+    return named | set(re.findall(r'<a id="([^"]+)">', text))
 
 
 @pytest.mark.parametrize("page", PAGES, ids=named)
@@ -117,11 +119,16 @@ def test_options_and_keywords_that_an_error_names_exist() -> None:
     assert seen > 40
 
 
-def test_the_index_of_decisions_has_the_heading_of_each_page() -> None:
-    index = ROOT / "docs" / "decisions" / "README.md"
-    wrong = [
-        (title, heading)
-        for title, file in re.findall(r"\[([^\]]+)\]\(([\w-]+\.md)\)", index.read_text(encoding="utf-8"))
-        if title != (heading := (index.parent / file).read_text(encoding="utf-8").splitlines()[0][2:])
-    ]
-    assert wrong == []
+def test_every_page_of_a_decision_has_its_row() -> None:
+    text = (ROOT / "docs" / "decisions.md").read_text(encoding="utf-8")
+    rows = set(re.findall(r'<a id="([^"]+)"></a>\[[^\]]+\]\(decisions/\1\.md\)', text))
+    assert rows == {page.stem for page in (ROOT / "docs" / "decisions").glob("*.md")}
+
+
+def test_the_sources_name_pages_and_anchors_that_exist() -> None:
+    lost = []
+    for source in sorted((ROOT / "src").rglob("*.py")):
+        for page, fragment in re.findall(r"(docs/[\w/-]+\.md)(?:#([\w-]+))?", source.read_text("utf-8")):
+            if not (ROOT / page).exists() or (fragment and fragment not in anchors(ROOT / page)):
+                lost.append((source.name, page, fragment))
+    assert lost == []

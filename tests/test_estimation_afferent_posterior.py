@@ -166,7 +166,7 @@ def test_calibration_detects_intervals_that_are_too_narrow_or_too_wide(places, w
 
 
 def test_rates_that_end_at_zero_make_intervals_somewhat_too_narrow(places) -> None:
-    """A known departure, docs/decisions/likelihood-of-rates.md: whoever mends it will see it here."""
+    """A known departure, docs/decisions.md#likelihood-of-rates: whoever mends it will see it here."""
     held = (np.abs(ranks(places, 300, pedestal_hz=0.0)[:, :4] - 0.5) < 0.4).mean()
     assert 0.70 < held < 0.78
 

@@ -178,10 +178,7 @@ def force_of_a_bar(size_mm, wider_mm=0.0):
 
 
 def test_a_row_on_an_edge_does_not_touch_on_a_coarse_mesh_and_this_error_converges():
-    """The edge belongs to the contact: with its row the force is nearer to the limit of 60.5 mN.
-
-    The numbers are those of docs/decisions/edge-on-a-row.md.
-    """
+    """The edge belongs to the contact: with its row the force is nearer to the limit of 60.5 mN."""
     missing = np.array([force_of_a_bar(size) for size in (0.6, 0.3, 0.15)]) / 60.5 - 1.0
     np.testing.assert_allclose(missing, [-0.23, -0.08, -0.02], atol=0.01)
     touching = np.array([force_of_a_bar(size, 0.8 * size) for size in (0.6, 0.3)]) / 60.5 - 1.0

@@ -45,11 +45,3 @@ def test_pictures_are_light() -> None:
 
 def test_the_time_is_the_one_the_command_expects() -> None:
     assert f"It takes {EXPECTED_TIME['standard']}" in README.replace("\n", " ")
-
-
-@pytest.mark.parametrize(
-    "source", sorted((ROOT / "src").rglob("*.py")), ids=lambda path: str(path.relative_to(ROOT / "src"))
-)
-def test_source_names_pages_that_exist(source: Path) -> None:
-    named = re.findall(r"docs/[\w/-]+\.md", source.read_text(encoding="utf-8"))
-    assert [page for page in named if not (ROOT / page).exists()] == []

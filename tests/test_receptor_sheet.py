@@ -160,7 +160,7 @@ def test_a_sheet_of_one_row_is_refused():
 
 @pytest.mark.parametrize(("z", "proximal", "inwards"), [(0.0, 0.07, 0.0), (2.5, 0.06, 0.12)])
 def test_straight_down_is_not_along_the_normal(z, proximal, inwards):
-    """The numbers of docs/decisions/depth-of-sampling.md."""
+    """Sites of two numbers and of three differ, because the pad is inclined."""
     sheet = SHEETS["full"]
     organ = sheet._border(sheet.below(FINGER.skin_point([17.37], [z])))[0][0]
     assert_allclose([17.37 - organ[0], z - organ[2]], [proximal, inwards], rtol=0, atol=0.006)

@@ -659,17 +659,6 @@ def command():
     return typer.main.get_command(cli.app).commands["fit"]
 
 
-def test_the_page_of_the_format_names_every_option_and_shows_commands_that_parse():
-    page = (ROOT / "docs" / "fit.md").read_text(encoding="utf-8")
-    options = {name for option in command().params for name in option.opts if name.startswith("--")}
-    rows = re.findall(r"^\| (`--.*?) \|", page, re.MULTILINE)
-    assert {name for row in rows for name in re.findall(r"--[\w-]+", row)} == options - {"--help"}
-    shown = re.findall(r"^fingerpad fit (.+)$", page, re.MULTILINE)
-    assert len(shown) == 2
-    for line in shown:
-        command().make_context("fit", shlex.split(line))
-
-
 # The figures
 
 

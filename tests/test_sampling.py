@@ -221,7 +221,7 @@ def by_triangles(mesh, values, organs):
     ],
 )
 def test_smooth_fields_are_read_better_than_by_triangles(resolution, field, quick, standard):
-    """The errors of docs/decisions/sampling-between-elements.md."""
+    """The errors behind docs/decisions.md#sampling-between-elements."""
     mesh = mesh_of(resolution)
     sites = np.random.default_rng(1).uniform([14.0, -3.0], [20.5, 3.0], (1000, 2))
     sheet, truth = ReceptorSheet(mesh), FIELDS_IN_SPACE[field]

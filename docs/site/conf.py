@@ -3,6 +3,7 @@
 The source folder is the root of the repository, so that pages keep their links to each other and to files.
 """
 
+import re
 import sys
 from pathlib import Path
 
@@ -33,10 +34,10 @@ extensions = [
     "sphinx_gallery.gen_gallery",
 ]
 source_suffix = {".md": "markdown", ".rst": "restructuredtext"}
-myst_enable_extensions = ["dollarmath"]
+myst_enable_extensions = ["dollarmath", "attrs_inline"]
 myst_heading_anchors = 4
 myst_url_schemes = dict.fromkeys(("http", "https", "mailto")) | {"doi": "https://doi.org/{{path}}"}
-# Decisions are listed on their own page. Shapes such as (n_sites,) are no references.
+# Pages of decisions are linked from docs/decisions.md. Shapes such as (n_sites,) are no references.
 suppress_warnings = ["config.cache", "toc.not_included", "ref.python"]
 
 default_role = "code"
@@ -74,7 +75,13 @@ def mathml(translator, node) -> None:  # type: ignore[no-untyped-def]
     raise nodes.SkipNode
 
 
+def anchors(app, name, source) -> None:  # type: ignore[no-untyped-def]
+    """Turn anchors in HTML, which GitHub reads, into targets that Sphinx knows."""
+    source[0] = re.sub(r'<a id="([^"]+)"></a>(\[[^\]]+\]\([^)]+\)|[^|]+?)(?= \|)', r"[\2]{#\1}", source[0])
+
+
 def setup(app) -> None:  # type: ignore[no-untyped-def]
     """Write the pages of the reference, which follow the list of public names."""
+    app.connect("source-read", anchors)
     app.add_html_math_renderer("mathml", (mathml, None), (mathml, None))
     write_reference(HERE.parent / "reference")

@@ -1,7 +1,7 @@
 """Results that draw themselves and turn into tables: `plot`, a picture in a notebook, pandas and xarray.
 
 What draws and what makes tables lies in packages above, and is loaded when it is first used: the two imports
-upwards that the contracts of pyproject.toml allow (docs/decisions/results-that-draw.md).
+upwards that the contracts of pyproject.toml allow (docs/decisions.md#results-that-draw).
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Share work between threads, with the same bits on any number of them: docs/decisions/threads.md.
+"""Share work between threads, with the same bits on any number of them: docs/decisions.md#threads.
 
 Work is a function of consecutive numbers (elements, columns, receptors or trials), cut into chunks. Chunks do
 not depend on the number of threads, and results come back in the order of the chunks. Threads help only where

@@ -264,7 +264,7 @@ class Line(Indenter):
 
     Nodes cannot resolve the roundness of a body as thin as their spacing: one node would balance on its top
     and slide off. The strip of skin that lies under the undeformed wire is therefore pushed along the
-    direction of pressing and does not slide along the finger (docs/decisions/line-load.md).
+    direction of pressing and does not slide along the finger (docs/decisions.md#line-load).
 
     Parameters
     ----------

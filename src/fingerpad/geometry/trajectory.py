@@ -74,7 +74,7 @@ class Trajectory(Motion):
     All is linear between the samples. Contact may be lost and made again: a depth below 0 lifts the indenter
     off the undeformed skin, and skin that still recovers follows it or stays behind. Depth and force are
     along the direction of pressing at first touch, however the indenter moves and turns later
-    (docs/decisions/pose-over-time.md).
+    (docs/decisions.md#pose-over-time).
 
     Parameters
     ----------

@@ -3,7 +3,7 @@
 All but the paper's method (`fingerpad.inference.start_points.response_surface`) fit four numbers, optionally
 with the offset of the receptor along the finger, within the same bounds. The four are the identifiable ones
 with the potential at rest over the threshold, beta tau/(C v), in the place of beta/(C v): its bound keeps the
-afferent silent at rest (docs/decisions/silent-at-rest.md).
+afferent silent at rest (docs/decisions.md#silent-at-rest).
 """
 
 from __future__ import annotations

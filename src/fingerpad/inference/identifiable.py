@@ -6,7 +6,7 @@ A spike occurs when the potential reaches the threshold, u = v. Divided by v, Eq
 
 and neither C nor v appears alone. beta, k_d, k_s, C and v are therefore determined only up to a common scale:
 if C or v and the three gains are multiplied by the same number, no spike changes. Recordings determine the
-three gains over C v, and tau (docs/decisions/four-identifiable-parameters.md).
+three gains over C v, and tau (docs/decisions.md#four-identifiable-parameters).
 
 A soft threshold has a width as a fifth parameter. With a, b, c = (beta, k_d, k_s)/(C v), tau and the width w
 of the threshold over the threshold,
@@ -37,7 +37,7 @@ IDENTIFIABLE_NAMES = (
 """The four parameters in the paper's order: beta/(C v), k_d/(C v), k_s/(C v), tau."""
 
 LARGEST_RESTING_SHARE = 0.95
-"""Largest potential at rest over the threshold in fits, beta tau/(C v): docs/decisions/silent-at-rest.md."""
+"""Largest potential at rest over the threshold in fits, beta tau/(C v): docs/decisions.md#silent-at-rest."""
 
 IDENTIFIABLE_UNITS = ("1/ms", "1/kPa", "1/(kPa ms)", "ms")
 

@@ -11,7 +11,7 @@ and equal prior probabilities for all lengths of a grid, both integrals have clo
 
     p(y | theta)  ~  sum_l |R_l|^(-1/2) (nu s^2 + q_l)^(-(n + nu)/2).
 
-See docs/decisions/likelihood-of-rates.md for the evidence that residuals are correlated.
+See docs/decisions.md#likelihood-of-rates for the evidence that residuals are correlated.
 """
 
 from __future__ import annotations

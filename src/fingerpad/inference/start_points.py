@@ -36,7 +36,7 @@ def printed_starts() -> FloatArray:
 def start_points() -> FloatArray:
     """Both start points of the paper, (2, 6), with rescaled gains.
 
-    One factor of k_d and one of k_s hold for both, see docs/decisions/dynamic-gain-rescaled.md.
+    One factor of k_d and one of k_s hold for both, see docs/decisions.md#dynamic-gain-rescaled.
     """
     scales = [1.0, neuron.DYNAMIC_GAIN_SCALE.value, neuron.STATIC_GAIN_SCALE.value, 1.0, 1.0, 1.0]
     return printed_starts() * scales

@@ -9,7 +9,7 @@
 
 Invariants and barred stretches are those of the isochoric part of the deformation. Neo-Hooke and
 Mooney-Rivlin are the polynomial with coefficients zero. A "linear elastic" layer at finite strain is read as
-neo-Hooke with the same shear and bulk modulus (docs/decisions/linear-elastic.md) or, if asked for, as Hencky.
+neo-Hooke with the same shear and bulk modulus (docs/decisions.md#linear-elastic) or, if asked for, as Hencky.
 The polynomial has its own compiled kernel; every other law is differentiated from its formula (see `energy`).
 """
 
@@ -57,7 +57,7 @@ class Energy(metaclass=KnownKeywords):
     """A law of your own: its energy as a formula in the principal stretches or invariants.
 
     A formula without a term that mixes J with a change of shape keeps its pressure while it relaxes; of any
-    other the whole stress relaxes (docs/decisions/relaxing-foams.md).
+    other the whole stress relaxes (docs/decisions.md#relaxing-foams).
 
     Parameters
     ----------

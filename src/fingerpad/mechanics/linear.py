@@ -26,7 +26,7 @@ from fingerpad.mechanics.multigrid import Multigrid
 MOST_ITERATIONS = 400
 DIRECT_POISSON, MULTIGRID_POISSON = 0.4999, 0.499
 """Largest Poisson's ratio with a factor, and with multigrid, whose iterations grow above it (see
-docs/decisions/linear-solver.md)."""
+docs/decisions.md#linear-solver)."""
 
 MULTIGRID_NODES = 4_000
 """Smallest mesh for multigrid; for a smaller mesh a factor takes a fraction of a second."""

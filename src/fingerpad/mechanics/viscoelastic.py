@@ -191,7 +191,7 @@ def stored_energy_density(
 
         e_i = g_i W0 |tau_i|² / |g_i tau0|²,
 
-    which is exact for a linear law and for an unrelaxed branch of any law (docs/decisions/stored-energy.md).
+    which is exact for a linear law and for an unrelaxed branch of any law (docs/decisions.md#stored-energy).
     The volumetric part does not relax.
     """
     stored = np.empty(len(mesh.elements))

@@ -66,7 +66,7 @@ class EscapeRate:
     width : float
         Width of the threshold over the threshold, delta/v. [1]
     escape_ms : float, optional
-        tau_e. It can be absorbed in the threshold, docs/decisions/escape-rate.md. [ms]
+        tau_e. It can be absorbed in the threshold, docs/decisions.md#escape-rate. [ms]
 
     Raises
     ------

@@ -9,7 +9,7 @@ A `Drive` holds what does not depend on the gains: SED and its rate on fine knot
 current for any gains is then a linear combination.
 
 In the paper both terms use SED. As an extension, another quantity may take its place in either term:
-I = beta + k_d |Q'| + k_s P (docs/decisions/dynamic-term-quantity.md).
+I = beta + k_d |Q'| + k_s P (docs/decisions.md#dynamic-term-quantity).
 """
 
 from __future__ import annotations

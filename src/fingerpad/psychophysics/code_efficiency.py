@@ -5,7 +5,7 @@ The paper's noise is proportional to the response mu of a receptor. A noise floo
     r ~ Normal(mu, (sigma_1 mu)^2 + s^2)
 
 Without the floor a receptor that responds weakly or not at all has hardly any noise, and one that begins to
-respond identifies the stimulus with certainty (docs/decisions/ideal-observer.md).
+respond identifies the stimulus with certainty (docs/decisions.md#ideal-observer).
 """
 
 from __future__ import annotations

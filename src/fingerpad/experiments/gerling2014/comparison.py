@@ -34,7 +34,7 @@ LEAST_R2 = 0.93
 
 CHOSEN_BY_DEFLECTION = ("trial2", "trial3", "trial3_stiffening", "paper", "human")
 """Sets of tissues whose moduli were identified from the deflection under the cylinder
-(docs/decisions/lost-hyperelastic-coefficients.md, docs/decisions/paper-and-human.md)."""
+(docs/decisions.md#lost-hyperelastic-coefficients, docs/decisions/paper-and-human.md)."""
 
 CHOSEN_BY_RATES = ("paper", "human")
 """Sets whose moduli, Poisson's ratio and drive were chosen by the rates under the bar, among others."""
@@ -93,7 +93,7 @@ def _deflection(found: SkinDeflectionResult) -> list[ClaimRow]:
             max(more_mm[1]) < 0.0 < min(more_mm[2]),
             "judged as the figure is drawn: mean deflection less that of Trial 3, "
             f"{' and '.join(REGIONS_MM)}; on a deflection axis that points down, the smaller deflection lies "
-            "above: docs/decisions/order-of-the-trials.md",
+            "above: docs/decisions.md#order-of-the-trials",
         ),
     ]
 
@@ -160,7 +160,7 @@ def _before_folds(materials: str, fitted_to_people: bool) -> str:
     if fitted_to_people:
         starts = "each fit starts from a search in its training set; the hit rates of people enter each fold"
     else:
-        starts = "the start gains were chosen on all 36 shifts (docs/decisions/dynamic-gain-rescaled.md)"
+        starts = "the start gains were chosen on all 36 shifts (docs/decisions.md#dynamic-gain-rescaled)"
     if materials not in CHOSEN_BY_RATES:
         return starts
     return f"{starts}; drive, moduli and Poisson's ratio of {materials} were chosen with all 36 shifts"
@@ -203,7 +203,7 @@ def _single_unit(materials: str, found: SingleUnitResult) -> list[ClaimRow]:
 
 def _fold_3(found: SingleUnitResult) -> list[ClaimRow]:
     """Judge the paper's session of fold 3; a fit without its second start point has no such session."""
-    # The shifts of the paper's fold 3 are lost, so that any of our folds may be it (docs/decisions/folds.md).
+    # The shifts of the paper's fold 3 are lost, so that any of our folds may be it (docs/decisions.md#folds).
     sessions = [climb for fold in found.folds for climb in fold.climbs if climb.start == SESSION_START]
     if not sessions or found.method != ResponseSurface.name:
         return []
@@ -223,7 +223,7 @@ def _fold_3(found: SingleUnitResult) -> list[ClaimRow]:
             lowest >= fitted and all(step > 0 for step in steps),
             "judged: at least the paper's in every fold, since its fold 3 is not known; "
             f"{min(steps)} to {max(steps)} iterations; the gains of the start are rescaled "
-            "(docs/decisions/dynamic-gain-rescaled.md)",
+            "(docs/decisions.md#dynamic-gain-rescaled)",
             RECORDED,
         ),
         claim(
@@ -233,7 +233,7 @@ def _fold_3(found: SingleUnitResult) -> list[ClaimRow]:
             f"{min(fss_test):.2f} to {max(fss_test):.2f}",
             in_all if in_all or in_none else Verdict.NOT_DECIDABLE,
             "judged: at least the paper's in all folds (met) or in none (missed), since its fold 3 is not "
-            "known (docs/decisions/folds.md)",
+            "known (docs/decisions.md#folds)",
             RECORDED,
         ),
     ]

@@ -278,7 +278,7 @@ def _variants(statistics: DiscriminationStatistics) -> list[ClaimRow]:
             "wider",
             f"{_text(wide.ratio)} times",
             _above(wide.ratio, 1.0),
-            "the decision point varies; other readings: docs/decisions/decision-criterion.md",
+            "the decision point varies; other readings: docs/decisions.md#decision-criterion",
         ),
         (
             "3.3",

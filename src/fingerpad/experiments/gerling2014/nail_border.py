@@ -4,7 +4,7 @@ The paper shows a figure and gives no number. Stress decreases steadily from the
 back, so both stresses are taken from the same section of the finger: the concentration is the stress of the
 skin at the lateral border of the nail over that of the skin 2 to 3 mm away from it. At the end of a fixed
 nail, the stress of an elastic body grows without bound as elements shrink; the number therefore depends on
-the size of the elements (docs/decisions/nail-border.md).
+the size of the elements (docs/decisions.md#nail-border).
 """
 
 from __future__ import annotations

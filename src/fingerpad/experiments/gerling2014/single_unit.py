@@ -40,8 +40,8 @@ RECEPTOR = ((RECEPTOR_X_MM, 0.0),)
 def bar_touches(conditions: Conditions) -> list[Touch]:
     """36 touches of the bar, shifted along the finger.
 
-    Its flat face stays parallel to the skin at the receptor (docs/decisions/bar-orientation.md). A positive
-    shift moves the bar towards the proximal end (docs/decisions/bar-shift.md).
+    Its flat face stays parallel to the skin at the receptor (docs/decisions.md#bar-orientation). A positive
+    shift moves the bar towards the proximal end (docs/decisions.md#bar-shift).
     """
     tilt = conditions.skin_tilt_deg
     grading = conditions.bar_grading()

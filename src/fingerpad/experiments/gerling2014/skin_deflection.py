@@ -84,7 +84,7 @@ def deflection_r2(profile: SurfaceProfile, proximal_positive: bool = True) -> fl
     """R² of a profile against the observed deflection under the cylinder, its marked artefact left out.
 
     The source does not state which end of the finger its positive distances point to. Read as proximal they
-    fit better (docs/decisions/deflection-direction.md); `proximal_positive` False reads them as distal.
+    fit better (docs/decisions.md#deflection-direction); `proximal_positive` False reads them as distal.
     """
     observed = cylinder_deflection()
     kept = ~observed.is_artefact

@@ -97,7 +97,7 @@ def jackknife_covariance(estimates: ArrayLike) -> FloatArray | None:
 
     It uses no derivatives: rates jump where a spike enters its window, and a fit may end in any of many local
     maxima. A covariance from derivatives at the best fit neglects both and is too small
-    (docs/decisions/jackknife.md).
+    (docs/decisions.md#jackknife).
 
     Notes
     -----
