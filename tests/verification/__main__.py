@@ -3,19 +3,12 @@
 With names of cases, run only those, and print their rows instead.
 """
 
-import platform
 import sys
 import time
-from datetime import UTC, datetime
-
-import numpy
-import scipy
-
-import fingerpad
 
 from .cases import ORDERED
-from .page import PAGE, expectation, number, page_text
-from .pictures import draw_all
+from .page import PAGE, expectation, number, page_text, read_rows, write_rows
+from .pictures import PICTURES, draw_all
 from .press_table import RESOLUTIONS, TABLE_PAGE, press_all
 from .stored_runs import closing
 
@@ -36,10 +29,9 @@ def run_all(names: list[str]) -> int:
                 )
         print(f"{case.name}: {len(case.rows)} numbers, {time.perf_counter() - start:.1f} s", flush=True)
     if not names:
-        versions = f"Python {platform.python_version()}, NumPy {numpy.__version__}, SciPy {scipy.__version__}"
-        day = datetime.now(UTC).date().isoformat()
-        stamp = f"Written on {day} by fingerpad {fingerpad.__version__}, {versions}."
-        PAGE.write_text(page_text(ORDERED, draw_all(), stamp, closing()), encoding="utf-8")
+        write_rows(ORDERED)
+        draw_all()
+        PAGE.write_text(page_text(ORDERED, read_rows(), PICTURES, closing()), encoding="utf-8")
         print(f"wrote {PAGE}", flush=True)
         press_all(RESOLUTIONS)
         print(f"wrote {TABLE_PAGE}")

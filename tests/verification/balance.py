@@ -63,7 +63,7 @@ def ordinary(name):
 @case(
     THEME,
     "Contact force and reaction of the supports",
-    "Newton's third law; our own bound, 1e-4, checked in every indentation",
+    "Newton's third law",
 )
 def force_balance() -> list[Row]:
     """A relaxing layered block under every indenter, ramp and hold, default settings: largest difference at
@@ -153,7 +153,7 @@ def energy_adds_up() -> list[Row]:
 @case(
     THEME,
     "Energy balance with many steps",
-    "External work = stored + dissipated + in the penalty's springs",
+    "Conservation of energy",
     slow=True,
 )
 def energy_balance_many_steps() -> list[Row]:

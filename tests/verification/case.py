@@ -1,4 +1,4 @@
-"""What a case is: a function that yields rows, with its story."""
+"""What a case is: a function that yields rows."""
 
 from __future__ import annotations
 
@@ -81,12 +81,10 @@ class Case:
     ----------
     name : str
         Name of the function.
-    theme, title, about, source : str
-        Chapter of the page, heading, what is done, and where the known answer comes from.
+    theme, title, source : str
+        Chapter of the page, what is pressed or checked, and where the known answer comes from.
     slow : bool
-        Whether the page runs it, and not every test run.
-    runs : str
-        Where a slow case runs, as the page says it.
+        Whether only the page runs it, and not every test run.
     measure : callable
         Does the work; returns rows.
     """
@@ -94,10 +92,8 @@ class Case:
     name: str
     theme: str
     title: str
-    about: str
     source: str
     slow: bool
-    runs: str
     measure: Callable[[], list[Row]]
 
     @cached_property
@@ -109,14 +105,11 @@ class Case:
 CASES: list[Case] = []
 
 
-def case(
-    theme: str, title: str, source: str, slow: bool = False, runs: str = "slow: run for this page only"
-) -> Callable:
-    """Register a function as a case; its docstring says what is done."""
+def case(theme: str, title: str, source: str, slow: bool = False) -> Callable:
+    """Register a function as a case."""
 
     def register(measure: Callable[[], list[Row]]) -> Callable[[], list[Row]]:
-        about = " ".join((measure.__doc__ or "").split())
-        CASES.append(Case(measure.__name__, theme, title, about, source, slow, runs, measure))
+        CASES.append(Case(measure.__name__, theme, title, source, slow, measure))
         return measure
 
     return register

@@ -373,7 +373,7 @@ def line_load():
     return pressed_slice(plane_mesh(sides, lines(0.05, 2.0, 400.0, 1.2)), Line(), 0.005, 0.3)
 
 
-SPHERE_SOURCE = "Hertz 1882; stresses on the axis by Huber 1904; Johnson 1985, ch. 3-4"
+SPHERE_SOURCE = "Hertz, Huber; Johnson 1985, ch. 3-4"
 
 
 @case(THEME, "Sphere", SPHERE_SOURCE)
@@ -404,7 +404,7 @@ def sphere_force_control() -> list[Row]:
     ]
 
 
-@case(THEME, "Cylinder", "Hertz 1882; McEwen 1949; Johnson 1985, ch. 4")
+@case(THEME, "Cylinder", "Hertz, McEwen; Johnson 1985, ch. 4")
 def cylinder() -> list[Row]:
     """R = 50 mm, plane strain. In two dimensions the depth depends on the size of the block, so everything is
     compared at the computed force: a² = 4 F R / (pi E*).
@@ -415,7 +415,7 @@ def cylinder() -> list[Row]:
 @case(
     THEME,
     "Cylinder on nearly incompressible tissue",
-    "Hertz 1882; McEwen 1949; Johnson 1985, ch. 4",
+    "Hertz, McEwen; Johnson 1985, ch. 4",
     slow=True,
 )
 def cylinder_nearly_incompressible() -> list[Row]:

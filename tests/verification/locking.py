@@ -103,7 +103,7 @@ def cook_membrane_fine() -> list[Row]:
 @case(
     THEME,
     "Pressure of Cook's membrane",
-    "Bound of our own, on what is known to come with one pressure per brick",
+    "Bound of our own",
 )
 def cook_pressure() -> list[Row]:
     """Share of the pressure that alternates from element to element (rms of mixed second differences over

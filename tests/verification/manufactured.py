@@ -162,7 +162,7 @@ def order(coarse, fine, errors_of, index):
 QUANTITIES = (("displacement", 1.9), ("stress at points", 0.95), ("stress, element means", 1.3))
 TARGETS = (("displacement", 2.0), ("stress at points", 1.0))
 
-SOURCE = "Method of manufactured solutions (Roache 2002); orders of the linear brick with constant pressure"
+SOURCE = "Manufactured solutions (Roache 2002)"
 
 
 @case(THEME, "Orders of convergence, nu = 0.3 and 0.49", SOURCE)

@@ -81,13 +81,13 @@ def both_errors(material, gradient, bound, tolerance):
     return rows
 
 
-@case(THEME, "Small strain, nu = 0.3", "Irons & Razzaque 1972: the patch test")
+@case(THEME, "Small strain, nu = 0.3", "Irons & Razzaque 1972")
 def patch_small_strain() -> list[Row]:
     """Boundary nodes follow a strain of 1e-4; largest errors inside. Zero to round-off."""
     return both_errors(LINEAR, 1e-4 * STRAIN, 1e-14, tolerance=1e-11)
 
 
-@case(THEME, "Finite strain, polynomial law, nu = 0.48", "Irons & Razzaque 1972: the patch test")
+@case(THEME, "Finite strain, polynomial law, nu = 0.48", "Irons & Razzaque 1972")
 def patch_finite_strain() -> list[Row]:
     """The same with strains of up to 0.3."""
     return both_errors(POLYNOMIAL, 0.3 * STRAIN, 1e-12, tolerance=1e-13)

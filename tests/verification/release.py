@@ -136,7 +136,7 @@ def recovery() -> list[Row]:
     return rows
 
 
-@case(THEME, "Second touch after a pause", "One history of springs and dashpots in one dimension")
+@case(THEME, "Second touch after a pause", "Springs and dashpots in one dimension")
 def second_touch() -> list[Row]:
     """The block of two Prony terms is pressed twice by 0.5 mm, 50 ms in, 100 ms held, 50 ms out: force at the
     end of the second ramp over that of the first, for pauses of several lengths. After many relaxation
@@ -235,7 +235,7 @@ def hysteresis_of_a_sphere() -> list[Row]:
     ]
 
 
-@case(THEME, "Energy balance through a release", "Conservation of energy; our own bound, 0.5 %")
+@case(THEME, "Energy balance through a release", "Conservation of energy")
 def balance_through_release() -> list[Row]:
     """The relaxing layered block that loses a half of its stiffness under every indenter: pressed by 0.3 mm,
     held, released and left alone, 16 steps per ramp. Largest imbalance at any time, over the largest work.

@@ -18,7 +18,7 @@ PRESSES = (
 @case(
     THEME,
     "A small sphere and a small punch, quick against standard",
-    "the press at standard resolution; the bounds are those that quick must keep",
+    "The press at standard resolution",
     slow=True,
 )
 def small_bodies() -> list[Row]:
