@@ -37,7 +37,7 @@ STUDIES = (
         "Press bars and spheres into finer meshes, and report the error of the meshes of every resolution.",
         mesh_refinement.run,
         mesh_refinement.blocks,
-        "verification.md",
+        None,
         has_conditions=False,
     ),
 )

@@ -446,7 +446,7 @@ ERROR_COLUMNS = (
 
 
 def blocks(results: MeshRefinement) -> dict[str, str]:
-    """Return the convergence table of docs/verification.md."""
+    """Return the convergence table."""
     nodes = {size.name: (size.bar_nodes, size.sphere_nodes) for size in results.meshes}
     rows = [
         (

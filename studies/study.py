@@ -15,7 +15,7 @@ from fingerpad.core.files import write_atomically
 from fingerpad.core.results import to_json
 from fingerpad.experiments.conditions import Conditions
 from fingerpad.experiments.runner import Runner
-from studies.pages import DOCS, write_blocks
+from studies.pages import DOCS, joined, write_blocks
 
 Seed = Annotated[int, typer.Option(parser=to_whole, metavar="INTEGER", help="Seed of all random numbers.")]
 Out = Annotated[Path, typer.Option(help="Folder for page, numbers and stored indentations.")]
@@ -33,7 +33,7 @@ class Study:
         From a runner and conditions to a result, an instance of a `result_class`.
     blocks : callable
         From that result to the blocks of the page, Markdown by name.
-    page : str
+    page : str or None
         Page of docs/ that has these blocks.
     has_conditions : bool
         Whether resolution, seed and tissues can be chosen.
@@ -43,12 +43,12 @@ class Study:
     help: str
     run: Callable[[Runner, Conditions], Any]
     blocks: Callable[[Any], Mapping[str, str]]
-    page: str
+    page: str | None
     has_conditions: bool = True
 
 
 def run_study(study: Study, runner: Runner, conditions: Conditions) -> tuple[Path, Path]:
-    """Run a study, and write `NAME.md`, its page with new blocks, and `NAME.json`, its numbers.
+    """Run a study, and write `NAME.md`, its page with new blocks or the blocks, and `NAME.json`, its numbers.
 
     Raises
     ------
@@ -60,8 +60,11 @@ def run_study(study: Study, runner: Runner, conditions: Conditions) -> tuple[Pat
     result = study.run(runner, conditions)
     numbers = runner.folder / f"{study.name}.json"
     write_atomically(numbers, to_json(result) + b"\n")
-    page = runner.folder / f"{study.name}.md"
-    return write_blocks(DOCS / study.page, study.blocks(result), page), numbers
+    page, blocks = runner.folder / f"{study.name}.md", study.blocks(result)
+    if study.page is None:
+        write_atomically(page, f"{joined(*blocks.values())}\n".encode())
+        return page, numbers
+    return write_blocks(DOCS / study.page, blocks, page), numbers
 
 
 def command_of(study: Study) -> Callable[..., None]:

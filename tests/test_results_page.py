@@ -6,10 +6,8 @@ from pathlib import Path
 
 import pytest
 
-import fingerpad as fp
 from fingerpad.core.errors import InputError, StoreError
 from fingerpad.core.results import from_json
-from studies import chain_picture
 from studies.command_line_page import command_line_page
 from studies.pages import with_blocks
 from studies.results_page import (
@@ -78,22 +76,3 @@ def test_files_that_are_missing_or_of_another_kind_are_refused(tmp_path):
     (tmp_path / "other.json").write_text(json.dumps({"format": "fingerpad fit", "format_version": 1}))
     with pytest.raises(StoreError, match="must have the format fingerpad reproduction"):
         read_excerpt(tmp_path / "other.json")
-
-
-def test_the_picture_shows_the_hit_rates_of_the_run_and_all_axes_have_names(shown):
-    skin = fp.indent(
-        fp.Fingertip(),
-        fp.Sphere(curvature_per_m=287),
-        fp.RampAndHold(depth_mm=1.0),
-        settings=fp.PressSettings(ramp_steps=3, hold_steps=2),
-    )
-    response = fp.Population.grid(density_per_cm2=100).respond(skin)
-    percept = shown.percept["human"]
-    figure = chain_picture.draw(skin, response, percept)
-    section, curve, motion, spikes, _ = figure.axes
-    model, *_ = curve.lines
-    assert model.get_xydata().tolist() == list(
-        map(list, zip(percept.curvature_per_m, percept.codes[0].hit_rate, strict=True))
-    )
-    assert all(axes.get_xlabel() and axes.get_ylabel() for axes in (section, curve, spikes))
-    assert motion.get_ylabel() == "depth\n[mm]"

@@ -74,8 +74,8 @@ def test_every_study_has_a_command_and_a_line_of_help(call):
     assert len(names) == len(set(names)) == 4
     assert all(f" {name} " in said for name in (*names, "results"))
     assert all(f"`{name}`" in studies.__doc__ for name in (*names, "results"))
-    for each in command.STUDIES:
-        assert "<!-- begin " in (DOCS / each.page).read_text(encoding="utf-8")
+    for page in {study.page for study in command.STUDIES} - {None}:
+        assert "<!-- begin " in (DOCS / page).read_text(encoding="utf-8")
 
 
 @pytest.mark.parametrize(

@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from fingerpad.data import tissues as published
@@ -63,3 +64,33 @@ def test_a_changed_constant_moves_its_rows_and_no_other(monkeypatch):
     after = tissue_table(tissue_layers()).rows
     moved = [old.cells[:2] for old, new in zip(before, after, strict=True) if old != new]
     assert moved == [("human", "dermis")]
+
+
+def test_the_stiffening_set_is_trial_3_with_another_coefficient():
+    for stiffens, plain in zip(
+        named_tissues("trial3_stiffening").layers, named_tissues("trial3").layers, strict=True
+    ):
+        assert stiffens.shear_modulus_kpa == pytest.approx(plain.shear_modulus_kpa)
+        assert stiffens.bulk_modulus_kpa == pytest.approx(plain.bulk_modulus_kpa)
+    ratios = [layer.law.c20 / layer.law.c10 for layer in named_tissues("trial3_stiffening").layers]
+    assert ratios == pytest.approx([0.0, 0.0, 5.0, 5.0])
+
+
+@pytest.mark.parametrize("layer", ["SKIN", "SUBCUTIS"])
+def test_polynomials_follow_wus_hyperfoam_in_uniaxial_compression(layer):
+    """Nominal stress of both laws in a bar that is free to the sides, up to 50 %."""
+    mu, alpha, (c10, c01, c20, c11, c02) = (
+        np.array(getattr(published, f"WU_{layer}_{name}").value)
+        for name in ("HYPERFOAM_MU", "HYPERFOAM_ALPHA", "POLYNOMIAL")
+    )
+    stretch, nu = np.linspace(0.5, 1.0, 60, endpoint=False)[:, None], 0.48
+    volume = stretch ** (1.0 - 2.0 * nu)
+    exponent = -alpha * nu / (1.0 - 2.0 * nu)
+    foam = (2.0 / stretch * (mu / alpha * (stretch**alpha - volume**exponent))).sum(axis=1)
+    length = stretch[:, 0]
+    first, second = length**2 + 2.0 / length - 3.0, 2.0 * length + length**-2 - 3.0
+    of_first = c10 + 2.0 * c20 * first + c11 * second
+    of_second = c01 + c11 * first + 2.0 * c02 * second
+    polynomial = 2.0 * (length - length**-2) * (of_first + of_second / length)
+    misfit = np.sqrt(np.mean((polynomial - foam) ** 2)) / np.abs(foam).max()
+    assert misfit < 0.001

@@ -18,7 +18,7 @@ from fingerpad.geometry.trajectory import Trajectory
 from fingerpad.mechanics import cycles
 from fingerpad.mechanics.contact import place
 from fingerpad.mechanics.cycles import PronyCycle
-from fingerpad.mechanics.inertia import fastest_hz, moved_mass_mg, resonance_hz
+from fingerpad.mechanics.inertia import fastest_hz, resonance_hz
 from fingerpad.mechanics.materials import Material, MaterialTable, Prony
 from fingerpad.mechanics.press import press
 from fingerpad.mechanics.press_settings import PressSettings
@@ -207,12 +207,6 @@ def test_a_vibration_by_force_has_its_forces_and_its_skipped_cycles_those_of_all
     some, every = vibrated(motion), vibrated(motion, cycle_tolerance=None)
     np.testing.assert_allclose(some.force_mn[1:], motion.prescribed_at(some.times_ms[1:]), rtol=1e-3)
     np.testing.assert_allclose(some.depth_mm, every.depth_mm, atol=0.01 * every.depth_mm.max())
-
-
-def test_moved_mass_of_a_body_that_moves_as_a_whole_is_its_mass():
-    mesh = block()
-    mass = moved_mass_mg(mesh, np.tile([0.0, 0.6, 0.8], (len(mesh.nodes_mm), 1)))
-    assert mass == pytest.approx(6.0 * 6.0 * 3.0 * DENSITY.value * 1e-3)
 
 
 def test_touch_warns_of_inertia_before_anything_is_pressed():

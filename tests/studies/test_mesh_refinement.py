@@ -5,12 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from fingerpad.core.errors import InputError
 from fingerpad.core.results import from_json, to_json
 from fingerpad.data import bar_firing_rates
 from fingerpad.experiments import runner
 from fingerpad.experiments.conditions import RECEPTOR_X_MM, Conditions
-from fingerpad.experiments.gerling2014 import single_unit, sphere_discrimination
 from fingerpad.geometry.fingertip import Fingertip
 from fingerpad.geometry.grading import Grading
 from fingerpad.geometry.indenters import Sphere
@@ -21,7 +19,6 @@ from fingerpad.report.formatting import number
 from fingerpad.skin.indentation import touch_of
 from studies import mesh_refinement
 from studies.mesh_refinement import (
-    TISSUES,
     MeshRefinement,
     Reading,
     blocks,
@@ -66,25 +63,6 @@ def test_a_refined_mesh_has_the_factor_in_every_direction(factor):
     # Around and along, numbers are rounded up to even ones on either side of the centre.
     assert np.abs(np.array(after[:2]) - factor * np.array(before[:2])).max() <= 4
     assert after[2] == 4 * np.ceil(factor)
-
-
-def test_refined_keeps_the_zones_and_a_factor_of_one_keeps_the_mesh():
-    grading = Conditions("standard", tissues=TISSUES).bar_grading()
-    assert mesh_refinement.refined(grading, 1.0) == grading
-    finer = mesh_refinement.refined(grading, 1.5)
-    assert (finer.centre_mm, finer.half_length_mm) == (grading.centre_mm, grading.half_length_mm)
-    assert finer.counts == (6, 2, 6, 6)
-    assert finer.size_x_mm == pytest.approx(0.1 / 1.5)
-    # Over the distance that one standard element took, sizes grow as much as before.
-    assert finer.growth**1.5 == pytest.approx(grading.growth)
-
-
-def test_quick_and_standard_are_the_meshes_of_the_studies():
-    levels = {level.name: level for level in mesh_refinement.LEVELS}
-    for name in ("quick", "standard"):
-        conditions = Conditions(name, tissues=TISSUES)
-        assert list(levels[name].bars().values()) == single_unit.bar_touches(conditions)
-        assert levels[name].balls() == sphere_discrimination.discrimination_touches(conditions)
 
 
 # How differences are summed up
@@ -148,11 +126,6 @@ def test_order_and_limit_of_a_power_are_found(order, scale):
 @pytest.mark.parametrize("values", [(1.0, 2.0, 1.0), (1.0, 1.1, 1.5), (1.0, 2.0, 2.0), (1.0, 1.0, 2.0)])
 def test_no_order_is_made_up_where_values_do_not_settle(values):
     assert np.isnan(observed_order(values, (0.5, 1.0, 1.5))).all()
-
-
-def test_order_needs_three_rising_factors():
-    with pytest.raises(InputError, match="three increasing factors"):
-        observed_order((1.0, 2.0, 3.0), (1.0, 1.0, 2.0))
 
 
 # A whole run, and what is shown of it

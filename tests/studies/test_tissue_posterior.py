@@ -6,9 +6,8 @@ from dataclasses import replace
 import emcee
 import numpy as np
 import pytest
-from scipy.special import xlog1py, xlogy
 
-from fingerpad.core.errors import ConvergenceError, InputError
+from fingerpad.core.errors import InputError
 from fingerpad.core.results import from_json, to_json
 from fingerpad.core.signals import SedTraces
 from fingerpad.experiments.conditions import RECEPTOR_X_MM, Conditions
@@ -29,7 +28,6 @@ from studies.finger_levels import (
     deflection_distances_mm,
     euclidean_hit_rates,
     gradient_hit_rates,
-    sphere_rates,
 )
 from studies.finger_posterior import (
     LOGARITHMIC,
@@ -61,9 +59,9 @@ from studies.tissue_design import (
     tissues_at,
     values_at,
 )
-from studies.tissue_emulator import Components, Emulator, GaussianProcess, left_out
+from studies.tissue_emulator import Emulator, GaussianProcess, left_out
 from studies.tissue_page import POSTERIOR_COLUMNS, posterior_blocks
-from studies.tissue_posterior import Case, Pressed, TissuePosterior, like_human
+from studies.tissue_posterior import Pressed, TissuePosterior, like_human
 from studies.tissue_search import Skins, bar_traces, touches
 
 # Design
@@ -88,11 +86,6 @@ def test_tissues_of_a_point_have_its_ratios_and_those_of_human_lie_within():
     assert ((human > 0.05) & (human < 0.95)).all()
 
 
-def test_a_point_without_all_parameters_is_refused():
-    with pytest.raises(InputError, match="point must have 5 values: got 2"):
-        tissues_at([1.0, 2.0])
-
-
 # Emulator
 
 
@@ -107,41 +100,6 @@ def test_the_error_of_the_emulator_falls_with_the_size_of_the_design():
         errors.append(np.abs(GaussianProcess.fit(points, smooth(points)).mean(new) - smooth(new)).max())
     assert errors == sorted(errors, reverse=True)
     assert errors[-1] < 0.02 * np.ptp(smooth(new))
-
-
-def test_the_deviation_of_a_process_covers_its_errors():
-    random = np.random.default_rng(2)
-    points, new = design(16)[:, :3], random.uniform(size=(300, 3))
-    mean, deviation = GaussianProcess.fit(points, smooth(points)).predict(new)
-    within = np.abs(mean - smooth(new)) <= 2.0 * deviation
-    assert within.mean() > 0.85
-    assert (deviation > 0.0).all()
-
-
-def test_scatter_is_smoothed_and_its_size_found():
-    random = np.random.default_rng(3)
-    points = random.uniform(size=(64, 2))
-    values = points[:, 0] + 0.1 * random.normal(size=64)
-    process = GaussianProcess.fit(points, values)
-    assert np.exp(process.logarithms[2]) * values.std() == pytest.approx(0.1, rel=0.4)
-    new = random.uniform(size=(100, 2))
-    assert np.sqrt(np.mean((process.mean(new) - new[:, 0]) ** 2)) < 0.05
-
-
-def test_components_restore_outputs_of_any_shape():
-    points = design(16)
-    shapes = np.random.default_rng(4).normal(size=(2, 2, 7))
-    values = np.einsum("nk,kij->nij", points[:, :2], shapes)
-    found = Components.fit(points, values)
-    assert len(found.processes) == 2
-    assert found.predict(points).shape == (16, 2, 7)
-    assert found.predict(points) == pytest.approx(values, abs=1e-3 * np.abs(values).max())
-
-
-def test_an_output_that_never_changes_is_restored():
-    points = design(8)
-    values = np.full((8, 3), 2.5)
-    assert Components.fit(points, values).predict(points) == pytest.approx(values)
 
 
 def test_points_left_out_are_predicted_by_an_emulator_that_has_not_seen_them():
@@ -237,30 +195,6 @@ def test_the_posterior_of_a_linear_gaussian_model_is_recovered():
     assert chains.acceptance > 0.4
 
 
-def test_a_proposal_of_another_shape_samples_the_same_density():
-    """Without the ratio of proposal densities, the draws would follow the proposal."""
-    random = np.random.default_rng(7)
-    wide = Proposal.of(np.array([1.0, -1.0]), 9.0 * np.eye(2))
-    chains = sample(
-        lambda points: -0.5 * np.square(points).sum(axis=1),
-        [0.0, 0.0],
-        [2.0, 2.0],
-        ("a", "b"),
-        seed=2,
-        n_walkers=40,
-        n_steps=160,
-        moves=[(wide.move(), 1.0)],
-    )
-    assert chains.flat.std(axis=0) == pytest.approx([1.0, 1.0], abs=0.06)
-    draws = wide.draw(20000, random)
-    assert np.median(draws, axis=0) == pytest.approx([1.0, -1.0], abs=0.1)
-
-
-def test_an_impossible_density_is_refused():
-    with pytest.raises(ConvergenceError, match="No first draw is possible"):
-        adapted(lambda points: np.full(len(points), -np.inf), np.zeros((800, 2)), np.random.default_rng(1))
-
-
 # Likelihood
 
 
@@ -271,13 +205,6 @@ def test_extremes_of_normal_numbers_have_a_density():
     for n in (3, 4):
         density = [np.exp(log_extremes(pair[None], np.zeros((1, 1)), n, (1.0,))[0]) for pair in pairs]
         assert np.sum(density) * (grid[1] - grid[0]) ** 2 == pytest.approx(1.0, abs=0.01)
-
-
-def test_the_force_of_people_is_most_likely_in_the_middle_of_their_range():
-    ranges = np.log([[0.1, 0.4]])
-    centres = np.linspace(np.log(0.05), np.log(0.8), 41)[:, None]
-    best = centres[np.argmax(log_extremes(ranges, centres))]
-    assert np.exp(best[0]) == pytest.approx(0.2, rel=0.05)
 
 
 # A chain of synthetic skins
@@ -377,19 +304,6 @@ def test_a_common_factor_changes_forces_and_gains_only(finger):
     assert second.hit_rates == pytest.approx(first.hit_rates)
 
 
-def test_levels_that_are_not_asked_for_are_not_computed(finger):
-    found = finger.predict(truth(), ("deflection", "force"))
-    assert found.bar_hz.size == found.sphere_hz.size == found.hit_rates.size == 0
-
-
-def test_the_likelihood_of_hits_is_binomial(finger):
-    observed = replace(Observations.published(), hits=np.array([55.0, 90.0]))
-    found = finger.predict(truth())
-    rate = found.hit_rates.mean(axis=1)[0]
-    expected = (xlogy([55.0, 90.0], rate) + xlog1py([45.0, 10.0], -rate)).sum()
-    assert Likelihood(observed).of_levels(found, ("percept",))["percept"][0] == pytest.approx(expected)
-
-
 def test_each_level_is_most_likely_at_the_truth(finger):
     observed = synthetic(
         finger.predict(truth()),
@@ -401,21 +315,6 @@ def test_each_level_is_most_likely_at_the_truth(finger):
     wrong[:, LOGARITHMIC] *= 1.5
     good, bad = (likelihood.of_levels(finger.predict(values)) for values in (right, wrong))
     assert all(good[level][0] > bad[level][0] for level in LEVELS)
-
-
-def test_synthetic_observations_have_the_residuals_that_they_are_given(finger):
-    random, found = np.random.default_rng(5), finger.predict(truth())
-    residuals = {"deflection": (0.05, 1.0), "dynamic": (5.0, 0.6), "static": (2.0, 0.0), "force": (0.36, 0.0)}
-    rows = [synthetic(found, residuals, random) for _ in range(300)]
-    errors = np.array([one.deflection_mm for one in rows]) - found.deflection_mm
-    assert errors.std() == pytest.approx(0.05, rel=0.1)
-    near = np.corrcoef(errors[:, 10], errors[:, 11])[0, 1]
-    step = np.diff(deflection_distances_mm())[10]
-    assert near == pytest.approx(np.exp(-step / 1.0), abs=0.1)
-    ends = np.array([one.plate_force_n for one in rows])
-    assert (ends[..., 0] < ends[..., 1]).all()
-    assert np.log(ends[..., 1] / ends[..., 0]).mean() == pytest.approx(2.06 * 0.36, rel=0.1)
-    assert min(one.static_hz.min() for one in rows) == 0.0
 
 
 # Levels
@@ -435,17 +334,6 @@ def test_rates_of_a_point_are_those_of_the_papers_model():
     found = bar_rates(own, driven.times_ms, {"bars": relative[None]})
     assert found[0, 0] == pytest.approx(dynamic, abs=0.5)
     assert found[1, 0] == pytest.approx(static, abs=0.1)
-
-
-def test_spheres_are_ordered_by_position_then_curvature_and_both_sides_are_equal(finger):
-    static = sphere_rates(
-        finger_posterior.afferents_of(truth(), finger.outputs(truth())), TIMES_MS, finger.outputs(truth())
-    )
-    assert static.shape == (1, 2, 3, 18)
-    by_row = static.reshape(1, 2, 3, 3, 6)
-    assert by_row == pytest.approx(by_row[..., ::-1])
-    assert (static[0, 0, 2] >= static[0, 0, 0]).all()
-    assert (static[0, 1] <= static[0, 0]).all()
 
 
 def test_silent_receptors_make_an_observer_guess():
@@ -484,11 +372,6 @@ def test_experiments_use_pressed_tissues_and_an_emulator_that_has_not_seen_them(
     assert cases[0].draw().shape[1] == len(PARAMETERS)
     unseen = tissues.emulators[tissues.unseen[3]].predict(SHARES[3:4])["log_force"]
     assert tissues.emulated()["log_force"][3] == pytest.approx(unseen[0])
-
-
-def test_draws_that_do_not_converge_are_none(finger, short_search):
-    strict = replace(FEW, smallest_effective_size=1e9)
-    assert Case(finger, Observations.published(), PRIOR, 0, truth()[0], strict).draw() is None
 
 
 # One tiny run

@@ -7,7 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from fingerpad.core.errors import ConvergenceError, InputError
+from fingerpad.core.errors import InputError
 from fingerpad.core.results import from_json, to_json
 from fingerpad.core.signals import SedTraces
 from fingerpad.data import protocol
@@ -15,7 +15,6 @@ from fingerpad.experiments.conditions import RECEPTOR_X_MM, Conditions
 from fingerpad.experiments.runner import Runner
 from fingerpad.geometry.grading import Grading
 from fingerpad.inference import rates_and_hit_rates
-from fingerpad.skin.sampling import SurfaceProfile
 from studies import tissue_search
 from studies.pages import DOCS
 from studies.tissue_candidates import HUMAN, HUMAN_KPA, LEVELS, STRESS, Reading, candidates
@@ -31,7 +30,6 @@ from studies.tissue_search import (
     Skins,
     TissueSearch,
     bar_traces,
-    deflection,
     driven,
     fitted,
     met,
@@ -67,17 +65,6 @@ def test_a_candidate_is_pressed_by_cylinder_plate_bar_and_spheres():
     assert all(touch.tissues == HUMAN.tissues for touch in pressed.values())
     more = touches(HUMAN, Conditions("quick"))
     assert tuple(key[1] for key in more if key[0] == "bar") == protocol.BAR_SHIFTS.value
-
-
-def test_a_common_factor_and_another_drive_need_no_press_of_their_own():
-    other = replace(HUMAN, name="other", factor=3.0, reading=Reading("von_mises"))
-    assert touches(other, Conditions("quick")) == touches(HUMAN, Conditions("quick"))
-
-
-def test_the_one_bar_has_its_edges_on_the_mesh_and_all_sites_in_the_fine_zone():
-    grading = touches(replace(HUMAN, finalist=False), Conditions("quick"))[ONE_BAR].grading
-    assert grading.half_length_mm > max(map(abs, protocol.BAR_SHIFTS.value))
-    assert grading.size_x_mm == Conditions("quick").bar_grading().size_x_mm
 
 
 # What an afferent follows
@@ -167,42 +154,11 @@ def test_a_common_factor_on_the_drive_changes_gains_only(short_fits):
     assert second[1:3] == pytest.approx(first[1:3] / 8.0, rel=1e-4)
 
 
-def test_a_percept_of_equal_or_silent_responses_has_no_noise():
-    skins, silent = synthetic_skins(), np.array([-1.0, 1e-9, 1e-12, 50.0, 1e-6, 50.0])
-    equal = dict.fromkeys(skins.spheres, skins.spheres[SPHERES_PER_M[0], 0.0])
-    for spheres, six in ((equal, TRUTH), (skins.spheres, silent)):
-        found = percept(replace(skins, spheres=spheres), six)
-        assert found.hit_rates == pytest.approx(np.full((2, 2), 0.5))
-        assert np.isnan([found.noise_sigma, found.euclidean_rms]).all()
-
-
 def test_the_percept_of_synthetic_responses_improves_with_less_noise():
     found = percept(synthetic_skins(), TRUTH)
     assert 0.5 < found.hit_rates[0, 0] < found.hit_rates[0, 1]
     assert (found.hit_rates[0] == found.hit_rates[1]).all()
     assert 0.0 < found.noise_sigma < 1.0
-
-
-class Pressed:
-    """A press with a force and a flat profile."""
-
-    def __init__(self, force_n=0.0):
-        self.force_mn = np.array([0.0, 1000.0 * force_n])
-
-    def surface_profile(self):
-        return SurfaceProfile(np.array([-10.0, 10.0]), np.array([0.3, 0.3]))
-
-
-def test_a_common_factor_multiplies_forces_only():
-    responses = {
-        ("cylinder", 3.17, 0.0): Pressed(),
-        ("plate", 1.0, 0.0): Pressed(0.4),
-        ("plate", 2.0, 0.0): Pressed(1.6),
-    }
-    found, doubled = deflection(responses), deflection(responses, factor=2.0)
-    assert found.plate_force_n.tolist() == [0.4, 1.6]
-    assert doubled.plate_force_n.tolist() == [0.8, 3.2]
-    assert doubled.r2 == found.r2
 
 
 # Verdicts
@@ -295,12 +251,3 @@ def test_the_block_shows_every_candidate_and_has_the_form_of_the_page(tiny):
     assert "| odd | – | – | – | – | – |" in block
     assert "odd could not be solved: It folded." in block
     assert f"| {' | '.join(SEARCH_COLUMNS)} |" in (DOCS / "tissues.md").read_text(encoding="utf-8")
-
-
-def test_a_candidate_that_cannot_be_solved_is_named(tmp_path, monkeypatch):
-    def solve(runner, wanted, stage):
-        raise ConvergenceError("no answer\nat step 3", [])
-
-    monkeypatch.setattr(Runner, "solve", solve)
-    row = tissue_search.search_one(HUMAN, Runner(tmp_path), Conditions("quick"))
-    assert (row.name, row.levels, row.unsolved) == ("human", None, "no answer")

@@ -26,10 +26,8 @@ from fingerpad.core.checks import FloatArray, float_array
 from fingerpad.core.errors import InertiaWarning, level_of_caller
 from fingerpad.core.units import MS_PER_S
 from fingerpad.data.tissues import DENSITY
-from fingerpad.geometry.mesh import Mesh
 from fingerpad.geometry.motion import Motion
-from fingerpad.mechanics.materials import Material, MaterialTable
-from fingerpad.mechanics.viscoelastic import instantaneous_state
+from fingerpad.mechanics.materials import Material
 
 LARGEST_SHARE = 0.1
 """Force that accelerates the tissue over the elastic force, above which a touch warns or has a caveat."""
@@ -103,13 +101,3 @@ def warn_of_inertia(motion: Motion, materials: Sequence[Material], thickness_mm:
             InertiaWarning,
             stacklevel=level_of_caller(),
         )
-
-
-def moved_mass_mg(mesh: Mesh, way: FloatArray) -> float:
-    """Mass that moves with an indenter, rho integral |du/dd|² dV: twice its kinetic energy at unit speed."""
-    elastic = MaterialTable.of((Material.neo_hooke(1.0, 0.4),) * (int(mesh.layer.max()) + 1))
-    at_rest = np.zeros_like(mesh.nodes_mm)
-    volume_mm3 = instantaneous_state(mesh, at_rest, elastic).energies[:, :, 0].sum(axis=1)
-    parts = 2.0 if mesh.symmetry_nodes.size else 1.0
-    squares = (way[mesh.elements].mean(axis=1) ** 2).sum(axis=1)
-    return parts * DENSITY.value * 1e-3 * float(volume_mm3 @ squares)

@@ -61,15 +61,6 @@ def receptor_sed(
     return SedTraces.joined([traces_below(skin, RECEPTOR, *quantities) for skin in responses])
 
 
-def receptor_traces(responses: list[SkinResponse], quantity: str) -> SedTraces:
-    """Another quantity at the receptor in the place of strain energy density, one column per shift."""
-    sampled = np.hstack([skin.sample(quantity, RECEPTOR) for skin in responses])
-    first = responses[0]
-    return SedTraces(
-        first.times_ms, sampled, np.array(first.kinks_ms), phases=first.phases, onset_ms=first.onset_ms
-    )
-
-
 def following(static: SedTraces, dynamic: SedTraces, quantity: str) -> SedTraces:
     """Traces whose dynamic term follows another quantity."""
     return replace(static, dynamic_kpa=dynamic.sed_kpa, dynamic_quantity=quantity)
