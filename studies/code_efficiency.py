@@ -22,8 +22,7 @@ from fingerpad.psychophysics.code_efficiency import (
     code_statistic,
 )
 from fingerpad.psychophysics.encoding import RESPONSE_MEASURES, neighbour_pairs, taking_part
-from fingerpad.psychophysics.ideal_observer import present
-from fingerpad.psychophysics.response_models import ResponseModel, multiplied_responses
+from fingerpad.psychophysics.ideal_observer import ResponseModel, multiplied_responses, present
 from studies.fitted_bars import fit_bars
 from studies.poisson_responses import PoissonResponses
 

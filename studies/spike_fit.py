@@ -28,8 +28,7 @@ from fingerpad.inference.identifiable import (
     SPIKE_PARAMETER_UNITS,
     identifiable,
 )
-from fingerpad.inference.soft_afferent import soft_membrane, soft_spikes
-from fingerpad.inference.spike_fit import SpikeFit, fit_spikes
+from fingerpad.inference.spike_fit import SpikeFit, fit_spikes, soft_membrane, soft_spikes
 from fingerpad.inference.spike_likelihood import (
     SpikeLikelihood,
     time_rescaling,

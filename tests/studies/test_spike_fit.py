@@ -12,7 +12,7 @@ from fingerpad.core.signals import SedTraces
 from fingerpad.inference.identifiable import (
     SPIKE_PARAMETER_NAMES,
 )
-from fingerpad.inference.soft_afferent import soft_spikes
+from fingerpad.inference.spike_fit import soft_spikes
 from fingerpad.neuron.transduction import drive
 from fingerpad.report.style import png
 from sections import SED_DRIVEN as AFFERENT
