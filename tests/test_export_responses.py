@@ -16,8 +16,12 @@ from fingerpad.core.phases import ramp_and_hold_phases
 from fingerpad.core.signals import ResponseMap, SpikeTrains
 from fingerpad.experiments.recording_files import read_recordings
 from fingerpad.experiments.stimuli import read_stimuli
-from fingerpad.export.responses import read_response_csv, write_response_csv
-from fingerpad.export.responses_nwb import read_responses_nwb, write_responses_nwb
+from fingerpad.export.responses import (
+    read_response_csv,
+    read_responses_nwb,
+    write_response_csv,
+    write_responses_nwb,
+)
 from fingerpad.neuron.response_maps import recruitment_rank
 
 TOUCH = fp.Touch(

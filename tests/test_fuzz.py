@@ -43,7 +43,7 @@ from fingerpad.neuron.transduction import Transduction
 from fingerpad.psychophysics.counts import JudgementCounts
 from fingerpad.psychophysics.discrimination import Experiment
 from fingerpad.psychophysics.functions import PsychometricFunction
-from fingerpad.psychophysics.response_models import GaussianResponses
+from fingerpad.psychophysics.ideal_observer import GaussianResponses
 from fingerpad.skin.sampling import SurfaceProfile
 
 LONGEST = 2600

@@ -39,8 +39,8 @@ from fingerpad.inference.recordings import RateRecordings
 from fingerpad.neuron.population import sensitivities
 from fingerpad.psychophysics.discrimination import Experiment, discriminate_gradient_sum
 from fingerpad.psychophysics.encoding import gradient_sum
+from fingerpad.psychophysics.ideal_observer import GaussianResponses
 from fingerpad.psychophysics.psychometric import fit_psychometric
-from fingerpad.psychophysics.response_models import GaussianResponses
 from fingerpad.report.style import new_figure, png
 from fingerpad.skin.sampling import SurfaceProfile
 from fingerpad.skin.store import Store

@@ -10,8 +10,7 @@ from fingerpad.core.errors import InputError, MaterialWarning
 from fingerpad.data import tissues
 from fingerpad.mechanics.energy import SECOND, translate
 from fingerpad.mechanics.laws import Energy, Hencky, Hyperfoam, Ogden, Polynomial
-from fingerpad.mechanics.materials import Material, MaterialTable
-from fingerpad.mechanics.stability import instability
+from fingerpad.mechanics.materials import Material, MaterialTable, instability
 
 LOGS = np.array([0.21, -0.34, 0.13, 0.17])
 STEP = 1e-20

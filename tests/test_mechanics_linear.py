@@ -10,13 +10,13 @@ from scipy.sparse.linalg import spsolve
 from fingerpad.core.errors import ConvergenceError, InputError
 from fingerpad.geometry.mesh import block_mesh
 from fingerpad.mechanics import linear
-from fingerpad.mechanics.aggregation import SmoothedAggregation
 from fingerpad.mechanics.assembly import Sparsity, assemble
 from fingerpad.mechanics.factors import SuperLuFactor
 from fingerpad.mechanics.linear import (
     KeptFactor,
     LinearSolver,
     NotPositiveDefiniteError,
+    SmoothedAggregation,
     choose_preconditioner,
     free_degrees_of_freedom,
 )

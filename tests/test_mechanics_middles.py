@@ -8,12 +8,10 @@ from fingerpad.geometry.indenters import Sphere
 from fingerpad.geometry.mesh import block_mesh
 from fingerpad.geometry.motion import RampAndHold
 from fingerpad.mechanics.assembly import Sparsity
-from fingerpad.mechanics.contact import Contact, Placement, place
+from fingerpad.mechanics.contact import Contact, Middles, Placement, place
 from fingerpad.mechanics.materials import Material
-from fingerpad.mechanics.middles import Middles
 from fingerpad.mechanics.press import press
-from fingerpad.mechanics.press_settings import PressSettings
-from fingerpad.mechanics.small_bodies import sag_mm
+from fingerpad.mechanics.press_settings import PressSettings, sag_mm
 
 SPACING_MM = 0.5
 BALL = Sphere(curvature_per_m=1000.0 / 0.4)

@@ -158,7 +158,7 @@ def test_a_search_about_a_small_body_may_take_more_newton_steps(monkeypatch):
         finest_mm=0.08,
     )
     assert small_body().force_mn[-1] > 0.0
-    monkeypatch.setattr("fingerpad.mechanics.small_bodies.MORE_NEWTON_STEPS", 1)
+    monkeypatch.setattr("fingerpad.mechanics.press_settings.MORE_NEWTON_STEPS", 1)
     with pytest.raises(ConvergenceError, match="after 5 Newton steps"):
         small_body()
 

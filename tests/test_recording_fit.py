@@ -43,7 +43,7 @@ from fingerpad.inference.closed_form import ClosedFormModel
 from fingerpad.inference.identifiable import IDENTIFIABLE_NAMES, identifiable
 from fingerpad.inference.rate_model import AfferentModel
 from fingerpad.inference.recordings import RateRecordings, SpikeRecordings
-from fingerpad.inference.soft_afferent import soft_spikes
+from fingerpad.inference.spike_fit import soft_spikes
 from fingerpad.inference.start_points import start_points
 from fingerpad.neuron.afferent import Afferent
 from fingerpad.neuron.afferent_types import RA

@@ -7,10 +7,10 @@ from fingerpad.geometry.indenters import Sphere
 from fingerpad.geometry.mesh import block_mesh
 from fingerpad.geometry.motion import RampAndHold
 from fingerpad.mechanics.contact import place
+from fingerpad.mechanics.fields import skin_contact
 from fingerpad.mechanics.materials import Material
 from fingerpad.mechanics.press import press
 from fingerpad.mechanics.press_settings import PressSettings
-from fingerpad.mechanics.skin_contact import skin_contact
 
 E_STAR_KPA = 100.0
 

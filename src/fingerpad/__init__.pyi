@@ -31,7 +31,7 @@ from fingerpad.export.dataset import touch_dataset as touch_dataset
 from fingerpad.export.dataset import write_touch as write_touch
 from fingerpad.export.formats import export_touch as export_touch
 from fingerpad.export.responses import write_response_csv as write_response_csv
-from fingerpad.export.responses_nwb import write_responses_nwb as write_responses_nwb
+from fingerpad.export.responses import write_responses_nwb as write_responses_nwb
 from fingerpad.export.sweep import run_sweep as run_sweep
 from fingerpad.export.sweep_dataset import observe_sweep as observe_sweep
 from fingerpad.export.sweep_dataset import open_sweep as open_sweep

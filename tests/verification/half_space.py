@@ -18,13 +18,12 @@ from fingerpad.geometry.mesh import Mesh, block_mesh
 from fingerpad.geometry.motion import ForceRampAndHold, RampAndHold
 from fingerpad.mechanics.configuration import Body, Load
 from fingerpad.mechanics.contact import Contact, place
-from fingerpad.mechanics.fields import cauchy_stress
+from fingerpad.mechanics.fields import SkinContact, cauchy_stress, skin_contact
 from fingerpad.mechanics.linear import LinearSolver, choose_preconditioner, free_degrees_of_freedom
 from fingerpad.mechanics.materials import Material
 from fingerpad.mechanics.newton import NewtonSettings, find_equilibrium
 from fingerpad.mechanics.press import press
 from fingerpad.mechanics.press_settings import PressSettings
-from fingerpad.mechanics.skin_contact import SkinContact, skin_contact
 from fingerpad.mechanics.viscoelastic import (
     StepCoefficients,
     StressHistory,

@@ -16,8 +16,7 @@ from fingerpad.core.files import path_of, write_atomically
 from fingerpad.core.keywords import known_keywords
 from fingerpad.core.signals import ResponseMap
 from fingerpad.export.dataset import first_line, library
-from fingerpad.export.responses import PLACES
-from fingerpad.export.responses_nwb import require_pynwb, write_responses_nwb
+from fingerpad.export.responses import PLACES, require_pynwb, write_responses_nwb
 from fingerpad.export.sweep_dataset import (
     DONE,
     check_sweep_data,
@@ -35,13 +34,9 @@ TABLE, TABLE_VERSION = "fingerpad sweep table", 1
 """What the header of a table says: `format` and `format_version`."""
 
 _RATES = (
-    "dynamic_rate_hz",
-    "static_rate_hz",
-    "dynamic_count_hz",
-    "static_count_hz",
-    "first_spike_latency_ms",
+    "dynamic_rate_hz", "static_rate_hz", "dynamic_count_hz", "static_count_hz", "first_spike_latency_ms",
     "spike_count",
-)
+)  # fmt: skip
 
 
 @known_keywords

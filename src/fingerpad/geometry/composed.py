@@ -13,8 +13,15 @@ from fingerpad.core.errors import InputError
 from fingerpad.core.keywords import known_keywords
 from fingerpad.core.values import converted
 from fingerpad.geometry.indenters import Bar, Indenter, Plate
-from fingerpad.geometry.relief import PIXELS, REACH_MM, RELIEF_MM, WIDTHS_MM, narrowest_relief
-from fingerpad.geometry.rounded_edges import check_edge_radius, with_rounded_edges
+from fingerpad.geometry.relief import (
+    PIXELS,
+    REACH_MM,
+    RELIEF_MM,
+    WIDTHS_MM,
+    check_edge_radius,
+    narrowest_relief,
+    with_rounded_edges,
+)
 
 SAME_MM = 1e-6
 """Heights that differ by less are equal. [mm]"""

@@ -20,8 +20,13 @@ from fingerpad.core.values import converted
 from fingerpad.geometry.closest_point import Triangles
 from fingerpad.geometry.indenters import Indenter
 from fingerpad.geometry.probing import traced_front
-from fingerpad.geometry.relief import PIXELS, REACH_MM, narrowest_relief
-from fingerpad.geometry.rounded_edges import check_edge_radius, with_rounded_edges
+from fingerpad.geometry.relief import (
+    PIXELS,
+    REACH_MM,
+    check_edge_radius,
+    narrowest_relief,
+    with_rounded_edges,
+)
 from fingerpad.geometry.surface_repair import border_of, is_crack, layers_of, repaired
 
 MOST_HEIGHTS = 2_000_000

@@ -23,8 +23,7 @@ from fingerpad.lab.state import LabState
 from fingerpad.neuron.afferent import Afferent
 from fingerpad.neuron.afferent_types import RA
 from fingerpad.neuron.population import Population
-from fingerpad.psychophysics.ideal_observer import present
-from fingerpad.psychophysics.response_models import multiplied_responses
+from fingerpad.psychophysics.ideal_observer import multiplied_responses, present
 from fingerpad.reduction.model import ON_THE_PAD, ReducedModel
 from fingerpad.reduction.streaming import ReducedTouch
 from fingerpad.reduction.training import first_touch_mm

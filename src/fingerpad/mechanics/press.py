@@ -29,15 +29,28 @@ from fingerpad.mechanics.balance import (
 )
 from fingerpad.mechanics.configuration import SMALLEST_FORCE_MN, Balance, Body, Load, Reached
 from fingerpad.mechanics.contact import Contact, Placement, check_friction
-from fingerpad.mechanics.fields import ElementFields, FieldState, Watched, cauchy_stress, fields_over_time
+from fingerpad.mechanics.fields import (
+    ElementFields,
+    FieldState,
+    SkinContact,
+    Watched,
+    cauchy_stress,
+    fields_over_time,
+    skin_contact,
+)
 from fingerpad.mechanics.friction import Anchors
 from fingerpad.mechanics.linear import NO_NODES, LinearSolver, choose_preconditioner, free_degrees_of_freedom
 from fingerpad.mechanics.materials import Material, MaterialTable
 from fingerpad.mechanics.mixed import MIXED_POISSON
 from fingerpad.mechanics.newton import FIRST_DEPTH_MM, Equilibrium, NewtonSettings, find_equilibrium
-from fingerpad.mechanics.press_settings import MOST_SOLVED, SAME_TIME, PressSettings
-from fingerpad.mechanics.skin_contact import SkinContact, skin_contact
-from fingerpad.mechanics.small_bodies import contact_about, steps_of_advance, steps_of_slide
+from fingerpad.mechanics.press_settings import (
+    MOST_SOLVED,
+    SAME_TIME,
+    PressSettings,
+    contact_about,
+    steps_of_advance,
+    steps_of_slide,
+)
 from fingerpad.mechanics.steps import Phase, adaptive_steps, steps_at
 from fingerpad.mechanics.viscoelastic import (
     StepCoefficients,

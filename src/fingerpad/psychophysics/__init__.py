@@ -10,15 +10,17 @@ from fingerpad.psychophysics.counts import JudgementCounts
 from fingerpad.psychophysics.functions import PsychometricFunction
 from fingerpad.psychophysics.ideal_observer import (
     Discriminability,
+    GaussianResponses,
     Presentation,
+    ResponseModel,
     Statistic,
     discriminability,
     efficiency,
     gaussian_information,
+    multiplied_responses,
     present,
 )
 from fingerpad.psychophysics.psychometric import PsychometricFit, fit_psychometric
-from fingerpad.psychophysics.response_models import GaussianResponses, ResponseModel, multiplied_responses
 from fingerpad.psychophysics.sensitivity import (
     TASKS,
     Sensitivity,
@@ -38,35 +40,10 @@ from fingerpad.psychophysics.uncertainty import (
 )
 
 __all__ = [
-    "TASKS",
-    "CodeEfficiency",
-    "Discriminability",
-    "FunctionCloud",
-    "GaussianResponses",
-    "GoodnessOfFit",
-    "JudgementCounts",
-    "Presentation",
-    "PsychometricFit",
-    "PsychometricFunction",
-    "ResponseModel",
-    "Sensitivity",
-    "Statistic",
-    "bootstrap",
-    "code_efficiency",
-    "code_statistic",
-    "d_prime_of_proportion",
-    "discriminability",
-    "efficiency",
-    "fit_psychometric",
-    "forced_choice",
-    "gaussian_information",
-    "goodness_of_fit",
-    "multiplied_responses",
-    "noisy_presentations",
-    "posterior",
-    "present",
-    "same_different_by_difference",
-    "same_different_by_looks",
-    "sensitivity",
-    "yes_no",
-]
+    "TASKS", "CodeEfficiency", "Discriminability", "FunctionCloud", "GaussianResponses", "GoodnessOfFit",
+    "JudgementCounts", "Presentation", "PsychometricFit", "PsychometricFunction", "ResponseModel",
+    "Sensitivity", "Statistic", "bootstrap", "code_efficiency", "code_statistic", "d_prime_of_proportion",
+    "discriminability", "efficiency", "fit_psychometric", "forced_choice", "gaussian_information",
+    "goodness_of_fit", "multiplied_responses", "noisy_presentations", "posterior", "present",
+    "same_different_by_difference", "same_different_by_looks", "sensitivity", "yes_no",
+]  # fmt: skip

@@ -21,12 +21,13 @@ from fingerpad.psychophysics.encoding import distance, gradient_sum
 from fingerpad.psychophysics.ideal_observer import (
     Discriminability,
     Presentation,
+    ResponseModel,
     Statistic,
     efficiency,
+    multiplied_responses,
     present,
 )
 from fingerpad.psychophysics.noisy_responses import session_trials
-from fingerpad.psychophysics.response_models import ResponseModel, multiplied_responses
 
 POPULATION_CODES = ("gradient_sum", "euclidean")
 SMALLEST_SPREAD = 1.0

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from fingerpad.mechanics.inertia import LARGEST_SHARE, inertial_share
-from fingerpad.mechanics.stability import STABLE_STRETCHES
+from fingerpad.mechanics.materials import STABLE_STRETCHES
 
 if TYPE_CHECKING:
     from fingerpad.skin.sampling import SkinResponse

@@ -8,8 +8,10 @@ the key of a touch depends on this file.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import Enum
+from operator import attrgetter
+from pkgutil import resolve_name
 from typing import TYPE_CHECKING
 
 # Only for types: the command line reads the names of the quantities here, without compiling anything.
@@ -79,214 +81,120 @@ class Field:
         return values[-1] if self.stored is Times.LAST else values
 
 
-def _von_mises_at_last_time(deformation: Deformation, _: Mesh) -> FloatArray:
-    from fingerpad.mechanics.fields import von_mises
+def _by(path: str) -> Callable[[Deformation, Mesh], FloatArray]:
+    """Return an attribute of a deformation, as `Field.of` does."""
+    return lambda deformation, _: attrgetter(path)(deformation)
 
-    return von_mises(deformation.stress_kpa)[None]
 
+def _at_last_time(function: str) -> Callable[[Deformation, Mesh], FloatArray]:
+    """Values of a function of `mechanics.fields` of the stress at the last time."""
 
-def _compression_at_last_time(deformation: Deformation, _: Mesh) -> FloatArray:
-    from fingerpad.mechanics.fields import largest_compression
+    def of(deformation: Deformation, _: Mesh) -> FloatArray:
+        values: FloatArray = resolve_name(f"fingerpad.mechanics.fields:{function}")(deformation.stress_kpa)
+        return values[None]
 
-    return largest_compression(deformation.stress_kpa)[None]
+    return of
 
 
 def _of_press(
-    name: str,
-    unit: str,
-    long_name: str,
-    of: Callable[[Deformation], FloatArray],
-    components: int = 1,
-    exported: str = "",
+    name: str, unit: str, long_name: str, path: str = "", components: int = 1, exported: str = ""
 ) -> Field:
     """Field of the whole press over time, stored and exported."""
-    return Field(
-        name,
-        unit,
-        long_name,
-        Place.PRESS,
-        lambda d, _: of(d),
-        components,
-        stored=Times.ALL,
-        exported=exported or name,
-    )
+    of = _by(path or name)
+    return Field(name, unit, long_name, Place.PRESS, of, components, Times.ALL, exported=exported or name)
+
+
+def _at_skin(
+    name: str, unit: str, long_name: str, path: str, components: int = 1, exported: str = ""
+) -> Field:
+    """Field at nodes of the skin over time, stored and exported."""
+    of = _by(path)
+    return Field(name, unit, long_name, Place.SKIN_NODE, of, components, Times.ALL, exported=exported or name)
 
 
 def _watched(
-    name: str,
-    unit: str,
-    long_name: str,
-    attribute: str,
-    *,
-    components: int = 1,
-    sampled: bool = False,
-    exported: str = "",
+    name: str, unit: str, long_name: str, attribute: str, components: int = 1, exported: str = ""
 ) -> Field:
-    """Field of elements that `ElementFields` computes; those that are sampled are stored."""
-    return Field(
-        name,
-        unit,
-        long_name,
-        Place.WATCHED,
-        lambda deformation, _: getattr(deformation.fields, attribute),
-        components,
-        stored=Times.ALL if sampled else Times.NONE,
-        sampled=name if sampled else "",
-        exported=exported or attribute,
+    """Field of elements that `ElementFields` computes, exported."""
+    of = _by(f"fields.{attribute}")
+    return Field(name, unit, long_name, Place.WATCHED, of, components, exported=exported or attribute)
+
+
+def _sampled(name: str, unit: str, long_name: str, attribute: str, exported: str = "") -> Field:
+    """Field of elements that `ElementFields` computes, exported, stored and sampled."""
+    return replace(
+        _watched(name, unit, long_name, attribute, exported=exported), stored=Times.ALL, sampled=name
     )
 
 
 FIELDS: dict[str, Field] = {
     field.name: field
     for field in (
-        _of_press("times_ms", "ms", "time", lambda d: d.times_ms, exported="TimeValue"),
+        _of_press("times_ms", "ms", "time", exported="TimeValue"),
+        _of_press("force_mn", "mN", "force of the indenter along its axis, on the whole finger"),
+        _of_press("depth_mm", "mm", "advance of the indenter since first touch"),
         _of_press(
-            "force_mn",
-            "mN",
-            "force of the indenter along its axis, on the whole finger",
-            lambda d: d.force_mn,
+            "contact_area_mm2", "mm²", "undeformed skin that the indenter touches, on the whole finger",
+            "contact.area_mm2",
         ),
-        _of_press("depth_mm", "mm", "advance of the indenter since first touch", lambda d: d.depth_mm),
+        _of_press("contact_force_mn", "mN", "force of the indenter on the skin, with friction", components=3),
+        _of_press("reaction_mn", "mN", "force of the tissue on bone and nail", components=3),
+        _of_press("external_uj", "µJ", "work of the indenter", "energy.external_uj"),
+        _of_press("stored_uj", "µJ", "stored energy", "energy.stored_uj"),
         _of_press(
-            "contact_area_mm2",
-            "mm²",
-            "undeformed skin that the indenter touches, on the whole finger",
-            lambda d: d.contact.area_mm2,
+            "dissipated_uj", "µJ", "energy dissipated by relaxation and friction", "energy.dissipated_uj"
         ),
-        _of_press(
-            "contact_force_mn",
-            "mN",
-            "force of the indenter on the skin, with friction",
-            lambda d: d.contact_force_mn,
-            components=3,
-        ),
-        _of_press(
-            "reaction_mn", "mN", "force of the tissue on bone and nail", lambda d: d.reaction_mn, components=3
-        ),
-        _of_press("external_uj", "µJ", "work of the indenter", lambda d: d.energy.external_uj),
-        _of_press("stored_uj", "µJ", "stored energy", lambda d: d.energy.stored_uj),
-        _of_press(
-            "dissipated_uj",
-            "µJ",
-            "energy dissipated by relaxation and friction",
-            lambda d: d.energy.dissipated_uj,
-        ),
-        _of_press("contact_uj", "µJ", "energy in the springs of the contact", lambda d: d.energy.contact_uj),
+        _of_press("contact_uj", "µJ", "energy in the springs of the contact", "energy.contact_uj"),
         Field(
-            "skin_displacement_mm",
-            "mm",
-            "displacement of the skin",
-            Place.SKIN_NODE,
-            lambda d, mesh: d.displacement_mm[:, mesh.skin_nodes],
-            components=3,
-            stored=Times.ALL,
+            "skin_displacement_mm", "mm", "displacement of the skin", Place.SKIN_NODE,
+            lambda d, mesh: d.displacement_mm[:, mesh.skin_nodes], components=3, stored=Times.ALL,
         ),
         Field(
-            "displacement_mm",
-            "mm",
-            "displacement",
-            Place.NODE,
-            lambda d, _: d.displacement_mm,
-            components=3,
-            stored=Times.LAST,
-            exported="displacement_mm",
+            "displacement_mm", "mm", "displacement", Place.NODE, _by("displacement_mm"), components=3,
+            stored=Times.LAST, exported="displacement_mm",
         ),
-        Field(
-            "contact_pressure_kpa",
-            "kPa",
-            "pressure of the indenter on the skin",
-            Place.SKIN_NODE,
-            lambda d, _: d.contact.pressure_kpa,
-            stored=Times.ALL,
-            exported="contact_pressure_kpa",
+        _at_skin(
+            "contact_pressure_kpa", "kPa", "pressure of the indenter on the skin", "contact.pressure_kpa"
         ),
-        Field(
-            "shear_kpa",
-            "kPa",
-            "friction over the area of the skin",
-            Place.SKIN_NODE,
-            lambda d, _: d.contact.shear_kpa,
-            components=3,
-            stored=Times.ALL,
+        _at_skin(
+            "shear_kpa", "kPa", "friction over the area of the skin", "contact.shear_kpa", components=3,
             exported="contact_shear_kpa",
         ),
+        _at_skin("slip_mm", "mm", "way that skin in contact has slid", "contact.slip_mm"),
         Field(
-            "slip_mm",
-            "mm",
-            "way that skin in contact has slid",
-            Place.SKIN_NODE,
-            lambda d, _: d.contact.slip_mm,
-            stored=Times.ALL,
-            exported="slip_mm",
+            "sed_kpa", "kPa", "strain energy density", Place.ELEMENT, _by("sed_kpa"), stored=Times.ALL,
+            sampled="stored", exported="sed_stored_kpa",
         ),
         Field(
-            "sed_kpa",
-            "kPa",
-            "strain energy density",
-            Place.ELEMENT,
-            lambda d, _: d.sed_kpa,
-            stored=Times.ALL,
-            sampled="stored",
-            exported="sed_stored_kpa",
+            "von_mises_kpa", "kPa", "von Mises stress at the last time", Place.ELEMENT,
+            _at_last_time("von_mises"), stored=Times.LAST,
         ),
         Field(
-            "von_mises_kpa",
-            "kPa",
-            "von Mises stress at the last time",
-            Place.ELEMENT,
-            _von_mises_at_last_time,
-            stored=Times.LAST,
+            "compressive_stress_kpa", "kPa", "largest compressive stress at the last time", Place.ELEMENT,
+            _at_last_time("largest_compression"), stored=Times.LAST,
         ),
-        Field(
-            "compressive_stress_kpa",
-            "kPa",
-            "largest compressive stress at the last time",
-            Place.ELEMENT,
-            _compression_at_last_time,
-            stored=Times.LAST,
-        ),
-        _watched(
-            "instantaneous",
-            "kPa",
-            "strain energy density without relaxation",
-            "instantaneous_kpa",
-            sampled=True,
+        _sampled(
+            "instantaneous", "kPa", "strain energy density without relaxation", "instantaneous_kpa",
             exported="sed_instantaneous_kpa",
         ),
-        _watched(
-            "work", "kPa", "work of the stress per volume", "work_kpa", sampled=True, exported="sed_work_kpa"
-        ),
-        _watched("von_mises", "kPa", "von Mises stress", "von_mises_kpa", sampled=True),
-        _watched(
-            "compressive_strain",
-            "",
-            "largest compressive logarithmic strain",
-            "compressive_strain",
-            sampled=True,
-        ),
-        _watched(
-            "compressive_stress", "kPa", "largest compressive stress", "compressive_stress_kpa", sampled=True
-        ),
+        _sampled("work", "kPa", "work of the stress per volume", "work_kpa", exported="sed_work_kpa"),
+        _sampled("von_mises", "kPa", "von Mises stress", "von_mises_kpa"),
+        _sampled("compressive_strain", "", "largest compressive logarithmic strain", "compressive_strain"),
+        _sampled("compressive_stress", "kPa", "largest compressive stress", "compressive_stress_kpa"),
         _watched("stress", "kPa", "Cauchy stress", "stress_kpa", components=6),
         _watched("strain", "", "logarithmic strain", "strain", components=6),
         _watched("green_lagrange_strain", "", "Green-Lagrange strain", "green_lagrange_strain", components=6),
         _watched(
-            "principal_stress",
-            "kPa",
-            "principal Cauchy stresses, smallest first",
-            "principal_stress_kpa",
+            "principal_stress", "kPa", "principal Cauchy stresses, smallest first", "principal_stress_kpa",
             components=3,
         ),
         _watched(
-            "principal_strain",
-            "",
-            "principal logarithmic strains, smallest first",
-            "principal_strain",
+            "principal_strain", "", "principal logarithmic strains, smallest first", "principal_strain",
             components=3,
         ),
         _watched("pressure", "kPa", "mean compressive stress", "pressure_kpa"),
     )
-}
+}  # fmt: skip
 
 
 def stored_fields() -> tuple[Field, ...]:

@@ -43,8 +43,7 @@ from fingerpad.psychophysics.code_efficiency import (
 from fingerpad.psychophysics.counts import binomial_interval
 from fingerpad.psychophysics.discrimination import Experiment
 from fingerpad.psychophysics.encoding import taking_part
-from fingerpad.psychophysics.ideal_observer import Presentation
-from fingerpad.psychophysics.response_models import multiplied_responses
+from fingerpad.psychophysics.ideal_observer import Presentation, multiplied_responses
 
 _UNITS = {
     "_per_m": "1/m",

@@ -18,8 +18,7 @@ from fingerpad.inference.identifiable import six_parameters
 from fingerpad.inference.rate_model import AfferentModel
 from fingerpad.inference.rate_problem import RateProblem
 from fingerpad.inference.recordings import RateRecordings, SpikeRecordings
-from fingerpad.inference.soft_afferent import SoftAfferent
-from fingerpad.inference.spike_fit import fit_spikes
+from fingerpad.inference.spike_fit import SoftAfferent, fit_spikes
 from fingerpad.inference.spike_likelihood import SpikeLikelihood, time_rescaling
 from fingerpad.inference.start_points import spike_start
 from fingerpad.neuron.transduction import Drive
