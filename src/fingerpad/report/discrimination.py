@@ -178,9 +178,9 @@ def caption_observers(section: SphereDiscrimination) -> str:
         f"of {number(section.goodwin.trials)} trials, an assumed number. (a-c) Gradient Sum of static rates, "
         "dynamic rates and first-spike latencies, (d) Euclidean Distance of static rates, all with the noise "
         "that was fitted to the diamonds with the code of (a). (e, f) The paper's noise on either side of "
-        "its best; (g) 10 noise matrices in place of 100; (h) the paper's best noise. In the paper the static "
-        "Gradient Sum fits best and hardly depends on the shift, dynamic rates and latencies depend on it, "
-        "more noise lowers the curve, and fewer matrices widen the bars."
+        "its best; (g) 10 noise matrices in place of 100; (h) the paper's best noise. In the paper the "
+        "static Gradient Sum fits best and hardly depends on the shift, dynamic rates and latencies depend "
+        "on it, more noise lowers the curve, and fewer matrices widen the bars."
     )
 
 
