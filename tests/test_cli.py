@@ -12,7 +12,7 @@ import typer
 
 import fingerpad as fp
 from fingerpad import __version__, cli
-from fingerpad.cli import choices
+from fingerpad.cli import options as choices
 from fingerpad.core.errors import ConvergenceError, FingerpadError, StoreError
 from fingerpad.data.tissues import DEFAULT_TISSUES
 from fingerpad.experiments import gerling2014

@@ -14,7 +14,7 @@ import pytest
 import typer
 
 from fingerpad import cli
-from fingerpad.cli import choices
+from fingerpad.cli import options as choices
 from fingerpad.core.compilation import SHORT_NOTICE, SUBJECT
 from fingerpad.core.errors import ConvergenceError, InputError
 from fingerpad.core.random_streams import Presentations
@@ -26,6 +26,7 @@ from fingerpad.experiments.afferent_files import fitted_afferent
 from fingerpad.experiments.conditions import RECEPTOR_X_MM, Conditions
 from fingerpad.experiments.descriptions.stimuli import NamedStimulus
 from fingerpad.experiments.fit import fit as study
+from fingerpad.experiments.fit import rate_uncertainty as recording_posterior
 from fingerpad.experiments.fit import session
 from fingerpad.experiments.fit.methods import METHODS, check_spikes
 from fingerpad.experiments.fit.rate_uncertainty import rate_posterior

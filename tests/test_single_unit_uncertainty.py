@@ -13,7 +13,7 @@ from fingerpad.experiments.gerling2014.single_unit_uncertainty import Uncertaint
 from fingerpad.inference.identifiable import IDENTIFIABLE_NAMES, identifiable
 from fingerpad.inference.rate_model import AfferentModel
 from fingerpad.inference.recordings import RateRecordings
-from fingerpad.report import single_unit_uncertainty as report
+from fingerpad.report import single_unit as report
 from fingerpad.report.style import png
 from sections import SED_DRIVEN
 

@@ -16,11 +16,11 @@ from fingerpad.experiments.gerling2014 import (
     comparison,
     discrimination_claims,
     nail_border,
-    response_maps,
     single_unit,
     skin_deflection,
     sphere_discrimination,
 )
+from fingerpad.experiments.gerling2014 import three_levels as response_maps
 from fingerpad.experiments.gerling2014.claim_row import ClaimRow, Group, Verdict, paired, two_digits
 from fingerpad.experiments.gerling2014.single_unit import FiringCourse, _dynamic_share, _peak_ms
 from fingerpad.experiments.gerling2014.skin_deflection import SkinForce

@@ -14,7 +14,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from fingerpad import cli
-from fingerpad.cli import choices
+from fingerpad.cli import options as choices
 from fingerpad.core.errors import ConvergenceError, InputError
 from fingerpad.data import cylinder_deflection, protocol
 from fingerpad.experiments import scores

@@ -30,11 +30,6 @@ ENLARGED_MM, THIN_MM = (1.3, 2.0), 0.2
 """Half the width and the height of the enlarged part; what is thinner is named beside it. [mm]"""
 
 
-def faces_of(right_mm: FloatArray, up_mm: FloatArray) -> FloatArray:
-    """Corners of the faces between the nodes of a grid, (n_faces, 4, 2). [mm]"""
-    return corners(np.stack([right_mm, up_mm], axis=-1))
-
-
 def corners(points: np.ndarray) -> np.ndarray:
     """Return the four corners of each face of a grid of points, (n_faces, 4, ...)."""
     around = (points[:-1, :-1], points[1:, :-1], points[1:, 1:], points[:-1, 1:])
@@ -85,7 +80,7 @@ def _draw_solid(
     paint = [colours * _brightness(faces, sign)[:, None] for faces, sign in zip(solid, halves, strict=True)]
     if plane is not None:
         # A hair before the middle, so that it covers what lies behind.
-        flat = faces_of(plane.right_mm, plane.up_mm)
+        flat = corners(np.stack([plane.right_mm, plane.up_mm], axis=-1))
         solid.append(np.stack([flat[..., 0], np.full(flat.shape[:2], -0.01), flat[..., 1]], axis=-1))
         layers = np.array([to_rgb(colour) for colour in LAYER_COLOURS])[section.layer]
         paint.append(np.tile(layers, (plane.right_mm.shape[0] - 1, 1)))
@@ -142,15 +137,13 @@ def _draw_plane(axes: Axes, plane: MeshPlane, section: MeshPicture, lines: float
     right, up = sign * plane.right_mm, plane.up_mm
     colours = np.tile(np.array(LAYER_COLOURS)[section.layer], right.shape[0] - 1)
     axes.fill(right[:, -1], up[:, -1], facecolor=BONE, edgecolor="none", zorder=0)
-    axes.add_collection(
-        PolyCollection(
-            list(faces_of(right, up)), facecolors=colours.tolist(), edgecolors="#00000080", linewidths=lines
-        )
-    )
+    faces, edges = list(corners(np.stack([right, up], axis=-1))), "#00000080"
+    drawn = PolyCollection(faces, facecolors=colours.tolist(), edgecolors=edges, linewidths=lines)
+    axes.add_collection(drawn)
     skin = np.stack([right[:, 0], up[:, 0]], axis=-1)
     covered = plane.under_nail[1:] & plane.under_nail[:-1]
-    edges = np.stack([skin[:-1], skin[1:]], axis=1)[covered]
-    axes.add_collection(LineCollection(list(edges), colors=NAIL, linewidths=NAIL_WIDTH, capstyle="round"))
+    nail = np.stack([skin[:-1], skin[1:]], axis=1)[covered]
+    axes.add_collection(LineCollection(list(nail), colors=NAIL, linewidths=NAIL_WIDTH, capstyle="round"))
     axes.autoscale_view()
 
 
@@ -161,14 +154,9 @@ def _name_fixed_parts(axes: Axes, plane: MeshPlane, mirrored: bool) -> None:
     axes.text(0.0 if mirrored else right, up, "bone", ha="center", va="center")
     nail = plane.right_mm[plane.under_nail, 0], plane.up_mm[plane.under_nail, 0]
     if nail[0].size:
-        axes.annotate(
-            "nail",
-            (0.0 if mirrored else float(nail[0].mean()), float(nail[1].max())),
-            xytext=(0.0, 6.0),
-            textcoords="offset points",
-            ha="center",
-            color=NAIL,
-        )
+        place = (0.0 if mirrored else float(nail[0].mean()), float(nail[1].max()))
+        beside: Any = {"xytext": (0.0, 6.0), "textcoords": "offset points", "ha": "center"}
+        axes.annotate("nail", place, color=NAIL, **beside)
         axes.set_ylim(top=axes.get_ylim()[1] + 1.5)
 
 

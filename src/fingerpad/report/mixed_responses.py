@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from itertools import cycle
 from typing import Any
 
 import numpy as np
@@ -62,9 +63,7 @@ def draw_mixed_responses(touches: Mapping[str, Mapping[str, ResponseMap]]) -> Fi
 def draw_raster_by_type(axes: Axes, maps: Mapping[str, ResponseMap]) -> None:
     """Draw all spikes over time, in a band per type that the afferents which fire divide among them."""
     labels = []
-    for band, ((name, response), (colour, _)) in enumerate(
-        zip(maps.items(), _styles(len(maps)), strict=True)
-    ):
+    for band, ((name, response), (colour, _)) in enumerate(zip(maps.items(), cycle(STYLES), strict=False)):
         counts = response.spike_count
         middle = response.positions_mm.mean(axis=0)
         order = np.argsort(np.linalg.norm(response.positions_mm - middle, axis=1))
@@ -85,7 +84,7 @@ def draw_raster_by_type(axes: Axes, maps: Mapping[str, ResponseMap]) -> None:
 
 def draw_map_by_type(axes: Axes, maps: Mapping[str, ResponseMap]) -> None:
     """Draw where the afferents lie, with larger marks for more spikes."""
-    for (name, response), (colour, marker) in zip(maps.items(), _styles(len(maps)), strict=True):
+    for (name, response), (colour, marker) in zip(maps.items(), cycle(STYLES), strict=False):
         counts = response.spike_count
         x, z = response.positions_mm[:, 0], response.positions_mm[:, -1]
         axes.scatter(x[counts == 0], z[counts == 0], SILENT_MARK, color=colour, marker=".", linewidths=0.0)
@@ -103,7 +102,3 @@ def draw_trains(axes: Axes, trains: Sequence[FloatArray]) -> None:
     rows = list(range(1, len(trains) + 1))
     axes.eventplot(trains, lineoffsets=rows, linelengths=0.75, linewidths=1.0, colors=BLACK)
     axes.set(xlabel="time [ms]", ylim=(len(trains) + 0.75, 0.25), yticks=[])
-
-
-def _styles(count: int) -> list[tuple[str, Any]]:
-    return [STYLES[number % len(STYLES)] for number in range(count)]

@@ -14,8 +14,9 @@ from matplotlib.patches import Rectangle
 
 from fingerpad.core.checks import FloatArray
 from fingerpad.data import protocol
-from fingerpad.experiments.gerling2014.three_levels import PopulationMaps, RestingResponse
+from fingerpad.experiments.gerling2014.three_levels import PopulationMaps
 from fingerpad.report.formatting import number
+from fingerpad.report.mixed_responses import MAP_AXES
 from fingerpad.report.style import COLUMN_IN, GREY, PALE, new_figure, say_nothing_to_draw
 
 QUANTITIES = {
@@ -42,18 +43,13 @@ def draw_population(section: PopulationMaps) -> Figure:
             say_nothing_to_draw(plane, "no afferent fires")
             surface.set_axis_off()
             continue
-        scale = scaling(*_span(values), clip=True)
+        low, high = float(np.nanmin(values)), float(np.nanmax(values))
+        scale = scaling(low, max(high, 1.001 * low, 1e-3), clip=True)  # apart, as logarithms need it
         _surface(surface, x, z, values, label, colours, scale)
         _map(plane, x, z, values, label, colours, scale, receptors)
         # Until it is drawn, Matplotlib 3.11.0 lays a surface out as if it filled the figure.
         surface.draw(figure.canvas.get_renderer())  # type: ignore[attr-defined]
     return figure
-
-
-def _span(values: FloatArray) -> tuple[float, float]:
-    """Lowest and highest value; apart from each other, as logarithms need it."""
-    low, high = float(np.nanmin(values)), float(np.nanmax(values))
-    return low, max(high, 1.001 * low, 1e-3)
 
 
 def round_ticks(scale: Normalize) -> list[float]:
@@ -98,55 +94,35 @@ def _surface(
 
 
 def _map(
-    axes: Axes,
-    x: FloatArray,
-    z: FloatArray,
-    values: FloatArray,
-    label: str,
-    colours: str,
-    scale: Normalize,
+    axes: Axes, x: FloatArray, z: FloatArray, values: FloatArray, label: str, colours: str, scale: Normalize,
     receptors: FloatArray,
-) -> None:
+) -> None:  # fmt: skip
     picture = axes.pcolormesh(
         x, z, np.ma.masked_where(~(values.T > 0.0), values.T), cmap=colours, norm=scale, shading="nearest"
     )
     silent = Rectangle((0, 0), 1, 1, transform=axes.transAxes, facecolor=PALE, hatch="//", edgecolor=GREY)
     silent.set(zorder=0, linewidth=0.0)
     axes.add_patch(silent)
-    axes.plot(
-        receptors[:, 0],
-        receptors[:, 1],
-        "o",
-        markersize=4.5,
-        color="white",
-        markeredgecolor="black",
-        label=f"{len(receptors)} receptors",
-    )
-    axes.set_aspect("equal")
+    dots: Any = {"markersize": 4.5, "color": "white", "markeredgecolor": "black"}
+    axes.plot(receptors[:, 0], receptors[:, 1], "o", label=f"{len(receptors)} receptors", **dots)
+    axes.set(**MAP_AXES)
     axes.grid(visible=False)
-    axes.set_xlabel("x, distal [mm]")
-    axes.set_ylabel("z, lateral [mm]")
     with_round_ticks(axes.figure.colorbar(picture, ax=axes, label=label, shrink=0.85), scale)
     axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), borderaxespad=0.1)
 
 
 def caption_population(section: PopulationMaps, human: PopulationMaps) -> str:
     """Caption of Figure 6."""
-    resting = [_resting(name, each.at_rest) for name, each in (("paper", section), ("human", human))]
+    resting = "".join(
+        f" The afferent of {name} also fires without touch, {number(each.at_rest.static_rate_hz)} spikes/s "
+        f"from {number(each.at_rest.first_spike_latency_ms)} ms on."
+        for name, each in (("paper", section), ("human", human))
+        if np.isfinite(each.at_rest.first_spike_latency_ms)
+    )
     return (
         f"Predicted response of afferents all over the pad to a sphere of {number(section.curvature_per_m)} "
         f"1/m, at a depth of {protocol.DEPTH.value} mm. Left: the quantity as a height, as in the paper, but "
         "latencies on a logarithmic scale. Right: the same seen from above; circles are the receptors of "
         "Figures 7 and 8, hatched skin does not respond. All afferents have the parameters of the fitted "
-        f"afferent; nothing here was observed.{''.join(resting)}"
-    )
-
-
-def _resting(name: str, rest: RestingResponse) -> str:
-    """Describe the response of afferents of a set without touch, if there is one."""
-    if np.isnan(rest.first_spike_latency_ms):
-        return ""
-    return (
-        f" The afferent of {name} also fires without touch, {number(rest.static_rate_hz)} spikes/s from "
-        f"{number(rest.first_spike_latency_ms)} ms on."
+        f"afferent; nothing here was observed.{resting}"
     )

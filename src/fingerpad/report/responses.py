@@ -66,16 +66,8 @@ def _dots(axes: Any, response: ResponseMap, values: FloatArray, colours: str, sc
         silent, answers = plane[side & ~(values > 0.0)], plane[side & (values > 0.0)]
         known = values[side & (values > 0.0)]
         axes.scatter(*silent.T, s=size, marker=marker, facecolors="none", edgecolors=GREY, linewidths=0.6)
-        dots = axes.scatter(
-            *answers.T,
-            s=size,
-            marker=marker,
-            c=known,
-            cmap=colours,
-            norm=scale,
-            edgecolors=GREY,
-            linewidths=0.6,
-        )
+        edge = {"edgecolors": GREY, "linewidths": 0.6}
+        dots = axes.scatter(*answers.T, s=size, marker=marker, c=known, cmap=colours, norm=scale, **edge)
     axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), **MAP_AXES)
     axes.grid(visible=False)
     return dots

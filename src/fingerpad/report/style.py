@@ -99,16 +99,11 @@ def write_png(draw: Callable[[Any], Figure], section: Any, path: Path) -> Path:
     Parameters
     ----------
     draw : callable
-        One of the report's, such as `responses.draw`.
+        One of the report's, such as `responses.draw_responses`.
     section : Any
         What it draws.
     path : Path
         The file; folders are made as needed, and it is there whole or not at all.
-
-    Returns
-    -------
-    Path
-        The file.
 
     Raises
     ------

@@ -15,7 +15,7 @@ from fingerpad.core.units import MM_PER_M
 from fingerpad.data import protocol
 from fingerpad.experiments.gerling2014.three_levels import ThreeLevels
 from fingerpad.report.formatting import fixed, joined, number
-from fingerpad.report.mesh_picture import faces_of
+from fingerpad.report.mesh_picture import corners
 from fingerpad.report.style import BLACK, BLUE, COLUMN_IN, GREY, PALE, new_figure
 from fingerpad.report.touch import DECADES, SKIN
 
@@ -42,7 +42,7 @@ def _draw_skin(axes: Axes, section: ThreeLevels) -> None:
     values = section.pressed_kpa.ravel()
     largest = float(np.max(values[values > 0.0], initial=0.0)) or 1.0
     faces = PolyCollection(
-        list(faces_of(section.x_mm, section.y_mm)),
+        list(corners(np.stack([section.x_mm, section.y_mm], axis=-1))),
         array=np.ma.masked_invalid(values),
         cmap=SKIN,
         norm=LogNorm(largest / 10.0**DECADES, largest, clip=True),

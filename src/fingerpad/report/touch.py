@@ -70,11 +70,6 @@ def save_figure(
     indenter : Indenter, optional
         The body that pressed, to be drawn as well; as it stands when it is not spun.
 
-    Returns
-    -------
-    Path
-        The file.
-
     Raises
     ------
     InputError
@@ -221,8 +216,6 @@ def draw_spikes(axes: Axes, skin: SkinResponse, response: ResponseMap) -> None:
         say_nothing_to_draw(axes, "no afferent fires a spike")
         return
     draw_trains(axes, firing)
-    axes.set(
-        ylabel=f"{len(firing)} of {len(trains)} afferents fire,\nnearest on top",
-        xlim=(0.0, skin.times_ms[-1]),
-    )
+    label = f"{len(firing)} of {len(trains)} afferents fire,\nnearest on top"
+    axes.set(ylabel=label, xlim=(0.0, skin.times_ms[-1]))
     axes.grid(visible=False)
