@@ -39,28 +39,20 @@ def test_first_touch_is_where_the_smallest_gap_is_zero(body, rotation):
     skin = rough_skin() @ rotation.T
     placement = place(body, skin, rotation @ np.array([0.2, -4.0, -0.1]), rotation)
     rounding_mm = 16 * np.spacing(13.0)  # of products with a rotation and of its own, 13 mm away
-    np.testing.assert_allclose(
-        body.gap(placement.to_local(skin, 0.0))[0].min(), 0.0, rtol=0, atol=rounding_mm
-    )
+    assert abs(body.gap(placement.to_local(skin, 0.0))[0].min()) <= rounding_mm
     assert body.gap(placement.to_local(skin, 1e-6))[0].min() < 0.0
     # The axis stays where it was asked for, and the start along it does not matter.
     further = place(body, skin, rotation @ np.array([0.2, 9.0, -0.1]), rotation)
     np.testing.assert_allclose(further.origin_mm, placement.origin_mm, rtol=0, atol=rounding_mm)
 
 
-def test_first_touch_of_a_ball_with_one_node_beside_its_axis():
-    skin = np.array([[1.2, 0.0, 0.0]])
-    placement = place(SPHERE, skin, np.array([0.0, -7.0, 0.0]), np.eye(3))
-    np.testing.assert_allclose(
-        placement.origin_mm, [0.0, RADIUS - np.sqrt(RADIUS**2 - 1.2**2), 0.0], atol=1e-14
-    )
-
-
-@pytest.mark.parametrize("body", [SPHERE, Line()], ids=["Sphere", "Line"])
-def test_passing_by_is_refused(body):
-    with pytest.raises(InputError, match="never touches") as refusal:
-        place(body, np.array([[5.0, 0.0, 0.0]]), np.zeros(3), np.eye(3))
-    assert str(refusal.value).endswith(".")
+def test_first_touch_of_one_node_beside_the_axis_and_of_none():
+    placement = place(SPHERE, np.array([[1.2, 0.0, 0.0]]), np.array([0.0, -7.0, 0.0]), np.eye(3))
+    expected = [0.0, RADIUS - np.sqrt(RADIUS**2 - 1.2**2), 0.0]
+    np.testing.assert_allclose(placement.origin_mm, expected, atol=1e-14)
+    for body in (SPHERE, Line()):
+        with pytest.raises(InputError, match=r"never touches.*\.$"):
+            place(body, np.array([[5.0, 0.0, 0.0]]), np.zeros(3), np.eye(3))
 
 
 def test_frame_moves_with_the_depth():
@@ -83,7 +75,7 @@ def tilted_contact(body, seed=2, n=12):
 
 
 @pytest.mark.parametrize("body", BODIES, ids=NAMES)
-def test_force_is_the_slope_of_the_potential(body):
+def test_force_is_the_slope_of_the_potential_and_stiffness_with_curvature_that_of_the_force(body):
     contact, positions, depth, multipliers = tilted_contact(body)
     state = contact.state(positions, depth, multipliers)
     assert (np.linalg.norm(state.force_mn, axis=1) > 0).sum() >= 3
@@ -96,12 +88,6 @@ def test_force_is_the_slope_of_the_potential(body):
         behind = contact.state(positions - offset, depth, multipliers).potential
         slope[index] = (ahead - behind) / (2 * step)
     np.testing.assert_allclose(state.force_mn, -slope, rtol=0, atol=1e-6 * np.abs(slope).max())
-
-
-@pytest.mark.parametrize("body", BODIES, ids=NAMES)
-def test_stiffness_with_curvature_is_the_slope_of_the_force(body):
-    contact, positions, depth, multipliers = tilted_contact(body)
-    state = contact.state(positions, depth, multipliers)
     stiffness = state.stiffness + contact.curvature_stiffness(state, positions, depth)
     step = 1e-7
     for axis, offset in enumerate(step * np.eye(3)):
@@ -130,12 +116,11 @@ def test_pressures_by_hand():
 
 
 def test_pressed_node_that_hovers_is_a_misfit_and_no_penetration():
+    """A far node is neither pressed nor inside."""
     contact = Contact(Plate(), Placement(np.zeros(3), np.eye(3)), np.arange(2), np.full(2, 0.1), 1000.0)
     state = contact.state(np.array([[0.0, 0.53, 0.0], [0.0, 0.9, 0.0]]), 0.5, np.array([4.0, 0.0]))
     assert state.penetration_mm == 0.0
-    np.testing.assert_allclose(
-        state.misfit_mm, 0.03, rtol=1e-12
-    )  # the far node is neither pressed nor inside
+    np.testing.assert_allclose(state.misfit_mm, 0.03, rtol=1e-12)
 
 
 def test_augmentation_keeps_the_force_of_a_node_that_no_longer_penetrates():
@@ -168,9 +153,8 @@ def force_of_a_bar(size_mm, wider_mm=0.0):
     fine = size_mm * np.arange(-round(3.0 / size_mm), round(3.0 / size_mm) + 1)
     depths = np.cumsum(np.concatenate([[0.0], min(size_mm, 0.3) * 1.25 ** np.arange(20)]))
     depths = depths[: np.searchsorted(depths, 4.0) + 1] * (4.0 / depths[np.searchsorted(depths, 4.0)])
-    mesh = block_mesh(
-        np.concatenate([-beside[::-1], fine, beside]), depths, [0.0, 0.5], [2] * (depths.size - 1), True
-    )
+    along = np.concatenate([-beside[::-1], fine, beside])
+    mesh = block_mesh(along, depths, [0.0, 0.5], [2] * (depths.size - 1), True)
     motion, steps = RampAndHold(depth_mm=0.6, ramp_ms=50, hold_ms=10), PressSettings(6, 1)
     still = Placement(np.zeros(3), np.eye(3))
     tissue = (Material.neo_hooke(30.0, 0.4),) * 4

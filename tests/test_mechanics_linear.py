@@ -67,18 +67,13 @@ def test_free_degrees_of_freedom_by_hand():
     assert gripped.tolist() == [1, 2, 7]
 
 
-def test_factor_solves_to_double_precision():
+def test_factor_and_solver_solve_to_double_precision():
     blocks, residual = tangent(), residual_of()
     factor = SuperLuFactor(*SPARSITY.entries(FREE))
     factor.renew(blocks)
     exact = direct(blocks, residual)
     np.testing.assert_allclose(factor.solve(residual), exact, rtol=0, atol=1e-11 * np.abs(exact).max())
-
-
-def test_solver_restores_double_precision():
-    blocks, residual = tangent(), residual_of()
     solver = LinearSolver(KeptFactor(SPARSITY, FREE))
-    exact = direct(blocks, residual)
     solution = solver.solve(blocks, residual, relative_tolerance=1e-12)
     np.testing.assert_allclose(solution, exact, rtol=0, atol=1e-9 * np.abs(exact).max())
 
@@ -90,9 +85,8 @@ def test_factor_is_kept_while_it_serves_and_renewed_when_not():
         solver.solve(scale * blocks, residual_of(), 1e-8)
     assert solver.renewals == 1
     other = blocks.copy()
-    other[SPARSITY.diagonal] += (
-        np.diag([500.0, 0.0, 5.0]) * residual_of(1)[: len(BLOCK.nodes_mm), None, None] ** 2
-    )
+    size = residual_of(1)[: len(BLOCK.nodes_mm), None, None] ** 2
+    other[SPARSITY.diagonal] += np.diag([500.0, 0.0, 5.0]) * size
     exact = direct(other, residual_of(2))
     found = [solver.solve(other, residual_of(2), 1e-10) for _ in range(2)]
     assert solver.renewals == 2
@@ -100,17 +94,18 @@ def test_factor_is_kept_while_it_serves_and_renewed_when_not():
         np.testing.assert_allclose(solution, exact, rtol=0, atol=1e-7 * np.abs(exact).max())
 
 
-def test_indefinite_tangent_is_refused():
-    solver = LinearSolver(KeptFactor(SPARSITY, FREE))
+def test_indefinite_tangent_is_refused_at_once_and_under_a_kept_factor():
+    everything = np.arange(3 * len(BLOCK.nodes_mm))
+    fresh, kept = (LinearSolver(KeptFactor(SPARSITY, FREE)) for _ in range(2))
+    kept.solve(tangent(), residual_of(), 1e-8)
+    for solver in (fresh, kept):
+        with pytest.raises(ConvergenceError):
+            solver.solve(tangent(shift=60.0), residual_of(), 1e-8)
+    # Nothing holds the body: no displacement balances a net force.
     with pytest.raises(ConvergenceError):
-        solver.solve(tangent(shift=60.0), residual_of(), 1e-8)
-
-
-def test_tangent_that_turns_indefinite_under_a_kept_factor_is_refused():
-    solver = LinearSolver(KeptFactor(SPARSITY, FREE))
-    solver.solve(tangent(), residual_of(), 1e-8)
-    with pytest.raises(ConvergenceError):
-        solver.solve(tangent(shift=60.0), residual_of(), 1e-8)
+        LinearSolver(KeptFactor(SPARSITY, everything)).solve(tangent(), np.ones(everything.size), 1e-8)
+    with pytest.raises(ConvergenceError, match="SuperLU could not factor"):
+        KeptFactor(SPARSITY, FREE).renew(np.zeros_like(tangent()))
 
 
 @pytest.mark.parametrize("stage", ["renew", "follow"])
@@ -169,14 +164,6 @@ def test_solution_that_is_not_reached_is_refused():
     assert solver.renewals == 1
 
 
-def test_body_that_nothing_holds_is_refused():
-    """All nodes free: the tangent is singular and no displacement balances a net force."""
-    everything = np.arange(3 * len(BLOCK.nodes_mm))
-    solver = LinearSolver(KeptFactor(SPARSITY, everything))
-    with pytest.raises(ConvergenceError):
-        solver.solve(tangent(), np.ones(everything.size), 1e-8)
-
-
 @pytest.mark.parametrize("poisson", [0.48, 0.499, 0.4999])
 def test_factor_serves_a_body_that_is_nearly_incompressible(poisson):
     blocks, residual = tangent(poisson=poisson), residual_of()
@@ -191,16 +178,15 @@ def chosen(poisson):
     return choose_preconditioner(SPARSITY, FREE, BLOCK, poisson)
 
 
-def test_factor_is_chosen_for_a_small_mesh():
+def test_factor_or_multigrid_is_chosen_by_size_depth_and_ratio(monkeypatch):
     preconditioner, reason = chosen(0.4999)
     assert isinstance(preconditioner, KeptFactor)
     assert reason == (
         "SuperLU's factor of the whole tangent: 175 nodes are within 20000, and Poisson's ratio 0.4999 is "
         "within 0.4999."
     )
-
-
-def test_multigrid_is_chosen_for_a_large_mesh_within_its_reach(monkeypatch):
+    with pytest.raises(InputError, match=r"must not exceed 0.4999: got 0.49995; use 0.4999, where"):
+        chosen(0.49995)
     monkeypatch.setattr(linear, "MULTIGRID_NODES", 100)
     monkeypatch.setattr(linear, "DIRECT_NODES", 100)
     preconditioner, reason = chosen(Material.neo_hooke(7.0, 0.499).poisson)
@@ -212,11 +198,8 @@ def test_multigrid_is_chosen_for_a_large_mesh_within_its_reach(monkeypatch):
     said = r"must not exceed 0.499 for a mesh of more than 100 nodes: got 0.4995 and 175 nodes; use a smaller"
     with pytest.raises(InputError, match=said):
         chosen(0.4995)
-
-
-def test_column_too_deep_for_the_kernels_of_multigrid_gets_a_factor(monkeypatch):
-    monkeypatch.setattr(linear, "MULTIGRID_NODES", 100)
-    monkeypatch.setattr(linear, "MOST_LANES", BLOCK.grid.shape[2] - 1)
+    monkeypatch.setattr(linear, "DIRECT_NODES", 1000)
+    monkeypatch.setattr(linear, "MOST_LANES", BLOCK.grid.shape[2] - 1)  # too deep for the kernels
     assert isinstance(chosen(0.48)[0], KeptFactor)
 
 
@@ -254,18 +237,6 @@ def test_large_mesh_without_rows_is_solved_by_algebraic_multigrid(monkeypatch):
     monkeypatch.setitem(sys.modules, "pyamg", None)
     with pytest.raises(InputError, match=r"1,053 nodes needs PyAMG: pip install 'fingerpad\[meshes\]'"):
         choose_preconditioner(sparsity, free, mesh, 0.48)
-
-
-def test_ratio_beyond_every_solver_is_refused_with_what_to_do():
-    chosen(Material.neo_hooke(7.0, 0.4999).poisson)
-    with pytest.raises(InputError, match=r"must not exceed 0.4999: got 0.49995; use 0.4999, where"):
-        chosen(0.49995)
-
-
-def test_singular_tangent_is_refused_by_superlu():
-    blocks = np.zeros_like(tangent())
-    with pytest.raises(ConvergenceError, match="SuperLU could not factor"):
-        KeptFactor(SPARSITY, FREE).renew(blocks)
 
 
 def test_an_indefinite_matrix_is_refused_by_superlu():

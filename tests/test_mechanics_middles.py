@@ -50,17 +50,13 @@ def test_each_facet_and_each_edge_has_one_middle(symmetric):
     np.testing.assert_allclose(middles.area_mm2[facets:].sum(), 2 * facets * SPACING_MM**2, rtol=1e-12)
 
 
-def test_middles_between_chosen_nodes_only():
+def test_middles_lie_between_chosen_nodes_only_and_a_triangle_has_three_edges():
     mesh = block()
     under = mesh.skin_nodes[np.linalg.norm(mesh.nodes_mm[mesh.skin_nodes], axis=1) < 0.8]
     middles = Middles.of(mesh, Sparsity.of(mesh.elements, len(mesh.nodes_mm)), under, 0.0)
     assert under.size == 9
     assert len(middles.corners) == 4 + 12
     assert np.isin(middles.corners, under).all()
-
-
-def test_a_triangle_has_three_edges():
-    mesh = block()
     faces = mesh.skin_faces.copy()
     faces[:, 3] = faces[:, 2]
     mesh.__dict__["skin_faces"] = faces[:1]
@@ -96,9 +92,8 @@ def test_forces_on_nodes_are_the_slope_of_the_potential_and_the_tangent_that_of_
             slope = (state(ahead).potential - state(behind).potential) / (2 * step)
             np.testing.assert_allclose(forces(nodes_mm)[node, axis], -slope, rtol=1e-6, atol=1e-4)
             change = (forces(ahead) - forces(behind)).ravel() / (2 * step)
-            np.testing.assert_allclose(
-                tangent[:, 3 * node + axis], -change, rtol=0, atol=1e-4 * np.abs(tangent).max()
-            )
+            column = tangent[:, 3 * node + axis]
+            np.testing.assert_allclose(column, -change, rtol=0, atol=1e-4 * np.abs(tangent).max())
 
 
 def test_forces_of_middles_keep_their_sum_and_their_torque():
@@ -109,20 +104,16 @@ def test_forces_of_middles_keep_their_sum_and_their_torque():
     at_points = contact.state(points_mm, 0.3, np.zeros(len(points_mm))).force_mn
     at_nodes = contact.on_nodes(at_points)
     np.testing.assert_allclose(at_nodes.sum(axis=0), at_points.sum(axis=0), rtol=1e-12)
-    np.testing.assert_allclose(
-        np.cross(nodes_mm[contact.nodes], at_nodes).sum(axis=0),
-        np.cross(points_mm, at_points).sum(axis=0),
-        atol=1e-9 * np.abs(at_points).sum(),
-    )
+    torque = np.cross(points_mm, at_points).sum(axis=0)
+    on_nodes = np.cross(nodes_mm[contact.nodes], at_nodes).sum(axis=0)
+    np.testing.assert_allclose(on_nodes, torque, atol=1e-9 * np.abs(at_points).sum())
 
 
 @pytest.mark.parametrize("friction", [0.0, 0.5])
 def test_facets_do_not_cut_through_a_small_ball(friction):
     """Its tip is above the middle of an edge, from which skin without friction slides away."""
     lines, size_mm = 0.2 * np.arange(-6, 7), 0.2
-    mesh = block_mesh(
-        lines, np.array([0.0, 0.2, 0.5, 1.0, 2.0]), lines[6:], layers=[0, 0, 0, 0], symmetric=True
-    )
+    mesh = block_mesh(lines, [0.0, 0.2, 0.5, 1.0, 2.0], lines[6:], layers=[0, 0, 0, 0], symmetric=True)
     tissue, tip_mm = (Material.neo_hooke(20.0, 0.45),), np.array([0.5 * size_mm, 0.0, 0.0])
     placement = place(BALL, mesh.nodes_mm[mesh.skin_nodes], tip_mm, np.eye(3))
     motion, steps = RampAndHold(0.7, ramp_ms=50.0, hold_ms=50.0), PressSettings(ramp_steps=7, hold_steps=1)

@@ -30,30 +30,27 @@ def random_places(count, seed):
 def edge():
     """Points of the nail's outline, without its proximal end."""
     x, z = np.linspace(PROXIMAL_MM, DISTAL_MM, 400), np.linspace(-HALF_WIDTH_MM, HALF_WIDTH_MM, 400)
-    outline = np.concatenate(
-        [np.stack([x, np.full(400, side * HALF_WIDTH_MM)], axis=1) for side in (-1.0, 1.0)]
-        + [np.stack([np.full(400, DISTAL_MM), z], axis=1)]
-    )
+    sides = [np.stack([x, np.full(400, side * HALF_WIDTH_MM)], axis=1) for side in (-1.0, 1.0)]
+    outline = np.concatenate([*sides, np.stack([np.full(400, DISTAL_MM), z], axis=1)])
     _, dorsal, half_width = FINGER.section(outline[:, 0])
     height = dorsal * np.sqrt(1.0 - (outline[:, 1] / half_width) ** 2)
     return np.stack([outline[:, 0], height, outline[:, 1]], axis=1)
 
 
-def test_places_are_on_the_skin_and_not_under_the_nail():
+def test_places_are_on_the_skin_beside_the_nail_mirrored_left_and_right():
     points = NAIL.points(random_places(500, 1))
     assert np.abs(FINGER.level(points)).max() < 1e-12
     assert not FINGER.is_under_nail(points).any()
+    places = random_places(100, 4)
+    assert_array_equal(NAIL.points(places * [-1.0, 1.0]), NAIL.points(places) * [1.0, 1.0, -1.0])
 
 
-def test_the_edge_itself_is_the_nails_outline():
+def test_the_edge_itself_is_the_nails_outline_and_distance_is_counted_from_it():
     along = np.linspace(-1.0, 1.0, 41) * NAIL.half_length_mm(0.0)
     points = NAIL.points(np.stack([along, 0.0 * along], axis=1))
     assert cKDTree(edge()).query(points)[0].max() < 0.03
     assert_allclose(points[[0, -1]][:, [0, 2]], [[PROXIMAL_MM, -HALF_WIDTH_MM], [PROXIMAL_MM, HALF_WIDTH_MM]])
-
-
-def test_distance_is_that_from_the_nail():
-    """Straight lines are a little shorter than those of the skin: by d^3/(24 R^2), R being 2 mm or more."""
+    # Straight lines are a little shorter than those of the skin: by d^3/(24 R^2), R being 2 mm or more.
     places = random_places(500, 2)
     straight_mm = cKDTree(edge()).query(NAIL.points(places))[0]
     distance = places[:, 1]
@@ -70,11 +67,6 @@ def test_areas_of_the_plane_are_areas_of_the_skin():
     assert_allclose(np.linalg.norm(along, axis=1), 1.0, rtol=0, atol=0.01)
 
 
-def test_left_and_right_are_mirrored():
-    places = random_places(100, 4)
-    assert_array_equal(NAIL.points(places * [-1.0, 1.0]), NAIL.points(places) * [1.0, 1.0, -1.0])
-
-
 @pytest.mark.parametrize("density", [50.0, 100.0, 200.0])
 def test_rows_go_around_the_nail_a_pitch_apart(density):
     rows = NAIL.rows(2, density)
@@ -89,14 +81,11 @@ def test_rows_go_around_the_nail_a_pitch_apart(density):
     assert (points[:, 2] > 1e-9).sum() == (points[:, 2] < -1e-9).sum()
 
 
-def test_a_strip_of_random_receptors_has_its_density():
+def test_receptors_beside_the_nail_have_their_density_and_end_organs():
     strip = NAIL.region(3.0)
     layout = uniform(strip, 100.0, seed=6)
     assert len(layout) == round(strip.area_mm2)
     assert not FINGER.is_under_nail(NAIL.points(layout.places_mm)).any()
-
-
-def test_receptors_beside_the_nail_have_end_organs():
     population = Population.of_layout(NAIL.rows(2, 100.0), NAIL.points)
     sheet = ReceptorSheet(finger_mesh(FINGER, resolution_grading("quick", 17.37)))
     assert len(np.unique(sheet.below(population.positions_mm).round(6), axis=0)) == len(population) // 2 + 1

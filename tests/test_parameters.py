@@ -41,6 +41,11 @@ def test_names_are_unique_and_statuses_known() -> None:
     names = [number.name for number in all_published()]
     assert len(set(names)) == len(names)
     assert {number.status for number in all_published()} == set(STATUSES)
+    with pytest.raises(FrozenInstanceError):
+        protocol.DEPTH.value = 2.0  # type: ignore[misc]
+
+
+GOOD = {"name": "depth", "value": 1.0, "unit": "mm", "source": "here", "status": "paper"}
 
 
 @pytest.mark.parametrize(
@@ -59,23 +64,20 @@ def test_names_are_unique_and_statuses_known() -> None:
     ],
 )
 def test_published_refuses_numbers_without_a_story(change: dict[str, object], said: str) -> None:
-    good: dict[str, object] = {
-        "name": "depth",
-        "value": 1.0,
-        "unit": "mm",
-        "source": "here",
-        "status": "paper",
-    }
     with pytest.raises(InputError, match=said):
-        Published(**(good | change))  # type: ignore[type-var, arg-type]
+        Published(**(GOOD | change))  # type: ignore[type-var, arg-type]
 
 
-def test_published_is_frozen() -> None:
-    with pytest.raises(FrozenInstanceError):
-        protocol.DEPTH.value = 2.0  # type: ignore[misc]
-
-
-def test_profiles_have_one_value_per_station() -> None:
+def test_geometry_is_consistent_and_profiles_have_one_value_per_station():
+    layers = fingertip.STRATUM_CORNEUM.value + fingertip.LIVING_EPIDERMIS.value
+    assert layers == pytest.approx(fingertip.RECEPTOR_DEPTH.value, abs=1e-12)
+    x, y = fingertip.CONTACT_POINT.value
+    assert fingertip.VOLAR_Y.value[fingertip.STATIONS_X.value.index(x)] == y
+    assert 2 * max(fingertip.HALF_WIDTH_Z.value) == pytest.approx(fingertip.FULL_WIDTH.value, abs=0.05)
+    volar, dorsal = np.array(fingertip.BONE_VOLAR_Y.value), np.array(fingertip.BONE_DORSAL_Y.value)
+    assert fingertip.SPINE_Y.value == pytest.approx((volar + dorsal).mean() / 2, abs=0.4)
+    assert fingertip.BONE_HEIGHT.value == pytest.approx((dorsal - volar).max() / 2, abs=0.3)
+    assert fingertip.NAIL_X.value[0] < fingertip.BONE_TIP_X.value < fingertip.NAIL_X.value[1]
     for stations, profiles in (
         (fingertip.STATIONS_X, (fingertip.VOLAR_Y, fingertip.DORSAL_Y)),
         (fingertip.HALF_WIDTH_X, (fingertip.HALF_WIDTH_Z,)),
@@ -87,19 +89,7 @@ def test_profiles_have_one_value_per_station() -> None:
         assert stations.value[-1] < fingertip.LENGTH.value
 
 
-def test_geometry_is_consistent() -> None:
-    layers = fingertip.STRATUM_CORNEUM.value + fingertip.LIVING_EPIDERMIS.value
-    assert layers == pytest.approx(fingertip.RECEPTOR_DEPTH.value, abs=1e-12)
-    x, y = fingertip.CONTACT_POINT.value
-    assert fingertip.VOLAR_Y.value[fingertip.STATIONS_X.value.index(x)] == y
-    assert 2 * max(fingertip.HALF_WIDTH_Z.value) == pytest.approx(fingertip.FULL_WIDTH.value, abs=0.05)
-    volar, dorsal = np.array(fingertip.BONE_VOLAR_Y.value), np.array(fingertip.BONE_DORSAL_Y.value)
-    assert fingertip.SPINE_Y.value == pytest.approx((volar + dorsal).mean() / 2, abs=0.4)
-    assert fingertip.BONE_HEIGHT.value == pytest.approx((dorsal - volar).max() / 2, abs=0.3)
-    assert fingertip.NAIL_X.value[0] < fingertip.BONE_TIP_X.value < fingertip.NAIL_X.value[1]
-
-
-def test_layers_soften_inwards_in_every_material_set() -> None:
+def test_layers_soften_inwards_and_hyperfoams_are_as_soft_as_published():
     for epidermis, dermis, subcutis in (
         (tissues.MAENO_EPIDERMIS_YOUNG, tissues.MAENO_DERMIS_YOUNG, tissues.MAENO_SUBCUTIS_YOUNG),
         (
@@ -111,9 +101,6 @@ def test_layers_soften_inwards_in_every_material_set() -> None:
     ):
         assert epidermis.value > dermis.value > subcutis.value > 0
     assert tissues.WU_EPIDERMIS_YOUNG.value > tissues.MAENO_EPIDERMIS_YOUNG.value
-
-
-def test_hyperfoams_are_stable_at_rest_and_as_soft_as_published() -> None:
     for mu, expected_young_kpa in (
         (tissues.WU_SKIN_HYPERFOAM_MU, 3.25),
         (tissues.WU_SUBCUTIS_HYPERFOAM_MU, 1.6),
@@ -122,32 +109,24 @@ def test_hyperfoams_are_stable_at_rest_and_as_soft_as_published() -> None:
         assert young_kpa == pytest.approx(expected_young_kpa, rel=0.02)
 
 
-@pytest.mark.parametrize(
-    ("shares", "times"),
-    [
+def test_prony_series_relax_but_never_below_zero() -> None:
+    for shares, times in (
         (tissues.SKIN_PRONY_SHARES, tissues.SKIN_PRONY_TIMES),
         (tissues.MOUSE_PRONY_SHARES, tissues.MOUSE_PRONY_TIMES),
-    ],
-)
-def test_prony_series_relax_but_never_below_zero(
-    shares: Published[tuple[float, ...]], times: Published[tuple[float, ...]]
-) -> None:
-    assert len(shares.value) == len(times.value)
-    assert 0 < sum(shares.value) < 1
-    assert min(times.value) > 0
+    ):
+        assert len(shares.value) == len(times.value)
+        assert 0 < sum(shares.value) < 1
+        assert min(times.value) > 0
 
 
-def test_bar_shifts_are_the_36_positions_of_the_figure() -> None:
+def test_windows_lie_in_their_phases_and_bar_shifts_are_the_36_positions_of_the_figure():
+    end = protocol.RAMP.value + protocol.HOLD.value
+    assert 0 < protocol.DYNAMIC_WINDOW.value[0] < protocol.DYNAMIC_WINDOW.value[1] <= protocol.RAMP.value
+    assert protocol.RAMP.value < protocol.STATIC_WINDOW.value[0] < protocol.STATIC_WINDOW.value[1] <= end
     shifts = np.array(protocol.BAR_SHIFTS.value)
     assert shifts.size == 36
     np.testing.assert_allclose(shifts, -shifts[::-1], atol=1e-12)
     np.testing.assert_allclose(np.diff(shifts), 0.2, atol=1e-12)
-
-
-def test_windows_lie_in_their_phases() -> None:
-    end = protocol.RAMP.value + protocol.HOLD.value
-    assert 0 < protocol.DYNAMIC_WINDOW.value[0] < protocol.DYNAMIC_WINDOW.value[1] <= protocol.RAMP.value
-    assert protocol.RAMP.value < protocol.STATIC_WINDOW.value[0] < protocol.STATIC_WINDOW.value[1] <= end
 
 
 def test_start_points_differ_in_the_gains_only_and_the_scale_keeps_their_ratio() -> None:
@@ -159,15 +138,8 @@ def test_start_points_differ_in_the_gains_only_and_the_scale_keeps_their_ratio()
 
 def test_assumed_spheres_are_never_called_the_papers() -> None:
     statuses = {sphere.value: sphere.status for sphere in psychophysics.SPHERES}
-    assert statuses == {
-        287.0: "paper",
-        296.0: "paper",
-        305.0: "read",
-        316.0: "assumed",
-        328.0: "assumed",
-        340.0: "assumed",
-        365.0: "paper",
-    }
+    assumed = dict.fromkeys((316.0, 328.0, 340.0), "assumed")
+    assert statuses == dict.fromkeys((287.0, 296.0, 365.0), "paper") | {305.0: "read"} | assumed
     assert psychophysics.SPHERE_CURVATURES.status == "assumed"
     assert (np.diff(psychophysics.SPHERE_CURVATURES.value) > 0).all()
     assert psychophysics.SPHERE_CURVATURES.value[0] == protocol.STANDARD_CURVATURE.value

@@ -4,12 +4,12 @@ import math
 
 import numpy as np
 import pytest
-from numpy.testing import assert_allclose, assert_array_equal
+from numpy.testing import assert_allclose
 from scipy.special import ndtri
 
 from fingerpad.core.errors import InputError
 from fingerpad.core.random_streams import Purpose, normals
-from fingerpad.experiments.gerling2014 import discrepancy, goodwin
+from fingerpad.experiments.gerling2014 import goodwin
 from fingerpad.experiments.gerling2014.discrepancy import (
     discrepancy_analysis,
     expected_of_measure,
@@ -52,7 +52,7 @@ def bumps(centre_mm=17.37, steepness=1.0):
 
 
 @pytest.mark.parametrize(("hits", "trials"), [(58, 100), (95, 100), (3, 20)])
-def test_a_binomial_interval_leaves_half_of_the_doubt_on_either_side(hits, trials):
+def test_a_binomial_interval_leaves_half_of_the_doubt_on_either_side_or_ends_at_always_or_never(hits, trials):
     """Clopper & Pearson by their definition, summed term by term."""
 
     def tail(chance, numbers):
@@ -61,33 +61,24 @@ def test_a_binomial_interval_leaves_half_of_the_doubt_on_either_side(hits, trial
     low, high = binomial_interval(hits / trials, trials)
     assert tail(float(low), range(hits, trials + 1)) == pytest.approx(0.025, rel=1e-9)
     assert tail(float(high), range(hits + 1)) == pytest.approx(0.025, rel=1e-9)
-
-
-def test_a_binomial_interval_of_always_or_never_ends_there():
     low, high = binomial_interval([0.0, 1.0], 10)
     assert (low[0], high[1]) == (0.0, 1.0)
     assert low[1] == pytest.approx(0.025 ** (1 / 10))
 
 
-def test_the_number_of_trials_is_the_smallest_that_gives_both_fractions():
-    fits = [
-        n for n in range(1, 101) if all(abs(n * rate - round(n * rate)) < 1e-9 for rate in goodwin.HIT_RATES)
-    ]
-    assert fits[0] == goodwin.TRIALS == 100
-
-
-def test_the_line_is_straight_in_z_and_goes_through_both_points():
+def test_what_is_known_of_people_is_a_straight_line_in_z_with_intervals():
     assert_allclose(goodwin.line_in_z(goodwin.CURVATURES), goodwin.HIT_RATES, rtol=1e-12)
     slopes = np.diff(ndtri(goodwin.line_in_z([290.0, 310.0, 330.0, 350.0])))
     assert_allclose(slopes, slopes[0], rtol=1e-9)
     assert slopes[0] / 20.0 == pytest.approx((ndtri(0.95) - ndtri(0.58)) / 69.0)
-
-
-def test_what_is_known_of_people_has_intervals_around_the_points():
     known = goodwin.goodwin_hit_rates_at(CURVATURES[1:])
     assert (known.low < known.hit_rate).all()
     assert (known.hit_rate < known.high).all()
     assert known.line.shape == (6,)
+    fits = [
+        n for n in range(1, 101) if all(abs(n * rate - round(n * rate)) < 1e-9 for rate in goodwin.HIT_RATES)
+    ]
+    assert fits[0] == goodwin.TRIALS == 100
 
 
 # Sessions
@@ -105,43 +96,31 @@ def sessions():
 def test_every_observer_of_a_session_is_the_one_who_is_asked_alone(sessions):
     measures, observers = sessions
     assert observers.mean["static"].shape == (2, 2, 6)
-    for repeat in range(2):
-        for position in range(2):
-            session = 1 + 2 * repeat + position
-            static = measures["static"][position].responses
-            alone = {
-                "static": discriminate_gradient_sum(static, PAIRS, 0.06, 4, session=session),
-                "sigma_0.025": discriminate_gradient_sum(static, PAIRS, 0.025, 4, session=session),
-                "ten_matrices": discriminate_gradient_sum(
-                    static, PAIRS, 0.06, 4, Experiment(presentations=10), session=session
-                ),
-                "ten_hit_rates": discriminate_gradient_sum(
-                    static, PAIRS, 0.06, 4, Experiment(hit_rates=10), session=session
-                ),
-                "criterion_0.02": discriminate_gradient_sum(
-                    static, PAIRS, 0.06, 4, Experiment(criterion_sigma=0.02), session=session
-                ),
-                "euclidean": discriminate_euclidean(static, 0.06, 4, session=session),
-                "dynamic": discriminate_gradient_sum(
-                    measures["dynamic"][position].responses, PAIRS, 0.06, 4, session=session
-                ),
-            }
-            for name, rates in alone.items():
-                assert_allclose(observers.mean[name][repeat, position], rates.hit_rate, rtol=1e-12)
-                assert_allclose(observers.spread[name][repeat, position], rates.hit_rate_sd, rtol=1e-9)
+    others = {
+        "static": {},
+        "sigma_0.025": {"noise_sigma": 0.025},
+        "ten_matrices": {"experiment": Experiment(presentations=10)},
+        "ten_hit_rates": {"experiment": Experiment(hit_rates=10)},
+        "criterion_0.02": {"experiment": Experiment(criterion_sigma=0.02)},
+    }
+    for repeat, position in np.ndindex(2, 2):
+        session = 1 + 2 * repeat + position
+        static, dynamic = (measures[name][position].responses for name in ("static", "dynamic"))
+
+        def asked(rates, noise_sigma=0.06, experiment=Experiment(), session=session):  # noqa: B008
+            return discriminate_gradient_sum(rates, PAIRS, noise_sigma, 4, experiment, session=session)
+
+        alone = {name: asked(static, **other) for name, other in others.items()}
+        alone["euclidean"] = discriminate_euclidean(static, 0.06, 4, session=session)
+        alone["dynamic"] = asked(dynamic)
+        for name, rates in alone.items():
+            assert_allclose(observers.mean[name][repeat, position], rates.hit_rate, rtol=1e-12)
+            assert_allclose(observers.spread[name][repeat, position], rates.hit_rate_sd, rtol=1e-9)
 
 
 def test_the_mean_of_ten_hit_rates_is_unsteadier_by_the_root_of_ten(sessions):
     few, many = (sessions[1].unsteadiness[count] for count in (10, 100))
     assert_allclose(few / many, math.sqrt(10.0), rtol=0.25)
-
-
-def test_one_session_has_no_error_and_pairs_without_latency_no_gradient():
-    measures = {"static": [Measured(bumps(), PAIRS)]}
-    with pytest.raises(InputError, match="sessions must be a whole number of at least 2"):
-        observe(measures, 0.06, seed=4, sessions=1)
-    with pytest.raises(InputError, match="there are none"):
-        Measured(bumps(), PAIRS[:0])
 
 
 # Statistics
@@ -167,14 +146,11 @@ def made_up(seed=3, n_sessions=400, spread=0.05):
     return Observers(noisy, spreads, unsteadiness)
 
 
-def test_an_estimate_is_a_mean_with_its_standard_error():
+def test_an_estimate_is_a_mean_with_its_error_and_an_extreme_is_sought_in_the_means():
     values = np.array([1.0, 2.0, 4.0, 5.0])
     found = estimate(values)
     assert (found.value, found.error) == (3.0, pytest.approx(np.std(values, ddof=1) / 2.0))
-
-
-def test_the_largest_of_noisy_changes_is_sought_in_their_means():
-    """Ten changes of 0 but one: in any session the largest is noise, over many it is the one."""
+    # Ten changes of 0 but one: in any session the largest is noise, over many it is the one.
     changes = np.random.default_rng(1).standard_normal((400, 10)) + np.eye(10)[3] * 0.5
     assert extreme(changes, np.argmax).value == pytest.approx(0.5, abs=0.15)
     assert changes.max(axis=1).mean() > 1.4
@@ -208,23 +184,7 @@ def test_statistics_are_those_of_known_hit_rates():
     assert value(found.sweep.misfit[0][1]) == 0.025
 
 
-def test_noise_of_sessions_stands_in_the_errors():
-    found = discrimination_statistics(made_up(), CURVATURES, ("static", "dynamic"))
-    assert found.targets[0].at_goodwin[0].error == pytest.approx(0.05 / 20.0, rel=0.15)
-    assert found.shift["dynamic"].error == pytest.approx(0.05 * math.sqrt(2.0) / 20.0, rel=0.15)
-
-
 # Interpretations of the steps
-
-
-def test_hit_rates_of_distances_of_many_receptors_agree_with_the_closed_form():
-    """Independent folded normals add up; with 200 receptors their sum is normal."""
-    generator = np.random.default_rng(2)
-    values = generator.uniform(20.0, 60.0, 200) * np.array([[1.0], [1.0], [1.0]])
-    values[1:] += np.array([[2.0], [4.0]]) * generator.standard_normal(200)
-    sampled = discriminate_euclidean(values, 0.1, 3, Experiment(hit_rates=400))
-    assert_allclose(sampled.hit_rate, expected_euclidean_hit_rates(values, 0.1), atol=0.02)
-    assert 0.6 < sampled.hit_rate[0] < sampled.hit_rate[1] < 0.999
 
 
 @pytest.mark.parametrize("sigma", [0.03, 0.058, 0.12])
@@ -233,12 +193,6 @@ def test_few_receptors_give_a_skewed_distance_that_the_closed_form_knows(sigma):
     values = np.linspace(10.0, 55.0, 12) * np.array([[1.0], [1.03], [1.06], [1.2]])
     sampled = discriminate_euclidean(values, sigma, 3, Experiment(hit_rates=4000)).hit_rate
     assert_allclose(sampled, expected_euclidean_hit_rates(values, sigma), atol=0.005)
-
-
-def test_a_receptor_silent_under_both_spheres_changes_no_distance():
-    values = bumps()
-    silent = np.column_stack([values, np.zeros(7)])
-    assert_allclose(expected_euclidean_hit_rates(silent, 0.1), expected_euclidean_hit_rates(values, 0.1))
 
 
 def test_receptors_that_are_silent_once_take_no_part_in_latencies():
@@ -311,17 +265,6 @@ def test_the_analysis_names_every_interpretation_and_the_noise_that_fits_it():
     # A wavering fraction moves the point by a share of the small way between means, not of the point.
     point, fraction = found.criterion.point, found.criterion.fraction
     assert (fraction < 0.2 * point).all()
-
-
-def test_the_decoding_with_a_waiting_time_ends_with_the_ramp():
-    late = np.where(bumps() > 20.0, 80.0 - bumps(), np.nan)
-    found = discrepancy._interpretations(
-        {"static": [Measured(bumps(), PAIRS)]}, [late], GRID.positions_mm, 1.0
-    )
-    waiting = found["latency, waiting until the ramp ends"][0].responses
-    assert waiting.max() == discrepancy.PATIENCE_MS == 50.0
-    counted = found["latency, a silent receptor counting as the end of the stimulus"][0].responses
-    assert_array_equal(counted == 1000.0, np.isnan(late))
 
 
 def test_hit_rates_without_noise_of_a_session_are_the_expected_ones(sessions):

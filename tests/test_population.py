@@ -28,13 +28,19 @@ class Bump:
         return SedTraces([0.0, 50.0, 1000.0], np.outer([0.0, 1.0, 0.9], peaks), kinks_ms=[50.0])
 
 
-def test_the_papers_population_is_3_by_6_at_1_mm_and_symmetric_across_the_finger():
+def test_the_papers_population_is_3_by_6_at_1_mm_and_any_lattice_is_symmetric_at_its_density():
     population = Population.grid()
     x, z = population.positions_mm.T
     assert population.pitch_mm == 1.0
     assert_allclose(np.unique(x), [16.37, 17.37, 18.37], rtol=1e-14)
     assert_array_equal(np.unique(z), [-2.5, -1.5, -0.5, 0.5, 1.5, 2.5])
     assert len({tuple(position) for position in population.positions_mm}) == 18
+    for density in (25.0, 70.0, 400.0):
+        pitch = Population.grid(density, rows=2, columns=2).pitch_mm
+        assert_allclose(100.0 / pitch**2, density, rtol=1e-14)
+    positions = Population.grid(70.0, rows=4, columns=5, centre_mm=(10.0, 2.0)).positions_mm
+    mirrored = np.array([20.0, 4.0]) - positions
+    assert_allclose(positions[np.lexsort(positions.T)], mirrored[np.lexsort(mirrored.T)], rtol=1e-12)
 
 
 def test_the_default_grid_follows_the_finger_that_is_touched_and_others_stay():
@@ -52,18 +58,6 @@ def test_the_default_grid_follows_the_finger_that_is_touched_and_others_stay():
     assert branched.on(skin) is branched
 
 
-@pytest.mark.parametrize("density", [25.0, 70.0, 100.0, 400.0])
-def test_density_is_one_receptor_per_cell_of_the_lattice(density):
-    pitch = Population.grid(density, rows=2, columns=2).pitch_mm
-    assert_allclose(100.0 / pitch**2, density, rtol=1e-14)
-
-
-def test_a_lattice_is_symmetric_about_its_centre():
-    positions = Population.grid(70.0, rows=4, columns=5, centre_mm=(10.0, 2.0)).positions_mm
-    mirrored = np.array([20.0, 4.0]) - positions
-    assert_allclose(positions[np.lexsort(positions.T)], mirrored[np.lexsort(mirrored.T)], rtol=1e-12)
-
-
 def test_each_receptor_answers_what_a_lone_afferent_would_answer_there():
     population, skin = Population.grid(afferent=SENSITIVE), Bump(17.0, 0.3)
     response = population.respond(skin)
@@ -76,13 +70,16 @@ def test_each_receptor_answers_what_a_lone_afferent_would_answer_there():
         assert response.static_rate_hz[receptor] == static_hz[0]
 
 
-def test_the_map_peaks_under_the_touch_and_latency_is_shortest_there():
+def test_the_map_peaks_under_the_touch_and_an_untouched_skin_is_silent():
     population = Population.grid(afferent=SED_DRIVEN)
     response = population.respond(Bump(17.37, 0.5))
     under = int(np.argmin(np.square(population.positions_mm - [17.37, 0.5]).sum(axis=1)))
     assert np.argmax(response.static_rate_hz) == under
     assert np.argmax(response.dynamic_rate_hz) == under
     assert np.nanargmin(response.first_spike_latency_ms) == under
+    response = Population.grid(afferent=SED_DRIVEN).respond(Bump(17.0, 0.0, peak_kpa=0.0))
+    assert_array_equal(response.static_rate_hz, np.zeros(18))
+    assert np.isnan(response.first_spike_latency_ms).all()
 
 
 def test_a_mirrored_touch_gives_a_mirrored_map():
@@ -91,12 +88,6 @@ def test_a_mirrored_touch_gives_a_mirrored_map():
     mirrored = left.dynamic_rate_hz.reshape(3, 6)[:, ::-1].ravel()
     assert (right.dynamic_rate_hz > 0).any()
     assert_allclose(right.dynamic_rate_hz, mirrored, rtol=1e-9)
-
-
-def test_an_untouched_skin_is_silent():
-    response = Population.grid(afferent=SED_DRIVEN).respond(Bump(17.0, 0.0, peak_kpa=0.0))
-    assert_array_equal(response.static_rate_hz, np.zeros(18))
-    assert np.isnan(response.first_spike_latency_ms).all()
 
 
 class OneTrace:
@@ -111,16 +102,17 @@ class OneTrace:
         (lambda: Population([[1.0, 2.0]], 0.0), "pitch_mm must be greater"),
         (lambda: Population.grid(density_per_cm2=-1.0), "density_per_cm2 must be greater"),
         (lambda: Population.grid(rows=0), "rows must be a whole number"),
-        (
-            lambda: Population.grid(afferent=SED_DRIVEN).respond(OneTrace()),
-            "one trace per receptor: got 1 for",
-        ),
-        (
-            lambda: Population.grid(afferent=Afferent(static_quantity="von_mises")).respond(OneTrace()),
-            r"'compressive_stress' and 'von_mises': got OneTrace\.sed\(sites\); add them, or use an afferent",
-        ),
+        (lambda: sensitivities(0, 0.4, 1), "count must be a whole number"),
+        (lambda: sensitivities(3, -0.4, 1), "spread must not be negative"),
+        (lambda: Population([[1.0, 2.0]], 1.0, sensitivity=[1.0, 1.0]), "per receptor, 1: got 2"),
+        (lambda: Population([[1.0, 2.0]], 1.0, sensitivity=[0.0]), "the smallest 0"),
+        (lambda: Population([[1.0, 2.0]], 1.0, places_mm=[[1.0, 2.0, 3.0]]), "a pair per receptor"),
+        (lambda: Population.grid(afferent=SED_DRIVEN).respond(OneTrace()),
+         "one trace per receptor: got 1 for"),
+        (lambda: Population.grid(afferent=Afferent(static_quantity="von_mises")).respond(OneTrace()),
+         r"'compressive_stress' and 'von_mises': got OneTrace\.sed\(sites\); add them, or use an afferent"),
     ],
-)
+)  # fmt: skip
 def test_what_cannot_be_used_is_refused(wrong, message):
     with pytest.raises(InputError, match=message):
         wrong()
@@ -134,24 +126,16 @@ class BumpWithStress(Bump):
         values = {"stored": traces.sed_kpa, "compressive_stress": np.sqrt(traces.sed_kpa)}
         dynamic_kpa = None if dynamic_quantity == static_quantity else values[dynamic_quantity]
         return SedTraces(
-            traces.times_ms,
-            values[static_quantity],
-            traces.kinks_ms,
-            dynamic_kpa,
-            dynamic_quantity,
+            traces.times_ms, values[static_quantity], traces.kinks_ms, dynamic_kpa, dynamic_quantity,
             static_quantity,
-        )
-
-
-@pytest.mark.parametrize("tissues", ["", "human"])
-def test_the_default_afferent_responds_to_its_own_tissues_without_a_warning(tissues):
-    skin = BumpWithStress(17.37, 0.0)
-    skin.tissues_name = tissues
-    assert Population.grid(rows=1, columns=1).respond(skin).spikes
+        )  # fmt: skip
 
 
 def test_the_default_afferent_warns_of_other_tissues_and_their_own_does_not():
     skin = BumpWithStress(17.37, 0.0)
+    for own in ("", "human"):
+        skin.tissues_name = own
+        assert Population.grid(rows=1, columns=1).respond(skin).spikes
     skin.tissues_name = "paper"
     with pytest.warns(TissuesWarning, match=r"the skin has 'paper': give .*for_tissues\('paper'\)") as found:
         Population.grid(rows=1, columns=1).respond(skin)
@@ -180,11 +164,8 @@ def test_sensitivity_multiplies_both_gains_and_not_the_intercept():
         afferent = replace(resting, dynamic_quantity=quantity)
         response = Population(positions, 1.0, afferent, sensitivity=factors).respond(skin)
         for receptor, factor in enumerate(factors):
-            lone = replace(
-                afferent,
-                dynamic_gain=factor * afferent.dynamic_gain,
-                static_gain=factor * afferent.static_gain,
-            )
+            gains = {name: factor * getattr(afferent, name) for name in ("dynamic_gain", "static_gain")}
+            lone = replace(afferent, **gains)
             expected = Population(positions[[receptor]], 1.0, lone).respond(skin)
             assert_allclose(response.spikes[receptor], expected.spikes[0], rtol=1e-9)
         assert len(response.spikes.times_ms) > 100
@@ -211,18 +192,3 @@ def test_a_layout_becomes_a_population_where_its_plane_lies_on_the_skin():
     for population in (flat, curved):
         assert_array_equal(population.places_mm, layout.places_mm)
         assert len(population) == len(layout)
-
-
-@pytest.mark.parametrize(
-    ("wrong", "message"),
-    [
-        (lambda: sensitivities(0, 0.4, 1), "count must be a whole number"),
-        (lambda: sensitivities(3, -0.4, 1), "spread must not be negative"),
-        (lambda: Population([[1.0, 2.0]], 1.0, sensitivity=[1.0, 1.0]), "per receptor, 1: got 2"),
-        (lambda: Population([[1.0, 2.0]], 1.0, sensitivity=[0.0]), "the smallest 0"),
-        (lambda: Population([[1.0, 2.0]], 1.0, places_mm=[[1.0, 2.0, 3.0]]), "a pair per receptor"),
-    ],
-)  # fmt: skip
-def test_sensitivities_that_cannot_be_are_refused(wrong, message):
-    with pytest.raises(InputError, match=message):
-        wrong()

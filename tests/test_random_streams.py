@@ -1,6 +1,7 @@
 """Keyed random numbers: known answers, agreement with NumPy, independence of order and threads."""
 
 from concurrent.futures import ThreadPoolExecutor
+from itertools import product
 
 import numpy as np
 import pytest
@@ -18,13 +19,11 @@ def test_the_scrambler_gives_the_published_answer():
     assert words == ["16554d9eca36314c", "db20fe9d672d0fdc", "d7e772cee186176b", "7e68b68aec7ba23b"]
 
 
-@pytest.mark.parametrize("seed", [0, 1, 2**40 + 17, 2**63 - 1])
-@pytest.mark.parametrize("place", [(0, 0), (3, 5), (2**62, 1), (1, 2**62)])
-def test_uniform_numbers_are_those_of_numpy_to_the_bit(seed, place):
+def test_uniform_numbers_are_those_of_numpy_to_the_bit():
     """An independent implementation, with carries between halves that the known answer may not meet."""
-    trial, receptor = place
-    counter = np.array([0, 0, receptor, trial], dtype=np.uint64)
-    for purpose in Purpose:
+    seeds, places = (0, 1, 2**40 + 17, 2**63 - 1), ((0, 0), (3, 5), (2**62, 1), (1, 2**62))
+    for seed, (trial, receptor), purpose in product(seeds, places, Purpose):
+        counter = np.array([0, 0, receptor, trial], dtype=np.uint64)
         ours = uniforms(seed, [trial], [receptor], purpose, 41)[0, 0]
         numpys = np.random.Philox(counter=counter, key=np.array([seed, purpose], dtype=np.uint64))
         assert_array_equal(ours, np.random.Generator(numpys).random(41))
@@ -51,6 +50,9 @@ def test_neither_order_nor_company_nor_threads_change_a_number(draw):
 def test_numbers_have_their_distributions():
     assert kstest(uniforms(1, 20, 50, Purpose.ESCAPE, 40).ravel(), "uniform").pvalue > 0.001
     assert kstest(normals(1, 20, 50, Purpose.ESCAPE, 40).ravel(), "norm").pvalue > 0.001
+    # A number of streams means the first ones.
+    assert numbered("trials", 2).tolist() == [0, 1]
+    assert_array_equal(uniforms(1, 2, 3, Purpose.GAIN, 2), uniforms(1, range(2), range(3), Purpose.GAIN, 2))
 
 
 def neighbours():
@@ -67,18 +69,16 @@ def neighbours():
     }
 
 
-@pytest.mark.parametrize("step", list(neighbours()))
-def test_streams_with_neighbouring_keys_are_not_correlated(step):
+def test_streams_with_neighbouring_keys_are_not_correlated():
     """The correlation of n independent pairs is normal with variance 1/n."""
-    first, second = neighbours()[step]
-    if step == "trial against receptor":  # the diagonal is the same number twice
-        off = ~np.eye(len(first), dtype=bool)
-        first, second = first[off], second[off]
-        pairs = first.size / 2  # (i, j) with (j, i) and the reverse are one pair
-    else:
+    for step, (first, second) in neighbours().items():
         pairs = first.size
-    correlation = float(np.mean(first * second))
-    assert abs(correlation) * np.sqrt(pairs) < 3.5
+        if step == "trial against receptor":  # the diagonal is the same number twice
+            off = ~np.eye(len(first), dtype=bool)
+            first, second = first[off], second[off]
+            pairs = first.size / 2  # (i, j) with (j, i) and the reverse are one pair
+        correlation = float(np.mean(first * second))
+        assert abs(correlation) * np.sqrt(pairs) < 3.5, step
 
 
 def test_first_numbers_of_many_streams_fill_the_unit_interval_evenly():
@@ -87,11 +87,6 @@ def test_first_numbers_of_many_streams_fill_the_unit_interval_evenly():
     counts = np.bincount((first * 64).astype(int), minlength=64)
     statistic = np.sum((counts - first.size / 64) ** 2) / (first.size / 64)
     assert chi2.ppf(0.001, 63) < statistic < chi2.ppf(0.999, 63)
-
-
-def test_a_number_of_streams_means_the_first_ones():
-    assert numbered("trials", 2).tolist() == [0, 1]
-    assert_array_equal(uniforms(1, 2, 3, Purpose.GAIN, 2), uniforms(1, range(2), range(3), Purpose.GAIN, 2))
 
 
 @pytest.mark.parametrize(

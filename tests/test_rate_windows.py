@@ -28,12 +28,11 @@ def traces(ramp_ms, end_ms=1150.0):
     return SedTraces([0.0, ramp_ms, end_ms], [[0.0], [2.0], [2.0]], [ramp_ms])
 
 
-@pytest.mark.parametrize("motion", [RampAndHold(), ForceRampAndHold(100.0)], ids=["depth", "force"])
-def test_windows_of_the_papers_motion_are_the_papers_to_the_bit(motion):
-    assert rate_windows_ms(motion.phases) == PAPER_WINDOWS_MS
+def test_windows_of_the_papers_motion_are_the_papers_to_the_bit():
     assert (protocol.DYNAMIC_WINDOW.value, protocol.STATIC_WINDOW.value) == PAPER_WINDOWS_MS
-    same = Trajectory((0.0, 50.0, 1000.0), (0.0, 1.0, 1.0))
-    assert same.phases == motion.phases
+    for motion in (RampAndHold(), ForceRampAndHold(100.0)):
+        assert rate_windows_ms(motion.phases) == PAPER_WINDOWS_MS
+        assert Trajectory((0.0, 50.0, 1000.0), (0.0, 1.0, 1.0)).phases == motion.phases
     assert rate_windows_ms(traces(50.0, 1000.0).phases) == PAPER_WINDOWS_MS
 
 
@@ -48,7 +47,7 @@ def test_windows_lie_in_their_phases(ramp_ms, hold_ms):
     assert static[0] - hold.start_ms == pytest.approx(550.0 * min(1.0, hold_ms / 950.0))
 
 
-def test_a_slow_ramp_is_not_read_in_the_papers_window():
+def test_a_slow_ramp_is_not_read_in_the_papers_window_and_a_population_follows_its_phases():
     """The rate at the end of a ramp of 200 ms is higher than in its first quarter."""
     slow = traces(200.0)
     (followed,), _ = SED_DRIVEN.rates(slow)
@@ -60,8 +59,6 @@ def test_a_slow_ramp_is_not_read_in_the_papers_window():
     roving = ReceptorOffset.of_traces({-0.1: slow, 0.1: slow})
     assert roving.evaluate(np.append(SED_DRIVEN.parameters, 0.0))[0] == followed
 
-
-def test_a_population_follows_the_phases_of_its_skin():
     class Pressed:
         def sed(self, sites):
             return traces(200.0)
@@ -89,20 +86,14 @@ def test_stimuli_of_a_fit_share_their_windows():
     assert AfferentModel.of_traces([traces(50.0, 1000.0), longer]).used_windows_ms == PAPER_WINDOWS_MS
     with pytest.raises(InputError, match="120-200 ms, 750-1100 ms or 30-50 ms, 600-950 ms"):
         AfferentModel.of_traces([traces(200.0), longer])
-    assert (
-        common_rate_windows_ms([longer.phases, traces(200.0).phases], *PAPER_WINDOWS_MS) == PAPER_WINDOWS_MS
-    )
+    both = [longer.phases, traces(200.0).phases]
+    assert common_rate_windows_ms(both, *PAPER_WINDOWS_MS) == PAPER_WINDOWS_MS
 
 
 def test_each_stimulus_of_a_task_has_its_own_windows():
-    given_task = {
-        "question": "Which ramp?",
-        "object": "sphere",
-        "motion": {"hold_ms": 950},
-        "stimuli": {"vary": "motion.ramp_ms", "values": [50, 1500]},
-        "standard": 50,
-        "noise": 0.1,
-    }
+    ramps = {"vary": "motion.ramp_ms", "values": [50, 1500]}
+    given_task = {"question": "Which ramp?", "object": "sphere", "motion": {"hold_ms": 950}}
+    given_task |= {"stimuli": ramps, "standard": 50, "noise": 0.1}
 
     def prepared(**more):
         task = parse_task(given_task | more)

@@ -124,14 +124,18 @@ def test_the_way_to_the_tip_has_no_gap():
         assert_allclose(read, organs[:, 0], rtol=0, atol=0.12)
 
 
-@pytest.mark.parametrize(
-    ("site", "side"), [((17.37, -9.0, 0.0), 0.8), ((17.37, -12.0, 0.0), 2.1), ((40.0, 0.0, 0.0), 8.0)]
-)
-def test_points_beside_the_skin_are_refused(site, side):
-    with pytest.raises(InputError, match="must lie on the skin of the mesh") as refusal:
-        SHEETS["full"].below(np.array([[17.37, -9.85, 0.0], site]))
-    away = float(str(refusal.value).split(" mm is ")[1].split(" mm")[0])
-    assert abs(away - side) < 0.15 * side
+def test_the_tip_is_skin_and_points_beside_the_skin_are_refused():
+    assert SHEETS["full"].below(np.array([[FINGER.length_mm, 0.0, 0.0]])).shape == (1, 2)
+    for site, side in (((17.37, -9.0, 0.0), 0.8), ((17.37, -12.0, 0.0), 2.1), ((40.0, 0.0, 0.0), 8.0)):
+        with pytest.raises(InputError, match="must lie on the skin of the mesh") as refusal:
+            SHEETS["full"].below(np.array([[17.37, -9.85, 0.0], site]))
+        away = float(str(refusal.value).split(" mm is ")[1].split(" mm")[0])
+        assert abs(away - side) < 0.15 * side
+    with pytest.raises(InputError, match="must lie on the skin"):
+        SHEETS["half"].below(np.array([[-0.05, -9.7, 0.0]]))  # before the cut
+    block = block_mesh([0.0, 1.0], [0.0, 0.4, 0.5], [0.0, 1.0, 2.0], layers=[0, 1])
+    with pytest.raises(InputError, match=r"two elements along and around, or more: got \(1, 2\)"):
+        ReceptorSheet(block)
 
 
 def test_a_block_is_read_up_to_its_rim_and_no_farther():
@@ -145,17 +149,6 @@ def test_a_block_is_read_up_to_its_rim_and_no_farther():
     for beyond in ([-0.01, 0.0, 1.0], [1.0, 0.0, rim + 0.01]):
         with pytest.raises(InputError, match="must lie on the skin"):
             sheet.below(np.array([beyond]))
-
-
-def test_no_finger_before_its_cut():
-    with pytest.raises(InputError, match="must lie on the skin"):
-        SHEETS["half"].below(np.array([[-0.05, -9.7, 0.0]]))
-
-
-def test_a_sheet_of_one_row_is_refused():
-    block = block_mesh([0.0, 1.0], [0.0, 0.4, 0.5], [0.0, 1.0, 2.0], layers=[0, 1])
-    with pytest.raises(InputError, match=r"two elements along and around, or more: got \(1, 2\)"):
-        ReceptorSheet(block)
 
 
 @pytest.mark.parametrize(("z", "proximal", "inwards"), [(0.0, 0.07, 0.0), (2.5, 0.06, 0.12)])
@@ -183,11 +176,6 @@ def test_columns_agree_at_the_pole(name):
     around = np.outer(np.cos(angles), np.cross(FINGER.skin_normal(pole), sideways))
     ring = pole + 0.003 * (around + np.outer(np.sin(angles), sideways))
     assert_allclose(sheet.below(ring)[:, 0], n_along - 0.5, rtol=0, atol=0.03)
-
-
-def test_the_tip_itself_is_skin():
-    tip = np.array([[FINGER.length_mm, 0.0, 0.0]])
-    assert SHEETS["full"].below(tip).shape == (1, 2)
 
 
 def test_the_coefficients_of_a_spline_are_those_of_scipy():

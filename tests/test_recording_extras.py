@@ -14,7 +14,6 @@ from fingerpad.experiments.fit.methods import check_offset, fit_offset
 from fingerpad.experiments.fit.rate_uncertainty import profiled
 from fingerpad.experiments.fit.results import ParameterProfile, RatePosterior
 from fingerpad.inference.identifiable import IDENTIFIABLE_NAMES, identifiable
-from fingerpad.inference.rate_likelihood import RateLikelihood
 from fingerpad.inference.rate_model import AfferentModel, four_number_model
 from fingerpad.inference.rate_problem import RateProblem
 from fingerpad.inference.receptor_offset import ReceptorOffset
@@ -60,11 +59,8 @@ def fitted():
 
 def test_between_two_places_the_drive_is_linear_and_at_a_place_it_is_that_of_the_place():
     for offset in PLACES_MM:
-        assert_allclose(
-            TRUTH.at(offset).evaluate(KNOWN),
-            AfferentModel.of_traces(felt(offset)).evaluate(KNOWN),
-            rtol=1e-12,
-        )
+        there = AfferentModel.of_traces(felt(offset)).evaluate(KNOWN)
+        assert_allclose(TRUTH.at(offset).evaluate(KNOWN), there, rtol=1e-12)
     (between,) = TRUTH.at(0.06).drives
     ends = [AfferentModel.of_traces(felt(offset)).drives[0].sed_kpa for offset in (0.0, 0.3)]
     assert_allclose(between.sed_kpa, 0.8 * ends[0] + 0.2 * ends[1], rtol=1e-12)
@@ -82,15 +78,11 @@ def test_stimuli_with_different_motions_can_be_sampled_at_an_offset():
         ReceptorOffset(np.array([-0.2, 0.2]), [mixed[0], MODEL])
 
 
-@pytest.mark.parametrize("method", ["least_squares", "cma_es"])
-def test_a_receptor_beside_its_place_is_found(method, fitted):
-    if method == "least_squares":
-        found, error = fitted.offset, 0.02
-    else:
-        found, error = fit_offset(BESIDE, ASIDE, np.arange(9) % 2, method, WINDOWS_MS), 0.02
-    assert found.offset_mm == pytest.approx(TRUE_OFFSET_MM, abs=error)
-    assert found.fss_in_sample > 0.999
-    assert found.identifiable["dynamic_gain_per_kpa"] == pytest.approx(identifiable(KNOWN)[1], rel=0.1)
+def test_a_receptor_beside_its_place_is_found(fitted):
+    for found in (fitted.offset, fit_offset(BESIDE, ASIDE, np.arange(9) % 2, "cma_es", WINDOWS_MS)):
+        assert found.offset_mm == pytest.approx(TRUE_OFFSET_MM, abs=0.02)
+        assert found.fss_in_sample > 0.999
+        assert found.identifiable["dynamic_gain_per_kpa"] == pytest.approx(identifiable(KNOWN)[1], rel=0.1)
 
 
 def test_the_fit_in_its_place_stands_beside_it_and_the_receptor_held_there_is_that_fit(fitted):
@@ -111,20 +103,10 @@ def test_a_receptor_that_may_move_never_fits_worse():
     assert abs(found.offset_mm) < 0.02
 
 
-@pytest.mark.parametrize(
-    ("beside", "said"),
-    [
-        ({0.0: BESIDE[0.0], 0.3: BESIDE[0.3]}, "below and above 0 mm: got 0, 0.3"),
-        ({}, "below and above 0 mm: got none"),
-    ],
-    ids=["one side", "nowhere"],
-)
-def test_a_row_of_sites_lies_on_both_sides(beside, said):
-    with pytest.raises(InputError, match=said):
-        fit_recordings(BESIDE[0.0], ASIDE, beside=beside)
-
-
-def test_an_offset_needs_its_method_and_several_places():
+def test_an_offset_needs_its_method_several_places_and_sites_on_both_sides():
+    for beside, said in (({0.0: BESIDE[0.0], 0.3: BESIDE[0.3]}, "got 0, 0.3"), ({}, "got none")):
+        with pytest.raises(InputError, match=f"below and above 0 mm: {said}"):
+            fit_recordings(BESIDE[0.0], ASIDE, beside=beside)
     with pytest.raises(InputError, match="least_squares or cma_es: got likelihood"):
         check_offset("likelihood", [0.0, 1.0])
     with pytest.raises(InputError, match=r"all are at 1\.5 mm"):
@@ -151,25 +133,6 @@ def test_profiles_hold_the_known_afferent_and_rise_to_both_sides():
     _, dynamic, static, _ = found
     assert dynamic.high < 1.3 * identifiable(KNOWN)[1]
     assert static.high - static.low < 0.5 * identifiable(KNOWN)[2]
-
-
-def test_likely_points_are_likely_and_find_a_better_place_than_a_poor_fit():
-    likelihood = RateLikelihood(four_number_model(MODEL), IN_PLACE)
-    poor = identifiable(KNOWN) * [1.0, 1.3, 0.9, 1.4]
-    points = rate_uncertainty.likely_points(likelihood, poor)
-    heights = likelihood.log_likelihood(points)
-    assert len(points) > 50
-    assert np.ptp(heights) <= rate_uncertainty.MOST_LOSS
-    assert heights.max() > likelihood.log_likelihood(poor[None])[0] + 20.0
-    assert (points[:, 0] * points[:, 3] < 1.0).all()
-    assert_array_equal(points, rate_uncertainty.likely_points(likelihood, poor))
-
-
-def test_a_search_begins_where_no_afferent_fires_untouched():
-    begun = rate_uncertainty.admissible([0.5, 0.0, 0.03, 40.0])
-    assert begun[0] * begun[3] == pytest.approx(0.9)
-    assert begun[1] > 0.0
-    assert_array_equal(rate_uncertainty.admissible([-0.1, 2.0, 0.03, 40.0]), [-0.1, 2.0, 0.03, 40.0])
 
 
 # Sensitivity
@@ -206,7 +169,7 @@ def section(fitted):
     return replace(fitted, profiles=profiles)
 
 
-def test_figures_draw_what_was_found(section):
+def test_figures_words_and_tables_hold_what_was_found(section):
     panels = report.draw_profiles(section).axes
     assert [axes.lines[0].get_ydata().tolist() for axes in panels] == [[3.0, 0.0, 2.5]] * 4
     assert panels[3].get_xlabel() == "τ [ms]"
@@ -220,29 +183,6 @@ def test_figures_draw_what_was_found(section):
     assert lines["fitted without a fold"].get_xdata().tolist() == section.offset.folds_mm.tolist()
     for draw in (report.draw_profiles, report.draw_sensitivity, report.draw_offset):
         assert png(draw, section).startswith(b"\x89PNG")
-
-
-def test_credible_intervals_are_drawn_where_there_are_some(section):
-    posterior = RatePosterior(
-        level=0.95,
-        seed=1,
-        n_draws=10,
-        n_evaluations=20,
-        largest_r_hat=1.0,
-        smallest_effective_size=9.0,
-        median=dict.fromkeys(IDENTIFIABLE_NAMES, 2.0),
-        interval=dict.fromkeys(IDENTIFIABLE_NAMES, (1.5, 2.5)),
-        covariance=np.eye(4),
-        bands={},
-    )
-    drawn = replace(section, posterior=posterior)
-    panels = zip(report.draw_profiles(drawn).axes, report.draw_profiles(section).axes, strict=True)
-    assert all(len(more.lines) == len(fewer.lines) + 1 for more, fewer in panels)
-    assert "credible interval" in report.caption_profiles(drawn)
-    assert "credible interval" not in report.caption_profiles(section)
-
-
-def test_words_and_tables_hold_the_numbers(section):
     found = section.offset
     assert f"fitted offset is {found.offset_mm:.3g} mm" in report.caption_offset(section)
     (table,) = report.offset_tables(section)
@@ -253,3 +193,15 @@ def test_words_and_tables_hold_the_numbers(section):
     most = max(zip(section.sensitivity.total, ("β", "k_d", "k_s", "τ"), strict=True))[1]
     assert f"The largest total index is that of {most}" in report.caption_sensitivity(section)
     assert len(report.sensitivity_tables(section)[0].rows) == 4
+
+
+def test_credible_intervals_are_drawn_where_there_are_some(section):
+    drawn = replace(section, posterior=RatePosterior(
+        level=0.95, seed=1, n_draws=10, n_evaluations=20, largest_r_hat=1.0, smallest_effective_size=9.0,
+        median=dict.fromkeys(IDENTIFIABLE_NAMES, 2.0), interval=dict.fromkeys(IDENTIFIABLE_NAMES, (1.5, 2.5)),
+        covariance=np.eye(4), bands={},
+    ))  # fmt: skip
+    panels = zip(report.draw_profiles(drawn).axes, report.draw_profiles(section).axes, strict=True)
+    assert all(len(more.lines) == len(fewer.lines) + 1 for more, fewer in panels)
+    assert "credible interval" in report.caption_profiles(drawn)
+    assert "credible interval" not in report.caption_profiles(section)

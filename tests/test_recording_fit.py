@@ -50,7 +50,6 @@ from fingerpad.neuron.afferent import Afferent
 from fingerpad.neuron.afferent_types import RA
 from fingerpad.neuron.rate_windows import PAPER_WINDOWS_MS
 from fingerpad.neuron.transduction import drive
-from fingerpad.psychophysics.uncertainty import posterior as recording_posterior
 from fingerpad.report import recording_fit as report
 from sections import sed_driven
 

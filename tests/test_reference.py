@@ -14,11 +14,8 @@ def fss(observed: np.ndarray, predicted: np.ndarray) -> float:
     return 1 - ((observed - predicted) ** 2).sum() / (observed**2).sum()
 
 
-def test_bar_was_observed_at_the_shifts_of_the_protocol() -> None:
+def test_bar_was_observed_at_the_shifts_of_the_protocol_and_predictions_reach_the_known_scores():
     np.testing.assert_array_equal(bar_firing_rates().shift_mm, protocol.BAR_SHIFTS.value)
-
-
-def test_best_symmetric_and_constant_predictions_reach_the_known_scores() -> None:
     observed = bar_firing_rates()
     for rates, symmetric, constant in (
         (observed.dynamic_rate_hz, 0.957, 0.559),
@@ -64,8 +61,6 @@ def test_observations_carry_their_story_and_cannot_be_changed(load) -> None:
         ("# content: a\n# source: b\n# status: heard\nrate_hz\n1\n", "must be one of paper"),
         (STORY + "shift_mm,rate_hz\n1\n", "needs 2 entries per row"),
         (STORY + "shift_mm,rate_hz\n1,high\n", "rate_hz of rates must be a finite number: got 'high'"),
-        (STORY + "shift_mm,rate_hz\n1,nan\n", "rate_hz of rates must be a finite number: got 'nan'"),
-        (STORY, "needs a header and at least one row"),
         (STORY + "rate_hz\n", "needs a header and at least one row"),
     ],
 )

@@ -62,19 +62,14 @@ def test_receptors_in_space_are_drawn_from_below_and_dorsal_ones_are_squares():
     assert corners[0] == corners[1] > 5
 
 
-def test_a_population_that_stays_silent_is_drawn_hollow():
+def test_a_picture_is_written_as_it_is_drawn_a_silent_one_too_and_nobody_is_refused(tmp_path):
     silent = ResponseMap([[0.0, 0.0]], 1.0, SpikeTrains.from_lists([[]]), [0.0], [0.0], [np.nan])
-    assert png(responses.draw_responses, {"silent": silent}).startswith(b"\x89PNG")
-
-
-def test_nobody_is_refused():
+    for shown in ({"mine": response()}, {"silent": silent}):
+        path = write_png(responses.draw_responses, shown, tmp_path / "deeper" / "map.png")
+        assert path.read_bytes() == png(responses.draw_responses, shown)
+        assert path.read_bytes().startswith(b"\x89PNG")
     with pytest.raises(InputError, match="at least one population"):
         responses.draw_responses({})
-
-
-def test_a_picture_is_written_as_it_is_drawn(tmp_path):
-    path = write_png(responses.draw_responses, {"mine": response()}, tmp_path / "deeper" / "map.png")
-    assert path.read_bytes() == png(responses.draw_responses, {"mine": response()})
 
 
 def test_a_mixed_population_has_a_raster_and_a_map_per_touch():

@@ -10,7 +10,6 @@ import struct
 import subprocess
 import sys
 import time
-from html.parser import HTMLParser
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -34,13 +33,8 @@ COMMAND = (sys.executable, "-W", "error", "-m", "fingerpad", "reproduce")
 MEASURES = ("static", "dynamic", "latency")
 HIT_RATES = ("hit_rate", "hit_rate_sd", "hit_rate_shifted", "hit_rate_shifted_sd")
 PARAMETERS = {
-    "intercept_ma",
-    "dynamic_gain",
-    "static_gain",
-    "time_constant_ms",
-    "capacitance_mf",
-    "threshold_mv",
-}
+    "intercept_ma", "dynamic_gain", "static_gain", "time_constant_ms", "capacitance_mf", "threshold_mv",
+}  # fmt: skip
 MEASURED = ("started", "wall_s", "peak_memory_mb", "stages", "weber_144", "weber_287")
 """Parts of the manifest and of the summary that differ between runs, or are left out at quick resolution."""
 
@@ -57,23 +51,13 @@ INDENTATIONS = 6 + 2 * (4 + 36 + 14 + 1)
 def run(folder, *options):
     """Reproduce in a subprocess whose warnings are errors."""
     started = time.perf_counter()
-    done = subprocess.run(
-        [*COMMAND, "--resolution", "quick", "--jobs", "2", "--out", str(folder), *options],
-        capture_output=True,
-        text=True,
-        check=False,
-        cwd=folder.parent,
-    )
+    command = [*COMMAND, "--resolution", "quick", "--jobs", "2", "--out", str(folder), *options]
+    done = subprocess.run(command, capture_output=True, text=True, check=False, cwd=folder.parent)
     text = (folder / "results.json").read_text(encoding="utf-8") if done.returncode == 0 else "null"
     return SimpleNamespace(
-        folder=folder,
-        status=done.returncode,
-        said=done.stdout,
-        errors=done.stderr,
-        text=text,
-        results=json.loads(text),
-        wall_s=time.perf_counter() - started,
-    )
+        folder=folder, status=done.returncode, said=done.stdout, errors=done.stderr, text=text,
+        results=json.loads(text), wall_s=time.perf_counter() - started,
+    )  # fmt: skip
 
 
 PROGRESS = re.compile(r"[a-z ]+: (\d+ % of number )?\d+ of \d+(, \d+ s left| after \d+ s)")
@@ -96,14 +80,10 @@ def of_set(first, request):
     return first.results[request.param]
 
 
-def drawings(run):
-    """Figures that the page of a run has."""
-    return reproduction_page(read_results(run.folder / "results.json", ReproductionResult)).drawings
-
-
 def images(run):
     """Number of images on the page of a run: many figures have one of each set."""
-    return sum(1 + (drawing.human is not None) for drawing in drawings(run))
+    page = reproduction_page(read_results(run.folder / "results.json", ReproductionResult))
+    return sum(1 + (drawing.human is not None) for drawing in page.drawings)
 
 
 @pytest.fixture(scope="session")
@@ -136,15 +116,7 @@ def second(first, tmp_path_factory):
 # From nothing
 
 
-def test_a_run_has_the_numbers_that_the_pages_show(first):
-    shown = excerpt(read_results(first.folder / "results.json", ReproductionResult))
-    assert sum(shown.indentations.values()) == INDENTATIONS
-    assert len(readme_table(shown).splitlines()) == 2 + len(first.results["statements"])
-    for percept in shown.percept.values():
-        assert percept.codes[0].hit_rate.size == percept.curvature_per_m.size == 6
-
-
-def test_a_run_ends_with_status_0_and_names_results_and_missed_criteria(first):
+def test_a_run_ends_with_status_0_and_whole_files_and_the_numbers_of_the_pages(first, stamps):
     assert first.status == 0
     # The kernels may be compiled only now.
     assert told(first)[0].startswith("Reproducing at quick resolution with 2 process(es)")
@@ -156,12 +128,14 @@ def test_a_run_ends_with_status_0_and_names_results_and_missed_criteria(first):
         assert verdict.startswith(f"{name}: of {len(first.results['statements'])} statements of the paper")
         for each in first.results["statements"]:
             assert (each["statement"] in verdict) == (each[f"verdict_{name}"] == "missed")
-
-
-def test_the_folder_holds_whole_files_only(first, stamps):
     assert sorted(os.listdir(first.folder)) == ["figures", STORE_FOLDER, "report.html", "results.json"]
     assert len(stamps) == INDENTATIONS
     assert all(re.fullmatch(r"[0-9a-f]{32}\.npz", name) for name in stamps)
+    shown = excerpt(read_results(first.folder / "results.json", ReproductionResult))
+    assert sum(shown.indentations.values()) == INDENTATIONS
+    assert len(readme_table(shown).splitlines()) == 2 + len(first.results["statements"])
+    for percept in shown.percept.values():
+        assert percept.codes[0].hit_rate.size == percept.curvature_per_m.size == 6
 
 
 def numbers(value):
@@ -175,7 +149,7 @@ def numbers(value):
         yield value
 
 
-def test_results_have_every_section_and_finite_numbers_only(first):
+def test_results_have_every_section_finite_numbers_and_every_input(first):
     files = {"format", "format_version", "tissues", "inputs", "manifest"}
     assert set(first.results) == files | {"summary", "statements", "skin_deflection", *SETS}
     studies = {"tissues", "skin_force", "single_unit", "firing", "discrimination", "mesh", "levels"}
@@ -184,6 +158,9 @@ def test_results_have_every_section_and_finite_numbers_only(first):
         assert {key for key, section in first.results[name].items() if section is None} == BEYOND
     assert not re.search(r"\b(NaN|Infinity)\b", first.text)
     assert all(math.isfinite(number) for number in numbers(first.results))
+    listed = first.results["inputs"]
+    assert [number["name"] for number in listed] == [number.name for number in all_published()]
+    assert {number["status"] for number in listed} <= {"paper", "read", "recalled", "assumed"}
 
 
 @pytest.mark.parametrize("name", SETS)
@@ -221,35 +198,32 @@ def test_one_set_serves_four_levels(first):
     assert found["hit_rate_365"] == pytest.approx([0.95, 0.95], abs=0.03)
 
 
-def test_skin_deflection_is_complete(first):
+def test_skin_deflection_is_complete_and_trial_3_follows_the_observed_skin(first):
     found = first.results["skin_deflection"]
     assert set(found) == {"trial1", "trial2", "trial3", "observed"}
     for trial in ("trial1", "trial2", "trial3"):
         assert set(found[trial]) == {"line", "cylinder"}
-        for name, profile in found[trial].items():
+        for profile in found[trial].values():
             distance, deflection = profile["distance_mm"], profile["deflection_mm"]
             assert len(distance) == len(deflection) > 20
             assert distance == sorted(distance)
             assert 0.5 < max(deflection) <= 1.01
             assert abs(distance[int(np.argmax(deflection))]) < 0.6
             assert 50.0 < profile["force_mn"] < 1000.0
-            assert ("r2" in profile) == (name == "cylinder")
         assert found[trial]["cylinder"]["r2"] < 1.0
+    assert found["trial3"]["cylinder"]["r2"] >= 0.93
 
 
-def test_single_unit_is_complete(of_set):
+def test_single_unit_is_complete_and_reaches_the_papers_fss(of_set):
     found = of_set["single_unit"]
-    for name in ("shift_mm", "dynamic_rate_hz", "static_rate_hz"):
-        assert len(found[name]) == 36
+    assert {len(found[name]) for name in ("shift_mm", "dynamic_rate_hz", "static_rate_hz")} == {36}
     np.testing.assert_allclose(np.diff(found["shift_mm"]), 0.2, rtol=0, atol=1e-12)
-    assert set(found["parameters"]) == PARAMETERS
     assert len(found["folds"]) == 6
-    for fold in found["folds"]:
-        assert set(fold["parameters"]) == PARAMETERS
-        assert fold["fss_train"] <= 1.0
-        assert fold["fss_test"] <= 1.0
+    for fit in (found, *found["folds"]):
+        assert set(fit["parameters"]) == PARAMETERS
+    assert max(fold[name] for fold in found["folds"] for name in ("fss_train", "fss_test")) <= 1.0
     mean = np.mean([fold["fss_test"] for fold in found["folds"]])
-    assert found["fss_out_of_sample"] == pytest.approx(mean, rel=1e-12)
+    assert 0.81 <= found["fss_out_of_sample"] == pytest.approx(mean, rel=1e-12)
     assert found["fss_in_sample"] <= 1.0
 
 
@@ -258,7 +232,7 @@ def test_what_goes_beyond_the_paper_comes_on_top(second):
         assert None not in second.results[name].values()
     assert all(math.isfinite(number) for number in numbers(second.results))
     page = (second.folder / "report.html").read_text(encoding="utf-8")
-    assert Links(page).tags.count("img") == images(second)
+    assert page.count("<img ") == images(second)
 
 
 def test_discrimination_is_complete(of_set):
@@ -273,6 +247,8 @@ def test_discrimination_is_complete(of_set):
         for values in table.values():
             assert len(values) == 6
             assert all(0.0 <= value <= 1.0 for value in values)
+    for position in ("hit_rate", "hit_rate_shifted"):
+        assert (np.diff(found["gradient_sum"]["static"][position]) > 0).all()
 
 
 def test_population_and_nail_are_maps(of_set):
@@ -306,27 +282,7 @@ def test_the_manifest_holds_the_command_that_repeats_the_run(first):
     assert all(mesh["smallest_gauss_jacobian_mm3"] > 0 for mesh in manifest["meshes"].values())
 
 
-def test_every_published_number_is_listed_with_its_status(first):
-    listed = first.results["inputs"]
-    assert [number["name"] for number in listed] == [number.name for number in all_published()]
-    assert {number["status"] for number in listed} <= {"paper", "read", "recalled", "assumed"}
-
-
 # The claims
-
-
-def test_trial_3_follows_the_observed_skin(first):
-    assert first.results["skin_deflection"]["trial3"]["cylinder"]["r2"] >= 0.93
-
-
-def test_fss_out_of_sample_reaches_the_papers(of_set):
-    assert of_set["single_unit"]["fss_out_of_sample"] >= 0.81
-
-
-@pytest.mark.parametrize("position", ["hit_rate", "hit_rate_shifted"])
-def test_static_hit_rates_rise_with_curvature(of_set, position):
-    rates = of_set["discrimination"]["gradient_sum"]["static"][position]
-    assert (np.diff(rates) > 0).all()
 
 
 def test_the_comparison_marks_what_it_misses(of_set):
@@ -343,69 +299,29 @@ def test_a_fitted_number_is_told_apart_from_a_prediction(first):
     """The set human is fitted to hit rates of people, and its moduli to deflection and force."""
     group = {row["quantity"]: row["group"] for row in first.results["human"]["comparison"]}
     chosen = (
-        "Tissues of the run",
-        "Hit rate at",
-        "Dynamic rate",
-        "Static rate,",
-        "Euclidean",
-        "Noise sigma_1",
-    )
-    for quantity, found in group.items():
-        if quantity.startswith(chosen):
-            assert found == "fitted", quantity
+        "Tissues of the run", "Hit rate at", "Dynamic rate", "Static rate,", "Euclidean", "Noise sigma_1",
+    )  # fmt: skip
+    fitted = {quantity: found for quantity, found in group.items() if quantity.startswith(chosen)}
+    assert fitted == dict.fromkeys(fitted, "fitted") != {}
     assert group["Single unit, FSS out of sample (mean of six folds)"] == "statement"
 
 
 # The page
 
 
-class Links(HTMLParser):
-    """Everything that a browser would follow or load."""
-
-    def __init__(self, page):
-        super().__init__()
-        self.loaded, self.tags = [], []
-        self.feed(page)
-
-    def handle_starttag(self, tag, attrs):
-        self.tags.append(tag)
-        attributes = dict(attrs)
-        for name in ("src", "href", "srcset", "data", "action", "poster", "xlink:href"):
-            if name in attributes:
-                self.loaded.append(attributes[name] or "")
-
-
-def test_the_page_needs_nothing_from_outside(first, page):
-    links = Links(page)
-    assert links.tags.count("img") == images(first)
-    assert all(link.startswith(("data:image/png;base64,", "#")) for link in links.loaded)
-    assert not {"script", "link", "iframe", "object", "embed", "base"} & set(links.tags)
-    without_data = re.sub(r"data:[^\"']*", "", page)
-    assert not re.search(r"url\(|@import|(src|href)\s*=\s*[\"']?(https?:)?//", without_data)
-
-
-def test_the_page_shows_every_compared_number_and_no_machine_path(first, page):
+def test_the_page_shows_every_compared_number_and_figure_and_no_machine_path(first, page):
     text = re.sub(r"\s+", " ", re.sub(r"<[^>]*>", " ", page))
     for name in SETS:
         for row in first.results[name]["comparison"]:
             assert row["ours"] in text
     assert str(first.folder) not in page
     assert str(Path.home()) + "/" not in page
-
-
-def test_figures_are_images_of_a_readable_size(first):
-    figures = sorted((first.folder / "figures").glob("figure_*"))
-    named = sorted(int(re.match(r"figure_(\d+)_\w+\.png$", path.name)[1]) for path in figures)
-    expected = [each for each in drawings(first) if each.number for _ in range(1 + (each.human is not None))]
-    assert named == sorted(drawing.number for drawing in expected)
-    assert set(named) >= set(range(1, 10))
-    for path in figures:
+    assert page.count("<img ") == images(first)
+    for path in (first.folder / "figures").iterdir():
         content = path.read_bytes()
         assert content.startswith(b"\x89PNG\r\n\x1a\n")
         assert content.endswith(b"IEND\xaeB`\x82")
-        width, height = struct.unpack(">II", content[16:24])
-        assert min(width, height) > 400
-        assert len(content) > 10_000
+        assert min(struct.unpack(">II", content[16:24])) > 400
 
 
 # Again
@@ -420,16 +336,12 @@ def unmeasured(results):
     return results | {"manifest": kept(results["manifest"]), "summary": summary}
 
 
-def test_a_second_run_takes_everything_from_the_store(first, second, stamps):
+def test_a_second_run_takes_everything_from_the_store_and_gives_the_same_bits(first, second, stamps):
     assert second.status == 0
     assert all(PROGRESS.fullmatch(line) for line in told(second)[1:])
-    folder = second.folder / STORE_FOLDER
-    found = {path.name: path.stat().st_mtime_ns for path in folder.iterdir()}
+    found = {path.name: path.stat().st_mtime_ns for path in (second.folder / STORE_FOLDER).iterdir()}
     assert {name: found[name] for name in stamps} == stamps
     assert [stage.get("computed") for stage in second.results["manifest"]["stages"][:2]] == [None, 0]
-
-
-def test_a_second_run_gives_the_same_results_bit_for_bit(first, second):
     ours, theirs = unmeasured(first.results), unmeasured(second.results)
     for section in set(ours) - set(SETS):
         assert json.dumps(theirs[section]) == json.dumps(ours[section])

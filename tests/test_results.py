@@ -50,7 +50,7 @@ def found() -> Found:
     )
 
 
-def test_a_result_comes_back_from_its_json_bit_by_bit() -> None:
+def test_a_result_comes_back_from_its_json_bit_by_bit_and_is_frozen_arrays_included():
     again = from_json(Found, to_json(found()))
     assert again.folds[1].score == 0.1 * 3
     assert np.isnan(again.folds[0].score)
@@ -58,9 +58,6 @@ def test_a_result_comes_back_from_its_json_bit_by_bit() -> None:
     # What is not finite has one name in a file.
     np.testing.assert_array_equal(again.rate_hz, [[1.0, 2.0], [3.0, np.nan]])
     assert to_json(again) == to_json(found())
-
-
-def test_a_result_is_frozen_arrays_included() -> None:
     result = found()
     with pytest.raises(AttributeError):
         result.rate_hz = np.zeros((1, 1))  # type: ignore[misc]
@@ -71,13 +68,10 @@ def test_a_result_is_frozen_arrays_included() -> None:
 @pytest.mark.parametrize(
     "changed",
     [
-        {"rates_hz": [[1.0]]},
-        {"rate_hz": [1.0]},
-        {"counts": ["two"]},
-        {"counts": [None]},
+        {"rates_hz": [[1.0]]}, {"rate_hz": [1.0]}, {"counts": ["two"]}, {"counts": [None]},
         {"folds": [{"score": 1.0}]},
     ],
-)
+)  # fmt: skip
 def test_an_unknown_missing_or_unfit_field_is_an_error(changed: dict[str, object]) -> None:
     fields = json.loads(to_json(found())) | changed
     with pytest.raises(ValidationError):

@@ -17,19 +17,15 @@ def test_the_schema_in_the_package_is_the_one_that_the_types_give(results, tmp_p
     assert json.loads((tmp_path / file_name(name)).read_text(encoding="utf-8")) == schema(name)
 
 
-def test_every_file_of_results_has_its_own_format(tmp_path):
-    write_schemas(tmp_path)
-    assert len(list(tmp_path.iterdir())) == len(RESULT_FILES) + 1
-
-
 def test_a_docstring_is_no_part_of_a_format(monkeypatch, tmp_path):
     monkeypatch.setattr(RESULT_FILES[0], "__doc__", "Rewritten in plain English.")
     test_the_schema_in_the_package_is_the_one_that_the_types_give(RESULT_FILES[0], tmp_path)
     assert "description" not in json.dumps(schema(file_format(RESULT_FILES[0])[0]))
 
 
-def test_the_schema_of_a_described_touch_is_the_one_that_its_parts_give(tmp_path):
+def test_every_file_of_results_has_its_own_format_and_a_described_touch_the_one_of_its_parts(tmp_path):
     write_schemas(tmp_path)
+    assert len(list(tmp_path.iterdir())) == len(RESULT_FILES) + 1
     assert json.loads((tmp_path / TOUCH_SCHEMA).read_text(encoding="utf-8")) == touch_schema()
 
 

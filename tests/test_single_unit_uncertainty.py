@@ -39,7 +39,7 @@ def section() -> UncertaintyResult:
         return single_unit_uncertainty.uncertainty_result(SED, TRUTH, 1, quick=True)
 
 
-def test_the_truth_lies_within_its_intervals(section: UncertaintyResult) -> None:
+def test_the_truth_lies_within_its_intervals_and_four_of_six_directions_are_identified(section):
     four = identifiable(TRUTH)
     profiles = {profile.name: profile for profile in section.profiles}
     assert tuple(profiles) == IDENTIFIABLE_NAMES
@@ -52,26 +52,19 @@ def test_the_truth_lies_within_its_intervals(section: UncertaintyResult) -> None
         assert min(profiles[name].losses) >= 0.0
         assert profiles[name].low is None or profiles[name].low < found.median
     assert section.fit == pytest.approx(dict(zip(IDENTIFIABLE_NAMES, four, strict=True)))
-
-
-def test_both_forms_are_the_same_draws(section: UncertaintyResult) -> None:
     scale = section.capacitance_mf * section.threshold_mv
     for six, four in zip(("intercept_ma", "dynamic_gain", "static_gain"), IDENTIFIABLE_NAMES, strict=False):
         for end in ("low", "median", "high"):
-            assert getattr(section.posterior[six], end) == pytest.approx(
-                scale * getattr(section.posterior[four], end)
-            )
+            expected = scale * getattr(section.posterior[four], end)
+            assert getattr(section.posterior[six], end) == pytest.approx(expected)
     assert section.posterior["resting_share"].high < 1.0
+    directions = section.identifiability
+    assert directions.rank == 4
+    assert len(directions.silent_directions) == 2
+    assert max(directions.relative_singular_values[4:]) < 1e-6
 
 
-def test_four_of_six_directions_are_identified(section: UncertaintyResult) -> None:
-    found = section.identifiability
-    assert found.rank == 4
-    assert len(found.silent_directions) == 2
-    assert max(found.relative_singular_values[4:]) < 1e-6
-
-
-def test_bands_hold_most_of_what_was_observed(section: UncertaintyResult) -> None:
+def test_bands_hold_most_of_what_was_observed_and_convergence_is_reported(section):
     for rates in section.rates.values():
         assert 0.85 <= rates.share_within_new <= 1.0
         for low, middle, high, new_high in zip(
@@ -82,9 +75,6 @@ def test_bands_hold_most_of_what_was_observed(section: UncertaintyResult) -> Non
     # Residuals were drawn independently, with 12 and 2 spikes/s.
     assert section.rates["dynamic"].residual_deviation_hz.low < 12.0 < 25.0
     assert section.evidence_for_alike_residuals < 3.0
-
-
-def test_convergence_and_sensitivity_are_reported(section: UncertaintyResult) -> None:
     assert section.convergence.r_hat <= 1.02
     assert section.convergence.effective_draws >= 100.0
     found = section.sensitivity
@@ -102,12 +92,8 @@ def test_the_figure_shows_bands_over_points_and_a_profile_of_each_number(section
         np.testing.assert_array_equal(observed.get_ydata(), section.rates[phase].observed_hz)
         assert len(axes.collections) == 2
         assert axes.get_ylim()[0] == 0.0
-    assert [axes.get_xlabel().split(" [")[1] for axes in profiles] == [
-        "1/ms]",
-        "1/kPa]",
-        "1/(kPa ms)]",
-        "ms]",
-    ]
+    units = [axes.get_xlabel().split(" [")[1] for axes in profiles]
+    assert units == ["1/ms]", "1/kPa]", "1/(kPa ms)]", "ms]"]
     for axes, profile in zip(profiles, section.profiles, strict=True):
         np.testing.assert_array_equal(axes.lines[0].get_ydata(), profile.losses)
     assert png(report.draw_uncertainty, section).startswith(b"\x89PNG")
@@ -116,13 +102,9 @@ def test_the_figure_shows_bands_over_points_and_a_profile_of_each_number(section
 def test_the_words_hold_the_numbers(section: UncertaintyResult) -> None:
     caption = report.caption_uncertainty(section)
     assert "95 % bands" in caption
-    determined, residuals, sensitivity, convergence = report.uncertainty_tables(section)
-    assert [len(table.rows) for table in (determined, residuals, sensitivity, convergence)] == [8, 2, 4, 9]
-    assert all(
-        len(row.cells) == len(table.columns)
-        for table in report.uncertainty_tables(section)
-        for row in table.rows
-    )
+    tables = determined, residuals, _, _ = report.uncertainty_tables(section)
+    assert [len(table.rows) for table in tables] == [8, 2, 4, 9]
+    assert all(len(row.cells) == len(table.columns) for table in tables for row in table.rows)
     shares = [f"{rates.share_within_new:.2f}" for rates in section.rates.values()]
     assert [row.cells[-1] for row in residuals.rows] == shares
     assert "known only up to a common scale" in determined.note

@@ -9,16 +9,13 @@ from fingerpad.core.errors import InputError
 from fingerpad.geometry.motion import ForceRampAndHold, RampAndHold
 
 
-def test_depth_rises_linearly_then_stays():
+def test_depth_or_force_rises_linearly_then_stays_at_the_same_times():
     motion = RampAndHold(depth_mm=2.0, ramp_ms=40.0, hold_ms=100.0)
     np.testing.assert_allclose(
         motion.prescribed_at([-5.0, 0.0, 10.0, 40.0, 41.0, 140.0]), [0, 0, 0.5, 2, 2, 2], rtol=1e-15
     )
     assert motion.end_ms == 140.0
     assert motion.prescribed_at(np.zeros((2, 3))).shape == (2, 3)
-
-
-def test_force_rises_linearly_then_stays_and_is_solved_at_the_same_times_as_a_depth():
     motion = ForceRampAndHold(force_mn=80.0, ramp_ms=40.0, hold_ms=100.0)
     np.testing.assert_allclose(
         motion.prescribed_at([-5.0, 0.0, 10.0, 40.0, 140.0]), [0, 0, 20, 80, 80], rtol=1e-15
@@ -53,8 +50,7 @@ def test_hold_times_grow_geometrically_from_the_ramp_step():
 
 
 @pytest.mark.parametrize("name", ["depth_mm", "ramp_ms", "hold_ms"])
-@pytest.mark.parametrize("value", [0.0, -1.0, np.nan, np.inf, "1 mm", True])
-def test_impossible_motions_are_refused_in_one_sentence(name, value):
-    with pytest.raises(InputError, match=name) as refusal:
-        RampAndHold(**{name: value})
-    assert str(refusal.value).endswith(".")
+def test_impossible_motions_are_refused_in_one_sentence(name):
+    for value in (0.0, -1.0, np.nan, np.inf, "1 mm", True):
+        with pytest.raises(InputError, match=rf"{name}.*\.$"):
+            RampAndHold(**{name: value})

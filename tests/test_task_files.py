@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import yaml
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
@@ -50,17 +51,12 @@ BARS = {
     "stimuli": [
         {"name": "narrow", "object": {"width_mm": 2.0}},
         {"name": "wide", "object": {"width_mm": 4.0}, "place": {"x_mm": 0.5}},
-        {
-            "name": "deep",
-            "object": {"width_mm": 2.0},
-            "motion": {"depth_mm": 0.8},
-            "place": {"tilt_deg": 0.0},
-            "friction": 0.3,
-        },
+        {"name": "deep", "object": {"width_mm": 2.0}, "motion": {"depth_mm": 0.8}, "place": {"tilt_deg": 0.0},
+         "friction": 0.3},
     ],
     "standard": "wide",
     "noise": 0.1,
-}
+}  # fmt: skip
 
 
 def changed(content, **parts):
@@ -81,12 +77,15 @@ def test_what_varies_makes_one_stimulus_per_value_and_the_standard_comes_first()
     stimuli = task_stimuli(parse_task(changed(SPHERES, standard=296)))
     assert [stimulus.name for stimulus in stimuli] == ["296", "287", "365"]
     assert [stimulus.level for stimulus in stimuli] == [296.0, 287.0, 365.0]
-    assert [stimulus.indenter for stimulus in stimuli] == [
-        Sphere(curvature_per_m=296.0),
-        Sphere(curvature_per_m=287.0),
-        Sphere(curvature_per_m=365.0),
-    ]
+    spheres = [Sphere(curvature_per_m=stimulus.level) for stimulus in stimuli]
+    assert [stimulus.indenter for stimulus in stimuli] == spheres
     assert {stimulus.motion for stimulus in stimuli} == {RampAndHold()}
+    for varied, first, second in (
+        ("motion.force_mn", ForceRampAndHold(50.0), ForceRampAndHold(80.0)),
+        ("motion.ramp_ms", RampAndHold(ramp_ms=50.0), RampAndHold(ramp_ms=80.0)),
+    ):
+        task = changed(SPHERES, stimuli={"vary": varied, "values": [50, 80]}, standard=50)
+        assert [stimulus.motion for stimulus in task_stimuli(parse_task(task))] == [first, second]
 
 
 def test_listed_stimuli_have_parameters_of_their_own():
@@ -96,16 +95,6 @@ def test_listed_stimuli_have_parameters_of_their_own():
     assert (narrow.indenter, narrow.x_mm, narrow.tilt_deg) == (Bar(2.0, 0.2), 0.0, None)
     # Its own depth takes the place of the force that the others share.
     assert (deep.motion, deep.tilt_deg, deep.friction) == (RampAndHold(0.8), 0.0, 0.3)
-
-
-def test_a_force_or_a_duration_may_vary_as_well_as_a_size():
-    forces = changed(SPHERES, stimuli={"vary": "motion.force_mn", "values": [50, 80]}, standard=50)
-    assert [stimulus.motion for stimulus in task_stimuli(parse_task(forces))] == [
-        ForceRampAndHold(50.0),
-        ForceRampAndHold(80.0),
-    ]
-    ramps = changed(SPHERES, stimuli={"vary": "motion.ramp_ms", "values": [50, 25]}, standard=50)
-    assert [stimulus.motion.ramp_ms for stimulus in task_stimuli(parse_task(ramps))] == [50.0, 25.0]
 
 
 def test_any_object_and_any_motion_may_be_discriminated(tmp_path):
@@ -122,17 +111,13 @@ def test_any_object_and_any_motion_may_be_discriminated(tmp_path):
         standard="a",
     )
     found = task_touches(parse_task(letters), tmp_path)
-    assert {name: touch.indenter for name, touch in found.items()} == {
-        name: braille(name) for name in ("a", "b")
-    }
+    assert {name: touch.indenter for name, touch in found.items()} == {name: braille(name) for name in "ab"}
     assert {touch.friction for touch in found.values()} == {0.2}
     assert [pose.x_mm for pose in found["a"].stimulus.poses][-1] == 1.0
     assert len({touch.grading for touch in found.values()}) == 1
-    bump, stroke = (
-        {"kind": "sphere", "radius_mm": 3},
-        {"kind": "stroke", "depth_mm": 0.4, "speed_mm_per_s": 20, "x_mm": 1},
-    )
-    mixed = [{"name": "pressed", "object": bump}, {"name": "slid", "object": "plate", "motion": stroke}]
+    stroke = {"kind": "stroke", "depth_mm": 0.4, "speed_mm_per_s": 20, "x_mm": 1}
+    bump = {"name": "pressed", "object": {"kind": "sphere", "radius_mm": 3}}
+    mixed = [bump, {"name": "slid", "object": "plate", "motion": stroke}]
     pressed = task_touches(parse_task(changed(SPHERES, resolution="quick", stimuli=mixed, standard="slid")))
     assert [touch.stimulus.stays for touch in pressed.values()] == [False, True]
 
@@ -149,48 +134,39 @@ def test_the_papers_spheres_are_the_very_touches_of_a_reproduction():
 
 def test_all_stimuli_meet_one_mesh_that_is_fine_below_each_of_them():
     pressed = task_touches(parse_task(changed(BARS, resolution="quick")))
-    gradings = {touch.grading for touch in pressed.values()}
-    assert len(gradings) == 1
-    grading = gradings.pop()
+    (grading,) = {touch.grading for touch in pressed.values()}
     for touch in pressed.values():
-        reach = touch.indenter.half_width_mm
-        assert grading.centre_mm - grading.half_length_mm < touch.at_mm[0] - reach
-        assert grading.centre_mm + grading.half_length_mm > touch.at_mm[0] + reach
+        reach = touch.indenter.half_width_mm + abs(touch.at_mm[0] - grading.centre_mm)
+        assert grading.half_length_mm > reach
     assert pressed["wide"].at_mm == (RECEPTOR_X_MM + 0.5, 0.0)
     assert pressed["deep"].tilt_deg == 0.0
     assert pressed["narrow"].tilt_deg == Conditions("quick").skin_tilt_deg
-
-
-def test_beside_the_midline_both_halves_are_pressed():
-    beside = changed(SPHERES, place={"z_mm": 1.0}, resolution="quick")
-    assert all(
-        touch.grading.full and touch.at_mm[1] == 1.0 for touch in task_touches(parse_task(beside)).values()
-    )
+    beside = task_touches(parse_task(changed(SPHERES, place={"z_mm": 1.0}, resolution="quick")))
+    assert all(touch.grading.full and touch.at_mm[1] == 1.0 for touch in beside.values())
 
 
 def test_a_population_without_further_words_is_the_papers():
-    population, paper = task_population(parse_task(SPHERES)), Population.grid()
-    np.testing.assert_array_equal(population.positions_mm, paper.positions_mm)
-    assert population.afferent == Afferent()
+    population = task_population(parse_task(SPHERES))
+    np.testing.assert_array_equal(population.positions_mm, Population.grid().positions_mm)
+    assert (population.afferent, population.sensitivity) == (Afferent(), None)
+    first, other = (
+        task_population(parse_task(changed(SPHERES, population={"sensitivity_spread": 0.4, "seed": seed})))
+        for seed in (0, 1)
+    )
+    assert first.sensitivity.shape == other.sensitivity.shape == (18,)
+    assert (first.sensitivity != other.sensitivity).all()
 
 
 @pytest.mark.parametrize("layout", ["rectangular", "hexagonal", "uniform", "jittered", "poisson-disc"])
 def test_any_layout_fills_its_region_at_its_density(layout):
     region = {"shape": "rectangle", "length_mm": 8.0, "width_mm": 6.0}
-    settings = {
-        "layout": layout,
-        "density_per_cm2": 150,
-        "region": region,
-        "offset_mm": [1.0, 0.0],
-        "seed": 3,
-    }
-    population = task_population(parse_task(changed(SPHERES, population=settings)))
+    words = {"layout": layout, "density_per_cm2": 150, "region": region, "offset_mm": [1.0, 0.0], "seed": 3}
+    population, again = (task_population(parse_task(changed(SPHERES, population=words))) for _ in range(2))
     assert abs(len(population) - 0.48 * 150) <= 8
     x, z = population.positions_mm[:, 0], population.positions_mm[:, -1]
     assert abs(x.mean() - RECEPTOR_X_MM - 1.0) < 1.0
     assert np.ptp(x) <= 8.5
     assert np.ptp(z) <= 6.1
-    again = task_population(parse_task(changed(SPHERES, population=settings)))
     np.testing.assert_array_equal(again.positions_mm, population.positions_mm)
 
 
@@ -205,16 +181,6 @@ def test_afferents_fill_the_pad_at_the_density_of_its_skin_or_line_the_nail():
     assert len(
         PreparedTask(parse_task(SPHERES), task_stimuli(parse_task(SPHERES)), rows).neighbours
     ) > 2 * len(rows)
-
-
-def test_seed_and_spread_make_another_finger():
-    def sensitivity(**settings):
-        return task_population(parse_task(changed(SPHERES, population=settings))).sensitivity
-
-    assert sensitivity() is None
-    first, other = sensitivity(sensitivity_spread=0.4), sensitivity(sensitivity_spread=0.4, seed=1)
-    assert first.shape == other.shape == (18,)
-    assert (first != other).all()
 
 
 def test_an_afferent_is_ours_or_ones_own_numbers_or_of_a_file_of_results(tmp_path, monkeypatch):
@@ -267,15 +233,9 @@ def test_a_folder_named_like_an_example_task_is_not_taken_for_a_file(tmp_path, m
 
 def test_numbers_without_a_point_are_numbers_and_words_are_words():
     assert read_yaml("[1e-6, 1.5E3, -2e+1, .5e2]", "here") == [1e-6, 1500.0, -20.0, 50.0]
-    assert read_yaml("[yes, no, on, off, true, false, e5, 1e]", "here") == [
-        "yes", "no", "on", "off", True, False, "e5", "1e",
-    ]  # fmt: skip
-
-
-def test_other_readers_of_yaml_keep_their_own_words():
-    import yaml
-
-    assert yaml.safe_load("[yes, 1e-6]") == [True, "1e-6"]
+    words = ["yes", "no", "on", "off", True, False, "e5", "1e"]
+    assert read_yaml("[yes, no, on, off, true, false, e5, 1e]", "here") == words
+    assert yaml.safe_load("[yes, 1e-6]") == [True, "1e-6"]  # other readers keep their own words
 
 
 # How it is refused
@@ -291,236 +251,112 @@ def refused(content):
     return said
 
 
+# What description files have in common with touches is tried in test_touch_description.py.
 REFUSALS = """
-question: null
-    question must be given: it is missing.
-question: 3
-    question must be a text: got 3.
-noise: null
-    noise must be given
-noise: -0.1
-    noise must be a number from 0 to 1000, or fitted: got -0.1.
-noise: 1e300
-    noise must be a number from 0 to 1000, or fitted: got 1e+300.
-noise: much
-    noise must be a number from 0 to 1000, or fitted: got 'much'.
-noise: true
-    noise must be a number from 0 to 1000, or fitted: got True.
-{noise: 0, code: [gradient_sum, ideal]}
-    noise must be greater than 0 where code has ideal: got 0.
-{noise: fitted, code: [ideal, euclidean], observed: {points: [{at: 296, hit_rate: 0.6}]}}
+question: null => question must be given: it is missing.
+noise: null => noise must be given
+noise: 1e300 => noise must be a number from 0 to 1000, or fitted: got 1e+300.
+noise: much => noise must be a number from 0 to 1000, or fitted: got 'much'.
+{noise: 0, code: [gradient_sum, ideal]} => noise must be greater than 0 where code has ideal: got 0.
+{noise: fitted, code: [ideal, euclidean], observed: {points: [{at: 296, hit_rate: 0.6}]}} =>
     code must not begin with ideal where noise is fitted
-noise: fitted
-    noise can only be fitted to observed hit rates of the comparisons, 296, 365
-{noise: fitted, observed: {points: [{at: 305, hit_rate: 0.7}]}}
+noise: fitted => noise can only be fitted to observed hit rates of the comparisons, 296, 365
+{noise: fitted, observed: {points: [{at: 305, hit_rate: 0.7}]}} =>
     noise can only be fitted to observed hit rates
-nois: 0.1
-    nois is unknown: did you mean noise?
-colour: red
-    colour is unknown: the file has resolution, finger, tissues, object,
-stimuli: null
-    stimuli must be given
-stimuli: []
-    stimuli must be two or more
-stimuli: {vary: object.curvature_per_m, values: [287]}
-    stimuli must be two or more
-stimuli: {vary: object.curvature_per_m, values: [287, 287]}
-    '287' is repeated
-stimuli: {vary: object.curvature_per_m, values: [287, x]}
+nois: 0.1 => nois is unknown: did you mean noise?
+colour: red => colour is unknown: the file has resolution, finger, tissues, object,
+stimuli: null => stimuli must be given
+stimuli: [] => stimuli must be two or more
+stimuli: {vary: object.curvature_per_m, values: [287]} => stimuli must be two or more
+stimuli: {vary: object.curvature_per_m, values: [287, 287]} => '287' is repeated
+stimuli: {vary: object.curvature_per_m, values: [287, x]} =>
     stimuli.values[2], object.curvature_per_m must be a finite number: got 'x'.
-stimuli: {vary: object.curvature_per_m, values: [287, 0]}
+stimuli: {vary: object.curvature_per_m, values: [287, 0]} =>
     stimuli.values[2], object: curvature_per_m must be greater than 0
-stimuli: {vary: object.curvature_per_m, values: 287}
-    stimuli.values must be a list: got 287.
-stimuli: {vary: colour, values: [1, 2]}
+stimuli: {vary: object.curvature_per_m, values: 287} => stimuli.values must be a list: got 287.
+stimuli: {vary: colour, values: [1, 2]} =>
     stimuli.vary must be friction, or a key of object, motion or place such as object.radius_mm: got 'colour'.
-stimuli: {vary: curvature_per_m, values: [1, 2]}
+stimuli: {vary: curvature_per_m, values: [1, 2]} =>
     stimuli.vary must be friction, or a key of object, motion or place such as object.curvature_per_m: got
-stimuli: {vary: friction.x, values: [1, 2]}
-    stimuli.vary must be friction
-stimuli: {vary: object, values: [1, 2]}
-    stimuli.vary must be friction
-stimuli: {vary: object.width_mm, values: [1, 2]}
+stimuli: {vary: object.width_mm, values: [1, 2]} =>
     stimuli.values[1], object.width_mm is unknown: object has kind, curvature_per_m
-{stimuli: {vary: motion.depth_mm, values: [1, 15]}, standard: 1}
+{stimuli: {vary: motion.depth_mm, values: [1, 15]}, standard: 1} =>
     stimuli.values[2], motion: depth_mm must stay below
-stimuli: {vary: object.curvature_per_m}
-    stimuli.values must be given
-stimuli: spheres
-    stimuli must be a mapping of keys to values: got 'spheres'.
-stimuli: [{object: {curvature_per_m: 300}}]
-    stimuli[1].name must be given
-stimuli: [{name: a}, {name: a}]
-    'a' is repeated
-{stimuli: [{name: a, level: 1}, {name: b}], standard: a}
+stimuli: {vary: object.curvature_per_m} => stimuli.values must be given
+stimuli: [{object: {curvature_per_m: 300}}] => stimuli[1].name must be given
+stimuli: [{name: a}, {name: a}] => 'a' is repeated
+{stimuli: [{name: a, level: 1}, {name: b}], standard: a} =>
     level must be given for all stimuli or for none: 'b' has none.
-{stimuli: [{name: a, object: {widht_mm: 3}}, {name: b}], object: bar}
+{stimuli: [{name: a, object: {widht_mm: 3}}, {name: b}], object: bar} =>
     stimuli[1].object.widht_mm is unknown: did you mean width_mm?
-stimuli: [{name: a, objct: {width_mm: 3}}, {name: b}]
-    stimuli[1].objct is unknown: did you mean object?
-stimuli: [{name: a, width_mm: 3}, {name: b}]
+stimuli: [{name: a, width_mm: 3}, {name: b}] =>
     stimuli[1].width_mm is unknown: stimuli[1] has object, motion, place,
-stimuli: [{name: a, friction: -1}, {name: b}]
-    stimuli[1].friction must be a number not below 0: got -1
-standard: 300
-    standard must be one of the stimuli, 287, 296, 365: got 300.0.
-standard: flat
-    standard must be one of the stimuli, 287, 296, 365: got 'flat'.
-standard: [287]
-    standard must be a number or a name: got [287].
-object: {}
-    object.kind must be given: it is missing.
-object: null
-    object.kind must be given: it is missing.
-object: {kind: needle}
-    object.kind must be one of sphere, cylinder
-object: {kind: shpere}
-    got 'shpere' (did you mean sphere?).
-object: {kind: sphere, curvature_per_m: 3}
-    object.curvature_per_m must not be given where stimuli.vary it
-object: 3
-    object
-motion: {depth_mm: 1, force_mn: 1}
-    motion: depth_mm and force_mn exclude each other
-motion: {depth_mm: 0}
-    motion: depth_mm must be greater than 0
-motion: {depth: 1}
-    motion.depth is unknown: did you mean depth_mm?
-motion: {kind: sien}
-    got 'sien' (did you mean sine?).
-motion: {kind: recorded, file: none.csv}
-    motion: none.csv must be a file that can be read
-motion: sliding
-    motion must be a mapping of keys to values: got 'sliding'.
-motion: {kind: stroke, depth_mm: 0.5, speed_mm_per_s: 20, x_mm: 40}
+stimuli: [{name: a, friction: -1}, {name: b}] => stimuli[1].friction must be a number not below 0: got -1
+standard: 300 => standard must be one of the stimuli, 287, 296, 365: got 300.0.
+standard: [287] => standard must be a number or a name: got [287].
+object: null => object.kind must be given: it is missing.
+object: {kind: sphere, curvature_per_m: 3} => object.curvature_per_m must not be given where stimuli.vary it
+motion: {kind: recorded, file: none.csv} => motion: none.csv must be a file that can be read
+motion: {kind: stroke, depth_mm: 0.5, speed_mm_per_s: 20, x_mm: 40} =>
     motion: The indenter must not leave the finger
-place: {x_mm: 90}
-    place: A position must lie on the finger
-place: {x_mm: far}
-    place.x_mm must be a finite number: got 'far'.
-place: {offset_mm: [1, 0]}
-    place.offset_mm is unknown
-place: {tilt_deg: 80}
-    place.tilt_deg must lie within 45 degrees
-place: 3
-    place must be a mapping of keys to values: got 3.
-friction: -0.1
-    friction must be a number not below 0: got -0.1.
-friction: rough
-    friction must be a finite number: got 'rough'.
-finger: {length_mm: 3}
-    finger:
-finger: giant
-    finger:
-tissues: wood
-    tissues must be one of human
-tissues: humn
-    got 'humn' (did you mean human?).
-resolution: high
-    resolution must be one of quick, standard, paper: got 'high'.
-reach_mm: 0
-    reach_mm must be a number greater than 0: got 0.
-common: {indenter: sphere}
-    common is unknown
-skin: {materials: human}
-    skin is unknown
-population: {density_per_cm2: 0}
-    population.density_per_cm2 must be a number greater than 0: got 0.
-population: {density_per_cm2: .nan}
-    population.density_per_cm2 must be
-population: {rows: 0}
-    population.rows must be a whole number of at least 1: got 0.
-population: {rows: 2.5}
-    population.rows must be a whole number
-population: {layout: spiral}
-    population.layout must be one of grid, rectangular
-population: {layout: hexagonal}
-    population.region must be given for the layout hexagonal
-population: {layout: hexagonal, rows: 3, region: {shape: rectangle, length_mm: 3, width_mm: 6}}
+place: {x_mm: 90} => place: A position must lie on the finger
+finger: giant => finger:
+reach_mm: 0 => reach_mm must be a number greater than 0: got 0.
+skin: {materials: human} => skin is unknown
+population: {density_per_cm2: 0} => population.density_per_cm2 must be a number greater than 0: got 0.
+population: {layout: hexagonal, rows: 3, region: {shape: rectangle, length_mm: 3, width_mm: 6}} =>
     population.rows must not be given: it belongs to the layout grid
-population: {region: {shape: rectangle, length_mm: 3, width_mm: 6}}
+population: {region: {shape: rectangle, length_mm: 3, width_mm: 6}} =>
     population.region must not be given: it belongs to the layout rectangular or hexagonal
-population: {layout: uniform, region: {shape: rectangle, length_mm: 0, width_mm: 6.0}}
+population: {layout: uniform, region: {shape: rectangle, length_mm: 0, width_mm: 6.0}} =>
     population.region.length_mm must be a number greater than 0: got 0.
-population: {layout: uniform, region: {shape: rectangle, length_mm: 1}}
+population: {layout: uniform, region: {shape: rectangle, length_mm: 1}} =>
     population.region.width_mm must be given for a rectangle
-population: {layout: uniform, region: {shape: rectangle, length_mm: 3, width_mm: 6, corners_mm: []}}
+population: {layout: uniform, region: {shape: rectangle, length_mm: 3, width_mm: 6, corners_mm: []}} =>
     population.region.corners_mm must not be given: a rectangle has length_mm, width_mm.
-population: {layout: uniform, region: {shape: polygon, corners_mm: [[0, 0], [1, 1], [2, 2]]}}
+population: {layout: uniform, region: {shape: polygon, corners_mm: [[0, 0], [1, 1], [2, 2]]}} =>
     population.region: corners_mm must enclose an area
 population: {layout: uniform, density_per_cm2: 0.1, region: {shape: rectangle, length_mm: 3, width_mm: 6}}
+    =>
     population: A density of
 population: {layout: uniform, density_per_cm2: 1.0e+9, region: {shape: rectangle, length_mm: 3, width_mm: 6}}
+    =>
     population: A layout may have
-population: {seed: -1}
-    population.seed must be a whole number of at least 0: got -1.
-population: {sensitivity_spread: -1}
-    population.sensitivity_spread must be a number not below 0: got -1.
-afferent: 3
-    afferent must be a mapping of keys to values: got 3.
-afferent: {tau: 3}
-    afferent.tau is unknown
-afferent: {time_constant_ms: 0}
-    afferent.time_constant_ms must be a number greater than 0: got 0.
-afferent: none.json
-    afferent: none.json must be a file that can be read
-code: guess
-    code[1] must be one of gradient_sum, euclidean
-code: []
-    code must have at least one entry: got [].
-code: [euclidean, 3]
-    code[2] must be one of
-measure: pressure
-    measure[1] must be one of static, dynamic, latency: got 'pressure'.
-windows_ms: {static: [900, 600]}
-    windows_ms.static must be a start from 0 on and a later end
-windows_ms: {static: [600, 1200]}
+population: {seed: -1} => population.seed must be a whole number of at least 0: got -1.
+population: {sensitivity_spread: -1} => population.sensitivity_spread must be a number not below 0: got -1.
+afferent: {time_constant_ms: 0} => afferent.time_constant_ms must be a number greater than 0: got 0.
+afferent: none.json => afferent: none.json must be a file that can be read
+code: guess => code[1] must be one of gradient_sum, euclidean
+measure: pressure => measure[1] must be one of static, dynamic, latency: got 'pressure'.
+windows_ms: {static: [600, 1200]} =>
     windows_ms.static must end with the stimuli, not at 1200 ms: '287' ends at 1000 ms.
-windows_ms: {static: [600]}
-    windows_ms.static must be a pair of numbers: got [600].
-experiment: {seed: -1}
-    experiment.seed must be a whole number of at least 0: got -1.
-experiment: {hit_rates: 1}
-    experiment.hit_rates must be a whole number of at least 2: got 1.
-experiment: {criterion: 2}
-    experiment.criterion must be a number within 0 ... 1: got 2.
-experiment: {trials: 0}
-    experiment.trials must be a whole number of at least 1: got 0.
-{experiment: {criterion_sigma: 0.1}, code: euclidean}
+experiment: {hit_rates: 1} => experiment.hit_rates must be a whole number of at least 2: got 1.
+experiment: {criterion: 2} => experiment.criterion must be a number within 0 ... 1: got 2.
+experiment: {trials: 0} => experiment.trials must be a whole number of at least 1: got 0.
+{experiment: {criterion_sigma: 0.1}, code: euclidean} =>
     experiment.criterion_sigma must be 0 where code has euclidean
-curve: {sigmoid: step}
-    curve.sigmoid must be one of normal
-curve: {lapse: 0.6}
-    curve.lapse must be a number within 0 ... 0.5, or free: got 0.6.
-curve: {proportion: 0.5}
-    curve.proportion must be a number between 0.5 and 1: got 0.5.
-observed: {}
-    observed.points must be given
-observed: {points: []}
-    observed.points must have at least one entry
-observed: {points: [{at: 296, hit_rate: 58}]}
+curve: {sigmoid: step} => curve.sigmoid must be one of normal
+curve: {lapse: 0.6} => curve.lapse must be a number within 0 ... 0.5, or free: got 0.6.
+curve: {proportion: 0.5} => curve.proportion must be a number between 0.5 and 1: got 0.5.
+observed: {} => observed.points must be given
+observed: {points: [{at: 296, hit_rate: 58}]} =>
     observed.points[1].hit_rate must be a number within 0 ... 1: got 58.
-observed: {points: [{at: flat, hit_rate: 0.5}]}
-    observed.points[1].at must be one of the stimuli
+observed: {points: [{at: flat, hit_rate: 0.5}]} => observed.points[1].at must be one of the stimuli
 """
-LINES = REFUSALS.strip().splitlines()
+LINES = REFUSALS.strip().replace("\n    ", " ").splitlines()
 
 
-@pytest.mark.parametrize(("parts", "said"), list(zip(LINES[::2], LINES[1::2], strict=True)))
+@pytest.mark.parametrize(("parts", "said"), [line.split(" => ") for line in LINES])
 def test_invalid_values_are_refused_in_one_sentence_with_their_position(parts, said):
-    assert said.strip() in refused(changed(SPHERES, **read_yaml(parts, "part")))
+    assert said in refused(changed(SPHERES, **read_yaml(parts, "part")))
 
 
 @pytest.mark.parametrize(
     ("text", "said"),
     [
         ("question: a\nquestion: b\n", "mine.yaml, line 2: question is repeated, keep one."),
-        ("question: [a\n", "mine.yaml cannot be read as YAML"),
-        ("- 1\n- 2\n", "mine.yaml, the file must be a mapping of keys to values: got [1, 2]."),
         ("", "mine.yaml, the file must be a mapping of keys to values: it is empty."),
         ("question: &a [*a]\n", "mine.yaml cannot be read as YAML (it has an anchor or an alias"),
-        ("[" * 600, "mine.yaml cannot be read as YAML"),
-        ("{[1]: 2}", "mine.yaml cannot be read as YAML"),
     ],
 )
 def test_a_file_that_is_no_question_is_refused_with_its_name(tmp_path, monkeypatch, text, said):

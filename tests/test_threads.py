@@ -10,13 +10,7 @@ import pytest
 
 import fingerpad as fp
 from fingerpad.core.errors import InputError
-from fingerpad.core.threads import (
-    available_threads,
-    compiled_threads,
-    current_threads,
-    in_blocks,
-    in_chunks,
-)
+from fingerpad.core.threads import available_threads, compiled_threads, current_threads, in_blocks, in_chunks
 
 needs_two_threads = pytest.mark.skipif(available_threads() < 2, reason="this machine has one core")
 
@@ -28,16 +22,13 @@ def test_number_is_what_it_was_afterwards():
         with compiled_threads() as inner:
             assert inner == 1
     assert current_threads() == before == available_threads()
+    touch = fp.touch_of(fp.Fingertip(), fp.Sphere(curvature_per_m=287))
+    for wrong in (0, -1, 1.5, True, 10_000):
+        with pytest.raises(InputError, match="threads must"):
+            touch.solve(threads=wrong)
     with pytest.raises(ZeroDivisionError), compiled_threads(1):
         raise ZeroDivisionError
     assert current_threads() == before
-
-
-@pytest.mark.parametrize("threads", [0, -1, 1.5, True, 10_000])
-def test_number_of_threads_is_checked(threads):
-    touch = fp.touch_of(fp.Fingertip(), fp.Sphere(curvature_per_m=287))
-    with pytest.raises(InputError, match="threads must"):
-        touch.solve(threads=threads)
 
 
 @needs_two_threads
@@ -66,16 +57,14 @@ def test_press_has_the_same_bits_on_any_number_of_threads():
         settings=fp.PressSettings(ramp_steps=1, hold_steps=1),
     )  # fmt: skip
     alone, together = (touch.solve(threads, whole=True).deformation for threads in (1, 2))
-    for name in ("force_mn", "displacement_mm", "sed_kpa", "reaction_mn", "stress_kpa"):
-        np.testing.assert_array_equal(getattr(together, name), getattr(alone, name), err_msg=name)
-    for name in ("gradient", "stress_kpa", "stored_kpa", "instantaneous_kpa", "work_kpa"):
-        np.testing.assert_array_equal(
-            getattr(together.fields, name), getattr(alone.fields, name), err_msg=name
-        )
-    for name in ("external_uj", "stored_uj", "dissipated_uj", "contact_uj"):
-        np.testing.assert_array_equal(
-            getattr(together.energy, name), getattr(alone.energy, name), err_msg=name
-        )
+    for part, names in (
+        (lambda done: done, ("force_mn", "displacement_mm", "sed_kpa", "reaction_mn", "stress_kpa")),
+        (lambda done: done.fields, ("gradient", "stress_kpa", "stored_kpa", "instantaneous_kpa", "work_kpa")),
+        (lambda done: done.energy, ("external_uj", "stored_uj", "dissipated_uj", "contact_uj")),
+    ):
+        for name in names:
+            one, two = (getattr(part(done), name) for done in (alone, together))
+            np.testing.assert_array_equal(two, one, err_msg=name)
     assert together.newton_steps == alone.newton_steps
 
 

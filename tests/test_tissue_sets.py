@@ -1,6 +1,7 @@
 """The table of tissues: every layer of every set, with the numbers that the solver receives."""
 
 from dataclasses import replace
+from itertools import chain, product
 
 import numpy as np
 import pytest
@@ -24,17 +25,13 @@ def shear_kpa(numbers, poisson):
 
 def test_the_table_has_four_rows_per_set_in_order():
     layers = tissue_layers()
-    assert [(layer.tissues, layer.layer) for layer in layers] == [
-        (tissues, layer) for tissues in TISSUES for layer in LAYERS
-    ]
+    assert [(each.tissues, each.layer) for each in layers] == list(product(TISSUES, LAYERS))
     assert len(tissue_table(layers).rows) == 4 * len(TISSUES)
 
 
 def test_every_modulus_is_that_of_the_published_numbers_beside_it():
     assert list(ELASTICITY) == list(TISSUES)
-    for layer, numbers in zip(
-        tissue_layers(), (n for rows in ELASTICITY.values() for n in rows), strict=True
-    ):
+    for layer, numbers in zip(tissue_layers(), chain.from_iterable(ELASTICITY.values()), strict=True):
         assert layer.shear_kpa == pytest.approx(shear_kpa(numbers, layer.poisson)), layer.tissues
         assert all(number.status in layer.modulus_status for number in numbers)
         assert all(number.source in layer.source for number in numbers)
@@ -42,13 +39,8 @@ def test_every_modulus_is_that_of_the_published_numbers_beside_it():
 
 def test_only_the_deviator_relaxes():
     for layer in tissue_layers():
-        bulk = [
-            2.0 * shear * (1.0 + poisson) / (3.0 * (1.0 - 2.0 * poisson))
-            for shear, poisson in (
-                (layer.shear_kpa, layer.poisson),
-                (layer.shear_at_once_kpa, layer.poisson_at_once),
-            )
-        ]
+        moduli = ((layer.shear_kpa, layer.poisson), (layer.shear_at_once_kpa, layer.poisson_at_once))
+        bulk = [2.0 * shear * (1.0 + nu) / (3.0 * (1.0 - 2.0 * nu)) for shear, nu in moduli]
         assert bulk[0] == pytest.approx(bulk[1])
         assert layer.shear_kpa / layer.shear_at_once_kpa == pytest.approx(1.0 - sum(layer.prony_shares))
         material = named_tissues(layer.tissues).layers[LAYERS.index(layer.layer)]

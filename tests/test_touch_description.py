@@ -3,6 +3,7 @@
 import hashlib
 import json
 import re
+from functools import partial
 from pathlib import Path
 
 import fastjsonschema
@@ -59,30 +60,17 @@ FULL = {
 
 @pytest.fixture
 def call(run_program):
-    from functools import partial
-
     return partial(run_program, cli.main, "fingerpad")
 
 
 # What a description means
 
 
-def test_a_description_is_the_touch_that_python_makes():
+def test_a_description_is_the_touch_that_python_makes_and_its_defaults_are_the_papers():
     assert described_touch(FULL).touch == touch_of(
-        fp.Fingertip(stratum_corneum_mm=0.5),
-        fp.Sphere(radius_mm=4.0),
-        fp.RampAndHold(0.5),
-        "human",
-        "quick",
-        (RECEPTOR_X_MM + 0.5, 0.0),
-        tilt_deg=3.0,
-        friction=0.1,
-        spin_deg=10.0,
-        times_ms=(20.0, 400.0),
-    )
-
-
-def test_what_is_left_out_is_the_papers_perpendicular_to_the_skin():
+        fp.Fingertip(stratum_corneum_mm=0.5), fp.Sphere(radius_mm=4.0), fp.RampAndHold(0.5), "human", "quick",
+        (RECEPTOR_X_MM + 0.5, 0.0), tilt_deg=3.0, friction=0.1, spin_deg=10.0, times_ms=(20.0, 400.0),
+    )  # fmt: skip
     touch = described_touch({"object": "sphere"}).touch
     assert (touch.indenter, touch.stimulus, touch.friction) == (fp.Sphere(), RampAndHold(), 0.0)
     assert touch.tilt_deg == Conditions().skin_tilt_deg
@@ -95,22 +83,16 @@ def test_what_is_left_out_is_the_papers_perpendicular_to_the_skin():
         ("sphere:radius_mm=4", fp.Sphere(curvature_per_m=250.0)),
         ({"kind": "bar", "width_mm": 4, "edge_radius_mm": 0.2}, fp.Bar(4.0, 0.2)),
         ({"kind": "grating", "period_mm": 2, "duty": 0.25}, fp.Grating(0.5, 1.5)),
-        (
-            {"kind": "dots", "at_mm": [[0, 0], [2.5, 0]], "height_mm": 0.3},
-            fp.Dots([(0, 0), (2.5, 0)], height_mm=0.3),
-        ),
+        ({"kind": "dots", "at_mm": [[0, 0], [2.5, 0]], "height_mm": 0.3},
+         fp.Dots([(0, 0), (2.5, 0)], height_mm=0.3)),
         ({"kind": "braille", "text": "ab", "along_finger": False}, fp.braille("ab", along_finger=False)),
         ({"kind": "plate"}, fp.Plate()),
-        (
-            {"kind": "embossed_text", "text": "T", "capital_mm": 5, "weight": "normal"},
-            fp.embossed_text("T", capital_mm=5.0, weight="normal"),
-        ),
-        (
-            {"kind": "embossed", "outlines_mm": [[[0, 0], [3, 0], [0, 3]]], "height_mm": 0.4},
-            fp.Embossed([[(0.0, 0.0), (3.0, 0.0), (0.0, 3.0)]], 0.4),
-        ),
+        ({"kind": "embossed_text", "text": "T", "capital_mm": 5, "weight": "normal"},
+         fp.embossed_text("T", capital_mm=5.0, weight="normal")),
+        ({"kind": "embossed", "outlines_mm": [[[0, 0], [3, 0], [0, 3]]], "height_mm": 0.4},
+         fp.Embossed([[(0.0, 0.0), (3.0, 0.0), (0.0, 3.0)]], 0.4)),
     ],
-)
+)  # fmt: skip
 def test_an_object_is_what_its_class_makes(content, body):
     assert described_touch({"object": content, "motion": {"depth_mm": 0.4}}).touch.indenter == body
 
@@ -142,30 +124,23 @@ def test_a_recorded_motion_is_named_from_the_folder_of_the_description(tmp_path)
     (tmp_path / "deep" / "press.csv").write_text("time_ms,depth_mm\n0,0\n50,0.6\n500,0.6\n", encoding="utf-8")
     path = tmp_path / "touch.yaml"
     path.write_text("object: plate\nmotion: {kind: recorded, file: deep/press.csv}\n", encoding="utf-8")
-    described = fp.read_touch_description(path)
-    assert described.touch.stimulus.depth_mm == (0.0, 0.6, 0.6)
-    assert set(described.input_hashes()) == {str(path), str(tmp_path / "deep" / "press.csv")}
+    assert fp.read_touch_description(path).touch.stimulus.depth_mm == (0.0, 0.6, 0.6)
 
 
 def test_hashes_name_every_file_of_a_description(tmp_path):
-    for name in ("own.inp", "body.stl", "press.csv", "fit.json"):
+    names = ["own.inp", "body.stl", "press.csv", "fit.json"]
+    for name in names:
         (tmp_path / name).write_bytes(name.encode())
-    (tmp_path / "touch.yaml").write_text(
+    path = tmp_path / "touch.yaml"
+    path.write_text(
         "finger: {kind: mesh, path: own.inp}\nobject: {kind: surface, path: body.stl, unit: mm}\n"
         "motion: {kind: recorded, file: press.csv}\nafferents: {afferent: fit.json}\n"
     )
-    found = fp.read_touch_description(tmp_path / "touch.yaml").input_hashes()
-    assert {Path(name).name for name in found} == {
-        "touch.yaml",
-        "own.inp",
-        "body.stl",
-        "press.csv",
-        "fit.json",
-    }
+    found = fp.read_touch_description(path).input_hashes()
+    assert set(found) == {str(tmp_path / name) for name in ("touch.yaml", *names)}
     assert found[str(tmp_path / "own.inp")] == hashlib.sha256(b"own.inp").hexdigest()
-    (tmp_path / "touch.yaml").write_text("finger: own.inp\nobject: sphere\n")
-    again = fp.read_touch_description(tmp_path / "touch.yaml").input_hashes()
-    assert {Path(name).name for name in again} == {"touch.yaml", "own.inp"}
+    path.write_text("finger: own.inp\nobject: sphere\n")
+    assert set(fp.read_touch_description(path).input_hashes()) == {str(path), str(tmp_path / "own.inp")}
 
 
 def test_a_surface_of_several_stimuli_is_read_once(tmp_path, monkeypatch):
@@ -192,16 +167,12 @@ def test_afferents_are_those_of_a_task_with_the_same_words():
     assert described.population.afferent == fp.Afferent(static_gain=1e-6)
 
 
-def test_every_object_motion_and_output_is_known_to_docs_example_and_writers():
+def test_the_page_and_the_example_know_every_word_and_the_pages_files_are_possible():
     page = (ROOT / "docs" / "touch.md").read_text(encoding="utf-8")
     assert set(WRITERS) == set(OUTPUTS)
     for name in (*OBJECTS, *MOTIONS, *OUTPUTS):
         assert f"`{name}`" in page, name
         assert name in EXAMPLE, name
-
-
-def test_the_files_on_the_page_are_possible():
-    page = (ROOT / "docs" / "touch.md").read_text(encoding="utf-8")
     blocks = re.findall(r"```yaml\n(.*?)```", page, re.S)
     assert blocks
     for block in blocks:
@@ -245,16 +216,12 @@ def test_the_schema_accepts_what_is_accepted_and_explains_every_key():
 
 BALL = "object: {kind: sphere, radius_mm: 4}\n"
 WRONG = [
-    ("", "touch.yaml, the file is empty: write what is pressed, as the example of `fingerpad init`."),
-    ("# nothing\n", "the file is empty"),
+    ("# nothing\n",
+     "touch.yaml, the file is empty: write what is pressed, as the example of `fingerpad init`."),
     ("- object: sphere\n", "must be a mapping of keys to values"),
     ("just words\n", "must be a mapping of keys to values: got 'just words'"),
-    ("42\n", "must be a mapping of keys to values: got 42"),
-    ("object: [\n", "cannot be read as YAML"),
-    (
-        "object:\n\tkind: sphere\n",
-        "cannot be read as YAML (found character '\\t' that cannot start any token, line 2)",
-    ),
+    ("object:\n\tkind: sphere\n",
+     "cannot be read as YAML (found character '\\t' that cannot start any token, line 2)"),
     ("object: sphere\nobject: plate\n", "line 2: object is repeated, keep one"),
     ("object: {kind: sphere, kind: plate}\n", "kind is repeated"),
     ("[" * 600, "cannot be read as YAML"),
@@ -264,138 +231,93 @@ WRONG = [
     ("object: *nothing\n", "cannot be read as YAML"),
     ("1: 2\n", "must have texts as keys"),
     ("motion: {depth_mm: 1}\n", "object must be given: it is missing"),
-    ("objct: sphere\n", "line 1, objct is unknown: did you mean object?"),
     (BALL + "frictoin: 0.1\n", "line 2, frictoin is unknown: did you mean friction?"),
     (BALL + "colour: red\n", "line 2, colour is unknown: the file has resolution, finger, tissues"),
     ("object:\n", "line 1, object must be a mapping of keys to values: got None"),
-    ("object: 3\n", "object must be a mapping of keys to values: got 3"),
     ("object: [sphere]\n", "object must be a mapping of keys to values"),
     ("object: cone\n", "line 1, object: indenter must be one of sphere"),
     ("object: 'sphere:raduis_mm=3'\n", "line 1, object: Sphere has no raduis_mm: did you mean radius_mm?"),
-    ("object: {kind: shpere}\n", "line 1, object.kind must be one of sphere, cylinder, bar"),
-    ("object: {kind: 3}\n", "object.kind must be one of sphere"),
+    ("object: {kind: 3}\n", "object.kind must be one of sphere, cylinder, bar"),
+    ("object: {kind: shpere}\n", "got 'shpere' (did you mean sphere?)."),
     ("object: {radius_mm: 3}\n", "object.kind must be given: it is missing"),
-    (
-        "object:\n  kind: sphere\n  raduis_mm: 3\n",
-        "line 3, object.raduis_mm is unknown: did you mean radius_mm?",
-    ),
+    ("object:\n  kind: sphere\n  raduis_mm: 3\n",
+     "line 3, object.raduis_mm is unknown: did you mean radius_mm?"),
     ("object: {kind: plate, width_mm: 3}\n", "object.width_mm is unknown: object has kind"),
     ("object: {kind: sphere, radius_mm: wide}\n", "object.radius_mm must be a finite number: got 'wide'"),
     ("object: {kind: sphere, radius_mm: .nan}\n", "object.radius_mm must be a finite number: got '.nan'"),
-    ("object: {kind: sphere, radius_mm: .inf}\n", "object.radius_mm must be a finite number: got '.inf'"),
     ("object: {kind: sphere, radius_mm: true}\n", "object.radius_mm must be a finite number: got True"),
     ("object: {kind: sphere, radius_mm: 2020-01-01}\n", "object.radius_mm must be a finite number"),
-    (
-        "object: {kind: sphere, radius_mm: -3}\n",
-        "line 1, object: radius_mm must be greater than 0 [mm]: got -3",
-    ),
-    ("object: {kind: sphere, radius_mm: 0}\n", "radius_mm must be greater than 0"),
-    (
-        "object: {kind: sphere, radius_mm: 4, curvature_per_m: 250}\n",
-        "radius_mm and curvature_per_m exclude each other",
-    ),
-    ("object: {kind: sphere, radius_mm: 0.01}\n", "grading must have elements"),
-    (
-        "object: {kind: bar, width_mm: 1, edge_radius_mm: 2}\n",
-        "edge_radius_mm must not exceed half of width_mm",
-    ),
+    ("object: {kind: sphere, radius_mm: -3}\n",
+     "line 1, object: radius_mm must be greater than 0 [mm]: got -3"),
+    ("object: {kind: sphere, radius_mm: 4, curvature_per_m: 250}\n",
+     "radius_mm and curvature_per_m exclude each other"),
+    ("object: {kind: sphere, radius_mm: 0.01}\n", "line 1, object: grading must have elements"),
+    ("object: {kind: bar, width_mm: 1, edge_radius_mm: 2}\n",
+     "edge_radius_mm must not exceed half of width_mm"),
     ("object: {kind: grating, period_mm: 2, duty: 1.5}\n", "duty must be below 1"),
     ("object: {kind: grating, groove_mm: 1, duty: 0.5}\n", "duty and groove_mm exclude each other"),
-    ("object: {kind: dots}\n", "object.at_mm must be given: it is missing"),
     ("object: {kind: dots, at_mm: [[0, 0, 0]]}\n", "object.at_mm must be a list of pairs of numbers"),
     ("object: {kind: dots, at_mm: []}\n", "object: at_mm must"),
-    (
-        "object: {kind: braille, text: A}\n",
-        "line 1, object: text must have letters a to z and spaces: got 'A'; write 'a'.",
-    ),
+    ("object: {kind: braille, text: A}\n",
+     "line 1, object: text must have letters a to z and spaces: got 'A'; write 'a'."),
     ("object: {kind: braille, text: 7}\n", "object.text must be a text: got 7"),
-    (
-        "object: {kind: braille, text: a, along_finger: maybe}\n",
-        "object.along_finger must be true or false: got 'maybe'",
-    ),
-    (BALL + "motion: deep\n", "motion must be a mapping of keys to values: got 'deep'"),
-    (BALL + "motion: {kind: jump}\n", "line 2, motion.kind must be one of ramp_and_hold, sine"),
-    (BALL + "motion: {depth: 1}\n", "line 2, motion.depth is unknown: did you mean depth_mm?"),
-    (
-        BALL + "motion: {depth_mm: 1, force_mn: 100}\n",
-        "line 2, motion: depth_mm and force_mn exclude each other",
-    ),
-    (BALL + "motion: {depth_mm: -1}\n", "motion: depth_mm must be greater than 0"),
+    ("object: {kind: braille, text: a, along_finger: maybe}\n",
+     "object.along_finger must be true or false: got 'maybe'"),
+    (BALL + "motion: {kind: sien}\n", "line 2, motion.kind must be one of ramp_and_hold, sine"),
+    (BALL + "motion: {kind: sien}\n", "got 'sien' (did you mean sine?)."),
+    (BALL + "motion: {depth_mm: 1, force_mn: 100}\n",
+     "line 2, motion: depth_mm and force_mn exclude each other"),
     (BALL + "motion: {depth_mm: 1, ramp_ms: 0}\n", "motion: ramp_ms must be greater than 0"),
     (BALL + "motion: {depth_mm: 9}\n", "touch.yaml, line 2, motion: depth_mm must stay below"),
-    (BALL + "motion: {depth_mm: 1 mm}\n", "motion.depth_mm must be a finite number: got '1 mm'"),
     (BALL + "motion: {kind: sine, depth_mm: 0.5}\n", "line 2, motion: sine needs frequency_hz, cycles"),
-    (
-        BALL + "motion: {kind: sine, depth_mm: 0.5, amplitude_mm: 0.1, frequency_hz: 20, cycles: 2.5}\n",
-        "motion.cycles must be a whole number: got 2.5",
-    ),
-    (
-        BALL
-        + "motion: {kind: chirp, depth_mm: 0.5, amplitude_mm: 0.1, frequencies_hz: [5], sweep_ms: 100}\n",
-        "line 2, motion: frequencies_hz must be a pair",
-    ),
+    (BALL + "motion: {kind: sine, depth_mm: 0.5, amplitude_mm: 0.1, frequency_hz: 20, cycles: 2.5}\n",
+     "motion.cycles must be a whole number: got 2.5"),
+    (BALL + "motion: {kind: chirp, depth_mm: 0.5, amplitude_mm: 0.1, frequencies_hz: [5], sweep_ms: 100}\n",
+     "line 2, motion: frequencies_hz must be a pair"),
     (BALL + "motion: {kind: staircase}\n", "line 2, motion: "),
     (BALL + "motion: {kind: staircase, depths_mm: [0.5], forces_mn: [5]}\n", "line 2, motion: "),
-    (
-        BALL + "motion: {kind: stroke, depth_mm: 0.5, speed_mm_per_s: 20, x_mm: 30}\n",
-        "line 2, motion: The indenter must not leave the finger",
-    ),
-    (
-        BALL + "motion: {kind: trajectory, times_ms: [0, 20, 10], depth_mm: [0, 1, 1]}\n",
-        "times_ms must increase strictly",
-    ),
+    # A way of hundreds of kilometres is refused at once.
+    (BALL + "motion: {kind: stroke, depth_mm: 0.5, speed_mm_per_s: 20, x_mm: 999999999}\n",
+     "line 2, motion: The indenter must not leave the finger"),
+    (BALL + "motion: {kind: trajectory, times_ms: [0, 20, 10], depth_mm: [0, 1, 1]}\n",
+     "times_ms must increase strictly"),
     (BALL + "motion: {kind: trajectory, times_ms: [0, 20], depth_mm: [0, 1, 1]}\n", "one value per time"),
-    (
-        BALL + "motion: {kind: trajectory, times_ms: [0, 20], depth_mm: [0, .nan]}\n",
-        "depth_mm must be a list of finite numbers",
-    ),
+    (BALL + "motion: {kind: trajectory, times_ms: [0, 20], depth_mm: [0, .nan]}\n",
+     "depth_mm must be a list of finite numbers"),
     (BALL + "motion: {kind: recorded, file: none.csv}\n", "line 2, motion: "),
-    (BALL + "motion: {kind: recorded, file: 3}\n", "motion.file must be a text: got 3"),
     (BALL + "motion: {kind: recorded, file: touch.yaml}\n", "line 2, motion: "),
     (BALL + "place: {x_mm: 40}\n", "touch.yaml, line 2, place: A position must lie on the finger"),
-    (BALL + "place: {z_mm: 12}\n", "must lie on the finger"),
     (BALL + "place: {tilt_deg: 80}\n", "line 2, place.tilt_deg must lie within 45 degrees: got 80"),
     (BALL + "place: [0, 0]\n", "place must be a mapping of keys to values"),
-    (BALL + "place: {y_mm: 1}\n", "place.y_mm is unknown: did you mean"),
     ("object: line\nplace: {spin_deg: 30}\n", "spin_deg must be 0 for Line"),
     (BALL + "friction: -0.1\n", "line 2, friction must be a number not below 0: got -0.1"),
-    (BALL + "friction: rough\n", "friction must be a number not below 0: got 'rough'"),
     ("object: line\nfriction: 0.3\n", "friction"),
     (BALL + "tissues: humn\n", "line 2, tissues must be one of human, paper"),
     (BALL + "tissues: humn\n", "got 'humn' (did you mean human?)."),
-    (BALL + "motion: {kind: sien}\n", "got 'sien' (did you mean sine?)."),
-    (BALL + "outputs: [csv, figure]\n", "got 'figure' (did you mean figures?)."),
-    ("object: {kind: shpere}\n", "got 'shpere' (did you mean sphere?)."),
-    ("object: {kind: sphere, radius_mm: 0.01}\n", "line 1, object: grading must have elements"),
     (BALL + "tissues: [human]\n", "tissues must be one of human"),
     (BALL + "resolution: fine\n", "line 2, resolution must be one of quick, standard, paper: got 'fine'"),
     (BALL + "title: ''\n", "title must be a text: got ''"),
-    (BALL + "finger: {length_mm: 3}\n", "line 2, finger: "),
-    (BALL + "finger: {lenght_mm: 30}\n", "finger.lenght_mm is unknown: did you mean length_mm?"),
     (BALL + "finger: {dermis_mm: 9}\n", "line 2, finger: Bone and skin layers"),
-    (BALL + "times_ms: [400, 20]\n", "times_ms must increase strictly"),
+    (BALL + "finger: {lenght_mm: 30}\n", "finger.lenght_mm is unknown: did you mean length_mm?"),
+    (BALL + "finger: baby\n", "touch.yaml, line 2, finger: like must be one of adult, "),
+    (BALL + "finger: nope.msh\n", "touch.yaml, line 2, finger: nope.msh must be a file that can be read: "),
     (BALL + "times_ms: [4000]\n", "line 2, times_ms must lie within the motion"),
     (BALL + "times_ms: 20\n", "times_ms must be a list of finite numbers: got 20"),
-    (BALL + "afferents: {layout: hexagon}\n", "afferents.layout must be one of grid"),
     (BALL + "afferents: {layout: hexagonal}\n", "afferents.region must be given for the layout hexagonal"),
     (BALL + "afferents: {jitter: 0.1}\n", "afferents.jitter must not be given"),
     (BALL + "afferents: {rows: 0}\n", "afferents.rows must be a whole number of at least 1: got 0"),
-    (BALL + "afferents: {seed: 1.5}\n", "afferents.seed must be a whole number"),
     (BALL + "afferents: {noise: -1}\n", "afferents.noise must be a number not below 0: got -1"),
     (BALL + "afferents: {afferent: fit.json}\n", "afferent: "),
-    (
-        BALL + "afferents: {afferent: {static_gian: 1}}\n",
-        "afferents.afferent.static_gian is unknown: did you mean static_gain?",
-    ),
+    (BALL + "afferents: {afferent: RB}\n", "RB"),
+    (BALL + "afferents: {afferent: {static_gian: 1}}\n",
+     "afferents.afferent.static_gian is unknown: did you mean static_gain?"),
     (BALL + "afferents: {windows_ms: {static: [900, 600]}}\n", "afferents.windows_ms: "),
     (BALL + "outputs: []\n", "outputs must have at least one entry: got []"),
     (BALL + "outputs: [csv, figure]\n", "line 2, outputs[2] must be one of figures, csv"),
     (BALL + "outputs: 3\n", "outputs must be a list: got 3"),
-    (
-        BALL + "motion: {kind: stroke, depth_mm: 0.4, speed_mm_per_s: 20, x_mm: 2}\noutputs: febio\n",
-        "line 3, outputs[1]: febio decks move the indenter only along its axis",
-    ),
-]
+    (BALL + "motion: {kind: stroke, depth_mm: 0.4, speed_mm_per_s: 20, x_mm: 2}\noutputs: febio\n",
+     "line 3, outputs[1]: febio decks move the indenter only along its axis"),
+]  # fmt: skip
 
 
 @pytest.mark.parametrize(("text", "said"), WRONG, ids=[f"{n}" for n in range(len(WRONG))])
@@ -406,15 +328,10 @@ def test_a_malformed_description_is_refused_in_one_sentence_and_nothing_is_writt
         assert (status, printed) == (2, "")
         assert said in error
         assert error.startswith("fingerpad: touch.yaml")
+        assert error.count("touch.yaml") <= 1 + text.count("touch.yaml")  # the file is named once
         assert error.count("\n") == 1
         assert len(error) < 600
         assert [path.name for path in Path().iterdir()] == ["touch.yaml"]
-
-
-def test_a_way_of_hundreds_of_kilometres_is_refused_at_once():
-    stroke = {"kind": "stroke", "depth_mm": 0.3, "speed_mm_per_s": 20.0, "x_mm": 999_999_999}
-    with pytest.raises(fp.InputError, match=r"The indenter must not leave the finger at .* sample 4"):
-        described_touch({"object": "sphere", "motion": stroke}).touch  # noqa: B018
 
 
 def test_files_that_are_no_text_are_refused(call):
@@ -431,11 +348,7 @@ def test_files_that_are_no_text_are_refused(call):
 
 @pytest.mark.filterwarnings("ignore::fingerpad.core.errors.InertiaWarning")
 @settings(max_examples=150, deadline=None, suppress_health_check=[HealthCheck.too_slow])
-@given(
-    st.sampled_from([place for place in places(FULL) if place]),
-    VALUES,
-    CHANGES,
-)
+@given(st.sampled_from([place for place in places(FULL) if place]), VALUES, CHANGES)  # fmt: skip
 def test_any_change_of_a_description_is_possible_or_refused_in_one_sentence(place, value, change):
     try:
         check_described(described_touch(changed(FULL, place, value, change)))
@@ -521,42 +434,13 @@ def test_the_estimate_of_a_mesh_of_ones_own_counts_its_nodes_and_its_elimination
 def test_the_estimate_grows_with_mesh_steps_force_and_friction():
     ball = {"object": "sphere"}
     base = estimate_press(described_touch(ball))
-    more = [
-        estimate_press(described_touch(ball | change))
-        for change in (
-            {"resolution": "standard"},
-            {"motion": {"force_mn": 100}},
-            {"friction": 0.3},
-            {
-                "motion": {
-                    "kind": "repeated",
-                    "depth_mm": 1,
-                    "touches": 3,
-                    "ramp_ms": 50,
-                    "hold_ms": 99,
-                    "pause_ms": 9,
-                }
-            },
-        )
-    ]
+    thrice = {"kind": "repeated", "depth_mm": 1, "touches": 3, "ramp_ms": 50, "hold_ms": 99, "pause_ms": 9}
+    changes = (
+        {"resolution": "standard"}, {"motion": {"force_mn": 100}}, {"friction": 0.3}, {"motion": thrice},
+    )  # fmt: skip
+    more = [estimate_press(described_touch(ball | change)) for change in changes]
     assert all(other.time_s > 1.5 * base.time_s for other in more)
     assert more[0].memory_mb > base.memory_mb
-
-
-@pytest.mark.parametrize(
-    ("line", "said"),
-    [
-        ("finger: baby", "touch.yaml, line 2, finger: like must be one of adult, "),
-        ("finger: nope.msh", "touch.yaml, line 2, finger: nope.msh must be a file that can be read: "),
-        ("afferents: {afferent: RB}", "RB"),
-    ],
-)
-def test_an_error_of_a_part_names_the_file_once(run_program, tmp_path, line, said):
-    (tmp_path / "touch.yaml").write_text(f"object: sphere\n{line}\nmotion: {{depth_mm: 0.2}}\n")
-    status, _, errors = run_program(cli.main, "fingerpad", "touch", "touch.yaml", "--out", "out")
-    assert status == 2
-    assert said in errors
-    assert errors.count("touch.yaml") <= 1
 
 
 def test_types_of_afferents_by_name_and_mixed_in_files():

@@ -19,39 +19,34 @@ def ramp_and_hold(peaks_kpa=(1.0, 2.0, 3.0)):
     return SedTraces(TIMES_MS, np.outer(rise * relaxed, peaks_kpa), kinks_ms=[RAMP_MS])
 
 
-def test_a_straight_ramp_has_its_slope_as_rate_and_none_at_the_onset_or_in_the_hold():
+def test_a_straight_ramp_has_its_slope_and_the_rate_jumps_at_a_kink_and_nowhere_else():
     driven = drive(SedTraces([0.0, 50.0, 1000.0], [[0.0], [2.0], [2.0]], kinks_ms=[50.0]))
     ramp = (driven.times_ms > 0.0) & (driven.times_ms < 50.0)
     assert driven.rate_kpa_per_ms[0] == 0.0
     assert_allclose(driven.rate_kpa_per_ms[ramp], 0.04, rtol=1e-12)
     assert_allclose(driven.sed_kpa[ramp, 0], 0.04 * driven.times_ms[ramp], rtol=1e-12)
     assert_array_equal(driven.rate_kpa_per_ms[driven.times_ms > 50.0], 0.0)
-
-
-def test_the_rate_jumps_at_a_kink_and_nowhere_else():
     driven = drive(ramp_and_hold())
     repeated = np.flatnonzero(np.diff(driven.times_ms) == 0.0)
     assert_array_equal(driven.times_ms[repeated], [0.0, RAMP_MS])
     before, after = driven.rate_kpa_per_ms[repeated[1]], driven.rate_kpa_per_ms[repeated[1] + 1]
     assert (before > 5.0 * after).all()
     assert_allclose(driven.sed_kpa[repeated], driven.sed_kpa[repeated + 1], rtol=1e-15)
-
-
-def test_without_a_kink_the_rate_is_continuous():
     smooth = SedTraces(TIMES_MS, ramp_and_hold().sed_kpa)
     times = drive(smooth).times_ms
     assert_array_equal(times[:-1][np.diff(times) == 0.0], [0.0])
+    plain = drive(SedTraces([0.0, 10.0], [[0.0], [1.0]]))
+    marked = drive(SedTraces([0.0, 10.0], [[0.0], [1.0]], kinks_ms=[0.0, 10.0]))
+    assert_array_equal(plain.times_ms, marked.times_ms)
+    assert_array_equal(plain.rate_kpa_per_ms, marked.rate_kpa_per_ms)
 
 
-def test_given_times_stay_knots_to_the_last_bit_and_keep_their_energy():
+def test_given_times_keep_their_energy_and_between_them_it_stays_between_their_values():
     sed = ramp_and_hold()
     driven = drive(sed)
     assert np.isin(sed.times_ms, driven.times_ms).all()
     knots = np.searchsorted(driven.times_ms, sed.times_ms)
     assert_allclose(driven.sed_kpa[knots], sed.sed_kpa, rtol=1e-14)
-
-
-def test_energy_between_given_times_stays_between_their_values():
     rng = np.random.default_rng(3)
     sed = SedTraces(np.arange(12.0), rng.uniform(0.0, 3.0, (12, 20)))
     driven = drive(sed, shortest_piece_ms=0.01)
@@ -115,23 +110,13 @@ def test_twice_as_many_pieces_move_no_spike_by_more_than_the_documented_bound():
     assert np.median(moved) < 0.005
 
 
-def test_current_is_the_linear_combination_of_equation_1():
+def test_current_is_the_linear_combination_of_equation_1_of_traces_or_their_drive():
     driven = Drive([0.0, 1.0], [[2.0], [4.0]], [[0.0], [3.0]])
     current = Transduction(0.5, 10.0, 0.25).current(driven)
     assert_array_equal(current.current_ma, [[1.0], [0.5 + 30.0 + 1.0]])
     assert_array_equal(current.times_ms, driven.times_ms)
-
-
-def test_traces_and_their_drive_give_the_same_current():
     sed, gains = ramp_and_hold(), Transduction(1e-7, 2e-4, 1e-6)
     assert_array_equal(gains.current(sed).current_ma, gains.current(drive(sed)).current_ma)
-
-
-def test_two_times_are_enough_and_kinks_at_the_ends_change_nothing():
-    plain = drive(SedTraces([0.0, 10.0], [[0.0], [1.0]]))
-    marked = drive(SedTraces([0.0, 10.0], [[0.0], [1.0]], kinks_ms=[0.0, 10.0]))
-    assert_array_equal(plain.times_ms, marked.times_ms)
-    assert_array_equal(plain.rate_kpa_per_ms, marked.rate_kpa_per_ms)
 
 
 @pytest.mark.parametrize(
@@ -139,22 +124,16 @@ def test_two_times_are_enough_and_kinks_at_the_ends_change_nothing():
     [
         (lambda: SedTraces([0.0, 1.0], [[0.0], [1.0]], kinks_ms=[0.5]), "kinks_ms must be among times_ms"),
         (lambda: SedTraces([0.0, 1.0], [[0.0], [1.0]], kinks_ms=[1.0, 0.0]), "kinks_ms must increase"),
-        (
-            lambda: SedTraces([0.0, 1.0], [[0.0], [1.0]], dynamic_kpa=[[0.0], [1.0]]),
-            "dynamic_kpa is needed if dynamic_quantity is not static_quantity.*'stored' with it",
-        ),
-        (
-            lambda: SedTraces([0.0, 1.0], [[0.0], [1.0]], dynamic_quantity="work"),
-            "dynamic_kpa is needed .* got 'work' and 'stored' without it",
-        ),
-        (
-            lambda: SedTraces([0.0, 1.0], [[0.0], [1.0]], (), [[0.0, 1.0], [1.0, 1.0]], "work"),
-            "dynamic_kpa must match sed_kpa",
-        ),
-        (
-            lambda: SedTraces([0.0, 1.0], [[0.0], [1.0]], (), [[0.0], [-1.0]], "work"),
-            "dynamic_kpa .* must not be negative",
-        ),
+        (lambda: SedTraces([0.0, 1.0], [[0.0], [1.0]], dynamic_kpa=[[0.0], [1.0]]),
+         "dynamic_kpa is needed if dynamic_quantity is not static_quantity.*'stored' with it"),
+        (lambda: SedTraces([0.0, 1.0], [[0.0], [1.0]], dynamic_quantity="work"),
+         "dynamic_kpa is needed .* got 'work' and 'stored' without it"),
+        (lambda: SedTraces([0.0, 1.0], [[0.0], [1.0]], (), [[0.0, 1.0], [1.0, 1.0]], "work"),
+         "dynamic_kpa must match sed_kpa"),
+        (lambda: SedTraces([0.0, 1.0], [[0.0], [1.0]], (), [[0.0], [-1.0]], "work"),
+         "dynamic_kpa .* must not be negative"),
+        (lambda: SedTraces([0.0, 50.0], [[np.inf, 1.0], [-np.inf, 1.0]]),
+         "finite numbers only: 2 are not, first in row and column 1, 1"),
         (lambda: CurrentTraces([0.0, 0.0, 0.0], np.zeros((3, 1))), "nor repeat more than once"),
         (lambda: CurrentTraces([0.0, 2.0, 1.0], np.zeros((3, 1))), "must not decrease"),
         (lambda: Drive([0.0, 1.0], np.zeros((2, 1)), np.zeros((2, 2))), "Drive needs one row"),
@@ -163,7 +142,7 @@ def test_two_times_are_enough_and_kinks_at_the_ends_change_nothing():
         (lambda: drive(ramp_and_hold(), difference_step_ms=0.0), "difference_step_ms must be greater"),
         (lambda: drive(ramp_and_hold(), shortest_piece_ms=-1.0), "shortest_piece_ms must be greater"),
     ],
-)
+)  # fmt: skip
 def test_what_cannot_be_used_is_refused(wrong, message):
     with pytest.raises(InputError, match=message):
         wrong()
@@ -196,20 +175,22 @@ def test_traces_share_the_memory_of_checked_values_only():
     held = SedTraces([0.0, 50.0], frozen)
     given[1] = 7.0
     assert held.sed_kpa[1, 0] == 9.0
-    with pytest.raises(InputError, match="finite numbers only: 2 are not, first in row and column 1, 1"):
-        SedTraces([0.0, 50.0], [[np.inf, 1.0], [-np.inf, 1.0]])
     huge = np.full((2, 2), 1e308)
     assert_array_equal(SedTraces([0.0, 50.0], huge).sed_kpa, huge)
 
 
 def test_a_part_of_traces_or_of_their_drive_is_that_of_its_sites():
-    sed = SedTraces([0.0, 50.0, 90.0], [[0.0] * 3, [1.0, 2.0, 3.0], [1.0, 1.0, 2.0]], kinks_ms=[50.0])
-    assert_array_equal(sed.part(slice(1, 3)).sed_kpa, sed.sed_kpa[:, 1:])
-    assert_array_equal(sed.part(slice(1, 3)).kinks_ms, sed.kinks_ms)
-    part, whole = drive(sed).part(slice(2, 3)), drive(sed.part(slice(2, 3)))
-    assert_array_equal(part.rate_kpa_per_ms, whole.rate_kpa_per_ms)
-    assert_array_equal(part.sed_kpa, whole.sed_kpa)
-    assert part.n_sites == 1
+    energy = ramp_and_hold()
+    both = SedTraces(TIMES_MS, energy.sed_kpa, [RAMP_MS], energy.sed_kpa[:, ::-1] ** 2, "von_mises")
+    for sed in (energy, both):
+        assert_array_equal(sed.part(slice(1, 3)).sed_kpa, sed.sed_kpa[:, 1:])
+        assert_array_equal(sed.part(slice(1, 3)).kinks_ms, sed.kinks_ms)
+        part, whole = drive(sed).part(slice(0, 2)), drive(sed.part(slice(0, 2)))
+        assert_array_equal(part.rate_kpa_per_ms, whole.rate_kpa_per_ms)
+        assert_array_equal(part.rate_kpa_per_ms, drive(sed).rate_kpa_per_ms[:, :2])
+        assert_array_equal(part.sed_kpa, whole.sed_kpa)
+        assert part.dynamic_quantity == whole.dynamic_quantity == sed.dynamic_quantity
+        assert part.n_sites == 2
 
 
 def test_the_dynamic_term_follows_what_the_traces_bring_and_the_static_term_energy():
@@ -242,17 +223,8 @@ def test_both_terms_may_follow_one_other_quantity(options):
         assert kept.dynamic_quantity == kept.static_quantity == "von_mises"
 
 
-def test_a_part_of_traces_or_of_their_drive_keeps_what_the_dynamic_term_follows():
-    energy = ramp_and_hold()
-    both = SedTraces(TIMES_MS, energy.sed_kpa, [RAMP_MS], energy.sed_kpa[:, ::-1] ** 2, "von_mises")
-    part, whole = drive(both).part(slice(0, 2)), drive(both.part(slice(0, 2)))
-    assert_array_equal(part.rate_kpa_per_ms, whole.rate_kpa_per_ms)
-    assert_array_equal(part.rate_kpa_per_ms, drive(both).rate_kpa_per_ms[:, :2])
-    assert part.dynamic_quantity == whole.dynamic_quantity == "von_mises"
-
-
 @pytest.mark.parametrize("gains", [(1e-6, 2e-4, 7e-7), (-1e-6, 2e-4, -7e-7), (0.0, -1e-4, 3e-6)])
-def test_the_current_is_nowhere_above_its_bound(gains):
+def test_the_current_is_nowhere_above_its_bound_which_is_at_most_three_times_as_large(gains):
     rng = np.random.default_rng(4)
     times = np.concatenate([[0.0], np.cumsum(rng.uniform(0.2, 20.0, 20))])
     energy, strain = rng.exponential(size=(2, 21, 500)) * rng.integers(0, 2, (2, 21, 500))
@@ -262,9 +234,6 @@ def test_the_current_is_nowhere_above_its_bound(gains):
     chain = Transduction(*gains)
     for sed in (mixed, SedTraces(times, energy)):
         assert (chain.largest_current_ma(sed) >= chain.current(sed).current_ma.max(axis=0)).all()
-
-
-def test_the_bound_of_the_current_is_at_most_three_times_the_current():
     chain = Transduction(0.0, 2e-4, 7e-7)
     ratio = chain.largest_current_ma(ramp_and_hold()) / chain.current(ramp_and_hold()).current_ma.max(axis=0)
     assert (ratio > 1.0).all()
