@@ -10,7 +10,7 @@ MS_PER_S = 1000.0
 MM_PER_M = 1000.0
 MN_PER_N = 1000.0
 
-QUANTITY_UNITS = {
+SKIN_QUANTITY_UNITS = {
     "stored": "kPa",
     "instantaneous": "kPa",
     "work": "kPa",
@@ -22,6 +22,9 @@ QUANTITY_UNITS = {
     "skin_stretch": "",
 }
 """Unit of each quantity that an afferent can follow, by its name; empty for a strain."""
+
+QUANTITY_UNITS = {**SKIN_QUANTITY_UNITS, "current": "mA", "relative_current": ""}
+"""Unit of each quantity of `Traces`, by its name; empty for a pure number."""
 
 
 def with_unit(said: str, quantity: str, brackets: str = " [{}]") -> str:

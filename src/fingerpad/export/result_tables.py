@@ -12,8 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from fingerpad.core.displayed import Result
-from fingerpad.core.signals import CurrentTraces, HitRates, ResponseMap, SedTraces, SpikeTrains
-from fingerpad.core.units import QUANTITY_UNITS
+from fingerpad.core.signals import HitRates, ResponseMap, SpikeTrains, Traces
 from fingerpad.export.dataset import library, part_variable, response_values, touch_dataset, unit_of_name
 from fingerpad.inference.spike_parameters import SPIKE_PARAMETER_UNITS
 from fingerpad.skin.fields import Place, stored_fields
@@ -45,14 +44,9 @@ def profile_columns(profile: SurfaceProfile) -> Columns:
     return {"distance_mm": profile.distance_mm, "deflection_mm": profile.deflection_mm}
 
 
-def traces_columns(traces: SedTraces) -> Columns:
-    """Return what the static term follows, a column per site, by time."""
-    return {"time_ms": traces.times_ms} | dict(enumerate(traces.sed_kpa.T))
-
-
-def current_columns(traces: CurrentTraces) -> Columns:
-    """Currents, a column per site, by time; a time is repeated where the current jumps. [mA]"""
-    return {"time_ms": traces.times_ms} | dict(enumerate(traces.current_ma.T))
+def traces_columns(traces: Traces) -> Columns:
+    """Values, a column per site, by time; a time is repeated where a current jumps."""
+    return {"time_ms": traces.times_ms} | dict(enumerate(traces.values.T))
 
 
 def spike_columns(trains: SpikeTrains) -> Columns:
@@ -159,8 +153,7 @@ def sample_columns(sample: ReducedSample) -> Columns:
 TABLES: Mapping[str, Callable[[Any], Columns]] = {
     "SkinResponse": skin_columns,
     "SurfaceProfile": profile_columns,
-    "SedTraces": traces_columns,
-    "CurrentTraces": current_columns,
+    "Traces": traces_columns,
     "SpikeTrains": spike_columns,
     "ResponseMap": response_columns,
     "MixedResponse": mixed_columns,
@@ -181,25 +174,13 @@ def table(result: Result) -> pandas.DataFrame:
     return made.set_index(next(iter(columns)))
 
 
-def traces_dataset(traces: SedTraces) -> xarray.Dataset:
-    """Return what the two terms of the current follow, by time and site."""
-    values = {traces.static_quantity: traces.sed_kpa}
-    if traces.dynamic_kpa is not None:
-        values[traces.dynamic_quantity] = traces.dynamic_kpa
-    units = {name: QUANTITY_UNITS.get(name) or "1" for name in values}
-    return _by_time_and_site(traces.times_ms, values, units)
-
-
-def current_dataset(traces: CurrentTraces) -> xarray.Dataset:
-    """Currents by time and site; a time is repeated where the current jumps."""
-    return _by_time_and_site(traces.times_ms, {"current_ma": traces.current_ma}, {"current_ma": "mA"})
-
-
-def _by_time_and_site(
-    times_ms: np.ndarray, values: Mapping[str, np.ndarray], units: Mapping[str, str]
-) -> xarray.Dataset:
-    variables = {name: (("time", "site"), each, {"units": units[name]}) for name, each in values.items()}
-    coordinates = {"time": ("time", times_ms, {"units": "ms"})}
+def traces_dataset(traces: Traces) -> xarray.Dataset:
+    """Return each quantity by time and site; a time is repeated where a current jumps."""
+    variables = {
+        each.quantity: (("time", "site"), each.values, {"units": each.unit or "1"})
+        for each in (traces, traces.dynamic_term)
+    }
+    coordinates = {"time": ("time", traces.times_ms, {"units": "ms"})}
     made: xarray.Dataset = library("xarray").Dataset(variables, coordinates)
     return made
 
@@ -214,8 +195,7 @@ def response_dataset(response: ResponseMap) -> xarray.Dataset:
 
 DATASETS: Mapping[str, Callable[[Any], xarray.Dataset]] = {
     "SkinResponse": touch_dataset,
-    "SedTraces": traces_dataset,
-    "CurrentTraces": current_dataset,
+    "Traces": traces_dataset,
     "ResponseMap": response_dataset,
 }
 """Data sets with more dimensions than a table, by the name of a result's class."""

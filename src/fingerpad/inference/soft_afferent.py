@@ -8,7 +8,7 @@ import numpy as np
 
 from fingerpad.core.checks import FloatArray
 from fingerpad.core.random_streams import Presentations
-from fingerpad.core.signals import CurrentTraces, SpikeTrains
+from fingerpad.core.signals import SpikeTrains, Traces
 from fingerpad.inference.identifiable import six_parameters
 from fingerpad.inference.rate_model import Rates, evaluate_rows
 from fingerpad.inference.spike_parameters import SPIKE_PARAMETER_NAMES
@@ -22,7 +22,7 @@ PREDICTED_PRESENTATIONS = 20
 """Presentations whose mean is the predicted rate of an afferent with a soft threshold."""
 
 
-def soft_membrane(driven: Drive, parameters: FloatArray) -> tuple[EscapeRate, CurrentTraces]:
+def soft_membrane(driven: Drive, parameters: FloatArray) -> tuple[EscapeRate, Traces]:
     """Return the membrane and the current of an afferent with a soft threshold."""
     afferent = Afferent.from_parameters(six_parameters(parameters[:4]))
     return EscapeRate(afferent.membrane, float(parameters[4])), afferent.transduction.current(driven)

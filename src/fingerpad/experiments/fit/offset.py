@@ -12,7 +12,7 @@ import numpy as np
 
 from fingerpad.core.checks import FloatArray, IntArray, one_of
 from fingerpad.core.errors import InputError
-from fingerpad.core.signals import SedTraces
+from fingerpad.core.signals import Traces
 from fingerpad.experiments.fit.methods import FOUR_NUMBER_METHODS, prepare
 from fingerpad.experiments.fit.results import HeldOffset, OffsetFit
 from fingerpad.inference.afferent_methods import (
@@ -32,7 +32,7 @@ from fingerpad.inference.receptor_offset import ReceptorOffset
 from fingerpad.inference.recordings import RateRecordings
 from fingerpad.neuron.rate_windows import Windows
 
-Beside = Mapping[float, SedTraces | Sequence[SedTraces]]
+Beside = Mapping[float, Traces | Sequence[Traces]]
 """Strain energy density by offset from the believed place, distal positive [mm], one column per stimulus."""
 
 

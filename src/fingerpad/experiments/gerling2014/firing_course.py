@@ -10,7 +10,7 @@ from scipy.interpolate import interp1d
 
 from fingerpad.core.checks import FloatArray
 from fingerpad.core.results import Number, Vector, result_class
-from fingerpad.core.signals import CurrentTraces, SedTraces
+from fingerpad.core.signals import Traces
 from fingerpad.data import bar_firing_rates, protocol
 from fingerpad.experiments.conditions import RECEPTOR_X_MM
 from fingerpad.experiments.gerling2014.skin_force import PLATE_DEPTHS_MM, plate
@@ -46,12 +46,12 @@ class FiringCourse:
 
 
 def firing_course(
-    drive: SedTraces, sed: SedTraces, afferent: Afferent, pressed: Mapping[str, SkinResponse]
+    drive: Traces, sed: Traces, afferent: Afferent, pressed: Mapping[str, SkinResponse]
 ) -> FiringCourse:
     """Read when the fitted afferent fires and what drives it."""
     observed, (dynamic_ms, static_ms) = bar_firing_rates(), PAPER_WINDOWS_MS
     population = Population.grid(afferent=afferent, centre_mm=(RECEPTOR_X_MM, 0.0))
-    in_hold = interp1d(sed.times_ms, sed.sed_kpa, axis=0)(0.5 * (static_ms[0] + static_ms[1]))
+    in_hold = interp1d(sed.times_ms, sed.values, axis=0)(0.5 * (static_ms[0] + static_ms[1]))
     ramp_ms, end_ms = protocol.RAMP.value, float(drive.times_ms[-1])
     return FiringCourse(
         peak_ms=np.array([_peak_ms(train) for train in afferent.spikes(drive)]),
@@ -71,7 +71,7 @@ def _peak_ms(spikes_ms: FloatArray) -> float:
     return float(spikes_ms[1 + np.diff(spikes_ms).argmin()]) if spikes_ms.size > 1 else np.nan
 
 
-def _dynamic_share(drive: SedTraces, afferent: Afferent, start_ms: float, end_ms: float) -> FloatArray:
+def _dynamic_share(drive: Traces, afferent: Afferent, start_ms: float, end_ms: float) -> FloatArray:
     """Share of the dynamic term in the charge of both terms from a start to an end, (n_sites,); 0 without."""
     transduction = afferent.transduction
     static, dynamic = (
@@ -82,9 +82,9 @@ def _dynamic_share(drive: SedTraces, afferent: Afferent, start_ms: float, end_ms
     return np.divide(dynamic, both, out=np.zeros_like(both), where=both > 0.0)
 
 
-def _charge(current: CurrentTraces, start_ms: float, end_ms: float) -> FloatArray:
+def _charge(current: Traces, start_ms: float, end_ms: float) -> FloatArray:
     """Integral of a current whose knots include both times, (n_sites,). [mA ms]"""
     first = np.searchsorted(current.times_ms, start_ms, side="right") - 1
     last = np.searchsorted(current.times_ms, end_ms, side="left")
     within = slice(first, last + 1)
-    return np.asarray(np.trapezoid(current.current_ma[within], current.times_ms[within], axis=0))
+    return np.asarray(np.trapezoid(current.values[within], current.times_ms[within], axis=0))

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from fingerpad.core.results import Matrix, Number, Vector, result_class
-from fingerpad.core.signals import ResponseMap, SedTraces
+from fingerpad.core.signals import ResponseMap, Traces
 from fingerpad.data import protocol
 from fingerpad.experiments.conditions import RECEPTOR_X_MM
 from fingerpad.neuron.afferent import Afferent
@@ -72,12 +72,12 @@ def population_maps(standard: SkinResponse, afferent: Afferent) -> PopulationMap
 def resting_response(afferent: Afferent) -> RestingResponse:
     """Simulate an afferent without any touch."""
     end_ms = protocol.RAMP.value + protocol.HOLD.value
-    sed = SedTraces.at_rest(end_ms, afferent.dynamic_quantity, afferent.static_quantity)
-    dynamic_hz, static_hz = afferent.rates(sed, *PAPER_WINDOWS_MS)
+    traces = Traces.at_rest(end_ms, afferent.dynamic_quantity, afferent.static_quantity)
+    dynamic_hz, static_hz = afferent.rates(traces, *PAPER_WINDOWS_MS)
     return RestingResponse(
         dynamic_rate_hz=float(dynamic_hz[0]),
         static_rate_hz=float(static_hz[0]),
-        first_spike_latency_ms=float(first_spike_latency_ms(afferent.spikes(sed))[0]),
+        first_spike_latency_ms=float(first_spike_latency_ms(afferent.spikes(traces))[0]),
     )
 
 

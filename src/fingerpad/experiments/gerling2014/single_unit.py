@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 from numpy.typing import ArrayLike
 
 from fingerpad.core.checks import FloatArray
 from fingerpad.core.results import Number, Vector, result_class
-from fingerpad.core.signals import STORED_ENERGY, SedTraces, traces_below
+from fingerpad.core.signals import STORED_ENERGY, Traces, traces_below
 from fingerpad.data import bar_firing_rates, protocol
 from fingerpad.experiments.conditions import RECEPTOR_X_MM, Conditions, Touch
 from fingerpad.geometry.indenters import Bar
@@ -48,33 +46,19 @@ def bar_touches(conditions: Conditions) -> list[Touch]:
     ]
 
 
-def receptor_sed(
+def traces_at_receptor(
     responses: list[SkinResponse],
     dynamic_quantity: str = STORED_ENERGY,
     static_quantity: str = STORED_ENERGY,
-) -> SedTraces:
-    """Strain energy density at the one receptor, one column per shift of the bar."""
+) -> Traces:
+    """Quantities of the two terms at the one receptor, one column per shift of the bar."""
     quantities = (dynamic_quantity, static_quantity)
-    return SedTraces.joined([traces_below(skin, RECEPTOR, *quantities) for skin in responses])
+    return Traces.joined([traces_below(skin, RECEPTOR, *quantities) for skin in responses])
 
 
-def receptor_traces(responses: list[SkinResponse], quantity: str) -> SedTraces:
-    """Another quantity at the receptor in the place of strain energy density, one column per shift."""
-    sampled = np.hstack([skin.sample(quantity, RECEPTOR) for skin in responses])
-    first = responses[0]
-    return SedTraces(
-        first.times_ms, sampled, np.array(first.kinks_ms), phases=first.phases, onset_ms=first.onset_ms
-    )
-
-
-def following(static: SedTraces, dynamic: SedTraces, quantity: str) -> SedTraces:
-    """Traces whose dynamic term follows another quantity."""
-    return replace(static, dynamic_kpa=dynamic.sed_kpa, dynamic_quantity=quantity)
-
-
-def rate_problem(sed: SedTraces, initial_mv: float | None = None) -> RateProblem:
-    """Observed rates at all shifts, and the paper's model of the afferent driven by `sed`."""
-    return RateProblem(AfferentModel.of_traces(sed, initial_mv=initial_mv), bar_recordings())
+def rate_problem(traces: Traces, initial_mv: float | None = None) -> RateProblem:
+    """Observed rates at all shifts, and the paper's model of the afferent driven by traces."""
+    return RateProblem(AfferentModel.of_traces(traces, initial_mv=initial_mv), bar_recordings())
 
 
 def bar_recordings() -> RateRecordings:

@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 
 from fingerpad.core.checks import FloatArray
 from fingerpad.core.results import Number, Vector, result_class
-from fingerpad.core.signals import SedTraces
+from fingerpad.core.signals import Traces
 from fingerpad.data import bar_firing_rates
 from fingerpad.experiments.fit.rate_uncertainty import LEVEL, SEEDS_OF_PROFILES, fss_sensitivity, profiles
 from fingerpad.experiments.fit.results import FssSensitivity, ParameterProfile
@@ -132,7 +132,7 @@ class UncertaintyResult:
 
 
 def uncertainty_result(
-    sed: SedTraces,
+    traces: Traces,
     fitted: ArrayLike,
     seed: int,
     *,
@@ -141,7 +141,7 @@ def uncertainty_result(
 ) -> UncertaintyResult:
     """Compute identifiability, posterior, profile likelihoods and sensitivity."""
     recordings, shift_mm = single_unit.bar_recordings(), bar_firing_rates().shift_mm
-    six_model = AfferentModel.of_drive(drive(sed, pieces=PIECES), initial_mv=initial_mv)
+    six_model = AfferentModel.of_drive(drive(traces, pieces=PIECES), initial_mv=initial_mv)
     model = four_number_model(six_model)
     six = np.asarray(fitted, dtype=np.float64)
     four = identifiable(six)

@@ -6,7 +6,7 @@ import numpy as np
 
 from fingerpad.core.checks import FloatArray
 from fingerpad.core.results import Matrix, Vector, result_class
-from fingerpad.core.signals import CurrentTraces
+from fingerpad.core.signals import Traces
 from fingerpad.core.units import MM_PER_M
 from fingerpad.data import protocol
 from fingerpad.experiments.conditions import RECEPTOR_X_MM
@@ -97,7 +97,7 @@ def three_levels(standard: SkinResponse, afferent: Afferent) -> ThreeLevels:
         static_rate_hz=static_hz,
         times_ms=times,
         until_ms=UNTIL_MS,
-        current_ma=np.interp(times, below.times_ms, below.current_ma[:, 0]),
+        current_ma=np.interp(times, below.times_ms, below.values[:, 0]),
         potential_mv=membrane_potential(membrane, below, trains[0], times),
         rheobase_ma=membrane.capacitance_mf * membrane.threshold_mv / membrane.time_constant_ms,
         threshold_mv=membrane.threshold_mv,
@@ -105,7 +105,7 @@ def three_levels(standard: SkinResponse, afferent: Afferent) -> ThreeLevels:
 
 
 def membrane_potential(
-    membrane: LeakyIntegrateAndFire, current: CurrentTraces, spikes_ms: FloatArray, times_ms: FloatArray
+    membrane: LeakyIntegrateAndFire, current: Traces, spikes_ms: FloatArray, times_ms: FloatArray
 ) -> FloatArray:
     """Potential of a membrane whose spike times are known, Eq. 3."""
     tau, capacitance = membrane.time_constant_ms, membrane.capacitance_mf
@@ -115,7 +115,7 @@ def membrane_potential(
     length = np.diff(knots)
     # A repeated time is a jump of the current: the line between two knots is read inside of them.
     quarter, three_quarters = (
-        np.interp(knots[:-1] + share * length, current.times_ms, current.current_ma[:, 0])
+        np.interp(knots[:-1] + share * length, current.times_ms, current.values[:, 0])
         for share in (0.25, 0.75)
     )
     slope = 2.0 * (three_quarters - quarter) / length
@@ -125,7 +125,7 @@ def membrane_potential(
     since = np.where(last_spike < 0, np.inf, knots[:-1] - np.append(spikes_ms, 0.0)[last_spike])
     held = since < membrane.refractory_ms - 1e-9
     potential = np.zeros(knots.size)
-    potential[:1] = membrane.initial_potentials_mv(current.current_ma[0, :1])
+    potential[:1] = membrane.initial_potentials_mv(current.values[0, :1])
     for number, fixed in enumerate(held):
         start = 0.0 if since[number] == 0.0 else potential[number]
         relaxed = steady[number] + (start - steady[number]) * decay[number]
