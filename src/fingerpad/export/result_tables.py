@@ -13,8 +13,8 @@ import numpy as np
 
 from fingerpad.core.displayed import Result
 from fingerpad.core.signals import HitRates, ResponseMap, SpikeTrains, Traces
-from fingerpad.export.dataset import library, part_variable, response_values, touch_dataset, unit_of_name
-from fingerpad.inference.spike_parameters import SPIKE_PARAMETER_UNITS
+from fingerpad.core.units import QUANTITY_UNITS, unit_of, units_of
+from fingerpad.export.dataset import library, part_variable, response_values, touch_dataset, udunits
 from fingerpad.skin.fields import Place, stored_fields
 
 if TYPE_CHECKING:
@@ -121,7 +121,7 @@ def spike_fit_columns(fit: SpikeFit) -> Columns:
         "parameter": fit.names,
         "value": fit.parameters,
         "standard_error": fit.standard_errors,
-        "unit": SPIKE_PARAMETER_UNITS,
+        "unit": list(units_of(fit.names).values()),
     }
 
 
@@ -144,7 +144,7 @@ def task_columns(task: TaskResult) -> Columns:
 
 
 def sample_columns(sample: ReducedSample) -> Columns:
-    """Each quantity, and the error within which that of a full solution lies, by receptor. [kPa]"""
+    """Each quantity, and the error within which that of a full solution lies, by receptor."""
     n_receptors = len(next(iter(sample.fields.values())))
     errors = {f"{name}_error": np.full(n_receptors, error) for name, error in sample.field_errors.items()}
     return {"receptor": np.arange(n_receptors), **sample.fields, **errors}
@@ -177,7 +177,7 @@ def table(result: Result) -> pandas.DataFrame:
 def traces_dataset(traces: Traces) -> xarray.Dataset:
     """Return each quantity by time and site; a time is repeated where a current jumps."""
     variables = {
-        each.quantity: (("time", "site"), each.values, {"units": each.unit or "1"})
+        each.quantity: (("time", "site"), each.values, {"units": udunits(each.unit)})
         for each in (traces, traces.dynamic_term)
     }
     coordinates = {"time": ("time", traces.times_ms, {"units": "ms"})}
@@ -214,5 +214,6 @@ def dataset(result: Result) -> xarray.Dataset:
     made: xarray.Dataset = rows.rename_axis("row").to_xarray().drop_vars("row")
     for name, values in made.data_vars.items():
         if values.dtype.kind in "fiu":
-            values.attrs["units"] = unit_of_name(str(name))
+            quantity = str(name).removesuffix("_error")
+            values.attrs["units"] = udunits(QUANTITY_UNITS.get(quantity) or unit_of(str(name)))
     return made

@@ -30,9 +30,6 @@ IDENTIFIABLE_NAMES = (
 LARGEST_RESTING_SHARE = 0.95
 """Largest potential at rest over the threshold in fits, beta tau/(C v): docs/decisions/silent-at-rest.md."""
 
-IDENTIFIABLE_UNITS = ("1/ms", "1/kPa", "1/(kPa ms)", "ms")
-"""Units of the four parameters."""
-
 
 def identifiable(parameters: ArrayLike) -> FloatArray:
     """Return the four identifiable parameters."""

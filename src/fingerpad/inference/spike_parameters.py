@@ -16,13 +16,10 @@ from numpy.typing import ArrayLike
 
 from fingerpad.core.checks import FloatArray, float_array, positive
 from fingerpad.core.errors import InputError
-from fingerpad.inference.identifiable import IDENTIFIABLE_NAMES, IDENTIFIABLE_UNITS
+from fingerpad.inference.identifiable import IDENTIFIABLE_NAMES
 
 SPIKE_PARAMETER_NAMES = (*IDENTIFIABLE_NAMES, "escape_width")
 """The four identifiable parameters, and the width of the threshold over the threshold."""
-
-SPIKE_PARAMETER_UNITS = (*IDENTIFIABLE_UNITS, "1")
-"""Units of the five parameters."""
 
 N_PARAMETERS = len(SPIKE_PARAMETER_NAMES)
 

@@ -14,7 +14,7 @@ from fingerpad.core.errors import InputError, shown
 from fingerpad.core.keywords import KnownKeywords
 from fingerpad.core.signals import INTERVAL, STORED_ENERGY, SpikeTrains, Traces
 from fingerpad.core.threads import in_blocks
-from fingerpad.core.units import SKIN_QUANTITY_UNITS
+from fingerpad.core.units import SKIN_QUANTITY_UNITS, gain_unit, units_of
 from fingerpad.core.values import converted
 from fingerpad.data import neuron
 from fingerpad.neuron.lif import LeakyIntegrateAndFire
@@ -31,9 +31,6 @@ PARAMETER_NAMES = (
     "threshold_mv",
 )
 """The six fitted numbers in the paper's order: beta, k_d, k_s, tau, C, v."""
-
-PARAMETER_UNITS = ("mA", "mA ms/kPa", "mA/kPa", "ms", "mF", "mV")
-"""Units of the six fitted numbers."""
 
 _SITES_PER_BLOCK = 256
 """Sites that a thread takes through the whole chain at once: their traces stay in the cache."""
@@ -86,6 +83,15 @@ def check_quantities(afferent: Follows, traces: Follows) -> None:
             )
 
 
+def parameter_units(follows: Follows) -> dict[str, str]:
+    """Return the units of the six fitted numbers; those of the gains depend on the quantities."""
+    return {
+        "intercept_ma": "mA",
+        "dynamic_gain": gain_unit("dynamic_gain", follows.dynamic_quantity),
+        "static_gain": gain_unit("static_gain", follows.static_quantity),
+    } | units_of(PARAMETER_NAMES[3:])
+
+
 def check_known_quantities(afferent: Follows) -> None:
     """Raise `InputError` if an afferent follows a quantity that is not in `SKIN_QUANTITY_UNITS`."""
     for name in ("dynamic_quantity", "static_quantity"):
@@ -109,9 +115,9 @@ class Afferent(metaclass=KnownKeywords):
     intercept_ma : float
         Current without any load, beta. [mA]
     dynamic_gain : float
-        Gain on the rate of change of what the dynamic term follows, k_d. [mA ms/kPa]
+        Gain on the rate of change of what the dynamic term follows, k_d. [mA ms/kPa, or per its unit]
     static_gain : float
-        Gain on what the static term follows, k_s. [mA/kPa]
+        Gain on what the static term follows, k_s. [mA/kPa, or per its unit]
     time_constant_ms : float
         Time constant of the membrane, tau. [ms]
     capacitance_mf : float
@@ -273,7 +279,7 @@ class Afferent(metaclass=KnownKeywords):
 
     @property
     def static_threshold(self) -> float:
-        """Constant quantity above which the afferent fires, (C v / tau - beta) / k_s. [kPa]
+        """Constant quantity above which the afferent fires, (C v / tau - beta) / k_s. [its unit]
 
         Examples
         --------
@@ -293,7 +299,7 @@ class Afferent(metaclass=KnownKeywords):
         Parameters
         ----------
         quantity : float
-            The threshold. [kPa]
+            The threshold. [its unit]
 
         Raises
         ------

@@ -90,9 +90,9 @@ class Transduction:
     intercept_ma : float
         Current without any load, beta. [mA]
     dynamic_gain : float
-        Gain on the rate of change of SED, k_d. [mA ms/kPa]
+        Gain on the rate of change of SED, or of another quantity, k_d. [mA ms/kPa, or per its unit]
     static_gain : float
-        Gain on SED itself, k_s. [mA/kPa]
+        Gain on SED itself, or on another quantity, k_s. [mA/kPa, or per its unit]
 
     Examples
     --------

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from matplotlib.figure import Figure
 
+from fingerpad.core.signals import STORED_ENERGY
+from fingerpad.core.units import gain_unit, unit_of
 from fingerpad.data import protocol
 from fingerpad.experiments.gerling2014.single_unit_uncertainty import (
     CredibleInterval,
@@ -24,9 +26,9 @@ from fingerpad.report.single_unit import ALONG
 from fingerpad.report.style import BLUE, COLUMN_IN, PALE, draw_rates, new_figure
 
 GAINS = {
-    "intercept_ma": ("β", "mA"),
-    "dynamic_gain": ("k_d", "mA ms/kPa"),
-    "static_gain": ("k_s", "mA/kPa"),
+    "intercept_ma": ("β", unit_of("intercept_ma")),
+    "dynamic_gain": ("k_d", gain_unit("dynamic_gain", STORED_ENERGY)),
+    "static_gain": ("k_s", gain_unit("static_gain", STORED_ENERGY)),
 }
 
 

@@ -13,6 +13,7 @@ from fingerpad.core.checks import FloatArray, IntArray, whole
 from fingerpad.core.errors import InputError
 from fingerpad.core.keywords import known_keywords
 from fingerpad.core.signals import Traces
+from fingerpad.core.units import units_of
 from fingerpad.data import protocol
 from fingerpad.experiments.fit.methods import Prepared, prepare
 from fingerpad.experiments.fit.offset import Beside, check_beside, fit_offset
@@ -21,13 +22,12 @@ from fingerpad.inference.fitting.cross_validation import CrossValidation, cross_
 from fingerpad.inference.fitting.fractional_sum_of_squares import fractional_sum_of_squares
 from fingerpad.inference.identifiable import (
     IDENTIFIABLE_NAMES,
-    IDENTIFIABLE_UNITS,
     identifiable,
 )
 from fingerpad.inference.rate_model import AfferentModel, four_number_model
 from fingerpad.inference.rate_problem import RateProblem
 from fingerpad.inference.recordings import PHASES, RateRecordings, SpikeRecordings
-from fingerpad.neuron.afferent import PARAMETER_NAMES, PARAMETER_UNITS
+from fingerpad.neuron.afferent import PARAMETER_NAMES, parameter_units
 from fingerpad.neuron.rate_windows import Windows
 
 _PARTS = {
@@ -134,8 +134,8 @@ def fit_recordings(
         seconds=best.seconds,
         parameters=_six_by_name(prepared.six(best.parameters)),
         identifiable=_four_by_name(prepared.six(best.parameters)),
-        units=dict(zip(PARAMETER_NAMES, PARAMETER_UNITS, strict=True)),
-        identifiable_units=dict(zip(IDENTIFIABLE_NAMES, IDENTIFIABLE_UNITS, strict=True)),
+        units=parameter_units(model.drives[0]),
+        identifiable_units=units_of(IDENTIFIABLE_NAMES),
         identifiable_standard_error=dict(zip(IDENTIFIABLE_NAMES, errors.tolist(), strict=True)),
         identifiable_covariance=covariance,
         fss_in_sample=prepared.problem.score(best.parameters, np.arange(prepared.problem.n_observations)),

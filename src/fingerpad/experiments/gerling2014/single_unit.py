@@ -22,7 +22,7 @@ from fingerpad.inference.rate_model import AfferentModel
 from fingerpad.inference.rate_problem import RateProblem
 from fingerpad.inference.recordings import RateRecordings
 from fingerpad.inference.start_points import response_surface, start_points
-from fingerpad.neuron.afferent import PARAMETER_NAMES, PARAMETER_UNITS, Afferent
+from fingerpad.neuron.afferent import PARAMETER_NAMES, Afferent, parameter_units
 from fingerpad.neuron.spikes import modulation_difference, modulation_index
 from fingerpad.skin.sampling import SkinResponse
 
@@ -222,7 +222,7 @@ def single_unit_result(
         static_quantity=afferent.static_quantity,
         initial_mv=afferent.initial_mv,
         parameters=_named(best.parameters),
-        units=dict(zip(PARAMETER_NAMES, PARAMETER_UNITS, strict=True)),
+        units=parameter_units(afferent),
         shift_mm=shift_mm,
         dynamic_rate_hz=dynamic,
         static_rate_hz=static,
