@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.stats import norm, qmc
+from scipy.stats import norm
 
 from fingerpad.core.checks import FloatArray
 from fingerpad.experiments.fit.results import FssSensitivity, ParameterProfile
 from fingerpad.inference.afferent_posterior import from_coordinates, to_coordinates
+from fingerpad.inference.fitting.bounds import halton
 from fingerpad.inference.fitting.profile_likelihood import ProfileLikelihood, profile_likelihoods
 from fingerpad.inference.fitting.sensitivity import sobol_indices
 from fingerpad.inference.identifiable import IDENTIFIABLE_NAMES, identifiable
@@ -58,7 +59,7 @@ def likely_points(likelihood: RateLikelihood, four: ArrayLike) -> FloatArray:
     about the best points of all clouds before; points that are not much less likely than the best are kept.
     """
     middle, reach = to_coordinates(four), np.diag(FIRST_CLOUD)
-    design = norm.ppf(qmc.Halton(middle.size, scramble=False).random(CLOUDS * POINTS_OF_CLOUD + 1)[1:])
+    design = norm.ppf(halton(CLOUDS * POINTS_OF_CLOUD, middle.size))
     points, heights = middle[None], likelihood.log_likelihood(from_coordinates(middle[None]))
     for offsets in np.split(design, CLOUDS):
         cloud = middle + offsets @ reach.T
