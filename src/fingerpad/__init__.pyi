@@ -14,11 +14,10 @@ from fingerpad.core.progress import notebook_progress as notebook_progress
 from fingerpad.core.regions import Ellipse as Ellipse
 from fingerpad.core.regions import Polygon as Polygon
 from fingerpad.core.regions import Rectangle as Rectangle
-from fingerpad.core.signals import CurrentTraces as CurrentTraces
 from fingerpad.core.signals import HitRates as HitRates
 from fingerpad.core.signals import ResponseMap as ResponseMap
-from fingerpad.core.signals import SedTraces as SedTraces
 from fingerpad.core.signals import SpikeTrains as SpikeTrains
+from fingerpad.core.signals import Traces as Traces
 from fingerpad.experiments.cluster import Cluster as Cluster
 from fingerpad.experiments.descriptions.touch import TouchDescription as TouchDescription
 from fingerpad.experiments.descriptions.touch import read_touch_description as read_touch_description

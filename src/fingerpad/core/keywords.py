@@ -110,9 +110,8 @@ class OtherName:
         self,
         meaning: str | Callable[..., Mapping[str, float]],
         read: Callable[[Any], float] | None = None,
-        unit: str = "mm",
     ):
-        self.meaning, self.read, self.unit = meaning, read, unit
+        self.meaning, self.read = meaning, read
 
     def __get__(self, instance: Any, owner: type | None = None) -> Any:
         """Value of an instance; this object from the class."""

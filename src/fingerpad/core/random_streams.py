@@ -9,6 +9,7 @@ four words of 64 bits, so any number of any stream is computed directly, without
 
 NumPy has the same generator with the same counter: its uniform numbers and `uniforms` agree to the last bit.
 The kernels of `neuron` and `psychophysics` compute the numbers of a key inside their loops (`core.philox`).
+Libraries that draw take a generator of NumPy: it is made here from a key, and nowhere else.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import IntEnum
+from typing import Any
 
 import numpy as np
 from numba import njit
@@ -33,6 +35,35 @@ MOST_NUMBERS = 100_000_000
 """Largest number of random numbers that are drawn at once: 0.8 GB."""
 
 """Seeds, trials and receptors fit into a signed 64-bit integer, as in NumPy."""
+
+
+Key = int | Sequence[int] | np.random.SeedSequence
+"""A seed, or a seed and numbers."""
+
+
+def generator(key: Key) -> np.random.Generator:
+    """Return the generator of NumPy (Philox) for a key."""
+    return np.random.Generator(np.random.Philox(key))
+
+
+def published_generator(seed: int) -> np.random.Generator:
+    """Return the generator (PCG64) that drew what is published: CMA-ES, sweeps and reduced touches."""
+    return np.random.default_rng(seed)
+
+
+def emcee_state(key: Key) -> Any:
+    """Return the state that emcee needs of a generator: it takes Mersenne Twisters only."""
+    return np.random.RandomState(np.random.MT19937(key)).get_state()
+
+
+def independent_keys(key: Key, count: int) -> list[np.random.SeedSequence]:
+    """Derive keys of independent streams."""
+    return (key if isinstance(key, np.random.SeedSequence) else np.random.SeedSequence(key)).spawn(count)
+
+
+def seed_of(seed: int, number: int) -> int:
+    """Return the seed of one of several parts, so that one more part leaves the others where they are."""
+    return int(np.random.SeedSequence([seed, number]).generate_state(1)[0])
 
 
 class Purpose(IntEnum):

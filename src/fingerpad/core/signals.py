@@ -1,12 +1,12 @@
 """Values passed between the stages of the model: frozen, read-only, checked on construction.
 
-Skin -> `SedTraces` -> `CurrentTraces` -> `SpikeTrains` -> `ResponseMap` -> `HitRates`.
-`SedTraces` is the only interface between the mechanical and the neural half of the package.
+Skin -> `Traces` -> `Traces` of a current -> `SpikeTrains` -> `ResponseMap` -> `HitRates`.
+`Traces` is the only interface between the mechanical and the neural half of the package.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, fields, replace
 from inspect import signature
 from typing import Any, Protocol
@@ -18,7 +18,7 @@ from fingerpad.core.checks import FloatArray, finite, float_array, increasing, i
 from fingerpad.core.displayed import Result
 from fingerpad.core.errors import InputError
 from fingerpad.core.phases import Phase, from_onset, ramp_and_hold_phases
-from fingerpad.core.units import MS_PER_S, with_unit
+from fingerpad.core.units import MS_PER_S, QUANTITY_UNITS, with_unit
 from fingerpad.core.values import converted
 
 MOST_SHOWN = 8
@@ -30,6 +30,12 @@ INTERVAL, COUNT = "interval", "count"
 STORED_ENERGY = "stored"
 """Name of the quantity that drives both terms of the current in the paper: strain energy density."""
 
+CURRENT, RELATIVE_CURRENT = "current", "relative_current"
+"""What charges a membrane: the current, or the current over that which just reaches the threshold."""
+
+CURRENTS = (CURRENT, RELATIVE_CURRENT)
+"""Quantities that may jump and may be negative."""
+
 
 class Skin(Protocol):
     """Any object that returns the strain energy density below points of its surface."""
@@ -39,7 +45,7 @@ class Skin(Protocol):
         sites: ArrayLike,
         dynamic_quantity: str = STORED_ENERGY,
         static_quantity: str = STORED_ENERGY,
-    ) -> SedTraces:
+    ) -> Traces:
         """Strain energy density over time below `sites` of the skin. [mm]
 
         Sites are x and z of end organs on the volar side (n_sites, 2), or x, y and z of the skin above them
@@ -54,38 +60,28 @@ def _freeze(signal: object, **arrays: np.ndarray) -> None:
         object.__setattr__(signal, name, array)
 
 
-def _traces(kind: str, name: str, times_ms: ArrayLike, values: ArrayLike) -> tuple[FloatArray, FloatArray]:
-    times = float_array("times_ms", times_ms, 1)
-    table = float_array(name, values, 2)
-    if table.shape[0] != times.size or times.size < 2:
-        raise InputError(
-            f"{kind} needs one row of {name} per time and at least two times: "
-            f"got {table.shape} for {times.size} times."
-        )
-    return times, table
-
-
 @dataclass(frozen=True)
 @converted
-class SedTraces(Result):
-    """Strain energy density at receptor sites and at given times.
+class Traces(Result):
+    """One quantity at receptor sites over time: of the skin, or the current that it drives.
 
     Parameters
     ----------
     times_ms : array (n_times,)
-        Strictly increasing. [ms]
-    sed_kpa : array (n_times, n_sites)
-        Strain energy density, or the quantity of the static term in its place; not negative.
-        [kPa = µJ/mm³, or the unit of that quantity in `fingerpad.core.units.QUANTITY_UNITS`]
+        In order. A current may jump: its time is repeated once, with the values before and after. The times
+        of any other quantity are strictly increasing. [ms]
+    values : array (n_times, n_sites)
+        Values of the quantity; not negative, except those of a current. [`unit`]
     kinks_ms : array (n_kinks,), optional
-        Those of `times_ms` at which the motion changes abruptly, as from ramp to hold: there the
-        rate of change of SED is discontinuous, and interpolation must not smooth it. [ms]
-    dynamic_kpa : array (n_times, n_sites), optional
-        Quantity that drives the dynamic term, if it is not that of the static term; not negative.
-        [its unit in `fingerpad.core.units.QUANTITY_UNITS`]
-    dynamic_quantity, static_quantity : str, optional
-        What each term follows, by the names of `SkinResponse.sample`: "stored" is SED, as in the paper; any
-        other is an extension of its model.
+        Those of `times_ms` at which the motion changes abruptly, as from ramp to hold: there the rate of
+        change is discontinuous, and interpolation must not smooth it. [ms]
+    quantity : str, optional
+        What the values are, a name in `fingerpad.core.units.QUANTITY_UNITS`: one of `SkinResponse.sample`,
+        "current", or "relative_current" (over that of the threshold). Default: "stored", strain energy
+        density (SED), which drives both terms of the current in the paper.
+    dynamic : Traces, optional
+        Another quantity at the same times and sites, if the dynamic term of an afferent follows another one
+        than the static term. Its kinks, phases and onset become those of these traces.
     phases : tuple of Phase, optional
         Named parts of the touch; by default one kink after the onset separates "ramp" and "hold", and there
         are none where there is not one.
@@ -96,145 +92,189 @@ class SedTraces(Result):
     Raises
     ------
     InputError
-        If shapes disagree, a value is not finite or negative, a kink is not among the times, or
-        `dynamic_kpa` is given although both terms follow one quantity, or is missing although they do not.
+        If the quantity is unknown, shapes disagree, a value is not finite or negative, a kink is not among
+        the times, or `dynamic` has other times or sites, the same quantity, or a dynamic term of its own.
 
     Examples
     --------
-    >>> SedTraces([0.0, 50.0, 1000.0], [[0.0], [2.0], [1.8]]).n_sites
-    1
+    >>> Traces([0.0, 50.0, 1000.0], [[0.0], [2.0], [1.8]])
+    Traces(3 times to 1000 ms, 1 sites, stored at most 2 kPa)
+
+    A current that drops from 2 to 1 µA after 50 ms:
+
+    >>> Traces([0.0, 50.0, 50.0, 1000.0], [[2e-3], [2e-3], [1e-3], [1e-3]], quantity="current").unit
+    'mA'
     """
 
     times_ms: FloatArray
-    sed_kpa: FloatArray
+    values: FloatArray
     kinks_ms: FloatArray = field(default_factory=lambda: np.empty(0))
-    dynamic_kpa: FloatArray | None = None
-    dynamic_quantity: str = STORED_ENERGY
-    static_quantity: str = STORED_ENERGY
+    quantity: str = STORED_ENERGY
+    dynamic: Traces | None = None
     phases: tuple[Phase, ...] = ()
     onset_ms: float = None  # type: ignore[assignment]  # a number after initialisation
 
     def __post_init__(self) -> None:
-        times, sed = _traces("SedTraces", "sed_kpa", self.times_ms, self.sed_kpa)
-        increasing("times_ms", times)
-        if sed.min(initial=0.0) < 0.0:
-            raise InputError(f"sed_kpa must not be negative: the smallest value is {sed.min():.3g} kPa.")
+        one_of("quantity", self.quantity, tuple(QUANTITY_UNITS))
+        times, values = float_array("times_ms", self.times_ms, 1), float_array("values", self.values, 2)
+        if values.shape[0] != times.size or times.size < 2:
+            raise InputError(
+                "Traces needs one row of values per time and at least two times: "
+                f"got {values.shape} for {times.size} times."
+            )
+        if self.quantity in CURRENTS:
+            if (np.diff(times) < 0.0).any() or (times[2:] == times[:-2]).any():
+                raise InputError(
+                    f"times_ms must not decrease, nor repeat more than once: got {times[:4]} ..."
+                )
+        else:
+            increasing("times_ms", times)
+            if values.min(initial=0.0) < 0.0:
+                smallest = with_unit(f"{values.min():.3g}", self.quantity, " {}")
+                raise InputError(f"values must not be negative: the smallest is {smallest}.")
         kinks = increasing("kinks_ms", float_array("kinks_ms", self.kinks_ms, 1))
         if not np.isin(kinks, times).all():
             raise InputError(f"kinks_ms must be among times_ms: got {kinks[~np.isin(kinks, times)]}.")
-        _freeze(self, times_ms=times, sed_kpa=sed, kinks_ms=kinks)
-        if (self.dynamic_kpa is None) != (self.dynamic_quantity == self.static_quantity):
-            raise InputError(
-                "dynamic_kpa is needed if dynamic_quantity is not static_quantity, and only then: got "
-                f"{self.dynamic_quantity!r} and {self.static_quantity!r} "
-                f"{'without' if self.dynamic_kpa is None else 'with'} it."
-            )
-        if self.dynamic_kpa is not None:
-            _, dynamic = _traces("SedTraces", "dynamic_kpa", times, self.dynamic_kpa)
-            if dynamic.shape != sed.shape or dynamic.min(initial=0.0) < 0.0:
-                raise InputError(
-                    "dynamic_kpa must match sed_kpa and must not be negative: got shape "
-                    f"{dynamic.shape} for {sed.shape} and a smallest value of {dynamic.min():.3g}."
-                )
-            _freeze(self, dynamic_kpa=dynamic)
+        _freeze(self, times_ms=times, values=values, kinks_ms=kinks)
+        if self.dynamic is not None:
+            self._check_dynamic(self.dynamic)
         onset = self._first_touch_ms() if self.onset_ms is None else float(self.onset_ms)
         object.__setattr__(self, "onset_ms", onset)
         phases, later = self.phases, kinks[kinks > onset]
         if not phases and later.size == 1 and onset >= 0.0 and later[0] < times[-1]:
             phases = ramp_and_hold_phases(float(later[0]), float(times[-1]), onset)
         object.__setattr__(self, "phases", from_onset(phases, onset))
+        if self.dynamic is not None:
+            dynamic = replace(self.dynamic, kinks_ms=kinks, phases=self.phases, onset_ms=onset)
+            object.__setattr__(self, "dynamic", dynamic)
+
+    def _check_dynamic(self, dynamic: Traces) -> None:
+        if dynamic.quantity == self.quantity or dynamic.dynamic is not None:
+            raise InputError(
+                f"dynamic must hold another quantity than {self.quantity!r}, and one only: got "
+                f"{dynamic.quantity!r}; leave it out where both terms follow one quantity."
+            )
+        if dynamic.values.shape != self.values.shape or (dynamic.times_ms != self.times_ms).any():
+            raise InputError(
+                "dynamic must have the times and sites of the static term: got values of shape "
+                f"{dynamic.values.shape} to {dynamic.times_ms[-1]:g} ms for {self.values.shape} to "
+                f"{self.times_ms[-1]:g} ms."
+            )
 
     def _first_touch_ms(self) -> float:
         """Last time until which all values are 0; the first time if there is none, or nothing is touched."""
-        touched = self.sed_kpa.any(axis=1)
-        if self.dynamic_kpa is not None:
-            touched |= self.dynamic_kpa.any(axis=1)
+        touched = self.values.any(axis=1)
+        if self.dynamic is not None:
+            touched |= self.dynamic.values.any(axis=1)
         return float(self.times_ms[max(int(touched.argmax()) - 1, 0)])
 
     @classmethod
-    def joined(cls, traces: Sequence[SedTraces]) -> SedTraces:
+    def joined(cls, traces: Sequence[Traces]) -> Traces:
         """Traces of several stimuli with the same times and quantities, one after the other as columns.
 
         Examples
         --------
-        >>> halves = [SedTraces([0.0, 50.0], [[0.0], [height]]) for height in (1.0, 2.0)]
-        >>> SedTraces.joined(halves).sed_kpa.tolist()
+        >>> halves = [Traces([0.0, 50.0], [[0.0], [height]]) for height in (1.0, 2.0)]
+        >>> Traces.joined(halves).values.tolist()
         [[0.0, 0.0], [1.0, 2.0]]
         """
-        dynamic = [trace.dynamic_kpa for trace in traces if trace.dynamic_kpa is not None]
+        dynamic = [trace.dynamic for trace in traces if trace.dynamic is not None]
         return replace(
             traces[0],
-            sed_kpa=np.hstack([trace.sed_kpa for trace in traces]),
-            dynamic_kpa=np.hstack(dynamic) if dynamic else None,
+            values=np.hstack([trace.values for trace in traces]),
+            dynamic=cls.joined(dynamic) if dynamic else None,
         )
 
     @classmethod
     def at_rest(
         cls, end_ms: float, dynamic_quantity: str = STORED_ENERGY, static_quantity: str = STORED_ENERGY
-    ) -> SedTraces:
+    ) -> Traces:
         """Traces of one site that is not touched: 0 from the start to `end_ms`.
 
         Examples
         --------
-        >>> SedTraces.at_rest(1000.0).sed_kpa.tolist()
+        >>> Traces.at_rest(1000.0).values.tolist()
         [[0.0], [0.0]]
         """
-        nothing = np.zeros((2, 1))
-        return cls(
-            np.array([0.0, end_ms]),
-            nothing,
-            dynamic_kpa=None if dynamic_quantity == static_quantity else nothing,
-            dynamic_quantity=dynamic_quantity,
-            static_quantity=static_quantity,
-        )
+        times, nothing = np.array([0.0, end_ms]), np.zeros((2, 1))
+        dynamic = None
+        if dynamic_quantity != static_quantity:
+            dynamic = cls(times, nothing, quantity=dynamic_quantity)
+        return cls(times, nothing, quantity=static_quantity, dynamic=dynamic)
 
     def __repr__(self) -> str:
-        highest = self.sed_kpa.max(initial=0.0)
+        highest = f"{self.quantity} at most {self.values.max(initial=0.0):.3g}"
         return (
-            f"SedTraces({self.times_ms.size} times to {self.times_ms[-1]:g} ms, {self.n_sites} sites, "
-            + with_unit(f"{self.static_quantity} at most {highest:.3g}", self.static_quantity, " {}")
+            f"Traces({self.times_ms.size} times to {self.times_ms[-1]:g} ms, {self.n_sites} sites, "
+            + with_unit(highest, self.quantity, " {}")
             + ")"
         )
 
     @property
+    def unit(self) -> str:
+        """Unit of the values; empty for a strain and for a relative current."""
+        return QUANTITY_UNITS[self.quantity]
+
+    @property
     def n_sites(self) -> int:
         """Number of receptor sites."""
-        return self.sed_kpa.shape[1]
+        return self.values.shape[1]
 
-    def part(self, sites: slice) -> SedTraces:
+    @property
+    def dynamic_term(self) -> Traces:
+        """What the dynamic term follows: `dynamic`, or these traces where there is none."""
+        return self if self.dynamic is None else self.dynamic
+
+    @property
+    def dynamic_quantity(self) -> str:
+        """Quantity of the dynamic term."""
+        return self.dynamic_term.quantity
+
+    @property
+    def static_quantity(self) -> str:
+        """Quantity of the static term."""
+        return self.quantity
+
+    def with_values(self, change: Callable[[FloatArray], FloatArray]) -> Traces:
+        """Traces whose values, those of both terms, are changed by a function.
+
+        Examples
+        --------
+        >>> Traces([0.0, 50.0], [[0.0], [2.0]]).with_values(lambda values: 3.0 * values).values.tolist()
+        [[0.0], [6.0]]
+        """
+        dynamic = None if self.dynamic is None else self.dynamic.with_values(change)
+        return replace(self, values=change(self.values), dynamic=dynamic)
+
+    def part(self, sites: slice) -> Traces:
         """Traces of some of the sites."""
-        if sites == slice(0, self.n_sites):
-            return self
-        dynamic = None if self.dynamic_kpa is None else self.dynamic_kpa[:, sites]
-        return replace(self, sed_kpa=self.sed_kpa[:, sites], dynamic_kpa=dynamic)
+        return self if sites == slice(0, self.n_sites) else self.with_values(lambda values: values[:, sites])
 
-    def selected(self, sites: np.ndarray) -> SedTraces:
+    def selected(self, sites: np.ndarray) -> Traces:
         """Traces of the sites where a mask (n_sites,) is true.
 
         Examples
         --------
-        >>> SedTraces([0.0, 50.0], [[0.0, 0.0], [2.0, 3.0]]).selected(np.array([False, True])).n_sites
+        >>> Traces([0.0, 50.0], [[0.0, 0.0], [2.0, 3.0]]).selected(np.array([False, True])).n_sites
         1
         """
-        dynamic = None if self.dynamic_kpa is None else self.dynamic_kpa[:, sites]
-        return replace(self, sed_kpa=self.sed_kpa[:, sites], dynamic_kpa=dynamic)
+        return self.with_values(lambda values: values[:, sites])
 
-    def scaled(self, factors: ArrayLike) -> SedTraces:
+    def scaled(self, factors: ArrayLike) -> Traces:
         """Traces with each site's values multiplied by a factor of its own, (n_sites,), not negative.
 
         Examples
         --------
-        >>> SedTraces([0.0, 50.0], [[0.0, 0.0], [2.0, 2.0]]).scaled([1.0, 1.5]).sed_kpa[-1].tolist()
+        >>> Traces([0.0, 50.0], [[0.0, 0.0], [2.0, 2.0]]).scaled([1.0, 1.5]).values[-1].tolist()
         [2.0, 3.0]
         """
         each = float_array("factors", factors, 1)
         if each.size != self.n_sites:
             raise InputError(f"factors needs one number per site: got {each.size} for {self.n_sites}.")
-        dynamic = None if self.dynamic_kpa is None else self.dynamic_kpa * each
-        return replace(self, sed_kpa=self.sed_kpa * each, dynamic_kpa=dynamic)
+        return self.with_values(lambda values: values * each)
 
 
-def traces_below(skin: Skin, sites: ArrayLike, dynamic_quantity: str, static_quantity: str) -> SedTraces:
+def traces_below(skin: Skin, sites: ArrayLike, dynamic_quantity: str, static_quantity: str) -> Traces:
     """Traces of two quantities below sites of a skin."""
     if not callable(getattr(skin, "sed", None)):
         raise InputError(
@@ -260,55 +300,6 @@ def window_bounds(window_ms: Sequence[float]) -> tuple[float, float]:
     if len(bounds) != 2 or bounds[1] <= bounds[0]:
         raise InputError(f"window_ms must be a start and a later end: got {window_ms!r}.")
     return bounds[0], bounds[1]
-
-
-@dataclass(frozen=True)
-@converted
-class CurrentTraces(Result):
-    """Membrane current at receptor sites, piecewise linear between its times.
-
-    A repeated time is a discontinuity: its first row is the current just before, its second just after.
-
-    Parameters
-    ----------
-    times_ms : array (n_times,)
-        Knots, in order; a time may be repeated once. [ms]
-    current_ma : array (n_times, n_sites)
-        Current at the knots. [mA]
-
-    Examples
-    --------
-    A current that drops from 2 to 1 µA after 50 ms:
-
-    >>> CurrentTraces([0.0, 50.0, 50.0, 1000.0], [[2e-3], [2e-3], [1e-3], [1e-3]]).n_sites
-    1
-    """
-
-    times_ms: FloatArray
-    current_ma: FloatArray
-
-    def __post_init__(self) -> None:
-        times, current = _traces("CurrentTraces", "current_ma", self.times_ms, self.current_ma)
-        if (np.diff(times) < 0.0).any() or (times[2:] == times[:-2]).any():
-            raise InputError(f"times_ms must not decrease, nor repeat more than once: got {times[:4]} ...")
-        _freeze(self, times_ms=times, current_ma=current)
-
-    def __repr__(self) -> str:
-        return (
-            f"CurrentTraces({self.times_ms.size} times to {self.times_ms[-1]:g} ms, {self.n_sites} sites, "
-            f"at most {self.current_ma.max(initial=0.0):.3g} mA)"
-        )
-
-    @property
-    def n_sites(self) -> int:
-        """Number of receptor sites."""
-        return self.current_ma.shape[1]
-
-    def part(self, sites: slice) -> CurrentTraces:
-        """Currents of some of the sites."""
-        if sites == slice(0, self.n_sites):
-            return self
-        return CurrentTraces(self.times_ms, self.current_ma[:, sites])
 
 
 @dataclass(frozen=True)

@@ -17,24 +17,10 @@ from numpy.typing import ArrayLike
 
 from fingerpad.core.checks import finite, float_array, instance
 from fingerpad.core.errors import InputError, shown
+from fingerpad.core.units import unit_of
 
 _Kind = TypeVar("_Kind")
 _Convert = Callable[[str, Any], Any]
-
-_UNITS = {
-    "_per_m": "1/m",
-    "_mm2": "mm2",
-    "_mm": "mm",
-    "_ms": "ms",
-    "_mn": "mN",
-    "_kpa": "kPa",
-    "_deg": "degrees",
-    "_hz": "Hz",
-    "_ma": "mA",
-    "_mv": "mV",
-    "_mf": "mF",
-}
-"""Units by the end of a field's name."""
 
 _LARGEST_MM = 1e9
 """Largest length, a thousand kilometres. [mm]"""
@@ -196,5 +182,4 @@ def _within(name: str, value: float) -> float:
 
 @lru_cache(maxsize=1024)
 def _unit(name: str) -> str:
-    field = name.partition("[")[0]
-    return next((unit for end, unit in _UNITS.items() if field.endswith(end)), "")
+    return unit_of(name.partition("[")[0])

@@ -7,8 +7,9 @@ from functools import lru_cache
 
 from fingerpad.core.checks import number_in, one_of
 from fingerpad.core.errors import InputError
+from fingerpad.core.units import unit_of
 from fingerpad.geometry.indenters import Indenter
-from fingerpad.geometry.names import INDENTERS, SIZE_UNITS
+from fingerpad.geometry.names import INDENTERS
 
 
 @lru_cache(maxsize=1024)
@@ -29,4 +30,4 @@ def indenter_named(text: str) -> Indenter:
         if size in written:
             raise InputError(f"indenter must have {size} once: got {text!r}.")
         written[size] = value
-    return body(**{size: number_in(size, value, SIZE_UNITS.get(size, "")) for size, value in written.items()})
+    return body(**{size: number_in(size, value, unit_of(size)) for size, value in written.items()})

@@ -32,15 +32,15 @@ from fingerpad.experiments.descriptions.stimuli import (
 )
 from fingerpad.experiments.descriptions.stimulus import PlaceSettings
 from fingerpad.geometry.indenters import Bar
-from fingerpad.geometry.motion import MOTION_UNITS, Motion, RampAndHold
-from fingerpad.geometry.names import SIZE_UNITS
+from fingerpad.geometry.motion import PLAUSIBLE, Motion, RampAndHold
+from fingerpad.geometry.names import SIZES
 from fingerpad.skin.indentation import Touch
 
 COLUMNS = (
     "name",
     "object",
-    *(f"object.{size}" for size in SIZE_UNITS),
-    *(f"motion.{number}" for number in MOTION_UNITS),
+    *(f"object.{size}" for size in SIZES),
+    *(f"motion.{number}" for number in PLAUSIBLE),
     *(f"place.{name}" for name in PlaceSettings.model_fields),
     "friction",
 )

@@ -58,13 +58,11 @@ _PLACES = {
     Place.WATCHED: ("sheet",),
 }
 _COMPONENTS: dict[int, tuple[str, ...]] = {1: (), 3: ("axis",), 6: ("component",)}
-_UDUNITS = {"": "1", "mm²": "mm2", "µJ": "uJ"}
-_ENDINGS = (
-    ("_per_cm2", "cm-2"), ("_per_m", "m-1"), ("_mm_per_s", "mm s-1"), ("_mm2", "mm2"), ("_mm", "mm"),
-    ("_ms", "ms"), ("_mn", "mN"), ("_deg", "degree"), ("_hz", "s-1"), ("_kpa", "kPa"), ("_mv", "mV"),
-    ("_ma", "mA"), ("_uj", "uJ"),
-)  # fmt: skip
-"""Units by the end of a name."""
+_UDUNITS = {
+    "": "1", "mm²": "mm2", "mm³": "mm3", "µJ": "uJ", "degrees": "degree", "spikes/s": "s-1", "Hz": "s-1",
+    "1/m": "m-1", "1/mm": "mm-1", "1/cm²": "cm-2", "mm/s": "mm s-1",
+}  # fmt: skip
+"""Units that UDUNITS spells otherwise."""
 
 Attributes = dict[str, str | float | list[float] | np.ndarray]
 """Attributes of a variable or of the whole data set."""
@@ -319,7 +317,7 @@ def _fields(
             place = ("element",) if field.place is Place.WATCHED else place
             values = values if len(values) == n_times else values[-1]
         assert values is not None
-        attributes: Attributes = {"long_name": field.long_name, "units": unit_of(field)}
+        attributes: Attributes = {"long_name": field.long_name, "units": udunits(field.unit)}
         dims = (*place, *_COMPONENTS[field.components])
         if values.ndim > len(dims):
             dims = ("time", *dims)
@@ -506,7 +504,7 @@ def _check_variable(where: str, name: Hashable, values: xarray.Variable, data: x
     field = FIELDS.get("times_ms" if name == "time" else str(name))
     part = PARTS.get(str(name))
     if field is not None:
-        unit, holes = unit_of(field), False
+        unit, holes = udunits(field.unit), False
         ends = (*_PLACES[field.place], *_COMPONENTS[field.components])
         allowed = {ends, ("time", *ends)}
         if field.place is Place.WATCHED:
@@ -530,14 +528,9 @@ def _check_variable(where: str, name: Hashable, values: xarray.Variable, data: x
             raise InputError(f"{where} must hold whole numbers from 0 to {count - 1}: some are not.")
 
 
-def unit_of(field: Field) -> str:
-    """Return the unit of a field as UDUNITS reads it."""
-    return _UDUNITS.get(field.unit, field.unit)
-
-
-def unit_of_name(name: str) -> str:
-    """Return the unit that the name of a value ends with, as UDUNITS reads it; "1" without one."""
-    return next((unit for ending, unit in _ENDINGS if name.endswith(ending)), "1")
+def udunits(unit: str) -> str:
+    """Return a unit as UDUNITS reads it."""
+    return _UDUNITS.get(unit, unit)
 
 
 def field_dimensions(field: Field) -> tuple[str, ...]:

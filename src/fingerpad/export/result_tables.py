@@ -12,10 +12,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from fingerpad.core.displayed import Result
-from fingerpad.core.signals import CurrentTraces, HitRates, ResponseMap, SedTraces, SpikeTrains
-from fingerpad.core.units import QUANTITY_UNITS
-from fingerpad.export.dataset import library, part_variable, response_values, touch_dataset, unit_of_name
-from fingerpad.inference.identifiable import SPIKE_PARAMETER_UNITS
+from fingerpad.core.signals import HitRates, ResponseMap, SpikeTrains, Traces
+from fingerpad.core.units import QUANTITY_UNITS, unit_of, units_of
+from fingerpad.export.dataset import library, part_variable, response_values, touch_dataset, udunits
 from fingerpad.skin.fields import Place, stored_fields
 
 if TYPE_CHECKING:
@@ -45,14 +44,9 @@ def profile_columns(profile: SurfaceProfile) -> Columns:
     return {"distance_mm": profile.distance_mm, "deflection_mm": profile.deflection_mm}
 
 
-def traces_columns(traces: SedTraces) -> Columns:
-    """Return what the static term follows, a column per site, by time."""
-    return {"time_ms": traces.times_ms} | dict(enumerate(traces.sed_kpa.T))
-
-
-def current_columns(traces: CurrentTraces) -> Columns:
-    """Currents, a column per site, by time; a time is repeated where the current jumps. [mA]"""
-    return {"time_ms": traces.times_ms} | dict(enumerate(traces.current_ma.T))
+def traces_columns(traces: Traces) -> Columns:
+    """Values, a column per site, by time; a time is repeated where a current jumps."""
+    return {"time_ms": traces.times_ms} | dict(enumerate(traces.values.T))
 
 
 def spike_columns(trains: SpikeTrains) -> Columns:
@@ -127,7 +121,7 @@ def spike_fit_columns(fit: SpikeFit) -> Columns:
         "parameter": fit.names,
         "value": fit.parameters,
         "standard_error": fit.standard_errors,
-        "unit": SPIKE_PARAMETER_UNITS,
+        "unit": list(units_of(fit.names).values()),
     }
 
 
@@ -150,7 +144,7 @@ def task_columns(task: TaskResult) -> Columns:
 
 
 def sample_columns(sample: ReducedSample) -> Columns:
-    """Each quantity, and the error within which that of a full solution lies, by receptor. [kPa]"""
+    """Each quantity, and the error within which that of a full solution lies, by receptor."""
     n_receptors = len(next(iter(sample.fields.values())))
     errors = {f"{name}_error": np.full(n_receptors, error) for name, error in sample.field_errors.items()}
     return {"receptor": np.arange(n_receptors), **sample.fields, **errors}
@@ -159,8 +153,7 @@ def sample_columns(sample: ReducedSample) -> Columns:
 TABLES: Mapping[str, Callable[[Any], Columns]] = {
     "SkinResponse": skin_columns,
     "SurfaceProfile": profile_columns,
-    "SedTraces": traces_columns,
-    "CurrentTraces": current_columns,
+    "Traces": traces_columns,
     "SpikeTrains": spike_columns,
     "ResponseMap": response_columns,
     "MixedResponse": mixed_columns,
@@ -181,25 +174,13 @@ def table(result: Result) -> pandas.DataFrame:
     return made.set_index(next(iter(columns)))
 
 
-def traces_dataset(traces: SedTraces) -> xarray.Dataset:
-    """Return what the two terms of the current follow, by time and site."""
-    values = {traces.static_quantity: traces.sed_kpa}
-    if traces.dynamic_kpa is not None:
-        values[traces.dynamic_quantity] = traces.dynamic_kpa
-    units = {name: QUANTITY_UNITS.get(name) or "1" for name in values}
-    return _by_time_and_site(traces.times_ms, values, units)
-
-
-def current_dataset(traces: CurrentTraces) -> xarray.Dataset:
-    """Currents by time and site; a time is repeated where the current jumps."""
-    return _by_time_and_site(traces.times_ms, {"current_ma": traces.current_ma}, {"current_ma": "mA"})
-
-
-def _by_time_and_site(
-    times_ms: np.ndarray, values: Mapping[str, np.ndarray], units: Mapping[str, str]
-) -> xarray.Dataset:
-    variables = {name: (("time", "site"), each, {"units": units[name]}) for name, each in values.items()}
-    coordinates = {"time": ("time", times_ms, {"units": "ms"})}
+def traces_dataset(traces: Traces) -> xarray.Dataset:
+    """Return each quantity by time and site; a time is repeated where a current jumps."""
+    variables = {
+        each.quantity: (("time", "site"), each.values, {"units": udunits(each.unit)})
+        for each in (traces, traces.dynamic_term)
+    }
+    coordinates = {"time": ("time", traces.times_ms, {"units": "ms"})}
     made: xarray.Dataset = library("xarray").Dataset(variables, coordinates)
     return made
 
@@ -214,8 +195,7 @@ def response_dataset(response: ResponseMap) -> xarray.Dataset:
 
 DATASETS: Mapping[str, Callable[[Any], xarray.Dataset]] = {
     "SkinResponse": touch_dataset,
-    "SedTraces": traces_dataset,
-    "CurrentTraces": current_dataset,
+    "Traces": traces_dataset,
     "ResponseMap": response_dataset,
 }
 """Data sets with more dimensions than a table, by the name of a result's class."""
@@ -234,5 +214,6 @@ def dataset(result: Result) -> xarray.Dataset:
     made: xarray.Dataset = rows.rename_axis("row").to_xarray().drop_vars("row")
     for name, values in made.data_vars.items():
         if values.dtype.kind in "fiu":
-            values.attrs["units"] = unit_of_name(str(name))
+            quantity = str(name).removesuffix("_error")
+            values.attrs["units"] = udunits(QUANTITY_UNITS.get(quantity) or unit_of(str(name)))
     return made

@@ -28,6 +28,7 @@ from fingerpad.core.errors import InputError, StoreError, shown
 from fingerpad.core.files import path_of
 from fingerpad.core.keywords import known_keywords
 from fingerpad.core.signals import SpikeTrains
+from fingerpad.core.units import unit_of
 from fingerpad.experiments.descriptions.values import Content
 from fingerpad.experiments.sweep.description import OBSERVER, Sweep, sweep_of
 from fingerpad.experiments.sweep.observers import MEASURED, observe
@@ -38,8 +39,7 @@ from fingerpad.export.dataset import (
     first_line,
     library,
     response_values,
-    unit_of,
-    unit_of_name,
+    udunits,
 )
 from fingerpad.skin.fields import FIELDS, Place
 
@@ -81,7 +81,7 @@ def variables(fields: Sequence[str] = ()) -> dict[str, Variable]:
         field = FIELDS[name]
         dtype = "f8" if field.place is Place.PRESS else "f4"
         found[_NAMES.get(name, name)] = Variable(
-            field_dimensions(field), unit_of(field), field.long_name, True, dtype
+            field_dimensions(field), udunits(field.unit), field.long_name, True, dtype
         )
         if field.place in PLACES_MM:
             of = PLACES_MM[field.place][0]
@@ -129,7 +129,7 @@ class SweepFile:
                     shape=(len(values),),
                     dtype=str if text else "f8",
                     dimension_names=[axis.name],
-                    attributes={"long_name": field, "units": "1" if text else unit_of_name(field)},
+                    attributes={"long_name": field, "units": "1" if text else udunits(unit_of(field))},
                 )
                 array[:] = np.array(spelled, dtype=object) if text else np.array(values, dtype=float)
         flags = {"flag_values": [PENDING, DONE, FAILED, LEFT_OUT], "flag_meanings": MEANINGS}

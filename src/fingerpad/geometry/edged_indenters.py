@@ -225,7 +225,7 @@ class Grating(Indenter):
     lip_mm: float = protocol.LIP_RADIUS.value
     edge_radius_mm = OtherName("lip_mm")
     period_mm = OtherName(_of_period, lambda body: body.ridge_mm + body.groove_mm)
-    duty = OtherName(_of_period, lambda body: body.ridge_mm / body.period_mm, unit="")
+    duty = OtherName(_of_period, lambda body: body.ridge_mm / body.period_mm)
 
     if TYPE_CHECKING:
 

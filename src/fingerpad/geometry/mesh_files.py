@@ -61,7 +61,7 @@ def read_finger(
     ----------
     path : str or Path
         The file.
-    unit : {"mm", "cm", "m", "um"}
+    unit : {"mm", "um", "cm", "m", "inch"}
         Unit of its coordinates.
     axes : str
         Axes of the file that point to the tip, to the nail and to the side, such as "z y -x".

@@ -17,6 +17,7 @@ from scipy.spatial import cKDTree
 
 from fingerpad.core.checks import FloatArray, IntArray, instance, one_of, pair, positive
 from fingerpad.core.errors import InputError
+from fingerpad.core.units import LENGTHS_MM
 from fingerpad.data import fingertip as published
 from fingerpad.geometry.fingertip import SIZES_MM
 from fingerpad.geometry.free_mesh import FACES, FingerMesh, FreeMesh
@@ -27,8 +28,6 @@ from fingerpad.geometry.mesh_quality import element_place, jacobian_at_gauss
 SKIN, BONE, NAIL, FIXED, SYMMETRY = "skin", "bone", "nail", "fixed", "symmetry"
 SETS = (SKIN, BONE, NAIL, FIXED, SYMMETRY, *LAYERS)
 """Names of sets; a file may write them with other capitals, and with _ or - for a space."""
-
-UNITS_MM = {"mm": 1.0, "cm": 10.0, "m": 1000.0, "um": 1e-3}
 
 _SAME_PLACE = 1e-7
 """Distance of two nodes that lie at the same place, over the size of the mesh."""
@@ -143,7 +142,7 @@ class _Making:
 
     def nodes(self, used: IntArray, unit: str, axes: str) -> FloatArray:
         """Nodes of elements in our axes and unit."""
-        factor = UNITS_MM[one_of("unit", unit, tuple(UNITS_MM))]
+        factor = LENGTHS_MM[one_of("unit", unit, tuple(LENGTHS_MM))]
         signs = {
             f"{sign}{axis}": (n, -1.0 if sign else 1.0) for n, axis in enumerate("xyz") for sign in ("", "-")
         }

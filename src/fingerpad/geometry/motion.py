@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike
 from fingerpad.core.checks import FloatArray, not_negative, plausible, positive, whole
 from fingerpad.core.keywords import KnownKeywords
 from fingerpad.core.phases import Phase, ramp_and_hold_phases
+from fingerpad.core.units import unit_of
 from fingerpad.core.values import converted
 from fingerpad.data import protocol
 
@@ -20,8 +21,6 @@ LONGEST_MS = 1e13
 PLAUSIBLE = {"depth_mm": (1e-3, 20.0), "force_mn": (1.0, 1e5), "ramp_ms": (1e-6, LONGEST_MS)}
 PLAUSIBLE["hold_ms"] = PLAUSIBLE["ramp_ms"]
 """Smallest and largest peaks and times of a touch: an afferent answers to 1 mN, and pads are 10 mm thick."""
-
-MOTION_UNITS = {"depth_mm": "mm", "force_mn": "mN", "ramp_ms": "ms", "hold_ms": "ms"}
 
 
 @dataclass(frozen=True)
@@ -167,9 +166,9 @@ class _OneRamp(Motion):
     hold_ms: float
 
     def __post_init__(self) -> None:
-        for name, unit in MOTION_UNITS.items():
+        for name, between in PLAUSIBLE.items():
             if hasattr(self, name):
-                plausible(name, getattr(self, name), unit, PLAUSIBLE[name])
+                plausible(name, getattr(self, name), unit_of(name), between)
 
     @property
     def end_ms(self) -> float:

@@ -1,4 +1,4 @@
-"""Names and units by which files refer to indenters and their sizes."""
+"""Names by which files refer to indenters and their sizes."""
 
 from __future__ import annotations
 
@@ -25,14 +25,11 @@ _FIELDS = {
     for name, kind in INDENTERS.items()
 }
 
-SIZE_UNITS = (
-    dict.fromkeys((size for sizes in _FIELDS.values() for size in sizes), "mm")
-    | {"curvature_per_m": "1/m"}
-    | {name: other.unit for kind in INDENTERS.values() for name, other in other_names(kind).items()}
-)
-"""Units of the sizes of indenters, other names of sizes included."""
-
 
 def sizes_of(indenter: str) -> tuple[str, ...]:
     """Sizes that an indenter has: fields of its class, then other names."""
     return tuple(dict.fromkeys([*_FIELDS[indenter], *other_names(INDENTERS[indenter])]))
+
+
+SIZES = tuple(dict.fromkeys(size for name in INDENTERS for size in sizes_of(name)))
+"""Sizes of all indenters, other names of sizes included."""

@@ -11,6 +11,7 @@ from fingerpad.core.checks import FloatArray, IntArray, float_array, one_of, pos
 from fingerpad.core.errors import InputError
 from fingerpad.core.files import LARGEST_TEXT_MB, check_file, path_of
 from fingerpad.core.keywords import known_keywords
+from fingerpad.core.units import LENGTHS_MM
 from fingerpad.geometry.surface import (
     LARGEST_MM,
     MOST_HEIGHTS,
@@ -21,8 +22,6 @@ from fingerpad.geometry.surface import (
     height_surface,
 )
 from fingerpad.geometry.triangle_files import read_triangles
-
-UNITS_MM = {"mm": 1.0, "um": 1e-3, "cm": 10.0, "m": 1000.0, "inch": 25.4}
 
 MESHES = (".stl", ".obj", ".ply")
 IMAGES = (".png", ".tif", ".tiff")
@@ -73,7 +72,7 @@ def read_surface(
         Hollow creases between triangles of a smaller angle are rounded; see `Surface`. [degrees]
     """
     file = path_of("path", path)
-    factor = UNITS_MM[one_of("unit", unit, tuple(UNITS_MM))] * positive("scale", scale)
+    factor = LENGTHS_MM[one_of("unit", unit, tuple(LENGTHS_MM))] * positive("scale", scale)
     number, sign = _AXES[one_of("up", up, tuple(_AXES))]
     at = float_array("at_mm", at_mm, 1)
     if at.shape != (2,):

@@ -12,9 +12,10 @@ from numpy.typing import ArrayLike, NDArray
 from fingerpad.core.checks import FloatArray, float_array, increasing, plausible
 from fingerpad.core.errors import InputError
 from fingerpad.core.phases import HOLD, RAMP, RELEASE, VIBRATION, Phase
+from fingerpad.core.units import unit_of
 from fingerpad.core.values import converted
 from fingerpad.data import protocol
-from fingerpad.geometry.motion import MOTION_UNITS, PLAUSIBLE, STILL, Cycles, Motion, Pose, hold_ends_ms
+from fingerpad.geometry.motion import PLAUSIBLE, STILL, Cycles, Motion, Pose, hold_ends_ms
 
 POSE_COLUMNS = ("x_mm", "z_mm", "tilt_deg", "spin_deg")
 """Columns of a trajectory that say where the indenter stands, beside its depth or force."""
@@ -167,7 +168,7 @@ class Trajectory(Motion):
         if values.max() <= 0.0 and not aside:
             raise InputError(f"{name} must be above 0 at some time: the indenter would never press.")
         if values.max() > 0.0 and not aside:
-            plausible(f"the largest {name}", values.max(), MOTION_UNITS[name], PLAUSIBLE[name])
+            plausible(f"the largest {name}", values.max(), unit_of(name), PLAUSIBLE[name])
         object.__setattr__(self, "times_ms", tuple(times.tolist()))
         object.__setattr__(self, "phases", tuple(self.phases) or self._phases_of_course())
         for phase in self.phases:
@@ -303,10 +304,10 @@ class Trajectory(Motion):
         return goes_on
 
     def __repr__(self) -> str:
-        what, unit = ("force_mn", "mN") if self.by_force else ("depth_mm", "mm")
+        what = "force_mn" if self.by_force else "depth_mm"
         return (
             f"Trajectory({len(self.times_ms)} samples to {self.end_ms:g} ms, {what} at most "
-            f"{max(self.prescribed):.4g} {unit}, {', '.join(phase.name for phase in self.phases)})"
+            f"{max(self.prescribed):.4g} {unit_of(what)}, {', '.join(phase.name for phase in self.phases)})"
         )
 
     @property

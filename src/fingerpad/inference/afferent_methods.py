@@ -69,11 +69,10 @@ def five_number_problem(model: RateModel, recordings: RateRecordings) -> RatePro
 
 def bounds_of(*drives: Drive) -> Bounds:
     """Bounds of the four numbers of a fit: those of `LOWEST`, `HIGHEST` and `SCALES`."""
-    rate, sed = (
-        max(float(getattr(driven, name).max()) for driven in drives)
-        for name in ("rate_kpa_per_ms", "sed_kpa")
+    rate, value = (
+        max(float(getattr(driven, name).max()) for driven in drives) for name in ("rate_per_ms", "values")
     )
-    strongest = np.array([1.0, rate, sed, 1.0])
+    strongest = np.array([1.0, rate, value, 1.0])
     return Bounds(*(np.array(terms) / strongest for terms in (SCALES, LOWEST, HIGHEST)))
 
 

@@ -16,6 +16,7 @@ from numpy.typing import ArrayLike
 
 from fingerpad.core.checks import FloatArray, finite, positive
 from fingerpad.core.errors import InputError
+from fingerpad.core.random_streams import generator
 from fingerpad.core.values import converted
 from fingerpad.data import neuron
 from fingerpad.inference.fitting.posterior import Chains, LogDensity, sample
@@ -163,9 +164,10 @@ def afferent_posterior(
             **settings,
         )
     )
-    random = np.random.Generator(np.random.Philox([seed, 1]))
     some = from_coordinates(chains.spread_out(N_PREDICTED))
-    return AfferentPosterior(chains, from_coordinates(chains.flat), likelihood.residual_draws(some, random))
+    return AfferentPosterior(
+        chains, from_coordinates(chains.flat), likelihood.residual_draws(some, generator([seed, 1]))
+    )
 
 
 def _unconstrained(coordinates: FloatArray) -> FloatArray:

@@ -101,13 +101,13 @@ class ClosedFormModel:
         intercept, dynamic_gain, static_gain, tau = parameters
         mean, slopes = np.empty(self.n_stimuli), np.empty((self.n_stimuli, 4))
         for drive, columns in zip(self.stimuli.drives, self.stimuli.stimuli, strict=True):
-            speed, sed = _samples(drive, window_ms)
-            g = intercept + dynamic_gain * speed + static_gain * sed
+            speed, value = _samples(drive, window_ms)
+            g = intercept + dynamic_gain * speed + static_gain * value
             rate, per_drive, per_tau = constant_drive_rate(
                 g, float(tau), self.stimuli.refractory_ms, self.bend
             )
             mean[columns] = rate.mean(axis=0)
-            for number, slope in enumerate((per_drive, per_drive * speed, per_drive * sed, per_tau)):
+            for number, slope in enumerate((per_drive, per_drive * speed, per_drive * value, per_tau)):
                 slopes[columns, number] = slope.mean(axis=0)
         return mean, slopes
 
@@ -120,8 +120,8 @@ def _samples(drive: Drive, window_ms: tuple[float, ...]) -> tuple[FloatArray, Fl
     before = np.clip(before, 0, drive.times_ms.size - 2)
     knots = drive.times_ms[before], drive.times_ms[before + 1]
     share = ((times - knots[0]) / (knots[1] - knots[0]))[:, np.newaxis]
-    speed, sed = (
+    speed, value = (
         values[before] + share * (values[before + 1] - values[before])
-        for values in (drive.rate_kpa_per_ms, drive.sed_kpa)
+        for values in (drive.rate_per_ms, drive.values)
     )
-    return speed, sed
+    return speed, value

@@ -39,8 +39,6 @@ IDENTIFIABLE_NAMES = (
 LARGEST_RESTING_SHARE = 0.95
 """Largest potential at rest over the threshold in fits, beta tau/(C v): docs/decisions.md#silent-at-rest."""
 
-IDENTIFIABLE_UNITS = ("1/ms", "1/kPa", "1/(kPa ms)", "ms")
-
 
 def identifiable(parameters: ArrayLike) -> FloatArray:
     six = _rows("parameters", parameters, PARAMETER_NAMES)
@@ -91,8 +89,6 @@ def _rows(name: str, values: ArrayLike, names: tuple[str, ...]) -> FloatArray:
 
 SPIKE_PARAMETER_NAMES = (*IDENTIFIABLE_NAMES, "escape_width")
 """The four identifiable parameters, and the width of the threshold over the threshold."""
-
-SPIKE_PARAMETER_UNITS = (*IDENTIFIABLE_UNITS, "1")
 
 N_PARAMETERS = len(SPIKE_PARAMETER_NAMES)
 

@@ -17,7 +17,7 @@ import numpy as np
 from fingerpad.core.checks import FloatArray, IntArray, not_negative
 from fingerpad.core.errors import InputError
 from fingerpad.core.keywords import KnownKeywords
-from fingerpad.core.signals import SedTraces
+from fingerpad.core.signals import Traces
 from fingerpad.core.threads import in_blocks
 from fingerpad.data import neuron
 from fingerpad.inference.identifiable import IDENTIFIABLE_NAMES, six_parameters
@@ -109,8 +109,8 @@ class AfferentModel(metaclass=KnownKeywords):
 
     Examples
     --------
-    >>> short = SedTraces([0.0, 50.0, 1000.0], [[0.0], [2.0], [2.0]], kinks_ms=[50.0])
-    >>> longer = SedTraces([0.0, 50.0, 2000.0], [[0.0], [2.0], [2.0]], kinks_ms=[50.0])
+    >>> short = Traces([0.0, 50.0, 1000.0], [[0.0], [2.0], [2.0]], kinks_ms=[50.0])
+    >>> longer = Traces([0.0, 50.0, 2000.0], [[0.0], [2.0], [2.0]], kinks_ms=[50.0])
     >>> model = AfferentModel.of_traces([short, longer, short])
     >>> [drive.n_sites for drive in model.drives]
     [2, 1]
@@ -150,36 +150,35 @@ class AfferentModel(metaclass=KnownKeywords):
     @classmethod
     def of_traces(
         cls,
-        sed: SedTraces | Sequence[SedTraces],
+        traces: Traces | Sequence[Traces],
         windows_ms: Windows | None = None,
         refractory_ms: float = neuron.REFRACTORY.value,
         initial_mv: float | None = None,
     ) -> AfferentModel:
-        """Make the model for strain energy density, stimuli grouped by their times.
+        """Make the model for what drives the afferent, stimuli grouped by their times.
 
         Parameters
         ----------
-        sed : SedTraces or sequence of SedTraces
-            Strain energy density, one column per stimulus; the columns of several traces are numbered
-            consecutively.
+        traces : Traces or sequence of Traces
+            One column per stimulus; the columns of several traces are numbered consecutively.
         windows_ms, refractory_ms, initial_mv
             As of the class.
         """
-        traces = [sed] if isinstance(sed, SedTraces) else list(sed)
-        quantities = sorted({f"{trace.dynamic_quantity} and {trace.static_quantity}" for trace in traces})
+        parts = [traces] if isinstance(traces, Traces) else list(traces)
+        quantities = sorted({f"{part.dynamic_quantity} and {part.static_quantity}" for part in parts})
         if len(quantities) != 1:
             raise InputError(
-                "sed must bring one dynamic_quantity and one static_quantity: got "
+                "traces must bring one dynamic_quantity and one static_quantity: got "
                 f"{', '.join(quantities) or 'no traces'}."
             )
-        groups: dict[tuple[object, ...], list[tuple[int, SedTraces]]] = {}
+        groups: dict[tuple[object, ...], list[tuple[int, Traces]]] = {}
         first = 0
-        for trace in traces:
+        for trace in parts:
             key = trace.times_ms.tobytes(), trace.kinks_ms.tobytes(), trace.phases, trace.onset_ms
             groups.setdefault(key, []).append((first, trace))
             first += trace.n_sites
         return cls(
-            tuple(drive(SedTraces.joined([trace for _, trace in group])) for group in groups.values()),
+            tuple(drive(Traces.joined([trace for _, trace in group])) for group in groups.values()),
             tuple(
                 np.concatenate([start + np.arange(trace.n_sites) for start, trace in group])
                 for group in groups.values()
@@ -259,7 +258,7 @@ def _evaluator_of(
     driven: Drive, refractory_ms: float, initial_mv: float | None, windows_ms: Windows
 ) -> Evaluate:
     """Return the rates under one drive as a function of six parameters; its arrays are allocated once."""
-    current, static_part = np.empty_like(driven.sed_kpa), np.empty_like(driven.sed_kpa)
+    current, static_part = np.empty_like(driven.values), np.empty_like(driven.values)
     initial = np.nan if initial_mv is None else float(initial_mv)
 
     def evaluate(parameters: FloatArray) -> Rates:
@@ -270,9 +269,9 @@ def _evaluator_of(
             )  # raises the error that names the parameter
         intercept, dynamic_gain, static_gain, tau, capacitance, threshold = six.tolist()
         # I = beta + k_d U' + k_s U, in the order of Transduction.current.
-        np.multiply(driven.rate_kpa_per_ms, dynamic_gain, out=current)
+        np.multiply(driven.rate_per_ms, dynamic_gain, out=current)
         current.__iadd__(intercept)
-        current.__iadd__(np.multiply(driven.sed_kpa, static_gain, out=static_part))
+        current.__iadd__(np.multiply(driven.values, static_gain, out=static_part))
         times, offsets = exact_trains(
             driven.times_ms, current, tau, capacitance, threshold, float(refractory_ms), initial
         )

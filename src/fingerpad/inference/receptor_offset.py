@@ -13,7 +13,7 @@ import numpy as np
 
 from fingerpad.core.checks import FloatArray, finite, float_array, increasing
 from fingerpad.core.errors import InputError
-from fingerpad.core.signals import SedTraces
+from fingerpad.core.signals import Traces
 from fingerpad.inference.rate_model import AfferentModel, Rates, evaluate_rows
 from fingerpad.neuron.afferent import PARAMETER_NAMES
 from fingerpad.neuron.rate_windows import Windows
@@ -54,12 +54,12 @@ class ReceptorOffset:
 
     @classmethod
     def of_traces(
-        cls, traces: Mapping[float, SedTraces | Sequence[SedTraces]], windows_ms: Windows | None = None
+        cls, traces: Mapping[float, Traces | Sequence[Traces]], windows_ms: Windows | None = None
     ) -> ReceptorOffset:
-        """Make the model from strain energy density at each offset."""
+        """Make the model from what drives the afferent at each offset."""
         return cls(
             np.array(list(traces), dtype=np.float64),
-            [AfferentModel.of_traces(sed, windows_ms) for sed in traces.values()],
+            [AfferentModel.of_traces(each, windows_ms) for each in traces.values()],
         )
 
     @property
@@ -96,6 +96,6 @@ def _between(near: Drive, far: Drive, share: float) -> Drive:
     """Drive interpolated linearly: `near` for a share of 0, `far` for 1."""
     return replace(
         near,
-        sed_kpa=(1.0 - share) * near.sed_kpa + share * far.sed_kpa,
-        rate_kpa_per_ms=(1.0 - share) * near.rate_kpa_per_ms + share * far.rate_kpa_per_ms,
+        values=(1.0 - share) * near.values + share * far.values,
+        rate_per_ms=(1.0 - share) * near.rate_per_ms + share * far.rate_per_ms,
     )

@@ -17,7 +17,7 @@ from fingerpad.core.displayed import Result
 from fingerpad.core.errors import ConvergenceError, InputError
 from fingerpad.core.keywords import known_keywords
 from fingerpad.core.random_streams import Presentations
-from fingerpad.core.signals import CurrentTraces, SpikeTrains
+from fingerpad.core.signals import SpikeTrains, Traces
 from fingerpad.inference.identifiable import (
     N_PARAMETERS,
     SPIKE_PARAMETER_NAMES,
@@ -204,7 +204,7 @@ PREDICTED_PRESENTATIONS = 20
 """Presentations whose mean is the predicted rate of an afferent with a soft threshold."""
 
 
-def soft_membrane(driven: Drive, parameters: FloatArray) -> tuple[EscapeRate, CurrentTraces]:
+def soft_membrane(driven: Drive, parameters: FloatArray) -> tuple[EscapeRate, Traces]:
     afferent = Afferent.from_parameters(six_parameters(parameters[:4]))
     return EscapeRate(afferent.membrane, float(parameters[4])), afferent.transduction.current(driven)
 

@@ -251,8 +251,8 @@ class SpikeLikelihood:
         _check_spikes(self.trains, times[0], ends, self.refractory_ms)
         intervals = cut(
             times,
-            self.drive.rate_kpa_per_ms,
-            self.drive.sed_kpa,
+            self.drive.rate_per_ms,
+            self.drive.values,
             sites,
             ends,
             self.trains.times_ms,

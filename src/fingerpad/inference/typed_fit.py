@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from fingerpad.core.checks import FloatArray, one_of, positive
 from fingerpad.core.errors import InputError
 from fingerpad.core.keywords import known_keywords
-from fingerpad.core.signals import INTERVAL, SedTraces
+from fingerpad.core.signals import INTERVAL, Traces
 from fingerpad.data import protocol
 from fingerpad.inference.fitting.cross_validation import cross_validate, interleaved_folds
 from fingerpad.inference.fitting.least_squares import LeastSquares
@@ -37,7 +37,7 @@ class TypedModel:
 
     afferent: AnyAfferent
     names: tuple[str, ...]
-    traces: Sequence[SedTraces]
+    traces: Sequence[Traces]
     windows_ms: Windows | None = None
 
     @property
@@ -95,7 +95,7 @@ def _largest_factor(afferent: AnyAfferent, name: str) -> float:
 def fit_afferent(
     afferent: AnyAfferent,
     free: Sequence[str],
-    traces: SedTraces | Sequence[SedTraces],
+    traces: Traces | Sequence[Traces],
     recordings: RateRecordings,
     memberships: ArrayLike | None = None,
     windows_ms: Windows | None = None,
@@ -111,7 +111,7 @@ def fit_afferent(
         Its type, and about which numbers is searched; a dataclass.
     free : sequence of str
         Names of the numbers that are fitted, such as "threshold" and "retraction"; each above 0.
-    traces : SedTraces or sequence of SedTraces
+    traces : Traces or sequence of Traces
         What the afferent follows, one column per stimulus of `recordings`.
     recordings : RateRecordings
         Observed rates; a phase that is silent in all stimuli is left out as None.
@@ -126,8 +126,8 @@ def fit_afferent(
 
     >>> import fingerpad as fp
     >>> course, heights = np.array([0.0, 1.0, 1.0]), np.array([4.0, 6.0, 9.0, 13.0, 18.0])
-    >>> stress = fp.SedTraces([0.0, 50.0, 1000.0], np.outer(course, heights), kinks_ms=[50.0],
-    ...     dynamic_quantity="compressive_stress", static_quantity="compressive_stress")
+    >>> stress = fp.Traces([0.0, 50.0, 1000.0], np.outer(course, heights), kinks_ms=[50.0],
+    ...     quantity="compressive_stress")
     >>> known = TypedModel(fp.RA(threshold=0.2), (), [stress]).evaluate(np.empty(0))
     >>> recordings = RateRecordings(("a", "b", "c", "d", "e"), known[0], None)
     >>> found = fit_afferent(fp.RA(), ["threshold"], stress, recordings)
@@ -138,7 +138,7 @@ def fit_afferent(
     for name in free:
         positive(one_of("free", name, known), getattr(afferent, name))
     model = TypedModel(
-        afferent, tuple(free), (traces,) if isinstance(traces, SedTraces) else tuple(traces), windows_ms
+        afferent, tuple(free), (traces,) if isinstance(traces, Traces) else tuple(traces), windows_ms
     )
     if not model.names:
         raise InputError(f"free must name at least one number of {type(afferent).__name__}: got none.")

@@ -13,7 +13,7 @@ from threadpoolctl import ThreadpoolController
 from fingerpad.core.checks import FloatArray
 from fingerpad.core.errors import InputError
 from fingerpad.core.keywords import known_keywords
-from fingerpad.core.signals import STORED_ENERGY, ResponseMap, SedTraces
+from fingerpad.core.signals import STORED_ENERGY, ResponseMap, Traces
 from fingerpad.data import psychophysics
 from fingerpad.experiments.descriptions.reduction import DescribedReduction
 from fingerpad.geometry.fingertip import Fingertip
@@ -231,11 +231,9 @@ def _answer(
     n_map = np.count_nonzero(on_skin)
     sed[:, on_skin] = fields[STORED_ENERGY][:, :n_map]
     dynamic, static = (fields[name][:, n_map:] for name in population.quantities)
-    same = population.quantities[0] == population.quantities[1]
-    traces = SedTraces(
-        times, static, np.intersect1d(motion.times_ms[1:-1], times),
-        None if same else dynamic, *population.quantities,
-    )  # fmt: skip
+    other, quantity = population.quantities
+    rate_of = None if other == quantity else Traces(times, dynamic, quantity=other)
+    traces = Traces(times, static, np.intersect1d(motion.times_ms[1:-1], times), quantity, rate_of)
     start, held, ends = motion.times_ms[2:5]
     return Answer(
         times, depth, force, error, area, middles_mm, x, z, sed,

@@ -14,6 +14,7 @@ from typing import Any
 from urllib.parse import urlsplit
 
 from fingerpad.core.errors import FingerpadError, InputError
+from fingerpad.core.units import unit_of
 from fingerpad.geometry.fingertip import FINGERS
 from fingerpad.lab.laboratory import Laboratory, Making
 from fingerpad.lab.state import AFFERENTS, BOUNDS, LabState, state_of
@@ -24,22 +25,22 @@ LOGGER = logging.getLogger(__name__)
 HOST = "127.0.0.1"
 
 CONTROLS = (
-    ("object", "object", "", 0),
-    ("size", "size", "", 1),
-    ("depth_mm", "depth", "mm", 0.05),
-    ("x_mm", "along the finger", "mm", 0.1),
-    ("z_mm", "across the finger", "mm", 0.1),
-    ("tilt_deg", "tilt", "degrees", 1),
-    ("slide_mm", "slide in the hold", "mm", 0.1),
-    ("ramp_ms", "press and lift", "ms", 10),
-    ("hold_ms", "hold", "ms", 10),
-    ("other", "compared with", "", 0),
-    ("other_size", "other size", "", 1),
-    ("afferent", "afferents", "", 0),
-    ("finger", "finger", "", 0),
-    ("tissues", "tissues", "", 0),
+    ("object", "object", 0),
+    ("size", "size", 1),
+    ("depth_mm", "depth", 0.05),
+    ("x_mm", "along the finger", 0.1),
+    ("z_mm", "across the finger", 0.1),
+    ("tilt_deg", "tilt", 1),
+    ("slide_mm", "slide in the hold", 0.1),
+    ("ramp_ms", "press and lift", 10),
+    ("hold_ms", "hold", 10),
+    ("other", "compared with", 0),
+    ("other_size", "other size", 1),
+    ("afferent", "afferents", 0),
+    ("finger", "finger", 0),
+    ("tissues", "tissues", 0),
 )
-"""What can be set: name, label, unit and step."""
+"""What can be set: name, label and step."""
 
 
 def spec_of(laboratory: Laboratory) -> dict[str, Any]:
@@ -62,7 +63,7 @@ def spec_of(laboratory: Laboratory) -> dict[str, Any]:
     first = laboratory.names[0]
     depth = min(LabState.depth_mm, objects[first]["depth_mm"][1])
     return {
-        "controls": CONTROLS,
+        "controls": [(name, label, unit_of(name), step) for name, label, step in CONTROLS],
         "objects": objects,
         "bounds": BOUNDS,
         "choices": {

@@ -14,6 +14,7 @@ import numpy as np
 
 from fingerpad.core.files import write_atomically
 from fingerpad.core.progress import NoProgress, Progress
+from fingerpad.core.units import unit_of
 from fingerpad.lab.laboratory import Laboratory
 from fingerpad.lab.state import AFFERENTS, LabState
 from fingerpad.lab.view import comparison, view_of_answer
@@ -25,11 +26,11 @@ FRAMES = 24
 """Pictures of the skin over time in each answer."""
 
 CONTROLS = (
-    ("object", "object", "", 0),
-    ("depth_mm", "depth", "mm", 0),
-    ("x_mm", "along the finger", "mm", 0),
-    ("other", "compared with", "", 0),
-    ("afferent", "afferents", "", 0),
+    ("object", "object"),
+    ("depth_mm", "depth"),
+    ("x_mm", "along the finger"),
+    ("other", "compared with"),
+    ("afferent", "afferents"),
 )
 
 
@@ -96,7 +97,7 @@ def _spec(objects: dict[str, LabState], known: dict[str, tuple[list[float], list
     depths, places = known[labels[0]]
     steps = {"depth_mm": depths[0], "x_mm": max(np.diff(places), default=0.0)}
     return {
-        "controls": [(*each[:3], steps.get(each[0], 0)) for each in CONTROLS],
+        "controls": [(name, label, unit_of(name), steps.get(name, 0)) for name, label in CONTROLS],
         "objects": {
             label: {
                 "depth_mm": [depths[0], depths[-1]],

@@ -219,12 +219,11 @@ for time in times_ms:
     pose, depth_mm = motion.pose_at(time), float(motion.prescribed_at(time))
     samples.append(stream.step(time, depth_mm, None, pose.x_mm, pose.z_mm, pose.tilt_deg))
 force_mn = np.array([sample.force_mn for sample in samples])
-traces = fp.SedTraces(
+traces = fp.Traces(
     times_ms,
     np.array([sample.fields[afferent.static_quantity] for sample in samples]),
     kinks_ms=motion.times_ms[1:-1],
-    dynamic_quantity=afferent.dynamic_quantity,
-    static_quantity=afferent.static_quantity,
+    quantity=afferent.static_quantity,
 )
 spikes = afferent.spikes(traces)
 print(f"{{force_mn.max():.1f}} mN, {{sum(len(train) for train in spikes)}} spikes")

@@ -323,11 +323,13 @@ class _Press:
         step_ms = length_ms(start.time_ms, target_ms)
         step = StepCoefficients.of(self.body.table, step_ms)
         carried = start.history.carried(step, self.body.mesh.layer)
-        force_mn, depth_mm = None, round(float(self.stimulus.prescribed_at(target_ms)), SAME_DIGITS)
-        if self.stimulus.by_force and depth_mm == 0.0:
+        force_mn, prescribed = None, round(float(self.stimulus.prescribed_at(target_ms)), SAME_DIGITS)
+        if not self.stimulus.by_force:
+            depth_mm = prescribed
+        elif prescribed == 0.0:
             depth_mm = start.found.depth_mm - LIFT_MM
-        elif self.stimulus.by_force:
-            force_mn = depth_mm / (2.0 if self.body.mesh.symmetry_nodes.size else 1.0)
+        else:
+            force_mn = prescribed / (2.0 if self.body.mesh.symmetry_nodes.size else 1.0)
             # The first node to touch may lie in the indenter by round-off.
             touches = start.found.contact.pressed_mn.sum() > SMALLEST_FORCE_MN
             further_mm = self.continued(start, target_ms) * start.step_depth_mm

@@ -12,9 +12,9 @@ from numpy.typing import ArrayLike
 from fingerpad.core.checks import FloatArray, float_array, not_negative, one_of
 from fingerpad.core.errors import InputError, shown
 from fingerpad.core.keywords import KnownKeywords
-from fingerpad.core.signals import INTERVAL, STORED_ENERGY, SedTraces, SpikeTrains
+from fingerpad.core.signals import INTERVAL, STORED_ENERGY, SpikeTrains, Traces
 from fingerpad.core.threads import in_blocks
-from fingerpad.core.units import QUANTITY_UNITS
+from fingerpad.core.units import SKIN_QUANTITY_UNITS, gain_unit, units_of
 from fingerpad.core.values import converted
 from fingerpad.data import neuron
 from fingerpad.neuron.lif import LeakyIntegrateAndFire
@@ -31,9 +31,6 @@ PARAMETER_NAMES = (
     "threshold_mv",
 )
 """The six fitted numbers in the paper's order: beta, k_d, k_s, tau, C, v."""
-
-PARAMETER_UNITS = ("mA", "mA ms/kPa", "mA/kPa", "ms", "mF", "mV")
-"""Units of the six fitted numbers."""
 
 _SITES_PER_BLOCK = 256
 """Sites that a thread takes through the whole chain at once: their traces stay in the cache."""
@@ -59,7 +56,7 @@ class Follows(Protocol):
 class AnyAfferent(Follows, Protocol):
     """What a population needs of an afferent: the quantities that it follows, and spikes."""
 
-    def spikes(self, sed: SedTraces) -> SpikeTrains:
+    def spikes(self, traces: Traces) -> SpikeTrains:
         """Simulate the spikes at every site."""
         ...
 
@@ -86,10 +83,19 @@ def check_quantities(afferent: Follows, traces: Follows) -> None:
             )
 
 
+def parameter_units(follows: Follows) -> dict[str, str]:
+    """Return the units of the six fitted numbers; those of the gains depend on the quantities."""
+    return {
+        "intercept_ma": "mA",
+        "dynamic_gain": gain_unit("dynamic_gain", follows.dynamic_quantity),
+        "static_gain": gain_unit("static_gain", follows.static_quantity),
+    } | units_of(PARAMETER_NAMES[3:])
+
+
 def check_known_quantities(afferent: Follows) -> None:
-    """Raise `InputError` if an afferent follows a quantity without a unit in `QUANTITY_UNITS`."""
+    """Raise `InputError` if an afferent follows a quantity that is not in `SKIN_QUANTITY_UNITS`."""
     for name in ("dynamic_quantity", "static_quantity"):
-        one_of(name, getattr(afferent, name), tuple(QUANTITY_UNITS))
+        one_of(name, getattr(afferent, name), tuple(SKIN_QUANTITY_UNITS))
 
 
 _NEEDED = ("dynamic_quantity", "static_quantity", "spikes")
@@ -109,9 +115,9 @@ class Afferent(metaclass=KnownKeywords):
     intercept_ma : float
         Current without any load, beta. [mA]
     dynamic_gain : float
-        Gain on the rate of change of what the dynamic term follows, k_d. [mA ms/kPa]
+        Gain on the rate of change of what the dynamic term follows, k_d. [mA ms/kPa, or per its unit]
     static_gain : float
-        Gain on what the static term follows, k_s. [mA/kPa]
+        Gain on what the static term follows, k_s. [mA/kPa, or per its unit]
     time_constant_ms : float
         Time constant of the membrane, tau. [ms]
     capacitance_mf : float
@@ -137,8 +143,8 @@ class Afferent(metaclass=KnownKeywords):
     --------
     SED rises to 2 kPa in 50 ms and stays: the rate is high in the ramp and low in the hold.
 
-    >>> sed = SedTraces([0.0, 50.0, 1000.0], [[0.0], [2.0], [2.0]], kinks_ms=[50.0])
-    >>> dynamic_hz, static_hz = Afferent.for_tissues("trial3").rates(sed)
+    >>> traces = Traces([0.0, 50.0, 1000.0], [[0.0], [2.0], [2.0]], kinks_ms=[50.0])
+    >>> dynamic_hz, static_hz = Afferent.for_tissues("trial3").rates(traces)
     >>> dynamic_hz.round().tolist(), static_hz.round().tolist()
     ([217.0], [63.0])
     """
@@ -273,7 +279,7 @@ class Afferent(metaclass=KnownKeywords):
 
     @property
     def static_threshold(self) -> float:
-        """Constant quantity above which the afferent fires, (C v / tau - beta) / k_s. [kPa]
+        """Constant quantity above which the afferent fires, (C v / tau - beta) / k_s. [its unit]
 
         Examples
         --------
@@ -293,7 +299,7 @@ class Afferent(metaclass=KnownKeywords):
         Parameters
         ----------
         quantity : float
-            The threshold. [kPa]
+            The threshold. [its unit]
 
         Raises
         ------
@@ -308,12 +314,12 @@ class Afferent(metaclass=KnownKeywords):
         raised = not_negative("quantity", quantity) - self.static_threshold
         return replace(self, intercept_ma=self.intercept_ma - self.static_gain * raised)
 
-    def spikes(self, sed: SedTraces | Drive) -> SpikeTrains:
+    def spikes(self, traces: Traces | Drive) -> SpikeTrains:
         """Simulate the spikes of this afferent at every site.
 
         Parameters
         ----------
-        sed : SedTraces or Drive
+        traces : Traces or Drive
             What the two terms follow. Pass `fingerpad.neuron.transduction.drive` of it if many afferents are
             simulated under the same traces, as in a fit.
 
@@ -325,29 +331,31 @@ class Afferent(metaclass=KnownKeywords):
         Raises
         ------
         InputError
-            If the quantities of the two terms are not those of `sed`.
+            If the quantities of the two terms are not those of `traces`.
         """
-        check_quantities(self, sed)
-        if isinstance(sed, Drive):
-            return SpikeTrains.joined(in_blocks(lambda sites: self._fired(sed.part(sites)), sed.n_sites))
+        check_quantities(self, traces)
+        if isinstance(traces, Drive):
+            return SpikeTrains.joined(
+                in_blocks(lambda sites: self._fired(traces.part(sites)), traces.n_sites)
+            )
         # Most of the skin moves too little for a spike.
-        may_fire = self._largest_current_ma(sed) > _SURELY_SILENT * self.rheobase_ma
-        return spikes_where(may_fire, sed, lambda some: self._fired(self._driven(some)))
+        may_fire = self._largest_current_ma(traces) > _SURELY_SILENT * self.rheobase_ma
+        return spikes_where(may_fire, traces, lambda some: self._fired(self._driven(some)))
 
     def _fired(self, driven: Drive) -> SpikeTrains:
         return self.membrane.spikes(self.transduction.current(driven))
 
-    def _driven(self, sed: SedTraces) -> Drive:
+    def _driven(self, traces: Traces) -> Drive:
         """Resample what the two terms follow, and the rate of change of the dynamic one."""
-        return drive(sed)
+        return drive(traces)
 
-    def _largest_current_ma(self, sed: SedTraces) -> FloatArray:
+    def _largest_current_ma(self, traces: Traces) -> FloatArray:
         """Bound of the current at every site, (n_sites,)."""
-        return self.transduction.largest_current_ma(sed)
+        return self.transduction.largest_current_ma(traces)
 
     def rates(
         self,
-        sed: SedTraces | Drive,
+        traces: Traces | Drive,
         dynamic_window_ms: Window | None = None,
         static_window_ms: Window | None = None,
     ) -> tuple[FloatArray, FloatArray]:
@@ -355,11 +363,11 @@ class Afferent(metaclass=KnownKeywords):
 
         Parameters
         ----------
-        sed : SedTraces or Drive
+        traces : Traces or Drive
             As in `spikes`.
         dynamic_window_ms, static_window_ms : (float, float), optional
             Start and end of the two windows; by default those of `rate_windows_ms`, which follow the phases
-            of `sed`: the paper's for the paper's motion. [ms]
+            of `traces`: the paper's for the paper's motion. [ms]
 
         Returns
         -------
@@ -369,20 +377,22 @@ class Afferent(metaclass=KnownKeywords):
         Raises
         ------
         InputError
-            As `spikes`, or if a window is not given and `sed` has no ramp or no hold.
+            As `spikes`, or if a window is not given and `traces` has no ramp or no hold.
         """
-        dynamic, static = rate_windows_ms(sed.phases, dynamic_window_ms, static_window_ms, sed.times_ms[-1])
-        spikes = self.spikes(sed)
+        dynamic, static = rate_windows_ms(
+            traces.phases, dynamic_window_ms, static_window_ms, traces.times_ms[-1]
+        )
+        spikes = self.spikes(traces)
         return firing_rate_hz(spikes, dynamic), firing_rate_hz(spikes, static)
 
 
 def spikes_where(
-    may_fire: np.ndarray, sed: SedTraces, spikes: Callable[[SedTraces], SpikeTrains]
+    may_fire: np.ndarray, traces: Traces, spikes: Callable[[Traces], SpikeTrains]
 ) -> SpikeTrains:
     """Spikes of the sites that may fire, block by block on all threads; the others are silent."""
     if not may_fire.any():
-        return SpikeTrains.from_lists([[]] * sed.n_sites)
-    some = sed.selected(may_fire)
+        return SpikeTrains.from_lists([[]] * traces.n_sites)
+    some = traces.selected(may_fire)
     trains = in_blocks(lambda sites: spikes(some.part(sites)), some.n_sites, _SITES_PER_BLOCK)
     return SpikeTrains.joined(trains).spread(may_fire)
 

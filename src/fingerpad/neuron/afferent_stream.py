@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 from fingerpad.core.checks import FloatArray, finite, float_array, whole
 from fingerpad.core.errors import InputError
 from fingerpad.core.keywords import KnownKeywords
-from fingerpad.core.signals import SedTraces, SpikeTrains
+from fingerpad.core.signals import SpikeTrains, Traces
 from fingerpad.neuron.afferent import Afferent, AnyAfferent, checked_afferent
 from fingerpad.neuron.afferent_types import SAI, RapidlyAdapting
 from fingerpad.neuron.band_pass import continued_stage, knots_between
@@ -130,9 +130,9 @@ class AfferentStream(metaclass=KnownKeywords):
         """Spikes since the last sample of an afferent that is given the whole trace."""
         self._trace.append((time_ms, static, dynamic))
         times, values, followed = (np.array(part) for part in zip(*self._trace, strict=True))
-        quantities = self._afferent.dynamic_quantity, self._afferent.static_quantity
-        same = quantities[0] == quantities[1]
-        traces = SedTraces(times, values, times[1:-1], None if same else followed, *quantities)
+        quantity, other = self._afferent.static_quantity, self._afferent.dynamic_quantity
+        rate_of = None if other == quantity else Traces(times, followed, quantity=other)
+        traces = Traces(times, values, times[1:-1], quantity, dynamic=rate_of)
         trains = self._afferent.spikes(traces)
         return SpikeTrains.from_lists([train[train > self._time_ms] for train in trains])
 

@@ -13,7 +13,7 @@ transmits no constant. SAII has the chain of SAI (Eqs. 1-5), but follows the str
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import ClassVar
 
 import numpy as np
@@ -21,7 +21,15 @@ import numpy as np
 from fingerpad.core.checks import FloatArray, instance, not_negative, one_of, positive
 from fingerpad.core.errors import InputError, shown
 from fingerpad.core.keywords import KnownKeywords
-from fingerpad.core.signals import COUNT, INTERVAL, STORED_ENERGY, CurrentTraces, SedTraces, SpikeTrains
+from fingerpad.core.signals import (
+    COUNT,
+    CURRENTS,
+    INTERVAL,
+    RELATIVE_CURRENT,
+    STORED_ENERGY,
+    SpikeTrains,
+    Traces,
+)
 from fingerpad.core.values import converted
 from fingerpad.data import afferents
 from fingerpad.neuron.afferent import Afferent, check_known_quantities, check_quantities, spikes_where
@@ -83,21 +91,21 @@ class RapidlyAdapting(metaclass=KnownKeywords):
         """What is followed."""
         return self.quantity
 
-    def current(self, sed: SedTraces) -> CurrentTraces:
+    def current(self, traces: Traces) -> Traces:
         """Band-passed and rectified quantity over the threshold at every site, in place of a current."""
-        times_ms, passed = self.band_pass.of(sed)
-        return CurrentTraces(times_ms, self.rectified(passed))
+        times_ms, passed = self.band_pass.of(traces)
+        return Traces(times_ms, self.rectified(passed), quantity=RELATIVE_CURRENT)
 
     def rectified(self, passed: FloatArray) -> FloatArray:
         """Rectify what the band pass transmits, over the threshold. [1]"""
         return (np.maximum(passed, 0.0) + self.retraction * np.maximum(-passed, 0.0)) / self.threshold
 
-    def spikes(self, sed: SedTraces) -> SpikeTrains:
+    def spikes(self, traces: Traces) -> SpikeTrains:
         """Simulate the spikes of this afferent at every site."""
-        check_quantities(self, sed)
+        check_quantities(self, traces)
         # Most of the skin moves too little for a spike; a current below 1 never reaches the threshold.
-        may_fire = self.band_pass.largest_share * np.ptp(sed.sed_kpa, axis=0) > self.threshold
-        return spikes_where(may_fire, sed, lambda some: self.membrane.spikes(self.current(some)))
+        may_fire = self.band_pass.largest_share * np.ptp(traces.values, axis=0) > self.threshold
+        return spikes_where(may_fire, traces, lambda some: self.membrane.spikes(self.current(some)))
 
 
 @dataclass(frozen=True)
@@ -117,8 +125,8 @@ class RA(RapidlyAdapting):
     --------
     Compressive stress rises by 5 kPa in 50 ms and stays:
 
-    >>> stress = SedTraces([0.0, 50.0, 1000.0], [[0.0], [5.0], [5.0]], kinks_ms=[50.0],
-    ...                    dynamic_quantity="compressive_stress", static_quantity="compressive_stress")
+    >>> stress = Traces([0.0, 50.0, 1000.0], [[0.0], [5.0], [5.0]], kinks_ms=[50.0],
+    ...                 quantity="compressive_stress")
     >>> spikes = RA().spikes(stress)[0]
     >>> bool(spikes.size > 2), bool((spikes < 60.0).all())
     (True, True)
@@ -155,8 +163,7 @@ class PC(RapidlyAdapting):
     >>> times_ms = np.arange(0.0, 400.0, 0.2)
     >>> def moved(frequency_hz):
     ...     course = 0.5 + 0.005 * np.sin(2e-3 * np.pi * frequency_hz * times_ms)
-    ...     return SedTraces(times_ms, course[:, None], dynamic_quantity="deep_displacement",
-    ...                      static_quantity="deep_displacement")
+    ...     return Traces(times_ms, course[:, None], quantity="deep_displacement")
     >>> PC().spikes(moved(250.0))[0].size > 80, PC().spikes(moved(10.0))[0].size
     (True, 0)
     """
@@ -212,32 +219,25 @@ class SAI(Afferent):
         positive("smoothing_ms", self.smoothing_ms, "ms")
         super().__post_init__()
 
-    def spikes(self, sed: SedTraces | Drive) -> SpikeTrains:
+    def spikes(self, traces: Traces | Drive) -> SpikeTrains:
         """Simulate the spikes of this afferent at every site, as `Afferent.spikes`."""
-        if isinstance(sed, Drive):
-            check_quantities(self, sed)
-            raise InputError("SAI smooths the traces of the skin: got a Drive; pass the SedTraces.")
-        return super().spikes(sed)
+        if isinstance(traces, Drive):
+            check_quantities(self, traces)
+            raise InputError("SAI smooths the traces of the skin: got a Drive; pass the Traces.")
+        return super().spikes(traces)
 
-    def _driven(self, sed: SedTraces) -> Drive:
+    def _driven(self, traces: Traces) -> Drive:
         """Both terms between common knots: the quantity, and its rate of change behind the low pass."""
-        followed = (
-            sed
-            if sed.dynamic_kpa is None
-            else SedTraces(sed.times_ms, sed.dynamic_kpa, sed.kinks_ms, onset_ms=sed.onset_ms)
-        )
-        times_ms, rate = smoothed_rate(followed, self.smoothing_ms)
-        static = resampled(sed, self.smoothing_ms).sed_kpa
-        return Drive(times_ms, static, np.abs(rate), sed.dynamic_quantity, sed.static_quantity, sed.phases)
+        times_ms, rate = smoothed_rate(traces.dynamic_term, self.smoothing_ms)
+        return replace(resampled(traces, self.smoothing_ms), times_ms=times_ms, rate_per_ms=np.abs(rate))
 
-    def _largest_current_ma(self, sed: SedTraces) -> FloatArray:
+    def _largest_current_ma(self, traces: Traces) -> FloatArray:
         """Bound of the current at every site: a low pass changes at most by its input's range in tau_s."""
-        dynamic = sed.sed_kpa if sed.dynamic_kpa is None else sed.dynamic_kpa
-        fastest = np.ptp(dynamic, axis=0) / self.smoothing_ms
+        fastest = np.ptp(traces.dynamic_term.values, axis=0) / self.smoothing_ms
         return (
             self.intercept_ma
             + abs(self.dynamic_gain) * fastest
-            + (self.static_gain * sed.sed_kpa).max(axis=0)
+            + (self.static_gain * traces.values).max(axis=0)
         )
 
 
@@ -260,8 +260,8 @@ class SAII(SAI):
     --------
     The skin is stretched by 5 % in 50 ms and stays:
 
-    >>> stretch = SedTraces([0.0, 50.0, 1000.0], [[0.0], [0.05], [0.05]], kinks_ms=[50.0],
-    ...                     dynamic_quantity="skin_stretch", static_quantity="skin_stretch")
+    >>> stretch = Traces([0.0, 50.0, 1000.0], [[0.0], [0.05], [0.05]], kinks_ms=[50.0],
+    ...                  quantity="skin_stretch")
     >>> dynamic_hz, static_hz = SAII().rates(stretch)
     >>> bool(dynamic_hz[0] > static_hz[0] > 5.0)
     True
@@ -285,7 +285,7 @@ class OwnAfferent(metaclass=KnownKeywords):
     Parameters
     ----------
     respond : callable
-        From `SedTraces`, a column per site, to `CurrentTraces` or to `SpikeTrains` of the same sites.
+        From `Traces` of the skin, a column per site, to `Traces` of a current or to `SpikeTrains`.
     membrane : LeakyIntegrateAndFire, optional
         Membrane that a current charges; needed if `respond` returns a current.
     dynamic_quantity, static_quantity : str, optional
@@ -302,51 +302,51 @@ class OwnAfferent(metaclass=KnownKeywords):
     --------
     One spike when strain energy density first exceeds 1 kPa:
 
-    >>> def first(sed):
+    >>> def first(traces):
     ...     return SpikeTrains.from_lists([
-    ...         sed.times_ms[course > 1.0][:1] for course in sed.sed_kpa.T
+    ...         traces.times_ms[course > 1.0][:1] for course in traces.values.T
     ...     ])
-    >>> sed = SedTraces([0.0, 25.0, 50.0], [[0.0, 0.0], [0.5, 1.5], [0.9, 3.0]])
-    >>> [train.tolist() for train in OwnAfferent(first).spikes(sed)]
+    >>> traces = Traces([0.0, 25.0, 50.0], [[0.0, 0.0], [0.5, 1.5], [0.9, 3.0]])
+    >>> [train.tolist() for train in OwnAfferent(first).spikes(traces)]
     [[], [25.0]]
 
     A current in proportion to its root, and a membrane:
 
-    >>> def root(sed):
-    ...     return CurrentTraces(sed.times_ms, 1e-6 * sed.sed_kpa**0.5)
+    >>> def root(traces):
+    ...     return Traces(traces.times_ms, 1e-6 * traces.values**0.5, quantity="current")
     >>> membrane = LeakyIntegrateAndFire(10.0, 1e-6, 5.0, 1.0)
-    >>> [train.size for train in OwnAfferent(root, membrane).spikes(sed)]
+    >>> [train.size for train in OwnAfferent(root, membrane).spikes(traces)]
     [3, 6]
     """
 
-    respond: Callable[[SedTraces], CurrentTraces | SpikeTrains]
+    respond: Callable[[Traces], Traces | SpikeTrains]
     membrane: LeakyIntegrateAndFire | None = None
     dynamic_quantity: str = STORED_ENERGY
     static_quantity: str = STORED_ENERGY
     rate_measure: str = INTERVAL
 
-    MUST_RETURN: ClassVar[str] = "respond must return CurrentTraces or SpikeTrains, an entry per site"
+    MUST_RETURN: ClassVar[str] = "respond must return Traces of a current, or SpikeTrains, an entry per site"
 
     def __post_init__(self) -> None:
         if not callable(self.respond):
-            raise InputError(f"respond must be a function of SedTraces: got {shown(self.respond)}.")
+            raise InputError(f"respond must be a function of Traces: got {shown(self.respond)}.")
         if self.membrane is not None:
             instance("membrane", self.membrane, LeakyIntegrateAndFire)
         one_of("rate_measure", self.rate_measure, (INTERVAL, COUNT))
         check_known_quantities(self)
 
-    def spikes(self, sed: SedTraces) -> SpikeTrains:
+    def spikes(self, traces: Traces) -> SpikeTrains:
         """Spikes at every site."""
-        check_quantities(self, sed)
-        given = self.respond(sed)
-        if isinstance(given, CurrentTraces):
+        check_quantities(self, traces)
+        given = self.respond(traces)
+        if isinstance(given, Traces) and given.quantity in CURRENTS:
             if self.membrane is None:
                 raise InputError(
                     "OwnAfferent needs a membrane because respond returns a current: got none; give "
                     "membrane=LeakyIntegrateAndFire(...), or let respond return SpikeTrains."
                 )
             given = self.membrane.spikes(given)
-        if not isinstance(given, SpikeTrains) or len(given) != sed.n_sites:
-            got = f"{len(given)} trains" if isinstance(given, SpikeTrains) else type(given).__name__
-            raise InputError(f"{self.MUST_RETURN}, {sed.n_sites} in all: got {got}.")
+        if not isinstance(given, SpikeTrains) or len(given) != traces.n_sites:
+            got = f"{len(given)} trains" if isinstance(given, SpikeTrains) else shown(given)
+            raise InputError(f"{self.MUST_RETURN}, {traces.n_sites} in all: got {got}.")
         return given

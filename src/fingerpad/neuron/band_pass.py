@@ -19,7 +19,7 @@ import numpy as np
 from numba import njit
 
 from fingerpad.core.checks import FloatArray, positive, whole
-from fingerpad.core.signals import SedTraces
+from fingerpad.core.signals import Traces
 from fingerpad.core.threads import in_blocks
 from fingerpad.core.units import MS_PER_S
 from fingerpad.core.values import converted
@@ -65,12 +65,12 @@ class BandPass:
         relative = np.asarray(frequency_hz, np.float64) / self.corner_hz
         return relative**self.rise / np.sqrt(1.0 + relative**2) ** (self.rise + self.fall)
 
-    def of(self, traces: SedTraces | Drive) -> tuple[FloatArray, FloatArray]:
+    def of(self, traces: Traces | Drive) -> tuple[FloatArray, FloatArray]:
         """Filter the quantity of the static term at every site; before the first time it is constant."""
         driven = traces if isinstance(traces, Drive) else resampled(traces, self.time_constant_ms)
 
         def filtered(sites: slice) -> FloatArray:
-            values = np.array(driven.sed_kpa[:, sites])
+            values = np.array(driven.values[:, sites])
             for stage in range(self.rise + self.fall):
                 _stage(driven.times_ms, values, self.time_constant_ms, stage < self.rise)
             return values
@@ -94,18 +94,18 @@ def knots_between(start_ms: float, end_ms: float, time_constant_ms: float) -> Fl
     return knots_of(np.array([start_ms, end_ms]), _MOST_PIECES, time_constant_ms / _KNOTS_PER_TIME_CONSTANT)
 
 
-def resampled(traces: SedTraces, time_constant_ms: float) -> Drive:
+def resampled(traces: Traces, time_constant_ms: float) -> Drive:
     """Resample traces so finely that a first-order stage with this time constant follows them. [ms]"""
     step_ms = time_constant_ms / _KNOTS_PER_TIME_CONSTANT
     return drive(traces, pieces=_MOST_PIECES, shortest_piece_ms=step_ms)
 
 
-def smoothed_rate(traces: SedTraces, time_constant_ms: float) -> tuple[FloatArray, FloatArray]:
+def smoothed_rate(traces: Traces, time_constant_ms: float) -> tuple[FloatArray, FloatArray]:
     """Rate of change of a quantity behind a first-order low pass: what this holds back, over its constant."""
     driven = resampled(traces, time_constant_ms)
 
     def held_back(sites: slice) -> FloatArray:
-        values = np.array(driven.sed_kpa[:, sites])
+        values = np.array(driven.values[:, sites])
         _stage(driven.times_ms, values, time_constant_ms, True)
         return values
 

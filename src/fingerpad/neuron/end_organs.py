@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -12,7 +12,7 @@ from fingerpad.core.errors import InputError
 from fingerpad.core.keywords import KnownKeywords
 from fingerpad.core.layouts import Place
 from fingerpad.core.random_streams import Purpose, uniforms
-from fingerpad.core.signals import SedTraces
+from fingerpad.core.signals import Traces
 from fingerpad.core.values import converted
 
 _SUM_TOLERANCE = 1e-6
@@ -43,7 +43,7 @@ class EndOrgans(metaclass=KnownKeywords):
     Examples
     --------
     >>> ends = EndOrgans([[[17.0, 0.0], [18.0, 0.0]]], weights=[0.75, 0.25])
-    >>> ends.combined(SedTraces([0.0, 50.0], [[0.0, 0.0], [2.0, 4.0]])).sed_kpa.tolist()
+    >>> ends.combined(Traces([0.0, 50.0], [[0.0, 0.0], [2.0, 4.0]])).values.tolist()
     [[0.0], [2.5]]
     """
 
@@ -134,13 +134,9 @@ class EndOrgans(metaclass=KnownKeywords):
         """All end organs, afferent by afferent, (n_afferents n_ends, 2 or 3). [mm]"""
         return self.positions_mm.reshape(-1, self.positions_mm.shape[-1])
 
-    def combined(self, traces: SedTraces) -> SedTraces:
+    def combined(self, traces: Traces) -> Traces:
         """Traces of the afferents from those of `sites_mm`."""
-        return replace(
-            traces,
-            sed_kpa=self._together(traces.sed_kpa),
-            dynamic_kpa=None if traces.dynamic_kpa is None else self._together(traces.dynamic_kpa),
-        )
+        return traces.with_values(self._together)
 
     def _together(self, values: FloatArray) -> FloatArray:
         shaped = values.reshape(len(values), *self.positions_mm.shape[:2])

@@ -25,11 +25,11 @@ from numba import njit
 from fingerpad.core.checks import FloatArray, positive
 from fingerpad.core.philox import four_uniforms
 from fingerpad.core.random_streams import Presentations, Purpose, checked_sites
-from fingerpad.core.signals import CurrentTraces, SpikeTrains
+from fingerpad.core.signals import SpikeTrains, Traces
 from fingerpad.core.threads import in_blocks
 from fingerpad.core.values import converted
 from fingerpad.neuron.exact_spikes import potential_at
-from fingerpad.neuron.lif import LeakyIntegrateAndFire
+from fingerpad.neuron.lif import LeakyIntegrateAndFire, checked_current
 
 ESCAPE_TIME_MS = 1.0
 """Mean time to a spike at a potential equal to the threshold, tau_e: a convention. [ms]"""
@@ -76,7 +76,7 @@ class EscapeRate:
     Examples
     --------
     >>> neuron = LeakyIntegrateAndFire(68.0, 1e-6, 50.0, 1.0)
-    >>> steady = CurrentTraces([0.0, 100.0], [[2e-6], [2e-6]])
+    >>> steady = Traces([0.0, 100.0], [[2e-6], [2e-6]], quantity="current")
     >>> EscapeRate(neuron, width=0.1).spikes(steady, seed=1)[0].round(1).tolist()
     [28.7, 56.3, 83.4]
     >>> EscapeRate(neuron, width=1e-4).spikes(steady, seed=1)[0].round(1).tolist()
@@ -91,15 +91,13 @@ class EscapeRate:
         positive("width", self.width)
         positive("escape_ms", self.escape_ms, "ms")
 
-    def spikes(
-        self, current: CurrentTraces, seed: int, presentations: Presentations | None = None
-    ) -> SpikeTrains:
+    def spikes(self, current: Traces, seed: int, presentations: Presentations | None = None) -> SpikeTrains:
         """Simulate spike times by time rescaling.
 
         Parameters
         ----------
-        current : CurrentTraces
-            One column per site. [mA]
+        current : Traces
+            Of a current, one column per site. [mA]
         seed : int
             Seed of the run; the same seed gives the same spikes on any number of threads.
         presentations : Presentations, optional
@@ -113,10 +111,10 @@ class EscapeRate:
         Raises
         ------
         InputError
-            If a presentation names a site that does not exist.
+            If the traces are not of a current, or a presentation names a site that does not exist.
         """
         everyone = presentations or Presentations.of_population(current.n_sites)
-        checked_sites(everyone.sites, current.n_sites)
+        checked_sites(everyone.sites, checked_current(current).n_sites)
         drives, initial = self.relative_drive(current), self.initial_potentials(current)
         numbers = (
             float(self.membrane.time_constant_ms),
@@ -132,14 +130,14 @@ class EscapeRate:
 
         return SpikeTrains.joined(in_blocks(trains, len(everyone), _TRAINS_PER_BLOCK))
 
-    def initial_potentials(self, current: CurrentTraces) -> FloatArray:
+    def initial_potentials(self, current: Traces) -> FloatArray:
         """Potentials at the first time over the threshold, (n_sites,)."""
-        return self.membrane.initial_potentials_mv(current.current_ma[0]) / self.membrane.threshold_mv
+        return self.membrane.initial_potentials_mv(current.values[0]) / self.membrane.threshold_mv
 
-    def relative_drive(self, current: CurrentTraces) -> FloatArray:
+    def relative_drive(self, current: Traces) -> FloatArray:
         """I/(C v), a row for each site. [1/ms]"""
         scale = self.membrane.capacitance_mf * self.membrane.threshold_mv
-        return np.ascontiguousarray(current.current_ma.T) / scale
+        return np.ascontiguousarray(current.values.T) / scale
 
 
 @njit(cache=True, error_model="numpy", nogil=True)

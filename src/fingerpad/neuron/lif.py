@@ -11,10 +11,20 @@ from dataclasses import dataclass
 
 from fingerpad.core.checks import FloatArray, finite, positive
 from fingerpad.core.errors import InputError
-from fingerpad.core.signals import CurrentTraces, SpikeTrains
+from fingerpad.core.signals import CURRENTS, SpikeTrains, Traces
 from fingerpad.core.threads import in_blocks
 from fingerpad.core.values import converted
 from fingerpad.neuron.exact_spikes import exact_trains, initial_potentials
+
+
+def checked_current(traces: Traces) -> Traces:
+    """Return traces of a current, or raise `InputError`."""
+    if traces.quantity not in CURRENTS:
+        raise InputError(
+            f"A membrane needs traces of a current: got {traces.quantity!r}; compute the current with "
+            "Transduction.current, or give quantity='current'."
+        )
+    return traces
 
 
 @dataclass(frozen=True)
@@ -49,7 +59,7 @@ class LeakyIntegrateAndFire:
     A constant current of 2 µA charges at 2 mV/ms minus the leak and reaches 50 mV every 32 ms.
 
     >>> neuron = LeakyIntegrateAndFire(68.0, 1e-6, 50.0, 1.0)
-    >>> spikes = neuron.spikes(CurrentTraces([0.0, 100.0], [[2e-6], [2e-6]]))
+    >>> spikes = neuron.spikes(Traces([0.0, 100.0], [[2e-6], [2e-6]], quantity="current"))
     >>> spikes[0].round(3).tolist()
     [31.165, 63.33, 95.495]
     """
@@ -71,23 +81,29 @@ class LeakyIntegrateAndFire:
                 "leave it out to start at rest."
             )
 
-    def spikes(self, current: CurrentTraces) -> SpikeTrains:
+    def spikes(self, current: Traces) -> SpikeTrains:
         """Spike times of one neuron per site, exact for a piecewise linear current.
 
         Parameters
         ----------
-        current : CurrentTraces
-            One column per neuron.
+        current : Traces
+            Of a current, one column per neuron. [mA]
 
         Returns
         -------
         SpikeTrains
             One train per site, up to the last knot.
+
+        Raises
+        ------
+        InputError
+            If the traces hold another quantity than a current.
         """
+        checked_current(current)
 
         def trains(neurons: slice) -> SpikeTrains:
             some = current.part(neurons)
-            return SpikeTrains(*exact_trains(some.times_ms, some.current_ma, *self.constants()))
+            return SpikeTrains(*exact_trains(some.times_ms, some.values, *self.constants()))
 
         return SpikeTrains.joined(in_blocks(trains, current.n_sites))
 

@@ -14,6 +14,7 @@ from fingerpad.core.displayed import Result
 from fingerpad.core.errors import InputError
 from fingerpad.core.keywords import KnownKeywords
 from fingerpad.core.layouts import Place
+from fingerpad.core.random_streams import seed_of
 from fingerpad.core.signals import ResponseMap, Skin, SpikeTrains, traces_below
 from fingerpad.core.values import converted
 from fingerpad.data import afferents as published
@@ -295,8 +296,3 @@ class MixedPopulation(metaclass=KnownKeywords):
                 maps[name] = part.respond_to(traces.part(slice(start, start + len(part.sites_mm))), *windows)
                 start += len(part.sites_mm)
         return MixedResponse(MappingProxyType({name: maps[name] for name in self.parts}))
-
-
-def seed_of(seed: int, number: int) -> int:
-    """Seed of one type, so that one more type leaves the others where they are."""
-    return int(np.random.SeedSequence([seed, number]).generate_state(1)[0])

@@ -15,7 +15,7 @@ from fingerpad.core.errors import InputError, TissuesWarning, level_of_caller, s
 from fingerpad.core.keywords import KnownKeywords, known_keywords
 from fingerpad.core.layouts import MOST_RECEPTORS, Layout, Place, around_zero
 from fingerpad.core.random_streams import Purpose, normals
-from fingerpad.core.signals import INTERVAL, ResponseMap, SedTraces, Skin, traces_below
+from fingerpad.core.signals import INTERVAL, ResponseMap, Skin, Traces, traces_below
 from fingerpad.core.values import converted
 from fingerpad.data import fingertip, psychophysics
 from fingerpad.data.tissues import DEFAULT_TISSUES
@@ -344,7 +344,7 @@ class Population(metaclass=KnownKeywords):
 
     def respond_to(
         self,
-        sed: SedTraces,
+        traces: Traces,
         dynamic_window_ms: Window | None = None,
         static_window_ms: Window | None = None,
     ) -> ResponseMap:
@@ -352,7 +352,7 @@ class Population(metaclass=KnownKeywords):
 
         Parameters
         ----------
-        sed : SedTraces
+        traces : Traces
             Traces of `quantities` at `sites_mm`.
         dynamic_window_ms, static_window_ms : (float, float), optional
             As in `respond`. [ms]
@@ -363,27 +363,27 @@ class Population(metaclass=KnownKeywords):
             If there is not one trace per site, or a window is missing.
         """
         sites = self.sites_mm
-        if sed.n_sites != len(sites):
+        if traces.n_sites != len(sites):
             raise InputError(
-                f"skin.sed must give one trace per receptor: got {sed.n_sites} for {len(sites)}."
+                f"skin.sed must give one trace per receptor: got {traces.n_sites} for {len(sites)}."
             )
         if self.ends is not None:
-            sed = self.ends.combined(sed)
+            traces = self.ends.combined(traces)
         measure = getattr(self.afferent, "rate_measure", INTERVAL)
         windows_ms = rate_windows_ms(
-            sed.phases, dynamic_window_ms, static_window_ms, sed.times_ms[-1], measure
+            traces.phases, dynamic_window_ms, static_window_ms, traces.times_ms[-1], measure
         )
         # What an afferent follows and its gains enter as a product: scaling the one scales the others.
-        spikes = self.afferent.spikes(sed if self.sensitivity is None else sed.scaled(self.sensitivity))
+        spikes = self.afferent.spikes(traces if self.sensitivity is None else traces.scaled(self.sensitivity))
         return ResponseMap(
             positions_mm=self.positions_mm,
             pitch_mm=self.pitch_mm,
             spikes=spikes,
             dynamic_rate_hz=RATE_OF[measure](spikes, windows_ms[0]),
             static_rate_hz=RATE_OF[measure](spikes, windows_ms[1]),
-            first_spike_latency_ms=first_spike_latency_ms(spikes, sed.onset_ms),
-            duration_ms=float(sed.times_ms[-1]),
-            phases=sed.phases,
+            first_spike_latency_ms=first_spike_latency_ms(spikes, traces.onset_ms),
+            duration_ms=float(traces.times_ms[-1]),
+            phases=traces.phases,
             windows_ms=windows_ms,
             rate_measure=measure,
             quantity=self.afferent.static_quantity,

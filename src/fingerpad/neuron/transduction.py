@@ -25,7 +25,7 @@ from fingerpad.core.checks import FloatArray, finite, float_array, positive, who
 from fingerpad.core.errors import InputError
 from fingerpad.core.keywords import known_keywords
 from fingerpad.core.phases import Phase
-from fingerpad.core.signals import STORED_ENERGY, CurrentTraces, SedTraces
+from fingerpad.core.signals import CURRENT, STORED_ENERGY, Traces
 from fingerpad.core.values import converted
 
 PIECES_PER_INTERVAL = 32
@@ -42,42 +42,42 @@ SAME_COUNT = 1e-6
 @dataclass(frozen=True)
 @converted
 class Drive:
-    """Strain energy density and its rate of change, both piecewise linear between the same knots."""
+    """A quantity, and the rate of change of it or of another one, piecewise linear between the same knots."""
 
     times_ms: FloatArray
     """Knots; a repeated knot is a jump of the rate, (n_knots,). [ms]"""
-    sed_kpa: FloatArray
-    """Strain energy density, or the quantity of the static term in its place, (n_knots, n_sites). [kPa]"""
-    rate_kpa_per_ms: FloatArray
-    """Absolute rate of change of SED, U' of Eq. 2, or of another quantity of the dynamic term; 0 at the
-    onset, (n_knots, n_sites). [kPa/ms, for a strain 1/ms]
+    values: FloatArray
+    """Quantity of the static term, (n_knots, n_sites). [its unit in `fingerpad.core.units.QUANTITY_UNITS`]"""
+    rate_per_ms: FloatArray
+    """Absolute rate of change of the quantity of the dynamic term, U' of Eq. 2; 0 at the onset, (n_knots,
+    n_sites). [its unit/ms]
     """
     dynamic_quantity: str = STORED_ENERGY
     static_quantity: str = STORED_ENERGY
     """What the two terms follow, by the names of `SkinResponse.sample`; "stored" is SED."""
     phases: tuple[Phase, ...] = ()
-    """As of `SedTraces`."""
+    """As of `Traces`."""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "times_ms", float_array("times_ms", self.times_ms, 1))
-        for name in ("sed_kpa", "rate_kpa_per_ms"):
+        for name in ("values", "rate_per_ms"):
             object.__setattr__(self, name, float_array(name, getattr(self, name), 2))
-        if not self.times_ms.size == len(self.sed_kpa) or self.sed_kpa.shape != self.rate_kpa_per_ms.shape:
+        if not self.times_ms.size == len(self.values) or self.values.shape != self.rate_per_ms.shape:
             raise InputError(
-                "Drive needs one row of sed_kpa and of rate_kpa_per_ms per knot: "
-                f"got {self.sed_kpa.shape} and {self.rate_kpa_per_ms.shape} for {self.times_ms.size} knots."
+                "Drive needs one row of values and of rate_per_ms per knot: "
+                f"got {self.values.shape} and {self.rate_per_ms.shape} for {self.times_ms.size} knots."
             )
 
     @property
     def n_sites(self) -> int:
         """Number of receptor sites."""
-        return self.sed_kpa.shape[1]
+        return self.values.shape[1]
 
     def part(self, sites: slice) -> Drive:
         """Drive of some of the sites."""
         if sites == slice(0, self.n_sites):
             return self
-        return replace(self, sed_kpa=self.sed_kpa[:, sites], rate_kpa_per_ms=self.rate_kpa_per_ms[:, sites])
+        return replace(self, values=self.values[:, sites], rate_per_ms=self.rate_per_ms[:, sites])
 
 
 @dataclass(frozen=True)
@@ -90,17 +90,17 @@ class Transduction:
     intercept_ma : float
         Current without any load, beta. [mA]
     dynamic_gain : float
-        Gain on the rate of change of SED, k_d. [mA ms/kPa]
+        Gain on the rate of change of SED, or of another quantity, k_d. [mA ms/kPa, or per its unit]
     static_gain : float
-        Gain on SED itself, k_s. [mA/kPa]
+        Gain on SED itself, or on another quantity, k_s. [mA/kPa, or per its unit]
 
     Examples
     --------
     SED rises by 2 kPa in 50 ms and stays: the current jumps, grows, drops and stays.
 
-    >>> sed = SedTraces([0.0, 50.0, 1000.0], [[0.0], [2.0], [2.0]], kinks_ms=[50.0])
-    >>> current = Transduction(0.0, dynamic_gain=1e-4, static_gain=1e-6).current(sed)
-    >>> [f"{current.current_ma[knot, 0]:.1e}" for knot in (0, 1, 33, 34, -1)]
+    >>> traces = Traces([0.0, 50.0, 1000.0], [[0.0], [2.0], [2.0]], kinks_ms=[50.0])
+    >>> current = Transduction(0.0, dynamic_gain=1e-4, static_gain=1e-6).current(traces)
+    >>> [f"{current.values[knot, 0]:.1e}" for knot in (0, 1, 33, 34, -1)]
     ['0.0e+00', '4.0e-06', '6.0e-06', '2.0e-06', '2.0e-06']
     """
 
@@ -113,26 +113,26 @@ class Transduction:
         finite("dynamic_gain", self.dynamic_gain, "mA ms/kPa")
         finite("static_gain", self.static_gain, "mA/kPa")
 
-    def current(self, sed: SedTraces | Drive) -> CurrentTraces:
+    def current(self, traces: Traces | Drive) -> Traces:
         """Compute the current through the membrane at every site, Eq. 1: I = beta + k_d U' + k_s U.
 
         Parameters
         ----------
-        sed : SedTraces or Drive
+        traces : Traces or Drive
             Traces are resampled with the defaults of `drive`.
 
         Returns
         -------
-        CurrentTraces
-            It jumps where the rate jumps.
+        Traces
+            Of the current, which jumps where the rate jumps. [mA]
         """
-        driven = sed if isinstance(sed, Drive) else drive(sed)
+        driven = traces if isinstance(traces, Drive) else drive(traces)
         current_ma = (
-            self.intercept_ma + self.dynamic_gain * driven.rate_kpa_per_ms + self.static_gain * driven.sed_kpa
+            self.intercept_ma + self.dynamic_gain * driven.rate_per_ms + self.static_gain * driven.values
         )
-        return CurrentTraces(driven.times_ms, current_ma)
+        return Traces(driven.times_ms, current_ma, quantity=CURRENT)
 
-    def largest_current_ma(self, sed: SedTraces) -> FloatArray:
+    def largest_current_ma(self, traces: Traces) -> FloatArray:
         """Bound of the current at every site, without a resampled trace.
 
         Between two times a monotone cubic is at most as large as at one of them, and at most three times as
@@ -140,7 +140,7 @@ class Transduction:
 
         Parameters
         ----------
-        sed : SedTraces
+        traces : Traces
             As of `current`.
 
         Returns
@@ -154,13 +154,14 @@ class Transduction:
 
         Examples
         --------
-        >>> sed = SedTraces([0.0, 50.0, 1000.0], [[0.0], [2.0], [2.0]], kinks_ms=[50.0])
-        >>> Transduction(0.0, dynamic_gain=1e-4, static_gain=1e-6).largest_current_ma(sed).round(9).tolist()
+        >>> traces = Traces([0.0, 50.0, 1000.0], [[0.0], [2.0], [2.0]], kinks_ms=[50.0])
+        >>> gains = Transduction(0.0, dynamic_gain=1e-4, static_gain=1e-6)
+        >>> gains.largest_current_ma(traces).round(9).tolist()
         [1.4e-05]
         """
-        dynamic = sed.sed_kpa if sed.dynamic_kpa is None else sed.dynamic_kpa
+        slope, value = 3.0 * max(self.dynamic_gain, 0.0), self.static_gain
         above = _largest_sum(
-            np.diff(sed.times_ms), dynamic, sed.sed_kpa, 3.0 * max(self.dynamic_gain, 0.0), self.static_gain
+            np.diff(traces.times_ms), traces.dynamic_term.values, traces.values, slope, value
         )
         return self.intercept_ma + above
 
@@ -180,26 +181,26 @@ def _largest_sum(lengths, dynamic, static, of_slope, of_value):  # type: ignore[
 
 @known_keywords
 def drive(
-    sed: SedTraces,
+    traces: Traces,
     *,
     difference_step_ms: float | None = None,
     pieces: int = PIECES_PER_INTERVAL,
     shortest_piece_ms: float = SHORTEST_PIECE_MS,
 ) -> Drive:
-    """Resample strain energy density and compute its rate of change, Eq. 2.
+    """Resample what drives the current and compute the rate of change of its dynamic term, Eq. 2.
 
     Each interval between two given times is divided into `pieces` equal pieces (fewer if they would be
     shorter than `shortest_piece_ms`), on which the cubic and its derivative are replaced by linear
     functions. The error decreases with the square of the number of pieces and is proportional to the change
-    of SED in the interval, so long smooth intervals need no more knots than short steep ones. Twice the
+    in the interval, so long smooth intervals need no more knots than short steep ones. Twice the
     default number moves half of the spikes of a ramp and hold of 8 + 12 steps by less than 0.005 ms, and
     none by more than 0.1 ms (a spike whose potential hardly exceeds the threshold).
 
     Parameters
     ----------
-    sed : SedTraces
-        Its `kinks_ms` and its onset separate the phases, each with its own interpolant. If it has
-        `dynamic_kpa`, the rate is that of this quantity.
+    traces : Traces
+        Its `kinks_ms` and its onset separate the phases, each with its own interpolant. The rate is
+        that of the quantity of the dynamic term.
     difference_step_ms : float, optional
         Step h of the backward difference printed as Eq. 2 (the paper: 0.001 ms). Before the onset SED is
         that of the onset. Default: the limit h -> 0, the derivative of the interpolant. [ms]
@@ -221,53 +222,41 @@ def drive(
 
     Examples
     --------
-    >>> ramp = SedTraces([0.0, 50.0], [[0.0], [2.0]])
+    >>> ramp = Traces([0.0, 50.0], [[0.0], [2.0]])
     >>> resampled = drive(ramp, pieces=2)
     >>> resampled.times_ms.tolist()
     [0.0, 0.0, 25.0, 50.0]
-    >>> resampled.rate_kpa_per_ms[:, 0].round(6).tolist()
+    >>> resampled.rate_per_ms[:, 0].round(6).tolist()
     [0.0, 0.04, 0.04, 0.04]
     """
     whole("pieces", pieces, 1)
     positive("shortest_piece_ms", shortest_piece_ms, "ms")
-    if sed.dynamic_kpa is not None:
-        energy, followed = (
+    if traces.dynamic is not None:
+        static, dynamic = (
             drive(
-                SedTraces(sed.times_ms, values, sed.kinks_ms, onset_ms=sed.onset_ms),
+                each,
                 difference_step_ms=difference_step_ms,
                 pieces=pieces,
                 shortest_piece_ms=shortest_piece_ms,
             )
-            for values in (sed.sed_kpa, sed.dynamic_kpa)
+            for each in (replace(traces, dynamic=None), traces.dynamic)
         )
-        return replace(
-            energy,
-            rate_kpa_per_ms=followed.rate_kpa_per_ms,
-            dynamic_quantity=sed.dynamic_quantity,
-            static_quantity=sed.static_quantity,
-            phases=sed.phases,
-        )
-    spans = _between_kinks(sed)
-    knots = [knots_of(sed.times_ms[first : last + 1], pieces, shortest_piece_ms) for first, last in spans]
+        return replace(static, rate_per_ms=dynamic.rate_per_ms, dynamic_quantity=dynamic.dynamic_quantity)
+    spans = _between_kinks(traces)
+    knots = [knots_of(traces.times_ms[first : last + 1], pieces, shortest_piece_ms) for first, last in spans]
     if difference_step_ms is not None:
-        driven = _difference(sed, spans, knots, positive("difference_step_ms", difference_step_ms, "ms"))
-        return replace(
-            driven,
-            dynamic_quantity=sed.dynamic_quantity,
-            static_quantity=sed.static_quantity,
-            phases=sed.phases,
-        )
-    times = np.concatenate([sed.times_ms[:1], *knots])
-    values, rates = np.empty((2, times.size, sed.n_sites))
-    values[0], rates[0] = sed.sed_kpa[0], 0.0
+        return _difference(traces, spans, knots, positive("difference_step_ms", difference_step_ms, "ms"))
+    times = np.concatenate([traces.times_ms[:1], *knots])
+    values, rates = np.empty((2, times.size, traces.n_sites))
+    values[0], rates[0] = traces.values[0], 0.0
     start = 1
     for (first, last), some in zip(spans, knots, strict=True):
         given, rows = slice(first, last + 1), slice(start, start + some.size)
-        _interpolate(sed.times_ms[given], sed.sed_kpa[given], some, values[rows], rates[rows])
+        _interpolate(traces.times_ms[given], traces.values[given], some, values[rows], rates[rows])
         start = rows.stop
     for array in (times, values, rates):
         array.setflags(write=False)
-    return Drive(times, values, rates, sed.dynamic_quantity, sed.static_quantity, sed.phases)
+    return Drive(times, values, rates, traces.quantity, traces.quantity, traces.phases)
 
 
 @njit(cache=True, error_model="numpy", nogil=True)
@@ -321,11 +310,11 @@ def _end_slope(length: float, other: float, slope: float, beside: float) -> floa
     return 3.0 * slope if slope * beside <= 0.0 and abs(found) > 3.0 * abs(slope) else found
 
 
-def _between_kinks(sed: SedTraces) -> list[tuple[int, int]]:
+def _between_kinks(traces: Traces) -> list[tuple[int, int]]:
     """First and last index of the times of each part between kinks; the onset is one of them."""
-    borders = np.flatnonzero(np.isin(sed.times_ms, np.append(sed.kinks_ms, sed.onset_ms)))
-    inner = borders[(borders > 0) & (borders < sed.times_ms.size - 1)]
-    return list(pairwise([0, *inner.tolist(), sed.times_ms.size - 1]))
+    borders = np.flatnonzero(np.isin(traces.times_ms, np.append(traces.kinks_ms, traces.onset_ms)))
+    inner = borders[(borders > 0) & (borders < traces.times_ms.size - 1)]
+    return list(pairwise([0, *inner.tolist(), traces.times_ms.size - 1]))
 
 
 def knots_of(times_ms: FloatArray, pieces: int, shortest_piece_ms: float) -> FloatArray:
@@ -339,17 +328,18 @@ def knots_of(times_ms: FloatArray, pieces: int, shortest_piece_ms: float) -> Flo
 
 
 def _difference(
-    traces: SedTraces, spans: list[tuple[int, int]], knots: list[FloatArray], step_ms: float
+    traces: Traces, spans: list[tuple[int, int]], knots: list[FloatArray], step_ms: float
 ) -> Drive:
     """Compute the backward difference of Eq. 2 as printed: U' = |U(t) - U(t - h)| / h."""
     given = traces.times_ms
     parts = [
-        PchipInterpolator(given[first : last + 1], traces.sed_kpa[first : last + 1]) for first, last in spans
+        PchipInterpolator(given[first : last + 1], traces.values[first : last + 1]) for first, last in spans
     ]
-    sed = PPoly(np.concatenate([part.c for part in parts], axis=1), given)
+    values = PPoly(np.concatenate([part.c for part in parts], axis=1), given)
     onset, end = given[0], given[-1]
     # From one step after a kink on, the difference lies within one part: a knot there limits the jump.
     settled = np.array([part.x[0] + step_ms for part in parts])
     times = np.unique(np.concatenate([*knots, settled[settled < end]]))
     before = np.maximum(times - step_ms, onset)
-    return Drive(times, sed(times), np.abs(sed(times) - sed(before)) / step_ms)
+    rates = np.abs(values(times) - values(before)) / step_ms
+    return Drive(times, values(times), rates, traces.quantity, traces.quantity, traces.phases)

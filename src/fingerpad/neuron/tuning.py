@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 from fingerpad.core.checks import FloatArray, float_array, not_negative, positive
 from fingerpad.core.errors import InputError
 from fingerpad.core.keywords import known_keywords
-from fingerpad.core.signals import SedTraces
+from fingerpad.core.signals import Traces
 from fingerpad.core.units import MS_PER_S
 from fingerpad.neuron.afferent import AnyAfferent, checked_afferent
 
@@ -30,23 +30,17 @@ _AMPLITUDES, _ROUNDS = 41, 3
 
 def vibration(
     frequency_hz: float, amplitudes_um: ArrayLike, per_um: float, hold: float, quantity: str
-) -> SedTraces:
+) -> Traces:
     """Traces of one quantity under a vibration on a hold, a column per amplitude; none falls below 0."""
     period_ms = MS_PER_S / positive("frequency_hz", frequency_hz, "Hz")
     phase = np.arange(CYCLES * SAMPLES_PER_CYCLE + 1) / SAMPLES_PER_CYCLE
     wave = np.outer(np.sin(2.0 * np.pi * phase), per_um * float_array("amplitudes_um", amplitudes_um, 1))
     times_ms = np.append(0.0, SETTLING_MS + period_ms * phase)
     values = np.maximum(not_negative("hold", hold) + np.vstack([0.0 * wave[:1], wave]), 0.0)
-    return SedTraces(
-        times_ms,
-        values,
-        kinks_ms=np.array([SETTLING_MS]),
-        dynamic_quantity=quantity,
-        static_quantity=quantity,
-    )
+    return Traces(times_ms, values, kinks_ms=np.array([SETTLING_MS]), quantity=quantity)
 
 
-def impulses_per_cycle(afferent: AnyAfferent, traces: SedTraces) -> FloatArray:
+def impulses_per_cycle(afferent: AnyAfferent, traces: Traces) -> FloatArray:
     """Impulses in the counted cycles of `vibration`, over their number, (n_amplitudes,)."""
     end_ms = float(traces.times_ms[-1])
     from_ms = end_ms - (end_ms - SETTLING_MS) * COUNTED_CYCLES / CYCLES

@@ -20,6 +20,7 @@ import numpy as np
 from fingerpad.core.checks import FloatArray, instance, whole
 from fingerpad.core.errors import InputError
 from fingerpad.core.keywords import known_keywords
+from fingerpad.core.random_streams import published_generator
 from fingerpad.core.signals import STORED_ENERGY
 from fingerpad.data.neuron import HUMAN_QUANTITY
 from fingerpad.geometry.trajectory import Trajectory
@@ -109,7 +110,7 @@ def reduce_touch(
     model = with_exponents(model, repressed, shape)
     if not calibration:
         return model
-    random = np.random.default_rng(seed)
+    random = published_generator(seed)
     held_out = [draw_touch(training, model, random) for _ in range(calibration)]
     solved = solve([touch for _, touch in held_out], "calibration")
     errors = [largest_errors(model, skin, shape) for (shape, _), skin in zip(held_out, solved, strict=True)]

@@ -87,11 +87,11 @@ class ReducedModel(metaclass=KnownKeywords):
     coefficients : array (n_poses, n_terms, n_modes)
         Coefficients of the modes.
     modes : array (n_modes, n_quantities, n_grid, n_grid)
-        Fields about the middle of the contact. [kPa]
+        Fields about the middle of the contact. [each in its unit]
     reach_mm : array (2,)
         Half-extent of the fields along and across. [mm]
     largest : array (n_quantities + 1,)
-        Largest values of the quantities [kPa] and of the force [mN] in the training.
+        Largest values of the quantities [each in its unit] and of the force [mN] in the training.
     error : array (n_quantities + 1,)
         Errors that 95 % of new touches stay within, all of them together, over `error_scale` (see
         `building`). Infinite before that is measured.

@@ -58,11 +58,11 @@ class ReducedSample(Result):
     contact_area_mm2 : float
         Undeformed skin in contact. [mm²]
     fields : dict of str to array (n_receptors,)
-        Quantities at the receptors. [kPa]
+        Quantities at the receptors. [each in its unit]
     force_error_mn : float
         The force of a full solution lies within it for 95 % of touches. [mN]
     field_errors : dict of str to float
-        The same of each quantity, at all receptors. [kPa]
+        The same of each quantity, at all receptors. [its unit]
     """
 
     time_ms: float

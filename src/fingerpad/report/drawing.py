@@ -16,7 +16,7 @@ from matplotlib.figure import Figure
 from fingerpad.core.checks import FloatArray, one_of
 from fingerpad.core.displayed import Displayed
 from fingerpad.core.errors import InputError
-from fingerpad.core.signals import COUNT, CurrentTraces, HitRates, ResponseMap, SedTraces, SpikeTrains
+from fingerpad.core.signals import COUNT, CURRENT, HitRates, ResponseMap, SpikeTrains, Traces
 from fingerpad.core.units import with_unit
 from fingerpad.experiments.discrimination.analysis import TaskResult
 from fingerpad.experiments.fit.results import FitResult
@@ -123,16 +123,14 @@ def draw_map(axes: Axes, response: ResponseMap, quantity: str | None = None) -> 
     axes.set(**MAP_AXES)
 
 
-def draw_traces(axes: Axes, traces: SedTraces) -> None:
-    """Draw what the static term follows over time, a line per site."""
-    _draw_by_site(axes, traces.times_ms, traces.sed_kpa)
-    axes.set(xlabel="time [ms]", ylabel=_label(traces.static_quantity))
-
-
-def draw_currents(axes: Axes, traces: CurrentTraces) -> None:
-    """Draw membrane currents over time, a line per site."""
-    _draw_by_site(axes, traces.times_ms, NANOAMPERE_PER_MA * traces.current_ma)
-    axes.set(xlabel="time [ms]", ylabel="current [nA]")
+def draw_traces(axes: Axes, traces: Traces) -> None:
+    """Draw the quantity over time, a line per site; a current in nA."""
+    if traces.quantity == CURRENT:
+        _draw_by_site(axes, traces.times_ms, NANOAMPERE_PER_MA * traces.values)
+        axes.set(xlabel="time [ms]", ylabel="current [nA]")
+    else:
+        _draw_by_site(axes, traces.times_ms, traces.values)
+        axes.set(xlabel="time [ms]", ylabel=_label(traces.quantity))
 
 
 def _draw_by_site(axes: Axes, times_ms: FloatArray, values: FloatArray) -> None:
@@ -241,8 +239,7 @@ DRAWINGS: Mapping[str, Mapping[str, Callable[..., None]]] = {
     },
     "ResponseMap": {"raster": draw_raster, "map": draw_map},
     "SpikeTrains": {"raster": draw_raster},
-    "SedTraces": {"traces": draw_traces},
-    "CurrentTraces": {"traces": draw_currents},
+    "Traces": {"traces": draw_traces},
     "MixedResponse": {"raster": draw_types, "map": draw_types_map},
     "SurfaceProfile": {"profile": draw_surface_profile},
     "HitRates": {"hit_rates": draw_hit_rates},

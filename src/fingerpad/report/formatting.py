@@ -6,6 +6,8 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from fingerpad.core.units import name_and_unit
+
 ABSENT = "–"
 UNBROKEN = "\N{NO-BREAK SPACE}"
 PHASE_LABELS = {"dynamic": "dynamic ramp", "static": "static hold"}
@@ -66,29 +68,8 @@ def joined(parts: Sequence[str]) -> str:
 
 def spelled(key: str) -> str:
     """Return the name of a field in words, its unit in brackets."""
-    words = key.split("_")
-    for length, unit in ((2, _UNITS.get("_".join(words[-2:]))), (1, _UNITS.get(words[-1]))):
-        if unit and len(words) > length:
-            return f"{' '.join(words[:-length])} [{unit}]"
-    return " ".join(words)
-
-
-_UNITS = {
-    "per_m": "1/m",
-    "per_mm": "1/mm",
-    "mm": "mm",
-    "mm2": "mm²",
-    "mm3": "mm³",
-    "ms": "ms",
-    "s": "s",
-    "mb": "MB",
-    "hz": "spikes/s",
-    "kpa": "kPa",
-    "mn": "mN",
-    "ma": "mA",
-    "mf": "mF",
-    "mv": "mV",
-}
+    name, unit = name_and_unit(key)
+    return name.replace("_", " ") + (f" [{unit}]" if unit else "")
 
 
 def plain(value: Any, digits: int = 3, longest: int = 8) -> str:

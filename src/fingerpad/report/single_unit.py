@@ -8,6 +8,8 @@ from typing import Any
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from fingerpad.core.signals import STORED_ENERGY
+from fingerpad.core.units import gain_unit, unit_of
 from fingerpad.data import paper, protocol
 from fingerpad.experiments.gerling2014.single_unit import (
     FoldResult,
@@ -253,7 +255,11 @@ def _modulation(modulation: RateModulation) -> Table:
     return Table("Modulation at the edge of the bar (the paper's Table 5)", columns, rows, note)
 
 
-GAINS = {"intercept_ma": ("β", "mA"), "dynamic_gain": ("k_d", "mA ms/kPa"), "static_gain": ("k_s", "mA/kPa")}
+GAINS = {
+    "intercept_ma": ("β", unit_of("intercept_ma")),
+    "dynamic_gain": ("k_d", gain_unit("dynamic_gain", STORED_ENERGY)),
+    "static_gain": ("k_s", gain_unit("static_gain", STORED_ENERGY)),
+}
 
 
 def draw_uncertainty(section: UncertaintyResult) -> Figure:

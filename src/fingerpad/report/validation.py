@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 
 from fingerpad.experiments.validation.observations import COLUMNS, KINDS
 from fingerpad.experiments.validation.validation import Prediction, ValidationFile
-from fingerpad.report.formatting import ABSENT, fixed, number, plain
+from fingerpad.report.formatting import ABSENT, fixed, number, plain, spelled
 from fingerpad.report.manifest import edition, facts_table, manifest_chapter
 from fingerpad.report.page import write_html
 from fingerpad.report.parts import Chapter, Page, Row, Table, illustrated, listed
@@ -128,12 +128,7 @@ def _conditions(results: ValidationFile) -> Table:
         )
         for condition, same in list(unique.items())[:LONGEST_TABLE]
     ]
-    headings = [
-        f"{column.rsplit('_', 2 if column.endswith('per_m') else 1)[0]} [{COLUMNS[column][0]}]"
-        if column in COLUMNS
-        else column
-        for column in conditions
-    ]
+    headings = [spelled(column) if column in COLUMNS else column for column in conditions]
     left = len(unique) - len(rows)
     return Table(
         f"Conditions [{results.unit}]",

@@ -16,7 +16,7 @@ from fingerpad.core.checks import FloatArray, float_array, increasing, instance,
 from fingerpad.core.displayed import Result
 from fingerpad.core.errors import InputError
 from fingerpad.core.phases import Phase
-from fingerpad.core.signals import STORED_ENERGY, ResponseMap, SedTraces
+from fingerpad.core.signals import STORED_ENERGY, ResponseMap, Traces
 from fingerpad.geometry.mesh import Mesh
 from fingerpad.geometry.motion import STILL, Pose
 from fingerpad.mechanics.tissues import name_of_tissues
@@ -289,7 +289,7 @@ class SkinResponse(Result):
 
     def sed(
         self, sites: ArrayLike, dynamic_quantity: str = STORED_ENERGY, static_quantity: str = STORED_ENERGY
-    ) -> SedTraces:
+    ) -> Traces:
         """Strain energy density in the living epidermis below points of the undeformed skin.
 
         End organs lie on the epidermal-dermal border and move with the tissue. A pair gives an organ's own x
@@ -307,17 +307,17 @@ class SkinResponse(Result):
 
         Returns
         -------
-        SedTraces
-            One column per site, with the end of the ramp as kink. [kPa]
+        Traces
+            One column per site, with the end of the ramp as kink.
         """
-        static, *dynamic = self._read(dict.fromkeys((static_quantity, dynamic_quantity)), sites)
-        return SedTraces(
+        static, *other = self._read(dict.fromkeys((static_quantity, dynamic_quantity)), sites)
+        dynamic = Traces(self.times_ms, other[0], quantity=dynamic_quantity) if other else None
+        return Traces(
             self.times_ms,
             static,
             np.array(self.kinks_ms),
-            dynamic[0] if dynamic else None,
-            dynamic_quantity,
             static_quantity,
+            dynamic,
             self.phases,
             self.onset_ms,
         )

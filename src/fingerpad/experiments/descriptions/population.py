@@ -10,6 +10,7 @@ import numpy as np
 from fingerpad.core.checks import IntArray
 from fingerpad.core.errors import InputError
 from fingerpad.core.layouts import PATTERNS
+from fingerpad.core.random_streams import seed_of
 from fingerpad.data.afferents import TYPES
 from fingerpad.experiments.afferent_files import fitted_afferent
 from fingerpad.experiments.descriptions.parts import (
@@ -22,7 +23,7 @@ from fingerpad.experiments.descriptions.parts import (
 )
 from fingerpad.geometry.fingertip import Finger, Fingertip
 from fingerpad.neuron.afferent import Afferent, AnyAfferent
-from fingerpad.neuron.mixed_population import MixedPopulation, seed_of, types_of_afferents
+from fingerpad.neuron.mixed_population import MixedPopulation, types_of_afferents
 from fingerpad.neuron.population import Population, sensitivities
 from fingerpad.psychophysics.encoding import neighbours_of
 

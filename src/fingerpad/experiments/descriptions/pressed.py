@@ -141,7 +141,7 @@ def respond(described: DescribedTouch, skin: SkinResponse) -> ResponseMap:
     afferent = as_sai(population.afferent)
     membrane = EscapeRate(afferent.membrane, asked.noise)
     noisy = OwnAfferent(
-        lambda sed: membrane.spikes(afferent.transduction.current(sed), asked.seed),
+        lambda traces: membrane.spikes(afferent.transduction.current(traces), asked.seed),
         dynamic_quantity=afferent.dynamic_quantity,
         static_quantity=afferent.static_quantity,
     )

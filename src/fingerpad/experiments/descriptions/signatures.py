@@ -21,6 +21,7 @@ from pydantic_core import CoreSchema, core_schema
 
 from fingerpad.core.keywords import other_names
 from fingerpad.core.results import JsonSchema
+from fingerpad.core.units import unit_of
 from fingerpad.experiments.descriptions.values import (
     NAMED,
     UNKNOWN,
@@ -86,7 +87,7 @@ def made_by(kind: str, makes: Callable[..., Any], without: Sequence[str] = ()) -
 def _of_other_names(makes: Callable[..., Any]) -> dict[str, str]:
     """Explanation of each parameter that is another name of a field."""
     others = other_names(makes) if isinstance(makes, type) else {}
-    return {name: f"Another name of {other.meaning}. [{other.unit}]" for name, other in others.items()}
+    return {name: f"Another name of {other.meaning}. [{unit_of(name)}]" for name, other in others.items()}
 
 
 def _value_of(hint: Any) -> Any:

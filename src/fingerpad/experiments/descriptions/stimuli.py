@@ -41,8 +41,8 @@ from fingerpad.experiments.descriptions.values import (
 from fingerpad.geometry.grading import RESOLUTIONS, Grading, covering
 from fingerpad.geometry.indenter_grading import grading_along
 from fingerpad.geometry.indenters import Sphere
-from fingerpad.geometry.motion import MOTION_UNITS
-from fingerpad.geometry.names import SIZE_UNITS
+from fingerpad.geometry.motion import PLAUSIBLE
+from fingerpad.geometry.names import SIZES
 from fingerpad.skin.indentation import Touch
 
 _NEAR_MM = max(protocol.SPHERE_POSITIONS.value)
@@ -134,7 +134,7 @@ def _listed(described: StimulusSet) -> list[tuple[Place, str, float | None, Stim
         return [(("stimuli", row), own.name, own.level, own) for row, own in enumerate(described.stimuli)]
     block, dot, key = described.stimuli.vary.partition(".")
     if block not in StimulusBlocks.model_fields or bool(dot) == (block == "friction"):
-        known = [f"object.{size}" for size in SIZE_UNITS] + [f"motion.{number}" for number in MOTION_UNITS]
+        known = [f"object.{size}" for size in SIZES] + [f"motion.{number}" for number in PLAUSIBLE]
         near = closest(
             described.stimuli.vary, [*known, *(f"place.{name}" for name in PlaceSettings.model_fields)]
         )

@@ -16,6 +16,7 @@ from fingerpad.core.errors import InputError
 from fingerpad.core.keywords import KnownKeywords, known_keywords
 from fingerpad.core.results import Matrix, Vector, result_class
 from fingerpad.core.signals import ResponseMap, Skin
+from fingerpad.core.units import name_and_unit
 from fingerpad.experiments.descriptions.population import population_neighbours
 from fingerpad.experiments.descriptions.stimuli import NamedStimulus, VariedStimuli
 from fingerpad.experiments.discrimination.decoding import (
@@ -44,17 +45,6 @@ from fingerpad.psychophysics.counts import binomial_interval
 from fingerpad.psychophysics.discrimination import Experiment
 from fingerpad.psychophysics.encoding import taking_part
 from fingerpad.psychophysics.ideal_observer import Presentation, multiplied_responses
-
-_UNITS = {
-    "_per_m": "1/m",
-    "_mm_per_s": "mm/s",
-    "_mm": "mm",
-    "_ms": "ms",
-    "_mn": "mN",
-    "_hz": "Hz",
-    "_deg": "degrees",
-}
-"""Unit of a key that varies, by its end."""
 
 SESSION = 2
 """Session of the random numbers of efficiencies; that of the hit rates is another."""
@@ -294,11 +284,8 @@ class PreparedTask(metaclass=KnownKeywords):
         """Say what the levels are."""
         if self.task.axis or not isinstance(self.task.stimuli, VariedStimuli):
             return self.task.axis or "level"
-        name = self.task.stimuli.vary.rpartition(".")[2]
-        for suffix, unit in _UNITS.items():
-            if name.endswith(suffix):
-                return f"{name.removesuffix(suffix).replace('_', ' ')} [{unit}]"
-        return name.replace("_", " ")
+        name, unit = name_and_unit(self.task.stimuli.vary.rpartition(".")[2])
+        return name.replace("_", " ") + (f" [{unit}]" if unit else "")
 
     def responses(self, skins: Mapping[str, Skin]) -> list[ResponseMap]:
         """Responses of the population to every stimulus."""

@@ -10,23 +10,24 @@ from numpy.typing import ArrayLike
 from fingerpad.core.checks import FloatArray, IntArray, whole
 from fingerpad.core.errors import InputError
 from fingerpad.core.keywords import known_keywords
-from fingerpad.core.signals import SedTraces
+from fingerpad.core.signals import Traces
+from fingerpad.core.units import units_of
 from fingerpad.data import protocol
 from fingerpad.experiments.fit.methods import Beside, Prepared, check_beside, fit_offset, prepare
 from fingerpad.experiments.fit.results import FitResult, FittedFold, PhaseRates
 from fingerpad.inference.fitting.cross_validation import CrossValidation, cross_validate, interleaved_folds
 from fingerpad.inference.fitting.fractional_sum_of_squares import fractional_sum_of_squares
-from fingerpad.inference.identifiable import IDENTIFIABLE_NAMES, IDENTIFIABLE_UNITS, identifiable
+from fingerpad.inference.identifiable import IDENTIFIABLE_NAMES, identifiable
 from fingerpad.inference.rate_model import AfferentModel, four_number_model
 from fingerpad.inference.rate_problem import RateProblem
 from fingerpad.inference.recordings import PHASES, RateRecordings, SpikeRecordings
-from fingerpad.neuron.afferent import PARAMETER_NAMES, PARAMETER_UNITS
+from fingerpad.neuron.afferent import PARAMETER_NAMES, parameter_units
 from fingerpad.neuron.rate_windows import Windows
 
 
 @known_keywords
 def fit_recordings(
-    sed: SedTraces | Sequence[SedTraces],
+    traces: Traces | Sequence[Traces],
     recordings: RateRecordings | SpikeRecordings,
     memberships: ArrayLike | None = None,
     *,
@@ -39,12 +40,12 @@ def fit_recordings(
     beside: Beside | None = None,
     positions_mm: ArrayLike | None = None,
 ) -> FitResult:
-    """Fit an afferent to recordings under stimuli whose strain energy density is known.
+    """Fit an afferent to recordings under stimuli whose traces are known.
 
     Parameters
     ----------
-    sed : SedTraces or sequence of SedTraces
-        Strain energy density at the receptor, one column per stimulus, in the order in which `recordings`
+    traces : Traces or sequence of Traces
+        What the afferent follows at the receptor, one column per stimulus, in the order in which `recordings`
         names them first; several traces follow each other.
     recordings : RateRecordings or SpikeRecordings
         Recorded responses; spikes are counted in `windows_ms`, mean over presentations.
@@ -54,8 +55,8 @@ def fit_recordings(
     method : str, optional
         One of `fingerpad.experiments.fit.methods.METHODS`.
     windows_ms : ((float, float), (float, float)), optional
-        Windows of the dynamic and of the static rate; by default those that follow the phases of `sed`, the
-        paper's for the paper's motion. [ms]
+        Windows of the dynamic and of the static rate; by default those that follow the phases of `traces`,
+        the paper's for the paper's motion. [ms]
     seed : int, optional
         Of methods that draw.
     with_posterior : bool, optional
@@ -64,8 +65,8 @@ def fit_recordings(
         Whether the likelihood of each of the four numbers is profiled.
     with_sensitivity : bool, optional
         Whether Sobol indices of FSS are computed.
-    beside : mapping of float to SedTraces or to a sequence of SedTraces, optional
-        The same energy density at places beside the receptor, by their offset along the finger, distal
+    beside : mapping of float to Traces or to a sequence of Traces, optional
+        The same quantities at places beside the receptor, by their offset along the finger, distal
         positive [mm], on both sides of 0: with it the receptor's offset is fitted as a seventh parameter,
         by least squares or CMA-ES, and reported with the fit.
     positions_mm : array_like (n_stimuli,), optional
@@ -86,15 +87,15 @@ def fit_recordings(
 
     >>> import fingerpad as fp
     >>> height_kpa = [0.8, 1.2, 1.6, 2.0, 2.5, 3.0]
-    >>> sed = fp.SedTraces([0.0, 50.0, 1000.0], np.outer([0.0, 1.0, 1.0], height_kpa), kinks_ms=[50.0])
+    >>> traces = fp.Traces([0.0, 50.0, 1000.0], np.outer([0.0, 1.0, 1.0], height_kpa), kinks_ms=[50.0])
     >>> six, energy = [0.0, 1.5e-4, 9e-7, 60.0, 1e-6, 50.0], "stored"
     >>> known = fp.Afferent.from_parameters(six, dynamic_quantity=energy, static_quantity=energy)
-    >>> recordings = RateRecordings(("a", "b", "c", "d", "e", "f"), *known.rates(sed))
-    >>> fit = fit_recordings(sed, recordings, memberships=[0, 1, 0, 1, 0, 1])
+    >>> recordings = RateRecordings(("a", "b", "c", "d", "e", "f"), *known.rates(traces))
+    >>> fit = fit_recordings(traces, recordings, memberships=[0, 1, 0, 1, 0, 1])
     >>> fit.fss_in_sample > 0.99, fit.fss_out_of_sample > 0.97
     (True, True)
     """
-    model = AfferentModel.of_traces(sed, windows_ms)
+    model = AfferentModel.of_traces(traces, windows_ms)
     counted = model.used_windows_ms
     rates = recordings if isinstance(recordings, RateRecordings) else recordings.rates(counted)
     if beside is not None:
@@ -122,8 +123,8 @@ def fit_recordings(
         seconds=best.seconds,
         parameters=_six_by_name(prepared.six(best.parameters)),
         identifiable=_four_by_name(prepared.six(best.parameters)),
-        units=dict(zip(PARAMETER_NAMES, PARAMETER_UNITS, strict=True)),
-        identifiable_units=dict(zip(IDENTIFIABLE_NAMES, IDENTIFIABLE_UNITS, strict=True)),
+        units=parameter_units(model.drives[0]),
+        identifiable_units=units_of(IDENTIFIABLE_NAMES),
         identifiable_standard_error=dict(zip(IDENTIFIABLE_NAMES, errors.tolist(), strict=True)),
         identifiable_covariance=covariance,
         fss_in_sample=prepared.problem.score(best.parameters, np.arange(prepared.problem.n_observations)),

@@ -9,7 +9,7 @@ import numpy as np
 
 from fingerpad.core.checks import FloatArray, IntArray, one_of
 from fingerpad.core.errors import InputError
-from fingerpad.core.signals import SedTraces
+from fingerpad.core.signals import Traces
 from fingerpad.data import neuron
 from fingerpad.experiments.fit.results import HeldOffset, OffsetFit, SpikeFitSummary
 from fingerpad.inference.afferent_methods import (
@@ -119,7 +119,7 @@ def prepare(
     return Prepared(problem, fitting, fitted_six)
 
 
-Beside = Mapping[float, SedTraces | Sequence[SedTraces]]
+Beside = Mapping[float, Traces | Sequence[Traces]]
 """Strain energy density by offset from the believed place, distal positive [mm], one column per stimulus."""
 
 

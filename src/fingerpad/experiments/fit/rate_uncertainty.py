@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.stats import norm, qmc
+from scipy.stats import norm
 
 from fingerpad.core.checks import FloatArray
 from fingerpad.experiments.fit.results import (
@@ -17,6 +17,7 @@ from fingerpad.experiments.fit.results import (
     RatePosterior,
 )
 from fingerpad.inference.afferent_posterior import afferent_posterior, from_coordinates, to_coordinates
+from fingerpad.inference.fitting.methods import halton
 from fingerpad.inference.fitting.posterior import credible_band
 from fingerpad.inference.fitting.profile_likelihood import ProfileLikelihood, profile_likelihoods
 from fingerpad.inference.fitting.sensitivity import sobol_indices
@@ -69,7 +70,7 @@ def likely_points(likelihood: RateLikelihood, four: ArrayLike) -> FloatArray:
     about the best points of all clouds before; points that are not much less likely than the best are kept.
     """
     middle, reach = to_coordinates(four), np.diag(FIRST_CLOUD)
-    design = norm.ppf(qmc.Halton(middle.size, scramble=False).random(CLOUDS * POINTS_OF_CLOUD + 1)[1:])
+    design = norm.ppf(halton(CLOUDS * POINTS_OF_CLOUD, middle.size))
     points, heights = middle[None], likelihood.log_likelihood(from_coordinates(middle[None]))
     for offsets in np.split(design, CLOUDS):
         cloud = middle + offsets @ reach.T

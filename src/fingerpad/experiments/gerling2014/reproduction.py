@@ -221,8 +221,8 @@ def set_result(
     quantity = conditions.quantity
     # A membrane of the paper's own system starts at 0, as it prints, whatever its tissues.
     initial_mv = PAPER_INITIAL.value if quantity == STORED_ENERGY else None
-    bar_sed = single_unit.receptor_sed(bars, quantity, quantity)
-    problem = single_unit.rate_problem(bar_sed, initial_mv)
+    bar_traces = single_unit.traces_at_receptor(bars, quantity, quantity)
+    problem = single_unit.rate_problem(bar_traces, initial_mv)
     method = _method(conditions, spheres)
     # The score of `human` has many maxima, between which last digits choose: its fit is that of Afferent().
     known = Afferent().parameters if str(conditions.tissues) == HUMAN else None
@@ -232,14 +232,15 @@ def set_result(
     )
     discrimination = sphere_discrimination.discriminate_spheres(spheres, afferent, conditions.seed)
     unit = single_unit.single_unit_result(problem, best, folds, afferent, method.name)
-    course = single_unit.firing_course(bar_sed, single_unit.receptor_sed(bars), afferent, responses["force"])
+    energy = single_unit.traces_at_receptor(bars)
+    course = single_unit.firing_course(bar_traces, energy, afferent, responses["force"])
     force = skin_deflection.skin_force(responses["force"])
     nail = nail_border.nail_border(responses["nail"]["nail"])
     uncertainty: UncertaintyResult | None = None
     thresholds: CurvatureThresholds | None = None
     if others := responses.get("spheres, other curvatures"):
         uncertainty = single_unit_uncertainty.uncertainty_result(
-            bar_sed, best.parameters, conditions.seed, initial_mv=initial_mv
+            bar_traces, best.parameters, conditions.seed, initial_mv=initial_mv
         )
         centred = {curvature: skin for (position, curvature), skin in spheres.items() if position == 0.0}
         thresholds = curvature_thresholds.curvature_thresholds(

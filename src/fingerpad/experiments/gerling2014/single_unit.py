@@ -11,7 +11,7 @@ from scipy.interpolate import interp1d
 
 from fingerpad.core.checks import FloatArray
 from fingerpad.core.results import Number, Vector, result_class
-from fingerpad.core.signals import STORED_ENERGY, CurrentTraces, SedTraces, traces_below
+from fingerpad.core.signals import STORED_ENERGY, Traces, traces_below
 from fingerpad.data import bar_firing_rates, protocol
 from fingerpad.experiments.conditions import RECEPTOR_X_MM, Conditions, Touch
 from fingerpad.experiments.gerling2014.skin_deflection import PLATE_DEPTHS_MM, plate
@@ -27,7 +27,7 @@ from fingerpad.inference.rate_model import AfferentModel
 from fingerpad.inference.rate_problem import RateProblem
 from fingerpad.inference.recordings import RateRecordings
 from fingerpad.inference.start_points import response_surface, start_points
-from fingerpad.neuron.afferent import PARAMETER_NAMES, PARAMETER_UNITS, Afferent
+from fingerpad.neuron.afferent import PARAMETER_NAMES, Afferent, parameter_units
 from fingerpad.neuron.population import Population
 from fingerpad.neuron.rate_windows import PAPER_WINDOWS_MS
 from fingerpad.neuron.spikes import modulation_difference, modulation_index
@@ -53,22 +53,19 @@ def bar_touches(conditions: Conditions) -> list[Touch]:
     ]
 
 
-def receptor_sed(
-    responses: list[SkinResponse], dynamic_quantity: str = STORED_ENERGY, static_quantity: str = STORED_ENERGY
-) -> SedTraces:
-    """Strain energy density at the one receptor, one column per shift of the bar."""
+def traces_at_receptor(
+    responses: list[SkinResponse],
+    dynamic_quantity: str = STORED_ENERGY,
+    static_quantity: str = STORED_ENERGY,
+) -> Traces:
+    """Quantities of the two terms at the one receptor, one column per shift of the bar."""
     quantities = (dynamic_quantity, static_quantity)
-    return SedTraces.joined([traces_below(skin, RECEPTOR, *quantities) for skin in responses])
+    return Traces.joined([traces_below(skin, RECEPTOR, *quantities) for skin in responses])
 
 
-def following(static: SedTraces, dynamic: SedTraces, quantity: str) -> SedTraces:
-    """Traces whose dynamic term follows another quantity."""
-    return replace(static, dynamic_kpa=dynamic.sed_kpa, dynamic_quantity=quantity)
-
-
-def rate_problem(sed: SedTraces, initial_mv: float | None = None) -> RateProblem:
-    """Observed rates at all shifts, and the paper's model of the afferent driven by `sed`."""
-    return RateProblem(AfferentModel.of_traces(sed, initial_mv=initial_mv), bar_recordings())
+def rate_problem(traces: Traces, initial_mv: float | None = None) -> RateProblem:
+    """Observed rates at all shifts, and the paper's model of the afferent driven by traces."""
+    return RateProblem(AfferentModel.of_traces(traces, initial_mv=initial_mv), bar_recordings())
 
 
 def bar_recordings() -> RateRecordings:
@@ -202,7 +199,7 @@ def single_unit_result(
         static_quantity=afferent.static_quantity,
         initial_mv=afferent.initial_mv,
         parameters=_named(best.parameters),
-        units=dict(zip(PARAMETER_NAMES, PARAMETER_UNITS, strict=True)),
+        units=parameter_units(afferent),
         shift_mm=shift_mm,
         dynamic_rate_hz=dynamic,
         static_rate_hz=static,
@@ -287,12 +284,12 @@ class FiringCourse:
 
 
 def firing_course(
-    drive: SedTraces, sed: SedTraces, afferent: Afferent, pressed: Mapping[str, SkinResponse]
+    drive: Traces, sed: Traces, afferent: Afferent, pressed: Mapping[str, SkinResponse]
 ) -> FiringCourse:
     """Read when the fitted afferent fires and what drives it."""
     observed, (dynamic_ms, static_ms) = bar_firing_rates(), PAPER_WINDOWS_MS
     population = Population.grid(afferent=afferent, centre_mm=(RECEPTOR_X_MM, 0.0))
-    in_hold = interp1d(sed.times_ms, sed.sed_kpa, axis=0)(0.5 * (static_ms[0] + static_ms[1]))
+    in_hold = interp1d(sed.times_ms, sed.values, axis=0)(0.5 * (static_ms[0] + static_ms[1]))
     ramp_ms, end_ms = protocol.RAMP.value, float(drive.times_ms[-1])
     return FiringCourse(
         peak_ms=np.array([_peak_ms(train) for train in afferent.spikes(drive)]),
@@ -312,7 +309,7 @@ def _peak_ms(spikes_ms: FloatArray) -> float:
     return float(spikes_ms[1 + np.diff(spikes_ms).argmin()]) if spikes_ms.size > 1 else np.nan
 
 
-def _dynamic_share(drive: SedTraces, afferent: Afferent, start_ms: float, end_ms: float) -> FloatArray:
+def _dynamic_share(drive: Traces, afferent: Afferent, start_ms: float, end_ms: float) -> FloatArray:
     """Share of the dynamic term in the charge of both terms from a start to an end, (n_sites,); 0 without."""
     transduction = afferent.transduction
     static, dynamic = (
@@ -323,9 +320,9 @@ def _dynamic_share(drive: SedTraces, afferent: Afferent, start_ms: float, end_ms
     return np.divide(dynamic, both, out=np.zeros_like(both), where=both > 0.0)
 
 
-def _charge(current: CurrentTraces, start_ms: float, end_ms: float) -> FloatArray:
+def _charge(current: Traces, start_ms: float, end_ms: float) -> FloatArray:
     """Integral of a current whose knots include both times, (n_sites,). [mA ms]"""
     first = np.searchsorted(current.times_ms, start_ms, side="right") - 1
     last = np.searchsorted(current.times_ms, end_ms, side="left")
     within = slice(first, last + 1)
-    return np.asarray(np.trapezoid(current.current_ma[within], current.times_ms[within], axis=0))
+    return np.asarray(np.trapezoid(current.values[within], current.times_ms[within], axis=0))

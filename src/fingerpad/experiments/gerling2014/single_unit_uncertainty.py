@@ -9,7 +9,8 @@ from numpy.typing import ArrayLike
 
 from fingerpad.core.checks import FloatArray
 from fingerpad.core.results import Number, Vector, result_class
-from fingerpad.core.signals import SedTraces
+from fingerpad.core.signals import Traces
+from fingerpad.core.units import units_of
 from fingerpad.data import bar_firing_rates
 from fingerpad.experiments.fit.rate_uncertainty import LEVEL, SEEDS_OF_PROFILES, fss_sensitivity, profiles
 from fingerpad.experiments.fit.results import FssSensitivity, ParameterProfile
@@ -17,7 +18,7 @@ from fingerpad.experiments.gerling2014 import single_unit
 from fingerpad.inference.afferent_posterior import AfferentPosterior, afferent_posterior
 from fingerpad.inference.fitting.posterior import credible_band
 from fingerpad.inference.fitting.sensitivity import identifiability
-from fingerpad.inference.identifiable import IDENTIFIABLE_NAMES, IDENTIFIABLE_UNITS, identifiable
+from fingerpad.inference.identifiable import IDENTIFIABLE_NAMES, identifiable
 from fingerpad.inference.rate_likelihood import INDEPENDENT, RateLikelihood, ResidualDraws
 from fingerpad.inference.rate_model import AfferentModel, four_number_model
 from fingerpad.inference.rate_problem import RateProblem
@@ -110,11 +111,11 @@ class UncertaintyResult:
 
 
 def uncertainty_result(
-    sed: SedTraces, fitted: ArrayLike, seed: int, *, quick: bool = False, initial_mv: float | None = None
+    traces: Traces, fitted: ArrayLike, seed: int, *, quick: bool = False, initial_mv: float | None = None
 ) -> UncertaintyResult:
     """Compute identifiability, posterior, profile likelihoods and sensitivity."""
     recordings, shift_mm = single_unit.bar_recordings(), bar_firing_rates().shift_mm
-    six_model = AfferentModel.of_drive(drive(sed, pieces=PIECES), initial_mv=initial_mv)
+    six_model = AfferentModel.of_drive(drive(traces, pieces=PIECES), initial_mv=initial_mv)
     model = four_number_model(six_model)
     six = np.asarray(fitted, dtype=np.float64)
     four = identifiable(six)
@@ -125,7 +126,7 @@ def uncertainty_result(
         level=LEVEL,
         seed=seed,
         names=IDENTIFIABLE_NAMES,
-        units=dict(zip(IDENTIFIABLE_NAMES, IDENTIFIABLE_UNITS, strict=True)),
+        units=units_of(IDENTIFIABLE_NAMES),
         fit=dict(zip(IDENTIFIABLE_NAMES, four.tolist(), strict=True)),
         capacitance_mf=six[4],
         threshold_mv=six[5],

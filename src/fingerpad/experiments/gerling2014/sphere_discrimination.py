@@ -8,7 +8,7 @@ import numpy as np
 
 from fingerpad.core.random_streams import Purpose, normals
 from fingerpad.core.results import Matrix, Vector, result_class
-from fingerpad.core.signals import SedTraces
+from fingerpad.core.signals import Traces
 from fingerpad.data import protocol, psychophysics
 from fingerpad.experiments.conditions import RECEPTOR_X_MM, Conditions, Touch
 from fingerpad.experiments.gerling2014.discrepancy import (
@@ -112,7 +112,7 @@ def to_rates_and_hit_rates(
     )
 
 
-def fit_to_people(traces: Sequence[SedTraces]) -> ToRatesAndHitRates:
+def fit_to_people(traces: Sequence[Traces]) -> ToRatesAndHitRates:
     """Return the method of `to_rates_and_hit_rates` for given drives of the afferents."""
     population = Population.grid(centre_mm=(RECEPTOR_X_MM, 0.0))
     n_receptors = len(population.positions_mm)

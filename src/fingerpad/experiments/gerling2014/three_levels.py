@@ -6,7 +6,7 @@ import numpy as np
 
 from fingerpad.core.checks import FloatArray, IntArray
 from fingerpad.core.results import Matrix, Number, TruthMatrix, TruthVector, Vector, WholeVector, result_class
-from fingerpad.core.signals import CurrentTraces, ResponseMap, SedTraces
+from fingerpad.core.signals import ResponseMap, Traces
 from fingerpad.core.units import MM_PER_M
 from fingerpad.data import fingertip, protocol
 from fingerpad.experiments.conditions import RECEPTOR_X_MM
@@ -90,7 +90,7 @@ def three_levels(standard: SkinResponse, afferent: Afferent) -> ThreeLevels:
         static_rate_hz=static_hz,
         times_ms=times,
         until_ms=UNTIL_MS,
-        current_ma=np.interp(times, below.times_ms, below.current_ma[:, 0]),
+        current_ma=np.interp(times, below.times_ms, below.values[:, 0]),
         potential_mv=membrane_potential(membrane, below, trains[0], times),
         rheobase_ma=membrane.capacitance_mf * membrane.threshold_mv / membrane.time_constant_ms,
         threshold_mv=membrane.threshold_mv,
@@ -98,7 +98,7 @@ def three_levels(standard: SkinResponse, afferent: Afferent) -> ThreeLevels:
 
 
 def membrane_potential(
-    membrane: LeakyIntegrateAndFire, current: CurrentTraces, spikes_ms: FloatArray, times_ms: FloatArray
+    membrane: LeakyIntegrateAndFire, current: Traces, spikes_ms: FloatArray, times_ms: FloatArray
 ) -> FloatArray:
     """Potential of a membrane whose spike times are known, Eq. 3."""
     tau, capacitance = membrane.time_constant_ms, membrane.capacitance_mf
@@ -108,7 +108,7 @@ def membrane_potential(
     length = np.diff(knots)
     # A repeated time is a jump of the current: the line between two knots is read inside of them.
     quarter, three_quarters = (
-        np.interp(knots[:-1] + share * length, current.times_ms, current.current_ma[:, 0])
+        np.interp(knots[:-1] + share * length, current.times_ms, current.values[:, 0])
         for share in (0.25, 0.75)
     )
     slope = 2.0 * (three_quarters - quarter) / length
@@ -118,7 +118,7 @@ def membrane_potential(
     since = np.where(last_spike < 0, np.inf, knots[:-1] - np.append(spikes_ms, 0.0)[last_spike])
     held = since < membrane.refractory_ms - 1e-9
     potential = np.zeros(knots.size)
-    potential[:1] = membrane.initial_potentials_mv(current.current_ma[0, :1])
+    potential[:1] = membrane.initial_potentials_mv(current.values[0, :1])
     for number, fixed in enumerate(held):
         start = 0.0 if since[number] == 0.0 else potential[number]
         relaxed = steady[number] + (start - steady[number]) * decay[number]
@@ -257,7 +257,7 @@ def population_maps(standard: SkinResponse, afferent: Afferent) -> PopulationMap
 def resting_response(afferent: Afferent) -> RestingResponse:
     """Simulate an afferent without any touch."""
     end_ms = protocol.RAMP.value + protocol.HOLD.value
-    sed = SedTraces.at_rest(end_ms, afferent.dynamic_quantity, afferent.static_quantity)
+    sed = Traces.at_rest(end_ms, afferent.dynamic_quantity, afferent.static_quantity)
     dynamic_hz, static_hz = afferent.rates(sed, *PAPER_WINDOWS_MS)
     return RestingResponse(
         dynamic_rate_hz=float(dynamic_hz[0]),

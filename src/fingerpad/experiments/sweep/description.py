@@ -111,10 +111,12 @@ class SampleSettings(Part):
             raise InputError("fields must name a field or more: it is empty.")
         from scipy.stats import qmc
 
+        from fingerpad.core.random_streams import published_generator
+
         kind = qmc.Sobol if self.method == SOBOL else qmc.LatinHypercube
         # All powers of two from the next one on begin with the same points, without a warning.
         size = 1 << (self.count - 1).bit_length() if self.method == SOBOL else self.count
-        points = kind(len(self.fields), rng=np.random.default_rng(self.seed)).random(size)[: self.count]
+        points = kind(len(self.fields), rng=published_generator(self.seed)).random(size)[: self.count]
         low, high = np.array(list(self.fields.values())).T
         if (low >= high).any():
             raise InputError("fields must have a lower bound and then a higher one: one has not.")

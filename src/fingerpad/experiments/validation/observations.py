@@ -13,6 +13,7 @@ from fingerpad.core.checks import FloatArray, finite, float_array, not_negative,
 from fingerpad.core.errors import InputError
 from fingerpad.core.keywords import known_keywords
 from fingerpad.core.tables import TableRow, read_csv
+from fingerpad.core.units import unit_of
 from fingerpad.experiments.indenter_text import indenter_named
 
 LARGEST_FILE_MB = 1.0
@@ -36,18 +37,18 @@ def not_concave(name: str, value: float, unit: str = "") -> float:
     return float(value)
 
 
-COLUMNS: dict[str, tuple[str, Callable[..., float]]] = {
-    "depth_mm": ("mm", not_negative),
-    "distance_mm": ("mm", finite),
-    "position_mm": ("mm", finite),
-    "curvature_per_m": ("1/m", not_concave),
-    "ridge_mm": ("mm", positive),
-    "groove_mm": ("mm", positive),
-    "force_n": ("N", not_negative),
-    "deflection_mm": ("mm", finite),
-    "rate_hz": ("spikes/s", not_negative),
+COLUMNS: dict[str, Callable[..., float]] = {
+    "depth_mm": not_negative,
+    "distance_mm": finite,
+    "position_mm": finite,
+    "curvature_per_m": not_concave,
+    "ridge_mm": positive,
+    "groove_mm": positive,
+    "force_n": not_negative,
+    "deflection_mm": finite,
+    "rate_hz": not_negative,
 }
-"""Unit and check of each column of numbers; the other column is the indenter."""
+"""Check of each column of numbers; the other column is the indenter."""
 
 INDENTER = "indenter"
 
@@ -70,7 +71,7 @@ class Kind:
     @property
     def unit(self) -> str:
         """Unit of what was observed."""
-        return COLUMNS[self.observed][0]
+        return unit_of(self.observed)
 
     @property
     def is_rate(self) -> bool:
@@ -227,7 +228,7 @@ def _observation(line: TableRow, kind: Kind) -> Observation:
 def _value(line: TableRow, column: str) -> Value:
     """Read an entry and check it."""
     if column != INDENTER:
-        return line.number(column, *COLUMNS[column])
+        return line.number(column, unit_of(column), COLUMNS[column])
     text = line.text(column)
     with line.placed():
         indenter_named(text)

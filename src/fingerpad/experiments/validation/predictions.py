@@ -10,7 +10,7 @@ import numpy as np
 from fingerpad.core.checks import FloatArray, one_of
 from fingerpad.core.errors import ConvergenceError, InputError
 from fingerpad.core.keywords import KnownKeywords
-from fingerpad.core.signals import SedTraces
+from fingerpad.core.signals import Traces
 from fingerpad.core.units import MN_PER_N
 from fingerpad.data import protocol
 from fingerpad.experiments.conditions import Conditions
@@ -239,7 +239,7 @@ def _rate(given: Mapping[str, Value], model: FingertipModel) -> Reading:
 def _resting_rate(model: FingertipModel) -> float:
     """Rate of the afferent without any touch. [spikes/s]"""
     afferent = model.responding
-    rest = SedTraces.at_rest(RampAndHold().end_ms, afferent.dynamic_quantity, afferent.static_quantity)
+    rest = Traces.at_rest(RampAndHold().end_ms, afferent.dynamic_quantity, afferent.static_quantity)
     return float(firing_rate_hz(afferent.spikes(rest), model.static_window_ms)[0])
 
 

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from fingerpad.core.checks import IntArray, positive, whole
+from fingerpad.core.random_streams import published_generator
 from fingerpad.inference.fitting.methods import Bounds, Fit, FitStep, Problem
 
 
@@ -44,7 +45,7 @@ class CovarianceAdaptation:
         from cma import CMAEvolutionStrategy  # takes a second to load
 
         clock, scales = time.perf_counter(), self.bounds.scales
-        generator = np.random.default_rng(self.seed)
+        generator = published_generator(self.seed)
         search = CMAEvolutionStrategy(
             np.asarray(self.start) / scales,
             self.first_spread,

@@ -44,8 +44,7 @@ class Bounds:
 
     def spread(self, number: int) -> FloatArray:
         """Points of a Halton sequence between the bounds, (number, n_parameters); deterministic."""
-        shares = qmc.Halton(self.scales.size, scramble=False).random(number + 1)[1:]  # the first is a corner
-        return self.low + shares * (self.high - self.low)
+        return self.low + halton(number, self.scales.size) * (self.high - self.low)
 
     def rows(self, name: str, points: ArrayLike) -> FloatArray:
         """Return points (n_points, n_parameters), or raise `InputError` if they have other parameters."""
@@ -55,6 +54,12 @@ class Bounds:
                 f"{name} must have one entry per scale: got {rows.shape[1]} for {self.scales.size}."
             )
         return rows
+
+
+def halton(number: int, dimensions: int) -> FloatArray:
+    """Return points of a Halton sequence in the unit cube, (number, dimensions); deterministic."""
+    points: FloatArray = qmc.Halton(dimensions, scramble=False).random(number + 1)
+    return points[1:]  # the first is a corner
 
 
 class Problem(Protocol):

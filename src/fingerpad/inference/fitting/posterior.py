@@ -30,6 +30,7 @@ from threadpoolctl import threadpool_limits
 
 from fingerpad.core.checks import FloatArray, finite, float_array, positive, whole
 from fingerpad.core.errors import ConvergenceError, InputError
+from fingerpad.core.random_streams import Key, emcee_state, generator, independent_keys
 
 TAILS = (0.025, 0.975)
 """Quantiles of the effective sample size of the tails: the ends of a 95 % interval."""
@@ -204,7 +205,7 @@ def sample(
     whole("most_steps", most_steps, at_least=n_steps)
     positive("smallest_effective_size", smallest_effective_size)
     density = _Checked(log_density)
-    seeds = np.random.SeedSequence(whole("seed", seed, at_least=0)).spawn(n_ensembles)
+    seeds = independent_keys(whole("seed", seed, at_least=0), n_ensembles)
     proposals = list(moves) if moves is not None else _moves()
     ensembles = [_ensemble(density, middle, scale, n_walkers, one, proposals) for one in seeds]
     history: list[str] = []
@@ -273,16 +274,20 @@ def _ensemble(
     centre: FloatArray,
     spread: FloatArray,
     n_walkers: int,
-    seed: np.random.SeedSequence,
+    key: Key,
     proposals: list[tuple[Any, float]],
 ) -> _Ensemble:
     """Start an ensemble at scattered points, with random numbers of its own."""
-    start, moves = seed.spawn(2)
-    walkers, heights = _start(
-        density, centre, spread, n_walkers, np.random.Generator(np.random.Philox(start))
+    start, moves = independent_keys(key, 2)
+    walkers, heights = _start(density, centre, spread, n_walkers, generator(start))
+    sampler = emcee.EnsembleSampler(
+        n_walkers,
+        centre.size,
+        density,
+        moves=proposals,
+        vectorize=True,
     )
-    sampler = emcee.EnsembleSampler(n_walkers, centre.size, density, moves=proposals, vectorize=True)
-    sampler.random_state = np.random.RandomState(np.random.MT19937(moves)).get_state()
+    sampler.random_state = emcee_state(moves)
     return _Ensemble(sampler, emcee.State(walkers, log_prob=heights, random_state=sampler.random_state))
 
 

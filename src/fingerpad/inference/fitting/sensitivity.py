@@ -17,6 +17,7 @@ from scipy.special import ndtri
 
 from fingerpad.core.checks import FloatArray, IntArray, finite, float_array, positive, whole
 from fingerpad.core.errors import InputError
+from fingerpad.core.random_streams import generator
 
 BatchObjective = Callable[[FloatArray], FloatArray]
 """Called with points (n_points, n_parameters); returns one number for each."""
@@ -79,7 +80,7 @@ def sobol_indices(
         raise InputError(f"n_base must be a power of two: got {n_base}.")
     if not 0.0 < finite("level", level) < 1.0:
         raise InputError(f"level must lie between 0 and 1: got {level!r}.")
-    random = np.random.Generator(np.random.Philox(whole("seed", seed, at_least=0)))
+    random = generator(whole("seed", seed, at_least=0))
     values: list[FloatArray] = []  # at A, at B, and at A with each column of B: parts of Saltelli's design
 
     def evaluate(points: FloatArray) -> FloatArray:
