@@ -31,9 +31,7 @@ class FreeMesh(Mesh):
     """
 
     outer_elements: IntArray
-    """Element of each face of the skin, whose last four nodes lie on the skin wherever that is possible,
-    (n_faces,).
-    """
+    """Element of each face of the skin; its last four nodes lie on the skin where possible, (n_faces,)."""
     receptor_depth_mm: float
     """Depth of the end organs below the skin, along its normal. [mm]"""
 

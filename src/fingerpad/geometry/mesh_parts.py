@@ -49,8 +49,7 @@ class MeshParts:
     nodes: FloatArray
     """Coordinates, in the file's unit, (n_nodes, 3)."""
     elements: IntArray
-    """Rows of `nodes`; a wedge repeats its third and its sixth node: 0, 1, 2, 2, 3, 4, 5, 5, (n_elements, 8).
-    """
+    """Rows of `nodes`; a wedge repeats its third and sixth: 0, 1, 2, 2, 3, 4, 5, 5, (n_elements, 8)."""
     labels: IntArray
     """Numbers of the elements in the file, (n_elements,)."""
     node_sets: Mapping[str, IntArray]

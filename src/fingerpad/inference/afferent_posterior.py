@@ -70,8 +70,8 @@ class AfferentPrior:
     """Weakly informative prior of an afferent's parameters.
 
     The potential at rest is normal about 0 and stays below the threshold, so that no spike occurs without a
-    stimulus; gains and time constant are log-normal about the start point of
-    fits, the paper's first one with its gains rescaled. See docs/decisions/priors.md.
+    stimulus; gains and time constant are log-normal about the start point of fits, the paper's first one with
+    its gains rescaled. See docs/decisions/priors.md.
     """
 
     resting_share_sd: float = 1.0
