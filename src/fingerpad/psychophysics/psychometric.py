@@ -11,8 +11,14 @@ from fingerpad.core.checks import FloatArray, finite, one_of
 from fingerpad.core.displayed import Result
 from fingerpad.core.errors import ConvergenceError, InputError
 from fingerpad.core.keywords import known_keywords
-from fingerpad.psychophysics.counts import SMALLEST_OVERDISPERSION, JudgementCounts, log_probability
-from fingerpad.psychophysics.functions import SIGMOIDS, PsychometricFunction, checked_levels
+from fingerpad.psychophysics.functions import (
+    SIGMOIDS,
+    SMALLEST_OVERDISPERSION,
+    JudgementCounts,
+    PsychometricFunction,
+    checked_levels,
+    log_probability,
+)
 from fingerpad.psychophysics.maximum_likelihood import (
     LAPSE,
     OVERDISPERSION,

@@ -116,13 +116,9 @@ class Touch(metaclass=KnownKeywords):
 
     def __post_init__(self) -> None:
         for name, kind in (
-            ("finger", Finger),
-            ("indenter", Indenter),
-            ("stimulus", Motion),
-            ("tissues", Tissues),
-            ("grading", Grading),
-            ("settings", PressSettings),
-        ):
+            ("finger", Finger), ("indenter", Indenter), ("stimulus", Motion), ("tissues", Tissues),
+            ("grading", Grading), ("settings", PressSettings),
+        ):  # fmt: skip
             instance(name, getattr(self, name), kind)
         x, z = _position(self.at_mm, self.finger)
         object.__setattr__(self, "at_mm", (x, z))

@@ -94,14 +94,8 @@ def sobol_indices(
         again = stats.sobol_indices(func=parts, n=n_base)
         return np.stack([again.first_order, again.total_order])
 
-    spread = stats.bootstrap(
-        (np.arange(n_base),),
-        resampled,
-        vectorized=False,
-        n_resamples=SOBOL_RESAMPLES,
-        method="percentile",
-        rng=random,
-    ).standard_error
+    settings = {"vectorized": False, "n_resamples": SOBOL_RESAMPLES, "method": "percentile", "rng": random}
+    spread = stats.bootstrap((np.arange(n_base),), resampled, **settings).standard_error
     half_widths = ndtri(0.5 + 0.5 * level) * spread
     return SobolIndices(
         names=labels,
