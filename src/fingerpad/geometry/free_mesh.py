@@ -91,8 +91,7 @@ class FingerMesh(Finger):
     pad_mm : (float, float)
         x and z of the middle of the pad, `contact_mm`. [mm]
     borders_mm : (float, float, float)
-        `layer_depths_mm`: depth of the lower border of stratum corneum, living epidermis and dermis below the
-        middle of the pad. [mm]
+        Depth of the lower borders of the outer three layers below the middle of the pad. [mm]
     """
 
     mesh: FreeMesh

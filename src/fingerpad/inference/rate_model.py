@@ -100,8 +100,7 @@ class AfferentModel(metaclass=KnownKeywords):
     stimuli : tuple of int array
         Stimulus number of each column of each drive; every stimulus once.
     windows_ms : ((float, float), (float, float)), optional
-        Windows of the dynamic and of the static rate; by default those that follow the phases of the stimuli.
-        [ms]
+        Windows of the dynamic and of the static rate; by default those of the phases of the stimuli. [ms]
     refractory_ms : float
         Refractory period, which is not fitted. [ms]
     initial_mv : float, optional
@@ -160,8 +159,7 @@ class AfferentModel(metaclass=KnownKeywords):
         Parameters
         ----------
         sed : SedTraces or sequence of SedTraces
-            Strain energy density, one column per stimulus; the columns of several traces are numbered
-            consecutively.
+            Strain energy density, one column per stimulus; columns of several traces are numbered in turn.
         windows_ms, refractory_ms, initial_mv
             As of the class.
         """

@@ -250,7 +250,6 @@ def checked_levels(levels: ArrayLike, sigmoid: str) -> FloatArray:
 SMALLEST_OVERDISPERSION = 1e-5
 """Below it the beta-binomial formula loses precision and the binomial one is used."""
 
-
 LARGEST_LEVEL = 1e9
 """Largest level of a stimulus; the fit loses its digits with far larger numbers."""
 

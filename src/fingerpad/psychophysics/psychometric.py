@@ -155,11 +155,9 @@ def fit_psychometric(
     threshold : float or None, optional
         Level at which F is one half; None to fit it up to half the span of the levels beyond them.
     width : float or None, optional
-        Distance of 5 and 95 % of F; None to fit it between half the smallest distance of levels and five
-        times their span.
+        Distance of 5 and 95 % of F; None to fit it, between half the closest levels and five spans of all.
     overdispersion : float or None, optional
-        Correlation of judgements of one level; 0 for the binomial likelihood, None to fit it within
-        0 ... 0.5. [0-1]
+        Correlation of judgements of one level; 0 for the binomial, None to fit it within 0 ... 0.5. [0-1]
 
     Raises
     ------

@@ -159,8 +159,7 @@ class ReducedTraining(metaclass=KnownKeywords):
     Parameters
     ----------
     touch : Touch
-        What is reduced: its finger, indenter, tissues, place, direction and friction; its motion and its mesh
-        do not count.
+        What is reduced: its finger, indenter, tissues, place, direction and friction, not motion and mesh.
     range : ReducedRange
         The poses.
     resolution : {"quick", "standard", "paper"}
