@@ -40,9 +40,8 @@ from fingerpad.mechanics.newton import NewtonSettings
 from fingerpad.neuron.band_pass import BandPass
 from fingerpad.neuron.lif import LeakyIntegrateAndFire
 from fingerpad.neuron.transduction import Transduction
-from fingerpad.psychophysics.counts import JudgementCounts
 from fingerpad.psychophysics.discrimination import Experiment
-from fingerpad.psychophysics.functions import PsychometricFunction
+from fingerpad.psychophysics.functions import JudgementCounts, PsychometricFunction
 from fingerpad.psychophysics.ideal_observer import GaussianResponses
 from fingerpad.skin.sampling import SurfaceProfile
 

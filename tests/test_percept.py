@@ -26,13 +26,13 @@ from fingerpad.experiments.gerling2014.discrimination_statistics import (
     observe,
 )
 from fingerpad.neuron.population import Population
-from fingerpad.psychophysics.counts import binomial_interval
 from fingerpad.psychophysics.discrimination import (
     Experiment,
     discriminate_euclidean,
     discriminate_gradient_sum,
 )
 from fingerpad.psychophysics.encoding import gradient_sum, neighbour_pairs, taking_part
+from fingerpad.psychophysics.functions import binomial_interval
 from fingerpad.psychophysics.noise_fit import expected_euclidean_hit_rates, expected_hit_rates
 
 CURVATURES = (287.0, 296.0, 305.0, 316.0, 328.0, 340.0, 365.0)

@@ -18,8 +18,9 @@ from fingerpad.psychophysics import (
     goodness_of_fit,
     posterior,
 )
-from fingerpad.psychophysics.counts import log_probability
-from fingerpad.psychophysics.functions import SIGMOIDS
+from fingerpad.psychophysics.functions import SIGMOIDS, log_probability
+from fingerpad.psychophysics.maximum_likelihood import _gradient, maximise_likelihood
+from fingerpad.psychophysics.psychometric import working_point
 from fingerpad.psychophysics.uncertainty import STEEPEST, weighted_quantiles
 
 LEVELS = np.array([2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0])

@@ -203,8 +203,7 @@ def write_touch(
     Parameters
     ----------
     path : str or Path
-        The file, or the folder of a Zarr store. It is written as a whole or not at all; an older one is
-        replaced.
+        The file, or the folder of a Zarr store, written as a whole or not at all; an older one is replaced.
     skin, response, quantities, seed
         As in `touch_dataset`.
 

@@ -37,7 +37,6 @@ RUBBING_KPA_PER_MM = 5_000.0
 DISPLACEMENT_TOLERANCE, ENERGY_TOLERANCE = 1e-3, 1e-4
 """FEBio's convergence criteria; its default for energy, 0.01, leaves forces 1 % wrong."""
 
-
 KINDS = ("hex8", "penta6")
 """FEBio's names of bricks and wedges."""
 

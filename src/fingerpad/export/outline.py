@@ -158,8 +158,7 @@ class RigidMesh:
     """Facets of a rigid indenter, each the outer face of a thin solid element."""
 
     nodes_mm: FloatArray
-    """The outer nodes, then as many inner ones in the same order, in the indenter's frame, (n_nodes, 3). [mm]
-    """
+    """The outer nodes, then as many inner ones, in the indenter's frame, (n_nodes, 3). [mm]"""
     quads: IntArray
     """Outer nodes, counter-clockwise seen from the skin, (n_quads, 4)."""
     triangles: IntArray

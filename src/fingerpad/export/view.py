@@ -91,8 +91,7 @@ def save_view(
     path : str or Path
         The file: .png, .gif, or .mp4, which the program ffmpeg has to be installed for.
     touch : xarray.Dataset, SkinResponse, str or Path
-        From `touch_dataset`, a response of the skin, which is drawn without afferents, or what `write_touch`
-        wrote.
+        From `touch_dataset`, what `write_touch` wrote, or a response of the skin, drawn without afferents.
     field : str
         "sed", "displacement" (on the plane of symmetry), "pressure", "shear", "slip" (on the skin), or the
         name of another variable at nodes or elements. Of a vector its length is shown.

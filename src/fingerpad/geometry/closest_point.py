@@ -36,8 +36,7 @@ class Triangles:
     """Corners, sorted; the last triangle fills the slots that are left, (n_slots, 3, 3). [mm]"""
     normals: FloatArray
     """Outward normals at the three corners, on the three edges (opposite to each corner) and on the face,
-    (n_slots, 7, 3).
-    """
+    (n_slots, 7, 3)."""
     low_mm: FloatArray
     high_mm: FloatArray
     """Boxes; the first is not used, (n_boxes, 3). [mm]"""

@@ -103,8 +103,7 @@ class Gap(Indenter):
     fillet_mm : float
         Radius of the two outer edges; `edge_radius_mm` is another name of it. [mm]
     lip_mm : float
-        Radius of the two lips of the gap, if the gap is at least twice as wide; `lip_radius_mm` is another
-        name of it. [mm]
+        Radius of the two lips, if the gap is at least twice as wide; `lip_radius_mm` is another name. [mm]
 
     References
     ----------
@@ -207,8 +206,7 @@ class Grating(Indenter):
     lip_mm : float
         Radius of the lips, at most half of a ridge; `edge_radius_mm` is another name of it. [mm]
     period_mm, duty : float, keywords
-        Instead of ridge and groove: from one ridge to the next, and the share of the ridge in it, by default
-        a half. [mm, 1]
+        Instead: from one ridge to the next, and the share of the ridge in it, by default a half. [mm, 1]
 
     Examples
     --------

@@ -155,7 +155,7 @@ def embossed_text(
     """Emboss letters of DejaVu Sans, their middle on the indenter's axis.
 
     The letters are read by a finger that points up the page; with `along_finger` the line of text runs
-    towards the tip of the finger.
+    towards the tip of the finger. Curves of the outlines are straight pieces.
 
     Parameters
     ----------
@@ -171,11 +171,6 @@ def embossed_text(
         Whether the line of text runs along the finger instead of across it.
     weight : {"normal", "bold"}
         Width of the strokes: 0.13 or 0.26 of `capital_mm` in a capital I.
-
-    Returns
-    -------
-    Embossed
-        The outlines of the font that matplotlib brings along; its curves are straight pieces.
 
     Examples
     --------
@@ -216,7 +211,7 @@ def embossed_text(
     return Embossed(tuple(corners), height_mm, edge_radius_mm)
 
 
-def _pieces(outlines: Sequence[Sequence[tuple[float, float]]]) -> FloatArray:
+def _pieces(outlines: Sequence[Sequence[tuple[float, float]] | FloatArray]) -> FloatArray:
     """Straight pieces of closed outlines: begin and end, (n, 2, 2)."""
     lines = [np.array(line) for line in outlines]
     return np.concatenate([np.stack([line, np.roll(line, -1, axis=0)], axis=1) for line in lines])
@@ -310,7 +305,7 @@ _SAME = 1e-9
 
 def joined_outlines(outlines: Sequence[FloatArray]) -> list[FloatArray]:
     """Boundary of what closed outlines enclose, where those that turn the other way cut out."""
-    whole = np.concatenate([np.stack([line, np.roll(line, -1, axis=0)], axis=1) for line in outlines])
+    whole = _pieces(outlines)
     extent = float(np.ptp(whole, axis=(0, 1)).max())
     parts = _parted(whole, _SAME * extent)
     along = parts[:, 1] - parts[:, 0]

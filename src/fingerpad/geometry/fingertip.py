@@ -64,8 +64,7 @@ class Profile:
     """
 
     readings_mm: Readings
-    """At least five readings with x increasing from 0 or more to less than `length_mm`, values above 0. [mm]
-    """
+    """At least five readings, x increasing from 0 or more to less than `length_mm`, values above 0. [mm]"""
     length_mm: float
     """x of the tip, L. [mm]"""
 

@@ -31,9 +31,7 @@ class FreeMesh(Mesh):
     """
 
     outer_elements: IntArray
-    """Element of each face of the skin, whose last four nodes lie on the skin wherever that is possible,
-    (n_faces,).
-    """
+    """Element of each face of the skin; its last four nodes lie on the skin where possible, (n_faces,)."""
     receptor_depth_mm: float
     """Depth of the end organs below the skin, along its normal. [mm]"""
 
@@ -93,8 +91,7 @@ class FingerMesh(Finger):
     pad_mm : (float, float)
         x and z of the middle of the pad, `contact_mm`. [mm]
     borders_mm : (float, float, float)
-        `layer_depths_mm`: depth of the lower border of stratum corneum, living epidermis and dermis below the
-        middle of the pad. [mm]
+        Depth of the lower borders of the outer three layers below the middle of the pad. [mm]
     """
 
     mesh: FreeMesh

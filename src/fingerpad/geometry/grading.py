@@ -21,7 +21,6 @@ Strip = tuple[float, float, float]
 STEPS_TO_SUM = 4000
 """Intervals over which the number of elements is summed where their size varies."""
 
-
 FINGER_MM = 40.0
 """Length of a finger, beyond which a fine zone has no elements. [mm]"""
 

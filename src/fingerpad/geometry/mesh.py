@@ -38,8 +38,7 @@ class Mesh:
     """x, y and z of the nodes, (n_nodes, 3). [mm]"""
     elements: IntArray
     """Nodes of each brick: lower face (towards the bone) counter-clockwise seen from the skin, then upper.
-    Elements are numbered along, around, through (skin to bone), the last running fastest, (n_elements, 8).
-    """
+    Elements are numbered along, around, through (skin to bone), the last running fastest, (n_elements, 8)."""
     layer: IntArray
     """Index into `LAYERS`, (n_elements,)."""
     shape: tuple[int, int, int]
@@ -48,8 +47,7 @@ class Mesh:
     """Whether both halves are meshed; otherwise only z >= 0, with `symmetry_nodes` on the plane z = 0."""
     skin_grid: IntArray
     """Nodes of the skin in grid order; the pole, and the seam of a full finger, appear more than once,
-    (n_along + 1, n_around + 1).
-    """
+    (n_along + 1, n_around + 1)."""
     bone_nodes: IntArray
     nail_nodes: IntArray
     symmetry_nodes: IntArray
@@ -57,9 +55,7 @@ class Mesh:
     midline_nodes: IntArray
     """Nodes of the volar skin at z = 0, x increasing, (n_along + 1,)."""
     living_epidermis: IntArray
-    """The sheet of elements just above the epidermal-dermal border; empty if there is none, (n_along,
-    n_around).
-    """
+    """The sheet of elements above the epidermal-dermal border; empty without one, (n_along, n_around)."""
 
     def __post_init__(self) -> None:
         for field in fields(self):
@@ -197,8 +193,7 @@ class GridLines:
     """Angle about the bone's axis: 0 volar, pi dorsal; from -pi for both halves, (n_around + 1,). [rad]"""
     through: FloatArray
     """0 at the skin, 1, 2 and 3 at the lower borders of stratum corneum, living epidermis and dermis, 4 at
-    the bone, (n_through + 1,).
-    """
+    the bone, (n_through + 1,)."""
 
     @property
     def full(self) -> bool:

@@ -102,14 +102,8 @@ def _is_wedge(elements: IntArray) -> np.ndarray:
 def _check_sets(mesh: Mesh) -> None:
     """Check that sets are valid, that skin and supports exist, and the plane of symmetry of half a body."""
     n_nodes, n_elements = len(mesh.nodes_mm), len(mesh.elements)
-    for name, last in (
-        ("skin_grid", n_nodes),
-        ("bone_nodes", n_nodes),
-        ("nail_nodes", n_nodes),
-        ("symmetry_nodes", n_nodes),
-        ("midline_nodes", n_nodes),
-        ("living_epidermis", n_elements),
-    ):
+    of_nodes = ("skin_grid", "bone_nodes", "nail_nodes", "symmetry_nodes", "midline_nodes")
+    for name, last in (*((name, n_nodes) for name in of_nodes), ("living_epidermis", n_elements)):
         numbers = getattr(mesh, name).ravel()
         wrong = numbers[(numbers < 0) | (numbers >= last)]
         if wrong.size:

@@ -250,14 +250,8 @@ def _whole(read: _Read, line: int, word: str) -> int:
 
 def _inp_elements(read: _Read, number: int, options: Mapping[str, str], rows: Sequence[Row]) -> None:
     kind = options.get("TYPE", "")
-    size = (
-        8
-        if re.fullmatch(r"(C3D8|F3D8|SC8).*", kind)
-        else 6
-        if re.fullmatch(r"(C3D6|F3D6|SC6).*", kind)
-        else 0
-    )
-    if not size:
+    size = 8 if re.match(r"C3D8|F3D8|SC8", kind) else 6
+    if not re.match(r"(C3D|F3D|SC)[68]", kind):
         if re.match(r"(S[34]|STRI|R3D|M3D|SFM|CPS|CPE|T3D|B3|MASS|SPRING|DCOUP)", kind):
             return  # shells, rigid facets and the like are no tissue
         read.wrong(f"elements must be C3D8, C3D6 or variants of them, got {kind}: {_REFUSED}", number)

@@ -48,8 +48,7 @@ class MeshParts:
     nodes: FloatArray
     """Coordinates, in the file's unit, (n_nodes, 3)."""
     elements: IntArray
-    """Rows of `nodes`; a wedge repeats its third and its sixth node: 0, 1, 2, 2, 3, 4, 5, 5, (n_elements, 8).
-    """
+    """Rows of `nodes`; a wedge repeats its third and sixth: 0, 1, 2, 2, 3, 4, 5, 5, (n_elements, 8)."""
     labels: IntArray
     """Numbers of the elements in the file, (n_elements,)."""
     node_sets: Mapping[str, IntArray]
@@ -130,12 +129,8 @@ class _Making:
         else:
             around = self.around(mesh, positive("receptor_depth_mm", receptor_depth_mm, "mm"))
         depth = float(receptor_depth_mm)
-        whole = replace(
-            mesh,
-            midline_nodes=_midline(mesh, contact_mm[1]),
-            living_epidermis=around,
-            receptor_depth_mm=depth,
-        )
+        midline = _midline(mesh, contact_mm[1])
+        whole = replace(mesh, midline_nodes=midline, living_epidermis=around, receptor_depth_mm=depth)
         made = FingerMesh(whole, contact_mm, depths)
         made.skin_point(*contact_mm)
         return made
@@ -255,15 +250,9 @@ class _Making:
                 f"element {self.parts.labels[worst]} is turned inside out (Jacobian {smallest[worst]:.3g} "
                 f"mm³), one of {inverted.size} such elements, {where}: move its nodes or reverse their order."
             )
-        middle = [
-            float(
-                np.median(
-                    self.depth_of(mesh, mesh.nodes_mm[mesh.elements[mesh.layer == number]].mean(axis=1))
-                )
-            )
-            for number in np.unique(mesh.layer)
-        ]
         present = np.unique(mesh.layer)
+        corners = [mesh.nodes_mm[mesh.elements[mesh.layer == number]] for number in present]
+        middle = [float(np.median(self.depth_of(mesh, each.mean(axis=1)))) for each in corners]
         for number in range(len(present) - 1):
             if middle[number] >= middle[number + 1]:
                 self.wrong(

@@ -46,8 +46,7 @@ def sine(
     ramp_ms, hold_ms : float, optional
         Durations of the ramp and of the hold before the vibration. [ms]
     force_mn, amplitude_mn : float, optional
-        Instead of depths, force of the hold on the whole finger, and half of its change from peak to peak.
-        [mN]
+        Instead, force of the hold on the whole finger, and half of its change from peak to peak. [mN]
 
     Returns
     -------

@@ -49,7 +49,6 @@ TIP_MM, TIP_SHARE = 0.5, 0.25
 """A ridge with slanted flanks is as wide as this far below its top [mm], or this share of its height; a
 groove so far above its bottom."""
 
-
 CORNER_SHARE = 0.4
 """A ridge, groove or dot covers this share of the disc; the tip of a corner between walls does not."""
 

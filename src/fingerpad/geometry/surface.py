@@ -76,8 +76,7 @@ class Surface(Indenter):
         If vertices are not finite, faces name no vertex, no triangle has an area, the surface is larger than
         1000 mm or smaller than 0.1 mm (a wrong unit), neighbouring triangles turn different sides out, more
         than two share an edge, it shows the skin its inner side, parts touch along walls that do not match,
-        the angle is not from 0 to 90 degrees, or
-        the radius does not fit.
+        the angle is not from 0 to 90 degrees, or the radius does not fit.
 
     Examples
     --------

@@ -128,8 +128,7 @@ def read_height_map(
     Parameters
     ----------
     path : str or Path
-        PNG or TIFF of one page in shades of grey of up to 16 bits, or of signed or float numbers; NPY or CSV
-        with numbers.
+        PNG or one-page TIFF, grey of up to 16 bits or of signed or float numbers; NPY or CSV with numbers.
     pitch_mm : float
         Distance between neighbouring heights. [mm]
     height_mm : float

@@ -39,7 +39,6 @@ ONSET_SHARES = (0.25, 0.5)
 SAME_VALUE = 0.02
 """Change over the largest depth, force or way of a trajectory below which it holds; recordings have noise."""
 
-
 FEWEST_TURNS = 4
 """Turns from down to up and back, without a lift or a stop between them, from which on a motion vibrates."""
 

@@ -195,8 +195,7 @@ def sampled(
         Largest error over the largest depth or force and over the extent of each way and rotation, at 33
         times in each linear piece. [1]
     looks : int, optional
-        Number of equal parts of the whole into which it is looked first: what lasts less than such a part
-        may be missed.
+        Number of equal parts into which it is looked first: what lasts less than one may be missed.
     phases : sequence of Phase, optional
         As of `Trajectory`.
 

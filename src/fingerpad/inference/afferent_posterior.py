@@ -154,16 +154,8 @@ def afferent_posterior(
     def unconstrained_density(points: FloatArray) -> FloatArray:
         return density(_constrained(points)) + points[:, 0]  # the Jacobian's logarithm is ln(1 - u)
 
-    chains = _constrained_chains(
-        sample(
-            unconstrained_density,
-            _unconstrained(centre),
-            START_SPREAD,
-            COORDINATE_NAMES,
-            seed=seed,
-            **settings,
-        )
-    )
+    begin = _unconstrained(centre), START_SPREAD, COORDINATE_NAMES
+    chains = _constrained_chains(sample(unconstrained_density, *begin, seed=seed, **settings))
     some = from_coordinates(chains.spread_out(N_PREDICTED))
     return AfferentPosterior(
         chains, from_coordinates(chains.flat), likelihood.residual_draws(some, generator([seed, 1]))

@@ -1,9 +1,8 @@
 """Rate of the membrane under a constant drive in closed form, with derivatives: a smooth approximation.
 
-In the four identifiable parameters (`fingerpad.inference.identifiable`) the membrane is driven by
-g = b + k_d U' + k_s U [1/ms], and its threshold is 1. Under a constant g the potential rises from 0 to the
-threshold in tau ln(x / (x - 1)), with the steady potential x = tau g. With the refractory period t_r the rate
-is
+In the four identifiable parameters (`fingerpad.inference.identifiable`) the membrane is driven by g = b + k_d
+U' + k_s U [1/ms], and its threshold is 1. Under a constant g the potential rises from 0 to the threshold in
+tau ln(x / (x - 1)), with the steady potential x = tau g. With the refractory period t_r the rate is
 
     f = 1 / (t_r + tau ln(x / (x - 1)))    for x > 1, else 0.
 

@@ -100,8 +100,7 @@ class AfferentModel(metaclass=KnownKeywords):
     stimuli : tuple of int array
         Stimulus number of each column of each drive; every stimulus once.
     windows_ms : ((float, float), (float, float)), optional
-        Windows of the dynamic and of the static rate; by default those that follow the phases of the stimuli.
-        [ms]
+        Windows of the dynamic and of the static rate; by default those of the phases of the stimuli. [ms]
     refractory_ms : float
         Refractory period, which is not fitted. [ms]
     initial_mv : float, optional
@@ -264,9 +263,8 @@ def _evaluator_of(
     def evaluate(parameters: FloatArray) -> Rates:
         six = np.asarray(parameters, dtype=np.float64)
         if not (six.shape == (len(PARAMETER_NAMES),) and np.isfinite(six).all() and (six[3:] > 0.0).all()):
-            Afferent.from_parameters(
-                six, refractory_ms, initial_mv=initial_mv
-            )  # raises the error that names the parameter
+            # It raises the error that names the parameter.
+            Afferent.from_parameters(six, refractory_ms, initial_mv=initial_mv)
         intercept, dynamic_gain, static_gain, tau, capacitance, threshold = six.tolist()
         # I = beta + k_d U' + k_s U, in the order of Transduction.current.
         np.multiply(driven.rate_per_ms, dynamic_gain, out=current)

@@ -19,8 +19,6 @@ from fingerpad.inference.recordings import RateRecordings
 class RateProblem:
     """Recorded rates and the model that is fitted to them.
 
-    Notes
-    -----
     Gerling et al. 2014, Eqs. 12-14. The sums run over the chosen stimuli.
     """
 

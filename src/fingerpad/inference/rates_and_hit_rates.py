@@ -38,8 +38,6 @@ CHANCE = 0.5
 class RatesAndHitRates:
     """Recorded rates and hit rates of people, to which one afferent is fitted.
 
-    Notes
-    -----
     The contract of `fingerpad.inference.fitting.methods.Problem`. All hit rates enter whichever rates are
     chosen, so that a cross validation leaves out rates only.
     """
@@ -82,9 +80,7 @@ class SphereHitRates:
     """Hit rates of two codes, predicted from the parameters of every afferent of a population."""
 
     model: RateModel
-    """Rates of all receptors under all spheres at all positions, one column each, receptors fastest and
-    positions slowest.
-    """
+    """Rates, a column per receptor, sphere and position, receptors fastest and positions slowest."""
     n_positions: int
     n_receptors: int
     """Sizes; the number of spheres, the standard first, follows."""

@@ -31,8 +31,7 @@ class ReceptorOffset:
     """
 
     offsets_mm: FloatArray
-    """Offsets along the finger at which the drive is sampled, distal positive, increasing, (n_offsets,). [mm]
-    """
+    """Offsets at which the drive is sampled, distal positive, increasing, (n_offsets,). [mm]"""
     models: Sequence[AfferentModel]
     """The model at each offset, all with the same stimuli and times."""
 

@@ -150,8 +150,7 @@ class SpikeRecordings(metaclass=KnownKeywords):
         Parameters
         ----------
         windows_ms : ((float, float), (float, float))
-            Start and end of the dynamic and of the static window, such as `rate_windows_ms` of the phases of
-            the motion. [ms]
+            Dynamic and static window, such as `rate_windows_ms` of the phases of the motion. [ms]
         measure : {"interval", "count"}
             What a rate is: one over the mean interval, or spikes over the length of the window.
         """

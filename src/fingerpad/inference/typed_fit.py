@@ -75,8 +75,7 @@ class TypedFit:
     free: tuple[str, ...]
     fss_in_sample: float
     fss_out_of_sample: float
-    """Fractional sum of squares of the fit to all stimuli, and its mean over the stimuli left out of folds.
-    """
+    """Fractional sum of squares of the fit to all stimuli, and its mean over stimuli left out of folds."""
     dynamic_rate_hz: FloatArray
     static_rate_hz: FloatArray
     """Rates of the afferent under all stimuli, (n_stimuli,). [spikes/s]"""

@@ -80,8 +80,7 @@ class Entry(NamedTuple):
     way: tuple[float, ...] = (0.0,) * 5
     force: tuple[float, ...] = (0.0,) * 5
     """The indenter's advance, ways along x and z [mm] and rotations [radians], and the forces [mN] and
-    torques [mN mm] that do work on them.
-    """
+    torques [mN mm] that do work on them."""
     stored_uj: float = 0.0
     dissipated_uj: float = 0.0
     contact_uj: float = 0.0

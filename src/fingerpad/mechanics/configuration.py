@@ -88,9 +88,7 @@ class Load:
     carried: FloatArray
     """H, the history that the step starts from, (n_elements, 8, 6). [kPa]"""
     force_mn: float | None = None
-    """Force along the indenter's axis on the body as it is meshed, half of it or whole; the depth is then
-    found. [mN]
-    """
+    """Force along the indenter's axis on the body as it is meshed; the depth is then found. [mN]"""
     anchors: Anchors | None = None
     """Where the skin holds on to the indenter at the start of the step; without friction nothing."""
     pressure_kpa: FloatArray | None = None
@@ -146,9 +144,7 @@ class Configuration:
     potential_uj: float
     """Incremental potential, NaN if an element is turned inside out. [µJ]"""
     out_of_balance_mn: FloatArray
-    """Contact forces minus internal forces; on nodes that are held, what their supports take, (n_nodes, 3).
-    [mN]
-    """
+    """Contact forces minus internal forces; on held nodes, what supports take, (n_nodes, 3). [mN]"""
     residual_mn: FloatArray
     """The same of the free degrees of freedom, (n_free,). [mN]"""
     residual_norm_mn: float

@@ -96,8 +96,7 @@ class Placement:
     rotation: FloatArray
     """Columns are the indenter's x, y and z axes in the finger's frame, (3, 3)."""
     pressing: FloatArray | None = None
-    """Unit direction of pressing; the indenter's y axis by default, as it is until the indenter tilts, (3,).
-    """
+    """Unit direction of pressing; by default the indenter's y axis, as it is until it tilts, (3,)."""
 
     @property
     def axis(self) -> FloatArray:
@@ -170,9 +169,7 @@ class ContactState:
     force_mn: FloatArray
     """Whole force of the indenter on each point: lambda n and friction, (n, 3). [mN]"""
     stiffness: FloatArray
-    """epsilon A n n' of the points in contact and that of friction, without the curvature of the indenter,
-    (n, 3, 3). [mN/mm]
-    """
+    """epsilon A n n' in contact and that of friction, without the indenter's curvature, (n, 3, 3). [mN/mm]"""
     potential: float
     """Energy of the penalty and of friction. [µJ]"""
     friction: Friction | None = None

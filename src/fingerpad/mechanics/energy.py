@@ -38,7 +38,6 @@ FUNCTIONS = ("log", "exp", "sqrt")
 MOST_OPERATIONS = 200
 LONGEST_FORMULA = 4000
 
-
 VARIABLE, ADD, SUBTRACT, MULTIPLY, DIVIDE, SCALE, SHIFT, POWER, LOG, EXP = range(10)
 OPERATION_SIZE = 4
 """Numbers per operation: its code, the results it takes (left, right) and a constant."""

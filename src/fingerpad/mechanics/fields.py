@@ -57,16 +57,13 @@ class ElementFields:
 
     elements: np.ndarray
     gradient: FloatArray
-    """Mean deformation gradient, its determinant the dilatation of the element, (n_times, n_elements, 3, 3).
-    """
+    """Mean deformation gradient, its determinant the dilatation, (n_times, n_elements, 3, 3)."""
     stress_kpa: FloatArray
     """Cauchy stress, mean over the present volume, (n_times, n_elements, 6). [kPa]"""
     stored_kpa: FloatArray
     instantaneous_kpa: FloatArray
     work_kpa: FloatArray
-    """Strain energy density per reference volume by its three definitions, (n_times, n_elements). [kPa =
-    µJ/mm³]
-    """
+    """Energy density per reference volume by its three definitions, (n_times, n_elements). [kPa = µJ/mm³]"""
 
     def of(self, elements: np.ndarray) -> ElementFields:
         order = np.argsort(self.elements)
@@ -301,20 +298,15 @@ class SkinContact:
     """Where and how hard the indenter presses, over time."""
 
     pressure_kpa: FloatArray
-    """Normal force on each node of `mesh.skin_nodes` over the present area that belongs to it, (n_times,
-    n_skin_nodes). [kPa]
-    """
+    """Normal force on each of `mesh.skin_nodes` over its present area, (n_times, n_skin_nodes). [kPa]"""
     shear_kpa: FloatArray
     """Friction on each node over that area, (n_times, n_skin_nodes, 3). [kPa]"""
     slip_mm: FloatArray
     """How far each node in contact has slid over the indenter since it came to touch, with friction,
-    (n_times, n_skin_nodes). [mm]
-    """
+    (n_times, n_skin_nodes). [mm]"""
     area_mm2: FloatArray
     present_area_mm2: FloatArray
-    """Skin in contact, undeformed and as it is then; of the whole body also when half of it is solved,
-    (n_times,). [mm²]
-    """
+    """Skin in contact, undeformed and as it is then; always of the whole body, (n_times,). [mm²]"""
 
 
 def skin_contact(

@@ -115,9 +115,7 @@ class Friction:
     force_mn: FloatArray
     """Friction on each node, (n, 3). [mN]"""
     stiffness: FloatArray
-    """Its tangent, or a stiffer one far from the solution; symmetric, without negative eigenvalues, (n, 3,
-    3). [mN/mm]
-    """
+    """Its tangent, or a stiffer one far from the solution; no negative eigenvalues, (n, 3, 3). [mN/mm]"""
     potential: float
     slip_mm: FloatArray
     pull_mn: FloatArray
@@ -129,8 +127,6 @@ def friction(
 ) -> Friction:
     """Friction on nodes that have slipped from their anchors.
 
-    Notes
-    -----
     With m = max(s, L / k) the law reads m t = L g, f = -t. Newton's method on g alone swings to and fro,
     since a node that slips resists no further slip and overshoots its place of rest. Linearising the law for
     g and t together, as for total variation (Chan, Golub & Mulet 1999), gives
@@ -188,8 +184,6 @@ def dragged(anchors: Anchors, local_mm: FloatArray, stiffness: FloatArray, touch
 def by_secants(tried: Sequence[tuple[Anchors, Anchors]]) -> Anchors:
     """Anchors that are likely to be those of the equilibrium that they lead to (Anderson 1965).
 
-    Notes
-    -----
     With x the cones given and g(x) those found, the next guess is the combination of the latest g whose rest
     g - x is smallest, were g linear. Repeating x = g(x) converges only if a change of x changes g by less. At
     the sides of a ball that is drawn in deep, more friction presses the skin by more than itself.
@@ -204,8 +198,6 @@ def by_secants(tried: Sequence[tuple[Anchors, Anchors]]) -> Anchors:
 def slid_mm(found: Anchors, after: Anchors, normal_before: FloatArray) -> FloatArray:
     """How far each node slid over the indenter in a step: the way that its anchor was dragged, (n,). [mm]
 
-    Notes
-    -----
     Between two normals that differ by the angle t the way is an arc. Its chord, projected along the face at
     its end, is shorter by sin(t) / t.
     """

@@ -279,8 +279,7 @@ class MaterialTable:
     law: FloatArray
     """Instantaneous c10, c01, c20, c11, c02, then 1/D1, 1/D2 [kPa]; the long-term share; the kind of law, the
     factor from given to instantaneous coefficients and the number of operations; then the operations of a
-    formula, (n_layers, 11 + 4 n_operations).
-    """
+    formula, (n_layers, 11 + 4 n_operations)."""
     shares: FloatArray
     times_ms: FloatArray
     """Prony series, padded with zero shares, (n_layers, n_terms)."""

@@ -145,9 +145,7 @@ class ColumnGrid:
     """The columns of one level at the crossings of its lines."""
 
     columns: np.ndarray
-    """Number of the column at each crossing; the pole and the seam of a finger appear repeatedly, (n_along,
-    n_around).
-    """
+    """Column at each crossing; pole and seam of a finger appear repeatedly, (n_along, n_around)."""
     along_mm: FloatArray
     around_mm: FloatArray
     """Distances of successive lines, (n_along - 1,). [mm]"""

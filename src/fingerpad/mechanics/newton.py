@@ -98,23 +98,17 @@ class NewtonSettings:
     residual_tolerance: float = 1e-5
     """Norm of the out-of-balance nodal forces over the contact force."""
     penetration_tolerance: float = 5e-3
-    """Largest distance between pressed skin and indenter, over the depth of indentation; contact is augmented
-    until it is met.
-    """
+    """Largest distance of pressed skin to the indenter, over the depth: contact is augmented until then."""
     most_iterations: int = 40
     """Newton steps before the attempt is given up."""
     balance_tolerance: float = 1e-4
     """Difference between the force of the indenter and the reaction of the supports, over that force. A small
-    residual does not imply it: many small nodal forces of one sign add up.
-    """
+    residual does not imply it: many small nodal forces of one sign add up."""
     persistent: bool = False
     """Whether the search goes on through an indefinite tangent and insists on a falling potential, as skin
-    about a small body or a sharp edge needs. Elsewhere a shorter step in time is the faster remedy.
-    """
+    about a small body or a sharp edge needs. Elsewhere a shorter step in time is the faster remedy."""
     least_penetration_mm: float = 0.0
-    """Penetration that is accepted at any depth after two augmentations: about a small body, a share of its
-    elements. [mm]
-    """
+    """Penetration accepted at any depth after two augmentations: about a small body. [mm]"""
 
     def __post_init__(self) -> None:
         positive("residual_tolerance", self.residual_tolerance)

@@ -84,9 +84,7 @@ class Deformation:
     times_ms: FloatArray
     """From 0, the unloaded state, (n_times,). [ms]"""
     force_mn: FloatArray
-    """Force of the indenter along its axis; that of the whole body also when half of it is solved,
-    (n_times,). [mN]
-    """
+    """Force of the indenter along its axis on the whole body, also if half is solved, (n_times,). [mN]"""
     displacement_mm: FloatArray
     """Displacements, (n_times, n_nodes, 3). [mm]"""
     sed_kpa: FloatArray
@@ -95,18 +93,13 @@ class Deformation:
     """How far the indenter has advanced since first touch, (n_times,). [mm]"""
     contact_force_mn: FloatArray
     """Whole force of the indenter on the skin, with friction, of the whole body also when half of it is
-    solved, (n_times, 3). [mN]
-    """
+    solved, (n_times, 3). [mN]"""
     reaction_mn: FloatArray
-    """Force of the body on bone and nail, of the whole body also when half of it is solved, (n_times, 3).
-    [mN]
-    """
+    """Force on bone and nail of the whole body, also if half of it is solved, (n_times, 3). [mN]"""
     nail_reaction_mn: FloatArray
     """Its part on the nail, (n_times, 3). [mN]"""
     force_imbalance: float
-    """Largest difference at any time between the indenter's force and the reaction of the supports, over that
-    force.
-    """
+    """Largest difference of the indenter's force to the reaction of the supports, over that force."""
     stress_kpa: FloatArray
     """Cauchy stress of all elements at the last time, as in `ElementFields`, (n_elements, 6). [kPa]"""
     fields: ElementFields

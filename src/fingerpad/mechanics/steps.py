@@ -116,8 +116,7 @@ class Phase:
     """Length of the first step to try. [ms]"""
     loading: bool
     """Whether SED grows to the end. Errors then are relative to the largest SED expected there, by growth in
-    proportion to time: no step is small beside what it has reached from nothing.
-    """
+    proportion to time: no step is small beside what it has reached from nothing."""
 
 
 def adaptive_steps(

@@ -160,9 +160,7 @@ class InstantaneousState(NamedTuple):
     """Integration weight and instantaneous energy W0 that may relax, (n_elements, 8, 2). [mm³, kPa]"""
     volumetric_kpa: FloatArray
     pressure_kpa: FloatArray
-    """U(Jbar) and U'(Jbar); 0 for laws that couple shape and volume, whose whole stress is in S0,
-    (n_elements,). [kPa]
-    """
+    """U(Jbar) and U'(Jbar); 0 for coupled laws, whose whole stress is in S0, (n_elements,). [kPa]"""
     dilatation: FloatArray
 
 

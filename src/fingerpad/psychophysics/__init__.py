@@ -6,8 +6,7 @@ from fingerpad.psychophysics.code_efficiency import (
     code_statistic,
     noisy_presentations,
 )
-from fingerpad.psychophysics.counts import JudgementCounts
-from fingerpad.psychophysics.functions import PsychometricFunction
+from fingerpad.psychophysics.functions import JudgementCounts, PsychometricFunction
 from fingerpad.psychophysics.ideal_observer import (
     Discriminability,
     GaussianResponses,

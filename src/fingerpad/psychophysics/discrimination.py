@@ -61,8 +61,7 @@ class Experiment:
 
     presentations: int = _REPETITIONS
     """Noisy presentations of each sphere: gradient sums behind one mean and standard deviation (d), or sets
-    of responses from which pairs are sampled (c*).
-    """
+    of responses from which pairs are sampled (c*)."""
     distributions: int = _REPETITIONS
     """Pairs of mean and standard deviation per sphere, Gradient Sum only (f)."""
     pairs: int = _REPETITIONS
@@ -74,14 +73,12 @@ class Experiment:
     criterion_sigma: float = 0.0
     """Spread of the decision point: for each hit rate it is multiplied by Normal(1, criterion_sigma). Above 0
     this is the paper's derivative of Gradient Sum: one mean and standard deviation per sphere, from
-    `presentations_varied` sums; steps (f) and (g) are omitted.
-    """
+    `presentations_varied` sums; steps (f) and (g) are omitted."""
     presentations_varied: int = _REPETITIONS_VARIED
     """Presentations of each sphere when the criterion varies."""
     criterion_moves: str = CRITERION_MOVES[0]
     """Quantity multiplied by the varied criterion: the decision point itself, beta, or a likelihood ratio of
-    1 that replaces beta.
-    """
+    1 that replaces beta."""
 
     def __post_init__(self) -> None:
         for name in ("presentations", "distributions", "pairs", "hit_rates", "presentations_varied"):

@@ -364,10 +364,8 @@ def gaussian_information(
     0.25
     """
     values, rises = float_array("responses", responses, 1), float_array("slopes", slopes, 1)
-    sigma, floor = (
-        checked_noise(noise_sigma, above_zero=True),
-        not_negative("smallest_spread", smallest_spread),
-    )
+    sigma = checked_noise(noise_sigma, above_zero=True)
+    floor = not_negative("smallest_spread", smallest_spread)
     zeros = np.count_nonzero(values == 0.0) if floor == 0.0 else 0
     if values.size != rises.size or zeros:
         raise InputError(

@@ -20,8 +20,7 @@ from scipy.special import digamma
 
 from fingerpad.core.checks import FloatArray
 from fingerpad.core.errors import ConvergenceError
-from fingerpad.psychophysics.counts import SMALLEST_OVERDISPERSION, log_probability
-from fingerpad.psychophysics.functions import Sigmoid
+from fingerpad.psychophysics.functions import SMALLEST_OVERDISPERSION, Sigmoid, log_probability
 
 PARAMETERS = ("threshold", "width", "guess", "lapse", "overdispersion")
 """Names of the parameters, in the order of their columns."""

@@ -54,9 +54,8 @@ def noisy_gradient_sums(
     """Sum the gradients of noisy presentations of every stimulus, steps (a) to (d).
 
     What `fingerpad.psychophysics.encoding.gradient_sum` makes of `noisy_responses`, without keeping either.
-    Several
-    measures of the same presentations, or several strengths of the noise, meet the same random numbers,
-    which are drawn once.
+    Several measures of the same presentations, or several strengths of the noise, meet the same random
+    numbers, which are drawn once.
     """
     values = np.asarray(responses, dtype=np.float64)
     measures = np.ascontiguousarray(values.reshape(-1, *values.shape[-2:]))

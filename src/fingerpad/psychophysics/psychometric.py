@@ -11,8 +11,14 @@ from fingerpad.core.checks import FloatArray, finite, one_of
 from fingerpad.core.displayed import Result
 from fingerpad.core.errors import ConvergenceError, InputError
 from fingerpad.core.keywords import known_keywords
-from fingerpad.psychophysics.counts import SMALLEST_OVERDISPERSION, JudgementCounts, log_probability
-from fingerpad.psychophysics.functions import SIGMOIDS, PsychometricFunction, checked_levels
+from fingerpad.psychophysics.functions import (
+    SIGMOIDS,
+    SMALLEST_OVERDISPERSION,
+    JudgementCounts,
+    PsychometricFunction,
+    checked_levels,
+    log_probability,
+)
 from fingerpad.psychophysics.maximum_likelihood import (
     LAPSE,
     OVERDISPERSION,
@@ -149,11 +155,9 @@ def fit_psychometric(
     threshold : float or None, optional
         Level at which F is one half; None to fit it up to half the span of the levels beyond them.
     width : float or None, optional
-        Distance of 5 and 95 % of F; None to fit it between half the smallest distance of levels and five
-        times their span.
+        Distance of 5 and 95 % of F; None to fit it, between half the closest levels and five spans of all.
     overdispersion : float or None, optional
-        Correlation of judgements of one level; 0 for the binomial likelihood, None to fit it within
-        0 ... 0.5. [0-1]
+        Correlation of judgements of one level; 0 for the binomial, None to fit it within 0 ... 0.5. [0-1]
 
     Raises
     ------

@@ -27,8 +27,14 @@ from numpy.typing import ArrayLike
 from fingerpad.core.checks import FloatArray, finite, float_array, instance, one_of, whole
 from fingerpad.core.errors import ConvergenceError, InputError
 from fingerpad.core.random_streams import Purpose, uniforms
-from fingerpad.psychophysics.counts import log_probability
-from fingerpad.psychophysics.functions import SIGMOIDS, Sigmoid, checked_levels, level_at, proportion
+from fingerpad.psychophysics.functions import (
+    SIGMOIDS,
+    Sigmoid,
+    checked_levels,
+    level_at,
+    log_probability,
+    proportion,
+)
 from fingerpad.psychophysics.maximum_likelihood import (
     GUESS,
     LAPSE,

@@ -144,9 +144,7 @@ class TrainingPose:
     values: tuple[float, ...]
     """Its place on each axis of the range."""
     first_touch_mm: float
-    """Depth at which the indenter meets the undeformed skin, along the pressing of the touch and from its
-    first touch. [mm]
-    """
+    """Depth at which the indenter meets undeformed skin, from the first touch of the touch. [mm]"""
     meets_mm: float
     """The same from the first touch at this place, before the indenter tilts. [mm]"""
     touches: tuple[Touch, ...]
@@ -161,8 +159,7 @@ class ReducedTraining(metaclass=KnownKeywords):
     Parameters
     ----------
     touch : Touch
-        What is reduced: its finger, indenter, tissues, place, direction and friction; its motion and its mesh
-        do not count.
+        What is reduced: its finger, indenter, tissues, place, direction and friction, not motion and mesh.
     range : ReducedRange
         The poses.
     resolution : {"quick", "standard", "paper"}
@@ -222,10 +219,7 @@ class ReducedTraining(metaclass=KnownKeywords):
     def pressed_again(self) -> tuple[tuple[float, ...], Touch]:
         """Touch in the middle of the range that goes deeper and back after it has relaxed.
 
-        Returns
-        -------
-        (tuple of float, Touch)
-            Value of the indenter's parameter, if one varies, and the touch.
+        Value of the indenter's parameter, if one varies, and the touch.
         """
         shape = tuple(0.5 * (axis.low + axis.high) for axis in self.range.axes[3:])
         depths_mm = tuple(share * self.range.depth_mm for share in PRESSED_AGAIN)

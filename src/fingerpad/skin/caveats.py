@@ -25,7 +25,6 @@ LARGEST_SED_RATIO = 6.5
 """Largest SED over the shear modulus of the living epidermis that docs/presses.md compares between meshes:
 58.5 kPa at 9 kPa, under a sphere of 0.25 mm."""
 
-
 LARGEST_IMBALANCE = 5e-3
 """Largest share of the indenter's work that is neither stored nor dissipated nor held by the contact, in the
 presses whose meshes docs/presses.md compares. Skin that snaps round an edge within one step loses more."""

@@ -116,13 +116,9 @@ class Touch(metaclass=KnownKeywords):
 
     def __post_init__(self) -> None:
         for name, kind in (
-            ("finger", Finger),
-            ("indenter", Indenter),
-            ("stimulus", Motion),
-            ("tissues", Tissues),
-            ("grading", Grading),
-            ("settings", PressSettings),
-        ):
+            ("finger", Finger), ("indenter", Indenter), ("stimulus", Motion), ("tissues", Tissues),
+            ("grading", Grading), ("settings", PressSettings),
+        ):  # fmt: skip
             instance(name, getattr(self, name), kind)
         x, z = _position(self.at_mm, self.finger)
         object.__setattr__(self, "at_mm", (x, z))
@@ -408,8 +404,7 @@ def indent(
         Steps and tolerances instead of those of `resolution`; `PressSettings(sed_tolerance=0.01)` chooses
         steps that keep the error of SED in time below 1 % of its largest value.
     times_ms : sequence of float
-        Times at which the response is wanted: it has them among its times, which the motion and the settings
-        choose. [ms]
+        Times that the response has beside those that the motion and the settings choose. [ms]
     whole : bool
         Whether to keep all nodes and elements over time as well, see `Touch.solve`.
     progress : Progress, optional

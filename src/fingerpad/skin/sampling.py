@@ -113,8 +113,7 @@ class SkinResponse(Result):
     fields : mapping of str to array
         Values of stored fields by their names in `skin.fields.FIELDS`, "times_ms" among them.
     force_imbalance : float
-        Largest difference at any time between the indenter's force and the reaction of bone and nail, over
-        that force.
+        Largest difference of the indenter's force to the reaction of bone and nail, over that force.
     energy_imbalance : float
         Largest difference at any time between the indenter's work and what was stored, dissipated and held
         by the contact, over that work.
@@ -302,8 +301,7 @@ class SkinResponse(Result):
         sites : array (n_sites, 2) or (n_sites, 3)
             x and z of end organs on the volar side, or x, y and z of the skin above them on any side. [mm]
         dynamic_quantity, static_quantity : str, optional
-            Quantities that drive the dynamic and the static response, names of `sample`. Default: SED, as in
-            the paper.
+            What drives the dynamic and the static response, names of `sample`. Default: SED, as in the paper.
 
         Returns
         -------

@@ -29,9 +29,7 @@ class Section:
     skin_mm: FloatArray
     nail_mm: FloatArray
     bone_mm: FloatArray
-    """Both ends of each edge of the outline on free skin, under the nail and on the bone, (n_edges, 2, 2).
-    [mm]
-    """
+    """Ends of each edge of the outline on free skin, under the nail and on the bone, (n_edges, 2, 2). [mm]"""
 
 
 def middle_section(mesh: Mesh, displacement_mm: FloatArray) -> Section:

@@ -41,9 +41,9 @@ from fingerpad.psychophysics.code_efficiency import (
     code_statistic,
     noisy_presentations,
 )
-from fingerpad.psychophysics.counts import binomial_interval
 from fingerpad.psychophysics.discrimination import Experiment
 from fingerpad.psychophysics.encoding import taking_part
+from fingerpad.psychophysics.functions import binomial_interval
 from fingerpad.psychophysics.ideal_observer import Presentation, multiplied_responses
 
 SESSION = 2

@@ -11,7 +11,7 @@ from scipy.special import ndtr, ndtri
 from fingerpad.core.checks import FloatArray
 from fingerpad.core.results import Vector, result_class
 from fingerpad.data import psychophysics
-from fingerpad.psychophysics.counts import binomial_interval
+from fingerpad.psychophysics.functions import binomial_interval
 from fingerpad.psychophysics.noise_fit import NoiseFit, fit_noise_sigma
 
 CURVATURES = psychophysics.GOODWIN_CURVATURES.value

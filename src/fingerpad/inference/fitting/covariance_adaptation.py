@@ -17,8 +17,6 @@ from fingerpad.inference.fitting.methods import Bounds, Fit, FitStep, Problem
 class CovarianceAdaptation:
     """CMA-ES from one start, with the package `cma`.
 
-    Notes
-    -----
     Hansen & Ostermeier 2001.
     """
 

@@ -58,8 +58,6 @@ def interleaved_folds(n_observations: int, n_folds: int = int(protocol.FOLDS.val
 def cross_validate(problem: Problem, method: Method, memberships: ArrayLike) -> CrossValidation:
     """Fit without the observations of each fold, and score the result on them.
 
-    Notes
-    -----
     Gerling et al. 2014, section 2.2.2.
     """
     folds = _checked_memberships(memberships, problem.n_observations)
@@ -99,8 +97,6 @@ def jackknife_covariance(estimates: ArrayLike) -> FloatArray | None:
     maxima. A covariance from derivatives at the best fit neglects both and is too small
     (docs/decisions.md#jackknife).
 
-    Notes
-    -----
     R. G. Miller, Biometrika 61 (1974) 1, the delete-a-group jackknife.
     """
     rows = float_array("estimates", estimates, 2)

@@ -26,8 +26,6 @@ Jacobian = Callable[[FloatArray, IntArray], FloatArray]
 class LeastSquares:
     """Trust-region least squares from the most promising of several starts.
 
-    Notes
-    -----
     The method of `scipy.optimize.least_squares`, "trf" (Branch, Coleman & Li 1999); the result is the best of
     all evaluated points. The method is deterministic.
     """

@@ -65,8 +65,6 @@ def halton(number: int, dimensions: int) -> FloatArray:
 class Problem(Protocol):
     """A model and the observations to which it is fitted.
 
-    Notes
-    -----
     `score = 1 - residuals @ residuals` up to round-off, so a method may maximise the score or minimise the
     residuals.
     """

@@ -39,8 +39,6 @@ TAILS = (0.025, 0.975)
 def split_r_hat(draws: FloatArray) -> float:
     """Return split R-hat: 1 if the halves of all ensembles have the same distribution, else larger.
 
-    Notes
-    -----
     R-hat = sqrt(((n - 1)/n W + B)/W) with W the mean variance within halves of n draws, and B the variance
     of their means, both of rank-normalised draws (Vehtari, Gelman, Simpson, Carpenter & Bürkner 2021).
     """
@@ -52,8 +50,6 @@ def split_r_hat(draws: FloatArray) -> float:
 def effective_size(draws: FloatArray) -> float:
     """Return the effective sample size of the mean.
 
-    Notes
-    -----
     The series of each ensemble is the mean of its walkers. The variance of the mean of such series is
     var (1 + 2 sum rho_t)/(n_ensembles n_steps). The sum of autocorrelations is truncated at the first pair
     that is not positive, and pairs are made monotone (Geyer 1992).
@@ -76,8 +72,6 @@ def effective_size(draws: FloatArray) -> float:
 def effective_sizes(draws: FloatArray) -> tuple[float, float]:
     """Return the effective sample sizes of the centre and of the tails.
 
-    Notes
-    -----
     Vehtari, Gelman, Simpson, Carpenter & Bürkner 2021.
     """
     values = _checked(draws)

@@ -65,8 +65,6 @@ def maximise(
 ) -> Fit:
     """Maximise `objective` from `start` by the response surface method.
 
-    Notes
-    -----
     Gerling et al. 2014, section 2.2.2; Box & Wilson 1951 for the method. Steps along the ascent are one coded
     unit at first, double after each gain and halve after each loss; the ascent ends when a step of one unit
     has no gain.
@@ -108,8 +106,6 @@ def maximise(
 class ResponseSurface:
     """The paper's method: response surfaces and steepest ascent from each start; the best result is taken.
 
-    Notes
-    -----
     Gerling et al. 2014, section 2.2.2; see `maximise`. The method is deterministic.
     """
 

@@ -37,13 +37,10 @@ class SobolIndices:
     first: FloatArray
     first_half_width: FloatArray
     """First-order index, the share of the variance that the parameter explains alone, and half the width of
-    its confidence interval, (n_parameters,). [1]
-    """
+    its confidence interval, (n_parameters,). [1]"""
     total: FloatArray
     total_half_width: FloatArray
-    """Total index: the share that the parameter explains alone and in interaction with others,
-    (n_parameters,). [1]
-    """
+    """Total index: the share explained alone and in interaction with others, (n_parameters,). [1]"""
     level: float
     """Level of confidence. [0-1]"""
     mean: float
@@ -64,8 +61,6 @@ def sobol_indices(
 ) -> SobolIndices:
     """Estimate first-order and total Sobol indices with `scipy.stats.sobol_indices`.
 
-    Notes
-    -----
     Saltelli et al. 2010. SciPy's own bootstrap of the indices takes no seed, so the points of the design are
     resampled here; a half width is that of a normal interval with the bootstrap's standard error.
     """
@@ -100,14 +95,8 @@ def sobol_indices(
         again = stats.sobol_indices(func=parts, n=n_base)
         return np.stack([again.first_order, again.total_order])
 
-    spread = stats.bootstrap(
-        (np.arange(n_base),),
-        resampled,
-        vectorized=False,
-        n_resamples=SOBOL_RESAMPLES,
-        method="percentile",
-        rng=random,
-    ).standard_error
+    settings = {"vectorized": False, "n_resamples": SOBOL_RESAMPLES, "method": "percentile", "rng": random}
+    spread = stats.bootstrap((np.arange(n_base),), resampled, **settings).standard_error
     half_widths = ndtri(0.5 + 0.5 * level) * spread
     return SobolIndices(
         names=labels,
@@ -149,9 +138,7 @@ class Identifiability:
     singular_values: FloatArray
     """Change of the outputs per unit step along each direction, largest first, (n_parameters,)."""
     directions: FloatArray
-    """One unit direction per row, in units of the scales; those with singular value 0 are last,
-    (n_parameters, n_parameters).
-    """
+    """One unit direction per row, in the scales, singular value 0 last, (n_parameters, n_parameters)."""
     rank: int
     """Number of singular values above zero, the number of identifiable combinations."""
 
