@@ -21,8 +21,11 @@ from fingerpad.data.neuron import PAPER_INITIAL
 from fingerpad.experiments.conditions import RECEPTOR_X_MM, Conditions
 from fingerpad.experiments.gerling2014 import single_unit, sphere_discrimination
 from fingerpad.experiments.gerling2014.discrepancy import expected_of_measure
-from fingerpad.experiments.gerling2014.discrimination_statistics import Measured
-from fingerpad.experiments.gerling2014.goodwin import fit_noise_to_goodwin, goodwin_columns
+from fingerpad.experiments.gerling2014.discrimination_statistics import (
+    Measured,
+    fit_noise_to_goodwin,
+    goodwin_columns,
+)
 from fingerpad.experiments.manifest import Manifest
 from fingerpad.experiments.runner import Runner
 from fingerpad.neuron.afferent import Afferent

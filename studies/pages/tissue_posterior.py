@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 
 from fingerpad.core.checks import FloatArray
 from fingerpad.data import bar_firing_rates, psychophysics
-from fingerpad.experiments.gerling2014.goodwin import goodwin_hit_rates_at
+from fingerpad.experiments.gerling2014.discrimination_statistics import goodwin_hit_rates_at
 from fingerpad.experiments.gerling2014.single_unit_uncertainty import CredibleInterval
 from fingerpad.report.formatting import fixed, joined
 from fingerpad.report.manifest import edition

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from pkgutil import resolve_name
+from collections.abc import Sequence
+from importlib import import_module
 from typing import Any
 
 import numpy as np
@@ -25,18 +25,8 @@ from fingerpad.inference.recordings import PHASES, RateRecordings, SpikeRecordin
 from fingerpad.neuron.afferent import PARAMETER_NAMES, PARAMETER_UNITS
 from fingerpad.neuron.rate_windows import Windows
 
-_PARTS = {
-    "posterior": "fingerpad.experiments.fit.rate_uncertainty:rate_posterior",
-    "profiles": "fingerpad.experiments.fit.rate_uncertainty:profiled",
-    "sensitivity": "fingerpad.experiments.fit.rate_uncertainty:fss_sensitivity",
-}
-"""What computes a part of the uncertainty of a fit; its module is loaded when the part is asked for."""
-
-
-def _part(name: str) -> Callable[..., Any]:
-    """Return the function of one of `_PARTS`."""
-    found: Callable[..., Any] = resolve_name(_PARTS[name])
-    return found
+_UNCERTAINTY = "fingerpad.experiments.fit.rate_uncertainty"
+"""What computes the uncertainty of a fit; it is loaded when a part is asked for."""
 
 
 @known_keywords
@@ -119,16 +109,19 @@ def fit_recordings(
     prepared = prepare(method, model, recordings, rates, seed)
     best = prepared.method.fit(prepared.problem, np.arange(len(rates.stimuli)))
     validation = cross_validate(prepared.problem, prepared.method, folds)
-    four = identifiable(prepared.six(best.parameters))
+    six = prepared.six(best.parameters)
+    four = identifiable(six)
     covariance = prepared.covariance(best, validation)
+    asked = with_posterior or with_profiles or with_sensitivity
+    parts: Any = import_module(_UNCERTAINTY) if asked else None
     errors = np.full(len(IDENTIFIABLE_NAMES), np.nan) if covariance is None else np.sqrt(np.diag(covariance))
     return FitResult(
         method=method,
         source=rates.source,
         n_evaluations=best.n_evaluations,
         seconds=best.seconds,
-        parameters=_six_by_name(prepared.six(best.parameters)),
-        identifiable=_four_by_name(prepared.six(best.parameters)),
+        parameters=dict(zip(PARAMETER_NAMES, six.tolist(), strict=True)),
+        identifiable=dict(zip(IDENTIFIABLE_NAMES, four.tolist(), strict=True)),
         units=dict(zip(PARAMETER_NAMES, PARAMETER_UNITS, strict=True)),
         identifiable_units=dict(zip(IDENTIFIABLE_NAMES, IDENTIFIABLE_UNITS, strict=True)),
         identifiable_standard_error=dict(zip(IDENTIFIABLE_NAMES, errors.tolist(), strict=True)),
@@ -141,13 +134,11 @@ def fit_recordings(
         phases=_phases(prepared.problem, rates, best.parameters, validation),
         folds=_folds(prepared, rates, validation),
         spikes=prepared.spikes(best, validation),
-        posterior=_part("posterior")(model, rates, four, seed, positions_mm) if with_posterior else None,
-        profiles=_part("profiles")(model, rates, four, positions_mm) if with_profiles else None,
-        sensitivity=(
-            _part("sensitivity")(RateProblem(four_number_model(model), rates), four, seed)
-            if with_sensitivity
-            else None
-        ),
+        posterior=parts.rate_posterior(model, rates, four, seed, positions_mm) if with_posterior else None,
+        profiles=parts.profiled(model, rates, four, positions_mm) if with_profiles else None,
+        sensitivity=parts.fss_sensitivity(RateProblem(four_number_model(model), rates), four, seed)
+        if with_sensitivity
+        else None,
         offset=None if beside is None else fit_offset(beside, rates, folds, method, windows_ms, seed),
     )
 
@@ -184,14 +175,6 @@ def check_enough(rates: RateRecordings, memberships: IntArray, n_free: int = len
                     )
 
 
-def _six_by_name(six: FloatArray) -> dict[str, float]:
-    return dict(zip(PARAMETER_NAMES, six.tolist(), strict=True))
-
-
-def _four_by_name(six: FloatArray) -> dict[str, float]:
-    return dict(zip(IDENTIFIABLE_NAMES, identifiable(six).tolist(), strict=True))
-
-
 def _phases(
     problem: RateProblem, rates: RateRecordings, fitted: FloatArray, validation: CrossValidation
 ) -> dict[str, PhaseRates]:
@@ -204,20 +187,17 @@ def _phases(
     observed = {phase: getattr(rates, f"{phase}_rate_hz") for phase in PHASES}
     return {
         phase: PhaseRates(
-            fss_in_sample=(
-                None
-                if observed[phase] is None
-                else fractional_sum_of_squares(observed[phase], predicted[phase])
-            ),
-            observed_hz=observed[phase],
+            fss_in_sample=None if seen is None else fractional_sum_of_squares(seen, predicted[phase]),
+            observed_hz=seen,
             fitted_hz=predicted[phase],
             out_of_sample_hz=left_out[phase],
         )
-        for phase in PHASES
+        for phase, seen in observed.items()
     }
 
 
 def _folds(prepared: Prepared, rates: RateRecordings, validation: CrossValidation) -> tuple[FittedFold, ...]:
+    six = [prepared.six(fold.fit.parameters) for fold in validation.folds]
     return tuple(
         FittedFold(
             fold=fold.fold + 1,
@@ -226,8 +206,8 @@ def _folds(prepared: Prepared, rates: RateRecordings, validation: CrossValidatio
             fss_test=fold.score_test,
             n_evaluations=fold.fit.n_evaluations,
             seconds=fold.fit.seconds,
-            parameters=_six_by_name(prepared.six(fold.fit.parameters)),
-            identifiable=_four_by_name(prepared.six(fold.fit.parameters)),
+            parameters=dict(zip(PARAMETER_NAMES, each.tolist(), strict=True)),
+            identifiable=dict(zip(IDENTIFIABLE_NAMES, identifiable(each).tolist(), strict=True)),
         )
-        for fold in validation.folds
+        for fold, each in zip(validation.folds, six, strict=True)
     )
