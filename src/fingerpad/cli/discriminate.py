@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-import shlex
-import sys
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from fingerpad.cli.options import RESOLUTION_CHOICES, Jobs, Scheduler
-from fingerpad.cli.running import engine, interruptible, make_writable, progress
+from fingerpad.cli.options import RESOLUTION_CHOICES, Jobs, Scheduler, option
+from fingerpad.cli.running import command_line, engine, interruptible, make_writable, progress, tell
 from fingerpad.core.errors import InputError
 
 
@@ -21,20 +19,16 @@ def discriminate_command(
             metavar="TASK", help="YAML file (format: docs/discriminate.md), or the name of an example task."
         ),
     ] = None,
-    out: Annotated[
-        Path, typer.Option(help="Folder for page, figures, results and stored indentations.")
-    ] = Path("discriminate"),
+    out: Annotated[Path, option("Folder for page, figures, results and stored indentations.")] = Path(
+        "discriminate"
+    ),
     resolution: Annotated[
-        str | None, typer.Option(help=f"One of {', '.join(RESOLUTION_CHOICES)}. Default: that of the task.")
+        str | None, option(f"One of {', '.join(RESOLUTION_CHOICES)}. Default: that of the task.")
     ] = None,
     jobs: Jobs = None,
     scheduler: Scheduler = None,
-    listed: Annotated[
-        bool, typer.Option("--list", help="List the example tasks of the package, and exit.")
-    ] = False,
-    example: Annotated[
-        str | None, typer.Option(help="Print the YAML file of an example task, and exit.")
-    ] = None,
+    listed: Annotated[bool, option("List the example tasks of the package, and exit.", "--list")] = False,
+    example: Annotated[str | None, option("Print the YAML file of an example task, and exit.")] = None,
 ) -> None:
     """Predict hit rates, psychometric curves and thresholds of a discrimination task."""
     from fingerpad.core.checks import one_of
@@ -64,14 +58,8 @@ def discriminate_command(
     make_writable(out)
     with interruptible():
         results = discriminate(
-            run,
-            progress(),
-            command=shlex.join(["fingerpad", *sys.argv[1:]]),
-            inputs=input_hashes(task, asked, run.prepared.stimuli),
+            run, progress(), command=command_line(), inputs=input_hashes(task, asked, run.prepared.stimuli)
         )
         page = write_task_page(results, out)
         schemas.write(out / "discriminate.json", results)
-    for paragraph in task_summary(results.discrimination):
-        typer.echo(paragraph)
-    typer.echo(f"Report: {page}")
-    typer.echo(f"Results: {out / 'discriminate.json'}")
+    tell(task_summary(results.discrimination), page, out / "discriminate.json")

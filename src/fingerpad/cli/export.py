@@ -15,6 +15,7 @@ from fingerpad.cli.options import (
     Resolution,
     Tissues,
     number_option,
+    option,
 )
 from fingerpad.cli.running import interruptible, make_writable
 from fingerpad.core.errors import InputError
@@ -28,16 +29,14 @@ def export_command(
     ],
     indenter: Annotated[
         str,
-        typer.Option(
-            help=f"One of {', '.join(INDENTER_CHOICES)}, with sizes as in punch:6.35 or sphere:radius_mm=3.5."
-        ),
+        option(f"One of {', '.join(INDENTER_CHOICES)}, with sizes as in punch:6.35 or sphere:radius_mm=3.5."),
     ] = SPHERE,
     curvature: Annotated[float | None, number_option("Curvature of the sphere. Default: 287. [1/m]")] = None,
     depth: Annotated[float | None, number_option("Depth of the hold. Default: 1. [mm]")] = None,
     trajectory: Annotated[
         Path | None,
-        typer.Option(
-            help="CSV file with a motion instead of ramp and hold (docs/motions.md); samples close to a line "
+        option(
+            "CSV file with a motion instead of ramp and hold (docs/motions.md); samples close to a line "
             "are left out."
         ),
     ] = None,
@@ -49,22 +48,17 @@ def export_command(
         ),
     ] = None,
     finger: Annotated[
-        str, typer.Option(help=f"One of {', '.join(FINGER_CHOICES)}, with measures as in adult:width_mm=18.")
+        str, option(f"One of {', '.join(FINGER_CHOICES)}, with measures as in adult:width_mm=18.")
     ] = ADULT,
     tissues: Tissues = DEFAULT_TISSUES,
     resolution: Resolution = QUICK,
-    format_name: Annotated[
-        str, typer.Option("--format", help=f"One of {', '.join(FORMAT_CHOICES)}.")
-    ] = "vtu",
+    format_name: Annotated[str, option(f"One of {', '.join(FORMAT_CHOICES)}.", "--format")] = "vtu",
     described: Annotated[
         Path | None,
-        typer.Option(
-            "--touch", help="YAML file of a touch (format: docs/touch.md) instead of the options above."
-        ),
+        option("YAML file of a touch (format: docs/touch.md) instead of the options above.", "--touch"),
     ] = None,
     elastic_moduli: Annotated[
-        str | None,
-        typer.Option(help="For calculix, whose materials do not relax: long_term or instantaneous."),
+        str | None, option("For calculix, whose materials do not relax: long_term or instantaneous.")
     ] = None,
 ) -> None:
     """Press an indenter into the finger and write the touch as a table, for ParaView or another solver."""

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import shlex
-import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -21,8 +19,17 @@ from fingerpad.cli.options import (
     Seed,
     integer_option,
     number_option,
+    option,
 )
-from fingerpad.cli.running import engine, interruptible, make_writable, progress, write_examples
+from fingerpad.cli.running import (
+    command_line,
+    engine,
+    interruptible,
+    make_writable,
+    progress,
+    tell,
+    write_examples,
+)
 from fingerpad.core.errors import InputError
 
 if TYPE_CHECKING:
@@ -37,11 +44,10 @@ def fit_command(
         Path | None, typer.Argument(help="CSV or NWB file (format: docs/fit.md). Not needed with --example.")
     ] = None,
     stimulus: Annotated[
-        str | None,
-        typer.Option(help="bar (shifted along the finger), or a CSV or YAML file with the stimuli."),
+        str | None, option("bar (shifted along the finger), or a CSV or YAML file with the stimuli.")
     ] = None,
     stimulus_column: Annotated[
-        str | None, typer.Option(help="Column with the name of the stimulus. Default: shift_mm or stimulus.")
+        str | None, option("Column with the name of the stimulus. Default: shift_mm or stimulus.")
     ] = None,
     unit: Annotated[int | None, integer_option("Id of the spike unit of an NWB file.")] = None,
     width: Annotated[float | None, number_option("Width of the bar. Default: 3. [mm]")] = None,
@@ -51,52 +57,47 @@ def fit_command(
     depth: Annotated[float | None, number_option("Depth of the hold. Default: 1. [mm]")] = None,
     dynamic_window: Annotated[
         tuple[float, float] | None,
-        typer.Option(
-            help="Window of the dynamic rate: start and end. Default: the last 40 % of the ramp (30 50 in "
+        option(
+            "Window of the dynamic rate: start and end. Default: the last 40 % of the ramp (30 50 in "
             "the paper). [ms]"
         ),
     ] = None,
     static_window: Annotated[
         tuple[float, float] | None,
-        typer.Option(
-            help="Window of the static rate: start and end. Default: 550 to 900 ms from the start of the "
+        option(
+            "Window of the static rate: start and end. Default: 550 to 900 ms from the start of the "
             "hold, or 58 to 95 % of a shorter one (600 950 in the paper). [ms]"
         ),
     ] = None,
     dynamic_quantity: Annotated[
         str | None,
-        typer.Option(
-            help=f"Quantity whose rate drives the dynamic term: {QUANTITY_CHOICES[0]} (the paper's SED), or, "
+        option(
+            f"Quantity whose rate drives the dynamic term: {QUANTITY_CHOICES[0]} (the paper's SED), or, "
             f"as an extension, {', '.join(QUANTITY_CHOICES[1:])}. Default: compressive_stress with the "
             "tissues human, stored with all others."
         ),
     ] = None,
     static_quantity: Annotated[
-        str | None, typer.Option(help="Quantity that drives the static term; choices and default as above.")
+        str | None, option("Quantity that drives the static term; choices and default as above.")
     ] = None,
-    method: Annotated[str, typer.Option(help=f"One of {', '.join(METHOD_CHOICES)}.")] = "least_squares",
+    method: Annotated[str, option(f"One of {', '.join(METHOD_CHOICES)}.")] = "least_squares",
     posterior: Annotated[
-        bool,
-        typer.Option(
-            "--posterior", help="Also sample the posterior: credible intervals of parameters and rates."
-        ),
+        bool, option("Also sample the posterior: credible intervals of parameters and rates.", "--posterior")
     ] = False,
     profiles: Annotated[
-        bool, typer.Option("--profiles", help="Also compute the profile likelihood of each parameter.")
+        bool, option("Also compute the profile likelihood of each parameter.", "--profiles")
     ] = False,
-    sensitivity: Annotated[
-        bool, typer.Option("--sensitivity", help="Also compute Sobol indices of the score.")
-    ] = False,
+    sensitivity: Annotated[bool, option("Also compute Sobol indices of the score.", "--sensitivity")] = False,
     offset: Annotated[
-        bool, typer.Option("--offset", help="Also fit the position of the receptor along the finger.")
+        bool, option("Also fit the position of the receptor along the finger.", "--offset")
     ] = False,
     afferent: Annotated[
-        str | None, typer.Option(help="Type of the afferent for --free: SAI, RA, PC or SAII. Default: SAI.")
+        str | None, option("Type of the afferent for --free: SAI, RA, PC or SAII. Default: SAI.")
     ] = None,
     free: Annotated[
         str,
-        typer.Option(
-            help="Fit these numbers of the type alone, separated by commas, as in --afferent RA "
+        option(
+            "Fit these numbers of the type alone, separated by commas, as in --afferent RA "
             "--free threshold. Default: the four that spikes of an SAI determine."
         ),
     ] = "",
@@ -105,32 +106,26 @@ def fit_command(
         integer_option("Number of interleaved folds. Default: 6, or the column fold of the recordings."),
     ] = None,
     out: Annotated[
-        Path,
-        typer.Option(help="Folder for the report, the figures, the results and the stored indentations."),
+        Path, option("Folder for the report, the figures, the results and the stored indentations.")
     ] = Path("fit"),
     resolution: Annotated[
-        str | None,
-        typer.Option(help=f"One of {', '.join(RESOLUTION_CHOICES)}. Default: that of the stimuli, standard."),
+        str | None, option(f"One of {', '.join(RESOLUTION_CHOICES)}. Default: that of the stimuli, standard.")
     ] = None,
     tissues: Annotated[
         str | None,
-        typer.Option(
-            help=f"One of {', '.join(TISSUES_CHOICES)}. Default: tissues of the stimuli, {DEFAULT_TISSUES}."
-        ),
+        option(f"One of {', '.join(TISSUES_CHOICES)}. Default: tissues of the stimuli, {DEFAULT_TISSUES}."),
     ] = None,
     finger: Annotated[
         str | None,
-        typer.Option(
-            help=f"One of {', '.join(FINGER_CHOICES)}, with measures as in adult:width_mm=18. Default: "
+        option(
+            f"One of {', '.join(FINGER_CHOICES)}, with measures as in adult:width_mm=18. Default: "
             "that of the stimuli, adult."
         ),
     ] = None,
     jobs: Jobs = None,
     scheduler: Scheduler = None,
     seed: Seed = 0,
-    example: Annotated[
-        Path | None, typer.Option(help="Write example recordings into this folder, and exit.")
-    ] = None,
+    example: Annotated[Path | None, option("Write example recordings into this folder, and exit.")] = None,
 ) -> None:
     """Fit an afferent to your own recordings: firing rates or spike times under known stimuli."""
     from fingerpad.core.checks import one_of
@@ -192,7 +187,7 @@ def fit_command(
     make_writable(out)
     named = [file for each in request.recorded.stimuli.values() for file in each.files]
     inputs = [recordings, *([] if stimulus == BAR else [Path(stimulus)]), *stimuli.finger_files, *named]
-    command = shlex.join(["fingerpad", *sys.argv[1:]])
+    command = command_line()
     hashes = {str(path): sha256(path) for path in inputs}
     with interruptible():
         if request.free:
@@ -203,10 +198,7 @@ def fit_command(
         results = run_fit(request, progress(), command, hashes)
         page = write_fit_page(results, out)
         schemas.write(out / "fit.json", results)
-    for paragraph in fit_summary(results.fit):
-        typer.echo(paragraph)
-    typer.echo(f"Report: {page}")
-    typer.echo(f"Results: {out / 'fit.json'}")
+    tell(fit_summary(results.fit), page, out / "fit.json")
 
 
 def _stimuli(

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from fingerpad.cli.options import Jobs, integer_option
+from fingerpad.cli.options import Jobs, integer_option, option
 from fingerpad.cli.running import engine, interruptible, make_writable, progress
 
 
@@ -20,13 +20,12 @@ def lab_command(
             "Default: a ball, a cylinder and a plate.",
         ),
     ] = None,
-    folder: Annotated[
-        Path, typer.Option(help="Where presses and reduced touches are kept for the next time.")
-    ] = Path("lab"),
+    folder: Annotated[Path, option("Where presses and reduced touches are kept for the next time.")] = Path(
+        "lab"
+    ),
     port: Annotated[int, integer_option("Port of the page. Default: one that is free.")] = 0,
     static: Annotated[
-        Path | None,
-        typer.Option(help="Write a page into this folder that needs no server, and serve nothing."),
+        Path | None, option("Write a page into this folder that needs no server, and serve nothing.")
     ] = None,
     jobs: Jobs = None,
 ) -> None:

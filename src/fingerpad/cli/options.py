@@ -109,6 +109,11 @@ def to_number(text: str) -> float:
         raise typer.BadParameter(f"must be a number: got {text!r}.") from error
 
 
+def option(help_text: str, name: str | None = None) -> Any:
+    """Make an option, by default of the name of its parameter."""
+    return typer.Option(*([name] if name else []), help=help_text)
+
+
 def number_option(help_text: str) -> Any:
     """Make an option that takes a number."""
     return typer.Option(parser=to_number, metavar="NUMBER", help=help_text)
@@ -119,8 +124,8 @@ def integer_option(help_text: str) -> Any:
     return typer.Option(parser=to_whole, metavar="INTEGER", help=help_text)
 
 
-Resolution = Annotated[str, typer.Option(help=f"One of {', '.join(RESOLUTION_CHOICES)}.")]
-Tissues = Annotated[str, typer.Option(help=f"One of {', '.join(TISSUES_CHOICES)}.")]
+Resolution = Annotated[str, option(f"One of {', '.join(RESOLUTION_CHOICES)}.")]
+Tissues = Annotated[str, option(f"One of {', '.join(TISSUES_CHOICES)}.")]
 Jobs = Annotated[int | None, integer_option("Number of processes. Default: one per core.")]
 Scheduler = Annotated[
     str | None,

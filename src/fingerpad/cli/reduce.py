@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from fingerpad.cli.options import Jobs, Scheduler
+from fingerpad.cli.options import Jobs, Scheduler, option
 from fingerpad.cli.running import engine, interruptible, make_writable, progress
 from fingerpad.core.errors import InputError
 
@@ -16,9 +16,9 @@ def reduce_command(
     config: Annotated[
         Path, typer.Argument(metavar="CONFIG", help="YAML file of a range (format: docs/reduced.md).")
     ],
-    out: Annotated[
-        Path, typer.Option(help="File of the reduced touch; presses are stored beside it.")
-    ] = Path("reduced.npz"),
+    out: Annotated[Path, option("File of the reduced touch; presses are stored beside it.")] = Path(
+        "reduced.npz"
+    ),
     jobs: Jobs = None,
     scheduler: Scheduler = None,
 ) -> None:

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from fingerpad.cli.options import Jobs, Resolution, Scheduler, Seed
+from fingerpad.cli.options import Jobs, Resolution, Scheduler, Seed, option
 from fingerpad.cli.running import engine, interruptible, make_writable, progress
 from fingerpad.core.progress import NoProgress
 
@@ -18,16 +18,15 @@ EXPECTED_TIME = {"quick": "two minutes", "standard": "less than 10 minutes", "pa
 def reproduce_command(
     resolution: Resolution = "standard",
     out: Annotated[
-        Path,
-        typer.Option(help="Folder for the report, the figures, the results and the stored indentations."),
+        Path, option("Folder for the report, the figures, the results and the stored indentations.")
     ] = Path("reproduction"),
     jobs: Jobs = None,
     scheduler: Scheduler = None,
     seed: Seed = 0,
     tissues: Annotated[
         str,
-        typer.Option(
-            help="Tissues of the first column. paper: Trial 3 with a Poisson's ratio of 0.40, our reading; "
+        option(
+            "Tissues of the first column. paper: Trial 3 with a Poisson's ratio of 0.40, our reading; "
             "trial3: Trial 3 to the letter, 0.48; or any other named set but human."
         ),
     ] = "paper",

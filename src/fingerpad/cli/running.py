@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import logging
 import os
+import shlex
 import signal
+import sys
 import tempfile
 import threading
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
@@ -86,14 +88,10 @@ def interruptible(ending: str = CONTINUES) -> Iterator[None]:
         raise typer.Exit(status) from error
 
 
-def cores() -> int:
-    """Count the cores that this process may use."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-
-
 def processes(jobs: int | None) -> int:
-    """Return what `--jobs` says, or one process per core."""
-    return cores() if jobs is None else jobs
+    """Return what `--jobs` says, or one process per core that this process may use."""
+    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    return cores if jobs is None else jobs
 
 
 def engine(jobs: int | None, scheduler: str | None) -> int | Engine:
@@ -109,6 +107,17 @@ def engine(jobs: int | None, scheduler: str | None) -> int | Engine:
     cluster = Cluster(scheduler)
     cluster.check()
     return cluster
+
+
+def command_line() -> str:
+    """Return the command line, for the manifest."""
+    return shlex.join(["fingerpad", *sys.argv[1:]])
+
+
+def tell(paragraphs: Sequence[str], page: Path, results: Path) -> None:
+    """Print a summary, and where page and results lie."""
+    for paragraph in (*paragraphs, f"Report: {page}", f"Results: {results}"):
+        typer.echo(paragraph)
 
 
 def make_writable(folder: Path, name: str = "--out") -> None:

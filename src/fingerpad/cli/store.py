@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from fingerpad.cli.options import Command, Group, number_option
+from fingerpad.cli.options import Command, Group, number_option, option
 from fingerpad.core.errors import InputError, StoreError
 
 if TYPE_CHECKING:
@@ -69,7 +69,7 @@ def prune_command(
     size: Annotated[
         float | None, number_option("Delete the oldest until the rest is at most so large. [MB]")
     ] = None,
-    yes: Annotated[bool, typer.Option("--yes", help="Delete; without it, only say what would be.")] = False,
+    yes: Annotated[bool, option("Delete; without it, only say what would be.", "--yes")] = False,
 ) -> None:
     """Delete stored indentations by age and by size; they are computed again when they are needed."""
     from fingerpad.core.checks import not_negative

@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-import shlex
-import sys
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from fingerpad.cli.options import Jobs, Scheduler
-from fingerpad.cli.running import engine, interruptible, make_writable, progress
+from fingerpad.cli.options import Jobs, Scheduler, option
+from fingerpad.cli.running import command_line, engine, interruptible, make_writable, progress
 
 MOST_FAILED = 99
 """Largest exit status for settings that failed: larger ones have other meanings."""
@@ -20,28 +18,19 @@ def sweep_command(
     sweep: Annotated[
         Path, typer.Argument(metavar="SWEEP", help="YAML file of a sweep (format: docs/sweeps.md).")
     ],
-    out: Annotated[Path, typer.Option(help="The data set, a folder that ends in .zarr.")] = Path(
-        "sweep.zarr"
-    ),
+    out: Annotated[Path, option("The data set, a folder that ends in .zarr.")] = Path("sweep.zarr"),
     jobs: Jobs = None,
     scheduler: Scheduler = None,
     store: Annotated[
-        Path | None,
-        typer.Option(help="Folder of stored indentations. Default: indentations, beside the data set."),
+        Path | None, option("Folder of stored indentations. Default: indentations, beside the data set.")
     ] = None,
-    table: Annotated[
-        Path | None, typer.Option(help="Also write rates as a table, a .csv or .parquet file.")
-    ] = None,
+    table: Annotated[Path | None, option("Also write rates as a table, a .csv or .parquet file.")] = None,
     spikes: Annotated[
-        Path | None, typer.Option(help="Also write the spikes of all settings as a session, a .nwb file.")
+        Path | None, option("Also write the spikes of all settings as a session, a .nwb file.")
     ] = None,
-    retry_failed: Annotated[
-        bool, typer.Option("--retry-failed", help="Try settings again that failed before.")
-    ] = False,
-    yes: Annotated[bool, typer.Option("--yes", help="Run a sweep of any size.")] = False,
-    dry: Annotated[
-        bool, typer.Option("--dry-run", help="Print how long it will take, and press nothing.")
-    ] = False,
+    retry_failed: Annotated[bool, option("Try settings again that failed before.", "--retry-failed")] = False,
+    yes: Annotated[bool, option("Run a sweep of any size.", "--yes")] = False,
+    dry: Annotated[bool, option("Print how long it will take, and press nothing.", "--dry-run")] = False,
 ) -> None:
     """Press a touch in all settings of a sweep, and write one labelled data set.
 
@@ -72,7 +61,7 @@ def sweep_command(
             any_size=yes,
             store=store,
             progress=progress(),
-            command=shlex.join(["fingerpad", *sys.argv[1:]]),
+            command=command_line(),
         )
     for line in done.lines:
         typer.echo(line)

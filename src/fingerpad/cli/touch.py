@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import shlex
-import sys
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from fingerpad.cli.running import interruptible, make_writable, progress
+from fingerpad.cli.options import option
+from fingerpad.cli.running import command_line, interruptible, make_writable, progress
 
 Description = Annotated[
     Path, typer.Argument(metavar="TOUCH", help="YAML file of a touch (format: docs/touch.md).")
@@ -40,9 +39,9 @@ def check_command(touch: Description) -> None:
 
 def touch_command(
     touch: Description,
-    out: Annotated[
-        Path, typer.Option(help="Folder for the outputs, the results and the stored indentation.")
-    ] = Path("touch"),
+    out: Annotated[Path, option("Folder for the outputs, the results and the stored indentation.")] = Path(
+        "touch"
+    ),
 ) -> None:
     """Press a touch that a file describes, and write figures, tables and files for other programs."""
     from fingerpad.experiments.descriptions.touch import read_touch_description
@@ -53,7 +52,7 @@ def touch_command(
     check_described(described)
     make_writable(out)
     with interruptible("Nothing of this touch was kept: the same command presses it again."):
-        pressed = run_touch(described, out, progress(), shlex.join(["fingerpad", *sys.argv[1:]]))
+        pressed = run_touch(described, out, progress(), command_line())
     for paragraph in touch_summary(pressed.result):
         typer.echo(paragraph)
     for caveat in pressed.skin.caveats:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import shlex
-import sys
 from pathlib import Path
 from typing import Annotated
 
@@ -17,8 +15,17 @@ from fingerpad.cli.options import (
     Resolution,
     Scheduler,
     Tissues,
+    option,
 )
-from fingerpad.cli.running import engine, interruptible, make_writable, progress, write_examples
+from fingerpad.cli.running import (
+    command_line,
+    engine,
+    interruptible,
+    make_writable,
+    progress,
+    tell,
+    write_examples,
+)
 from fingerpad.core.errors import InputError
 
 INCOMPLETE = 3
@@ -29,33 +36,33 @@ def validate_command(
     observations: Annotated[
         Path | None, typer.Argument(help="CSV file (format: docs/validate.md). Not needed with --example.")
     ] = None,
-    out: Annotated[
-        Path, typer.Option(help="Folder for page, figure, results and stored indentations.")
-    ] = Path("validate"),
+    out: Annotated[Path, option("Folder for page, figure, results and stored indentations.")] = Path(
+        "validate"
+    ),
     resolution: Resolution = "standard",
     tissues: Tissues = DEFAULT_TISSUES,
     afferent: Annotated[
         Path | None,
-        typer.Option(
-            help="fit.json of a fit, or results.json of a reproduction: the afferent whose rates are "
+        option(
+            "fit.json of a fit, or results.json of a reproduction: the afferent whose rates are "
             "predicted. Default: that of the tissues."
         ),
     ] = None,
     loading: Annotated[
         str,
-        typer.Option(
-            help=f"How a depth of force or deflection is reached, one of {', '.join(LOADING_CHOICES)}: "
+        option(
+            f"How a depth of force or deflection is reached, one of {', '.join(LOADING_CHOICES)}: "
             "read at the end of the paper's ramp and hold, or with relaxed tissues."
         ),
     ] = LOADING_CHOICES[0],
-    static_window: Annotated[
-        tuple[float, float], typer.Option(help="Window of the rates: start and end. [ms]")
-    ] = (600.0, 950.0),
+    static_window: Annotated[tuple[float, float], option("Window of the rates: start and end. [ms]")] = (
+        600.0,
+        950.0,
+    ),
     jobs: Jobs = None,
     scheduler: Scheduler = None,
     example: Annotated[
-        str | None,
-        typer.Option(help=f"Write an example file, one of {', '.join(KIND_CHOICES)}, into --out, and exit."),
+        str | None, option(f"Write an example file, one of {', '.join(KIND_CHOICES)}, into --out, and exit.")
     ] = None,
 ) -> None:
     """Score the model against your own observations of force, deflection or firing rates."""
@@ -84,16 +91,10 @@ def validate_command(
     inputs = [observations, *([] if afferent is None else [afferent])]
     with interruptible():
         results = validate(
-            request,
-            progress(),
-            command=shlex.join(["fingerpad", *sys.argv[1:]]),
-            inputs={str(path): sha256(path) for path in inputs},
+            request, progress(), command=command_line(), inputs={str(path): sha256(path) for path in inputs}
         )
         page = write_validation_page(results, out)
         schemas.write(out / "validate.json", results)
-    for paragraph in validation_summary(results):
-        typer.echo(paragraph)
-    typer.echo(f"Report: {page}")
-    typer.echo(f"Results: {out / 'validate.json'}")
+    tell(validation_summary(results), page, out / "validate.json")
     if results.n_predicted < results.n_rows:
         raise typer.Exit(INCOMPLETE)

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from fingerpad.cli.options import integer_option, number_option
+from fingerpad.cli.options import integer_option, number_option, option
 from fingerpad.cli.running import interruptible, progress
 from fingerpad.core.errors import InputError
 
@@ -20,11 +20,10 @@ def view_command(
         ),
     ],
     out: Annotated[
-        Path | None,
-        typer.Option(help="File to write: .png, .gif, or .mp4 with the program ffmpeg. Default: view.png."),
+        Path | None, option("File to write: .png, .gif, or .mp4 with the program ffmpeg. Default: view.png.")
     ] = None,
     field: Annotated[
-        str, typer.Option(help="sed, displacement, pressure, shear, slip, or another variable of RESULT.")
+        str, option("sed, displacement, pressure, shear, slip, or another variable of RESULT.")
     ] = "sed",
     time: Annotated[
         float | None, number_option("Time of a picture. Default: that of the largest depth. [ms]")

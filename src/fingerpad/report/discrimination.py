@@ -13,7 +13,7 @@ from matplotlib.text import Text
 
 from fingerpad.data import psychophysics
 from fingerpad.experiments.gerling2014.discrepancy import CriterionErrorBars
-from fingerpad.experiments.gerling2014.goodwin import GoodwinHitRates
+from fingerpad.experiments.gerling2014.discrimination_statistics import GoodwinHitRates
 from fingerpad.experiments.gerling2014.sphere_discrimination import ObserverHitRates, SphereDiscrimination
 from fingerpad.report.formatting import fixed, number, with_error
 from fingerpad.report.parts import Row, Table

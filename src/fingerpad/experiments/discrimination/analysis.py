@@ -29,7 +29,7 @@ from fingerpad.experiments.discrimination.decoding import (
     silent_stimuli,
     task_statistic,
 )
-from fingerpad.experiments.discrimination.task import FITTED, IDEAL, DiscriminationTask, ObservedPoint
+from fingerpad.experiments.discrimination.task import FITTED, IDEAL, DiscriminationTask
 from fingerpad.experiments.discrimination.task_stimuli import stimulus_index
 from fingerpad.neuron.mixed_population import MixedPopulation, one_map
 from fingerpad.neuron.population import Population
@@ -325,12 +325,20 @@ def analyse(prepared: PreparedTask, skins: Mapping[str, Skin]) -> TaskResult:
         )
     encoded = {measure: taking_part(table, prepared.neighbours) for measure, table in tables.items()}
     noise = _noise(prepared, encoded, silent)
+    settings, population = task.population, prepared.population
     return TaskResult(
         question=task.question,
         axis=prepared.axis,
         stimulus=tuple(stimulus.name for stimulus in stimuli),
         level=None if stimuli[0].level is None else np.array([stimulus.level for stimulus in stimuli]),
-        population=_population(prepared),
+        population=TaskPopulation(
+            layout=settings.layout,
+            n_receptors=len(population),
+            pitch_mm=population.pitch_mm,
+            density_per_cm2=sum((settings.densities_per_cm2 or {"": settings.density_per_cm2}).values()),
+            positions_mm=population.positions_mm,
+            sensitivity=population.sensitivity,
+        ),
         noise=noise,
         responses=tables,
         decodings=tuple(
@@ -347,18 +355,6 @@ def _named(stimuli: Sequence[NamedStimulus], rows: Sequence[int] | IntArray) -> 
     if len(rows) == len(stimuli):
         return "any stimulus"
     return f"the stimulus {', '.join(stimuli[row].name for row in rows)}"
-
-
-def _population(prepared: PreparedTask) -> TaskPopulation:
-    settings, population = prepared.task.population, prepared.population
-    return TaskPopulation(
-        layout=settings.layout,
-        n_receptors=len(population),
-        pitch_mm=population.pitch_mm,
-        density_per_cm2=sum((settings.densities_per_cm2 or {"": settings.density_per_cm2}).values()),
-        positions_mm=population.positions_mm,
-        sensitivity=population.sensitivity,
-    )
 
 
 def _noise(
@@ -452,24 +448,19 @@ def _decoding(
 
 def _observed(prepared: PreparedTask) -> TaskObservations | None:
     """Observed points with their levels, and binomial intervals where the trials are known."""
-    observed = prepared.task.observed
+    observed, stimuli, points = prepared.task.observed, prepared.stimuli, []
     if observed is None:
         return None
-    return TaskObservations(
-        source=observed.source,
-        points=tuple(_observation(prepared.stimuli, point) for point in observed.points),
-    )
-
-
-def _observation(stimuli: Sequence[NamedStimulus], point: ObservedPoint) -> TaskObservation:
-    at, interval = point.at, None
-    if point.trials:
-        low, high = binomial_interval(point.hit_rate, point.trials)
-        interval = (float(low), float(high))
-    return TaskObservation(
-        at=at,
-        level=stimuli[stimulus_index(stimuli, at, "at")].level if isinstance(at, str) else at,
-        hit_rate=point.hit_rate,
-        trials=point.trials,
-        interval=interval,
-    )
+    for point in observed.points:
+        at = point.at
+        low_high = binomial_interval(point.hit_rate, point.trials) if point.trials else None
+        points.append(
+            TaskObservation(
+                at=at,
+                level=stimuli[stimulus_index(stimuli, at, "at")].level if isinstance(at, str) else at,
+                hit_rate=point.hit_rate,
+                trials=point.trials,
+                interval=None if low_high is None else (float(low_high[0]), float(low_high[1])),
+            )
+        )
+    return TaskObservations(source=observed.source, points=tuple(points))

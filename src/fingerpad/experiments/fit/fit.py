@@ -105,7 +105,8 @@ def fit_recordings(
     prepared = prepare(method, model, recordings, rates, seed)
     best = prepared.method.fit(prepared.problem, np.arange(len(rates.stimuli)))
     validation = cross_validate(prepared.problem, prepared.method, folds)
-    four = identifiable(prepared.six(best.parameters))
+    six = prepared.six(best.parameters)
+    four = identifiable(six)
     covariance = prepared.covariance(best, validation)
     errors = np.full(len(IDENTIFIABLE_NAMES), np.nan) if covariance is None else np.sqrt(np.diag(covariance))
     posterior = profiles = sensitivity = None
@@ -121,8 +122,8 @@ def fit_recordings(
         source=rates.source,
         n_evaluations=best.n_evaluations,
         seconds=best.seconds,
-        parameters=_six_by_name(prepared.six(best.parameters)),
-        identifiable=_four_by_name(prepared.six(best.parameters)),
+        parameters=dict(zip(PARAMETER_NAMES, six.tolist(), strict=True)),
+        identifiable=dict(zip(IDENTIFIABLE_NAMES, four.tolist(), strict=True)),
         units=parameter_units(model.drives[0]),
         identifiable_units=units_of(IDENTIFIABLE_NAMES),
         identifiable_standard_error=dict(zip(IDENTIFIABLE_NAMES, errors.tolist(), strict=True)),
@@ -174,14 +175,6 @@ def check_enough(rates: RateRecordings, memberships: IntArray, n_free: int = len
                     )
 
 
-def _six_by_name(six: FloatArray) -> dict[str, float]:
-    return dict(zip(PARAMETER_NAMES, six.tolist(), strict=True))
-
-
-def _four_by_name(six: FloatArray) -> dict[str, float]:
-    return dict(zip(IDENTIFIABLE_NAMES, identifiable(six).tolist(), strict=True))
-
-
 def _phases(
     problem: RateProblem, rates: RateRecordings, fitted: FloatArray, validation: CrossValidation
 ) -> dict[str, PhaseRates]:
@@ -194,20 +187,17 @@ def _phases(
     observed = {phase: getattr(rates, f"{phase}_rate_hz") for phase in PHASES}
     return {
         phase: PhaseRates(
-            fss_in_sample=(
-                None
-                if observed[phase] is None
-                else fractional_sum_of_squares(observed[phase], predicted[phase])
-            ),
-            observed_hz=observed[phase],
+            fss_in_sample=None if seen is None else fractional_sum_of_squares(seen, predicted[phase]),
+            observed_hz=seen,
             fitted_hz=predicted[phase],
             out_of_sample_hz=left_out[phase],
         )
-        for phase in PHASES
+        for phase, seen in observed.items()
     }
 
 
 def _folds(prepared: Prepared, rates: RateRecordings, validation: CrossValidation) -> tuple[FittedFold, ...]:
+    six = [prepared.six(fold.fit.parameters) for fold in validation.folds]
     return tuple(
         FittedFold(
             fold=fold.fold + 1,
@@ -216,8 +206,8 @@ def _folds(prepared: Prepared, rates: RateRecordings, validation: CrossValidatio
             fss_test=fold.score_test,
             n_evaluations=fold.fit.n_evaluations,
             seconds=fold.fit.seconds,
-            parameters=_six_by_name(prepared.six(fold.fit.parameters)),
-            identifiable=_four_by_name(prepared.six(fold.fit.parameters)),
+            parameters=dict(zip(PARAMETER_NAMES, each.tolist(), strict=True)),
+            identifiable=dict(zip(IDENTIFIABLE_NAMES, identifiable(each).tolist(), strict=True)),
         )
-        for fold in validation.folds
+        for fold, each in zip(validation.folds, six, strict=True)
     )

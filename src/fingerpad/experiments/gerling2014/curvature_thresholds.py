@@ -149,9 +149,7 @@ def curvature_thresholds(
 ) -> CurvatureThresholds:
     """Thresholds of the static Gradient Sum at several standards."""
     curvatures = np.array(sorted(responses))
-    population = _population("paper", afferent)
-    neighbours = neighbour_pairs(population.positions_mm, population.pitch_mm)
-    static = np.array([population.respond(responses[at]).static_rate_hz for at in curvatures.tolist()])
+    neighbours, static = _encoded(_population("paper", afferent), responses, curvatures)
     return CurvatureThresholds(
         seed=seed,
         proportion=PROPORTION,
@@ -177,6 +175,14 @@ def _population(name: str, afferent: Afferent) -> Population:
     return Population.grid(rows=rows, columns=columns, centre_mm=(RECEPTOR_X_MM, 0.0), afferent=afferent)
 
 
+def _encoded(
+    population: Population, responses: Mapping[float, SkinResponse], curvatures: FloatArray
+) -> tuple[np.ndarray, FloatArray]:
+    """Pairs of neighbours, and static rates under each sphere."""
+    static = np.array([population.respond(responses[at]).static_rate_hz for at in curvatures.tolist()])
+    return neighbour_pairs(population.positions_mm, population.pitch_mm), static
+
+
 def _thresholds_of(
     name: str,
     responses: Mapping[float, SkinResponse],
@@ -187,8 +193,7 @@ def _thresholds_of(
 ) -> PopulationThresholds:
     """Thresholds of one population at every standard; its noise is fitted to people unless it is given."""
     population = _population(name, afferent)
-    neighbours = neighbour_pairs(population.positions_mm, population.pitch_mm)
-    static = np.array([population.respond(responses[c]).static_rate_hz for c in curvatures.tolist()])
+    neighbours, static = _encoded(population, responses, curvatures)
     draws = normals(seed, 1, len(population.positions_mm), Purpose.RESPONSE, NOISE_DRAWS)[0].T
     found: list[CurvatureThreshold] = []
     missed: list[MissingThreshold] = []

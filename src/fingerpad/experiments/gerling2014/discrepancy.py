@@ -17,8 +17,14 @@ from fingerpad.core.checks import FloatArray
 from fingerpad.core.errors import ConvergenceError
 from fingerpad.core.results import Matrix, Number, Vector, WholeVector, result_class
 from fingerpad.data import protocol, psychophysics
-from fingerpad.experiments.gerling2014 import goodwin
-from fingerpad.experiments.gerling2014.discrimination_statistics import CRITERION_SIGMAS, Measured
+from fingerpad.experiments.gerling2014.discrimination_statistics import (
+    CRITERION_SIGMAS,
+    HIT_RATES,
+    Measured,
+    fit_noise_to_goodwin,
+    goodwin_columns,
+    goodwin_misfit,
+)
 from fingerpad.psychophysics.discrimination import (
     CRITERION_MOVES,
     END_OF_STIMULUS_MS,
@@ -133,11 +139,15 @@ def discrepancy_analysis(
 ) -> DiscrepancyAnalysis:
     """Compute the numbers behind the discrepancies."""
     draws = standard_normals[:DRAWS]
-    columns = goodwin.goodwin_columns(curvature_per_m)
+    columns = goodwin_columns(curvature_per_m)
     codes: dict[str, Callable[..., FloatArray]] = {
         name: partial(expected_of_measure, both, standard_normals=draws) for name, both in measures.items()
     }
     codes["euclidean"] = partial(_expected_euclidean, measures["static"])
+    misfit = {
+        name: np.array([goodwin_misfit(rates(noise_sigma=sigma)[:, columns]) for sigma in CURVE_NOISE])
+        for name, rates in codes.items()
+    }
     interpretations = _interpretations(measures, latency_ms, positions_mm, pitch_mm)
     return DiscrepancyAnalysis(
         rise={name: _rises(both) for name, both in measures.items()},
@@ -149,15 +159,7 @@ def discrepancy_analysis(
             _judged(name, both, curvature_per_m, noise_sigma, draws) for name, both in interpretations.items()
         ),
         criterion=_criterion(measures["static"][0], noise_sigma, seed),
-        misfit_curve=MisfitCurve(
-            noise_sigma=np.array(CURVE_NOISE),
-            misfit={
-                name: np.array(
-                    [goodwin.goodwin_misfit(rates(noise_sigma=sigma)[:, columns]) for sigma in CURVE_NOISE]
-                )
-                for name, rates in codes.items()
-            },
-        ),
+        misfit_curve=MisfitCurve(noise_sigma=np.array(CURVE_NOISE), misfit=misfit),
         euclidean=_euclidean_fit(measures["static"], curvature_per_m),
     )
 
@@ -170,7 +172,7 @@ def _euclidean_fit(static: Sequence[Measured], curvature_per_m: Sequence[float])
     """Noise that fits the Euclidean Distance best, and what it reaches with it."""
     rates = partial(_expected_euclidean, static)
     try:
-        own = goodwin.fit_noise_to_goodwin(rates, curvature_per_m, len(static))
+        own = fit_noise_to_goodwin(rates, curvature_per_m, len(static))
     except ConvergenceError:
         return EuclideanFit()
     return EuclideanFit(
@@ -190,7 +192,7 @@ def rise_needed(measured: Measured, noise_sigma: float, standard_normals: FloatA
 
     def missed(way: float) -> float:
         rates = expected_hit_rates(pair(way), measured.neighbours, noise_sigma, standard_normals)
-        return float(rates[0]) - goodwin.HIT_RATES[-1]
+        return float(rates[0]) - HIT_RATES[-1]
 
     if np.array_equal(standard, farthest) or missed(STEEPEST) < 0.0:
         return float("nan")
@@ -257,7 +259,7 @@ def _judged(
         largest_shift=float(np.abs(at_study[1] - at_study[0]).max()),
     )
     try:
-        own = goodwin.fit_noise_to_goodwin(rates, curvature_per_m, len(both))
+        own = fit_noise_to_goodwin(rates, curvature_per_m, len(both))
     except ConvergenceError:
         return found
     at_own = rates(own.noise_sigma)

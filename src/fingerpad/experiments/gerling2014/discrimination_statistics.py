@@ -1,9 +1,10 @@
 """One number with its Monte-Carlo error for each statement of the paper about discrimination.
 
-Every statistic is computed session by session (`discrimination_sessions`). Its value is the mean over the
-sessions and its error the standard deviation of that mean. Where a statistic is the largest of several
-differences, the differences are averaged over the sessions first: the largest of noisy numbers grows with
-the noise.
+A session is the whole protocol with its own noise; the paper reports one. Within a session all observers of
+one position share the same noise, so that differences between them are not due to chance. The value of a
+statistic is the mean over the sessions and its error the standard deviation of that mean. Where it is the
+largest of several differences, these are averaged over the sessions first: the largest of noisy numbers grows
+with the noise.
 """
 
 from __future__ import annotations
@@ -13,13 +14,14 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
+from numpy.typing import ArrayLike
+from scipy.special import ndtr, ndtri
 
 from fingerpad.core.checks import FloatArray, whole
 from fingerpad.core.errors import InputError
 from fingerpad.core.results import Number, Vector, WholeVector, result_class
 from fingerpad.core.signals import HitRates
 from fingerpad.data import psychophysics
-from fingerpad.experiments.gerling2014.goodwin import goodwin_columns, goodwin_misfit, line_in_z
 from fingerpad.psychophysics.discrimination import (
     Experiment,
     checked_responses,
@@ -27,6 +29,8 @@ from fingerpad.psychophysics.discrimination import (
     hit_rates_of_sums,
 )
 from fingerpad.psychophysics.encoding import check_neighbours
+from fingerpad.psychophysics.functions import binomial_interval
+from fingerpad.psychophysics.noise_fit import NoiseFit, fit_noise_sigma
 from fingerpad.psychophysics.noisy_responses import noisy_gradient_sums, session_trials
 
 CHANCE = 0.5
@@ -134,9 +138,19 @@ def discrimination_statistics(
         misfit={name: estimate(misfit[name]) for name in codes},
         misfit_above_static={name: estimate(misfit[name] - misfit["static"]) for name in others},
         shift=shift,
-        shift_above_static={name: _difference(shift[name], shift["static"]) for name in others},
+        shift_above_static={
+            name: Estimate(
+                value=shift[name].value - shift["static"].value,
+                error=float(np.hypot(shift[name].error, shift["static"].error)),
+            )
+            for name in others
+        },
+        # Of the curve (n_sessions, n_comparisons); the first step is up from chance.
         smallest_rise={
-            name: tuple(_smallest_rise(one) for one in mean[name].swapaxes(0, 1)) for name in codes
+            name: tuple(
+                extreme(np.diff(one, axis=1, prepend=CHANCE), np.argmin) for one in mean[name].swapaxes(0, 1)
+            )
+            for name in codes
         },
         noise_lowers=NoiseEffect(
             noise_sigma=np.array(SWEPT_NOISE),
@@ -168,15 +182,6 @@ def _largest(changes: FloatArray) -> Estimate:
     """Absolute size of the largest of several changes (n_sessions, n_changes)."""
     found = extreme(changes, lambda means: np.abs(means).argmax())
     return Estimate(value=abs(found.value), error=found.error)
-
-
-def _difference(one: Estimate, other: Estimate) -> Estimate:
-    return Estimate(value=one.value - other.value, error=float(np.hypot(one.error, other.error)))
-
-
-def _smallest_rise(hit_rates: FloatArray) -> Estimate:
-    """Smallest step of the curve (n_sessions, n_comparisons), the first one up from chance."""
-    return extreme(np.diff(hit_rates, axis=1, prepend=CHANCE), np.argmin)
 
 
 def _error_bars(observers: Observers, variant: str, reference: str) -> ErrorBarChange:
@@ -316,3 +321,66 @@ def _unsteadiness(sums: FloatArray, hit_rates: int, seed: int, session: int) -> 
         for again in range(AGAIN)
     ]
     return float(np.sqrt(np.var(means, axis=0, ddof=1).mean()))
+
+
+CURVATURES = psychophysics.GOODWIN_CURVATURES.value
+HIT_RATES = psychophysics.GOODWIN_HIT_RATES.value
+TRIALS = int(psychophysics.GOODWIN_TRIALS.value)
+
+SMALLEST_NOISE, LARGEST_NOISE = 1e-4, 2.0
+"""Bounds of the noise fitted to the observed hit rates."""
+
+
+@result_class
+class GoodwinHitRates:
+    """Hit rates of people."""
+
+    curvature_per_m: Vector  # Comparison spheres, (2,). [1/m]
+    hit_rate: Vector
+    trials: int  # Trials behind each fraction (assumed).
+    low: Vector
+    high: Vector  # Observed fractions and their binomial 95 % intervals, (2,). [0-1]
+    line: Vector
+    """Hit rates at the spheres of the study on the line that is straight in z, (n_comparisons,). [0-1]"""
+
+
+def line_in_z(curvature_per_m: ArrayLike) -> FloatArray:
+    """Hit rates on the straight line in z that Goodwin's two points define."""
+    (near, far), (z_near, z_far) = CURVATURES, ndtri(HIT_RATES)
+    slope_m = (z_far - z_near) / (far - near)
+    return ndtr(z_near + slope_m * (np.asarray(curvature_per_m, dtype=np.float64) - near))
+
+
+def goodwin_hit_rates_at(curvature_per_m: ArrayLike) -> GoodwinHitRates:
+    """Observed hit rates of people, and the line at the comparison spheres."""
+    low, high = binomial_interval(HIT_RATES, TRIALS)
+    return GoodwinHitRates(
+        curvature_per_m=np.array(CURVATURES),
+        hit_rate=np.array(HIT_RATES),
+        trials=TRIALS,
+        low=low,
+        high=high,
+        line=line_in_z(curvature_per_m),
+    )
+
+
+def goodwin_columns(curvature_per_m: Sequence[float]) -> list[int]:
+    """Find Goodwin's two spheres among the comparisons."""
+    return [list(curvature_per_m).index(curvature) - 1 for curvature in CURVATURES]
+
+
+def goodwin_misfit(hit_rates: FloatArray, axis: int | tuple[int, ...] | None = None) -> FloatArray:
+    """Root mean square distance of hit rates to people's."""
+    return np.sqrt(np.square(hit_rates - np.array(HIT_RATES)).mean(axis=axis))
+
+
+def fit_noise_to_goodwin(
+    hit_rates: Callable[[float], FloatArray], curvature_per_m: Sequence[float], n_positions: int
+) -> NoiseFit:
+    """Fit one noise to Goodwin's two points at all positions of the spheres."""
+    columns = goodwin_columns(curvature_per_m)
+    return fit_noise_sigma(
+        lambda sigma: hit_rates(sigma)[:, columns].ravel(),
+        np.tile(HIT_RATES, n_positions),
+        (SMALLEST_NOISE, LARGEST_NOISE),
+    )

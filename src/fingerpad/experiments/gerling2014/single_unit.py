@@ -208,12 +208,8 @@ def single_unit_result(
         start_points=tuple(_named(start) for start in start_points()),
         folds=tuple(_fold(problem, fold, shift_mm) for fold in folds.folds),
         modulation=RateModulation(
-            dynamic=PhaseModulation(
-                observed=edge_modulation(shift_mm, observed_dynamic), ours=edge_modulation(shift_mm, dynamic)
-            ),
-            static=PhaseModulation(
-                observed=edge_modulation(shift_mm, observed_static), ours=edge_modulation(shift_mm, static)
-            ),
+            dynamic=_modulations(shift_mm, observed_dynamic, dynamic),
+            static=_modulations(shift_mm, observed_static, static),
         ),
     )
 
@@ -249,8 +245,13 @@ def _named(parameters: FloatArray) -> dict[str, float]:
     return dict(zip(PARAMETER_NAMES, parameters.tolist(), strict=True))
 
 
+def _modulations(shift_mm: FloatArray, observed_hz: FloatArray, ours_hz: FloatArray) -> PhaseModulation:
+    observed, ours = (edge_modulation(shift_mm, rate_hz) for rate_hz in (observed_hz, ours_hz))
+    return PhaseModulation(observed=observed, ours=ours)
+
+
 def edge_modulation(shift_mm: FloatArray, rate_hz: FloatArray) -> Modulation:
-    """Return the largest rate, the smallest under the flat face of the bar, and their modulation."""
+    """Compare the largest rate with the smallest under the flat face of the bar."""
     under_flat = np.abs(shift_mm) < protocol.BAR_WIDTH.value / 2 - protocol.BAR_FILLET.value
     largest, smallest = float(rate_hz.max()), float(rate_hz[under_flat].min())
     return Modulation(

@@ -19,15 +19,13 @@ from fingerpad.experiments.gerling2014.discrepancy import (
 from fingerpad.experiments.gerling2014.discrimination_statistics import (
     SESSIONS,
     DiscriminationStatistics,
+    GoodwinHitRates,
     Measured,
     Observers,
     discrimination_statistics,
-    observe,
-)
-from fingerpad.experiments.gerling2014.goodwin import (
-    GoodwinHitRates,
     fit_noise_to_goodwin,
     goodwin_hit_rates_at,
+    observe,
 )
 from fingerpad.inference.rate_model import AfferentModel
 from fingerpad.inference.rates_and_hit_rates import SphereHitRates, ToRatesAndHitRates
