@@ -1,4 +1,4 @@
-import time
+import timeit
 import tracemalloc
 from dataclasses import replace
 
@@ -36,10 +36,8 @@ def test_static_rate_is_the_closed_form_of_a_steady_current():
     afferent = replace(SED_DRIVEN, intercept_ma=0.0, static_gain=1.4e-6)
     _, static_hz = afferent.rates(ramp_and_hold(2.0))
     drive_mv = 1.4e-6 * 2.0 * afferent.time_constant_ms / afferent.capacitance_mf
-    interval_ms = afferent.refractory_ms - afferent.time_constant_ms * np.log1p(
-        -afferent.threshold_mv / drive_mv
-    )
-    assert_allclose(static_hz, 1000.0 / interval_ms, rtol=1e-10)
+    charging_ms = -afferent.time_constant_ms * np.log1p(-afferent.threshold_mv / drive_mv)
+    assert_allclose(static_hz, 1000.0 / (afferent.refractory_ms + charging_ms), rtol=1e-10)
 
 
 def test_the_default_afferent_is_that_of_the_default_tissues():
@@ -56,10 +54,6 @@ def test_the_default_afferent_is_that_of_the_default_tissues():
     assert (np.diff(dynamic_hz[2:]) > 0).all()
     assert (np.diff(static_hz[1:]) > 0).all()
     assert (dynamic_hz[2:] > static_hz[2:]).all()
-    with pytest.raises(
-        InputError, match=r"got traces of 'stored'; .* such as Afferent.for_tissues\('paper'\)"
-    ):
-        afferent.spikes(energy)
 
 
 def test_only_the_sets_with_an_afferent_of_their_own_differ_from_trial_3():
@@ -100,18 +94,10 @@ def test_the_printed_dynamic_gain_is_silent_in_the_ramp():
 def test_parameters_go_round():
     values = [1e-7, 3e-4, 1e-6, 40.0, 2e-6, 30.0]
     afferent = Afferent.from_parameters(values, refractory_ms=2.0)
-    assert afferent == Afferent(
-        intercept_ma=1e-7,
-        dynamic_gain=3e-4,
-        static_gain=1e-6,
-        time_constant_ms=40.0,
-        capacitance_mf=2e-6,
-        threshold_mv=30.0,
-        refractory_ms=2.0,
-    )
+    assert afferent == Afferent(**dict(zip(PARAMETER_NAMES, values, strict=True)), refractory_ms=2.0)
     assert_array_equal(afferent.parameters, values)
-    assert [getattr(afferent, name) for name in PARAMETER_NAMES] == values
-    assert Afferent.from_parameters(Afferent().parameters) == Afferent()
+    quantities = {"dynamic_quantity": "work", "static_quantity": "von_mises"}  # they are not fitted
+    assert Afferent.from_parameters(Afferent().parameters, **quantities) == Afferent(**quantities)
 
 
 def test_capacitance_and_threshold_only_scale_the_gains():
@@ -129,12 +115,7 @@ def test_a_drive_gives_what_its_traces_give_and_a_fit_can_afford_it():
     )
     prepared, afferent = drive(sed), SED_DRIVEN
     assert_array_equal(afferent.rates(prepared), afferent.rates(sed))
-    durations = []
-    for _ in range(20):
-        start = time.perf_counter()
-        afferent.rates(prepared)
-        durations.append(time.perf_counter() - start)
-    assert min(durations) < 2e-3
+    assert min(timeit.repeat(lambda: afferent.rates(prepared), number=1, repeat=20)) < 2e-3
 
 
 def test_many_receptors_never_stand_on_all_knots_at_once():
@@ -154,29 +135,23 @@ def test_many_receptors_never_stand_on_all_knots_at_once():
 
 
 @pytest.mark.parametrize(
-    ("numbers", "message"),
+    ("call", "said"),
     [
-        ([0.0, 1.0], "parameters must hold intercept_ma"),
-        ([0.0, 1.0, 1.0, -1.0, 1.0, 1.0], "time_constant_ms must be greater than 0"),
-        ([np.nan, 1.0, 1.0, 1.0, 1.0, 1.0], "parameters must hold finite"),
+        (lambda: Afferent.from_parameters([0.0, 1.0]), "parameters must hold intercept_ma"),
+        (lambda: Afferent.from_parameters([0.0, 1.0, 1.0, -1.0, 1.0, 1.0]), "time_constant_ms must be gre"),
+        (lambda: Afferent.from_parameters([np.nan, *[1.0] * 5]), "parameters must hold finite"),
+        (lambda: Afferent(threshold_mv=0.0), "threshold_mv"),
+        (lambda: Afferent(dynamic_gain=np.inf), "dynamic_gain"),
+        (lambda: Afferent().spikes(ramp_and_hold(1.0)), r"got traces of 'stored'; .*for_tissues\('paper'\)"),
+        (
+            lambda: replace(SED_DRIVEN, static_quantity="work").spikes(ramp_and_hold(1.0)),
+            "static term of this afferent needs 'work': got traces of 'stored'",
+        ),
     ],
 )
-def test_impossible_parameters_are_refused_on_construction(numbers, message):
-    with pytest.raises(InputError, match=message):
-        Afferent.from_parameters(numbers)
-
-
-def test_a_single_wrong_field_is_named():
-    with pytest.raises(InputError, match="threshold_mv"):
-        Afferent(threshold_mv=0.0)
-    with pytest.raises(InputError, match="dynamic_gain"):
-        Afferent(dynamic_gain=np.inf)
-
-
-def test_an_afferent_refuses_traces_of_another_static_quantity():
-    energy = ramp_and_hold(1.0, 2.0)
-    with pytest.raises(InputError, match="static term of this afferent needs 'work': got traces of 'stored'"):
-        replace(SED_DRIVEN, static_quantity="work").spikes(energy)
+def test_impossible_afferents_and_traces_of_another_quantity_are_refused(call, said):
+    with pytest.raises(InputError, match=said):
+        call()
 
 
 def test_an_afferent_and_its_traces_agree_on_what_the_dynamic_term_follows():
@@ -188,17 +163,8 @@ def test_an_afferent_and_its_traces_agree_on_what_the_dynamic_term_follows():
     assert_allclose(extended.spikes(both).times_ms, SED_DRIVEN.spikes(energy).times_ms, rtol=1e-12)
     assert_array_equal(extended.spikes(drive(both)).times_ms, extended.spikes(both).times_ms)
     for afferent, traces in ((SED_DRIVEN, both), (extended, energy), (extended, drive(energy))):
-        with pytest.raises(
-            InputError, match=r"dynamic term of this afferent needs '\w+': got traces of '\w+'"
-        ):
+        with pytest.raises(InputError, match=r"dynamic term of this afferent needs '\w+': got traces of"):
             afferent.spikes(traces)
-
-
-def test_what_a_term_follows_is_no_fitted_number():
-    quantities = {"dynamic_quantity": "work", "static_quantity": "von_mises"}
-    extended = Afferent.from_parameters(Afferent().parameters, **quantities)
-    assert extended == Afferent(**quantities)
-    assert_array_equal(extended.parameters, Afferent().parameters)
 
 
 def test_sites_that_are_not_simulated_would_be_silent():

@@ -1,6 +1,5 @@
 """RA, PC, SAII and own afferents, end organs and mixed populations."""
 
-from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -10,7 +9,6 @@ from numpy.testing import assert_allclose, assert_array_equal
 import fingerpad as fp
 from fingerpad.core.regions import Rectangle
 from fingerpad.data import afferents as published
-from fingerpad.inference.rate_model import AfferentModel
 from fingerpad.neuron.band_pass import BandPass
 from fingerpad.neuron.escape_rate import EscapeRate
 from fingerpad.neuron.lif import LeakyIntegrateAndFire
@@ -32,26 +30,23 @@ LIGHT_KPA = 0.7
 FREQUENCIES_HZ = np.array(published.TUNING_FREQUENCIES.value)
 
 
-def traces(quantity: str, times_ms: object, values: object, kinks_ms: object = ()) -> fp.SedTraces:
+def traces(quantity, times_ms, values, kinks_ms=()):
     columns = np.array(values, np.float64).reshape(len(np.array(times_ms)), -1)
-    return fp.SedTraces(
-        times_ms, columns, np.array(kinks_ms), dynamic_quantity=quantity, static_quantity=quantity
-    )
+    both = {"dynamic_quantity": quantity, "static_quantity": quantity}
+    return fp.SedTraces(times_ms, columns, np.array(kinks_ms), **both)
 
 
-def press(quantity: str, height: float, ramp_ms: float = 50.0) -> fp.SedTraces:
+def press(quantity, height, ramp_ms=50.0):
     return traces(quantity, [0.0, ramp_ms, 1000.0], [0.0, height, height], [ramp_ms])
 
 
 class Pressed:
     """Every quantity rises in 50 ms to a height that falls with the distance from a point, and stays."""
 
-    def __init__(self, heights: dict[str, float]) -> None:
+    def __init__(self, heights):
         self.heights = heights
 
-    def sed(
-        self, sites: object, dynamic_quantity: str = "stored", static_quantity: str = "stored"
-    ) -> fp.SedTraces:
+    def sed(self, sites, dynamic_quantity="stored", static_quantity="stored"):
         places = np.array(sites)
         assert dynamic_quantity == static_quantity
         away = np.hypot(places[:, 0] - 17.0, places[:, -1])
@@ -79,7 +74,7 @@ RESTED = {
 
 
 @pytest.mark.parametrize("name", RESTED)
-def test_the_same_touch_has_the_same_answer_after_any_rest(name: str) -> None:
+def test_the_same_touch_has_the_same_answer_after_any_rest(name):
     """Uneven samples, so that the slope at first touch would notice those before it."""
     afferent = RESTED[name]
     quantity = afferent.static_quantity
@@ -100,7 +95,7 @@ def test_the_same_touch_has_the_same_answer_after_any_rest(name: str) -> None:
             assert_allclose(getattr(again, read), getattr(once, read), rtol=1e-9)
 
 
-def test_a_stream_starts_at_rest_and_the_membrane_of_the_set_paper_at_0() -> None:
+def test_a_stream_starts_at_rest_and_the_membrane_of_the_set_paper_at_0():
     human, paper = fp.Afferent(), fp.Afferent.for_tissues("paper")
     first_ms = []
     for rest_ms in (0.0, 500.0):
@@ -119,16 +114,8 @@ def test_a_stream_starts_at_rest_and_the_membrane_of_the_set_paper_at_0() -> Non
     assert firing.membrane.initial_potentials_mv(np.array([firing.intercept_ma])) == 0.0
 
 
-def test_a_fit_simulates_the_membrane_that_it_fits() -> None:
-    stress = press("compressive_stress", 20.0)
-    for initial_mv in (None, 0.0):
-        afferent = replace(fp.Afferent(), initial_mv=initial_mv)
-        model = AfferentModel.of_traces(stress, initial_mv=initial_mv)
-        assert_array_equal(model.evaluate(afferent.parameters), afferent.rates(stress))
-
-
 @pytest.mark.parametrize("afferent", [fp.PC(), fp.RA()])
-def test_afferents_that_fire_once_in_a_ramp_have_a_rate_and_sai_keeps_that_of_the_paper(afferent) -> None:
+def test_afferents_that_fire_once_in_a_ramp_have_a_rate_and_sai_keeps_that_of_the_paper(afferent):
     places = [[17.0 + 0.02 * number, 0.0] for number in range(700)]
     found = fp.Population(places, 1.0, afferent).respond(FINGER)
     in_ramp = [np.count_nonzero(train <= 50.0) for train in found.spikes]
@@ -154,9 +141,7 @@ SQUARE = Rectangle(10.0, 10.0, centre_mm=(17.0, 0.0))
 
 @pytest.mark.parametrize(("rise", "fall"), [(1, 1), (2, 2), (3, 1)])
 @pytest.mark.parametrize("frequency_hz", [10.0, 100.0, 400.0])
-def test_the_band_pass_has_the_gain_of_its_transfer_function(
-    rise: int, fall: int, frequency_hz: float
-) -> None:
+def test_the_band_pass_has_the_gain_of_its_transfer_function(rise, fall, frequency_hz):
     band = BandPass(120.0, rise, fall)
     times_ms = np.arange(0.0, 400.0, 0.05)
     wave = 5.0 + np.sin(2e-3 * np.pi * frequency_hz * times_ms)
@@ -166,20 +151,16 @@ def test_the_band_pass_has_the_gain_of_its_transfer_function(
     assert_allclose(settled.min(), -band.gain(np.array([frequency_hz]))[0], rtol=0.01)
 
 
-def test_the_band_pass_of_a_step_of_speed_is_the_closed_form() -> None:
+def test_the_band_pass_of_a_step_of_speed_is_the_closed_form():
     band = BandPass(50.0, 1, 1)
     tau = band.time_constant_ms
-    at_ms, passed = band.of(traces("stored", [0.0, 40.0], [0.0, 8.0]))
+    sites = traces("stored", [0.0, 40.0], np.outer([0.0, 8.0], np.append(1.0, np.linspace(0.0, 2.0, 1500))))
+    at_ms, passed = band.of(sites)
+    for site in (0, 700, 1500):  # whatever the number of sites
+        assert_array_equal(passed[:, [site]], band.of(sites.part(slice(site, site + 1)))[1])
     x = at_ms / tau
     # s tau / (1 + s tau)^2 of a ramp of 0.2 per ms: 0.2 tau (1 - (1 + x) e^-x).
     assert_allclose(passed[:, 0], 0.2 * tau * (1.0 - (1.0 + x) * np.exp(-x)), atol=0.004 * 0.2 * tau)
-
-
-def test_the_band_pass_does_not_depend_on_the_number_of_sites() -> None:
-    many = traces("stored", [0.0, 30.0, 60.0], np.outer([0.0, 1.0, 0.5], np.linspace(0.0, 2.0, 1500)))
-    _, passed = BandPass(80.0, 1, 2).of(many)
-    for site in (0, 700, 1499):
-        assert_array_equal(passed[:, [site]], BandPass(80.0, 1, 2).of(many.part(slice(site, site + 1)))[1])
 
 
 @pytest.mark.parametrize(
@@ -191,15 +172,15 @@ def test_the_band_pass_does_not_depend_on_the_number_of_sites() -> None:
     ],
 )
 def test_tuning_curves_lie_within_a_factor_of_two_of_the_published_ones(
-    afferent: fp.RA, first_hz: int, observed_um: object, per_um: float, hold: float
-) -> None:
+    afferent, first_hz, observed_um, per_um, hold
+):
     found = tuning_curve(afferent, FREQUENCIES_HZ[first_hz:][: len(observed_um.value)], per_um, hold)
     ratio = found / np.array(observed_um.value)
     assert ratio.min() > 0.5
     assert ratio.max() < 2.0
 
 
-def test_the_best_frequencies_are_those_of_the_recordings() -> None:
+def test_the_best_frequencies_are_those_of_the_recordings():
     low, high, pacinian = published.BEST_FREQUENCIES.value
     ra = tuning_curve(fp.RA(), FREQUENCIES_HZ, PUNCH_KPA_PER_UM, PUNCH_HOLD_KPA)
     pc = tuning_curve(fp.PC(), FREQUENCIES_HZ[3:], PC_PER_UM, PC_HOLD_MM)
@@ -207,41 +188,27 @@ def test_the_best_frequencies_are_those_of_the_recordings() -> None:
     assert FREQUENCIES_HZ[3:][np.argmin(pc)] > pacinian
     assert pc[FREQUENCIES_HZ[3:] == 200.0] < 0.1 * ra[FREQUENCIES_HZ == 200.0]
     assert pc[FREQUENCIES_HZ[3:] == 10.0] > 2.0 * ra[FREQUENCIES_HZ == 10.0]
-
-
-def test_thresholds_of_a_curve_separate_silence_from_entrainment() -> None:
+    # A threshold separates silence from entrainment.
     (threshold_um,) = tuning_curve(fp.RA(), [40.0], PUNCH_KPA_PER_UM, PUNCH_HOLD_KPA)
-    beside = vibration(
-        40.0, threshold_um * np.array([0.98, 1.0]), PUNCH_KPA_PER_UM, PUNCH_HOLD_KPA, "compressive_stress"
-    )
+    amplitudes_um = threshold_um * np.array([0.98, 1.0])
+    beside = vibration(40.0, amplitudes_um, PUNCH_KPA_PER_UM, PUNCH_HOLD_KPA, "compressive_stress")
     below, above = impulses_per_cycle(fp.RA(), beside)
     assert below < 1.0 <= above
 
 
-@pytest.mark.parametrize(("afferent", "height"), [(fp.RA(), 15.0), (fp.PC(), 1.0)])
-def test_ra_and_pc_respond_to_a_press_and_are_silent_in_its_hold(afferent: fp.RA, height: float) -> None:
-    (spikes,) = afferent.spikes(press(afferent.quantity, height))
-    assert spikes.size > 1
-    assert spikes[-1] < 100.0
-
-
-def test_ra_rates_grow_with_the_speed_of_the_press() -> None:
-    counts = [
-        fp.RA().spikes(press("compressive_stress", 10.0, ramp_ms))[0].size / ramp_ms
-        for ramp_ms in (20.0, 80.0)
-    ]
-    assert counts[0] > 1.5 * counts[1]
-
-
-def test_retraction_alone_elicits_spikes_by_its_share() -> None:
-    released = traces(
-        "compressive_stress", [0.0, 500.0, 550.0, 900.0], [10.0, 10.0, 0.0, 0.0], [500.0, 550.0]
-    )
+def test_ra_and_pc_respond_to_ramps_only():
+    for afferent, height in ((fp.RA(), 15.0), (fp.PC(), 1.0)):
+        (spikes,) = afferent.spikes(press(afferent.quantity, height))
+        assert spikes.size > 1
+        assert spikes[-1] < 100.0
+    fast, slow = (fp.RA().spikes(press(fp.RA().quantity, 10.0, ms))[0].size / ms for ms in (20.0, 80.0))
+    assert fast > 1.5 * slow
+    released = traces(fp.RA().quantity, [0.0, 500.0, 550.0, 900.0], [10.0, 10.0, 0.0, 0.0], [500.0, 550.0])
     assert fp.RA().spikes(released)[0].size > 0
     assert replace(fp.RA(), retraction=0.0).spikes(released)[0].size == 0
 
 
-def test_saii_fires_regularly_while_the_skin_is_stretched() -> None:
+def test_saii_fires_regularly_while_the_skin_is_stretched():
     (spikes,) = fp.SAII().spikes(press("skin_stretch", 0.06))
     intervals = np.diff(spikes[spikes > 600.0])
     assert intervals.size > 5
@@ -249,10 +216,10 @@ def test_saii_fires_regularly_while_the_skin_is_stretched() -> None:
     assert fp.SAII().spikes(press("skin_stretch", 0.005))[0].size == 0
 
 
-def test_an_own_afferent_returns_current_or_spikes() -> None:
+def test_an_own_afferent_returns_current_or_spikes():
     membrane = LeakyIntegrateAndFire(20.0, 1e-6, 5.0, 1.0)
 
-    def current(sed: fp.SedTraces) -> fp.CurrentTraces:
+    def current(sed):
         return fp.CurrentTraces(sed.times_ms, 1e-6 * sed.sed_kpa)
 
     own = fp.OwnAfferent(current, membrane)
@@ -262,7 +229,7 @@ def test_an_own_afferent_returns_current_or_spikes() -> None:
     assert (response.static_rate_hz > 0.0).any()
 
 
-def test_one_end_organ_is_the_afferent_itself_and_two_are_their_weighted_sum() -> None:
+def test_one_end_organ_is_the_afferent_itself_and_two_are_their_weighted_sum():
     layout = fp.Population.grid(rows=2, columns=3).positions_mm
     alone = fp.Population(layout, 1.0, fp.RA()).respond(FINGER)
     single = fp.Population(layout, 1.0, fp.RA(), ends=fp.EndOrgans(layout[:, None])).respond(FINGER)
@@ -276,9 +243,7 @@ def test_one_end_organ_is_the_afferent_itself_and_two_are_their_weighted_sum() -
 @pytest.mark.parametrize(
     "afferent", [fp.SAI(), fp.RA(), fp.PC(), fp.SAII()], ids=lambda each: type(each).__name__
 )
-def test_sites_that_move_too_little_are_silent_and_leave_the_others_as_they_are(
-    afferent: fp.RA | fp.SAI,
-) -> None:
+def test_sites_that_move_too_little_are_silent_and_leave_the_others_as_they_are(afferent):
     scale = {"SAI": 6.0, "RA": 2.0, "PC": 0.2, "SAII": 0.1}[type(afferent).__name__]
     heights = scale * np.geomspace(1e-4, 1.0, 40)
     quantity = afferent.static_quantity
@@ -292,7 +257,7 @@ def test_sites_that_move_too_little_are_silent_and_leave_the_others_as_they_are(
 
 
 @pytest.mark.parametrize(("rise", "fall"), [(1, 1), (2, 2), (3, 1)])
-def test_no_input_gives_more_than_the_largest_share_of_its_range(rise: int, fall: int) -> None:
+def test_no_input_gives_more_than_the_largest_share_of_its_range(rise, fall):
     band = BandPass(100.0, rise, fall)
     # The worst input follows the sign of the impulse response, backwards in time.
     times_ms = np.arange(0.0, 120.0, 0.05)
@@ -312,7 +277,7 @@ def test_the_strongest_end_organ_leads_if_asked_for():
     assert equal.sed_kpa.tolist() == [[0.0], [3.0]]
 
 
-def test_scattered_end_organs_lie_within_reach_and_depend_on_seed_and_number_only() -> None:
+def test_scattered_end_organs_lie_within_reach_and_depend_on_seed_and_number_only():
     places = np.zeros((400, 2))
     ends = fp.EndOrgans.scattered(places, count=6, reach_mm=1.5, seed=3)
     away = np.linalg.norm(ends.positions_mm, axis=2)
@@ -323,14 +288,10 @@ def test_scattered_end_organs_lie_within_reach_and_depend_on_seed_and_number_onl
     assert_array_equal(lifted.positions_mm[..., [0, 2]], ends.positions_mm[:2])
 
 
-def test_a_mixed_population_has_the_published_densities_and_one_response() -> None:
+def test_a_mixed_population_has_the_published_densities_and_one_response():
     population = fp.MixedPopulation.at_densities(SQUARE, seed=4)
-    assert {name: len(part) for name, part in population.parts.items()} == {
-        "SAI": 70,
-        "RA": 140,
-        "PC": 21,
-        "SAII": 10,
-    }
+    sizes = {name: len(part) for name, part in population.parts.items()}
+    assert sizes == {"SAI": 70, "RA": 140, "PC": 21, "SAII": 10}
     assert sum(published.DENSITIES.value) == published.DENSITY_TOTAL.value == len(population)
     response = population.respond(FINGER)
     assert list(response) == ["SAI", "RA", "PC", "SAII"]
@@ -341,12 +302,7 @@ def test_a_mixed_population_has_the_published_densities_and_one_response() -> No
     assert not response["RA"].static_rate_hz.any()
     alone = fp.MixedPopulation.at_densities(SQUARE, {"SAI": 70.0}, seed=4).respond(FINGER)
     assert_array_equal(alone["SAI"].spikes.times_ms, response["SAI"].spikes.times_ms)
-
-
-def test_a_spread_makes_afferents_of_a_type_unequal() -> None:
-    population = fp.MixedPopulation.at_densities(SQUARE, {"RA": 140.0}, spread=0.4, seed=4)
-    factors = population.parts["RA"].sensitivity
-    assert factors is not None
+    factors = SPARSE(SQUARE, {"RA": 140.0}, spread=0.4, seed=4).parts["RA"].sensitivity
     assert np.log(factors).std() == pytest.approx(0.4, abs=0.06)
     assert not np.array_equal(factors, sensitivities(140, 0.4, seed=4))
 
@@ -355,65 +311,46 @@ ENERGY = press("stored", 1.0)
 SPARSE = fp.MixedPopulation.at_densities
 
 
-BAD: list[tuple[Callable[[], object], str]] = [
-    (lambda: fp.RA(threshold=0.0), "threshold must be greater than 0"),
+def own(respond):
+    return fp.OwnAfferent(respond).spikes(ENERGY)
+
+
+BAD = [
     (lambda: fp.RA(retraction=1.5), "retraction must lie within 0 ... 1: got 1.5"),
     (lambda: fp.RA(rise=0), "rise must be a whole number of at least 1"),
-    (lambda: fp.PC(corner_hz=-1.0), "corner_hz must be greater than 0"),
-    (lambda: fp.PC(membrane_ms=0.0), "time_constant_ms must be greater than 0"),
     (lambda: fp.RA().spikes(ENERGY), "needs 'compressive_stress': got traces of 'stored'"),
+    (lambda: fp.RA(treshold=0.1), "RA has no treshold: did you mean threshold"),
     (lambda: fp.OwnAfferent("sum"), "respond must be a function of SedTraces: got 'sum'"),
-    (lambda: fp.OwnAfferent(lambda sed: sed).spikes(ENERGY), "respond must return .* got SedTraces"),
-    (
-        lambda: fp.OwnAfferent(lambda sed: fp.SpikeTrains.from_lists([])).spikes(ENERGY),
-        "respond must return .* 1 in all: got 0 trains",
-    ),
-    (
-        lambda: fp.OwnAfferent(lambda sed: fp.CurrentTraces(sed.times_ms, sed.sed_kpa)).spikes(ENERGY),
-        "needs a membrane",
-    ),
+    (lambda: own(lambda sed: sed), "respond must return .* got SedTraces"),
+    (lambda: own(lambda sed: fp.SpikeTrains.from_lists([])), "respond must return .* 1 in all: got 0 trains"),
+    (lambda: own(lambda sed: fp.CurrentTraces(sed.times_ms, sed.sed_kpa)), "needs a membrane"),
     (lambda: fp.EndOrgans(ENDS, [0.5, 0.6]), "must sum to 1: got 1.1"),
     (lambda: fp.EndOrgans(ENDS, [1.5, -0.5]), "must not be negative: the smallest is -0.5"),
-    (lambda: fp.EndOrgans(ENDS, [1.0]), "one number per end organ, 2"),
-    (lambda: fp.EndOrgans([[0.0, 0.0]]), "positions_mm must"),
     (lambda: fp.EndOrgans(ENDS, combine="mean"), "combine must be one of sum, largest: got 'mean'"),
     (lambda: fp.EndOrgans(np.zeros((1, 0, 2))), "afferents by end organs"),
     (lambda: fp.EndOrgans.scattered([[0.0, 0.0]], 0, 1.0, 1), "count must be a whole number of at least 1"),
-    (
-        lambda: fp.Population([[17.0, 0.0]], 1.0, ends=fp.EndOrgans(np.zeros((2, 1, 2)))),
-        "ends needs one row per afferent, 1: got 2",
-    ),
+    (lambda: fp.Population([[17.0, 0.0]], 1.0, ends=fp.EndOrgans(np.zeros((2, 1, 2)))), "one row per"),
     (lambda: fp.Population([[17.0, 0.0]], 1.0, fp.RA), "afferent must be one such as"),
-    (lambda: fp.Population([[17.0, 0.0]], 1.0, None), "afferent must be one such as"),
-    (lambda: fp.MixedPopulation({}), "at least one Population"),
+    (lambda: fp.Population.grid().respond(None), r"skin must have a method sed\(sites\), .* got None"),
+    (lambda: fp.Population.grid(centre_mm=17.0), r"centre_mm must be a pair, x and z \[mm\]: got 17.0"),
+    (lambda: fp.Population.grid(finger="child"), r"finger must be one such as .* got 'child'"),
     (lambda: fp.MixedPopulation([fp.Population.grid()]), "parts must be a mapping .* got list"),
-    (lambda: tuning_curve(fp.RA, [40.0], 0.02), "afferent must be one such as"),
     (lambda: fp.MixedPopulation({"RA": fp.RA()}), r"parts\['RA'\] must be a Population"),
     (lambda: SPARSE(SQUARE, {"RA": 0.0}), r"densities_per_cm2\['RA'\].*greater than 0"),
-    (lambda: SPARSE(SQUARE, {"RA": -1.0}), r"densities_per_cm2\['RA'\].*greater than 0"),
     (lambda: SPARSE(SQUARE, {"FA": 10.0}), "type 'FA' without an afferent"),
-    (lambda: SPARSE(SQUARE, {}), "at least one Population"),
     (lambda: SPARSE(SQUARE, {"X": 50.0}, {"X": None}), "afferent must be one such as"),
-    (lambda: SPARSE(SQUARE, seed=-1), "seed must be a whole number"),
     (lambda: SPARSE(SQUARE, {"RA": 9.0}).respond(FINGER)["SAI"], "must be one of RA: got 'SAI'"),
     (lambda: SPARSE(SQUARE, 100.0), "densities_per_cm2, with a type as each key, must be of type Mapping"),
     (lambda: SPARSE(SQUARE, afferents=[fp.RA()]), "afferents, with a type as each key, must be of type"),
     (lambda: SPARSE("pad"), r"region must be one of fingerpad.core.regions or .* got 'pad'"),
     (lambda: SPARSE(SQUARE).respond("skin"), r"skin must have a method sed\(sites\), .* got 'skin'"),
-    (lambda: fp.Population.grid().respond(None), r"skin must have a method sed\(sites\), .* got None"),
-    (lambda: fp.Population.grid(centre_mm=17.0), r"centre_mm must be a pair, x and z \[mm\]: got 17.0"),
-    (lambda: fp.Population.grid(centre_mm=(17.0, 0.0, 1.0)), "centre_mm must be a pair"),
-    (lambda: fp.Population.grid(finger="child"), r"finger must be one such as .* got 'child'"),
-    (lambda: fp.RA(treshold=0.1), "RA has no treshold: did you mean threshold"),
-    (lambda: fp.SAI(smoothing=5.0), "SAI has no smoothing: did you mean smoothing_ms"),
-    (lambda: fp.RA().spikes([1.0, 2.0]), "needs 'compressive_stress': got traces of 'list'"),
     (lambda: tuning_curve(fp.RA(), [0.0], 0.02), "frequency_hz must be greater than 0"),
     (lambda: tuning_curve(fp.Afferent(static_quantity="stored"), [1.0], 0.02), "follows one quantity"),
 ]  # fmt: skip
 
 
 @pytest.mark.parametrize(("make", "said"), BAD)
-def test_bad_input_is_refused_in_one_sentence(make: Callable[[], object], said: str) -> None:
+def test_bad_input_is_refused_in_one_sentence(make, said):
     with pytest.raises(fp.InputError, match=said) as refused:
         make()
     assert "\n" not in str(refused.value)

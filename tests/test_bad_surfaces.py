@@ -1,8 +1,10 @@
 """Malformed surfaces and heights: one sentence with the file, what was expected and what came."""
 
+import io
 import struct
 import warnings
 import zlib
+from functools import partial
 
 import numpy as np
 import pytest
@@ -49,27 +51,21 @@ SAID = {
     "zero.obj": "line 4: a face must name three vertices or more, the first vertex as 1",
     "utf-16.obj": "zero bytes, as in UTF-16",
     "fewer.ply": "4 lines after its header, which promises 3 of vertex and 1 of face: got 5",
-    "fewer-faces.ply": "got 5",
-    "more.ply": "got 4",
     "fewer-binary.ply": "25 bytes after its header",
     "more-binary.ply": "its counts are wrong",
     "longer-binary.ply": "49 bytes after its header",
     "corners.ply": "as many numbers as the header says: got '3 0 1 2 3'",
     "concave.obj": "divide them into triangles",
-    "truncated.stl": "234 bytes for 3 triangles: got 214 bytes",
     "too-few.stl": "434 bytes for 7 triangles: got 134 bytes",
     "header.stl": "header.stl: it is no STL file: one of text begins with 'solid'",
     "words.stl": "words.stl: it is no STL file: one of text begins with 'solid'",
     "beyond.ply": "0 to 2: got numbers 0 to 7",
     "turned.obj": "outer sides on one side: 1 edges do not, one at",
     "three.obj": "two triangles at most along each edge",
-    "same.obj": "3 edges do not",
     "ragged.csv": "line 2 has 2 of them instead of 3",
     "points.csv": "9 times 3 numbers look like points x, y, z",
-    "cloud.csv": "60 times 3 numbers look like points",
     "flat.csv": "must have heights that differ",
     "words.csv": "got 'three' in line 2 and column 1",
-    "header.csv": "got 'x' in line 1 and column 1",
     "hole.csv": "got '' in line 2 and column 2",
     "semicolon.csv": "got '1;2' in line 1",
     "nan.csv": "first in row 2 and column 1",
@@ -82,8 +78,6 @@ SURFACES = {
     "cut-text.stl": ascii_stl("0 0 0", "10 0 0", "0 10 0")[:-11] + "facet normal 0 0 1\nouter loop\n",
     "utf-16.obj": TRIANGLE.encode("utf-16"),
     "fewer.ply": ply(body=CORNERS + "9 9 9\n3 0 1 2\n"),
-    "fewer-faces.ply": ply(body=CORNERS + "3 0 1 2\n3 1 0 2\n"),
-    "more.ply": ply(vertices=4),
     "fewer-binary.ply": binary_ply(vertices=2),
     "more-binary.ply": binary_ply(faces=2),
     "longer-binary.ply": binary_ply(tail=b"\1"),
@@ -91,68 +85,35 @@ SURFACES = {
     "concave.obj": "v 0 0 0\nv 9 1 0\nv 9 9 0\nv 8 2 0\nv 1 2 0\nv 0 9 0\nf 1 2 3 4 5 6\n",
     "empty.stl": "",
     "header.stl": bytes(80),
-    "spaces.stl": "   \n \n",
     "words.stl": "a dot\n",
     "no-triangle.stl": binary_stl([]),
-    "truncated.stl": binary_stl([ONE] * 3, cut=20),
     "too-few.stl": binary_stl([ONE], count=7),
-    "far-too-few.stl": binary_stl([ONE], count=4_000_000_000),
     "nan.stl": binary_stl([[[0.0, 0.0, np.nan], *ONE[1:]]]),
-    "infinite.stl": binary_stl([[[0.0, 0.0, np.inf], *ONE[1:]]]),
     "huge.stl": binary_stl([np.multiply(ONE, 3e37)]),
-    "point.stl": binary_stl([[ONE[0]] * 3]),
     "line.stl": binary_stl([[[0.0, 0.0, 0.0], [5.0, 0.0, 0.0], [10.0, 0.0, 0.0]]]),
     "metres.stl": binary_stl([np.multiply(ONE, 1e-3)]),
-    "microns.stl": binary_stl([np.multiply(ONE, 1e3)]),
     "down.stl": binary_stl([ONE[::-1]]),
     "wall.stl": binary_stl([[[0.0, 0.0, 0.0], [10.0, 0.0, 0.0], [0.0, 0.0, 10.0]]]),
-    "text.stl": ascii_stl("0 0 0", "ten 0 0", "0 10 0"),
     "two-numbers.stl": ascii_stl("0 0 0", "10 0", "0 10 0"),
-    "two-corners.stl": ascii_stl("0 0 0", "10 0 0"),
-    "nan-text.stl": ascii_stl("0 0 0", "nan 0 0", "0 10 0"),
-    "prose.stl": "solid as a rock, and no triangle in it",
     "image.stl": b"\x89PNG\r\n\x1a\n" + bytes(200),
-    "empty.obj": "",
-    "comments.obj": "# nothing\n# here\n",
     "vertices.obj": "v 0 0 0\nv 10 0 0\nv 0 10 0\n",
     "letters.obj": "v 0 0 0\nv x 0 0\nv 0 10 0\nf 1 2 3\n",
-    "short.obj": "v 0 0 0\nv 10 0\nv 0 10 0\nf 1 2 3\n",
-    "nan.obj": "v 0 0 0\nv nan 0 0\nv 0 10 0\nf 1 2 3\n",
     "infinite.obj": "v 0 0 0\nv inf 0 0\nv 0 10 0\nf 1 2 3\n",
     "beyond.obj": "v 0 0 0\nv 10 0 0\nv 0 10 0\nf 1 2 9\n",
     "zero.obj": "v 0 0 0\nv 10 0 0\nv 0 10 0\nf 0 1 2\n",
     "edge.obj": "v 0 0 0\nv 10 0 0\nv 0 10 0\nf 1 2\n",
     "flat.obj": "v 0 0 0\nv 10 0 0\nv 0 10 0\nf 1 1 2\n",
-    "face-first.obj": "f 1 2 3\n",
-    "words.obj": "this is no object\n",
     "bytes.obj": bytes(range(256)),
-    "down.obj": "v 0 0 0\nv 10 0 0\nv 0 10 0\nf 3 2 1\n",
-    "tiny.obj": "v 0 0 0\nv 0.01 0 0\nv 0 0.01 0\nf 1 2 3\n",
-    "empty.ply": "",
     "magic.ply": "plywood\n",
-    "header.ply": "ply\nformat ascii 1.0\nelement vertex 9\n",
     "format.ply": ply().replace("ascii 1.0", "roman 2.0"),
     "no-faces.ply": ply(faces=0, body=CORNERS),
-    "truncated.ply": ply(vertices=9, body=CORNERS),
     "beyond.ply": ply(body=CORNERS + "3 0 1 7\n"),
-    "negative.ply": ply(body=CORNERS + "3 0 1 -7\n"),
-    "letters.ply": ply(body="0 0 0\nten 0 0\n0 10 0\n3 0 1 2\n"),
-    "nan.ply": ply(body="0 0 0\nnan 0 0\n0 10 0\n3 0 1 2\n"),
     "cut.ply": ply().replace("ascii", "binary_little_endian"),
-    "down.ply": ply(body=CORNERS + "3 2 1 0\n"),
     "turned.obj": FOLDED + "f 1 2 3\nf 2 3 4\n",
     "three.obj": FOLDED + "v 5 5 9\nf 1 2 3\nf 3 2 4\nf 3 2 5\n",
-    "same.obj": FOLDED + "f 1 2 3\nf 1 2 3\n",
     "solid.step": "ISO-10303-21;",
     "noending": TRIANGLE,
 }
-
-
-@pytest.mark.parametrize("name", SURFACES)
-def test_a_malformed_surface_is_refused_in_one_sentence(tmp_path, name):
-    content = SURFACES[name]
-    (tmp_path / name).write_bytes(content if isinstance(content, bytes) else content.encode())
-    assert SAID.get(name, "") in _refused(name, lambda: read_surface(tmp_path / name))
 
 
 @pytest.mark.parametrize(
@@ -161,23 +122,28 @@ def test_a_malformed_surface_is_refused_in_one_sentence(tmp_path, name):
         ({"unit": "furlong"}, "unit must be one of"),
         ({"unit": 3}, "unit must be one of"),
         ({"unit": "m"}, "check the unit"),
-        ({"unit": "um"}, "check the unit"),
         ({"scale": 0.0}, "scale must be greater than 0"),
-        ({"scale": -1.0}, "scale must be greater than 0"),
         ({"scale": "twice"}, "scale must be a finite number"),
-        ({"scale": np.nan}, "scale must be a finite number"),
         ({"up": "z"}, "up must be one of"),
         ({"up": "-z"}, "outer side"),
-        ({"at_mm": (np.nan, 0.0)}, "at_mm"),
         ({"at_mm": ("left", 0.0)}, "at_mm"),
         ({"at_mm": (1.0, 2.0, 3.0)}, "at_mm must be two numbers"),
         ({"at_mm": 3.0}, "at_mm"),
+        ({"pitch_mm": 0.0}, "pitch_mm must be greater than 0"),
+        ({"pitch_mm": "fine"}, "pitch_mm must be a finite number"),
+        ({"pitch_mm": 1e-5}, "0.1 to 1000 mm"),
+        ({"pitch_mm": 1e3}, "0.1 to 1000 mm"),
+        ({"pitch_mm": 0.1, "height_mm": 0.0}, "height_mm must be greater than 0"),
+        ({"pitch_mm": 0.1, "height_mm": 1e6}, "heights within 1000 mm"),
+        ({"pitch_mm": 0.1, "height_mm": "1 mm"}, "height_mm must be a finite number"),
     ],
     ids=str,
 )
-def test_a_wrong_placement_is_refused_in_one_sentence(tmp_path, options, said):
+def test_a_wrong_placement_pitch_or_height_is_refused_in_one_sentence(tmp_path, options, said):
     (tmp_path / "good.obj").write_text(TRIANGLE.replace("10", "20"))
-    assert said in _refused(None, lambda: read_surface(tmp_path / "good.obj", **options))
+    np.save(tmp_path / "map.npy", np.outer(np.hanning(20), np.hanning(20)))
+    read, name = (read_height_map, "map.npy") if "pitch_mm" in options else (read_surface, "good.obj")
+    assert said in _refused(None, lambda: read(tmp_path / name, **options))
 
 
 @pytest.mark.parametrize(
@@ -192,55 +158,39 @@ def test_a_folder_and_a_missing_file_are_told(tmp_path, reader):
 
 MAPS = {
     "points.csv": "".join(f"{x},{y},{x * y}\n" for x in range(3) for y in range(3)),
-    "cloud.csv": "".join(f"{k % 7},{k % 11},{k % 3}\n" for k in range(60)),
     "flat.csv": "2,2,2\n2,2,2\n",
     "empty.csv": "",
-    "blank.csv": "\n\n\n",
     "ragged.csv": "1,2,3\n4,5\n6,7,8\n",
     "words.csv": "1,2\nthree,4\n",
-    "header.csv": "x,z\n1,2\n3,4\n",
     "semicolon.csv": "1;2\n3;4\n",
     "comma.csv": '"1,5","2,5"\n"3,5","4,5"\n',
     "hole.csv": "1,2\n3,\n",
     "nan.csv": "1,2\nnan,4\n",
-    "infinite.csv": "1,2\n3,inf\n",
-    "row.csv": "1,2,3\n",
     "column.csv": "1\n2\n3\n",
-    "one.csv": "1\n",
     "bytes.csv": bytes(range(256)),
-    "units.csv": "1mm,2mm\n3mm,4mm\n",
     "mountain.csv": "0,1e9\n0,0\n",
-    "empty.npy": "",
-    "magic.npy": b"\x93NUMPY\x01\x00",
     "text.npy": "1 2 3",
-    "empty.png": "",
-    "magic.png": b"\x89PNG\r\n\x1a\nxx",
     "text.png": "a picture of a dot",
-    "text.tif": "a picture of a dot",
     "cut.tif": b"II*\x00\x08\x00\x00\x00",
     "photo.jpg": b"\xff\xd8\xff",
     "map.txt": "1 2\n3 4\n",
 }
 
 
-@pytest.mark.parametrize("name", MAPS)
-def test_a_malformed_height_map_is_refused_in_one_sentence(tmp_path, name):
-    content = MAPS[name]
+@pytest.mark.parametrize("name", [*SURFACES, *MAPS])
+def test_a_malformed_file_is_refused_in_one_sentence(tmp_path, name):
+    content = (SURFACES | MAPS)[name]
     (tmp_path / name).write_bytes(content if isinstance(content, bytes) else content.encode())
-    assert SAID.get(name, "") in _refused(name, lambda: read_height_map(tmp_path / name, 0.1))
+    read = read_surface if name in SURFACES else partial(read_height_map, pitch_mm=0.1)
+    assert SAID.get(name, "") in _refused(name, lambda: read(tmp_path / name))
 
 
 ARRAYS = {
     "complex": np.ones((4, 4), dtype=complex),
     "text": np.array([["a", "b"], ["c", "d"]]),
-    "objects": np.array([[1, None], [2, 3]], dtype=object),
     "line": np.ones(9),
-    "number": np.array(3.0),
     "cube": np.ones((3, 3, 3)),
-    "none": np.ones((0, 5)),
     "nan": np.full((4, 4), np.nan),
-    "row": np.ones((1, 40)),
-    "flat": np.full((4, 4), 7),
     "points": np.stack(np.meshgrid(range(4), range(5), [0.0]), axis=-1).reshape(-1, 3).T,
     "times": np.zeros((3, 3), dtype="datetime64[s]"),
     "fields": np.zeros((3, 3), dtype=[("height", float)]),
@@ -257,9 +207,8 @@ def deep_png(kind, samples):
     """A PNG image of 2 by 2 pixels of 16 bits, all of which Pillow cannot write."""
 
     def chunk(name, content):
-        return (
-            struct.pack(">I", len(content)) + name + content + struct.pack(">I", zlib.crc32(name + content))
-        )
+        check = struct.pack(">I", zlib.crc32(name + content))
+        return struct.pack(">I", len(content)) + name + content + check
 
     rows = zlib.compress((b"\0" + bytes(range(4 * samples))) * 2)
     head = struct.pack(">2I5B", 2, 2, 16, kind, 0, 0, 0)
@@ -267,53 +216,34 @@ def deep_png(kind, samples):
 
 
 def test_images_that_do_not_hold_heights_are_refused(tmp_path):
-    grey = Image.new("L", (20, 20))
+    grey, cut = Image.new("L", (20, 20)), io.BytesIO()
     grey.putpixel((10, 10), 255)
-    content = tmp_path / "whole.png"
-    Image.effect_noise((200, 200), 80).save(content)
-    (tmp_path / "cut.png").write_bytes(content.read_bytes()[:900])
-    Image.new("1", (9000, 9000)).save(tmp_path / "large.png")
-    Image.new("L", (20, 1)).save(tmp_path / "row.png")
-    Image.new("RGB", (20, 20), (200, 40, 10)).save(tmp_path / "colour.png")
+    Image.effect_noise((200, 200), 80).save(cut, "PNG")
     translucent = grey.convert("RGBA")
     translucent.putpixel((3, 3), (0, 0, 0, 0))
-    translucent.save(tmp_path / "alpha.png")
-    Image.new("L", (20, 20)).save(tmp_path / "black.png")
-    Image.new("I;16", (20, 20), 9000).save(tmp_path / "uniform.tif")
-    Image.fromarray(np.zeros((20, 20, 3), np.uint8)).save(
-        tmp_path / "page.tif", save_all=True, append_images=[grey]
-    )
-    (tmp_path / "end.png").write_bytes(content.read_bytes()[:-5])
-    for name, kind, samples in (("deep.png", 2, 3), ("grey-and-alpha.png", 4, 2)):
-        (tmp_path / name).write_bytes(deep_png(kind, samples))
-    said = {"page.tif": "one page: got 2", "end.png": "cut off"}
-    for name in ("deep.png", "grey-and-alpha.png"):
-        said[name] = "of which 8 bits would be lost"
-    for name in ("cut.png", "large.png", "row.png", "colour.png", "alpha.png", *said):
-        assert said.get(name, "") in _refused(name, lambda name=name: read_height_map(tmp_path / name, 0.1))
-    for name in ("black.png", "uniform.tif"):
-        assert "all are equal" in _refused(name, lambda name=name: read_height_map(tmp_path / name, 0.1))
-
-
-@pytest.mark.parametrize(
-    ("options", "said"),
-    [
-        ({"pitch_mm": 0.0}, "pitch_mm must be greater than 0"),
-        ({"pitch_mm": -0.1}, "pitch_mm must be greater than 0"),
-        ({"pitch_mm": np.nan}, "pitch_mm must be a finite number"),
-        ({"pitch_mm": "fine"}, "pitch_mm must be a finite number"),
-        ({"pitch_mm": 1e-5}, "0.1 to 1000 mm"),
-        ({"pitch_mm": 1e3}, "0.1 to 1000 mm"),
-        ({"pitch_mm": 0.1, "height_mm": 0.0}, "height_mm must be greater than 0"),
-        ({"pitch_mm": 0.1, "height_mm": np.inf}, "height_mm must be a finite number"),
-        ({"pitch_mm": 0.1, "height_mm": 1e6}, "heights within 1000 mm"),
-        ({"pitch_mm": 0.1, "height_mm": "1 mm"}, "height_mm must be a finite number"),
-    ],
-    ids=str,
-)
-def test_a_wrong_pitch_or_height_is_refused_in_one_sentence(tmp_path, options, said):
-    np.save(tmp_path / "map.npy", np.outer(np.hanning(20), np.hanning(20)))
-    assert said in _refused(None, lambda: read_height_map(tmp_path / "map.npy", **options))
+    pages = Image.fromarray(np.zeros((20, 20, 3), np.uint8))
+    pages.save(tmp_path / "page.tif", save_all=True, append_images=[grey])
+    said = {"page.tif": "one page: got 2"}
+    for name, image, words in (
+        ("large.png", Image.new("1", (9000, 9000)), ""),
+        ("row.png", Image.new("L", (20, 1)), ""),
+        ("colour.png", Image.new("RGB", (20, 20), (200, 40, 10)), ""),
+        ("alpha.png", translucent, ""),
+        ("black.png", Image.new("L", (20, 20)), "all are equal"),
+        ("uniform.tif", Image.new("I;16", (20, 20), 9000), "all are equal"),
+    ):
+        image.save(tmp_path / name)
+        said[name] = words
+    for name, content, words in (
+        ("cut.png", cut.getvalue()[:900], ""),
+        ("end.png", cut.getvalue()[:-5], "cut off"),
+        ("deep.png", deep_png(2, 3), "of which 8 bits would be lost"),
+        ("grey-and-alpha.png", deep_png(4, 2), "of which 8 bits would be lost"),
+    ):
+        (tmp_path / name).write_bytes(content)
+        said[name] = words
+    for name, words in said.items():
+        assert words in _refused(name, lambda name=name: read_height_map(tmp_path / name, 0.1))
 
 
 def _refused(name, read):

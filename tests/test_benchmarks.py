@@ -3,14 +3,13 @@
 import importlib
 import re
 import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
 
-from benchmarks import growth, installing, peer_block, peer_neurons, profiles
+from benchmarks import growth, installing, peer_block, peer_neurons
 from benchmarks.__main__ import BENCHMARKS, run
-from benchmarks.measuring import FailedRunError, Spread, run_job
+from benchmarks.measuring import FailedRunError, run_job
 from benchmarks.measuring import run as run_command
 from benchmarks.page import PAGE, rewritten, targets_table
 from benchmarks.pressing import touch_of_sphere
@@ -26,27 +25,18 @@ MACHINE = {
 }  # fmt: skip
 
 
-def test_page_shows_what_was_measured():
-    assert rewritten(TEXT, read_all()) == TEXT, "run `make benchmarks ARGS=--page`"
-
-
-def test_every_target_has_a_row_and_every_report_a_section():
-    rows = [line for line in TEXT.splitlines() if line.startswith("| ")]
+def test_page_shows_what_was_measured_and_every_target_and_benchmark():
+    reports = read_all()
+    assert rewritten(TEXT, reports) == TEXT, "run `make benchmarks ARGS=--page`"
     for target in TARGETS:
-        assert any(f"| {target.job} | {target.bound} |" in row for row in rows), target.key
+        assert f"| {target.job} | {target.bound} |" in TEXT, target.key
     sections = re.findall(r"<!-- begin (\w+) -->", TEXT)
-    assert sections == ["targets", *dict.fromkeys(sections[1:])]
-    assert set(sections[1:]) == set(BENCHMARKS)
-
-
-@pytest.mark.parametrize("name", BENCHMARKS)
-def test_every_benchmark_can_be_measured_and_names_its_targets(name):
-    assert callable(importlib.import_module(f"benchmarks.{name}").measure)
-    if (report := read_all().get(name)) is not None:
-        assert report.measured.keys() == {target.key for target in TARGETS if target.benchmark == name}
-
-
-def test_reports_name_neither_folder_nor_host():
+    assert set(sections) == {"targets", *BENCHMARKS}
+    for name in BENCHMARKS:
+        assert callable(importlib.import_module(f"benchmarks.{name}").measure)
+        if name in reports:
+            keys = {target.key for target in TARGETS if target.benchmark == name}
+            assert reports[name].measured.keys() == keys
     for path in (PAGE.parent / "results").glob("*.json"):
         assert not re.search(r"/(home|tmp|root|work|Users)/", path.read_text(encoding="utf-8")), path.name
 
@@ -61,15 +51,8 @@ def test_report_survives_the_disk_and_reaches_the_page(tmp_path):
         assert expected in text
     row = next(line for line in targets_table(found).splitlines() if "| ≤ 12 s |" in line)
     assert "12.5 s | **no** | `sphere` |" in row
-
-
-def test_targets_are_bounds_from_above_or_below():
-    time, ratio = Target("a", "b", "c", 2.0, "s"), Target("a", "b", "c", 2.0, "x", at_least=True)
-    assert [time.met_by(value) for value in (1.9, 2.1)] == [True, False]
-    assert [ratio.met_by(value) for value in (1.9, 2.1)] == [False, True]
-
-
-def test_reports_refuse_a_number_without_target_and_a_row_of_other_length():
+    least = Target("a", "b", "c", 2.0, "x", at_least=True)
+    assert [least.met_by(value) for value in (1.9, 2.1)] == [False, True]
     with pytest.raises(ValueError, match="got \\['speed'\\] besides"):
         Report("sphere", "", "", [], {"speed": 1.0}, machine=MACHINE)
     with pytest.raises(ValueError, match="needs 2 cells"):
@@ -89,25 +72,13 @@ def test_a_job_runs_with_the_threads_it_is_given():
     code = "import os; print(os.environ['NUMBA_NUM_THREADS'] + os.environ['OMP_NUM_THREADS'])"
     assert run_command([sys.executable, "-c", code], threads=2).answer == 22
     assert run_job("measuring", "doubled", threads=1, number=4).answer == {"doubled": 8}
-
-
-def test_a_failed_run_names_the_failure():
     with pytest.raises(FailedRunError, match=r"status 1:\n(.|\n)*ZeroDivisionError"):
         run_command([sys.executable, "-c", "1 / 0"], threads=1)
-
-
-def test_spread_is_median_and_range():
-    spread = Spread.of([4.0, 1.0, 2.0])
-    assert (spread.median, spread.smallest, spread.largest) == (2.0, 1.0, 4.0)
 
 
 def test_unknown_benchmark_is_refused(capsys):
     assert run(["spheres"]) == 2
     assert f"spheres is none of {BENCHMARKS[0]}" in capsys.readouterr().err
-
-
-def test_continuous_integration_runs_no_benchmark():
-    assert "benchmarks" not in (Path(__file__).parents[1] / ".ci" / "run").read_text()
 
 
 def test_sizes_of_the_study_of_growth_span_the_target():
@@ -138,16 +109,11 @@ def test_a_press_reports_time_size_and_result():
     assert 50.0 < found.answer["before_mb"] < found.peak_mb
 
 
-def test_a_profile_names_functions_not_folders():
-    assert profiles.place("/a/b/press.py", 3, "step") == "`press.py: step`"
-
-
 def test_block_of_the_peers_is_layered_and_comes_back_from_its_file(tmp_path):
-    nodes = {}
-    for size in peer_block.SIZES:
+    for size, nodes in (("small", 5_800), ("large", 21_500)):
         job = peer_block.read_job(peer_block.write_block(tmp_path / f"{size}.npz", size))
         mesh = job.mesh
-        nodes[size] = len(mesh.nodes_mm)
+        assert len(mesh.nodes_mm) == pytest.approx(nodes, rel=0.02)
         assert np.ptp(mesh.nodes_mm, axis=0).tolist() == [14.0, 5.0, 12.0]
         assert mesh.full
         volumes_mm3 = np.abs(
@@ -158,29 +124,6 @@ def test_block_of_the_peers_is_layered_and_comes_back_from_its_file(tmp_path):
         assert thicknesses_mm[2:] == pytest.approx([1.153, 3.376])
         assert job.indenter.radius_mm == pytest.approx(3.0)
         assert job.depths_mm == pytest.approx(np.linspace(0.0, 1.0, 11))
-    assert nodes["small"] == pytest.approx(5_800, rel=0.02)
-    assert nodes["large"] == pytest.approx(21_500, rel=0.02)
-
-
-def test_lines_of_the_block_grow_by_one_ratio_from_the_size_of_the_core():
-    steps = np.diff(peer_block.lines(13, 7, 7.0))[20:]
-    assert steps[:13] == pytest.approx(2.5 / 13)
-    ratios = steps[13:] / steps[12:-1]
-    assert ratios == pytest.approx(ratios[0])
-    assert 1.0 < ratios[0] < 1.5
-
-
-def test_region_of_comparison_is_skin_near_the_axis(tmp_path):
-    mesh = peer_block.read_job(peer_block.write_block(tmp_path / "block.npz", "small")).mesh
-    region = peer_block.below_the_sphere(mesh)
-    assert set(mesh.layer[region]) == {1, 2}
-    middle = mesh.nodes_mm[mesh.elements].mean(axis=1)
-    away = np.hypot(middle[:, 0], middle[:, 2])
-    assert (
-        away[region].max()
-        < 2.0
-        < away[np.setdiff1d(np.flatnonzero(np.isin(mesh.layer, (1, 2))), region)].min()
-    )
 
 
 def test_spikes_are_paired_by_train_and_number(tmp_path):
@@ -190,11 +133,8 @@ def test_spikes_are_paired_by_train_and_number(tmp_path):
     for name, trains in (("mine", mine), ("theirs", theirs)):
         np.savez(tmp_path / f"{name}.npz", times_ms=trains.times_ms, offsets=trains.offsets)
     found = peer_neurons.timing(str(tmp_path / "mine.npz"), str(tmp_path / "theirs.npz"))
-    assert found == {
-        "rms_ms": pytest.approx(np.sqrt(1.25 / 5)),
-        "largest_ms": 1.0,
-        "same_count_percent": 25.0,
-    }
+    rms_ms = pytest.approx(np.sqrt(1.25 / 5))
+    assert found == {"rms_ms": rms_ms, "largest_ms": 1.0, "same_count_percent": 25.0}
 
 
 def test_afferents_of_the_peers_fire_and_runge_kutta_nears_their_exact_spikes(tmp_path):
@@ -206,15 +146,6 @@ def test_afferents_of_the_peers_fire_and_runge_kutta_nears_their_exact_spikes(tm
     assert checked["afferents"] == 2
     assert middle < 0.2 * coarse
     assert fine < 0.2 * middle < 0.01
-
-
-def test_environments_of_peers_are_made_once(tmp_path, monkeypatch):
-    monkeypatch.setattr(sys, "executable", str(tmp_path / "no-python"))  # making one would fail
-    peer = tmp_path / "felupe"
-    (peer / "bin").mkdir(parents=True)
-    (peer / "bin" / "python").touch()
-    (peer / "requirements.txt").write_text("\n".join(installing.REQUIREMENTS["felupe"]))
-    assert installing.environment_of("felupe", tmp_path) == peer / "bin" / "python"
 
 
 def test_a_peer_that_cannot_be_installed_is_named(tmp_path, monkeypatch):

@@ -2,7 +2,6 @@
 
 import inspect
 import re
-import signal
 import subprocess
 import sys
 from functools import partial
@@ -38,25 +37,18 @@ def call(monkeypatch, run_program):
     return partial(run_program, cli.main, "fingerpad")
 
 
-def test_version_is_that_of_the_package(call):
+def test_the_help_names_every_option_with_its_unit(call):
     assert call("--version") == (0, f"fingerpad {__version__}\n", "")
-
-
-def test_help_names_every_option_and_resolution(call):
-    status, said, errors = call("reproduce", "--help")
-    assert (status, errors) == (0, "")
-    words = " ".join(re.sub("[^\\w-]", " ", said).split())
-    assert "quick standard paper" in words
-    for option in ("--resolution", "--out", "--jobs", "--seed"):
-        assert option in words
-
-
-def test_the_help_keeps_every_unit(call):
+    status, summary, errors = call()
+    assert (status, errors) == (2, "")
     for name, command in typer.main.get_command(cli.app).commands.items():
-        said = " ".join(call(name, "--help")[1].split())
+        status, said, errors = call(name, "--help")
+        assert (status, errors) == (0, "")
+        said = " ".join(said.split())
         units = [unit for each in command.params for unit in re.findall(r"\[\S+\]", each.help or "")]
         assert all(said.count(unit) >= units.count(unit) for unit in units), name
-        assert " ".join(command.help.partition("\n\n")[0].split()) in " ".join(call("--help")[1].split())
+        assert " ".join(command.help.partition("\n\n")[0].split()) in " ".join(summary.split())
+    assert {"--resolution", "--out", "--jobs", "--seed"} <= set(call("reproduce", "--help")[1].split())
 
 
 def test_the_help_names_what_the_modules_know():
@@ -70,10 +62,8 @@ def test_the_help_names_what_the_modules_know():
 
 def test_one_set_of_tissues_is_the_default_everywhere():
     commands = typer.main.get_command(cli.app).commands
-    options = {
-        name: {each.name: each.default for each in command.params} for name, command in commands.items()
-    }
-    pressed = {name: each["tissues"] for name, each in options.items() if "tissues" in each}
+    options = [(name, each) for name, command in commands.items() for each in command.params]
+    pressed = {name: each.default for name, each in options if each.name == "tissues"}
     assert set(pressed) == {"reproduce", "fit", "validate", "export"}
     assert pressed.pop("reproduce") == "paper"  # the first column; the default tissues are the second
     assert pressed.pop("fit") is None  # those of the file of stimuli, which are the default tissues
@@ -83,48 +73,26 @@ def test_one_set_of_tissues_is_the_default_everywhere():
     assert Conditions().afferent == fp.Afferent() == fp.Population.grid().afferent
 
 
-def test_without_a_command_the_help_is_shown(call):
-    status, said, errors = call()
-    assert (status, errors) == (2, "")
-    assert "reproduce" in said
-
-
 @pytest.mark.parametrize(
     ("arguments", "named", "came"),
     [
         (["reproduce", "--depth", "1"], "No such option", "--depth"),
         (["reproduce", "--resolution", "qick"], "resolution must be one of quick, standard, paper", "'qick'"),
-        (["reproduce", "--resolution", "nan"], "resolution must be one of quick, standard, paper", "'nan'"),
-        (["reproduce", "--resolution", ""], "resolution must be one of quick, standard, paper", "''"),
         (["reproduce", "--tissues", "humann"], "tissues must be one of paper, trial1", "'humann'"),
         (["reproduce", "--jobs", "0"], "jobs must be a whole number of at least 1", "0"),
-        (["reproduce", "--jobs", "-2"], "jobs must be a whole number of at least 1", "-2"),
-        (["reproduce", "--jobs", "nan"], "'--jobs': must be a whole number", "'nan'"),
         (["reproduce", "--jobs", "1.5"], "'--jobs': must be a whole number", "'1.5'"),
         (["reproduce", "--seed", "-1"], "seed must be a whole number of at least 0", "-1"),
         (["reproduce", "--seed", "abc"], "'--seed': must be a whole number", "'abc'"),
-        (["reproduce", "--seed", "nan"], "'--seed': must be a whole number", "'nan'"),
-        (["reproduce", "--seed", "inf"], "'--seed': must be a whole number", "'inf'"),
-        (["reproduce", "--seed", ""], "'--seed': must be a whole number", "''"),
         (["reproduce", "--seed"], "--seed", "requires an argument"),
         (["fit", "--example", "--resolution", "quick"], "'--example' requires an argument", "'--resolution'"),
-        (["validate", "--example", "--out", "here"], "'--example' requires an argument", "'--out'"),
-        (["reproduce", "--out", "--no-extended"], "'--out' requires an argument", "'--no-extended'"),
         (["reproduce", "--quick"], "No such option: --quick; write --resolution quick", "quick"),
-        (["reproduce", "--quickly"], "No such option: --quickly.", "--quickly"),
         (["export", "out", "--materials", "a"], "No such option: --materials; write --tissues", ""),
         (["export"], "Missing argument", "'FOLDER'"),
-        (["view"], "Missing argument", "'RESULT'"),
         (["store"], "store needs a command: list, verify, prune", "list"),
-        (["store", "verify"], "Missing argument", "'FOLDER'"),
         (["store", "verify", "."], "FOLDER must hold stored indentations: . has none", "."),
         (["export", "out", "--elastic-moduli", "long_term"], "elastic_moduli is for calculix", "vtu"),
         (["export", "out", "--indenter", "cone"], "indenter must be one of sphere, cylinder, bar", "'cone'"),
-        (
-            ["export", "out", "--indenter", "bar", "--curvature", "287"],
-            "--curvature is that of a sphere",
-            "bar",
-        ),
+        (["export", "out", "--indenter", "bar", "--curvature", "2"], "--curvature is that of", "bar"),
         (["export", "out", "--indenter", "sphere:3", "--curvature", "287"], "without a size", "sphere:3"),
         (["export", "out", "--indenter", "punch:wide"], "diameter_mm must be a finite number", "'wide'"),
         (["export", "out", "--curvature", "round"], "'--curvature': must be a number", "'round'"),
@@ -132,8 +100,6 @@ def test_without_a_command_the_help_is_shown(call):
         (["export", "out", "--depth", "1", "--trajectory", "a.csv"], "--depth is that of a hold", "a.csv"),
         (["export", "out", "--tolerance", "0.02"], "--tolerance is that of a --trajectory", "give both"),
         (["export", "out", "--trajectory", "gone.csv"], "gone.csv must be a file", "No such file"),
-        (["export", "out", "--tissues", "steel"], "tissues must be one of", "'steel'"),
-        (["export", "out", "--resolution", "fine"], "resolution must be one of", "'fine'"),
         (["export", "out", "--touch", "gone.yaml"], "gone.yaml must be a file", "No such file"),
         (["export", "out", "--touch", "a.yaml", "--depth", "1"], "leave the other options", "a.yaml"),
         (["export", "out", "--format", "stl"], "format must be one of vtu", "'stl'"),
@@ -160,47 +126,33 @@ def test_without_its_extra_nothing_is_written(call, is_refused, monkeypatch, wor
     is_refused(call(*words), "fingerpad", "pip install", f"fingerpad[{extra}]")
 
 
-@pytest.mark.parametrize("below", ["", "/deeper", "/deeper/still"])
-def test_a_folder_that_cannot_be_is_named_and_what_is_there_stays(call, tmp_path, below):
+def test_a_folder_that_cannot_be_is_named_and_what_is_there_stays(call, tmp_path):
     (tmp_path / "note").write_text("mine")
-    status, said, errors = call("reproduce", "--out", f"note{below}")
-    assert (status, said, errors.count("\n")) == (2, "", 1)
-    assert f"--out must be a writable folder: note{below} is not" in errors
+    for below in ("", "/deeper", "/deeper/still"):
+        status, said, errors = call("reproduce", "--out", f"note{below}")
+        assert (status, said, errors.count("\n")) == (2, "", 1)
+        assert f"--out must be a writable folder: note{below} is not" in errors
     assert [path.name for path in tmp_path.iterdir()] == ["note"]
     assert (tmp_path / "note").read_text() == "mine"
 
 
 @pytest.mark.parametrize(
-    "failure",
+    ("failure", "status", "said"),
     [
-        FingerpadError("It went wrong."),
-        StoreError("x.npz cannot be read: delete it."),
-        ConvergenceError(
-            "No equilibrium at 3 ms: try more steps.", ("at 3 ms: 40 steps", "at 1 ms: 40 steps")
-        ),
+        (StoreError("x.npz cannot be read: delete it."), 2, "x.npz cannot be read: delete it."),
+        (ConvergenceError("No equilibrium at 3 ms.", ("at 3 ms: 40 steps",)), 2, "No equilibrium at 3 ms."),
+        (KeyboardInterrupt(), 130, "stopped. The same command continues after the last"),
     ],
-    ids=lambda failure: type(failure).__name__,
 )
-def test_failures_of_a_run_are_reported_without_a_traceback(call, monkeypatch, tmp_path, failure):
+def test_a_failed_run_is_reported_without_a_traceback(call, monkeypatch, tmp_path, failure, status, said):
     def fail(*_):
         raise failure
 
     monkeypatch.setattr(gerling2014, "reproduce", fail)
-    status, said, errors = call("reproduce", "--out", "run")
-    assert (status, said, errors.splitlines()[1:]) == (2, "", [f"fingerpad: {failure}"])
+    found, printed, errors = call("reproduce", "--out", "run")
+    assert (found, printed) == (status, "")
+    assert errors.splitlines()[-1].startswith(f"fingerpad: {said}")
     assert list((tmp_path / "run").iterdir()) == []
-
-
-def test_an_interrupted_run_reports_how_to_continue(call, monkeypatch):
-    def stop(*_):
-        raise KeyboardInterrupt
-
-    monkeypatch.setattr(gerling2014, "reproduce", stop)
-    status, said, errors = call("reproduce")
-    assert (status, said) == (128 + signal.SIGINT, "")
-    assert errors.splitlines()[1:] == [
-        "fingerpad: stopped. The same command continues after the last finished indentation."
-    ]
 
 
 def test_options_reach_the_run(call, monkeypatch, tmp_path):
@@ -246,9 +198,8 @@ def test_options_reach_the_export(call, monkeypatch, tmp_path):
     assert same == default
     assert played.stimulus == Trajectory((0.0, 50.0, 100.0), (0.0, 0.5, 0.0))
     assert (relaxing, elastic) == (None, "long_term")
-    assert touch == touch_of(
-        Fingertip(), Sphere(curvature_per_m=340), RampAndHold(depth_mm=0.5), "trial1", "standard"
-    )
+    ball, motion = Sphere(curvature_per_m=340), RampAndHold(depth_mm=0.5)
+    assert touch == touch_of(Fingertip(), ball, motion, "trial1", "standard")
     assert (folder.resolve(), format_name) == (tmp_path / "a" / "b", "vtu")
     assert default == touch_of(Fingertip(), Plate(), RampAndHold(depth_mm=1.0), "human", "quick")
 

@@ -8,7 +8,7 @@ import textwrap
 import pytest
 
 import fingerpad as fp
-from fingerpad.core.compilation import NOTICE, SHORT_NOTICE, SUBJECT, announce_compilation
+from fingerpad.core.compilation import NOTICE, SHORT_NOTICE, SUBJECT
 from fingerpad.mechanics.kernels import KERNELS
 
 KERNEL = """
@@ -28,19 +28,12 @@ def thrice(x):
 def say(tmp_path):
     """Run code in a new interpreter whose kernels are stored in a folder that is empty at first."""
     (tmp_path / "kernels.py").write_text(KERNEL)
-    places = {
-        "NUMBA_CACHE_DIR": str(tmp_path / "cache"),
-        "PYTHONPATH": os.pathsep.join([str(tmp_path), *sys.path]),
-    }
+    paths = os.pathsep.join([str(tmp_path), *sys.path])
+    places = {"NUMBA_CACHE_DIR": str(tmp_path / "cache"), "PYTHONPATH": paths}
 
     def run(code, **variables):
-        done = subprocess.run(
-            [sys.executable, "-W", "error", "-c", textwrap.dedent(code)],
-            capture_output=True,
-            text=True,
-            check=False,
-            env=os.environ | places | variables,
-        )
+        command = [sys.executable, "-W", "error", "-c", textwrap.dedent(code)]
+        done = subprocess.run(command, capture_output=True, text=True, env=os.environ | places | variables)
         assert done.returncode == 0, done.stderr
         return done.stdout.split(), done.stderr
 
@@ -54,15 +47,23 @@ LOOK = """
 """
 
 
-def test_a_kernel_is_compiled_once_per_source(say, tmp_path):
+def test_a_kernel_is_compiled_once_per_source_and_announced_by_the_parent_only(say, tmp_path):
+    announce = """
+        import logging, os
+        from fingerpad.core import engine
+        from fingerpad.core.compilation import announce_compilation
+        from kernels import twice
+        {first}
+        with announce_compilation([twice]):
+            pass
+    """
+    for silent in ("engine._begin(os.getppid())", "logging.getLogger('fingerpad').setLevel('ERROR')"):
+        assert say(announce.format(first=silent)) == ([], "")
+    assert say(LOOK, NUMBA_DISABLE_JIT="1") == (["True", "2", "True"], "")
     assert say(LOOK) == (["False", "2", "True"], "")
     assert say(LOOK) == (["True", "2", "True"], "")
     (tmp_path / "kernels.py").write_text(KERNEL.replace("2 * x", "2 * x + 0"))
     assert say(LOOK)[0] == ["False", "2", "True"]
-
-
-def test_without_compilation_there_is_no_message(say):
-    assert say(LOOK, NUMBA_DISABLE_JIT="1") == (["True", "2", "True"], "")
 
 
 PRESS = """
@@ -76,7 +77,6 @@ PRESS = """
         raise Pressed
 
     indentation.press = no_press
-    {set_up}
     touch = fp.touch_of(fp.Fingertip(), fp.Sphere())
     for _ in range(2):
         try:
@@ -86,25 +86,11 @@ PRESS = """
 """
 
 
-@pytest.mark.parametrize(
-    ("set_up", "said"),
-    [
-        ("", f"{SHORT_NOTICE}\n{NOTICE}\n"),  # of the description, then of the press
-        ("import logging; logging.getLogger('fingerpad').setLevel('ERROR')", ""),
-    ],
-    ids=["as it comes", "silenced"],
-)
-def test_a_first_press_reports_compilation_once(say, set_up, said):
-    assert say(PRESS.format(set_up=set_up)) == (["pressed", "pressed"], said)
-
-
-def test_a_compiled_kernel_is_not_announced(caplog):
-    class Compiled:
-        signatures = ((),)
-
-    with announce_compilation([Compiled()]):
-        pass
-    assert caplog.text == ""
+def test_a_first_press_reports_compilation_once(say):
+    assert say(PRESS) == (
+        ["pressed", "pressed"],
+        f"{SHORT_NOTICE}\n{NOTICE}\n",
+    )  # of the description, the press
 
 
 def test_messages_count_the_kernels_that_are_done(say):
@@ -147,16 +133,3 @@ def test_a_first_response_reports_compilation_once_and_none_that_is_stored(say):
 def test_a_press_calls_every_kernel_that_is_counted():
     fp.touch_of(fp.Fingertip(), fp.Sphere(), settings=fp.PressSettings(1, 1)).solve()
     assert [kernel for kernel in KERNELS if not kernel.signatures] == []
-
-
-def test_workers_leave_it_to_their_parent(say):
-    code = """
-        import logging, os
-        from fingerpad.core import engine
-        from fingerpad.core.compilation import announce_compilation
-        from kernels import twice
-        engine._begin(os.getppid())
-        with announce_compilation([twice]):
-            pass
-    """
-    assert say(code) == ([], "")

@@ -2,6 +2,7 @@ import math
 import os
 import subprocess
 import sys
+from functools import partial
 
 import numpy as np
 import pytest
@@ -21,7 +22,7 @@ from fingerpad.psychophysics.discrimination import (
     hit_rates_of_sums,
     likelihood_point,
 )
-from fingerpad.psychophysics.encoding import distance, gradient_sum, neighbour_pairs
+from fingerpad.psychophysics.encoding import gradient_sum, neighbour_pairs
 from fingerpad.psychophysics.noise_fit import expected_hit_rates, fit_noise_sigma
 from fingerpad.psychophysics.noisy_responses import (
     LARGEST_SESSION,
@@ -52,13 +53,11 @@ def bumps(curvatures=CURVATURES):
 
 def one_by_one(sphere, sigma, seed, trial, count):
     """(a): one presentation after the other, each number looked up by its key."""
-    numbers = [
-        normals(seed, [trial], [receptor], Purpose.RESPONSE, count)[0, 0] for receptor in range(len(sphere))
-    ]
-    return [
-        [value * (1.0 + sigma * numbers[receptor][k]) for receptor, value in enumerate(sphere)]
-        for k in range(count)
-    ]
+    varied = []
+    for receptor, value in enumerate(sphere):
+        numbers = normals(seed, [trial], [receptor], Purpose.RESPONSE, count)[0, 0]
+        varied.append([value * (1.0 + sigma * number) for number in numbers])
+    return list(zip(*varied, strict=True))
 
 
 def picked(seed, trial, count, choices):
@@ -81,20 +80,11 @@ def test_gradient_sum_follows_the_printed_steps(session):
     begin = session * TRIALS_PER_SESSION
     fitted = []
     for distribution in range(plan.distributions):  # (f)
-        sums = [
-            [
-                float(gradient_sum(one, PAIRS))  # (b), (c)
-                for one in one_by_one(
-                    values[sphere],
-                    sigma,
-                    seed,
-                    begin + sphere * plan.distributions + distribution,
-                    plan.presentations,
-                )  # (d)
-            ]
-            for sphere in range(3)
-        ]
-        fitted.append([mean_and_sd(of_sphere) for of_sphere in sums])  # (e)
+        fitted.append([])
+        for sphere in range(3):
+            trial = begin + sphere * plan.distributions + distribution
+            presented = one_by_one(values[sphere], sigma, seed, trial, plan.presentations)  # (d)
+            fitted[-1].append(mean_and_sd([float(gradient_sum(one, PAIRS)) for one in presented]))  # (b)
     pooled = [sum(one[sphere][0] for one in fitted) / plan.distributions for sphere in range(3)]
     expected = []
     for comparison in (1, 2):  # (j)
@@ -134,9 +124,8 @@ def test_the_varied_criterion_follows_the_printed_steps(moves):
                 common = math.sqrt(0.5 * (standard_sd**2 + sd**2))
 
                 def excess(x, mean=mean, common=common, shift=shift):
-                    return (
-                        norm.logpdf(x, mean, common) - norm.logpdf(x, standard_mean, common) - math.log(shift)
-                    )
+                    ratio = norm.logpdf(x, mean, common) - norm.logpdf(x, standard_mean, common)
+                    return ratio - math.log(shift)
 
                 point = brentq(excess, standard_mean - 9.0 * common, mean + 9.0 * common, xtol=1e-12)
             hits[comparison].append(normal_beyond(point, mean, sd, math.copysign(1.0, mean - standard_mean)))
@@ -146,7 +135,7 @@ def test_the_varied_criterion_follows_the_printed_steps(moves):
 
 
 # Few sets and many pairs: were a set of the standard to meet itself, a quarter of its distances would be 0.
-@pytest.mark.parametrize("plan", [SMALL, Experiment(presentations=4, pairs=60, hit_rates=8)])
+@pytest.mark.parametrize("plan", [SMALL, Experiment(presentations=4, pairs=60, hit_rates=8, criterion=0.4)])
 @pytest.mark.parametrize("norm", ["city-block", "euclidean"])
 def test_euclidean_distance_follows_the_printed_steps(norm, plan):
     values, sigma, seed = bumps([287.0, 292.0, 330.0]), 0.05, 8
@@ -173,9 +162,9 @@ def test_euclidean_distance_follows_the_printed_steps(norm, plan):
     hits = [[], []]
     for sums in repetitions:
         for comparison in (1, 2):
-            midpoint = 0.5 * (np.mean(sums[0]) + np.mean(sums[comparison]))
+            point = (1 - plan.criterion) * np.mean(sums[0]) + plan.criterion * np.mean(sums[comparison])
             above = pooled[comparison] > pooled[0]
-            judged = [(one > midpoint) == above for one in sums[comparison]]  # (h*)
+            judged = [(one > point) == above for one in sums[comparison]]  # (h*)
             hits[comparison - 1].append(sum(judged) / plan.pairs)
     rates = discriminate_euclidean(values, sigma, seed, plan, norm=norm)
     assert_allclose(rates.hit_rate, [mean_and_sd(rate)[0] for rate in hits], rtol=1e-12)
@@ -199,10 +188,7 @@ def test_several_measures_and_noises_meet_the_same_numbers_as_each_alone():
     together = noisy_gradient_sums(measures, PAIRS, sigmas, 4, trials, 5)
     for one, measure, sigma in zip(together, measures, sigmas, strict=True):
         assert_array_equal(one, noisy_gradient_sums(measure, PAIRS, sigma, 4, trials, 5))
-
-
-def test_shared_noise_is_the_same_for_every_sphere():
-    draws = standard_normals(3, (300, 18))
+    draws = standard_normals(3, (300, 18))  # the same for every sphere
     sums = shared_noise_gradient_sums(bumps(), PAIRS, 0.05, draws)
     assert_allclose(sums, gradient_sum(bumps()[:, np.newaxis] * (1.0 + 0.05 * draws), PAIRS), rtol=1e-13)
 
@@ -217,16 +203,10 @@ def test_the_number_of_threads_changes_no_bit():
         "sums = noisy_gradient_sums(values, pairs, 0.1, 3, session_trials(0, 2, 100), 10)\n"
         "print(sums.tobytes().hex()[:4000], hash(sums.tobytes()))"
     )
-    said = [
-        subprocess.run(
-            [sys.executable, "-c", program],
-            env=os.environ | {"NUMBA_NUM_THREADS": threads, "PYTHONHASHSEED": "0"},
-            capture_output=True,
-            text=True,
-            check=True,
-        ).stdout
-        for threads in ("1", "2")
-    ]
+    said = []
+    for threads in ("1", "2"):
+        variables = os.environ | {"NUMBA_NUM_THREADS": threads, "PYTHONHASHSEED": "0"}
+        said.append(subprocess.check_output([sys.executable, "-c", program], env=variables, text=True))
     assert said[0] == said[1] != ""
 
 
@@ -239,15 +219,6 @@ def test_sessions_of_one_seed_share_no_noise():
     assert abs(correlation) < 4.0 / np.sqrt(first.size)
     with pytest.raises(InputError, match="session must not exceed"):
         session_trials(LARGEST_SESSION + 1, 1)
-
-
-def test_fewer_hit_rates_are_the_first_of_many():
-    """So that 10 and 100 hit rates differ by their number and by nothing else."""
-    sums = noisy_gradient_sums(bumps(), PAIRS, 0.05, 1, session_trials(0, 7, 20), 10)
-    ten, hundred = (hit_rates_of_sums(sums, 1, Experiment(hit_rates=count)) for count in (10, 100))
-    assert_allclose(ten.hit_rate, hundred.hit_rate, atol=0.2)
-    again = hit_rates_of_sums(sums, 1, Experiment(hit_rates=10))
-    assert_array_equal(again.hit_rate, ten.hit_rate)
 
 
 def test_gradient_sum_of_two_receptors_is_normal_and_its_hit_rate_the_closed_form():
@@ -269,10 +240,12 @@ def test_gradient_sum_of_two_receptors_is_normal_and_its_hit_rate_the_closed_for
     assert_allclose(sampled.hit_rate_sd, density * of_z, rtol=0.1)
 
 
-@pytest.mark.parametrize("criterion", [0.2, 0.5, 0.8])
-def test_the_criterion_moves_the_decision_point(criterion):
-    values, sigma = np.array([[50.0, 80.0], [50.0, 84.0]]), 0.03
-    margin = (1.0 - criterion) * 4.0 / (sigma * np.hypot(50.0, 84.0))
+@pytest.mark.parametrize(("standard", "other", "criterion"), [
+    (80.0, 84.0, 0.2), (80.0, 84.0, 0.5), (80.0, 84.0, 0.8), (84.0, 80.0, 0.5),
+])  # fmt: skip
+def test_the_criterion_moves_the_decision_point_of_rising_and_falling_measures(standard, other, criterion):
+    values, sigma = np.array([[50.0, standard], [50.0, other]]), 0.03
+    margin = (1.0 - criterion) * 4.0 / (sigma * np.hypot(50.0, other))
     draws = standard_normals(1, (200_000, 2))
     assert_allclose(expected_hit_rates(values, TWO, sigma, draws, criterion), ndtr(margin), atol=2e-3)
     plan = Experiment(presentations=1000, criterion=criterion)
@@ -289,37 +262,17 @@ def test_a_likelihood_ratio_of_one_halves_the_distance_and_equal_means_have_no_o
     assert likelihood_point(10.0, 10.0, 4.0, ratio).tolist() == [10.0] * 3
 
 
-def test_equal_spheres_are_discriminated_by_chance_only():
-    values = np.repeat(bumps([287.0]), 3, axis=0)
-    assert_allclose(discriminate_gradient_sum(values, PAIRS, 0.05, 0).hit_rate, 0.5, atol=0.02)
-    assert_allclose(discriminate_euclidean(values, 0.05, 0).hit_rate, 0.5, atol=0.03)
-
-
-def test_very_different_spheres_are_always_discriminated():
-    values = bumps([287.0, 2000.0])
-    assert discriminate_gradient_sum(values, PAIRS, 0.05, 0).hit_rate[0] > 0.999
-    assert discriminate_euclidean(values, 0.05, 0).hit_rate[0] > 0.999
-
-
-def test_hit_rates_rise_with_curvature_and_fall_with_noise():
-    quiet = discriminate_gradient_sum(bumps(), PAIRS, 0.03, 0).hit_rate
-    loud = discriminate_gradient_sum(bumps(), PAIRS, 0.1, 0).hit_rate
-    apart = discriminate_euclidean(bumps(), 0.1, 0).hit_rate
-    assert (np.diff(quiet[:-1]) > 0).all()
-    assert (np.diff(loud) > 0).all()
-    assert (np.diff(apart) > 0).all()
-    assert (quiet > loud).all()
-
-
-def test_a_measure_that_falls_with_curvature_is_read_like_one_that_rises():
-    """Swapping standard and comparison swaps the side of the decision, not the observer's success."""
-    rising = np.array([[50.0, 80.0], [50.0, 84.0]])
-    falling = np.array([[50.0, 84.0], [50.0, 80.0]])
-    plan = Experiment(presentations=1000)
-    up = discriminate_gradient_sum(rising, TWO, 0.03, 1, plan).hit_rate[0]
-    down = discriminate_gradient_sum(falling, TWO, 0.03, 2, plan).hit_rate[0]
-    assert up == pytest.approx(ndtr(2.0 / (0.03 * np.hypot(50.0, 84.0))), abs=0.01)
-    assert down == pytest.approx(ndtr(2.0 / (0.03 * np.hypot(50.0, 80.0))), abs=0.01)
+def test_hit_rates_rise_from_chance_to_certainty_and_fall_with_noise():
+    same, far = np.repeat(bumps([287.0]), 3, axis=0), bumps([287.0, 2000.0])
+    assert_allclose(discriminate_gradient_sum(same, PAIRS, 0.05, 0).hit_rate, 0.5, atol=0.02)
+    assert_allclose(discriminate_euclidean(same, 0.05, 0).hit_rate, 0.5, atol=0.03)
+    assert discriminate_gradient_sum(far, PAIRS, 0.05, 0).hit_rate[0] > 0.999
+    assert discriminate_euclidean(far, 0.05, 0).hit_rate[0] > 0.999
+    quiet, loud = (discriminate_gradient_sum(bumps(), PAIRS, sigma, 0) for sigma in (0.03, 0.1))
+    assert (np.diff(quiet.hit_rate[:-1]) > 0).all()
+    assert (np.diff(loud.hit_rate) > 0).all()
+    assert (np.diff(discriminate_euclidean(bumps(), 0.1, 0).hit_rate) > 0).all()
+    assert (quiet.hit_rate > loud.hit_rate).all()
 
 
 def test_a_wavering_criterion_widens_the_error_bars_and_leaves_the_means():
@@ -333,48 +286,25 @@ def test_a_wavering_criterion_widens_the_error_bars_and_leaves_the_means():
     assert_allclose(much.hit_rate, steady.hit_rate, atol=0.03)
 
 
-def test_fewer_presentations_widen_the_error_bars():
-    """The paper's Figure 7 (g): 10 noise matrices instead of 100."""
-    many = discriminate_gradient_sum(bumps(), PAIRS, 0.055, 4)
-    few = discriminate_gradient_sum(bumps(), PAIRS, 0.055, 4, Experiment(presentations=10))
-    assert (few.hit_rate_sd[:4] > 2.0 * many.hit_rate_sd[:4]).all()
-
-
 def test_without_noise_hit_rates_are_1_or_at_chance_for_equal_stimuli():
     values = bumps([287.0, 287.0, 288.0])
+    whole = [[50.0, 60.0], [50.0, 60.0], [50.0, 61.0]]  # of which the standard deviation is exactly 0
     for rates in (
         discriminate_gradient_sum(values, PAIRS, 0.0, 0, SMALL),
         discriminate_euclidean(values, 0.0, 0, SMALL),
+        discriminate_gradient_sum(whole, TWO, 0.0, 0, SMALL),
     ):
         assert_array_equal(rates.hit_rate, [0.5, 1.0])
         assert_array_equal(rates.hit_rate_sd, [0.0, 0.0])
-
-
-def test_sums_that_never_vary_are_compared_as_they_are():
-    """Integers, so that mean and standard deviation are exact: the standard deviation is 0."""
-    values = [[50.0, 60.0], [50.0, 60.0], [50.0, 61.0]]
-    plan = Experiment(presentations=8, distributions=8, hit_rates=8)
-    rates = discriminate_gradient_sum(values, TWO, 0.0, 0, plan)
-    assert_array_equal(rates.hit_rate, [0.5, 1.0])
-    assert_array_equal(expected_hit_rates(values, TWO, 0.0, np.zeros((4, 2))), [0.5, 1.0])
+    assert_array_equal(expected_hit_rates(whole, TWO, 0.0, np.zeros((4, 2))), [0.5, 1.0])
 
 
 def test_the_same_seed_gives_the_same_bits_and_another_seed_others():
-    first, again, other = (discriminate_gradient_sum(bumps(), PAIRS, 0.05, seed) for seed in (9, 9, 10))
-    assert_array_equal(first.hit_rate, again.hit_rate)
-    assert (first.hit_rate != other.hit_rate).any()
-    assert_array_equal(
-        discriminate_euclidean(bumps(), 0.05, 9).hit_rate,
-        discriminate_euclidean(bumps(), 0.05, 9).hit_rate,
-    )
-
-
-def test_expected_hit_rates_are_those_that_sampling_approaches():
-    draws = standard_normals(11, (20_000, 18))
-    expected = expected_hit_rates(bumps(), PAIRS, 0.055, draws)
-    plan = Experiment(presentations=500, distributions=50, hit_rates=2000)
-    sampled = discriminate_gradient_sum(bumps(), PAIRS, 0.055, 12, plan)
-    assert_allclose(sampled.hit_rate, expected, atol=0.01)
+    for discriminate in (partial(discriminate_gradient_sum, neighbours=PAIRS), discriminate_euclidean):
+        rates = [discriminate(bumps(), noise_sigma=0.05, seed=seed).hit_rate for seed in (9, 9, 10)]
+        first, again, other = rates
+        assert_array_equal(first, again)
+        assert (first != other).any()
 
 
 def test_the_noise_behind_synthetic_hit_rates_is_recovered():
@@ -386,77 +316,44 @@ def test_the_noise_behind_synthetic_hit_rates_is_recovered():
     assert fit.noise_sigma == pytest.approx(truth, rel=0.03)
     assert_allclose(fit.hit_rates, observed, atol=0.01)
     assert fit.root_mean_square_error < 0.01
-
-
-def test_noise_that_meets_exact_targets_is_found_to_many_digits():
-    def predict(sigma):
-        return ndtr(np.array([0.01, 0.09]) / sigma)
-
-    assert fit_noise_sigma(predict, predict(0.0411)).noise_sigma == pytest.approx(0.0411, rel=1e-6)
-
-
-def test_targets_that_no_noise_can_meet_are_an_error():
+    met = ndtr(np.array([0.01, 0.09]) / 0.0411)
+    exact = fit_noise_sigma(lambda sigma: ndtr(np.array([0.01, 0.09]) / sigma), met)
+    assert exact.noise_sigma == pytest.approx(0.0411, rel=1e-6)
     with pytest.raises(ConvergenceError, match="No noise within"):
         fit_noise_sigma(lambda sigma: ndtr(np.array([1.0, 2.0]) / sigma), [0.3, 0.2])
 
 
 def test_silent_receptors_need_a_rule():
     latencies = np.where(bumps() > 8.0, 60.0 - bumps(), np.nan)
-    assert np.isnan(latencies).any()
     with pytest.raises(InputError, match="silent_value"):
         discriminate_gradient_sum(latencies, PAIRS, 0.05, 0, SMALL)
-    filled = np.where(np.isnan(latencies), END_OF_STIMULUS_MS, latencies)
-    assert END_OF_STIMULUS_MS == 1000.0
-    assert_array_equal(
-        discriminate_gradient_sum(latencies, PAIRS, 0.05, 0, SMALL, silent_value=END_OF_STIMULUS_MS).hit_rate,
-        discriminate_gradient_sum(filled, PAIRS, 0.05, 0, SMALL).hit_rate,
-    )
+    filled = discriminate_gradient_sum(np.nan_to_num(latencies, nan=1000.0), PAIRS, 0.05, 0, SMALL)
+    found = discriminate_gradient_sum(latencies, PAIRS, 0.05, 0, SMALL, silent_value=END_OF_STIMULUS_MS)
+    assert_array_equal(found.hit_rate, filled.hit_rate)
     assert np.isnan(latencies).any()
-
-
-def test_city_block_and_euclidean_distance_lead_to_different_hit_rates():
-    values = bumps()
-    assert not np.allclose(distance(values[0], values), distance(values[0], values, "euclidean"))
-    city_block = discriminate_euclidean(values, 0.05, 1).hit_rate
-    euclidean = discriminate_euclidean(values, 0.05, 1, norm="euclidean").hit_rate
-    assert (city_block != euclidean).any()
 
 
 @pytest.mark.parametrize(
     ("wrong", "message"),
     [
         (lambda: Experiment(presentations=1), "presentations must be a whole number"),
-        (lambda: Experiment(hit_rates=2.5), "hit_rates must be a whole number"),
         (lambda: Experiment(criterion=math.nan), "criterion must be a finite number"),
         (lambda: Experiment(criterion_sigma=-0.1), "criterion_sigma must not be negative"),
-        (
-            lambda: Experiment(criterion_moves="beta"),
-            "criterion_moves must be one of point, fraction, likelihood",
-        ),
-        (lambda: discriminate_gradient_sum(0.0 * bumps(), PAIRS, 0.1, 0), "population stays silent"),
-        (
-            lambda: discriminate_euclidean(bumps() * np.nan, 0.1, 0, silent_value=1.0),
-            "population stays silent",
-        ),
-        (lambda: expected_hit_rates(0.0 * bumps(), PAIRS, 0.1, np.ones((9, 18))), "population stays silent"),
-        (lambda: discriminate_gradient_sum(bumps(), PAIRS, 0.1, -1), "seed must be a whole number"),
+        (lambda: Experiment(criterion_moves="beta"), "criterion_moves must be one of point"),
+        (lambda: discriminate_gradient_sum(0.0 * bumps(), PAIRS, 0.1, 0), "stays silent"),
+        (lambda: discriminate_euclidean(bumps() * np.nan, 0.1, 0, silent_value=1.0), "stays silent"),
         (lambda: discriminate_gradient_sum(bumps(), PAIRS, 0.1, 0, session=-1), "session must be a whole"),
         (lambda: discriminate_gradient_sum(bumps()[:1], PAIRS, 0.1, 0), "at least one comparison"),
-        (lambda: discriminate_gradient_sum(bumps()[0], PAIRS, 0.1, 0), "2 dimension"),
         (lambda: discriminate_gradient_sum(bumps(), PAIRS, -0.1, 0), "noise_sigma must not"),
         (lambda: discriminate_gradient_sum(bumps(), PAIRS + 1, 0.1, 0), "neighbours must be"),
         (lambda: discriminate_gradient_sum([["a"]], PAIRS, 0.1, 0), "responses must be numbers"),
-        (lambda: discriminate_gradient_sum([[np.inf]] * 2, TWO, 0.1, 0), "finite numbers only"),
         (lambda: discriminate_euclidean(bumps(), 0.1, 0, norm="maximum"), "norm must be one of"),
-        (
-            lambda: discriminate_euclidean(bumps(), 0.1, 0, Experiment(criterion_sigma=0.1)),
-            "criterion_sigma must be 0",
-        ),
+        (lambda: discriminate_euclidean(bumps(), 0.1, 0, Experiment(criterion_sigma=0.1)), "criterion_sigma"),
         (lambda: expected_hit_rates(bumps(), PAIRS, 0.1, np.ones((9, 17))), "standard_normals needs"),
         (lambda: fit_noise_sigma(lambda sigma: [0.5]), "must give 2 hit rates: got 1"),
         (lambda: fit_noise_sigma(lambda sigma: [0.5, 0.5], bounds=(0.2, 0.1)), "bounds must be"),
     ],
-)
+)  # fmt: skip
 def test_what_cannot_be_used_is_refused(wrong, message):
     with pytest.raises(InputError, match=message):
         wrong()

@@ -52,9 +52,8 @@ class Strength:
 def discriminated():
     task = parse_task(TASK)
     prepared = PreparedTask(task, task_stimuli(task), task_population(task))
-    return analyse(
-        prepared, {each.name: Strength(each.indenter.curvature_per_m) for each in prepared.stimuli}
-    )
+    skins = {each.name: Strength(each.indenter.curvature_per_m) for each in prepared.stimuli}
+    return analyse(prepared, skins)
 
 
 def fitted():
@@ -69,7 +68,8 @@ def fitted():
 def results():
     """One result of each type that draws itself, by the name of the type."""
     finger = fp.Fingertip()
-    skin = fp.indent(finger, fp.Sphere(radius_mm=4.0), fp.RampAndHold(depth_mm=0.6, hold_ms=60))
+    motion, settings = fp.RampAndHold(depth_mm=0.6, hold_ms=60), fp.PressSettings(3, 2)
+    skin = fp.indent(finger, fp.Sphere(radius_mm=4.0), motion, settings=settings)
     response = fp.Population.grid(density_per_cm2=200).respond(skin, static_window_ms=(60, 110))
     return {
         "SkinResponse": skin,
@@ -90,11 +90,11 @@ def results():
         ),
         "TaskResult": discriminated(),
         "ReducedSample": fp.ReducedSample(
-            time_ms=12.0,
-            depth_mm=0.4,
-            force_mn=25.0,
-            contact_area_mm2=9.0,
-            fields={"stored": np.array([0.1, 0.4])},
+            12.0,
+            0.4,
+            25.0,
+            9.0,
+            {"stored": np.array([0.1, 0.4])},
             force_error_mn=0.2,
             field_errors={"stored": 0.02},
         ),
@@ -159,25 +159,21 @@ def test_few_sites_have_a_key_and_many_have_none(results):
     assert len(styles) == 6
     assert few.get_ylabel() == "current [nA]"
     assert few.lines[0].get_ydata().tolist() == pytest.approx([0.0, 20.0])
-    many = fp.CurrentTraces(times_ms, np.ones((2, 7))).plot(Figure().add_subplot())
-    assert many.get_legend() is None
-    assert results["CurrentTraces"].plot(Figure().add_subplot()).get_legend() is None
-
-
-def test_the_key_of_types_lies_beside_the_map(results):
+    axes = fp.SpikeTrains.from_lists([[], []]).plot(Figure().add_subplot())
+    assert "no afferent fires" in axes.texts[0].get_text()
     axes = Figure().add_subplot()
     results["MixedResponse"].plot(axes, "map")
     axes.figure.draw_without_rendering()
-    assert axes.get_legend().get_window_extent().x0 >= axes.get_window_extent().x1
-
-
-def test_without_axes_a_figure_of_pyplot_is_made(results):
+    assert axes.get_legend().get_window_extent().x0 >= axes.get_window_extent().x1  # beside the map
     matplotlib.use("agg")
     from matplotlib import pyplot
 
     axes = results["SkinResponse"].plot()
     assert axes.figure is pyplot.gcf()
     pyplot.close(axes.figure)
+    many = fp.CurrentTraces(times_ms, np.ones((2, 7))).plot(Figure().add_subplot())
+    assert many.get_legend() is None
+    assert results["CurrentTraces"].plot(Figure().add_subplot()).get_legend() is None
 
 
 @pytest.mark.parametrize("kind", DRAWINGS)
@@ -187,35 +183,33 @@ def test_a_notebook_shows_a_small_picture_and_one_line(results, kind):
     assert len(html) < 150_000
     assert "\n" not in line
     assert 20 < len(line) < 160
+    if kind in TABLES:
+        table, data = results[kind].to_pandas(), results[kind].to_xarray()
+        assert len(table) > 0
+        assert table.index.name
+        numbers = [values for values in data.data_vars.values() if values.dtype.kind == "f"]
+        assert numbers
+        assert all("units" in values.attrs for values in numbers)
 
 
-def test_unknown_drawings_and_quantities_are_refused(results):
-    with pytest.raises(InputError, match="what must be one of force, section"):
-        results["SkinResponse"].plot(what="sed")
-    with pytest.raises(InputError, match="quantity must be one of"):
-        results["ResponseMap"].plot(Figure().add_subplot(), "map", quantity="rate")
-    with pytest.raises(
-        InputError, match=r"axes must be axes of Matplotlib: got 'force'; name a drawing by what="
-    ):
-        results["SkinResponse"].plot("force")
-    with pytest.raises(InputError, match="Options of the drawing force are: none; got quantity"):
-        results["SkinResponse"].plot(quantity="stored")
-    with pytest.raises(InputError, match="Options of the drawing pad are: quantity, reach_mm; got reach"):
-        results["SkinResponse"].plot(what="pad", reach=2.0)
-    with pytest.raises(
-        InputError, match=r"progress must have a method stage, as fp.notebook_progress\(\) has"
-    ):
+@pytest.mark.parametrize(
+    ("kind", "arguments", "options", "said"),
+    [
+        ("SkinResponse", (), {"what": "sed"}, "what must be one of force, section"),
+        ("ResponseMap", (None, "map"), {"quantity": "rate"}, "quantity must be one of"),
+        ("SkinResponse", ("force",), {}, "axes must be axes of Matplotlib: got 'force'"),
+        ("SkinResponse", (), {"quantity": "stored"}, "Options of the drawing force are: none; got quantity"),
+        ("SkinResponse", (None, "pad"), {"reach": 2.0}, "drawing pad are: quantity, reach_mm; got reach"),
+    ],
+)  # fmt: skip
+def test_unknown_drawings_and_quantities_are_refused(results, kind, arguments, options, said):
+    with pytest.raises(InputError, match=said):
+        results[kind].plot(*arguments, **options)
+
+
+def test_progress_that_has_no_stages_is_refused():
+    with pytest.raises(InputError, match=r"progress must have a method stage, as fp.notebook_progress"):
         fp.indent(fp.Fingertip(), fp.Sphere(curvature_per_m=287.0), progress=True)
-
-
-@pytest.mark.parametrize("kind", TABLES)
-def test_every_result_becomes_a_table_and_a_data_set_with_units(results, kind):
-    table, data = results[kind].to_pandas(), results[kind].to_xarray()
-    assert len(table) > 0
-    assert table.index.name
-    numbers = [values for values in data.data_vars.values() if values.dtype.kind == "f"]
-    assert numbers
-    assert all("units" in values.attrs for values in numbers)
 
 
 def test_tables_hold_the_numbers_of_the_result(results):
@@ -228,9 +222,8 @@ def test_tables_hold_the_numbers_of_the_result(results):
     assert np.array_equal(traces.to_pandas().values, traces.sed_kpa)
     assert np.array_equal(traces.to_xarray().stored.values, traces.sed_kpa)
     spikes = response.spikes.to_pandas()
-    assert [spikes.time_ms[spikes.index == n].tolist() for n in range(len(response.spikes))] == [
-        train.tolist() for train in response.spikes
-    ]
+    for number, train in enumerate(response.spikes):
+        assert spikes.time_ms[spikes.index == number].tolist() == train.tolist()
     assert response.to_xarray().spike_time_ms.units == "ms"
     mixed = results["MixedResponse"].to_pandas()
     assert mixed.type.value_counts().to_dict() == {"SAI": len(response.spikes), "RA": len(response.spikes)}
@@ -240,12 +233,5 @@ def test_tables_hold_the_numbers_of_the_result(results):
     task = results["TaskResult"]
     decoded = task.to_pandas().query("measure == 'static'")
     assert decoded.hit_rate.tolist() == task.decodings[0].hit_rate.tolist()
-    assert (
-        results["SpikeFit"].to_pandas().standard_error.tolist()
-        == results["SpikeFit"].standard_errors.tolist()
-    )
-
-
-def test_silent_afferents_are_drawn_as_silent():
-    axes = fp.SpikeTrains.from_lists([[], []]).plot(Figure().add_subplot())
-    assert "no afferent fires" in axes.texts[0].get_text()
+    spike_fit = results["SpikeFit"]
+    assert spike_fit.to_pandas().standard_error.tolist() == spike_fit.standard_errors.tolist()

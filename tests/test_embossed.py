@@ -19,12 +19,7 @@ COARSE = Grading(17.37, 3.0, 3.0, 0.8, 0.8, 6.0, 1.3, 1, 1, 1, 1, full=True)
 
 
 def rectangle(half_x, half_z, x=0.0, z=0.0):
-    return [
-        (x - half_x, z - half_z),
-        (x + half_x, z - half_z),
-        (x + half_x, z + half_z),
-        (x - half_x, z + half_z),
-    ]
+    return [(x + a * half_x, z + b * half_z) for a, b in ((-1, -1), (1, -1), (1, 1), (-1, 1))]
 
 
 def circle(radius, corners=400, x=0.0):
@@ -40,17 +35,12 @@ def is_raised(body, x, z):
     return body.front(np.array([[x, 0.0, z]]))[0] > -0.5 * body.height_mm
 
 
-def test_a_long_rectangle_is_the_bar():
+def test_a_long_rectangle_is_the_bar_and_a_circle_the_flat_punch():
     ridge, bar, points = Embossed([rectangle(1.5, 40.0)], 4.0, 0.3), Bar(3.0, 0.3), points_about()
-    gap, normal = ridge.gap(points)
-    expected, direction = bar.gap(points)
-    np.testing.assert_allclose(gap, expected, rtol=0, atol=1e-12)
-    np.testing.assert_allclose(normal, direction, rtol=0, atol=1e-9)
+    for found, expected, atol in zip(ridge.gap(points), bar.gap(points), (1e-12, 1e-9), strict=True):
+        np.testing.assert_allclose(found, expected, rtol=0, atol=atol)
     assert ridge.relief_mm == 3.0
-
-
-def test_a_circle_is_the_flat_punch():
-    disc, punch, points = Embossed([circle(2.0)], 4.0, 0.3), FlatPunch(4.0, 0.3), points_about()
+    disc, punch = Embossed([circle(2.0)], 4.0, 0.3), FlatPunch(4.0, 0.3)
     np.testing.assert_allclose(disc.gap(points)[0], punch.gap(points)[0], rtol=0, atol=1e-4)
     assert disc.stroke_mm == pytest.approx(4.0, rel=1e-3)
 
@@ -60,12 +50,8 @@ def test_an_outline_within_another_is_a_hole():
     assert is_raised(ring, 1.6, 0.0)
     assert not is_raised(ring, 0.0, 0.0)
     assert ring.stroke_mm == pytest.approx(0.8)
-    assert replace(ring, outlines_mm=[rectangle(2.0, 2.0), rectangle(1.8, 1.8)]).relief_mm == pytest.approx(
-        0.2
-    )
-
-
-def test_the_narrowest_gap_between_shapes_is_told():
+    narrow = replace(ring, outlines_mm=[rectangle(2.0, 2.0), rectangle(1.8, 1.8)])
+    assert narrow.relief_mm == pytest.approx(0.2)
     pair = Embossed([rectangle(0.5, 2.0, x=-0.7), rectangle(0.5, 2.0, x=0.7)], 0.5, 0.1)
     assert pair.relief_mm == pytest.approx(0.4)
     assert pair.stroke_mm == pytest.approx(1.0)
@@ -75,11 +61,8 @@ def test_the_narrowest_gap_between_shapes_is_told():
 def test_the_normal_is_the_gradient_of_the_gap(text):
     body = embossed_text(text)
     check_gap(body.gap, text)
-    points, step = points_about(), 1e-6
-    slope = [
-        (body.gap(points + step * axis)[0] - body.gap(points - step * axis)[0]) / (2 * step)
-        for axis in np.eye(3)
-    ]
+    points = points_about()
+    slope = [(body.gap(points + d)[0] - body.gap(points - d)[0]) / 2e-6 for d in 1e-6 * np.eye(3)]
     differs = np.abs(np.stack(slope, axis=1) - body.gap(points)[1]).max(axis=1) > 1e-4
     assert differs.mean() < 0.02  # only where a crease lies within a step
 
@@ -106,27 +89,18 @@ def test_letters_are_read_by_a_finger_that_points_up():
     assert is_raised(along, -1.6, -2.6)
 
 
-@pytest.mark.parametrize(
-    ("text", "stroke", "relief"), [("H", 1.17, 1.17), ("i", 1.17, 0.58), ("n", 1.44, 1.44)]
-)
-def test_strokes_of_letters_are_measured(text, stroke, relief):
-    letter = embossed_text(text)
-    assert letter.stroke_mm == pytest.approx(stroke, abs=0.01)
-    assert letter.relief_mm == pytest.approx(relief, abs=0.01)
-
-
-def test_a_capital_has_its_height():
+def test_letters_have_their_strokes_height_and_symmetry():
+    for text, stroke, relief in (("H", 1.17, 1.17), ("i", 1.17, 0.58), ("n", 1.44, 1.44)):
+        letter = embossed_text(text)
+        assert letter.stroke_mm == pytest.approx(stroke, abs=0.01)
+        assert letter.relief_mm == pytest.approx(relief, abs=0.01)
     letter = np.concatenate(embossed_text("H", capital_mm=7.0).outlines_mm)
     assert np.ptp(letter[:, 0]) == pytest.approx(7.0)
     np.testing.assert_allclose(letter.min(axis=0), -letter.max(axis=0), atol=1e-8)
-
-
-def test_symmetry_is_that_of_the_letters():
-    across, along = embossed_text("U"), embossed_text("U", along_finger=True)
-    assert across.mirrors(0.0)
-    assert along.mirrors(90.0)
-    assert not across.mirrors(90.0)
-    assert not along.mirrors(0.0)
+    for along, turned_deg in ((False, 0.0), (True, 90.0)):
+        letter = embossed_text("U", along_finger=along)
+        assert letter.mirrors(turned_deg)
+        assert not letter.mirrors(90.0 - turned_deg)
 
 
 def test_a_mesh_must_resolve_the_strokes():
@@ -150,7 +124,7 @@ SQUARE = rectangle(1.0, 1.0)
 
 
 @pytest.mark.parametrize(
-    ("outlines", "sizes", "said"),
+    ("given", "sizes", "said"),
     [
         ([], {}, "at least one outline: got none"),
         ([SQUARE[:2]], {}, r"outlines_mm\[0\] must have at least three corners"),
@@ -163,24 +137,10 @@ SQUARE = rectangle(1.0, 1.0)
         ([SQUARE, rectangle(1.0, 1.0, x=2.0)], {}, "must not touch or cross"),
         ([SQUARE, SQUARE], {}, "must not touch or cross"),
         ([circle(3.0, MOST_CORNERS + 1)], {}, f"at most {MOST_CORNERS} corners"),
-        ([SQUARE], {"height_mm": 0.0}, "height_mm must be greater than 0"),
         ([SQUARE], {"height_mm": "high"}, "height_mm must be a finite number"),
         ([SQUARE], {"edge_radius_mm": -0.1}, "edge_radius_mm must be greater than 0"),
-        ([SQUARE], {"edge_radius_mm": np.nan}, "edge_radius_mm must be a finite number"),
         ([SQUARE], {"height_mm": 0.2, "edge_radius_mm": 0.3}, "must not exceed height_mm, 0.2 mm"),
         ([rectangle(0.1, 2.0)], {"edge_radius_mm": 0.2}, "half of the narrowest stroke, 0.1 mm"),
-    ],
-)  # fmt: skip
-def test_bad_outlines_are_refused_in_one_sentence(outlines, sizes, said):
-    with pytest.raises(InputError, match=said) as raised:
-        Embossed(outlines, **sizes)
-    assert "\n" not in str(raised.value)
-
-
-@pytest.mark.parametrize(
-    ("text", "options", "said"),
-    [
-        ("", {}, "at least one letter"),
         ("  ", {}, "at least one letter"),
         (7, {}, "at least one letter: got 7"),
         ("a\nb", {}, r"characters of DejaVu Sans: got '\\n'"),
@@ -188,21 +148,19 @@ def test_bad_outlines_are_refused_in_one_sentence(outlines, sizes, said):
         ("a", {"weight": "heavy"}, "weight must be one of"),
         ("a", {"capital_mm": -1.0}, "capital_mm must be greater than 0"),
         ("a", {"capital_mm": 0.5}, "half of the narrowest stroke"),
-        ("x" * 700, {}, "must have at most 4000 corners"),
+        ("x" * 340, {}, "must have at most 4000 corners"),
     ],
 )  # fmt: skip
-def test_text_that_cannot_be_embossed_is_refused_in_one_sentence(text, options, said):
+def test_outlines_and_text_that_cannot_be_embossed_are_refused(given, sizes, said):
     with pytest.raises(InputError, match=said) as raised:
-        embossed_text(text, **options)
+        (Embossed if isinstance(given, list) else embossed_text)(given, **sizes)
     assert "\n" not in str(raised.value)
 
 
 def area(outlines):
     """Area within outlines that turn counter-clockwise, holes clockwise."""
-    x, y = zip(*(np.array(line).T for line in outlines), strict=True)
-    return 0.5 * sum(
-        float((u * np.roll(v, -1) - v * np.roll(u, -1)).sum()) for u, v in zip(x, y, strict=True)
-    )
+    lines = [np.array(line).T for line in outlines]
+    return 0.5 * sum((x * np.roll(y, -1) - y * np.roll(x, -1)).sum() for x, y in lines)
 
 
 def test_outlines_that_overlap_become_their_union():
@@ -214,14 +172,10 @@ def test_outlines_that_overlap_become_their_union():
     assert [len(line) for line in joined_outlines([square, square])] == [4]
     wheel = [np.add(circle(1.0, 60), [np.cos(turn), np.sin(turn)]) for turn in np.arange(5) * 2.0 * np.pi / 5]
     points = np.random.default_rng(5).uniform(-2.2, 2.2, (4000, 2))
-    within = np.mean(
-        [np.any([np.hypot(*(point - part.mean(axis=0))) < 1.0 for part in wheel]) for point in points]
-    )
+    away = np.array([np.hypot(*(points - part.mean(axis=0)).T) for part in wheel])
+    within = (away < 1.0).any(axis=0).mean()
     assert area(joined_outlines(wheel)) == pytest.approx(within * 4.4**2, rel=0.03)
-
-
-@pytest.mark.parametrize(("text", "outlines"), [("\u00c7", 1), ("\u00c5", 3), ("\u0118", 1)])
-def test_letters_whose_outlines_overlap_are_raised_as_one(text, outlines):
-    letter = embossed_text(text, edge_radius_mm=0.05)
-    assert len(letter.outlines_mm) == outlines
-    check_gap(letter.gap, "letter")
+    for text, count in (("\u00c7", 1), ("\u00c5", 3), ("\u0118", 1)):  # letters whose outlines overlap
+        letter = embossed_text(text, edge_radius_mm=0.05)
+        assert len(letter.outlines_mm) == count
+        check_gap(letter.gap, "letter")

@@ -75,28 +75,14 @@ def test_gradient_sum_ignores_what_all_share_and_scales_with_contrast():
     assert gradient_sum(np.full(18, 4.0), EIGHT) == 0.0
 
 
-def test_leading_axes_are_populations():
-    values = np.random.default_rng(2).uniform(size=(2, 3, 18))
-    sums = gradient_sum(values, EIGHT)
-    assert sums.shape == (2, 3)
-    assert_allclose(sums[1, 2], gradient_sum(values[1, 2], EIGHT), rtol=1e-14)
-    assert distance(values, values[:, :1]).shape == (2, 3)
-
-
-@pytest.mark.parametrize("norm", ["city-block", "euclidean"])
-def test_distance_is_a_metric(norm):
-    first, second, third = np.random.default_rng(3).uniform(size=(3, 40, 18))
-    assert_array_equal(distance(first, first, norm), np.zeros(40))
-    assert_array_equal(distance(first, second, norm), distance(second, first, norm))
-    assert (
-        distance(first, third, norm) <= distance(first, second, norm) + distance(second, third, norm)
-    ).all()
-
-
-def test_distances_are_the_two_norms():
+def test_distances_are_the_two_norms_and_leading_axes_are_populations():
     first, second = np.random.default_rng(4).uniform(size=(2, 5, 18))
     assert_allclose(distance(first, second), np.linalg.norm(first - second, ord=1, axis=1), rtol=1e-13)
     assert_allclose(distance(first, second, "euclidean"), np.linalg.norm(first - second, axis=1), rtol=1e-13)
+    values = np.random.default_rng(2).uniform(size=(2, 3, 18))
+    sums = gradient_sum(values, EIGHT)
+    assert sums.shape == distance(values, values[:, :1]).shape == (2, 3)
+    assert_allclose(sums[1, 2], gradient_sum(values[1, 2], EIGHT), rtol=1e-14)
 
 
 @pytest.mark.parametrize(
@@ -110,8 +96,12 @@ def test_distances_are_the_two_norms():
         (lambda: gradient_sum(np.ones(2), [[0.0, 1.0]]), "rows of two receptor indices"),
         (lambda: distance(np.ones(2), np.ones(3)), "the same receptors twice"),
         (lambda: distance(np.ones(2), np.ones(2), "manhattan"), "norm must be one of"),
+        (lambda: delaunay_pairs([[0.0, 0.0], [1.0, 0.0]], 1.0), "not on one line: got 2"),
+        (lambda: delaunay_pairs([[0.0, 0.0], [1.0, 0.0], [2.0, 0.0]], 1.0), "not on one line: got 3"),
+        (lambda: delaunay_pairs(np.ones((4, 3)), 1.0), "rows of two numbers"),
+        (lambda: neighbours_of([[0.0, 0.0]], 1.0, "square"), "pattern must be one of rectangular, hexagonal"),
     ],
-)
+)  # fmt: skip
 def test_what_cannot_be_used_is_refused(wrong, message):
     with pytest.raises(InputError, match=message):
         wrong()
@@ -121,27 +111,17 @@ DISC = Ellipse(6.0, 6.0, (17.0, 0.0))
 """Region of random and hexagonal layouts; inner receptors lie well inside it."""
 
 
-def neighbours_by_receptor(pairs, count):
-    return np.bincount(pairs.ravel(), minlength=count)
-
-
 def test_inner_receptors_of_a_hexagonal_layout_have_six_neighbours_one_pitch_away():
     layout = hexagonal(DISC, 100.0)
     pairs = neighbours_of(layout.places_mm, layout.pitch_mm, layout.pattern)
     first, second = layout.places_mm[pairs.T]
     assert_allclose(np.linalg.norm(first - second, axis=1), layout.pitch_mm, rtol=1e-12)
-    inner = np.linalg.norm(layout.places_mm - DISC.centre_mm, axis=1) < 4.5
-    assert (neighbours_by_receptor(pairs, len(layout))[inner] == 6).all()
-
-
-def test_a_square_layout_has_the_neighbours_of_its_lattice():
-    layout = rectangular(DISC, 100.0)
-    pairs = neighbours_of(layout.places_mm, layout.pitch_mm, "rectangular")
-    assert_array_equal(pairs, neighbour_pairs(layout.places_mm, layout.pitch_mm, 8))
-
-
-def test_all_three_of_three_are_neighbours():
     assert delaunay_pairs([[0.0, 0.0], [1.0, 0.2], [0.3, 0.9]], 1.0).tolist() == [[0, 1], [0, 2], [1, 2]]
+    square = rectangular(DISC, 100.0)
+    pairs_of_square = neighbours_of(square.places_mm, square.pitch_mm, "rectangular")
+    assert_array_equal(pairs_of_square, neighbour_pairs(square.places_mm, square.pitch_mm, 8))
+    inner = np.linalg.norm(layout.places_mm - DISC.centre_mm, axis=1) < 4.5
+    assert (np.bincount(pairs.ravel(), minlength=len(layout))[inner] == 6).all()
 
 
 @pytest.mark.parametrize(
@@ -161,18 +141,4 @@ def test_neighbours_of_random_layouts_share_a_border_of_their_cells(layout):
     assert np.linalg.norm(first - second, axis=1).max() <= 3.0 * layout.pitch_mm
     inner = np.linalg.norm(layout.places_mm - DISC.centre_mm, axis=1) < 4.0
     # Euler: inside a triangulation every corner has six neighbours on average.
-    assert abs(neighbours_by_receptor(pairs, len(layout))[inner].mean() - 6.0) < 0.35
-
-
-@pytest.mark.parametrize(
-    ("wrong", "message"),
-    [
-        (lambda: delaunay_pairs([[0.0, 0.0], [1.0, 0.0]], 1.0), "not on one line: got 2"),
-        (lambda: delaunay_pairs([[0.0, 0.0], [1.0, 0.0], [2.0, 0.0]], 1.0), "not on one line: got 3"),
-        (lambda: delaunay_pairs(np.ones((4, 3)), 1.0), "rows of two numbers"),
-        (lambda: neighbours_of([[0.0, 0.0]], 1.0, "square"), "pattern must be one of rectangular, hexagonal"),
-    ],
-)  # fmt: skip
-def test_layouts_without_neighbours_are_refused(wrong, message):
-    with pytest.raises(InputError, match=message):
-        wrong()
+    assert abs(np.bincount(pairs.ravel(), minlength=len(layout))[inner].mean() - 6.0) < 0.35

@@ -6,8 +6,6 @@ import pytest
 from fingerpad.core.errors import InputError
 from fingerpad.core.signals import SedTraces
 from fingerpad.inference.identifiable import (
-    IDENTIFIABLE_NAMES,
-    IDENTIFIABLE_UNITS,
     LARGEST_RESTING_SHARE,
     identifiable,
     silent_at_rest,
@@ -19,17 +17,14 @@ SIX = np.array([2.3e-7, 1.0e-4, 5.6e-7, 72.0, 6.0e-7, 30.0])
 SED = SedTraces([0.0, 25.0, 50.0, 1000.0], [[0.0, 0.0], [0.4, 0.9], [1.0, 2.0], [0.8, 1.7]], [50.0])
 
 
-def test_the_numbers_are_the_gains_over_capacitance_and_threshold() -> None:
-    scale = 6.0e-7 * 30.0
-    np.testing.assert_allclose(
-        identifiable(SIX), [2.3e-7 / scale, 1e-4 / scale, 5.6e-7 / scale, 72.0], rtol=1e-14
-    )
-    assert len(IDENTIFIABLE_NAMES) == len(IDENTIFIABLE_UNITS) == 4
-
-
 @pytest.mark.parametrize(("capacitance", "threshold"), [(6.0e-7, 30.0), (1.0e-6, 50.0), (3.0e-7, 90.0)])
-def test_spikes_depend_on_the_four_numbers_alone(capacitance: float, threshold: float) -> None:
+def test_spikes_depend_on_the_four_numbers_alone(capacitance, threshold):
+    scale = 6.0e-7 * 30.0
+    by_hand = [2.3e-7 / scale, 1e-4 / scale, 5.6e-7 / scale, 72.0]
+    np.testing.assert_allclose(identifiable(SIX), by_hand, rtol=1e-14)
+    np.testing.assert_array_equal(identifiable([SIX, 2.0 * SIX])[0], identifiable(SIX))
     others = six_parameters(identifiable(SIX), capacitance, threshold)
+    np.testing.assert_array_equal(six_parameters(identifiable([SIX]), capacitance, threshold)[0], others)
     assert others[4:].tolist() == [capacitance, threshold]
     np.testing.assert_allclose(identifiable(others), identifiable(SIX), rtol=1e-14)
     expected, found = (sed_driven(six).spikes(SED) for six in (SIX, others))
@@ -43,13 +38,6 @@ def test_spikes_depend_on_the_four_numbers_alone(capacitance: float, threshold: 
         assert abs(other[1][3] - expected[1][3]) > 0.005
 
 
-def test_rows_are_turned_one_by_one() -> None:
-    rows = np.array([SIX, 2.0 * SIX])
-    np.testing.assert_array_equal(identifiable(rows), [identifiable(row) for row in rows])
-    four = identifiable(rows)
-    np.testing.assert_array_equal(six_parameters(four), [six_parameters(row) for row in four])
-
-
 @pytest.mark.parametrize(
     ("call", "words"),
     [
@@ -61,7 +49,7 @@ def test_rows_are_turned_one_by_one() -> None:
         (lambda: six_parameters(["a"] * 4), "four must hold numbers"),
     ],
 )
-def test_what_are_not_such_numbers_is_refused(call, words: str) -> None:
+def test_what_are_not_such_numbers_is_refused(call, words):
     with pytest.raises(InputError, match=words):
         call()
 

@@ -25,28 +25,25 @@ class Scaled:
     n_stimuli = 5
 
     def evaluate(self, parameters):
-        return parameters[0] * np.array([100.0, 130.0, 110.0, 70.0, 0.0]), parameters[0] * np.array(
-            [8.0, 25.0, 22.0, 6.0, 1.0]
-        )
+        shapes = [[100.0, 130.0, 110.0, 70.0, 0.0], [8.0, 25.0, 22.0, 6.0, 1.0]]
+        return tuple(parameters[0] * np.array(shapes))
 
     def evaluate_batch(self, points):
         return evaluate_rows(self, points)
 
 
-def recordings(*phases: str) -> RateRecordings:
-    return RateRecordings(
-        STIMULI, *(OBSERVED[phase] if phase in phases else None for phase in ("dynamic", "static"))
-    )
+def recordings(*phases):
+    return RateRecordings(STIMULI, *(OBSERVED[phase] if phase in phases else None for phase in OBSERVED))
 
 
-def integrated(residuals: np.ndarray, length_mm: float, deviation_hz: float) -> float:
+def integrated(residuals, length_mm, deviation_hz):
     """Log of the integral over sigma of prior times normal density, by quadrature."""
     n = residuals.size
     distances = np.abs(PLACES[:, None] - PLACES)
     correlation = np.exp(-distances / length_mm) if length_mm else np.eye(n)
     quadratic = residuals @ np.linalg.solve(correlation, residuals)
 
-    def integrand(log_variance: float) -> float:
+    def integrand(log_variance):
         variance = np.exp(log_variance)
         # Scaled inverse chi-square with one degree of freedom, in the logarithm of the variance.
         prior = 0.5 * np.log(deviation_hz**2 / (2.0 * variance)) - deviation_hz**2 / (2.0 * variance)
@@ -57,36 +54,30 @@ def integrated(residuals: np.ndarray, length_mm: float, deviation_hz: float) -> 
 
 
 @pytest.mark.parametrize("phases", [("dynamic",), ("static",), ("dynamic", "static")])
-def test_differences_of_log_likelihood_are_those_of_the_integral(phases: tuple[str, ...]) -> None:
+def test_differences_of_log_likelihood_are_those_of_the_integral(phases):
     lengths = (0.0, 0.5, 1.2)
     likelihood = RateLikelihood(Scaled(), recordings(*phases), PLACES, lengths, deviation_hz=7.0)
     heights = np.array([[0.5], [0.95], [1.3]])
-    expected = []
+    expected, independent = [], []
     for height in heights:
-        predicted = dict(zip(("dynamic", "static"), Scaled().evaluate(height), strict=True))
-        expected.append(
-            sum(
-                logsumexp([integrated(OBSERVED[phase] - predicted[phase], length, 7.0) for length in lengths])
+        predicted = dict(zip(OBSERVED, Scaled().evaluate(height), strict=True))
+        by_length = np.array(
+            [
+                [integrated(OBSERVED[phase] - predicted[phase], each, 7.0) for each in lengths]
                 for phase in phases
-            )
+            ]
         )
+        expected.append(logsumexp(by_length, axis=1).sum())
+        independent.append(by_length[:, 0].sum())
     found = likelihood.log_likelihood(heights)
     np.testing.assert_allclose(np.diff(found), np.diff(expected), rtol=1e-7)
     # The constant is the same without correlation: the difference is evidence.
     alone = RateLikelihood(Scaled(), recordings(*phases), deviation_hz=7.0).log_likelihood(heights)
-    independent = [
-        sum(
-            integrated(OBSERVED[phase] - predicted, 0.0, 7.0)
-            for phase, predicted in zip(("dynamic", "static"), Scaled().evaluate(height), strict=True)
-            if phase in phases
-        )
-        for height in heights
-    ]
     shared = len(phases) * np.log(len(lengths))
     np.testing.assert_allclose(found - alone, np.array(expected) - shared - independent, rtol=1e-6)
 
 
-def test_residual_draws_have_the_conditional_law() -> None:
+def test_residual_draws_have_the_conditional_law():
     """Without correlation sigma^2 is a scaled inverse chi-square; its mean is known."""
     likelihood = RateLikelihood(Scaled(), recordings("dynamic", "static"), deviation_hz=7.0)
     points = np.full((20000, 1), 0.95)
@@ -102,7 +93,7 @@ def test_residual_draws_have_the_conditional_law() -> None:
         assert draws[phase].new_hz.min() >= 0.0
 
 
-def test_lengths_are_drawn_by_their_shares_of_the_likelihood() -> None:
+def test_lengths_are_drawn_by_their_shares_of_the_likelihood():
     lengths = (0.0, 0.8)
     likelihood = RateLikelihood(Scaled(), recordings("dynamic"), PLACES, lengths, deviation_hz=7.0)
     draws = likelihood.residual_draws(np.full((20000, 1), 1.3), np.random.default_rng(2))["dynamic"]
@@ -123,6 +114,6 @@ def test_lengths_are_drawn_by_their_shares_of_the_likelihood() -> None:
         ({"recordings": RateRecordings(("a",), [1.0], None)}, "got 1 for 5"),
     ],
 )
-def test_what_does_not_fit_together_is_refused(changes: dict, words: str) -> None:
+def test_what_does_not_fit_together_is_refused(changes, words):
     with pytest.raises(InputError, match=words):
         RateLikelihood(**({"model": Scaled(), "recordings": recordings("dynamic")} | changes))

@@ -20,7 +20,7 @@ MODEL = AfferentModel.of_traces(SED)
 SIX = SED_DRIVEN.parameters
 
 
-def scattered(parameters: np.ndarray, n_points: int = 37) -> np.ndarray:
+def scattered(parameters, n_points=37):
     random = np.random.default_rng(4)
     return parameters * np.exp(random.normal(0.0, 0.4, size=(n_points, parameters.size)))
 
@@ -39,7 +39,7 @@ def scattered(parameters: np.ndarray, n_points: int = 37) -> np.ndarray:
     ],
     ids=["six", "two motions", "four", "offset", "closed form"],
 )
-def test_rows_equal_single_runs_to_the_bit(model, points: np.ndarray) -> None:
+def test_rows_equal_single_runs_to_the_bit(model, points):
     dynamic, static = model.evaluate_batch(points)
     expected = np.array([model.evaluate(point) for point in points])
     assert dynamic.shape == (37, model.n_stimuli)
@@ -49,46 +49,32 @@ def test_rows_equal_single_runs_to_the_bit(model, points: np.ndarray) -> None:
     assert (dynamic == 0.0).any(axis=1).sum() > 5
 
 
-def test_no_rows_have_no_rates() -> None:
-    assert four_number_model(MODEL).evaluate_batch(np.empty((0, 4)))[0].shape == (0, 6)
-
-
-def test_single_runs_equal_the_afferent_to_the_bit() -> None:
+def test_single_runs_equal_the_afferent_to_the_bit():
     windows = ((20.0, 50.0), (500.0, 900.0))
     (driven,) = MODEL.drives
     chosen = AfferentModel.of_drive(driven, windows, 2.0)
+    assert four_number_model(MODEL).evaluate_batch(np.empty((0, 4)))[0].shape == (0, 6)
+    by_row = evaluate_rows(MODEL, scattered(SIX, 9))
+    np.testing.assert_array_equal(by_row, MODEL.evaluate_batch(scattered(SIX, 9)))
     for point in scattered(SIX, 9):
         np.testing.assert_array_equal(MODEL.evaluate(point), sed_driven(point).rates(driven))
         rested = sed_driven(point, 2.0).rates(driven, *windows)
         np.testing.assert_array_equal(chosen.evaluate(point), rested)
 
 
-def test_a_model_without_a_batch_of_its_own_is_evaluated_row_by_row() -> None:
-    class Plain:
-        names = ("a",)
-        n_stimuli = 2
-
-        def evaluate(self, parameters):
-            return parameters[0] * np.array([1.0, 2.0]), parameters[0] * np.array([3.0, 4.0])
-
-        def evaluate_batch(self, points):
-            return evaluate_rows(self, points)
-
-    dynamic, static = Plain().evaluate_batch(np.arange(9.0)[:, None])
-    np.testing.assert_array_equal(dynamic, np.outer(np.arange(9.0), [1.0, 2.0]))
-    np.testing.assert_array_equal(static, np.outer(np.arange(9.0), [3.0, 4.0]))
-
-
-def test_a_row_that_is_no_afferent_is_refused() -> None:
-    points = scattered(SIX, 3)
-    points[1, 3] = -1.0
-    with pytest.raises(InputError, match="time_constant_ms must be greater than 0"):
-        MODEL.evaluate_batch(points)
-    with pytest.raises(InputError, match="got 4 numbers"):
-        MODEL.evaluate(points[0, :4])
-    with pytest.raises(InputError, match="refractory_ms must not be negative"):
-        AfferentModel.of_traces(SED, refractory_ms=-1.0)
-    with pytest.raises(InputError, match=r"points must have 6 columns: got shape \(3, 4\)"):
-        MODEL.evaluate_batch(points[:, :4])
-    with pytest.raises(InputError, match=r"points must have 4 columns: got shape \(3, 6\)"):
-        four_number_model(MODEL).evaluate_batch(points)
+@pytest.mark.parametrize(
+    ("call", "said"),
+    [
+        (lambda: MODEL.evaluate_batch([SIX, [*SIX[:3], -1.0, *SIX[4:]]]), "time_constant_ms must be"),
+        (lambda: MODEL.evaluate(SIX[:4]), "got 4 numbers"),
+        (lambda: AfferentModel.of_traces(SED, refractory_ms=-1.0), "refractory_ms must not be negative"),
+        (lambda: MODEL.evaluate_batch([SIX[:4]]), r"points must have 6 columns: got shape \(1, 4\)"),
+        (
+            lambda: four_number_model(MODEL).evaluate_batch([SIX]),
+            r"points must have 4 columns: got shape \(1, 6\)",
+        ),
+    ],
+)
+def test_a_row_that_is_no_afferent_is_refused(call, said):
+    with pytest.raises(InputError, match=said):
+        call()

@@ -37,21 +37,21 @@ COURSE = np.array([0.0, 0.06, 0.2, 0.42, 0.7, 1.0, 0.92, 0.85, 0.8])
 EVERYTHING = np.arange(SHIFT_MM.size)
 
 
-def traces(offset_mm: float = 0.0) -> SedTraces:
+def traces(offset_mm=0.0):
     """SED of a ramp and a relaxing hold; over the shifts a bump that is steeper on one side."""
     place = SHIFT_MM + offset_mm
     peak_kpa = 0.2 + 1.8 * np.exp(-np.square(place / np.where(place < 0.0, 0.6, 0.9)))
     return SedTraces(TIMES_MS, np.outer(COURSE, peak_kpa), kinks_ms=[50.0])
 
 
-def problem(model, truth) -> RateProblem:
+def problem(model, truth):
     """What an afferent with these parameters would have been recorded to answer."""
     dynamic, static = model.evaluate(truth)
     return RateProblem(model, RateRecordings(tuple(f"{shift:g}" for shift in SHIFT_MM), dynamic, static))
 
 
 @pytest.fixture(scope="module")
-def four_numbers() -> RateProblem:
+def four_numbers():
     model = four_number_model(AfferentModel.of_traces(traces()))
     return problem(model, FOUR)
 
@@ -65,14 +65,26 @@ def test_residuals_make_the_score_and_the_score_is_the_papers(four_numbers):
     residuals = four_numbers.residuals(other, chosen)
     assert residuals.shape == (10,)
     observed, (dynamic, static) = four_numbers.recordings, four_numbers.model.evaluate(other)
-    papers = 0.25 * fractional_sum_of_squares(
-        observed.dynamic_rate_hz[chosen], dynamic[chosen]
-    ) + 0.75 * fractional_sum_of_squares(observed.static_rate_hz[chosen], static[chosen])
+    in_ramp = fractional_sum_of_squares(observed.dynamic_rate_hz[chosen], dynamic[chosen])
+    in_hold = fractional_sum_of_squares(observed.static_rate_hz[chosen], static[chosen])
+    papers = 0.25 * in_ramp + 0.75 * in_hold
     assert four_numbers.score(other, chosen) == papers < 0.99
     assert 1.0 - residuals @ residuals == pytest.approx(papers, abs=1e-14)
     by_phase = four_numbers.score_by_phase(other, chosen)
     assert 0.25 * by_phase["dynamic"] + 0.75 * by_phase["static"] == pytest.approx(papers, abs=1e-14)
     assert four_numbers.score(FOUR, chosen) == 1.0
+    # A phase that was not recorded has no part in the score.
+    alone = replace(four_numbers, recordings=replace(observed, dynamic_rate_hz=None))
+    assert alone.residuals(other, EVERYTHING).shape == (21,)
+    assert alone.score(other, EVERYTHING) == four_numbers.score_by_phase(other, EVERYTHING)["static"] < 0.99
+    assert list(alone.score_by_phase(other, EVERYTHING)) == ["static"]
+    six = six_parameters(FOUR, capacitance_mf=3e-7, threshold_mv=20.0)
+    rates = AfferentModel.of_traces(traces()).evaluate(six)
+    np.testing.assert_allclose(rates, four_numbers.model.evaluate(identifiable(six)), rtol=1e-9)
+    with pytest.raises(InputError, match="one stimulus per column of the model's drive: got 2 for 21"):
+        replace(four_numbers, recordings=observed.chosen([0, 1]))
+    with pytest.raises(InputError, match="static_weight must not be negative"):
+        replace(four_numbers, static_weight=-1.0)
 
 
 class Fixed:
@@ -87,44 +99,20 @@ class Fixed:
         return self.rates_hz
 
 
-def score_of_the_bar(dynamic_hz, static_hz, **weights) -> float:
+def score_of_the_bar(dynamic_hz, static_hz, **weights):
     observed = bar_recordings()
     return RateProblem(Fixed(dynamic_hz, static_hz), observed, **weights).score(np.empty(0), np.arange(36))
 
 
-def test_static_phase_weighs_three_times_the_dynamic_phase() -> None:
+def test_static_phase_weighs_three_times_the_dynamic_phase():
     dynamic, static = bar_recordings().dynamic_rate_hz, bar_recordings().static_rate_hz
     silent = np.zeros(36)
     assert score_of_the_bar(dynamic, silent) == 0.25
     assert score_of_the_bar(silent, static) == 0.75
     assert score_of_the_bar(dynamic, silent, dynamic_weight=0.4, static_weight=0.6) == 0.4
-
-
-def test_best_symmetric_prediction_of_the_bar_has_the_known_weighted_score() -> None:
-    dynamic, static = bar_recordings().dynamic_rate_hz, bar_recordings().static_rate_hz
+    # The best symmetric prediction.
     score = score_of_the_bar((dynamic + dynamic[::-1]) / 2, (static + static[::-1]) / 2)
     assert score == pytest.approx(0.979, abs=5e-4)
-
-
-def test_a_phase_that_was_not_recorded_has_no_part_in_the_score(four_numbers):
-    alone = replace(four_numbers, recordings=replace(four_numbers.recordings, dynamic_rate_hz=None))
-    other = FOUR * [1.0, 1.5, 0.8, 1.0]
-    assert alone.residuals(other, EVERYTHING).shape == (21,)
-    assert alone.score(other, EVERYTHING) == four_numbers.score_by_phase(other, EVERYTHING)["static"] < 0.99
-    assert list(alone.score_by_phase(other, EVERYTHING)) == ["static"]
-
-
-def test_six_parameters_and_their_four_numbers_predict_the_same(four_numbers):
-    six = six_parameters(FOUR, capacitance_mf=3e-7, threshold_mv=20.0)
-    rates = AfferentModel.of_traces(traces()).evaluate(six)
-    np.testing.assert_allclose(rates, four_numbers.model.evaluate(identifiable(six)), rtol=1e-9)
-
-
-def test_recordings_of_other_stimuli_are_refused(four_numbers):
-    with pytest.raises(InputError, match="one stimulus per column of the model's drive: got 2 for 21"):
-        replace(four_numbers, recordings=four_numbers.recordings.chosen([0, 1]))
-    with pytest.raises(InputError, match="static_weight must not be negative"):
-        replace(four_numbers, static_weight=-1.0)
 
 
 # The rate in closed form
@@ -149,34 +137,25 @@ def test_slopes_of_the_formula_are_those_of_its_differences(bend):
 
     _, per_drive, per_tau = constant_drive_rate(drives, tau, 1.0, bend)
     shift = step * drives
-    np.testing.assert_allclose(
-        per_drive, (rate(drives + shift, tau) - rate(drives - shift, tau)) / (2.0 * shift), rtol=1e-5
-    )
+    slope = (rate(drives + shift, tau) - rate(drives - shift, tau)) / (2.0 * shift)
+    np.testing.assert_allclose(per_drive, slope, rtol=1e-5)
     shift = step * tau
-    np.testing.assert_allclose(
-        per_tau, (rate(drives, tau + shift) - rate(drives, tau - shift)) / (2.0 * shift), rtol=1e-5
-    )
-
-
-def test_the_bend_lets_a_rate_set_in_gently_and_vanishes_with_its_width():
-    below, above = np.array([0.015]), np.array([0.03])
-    assert constant_drive_rate(below, 50.0)[0] == 0.0 < constant_drive_rate(below, 50.0, bend=0.05)[0]
-    exact = constant_drive_rate(above, 50.0)[0]
-    errors = [abs(constant_drive_rate(above, 50.0, bend=bend)[0] - exact) for bend in (0.2, 0.1, 0.01)]
-    assert errors[0] > errors[1] > errors[2]
-    assert errors[2] < 1e-6
+    slope = (rate(drives, tau + shift) - rate(drives, tau - shift)) / (2.0 * shift)
+    np.testing.assert_allclose(per_tau, slope, rtol=1e-5)
+    exact, gentle = (constant_drive_rate([0.015, 0.03], tau, bend=width)[0] for width in (0.0, 0.05))
+    assert exact[0] == 0.0 < gentle[0]
+    bent = [constant_drive_rate([0.03], tau, bend=width)[0][0] for width in (0.2, 0.1, 0.01)]
+    errors = np.abs(np.array(bent) - exact[1])
+    assert errors[0] > errors[1] > errors[2] < 1e-6
 
 
 def test_slopes_of_the_model_are_those_of_its_residuals(four_numbers):
     smooth = replace(four_numbers, model=ClosedFormModel(AfferentModel.of_traces(traces())))
     slopes = smooth.jacobian_of(smooth.model.slopes)(FOUR, EVERYTHING)
-    steps = np.diag(1e-6 * FOUR)
-    differences = [
-        (smooth.residuals(FOUR + step, EVERYTHING) - smooth.residuals(FOUR - step, EVERYTHING))
-        / (2.0 * step.max())
-        for step in steps
-    ]
-    np.testing.assert_allclose(slopes, np.column_stack(differences), rtol=1e-4, atol=1e-7 * abs(slopes).max())
+    for slope, step in zip(slopes.T, np.diag(1e-6 * FOUR), strict=True):
+        above, below = (smooth.residuals(FOUR + sign * step, EVERYTHING) for sign in (1, -1))
+        difference = (above - below) / (2.0 * step.max())
+        np.testing.assert_allclose(slope, difference, rtol=1e-4, atol=1e-7 * abs(slopes).max())
 
 
 def test_static_rates_of_the_formula_are_near_those_of_spikes(four_numbers):
@@ -190,11 +169,8 @@ def test_static_rates_of_the_formula_are_near_those_of_spikes(four_numbers):
 @pytest.mark.parametrize("by_formula", [False, True])
 def test_the_truth_is_recovered_from_simulated_rates(four_numbers, by_formula):
     starts = FOUR * np.array([[0.3, 0.5, 1.6, 1.7], [1.5, 2.0, 0.5, 0.5]])
-    jacobian = (
-        four_numbers.jacobian_of(ClosedFormModel(AfferentModel.of_traces(traces())).slopes)
-        if by_formula
-        else None
-    )
+    slopes = ClosedFormModel(AfferentModel.of_traces(traces())).slopes
+    jacobian = four_numbers.jacobian_of(slopes) if by_formula else None
     method = LeastSquares(starts, Bounds(0.3 * FOUR, 0.0 * FOUR, 10.0 * FOUR), jacobian=jacobian)
     fit = method.fit(four_numbers, EVERYTHING)
     assert fit.score > 0.995
@@ -206,20 +182,16 @@ def test_the_truth_is_recovered_from_simulated_rates(four_numbers, by_formula):
 OFFSETS_MM = (-0.4, -0.2, 0.0, 0.2, 0.4)
 
 
-def offset_model() -> ReceptorOffset:
+def offset_model():
     return ReceptorOffset.of_traces({offset: traces(offset) for offset in OFFSETS_MM})
 
 
-def test_at_a_sampled_position_the_drive_is_the_sampled_one():
+def test_the_drive_is_the_sampled_one_and_interpolated_in_between():
     model = offset_model()
     six = SED_DRIVEN.parameters
     for offset in OFFSETS_MM:
         rates = model.evaluate(np.append(six, offset))
         np.testing.assert_array_equal(rates, AfferentModel.of_traces(traces(offset)).evaluate(six))
-
-
-def test_between_two_places_the_drive_is_interpolated():
-    model = offset_model()
     middle = model.at(0.1).drives[0]
     for name in ("sed_kpa", "rate_kpa_per_ms"):
         ends = [getattr(drive(traces(offset)), name) for offset in (0.0, 0.2)]
@@ -229,14 +201,9 @@ def test_between_two_places_the_drive_is_interpolated():
 def test_a_hidden_offset_is_recovered():
     six = six_parameters(FOUR)
     hidden = problem(offset_model(), np.append(six, 0.13))
-    free = replace(
-        hidden,
-        model=Reparametrised(
-            hidden.model,
-            (*IDENTIFIABLE_NAMES, "offset_mm"),
-            lambda five: np.append(six_parameters(five[:4]), five[4]),
-        ),
-    )
+    names = (*IDENTIFIABLE_NAMES, "offset_mm")
+    model = Reparametrised(hidden.model, names, lambda five: np.append(six_parameters(five[:4]), five[4]))
+    free = replace(hidden, model=model)
     start, scales = np.append(1.2 * FOUR, -0.05), np.append(0.3 * FOUR, 0.1)
     method = LeastSquares([start], Bounds(scales, [*(0.0 * FOUR), -0.4], [*(10.0 * FOUR), 0.4]))
     fit = method.fit(free, EVERYTHING)
@@ -263,27 +230,17 @@ def test_slopes_along_the_numbers_of_a_fit_are_the_limits_of_differences(four_nu
     model = ClosedFormModel(AfferentModel.of_traces(traces()))
     fitted = four_number_problem(AfferentModel.of_traces(traces()), four_numbers.recordings)
     numbers = np.array([FOUR[0] * FOUR[3], *FOUR[1:]])
-    np.testing.assert_allclose(
-        fitted.residuals(numbers, EVERYTHING), four_numbers.residuals(FOUR, EVERYTHING)
-    )
+    residuals = fitted.residuals(numbers, EVERYTHING)
+    np.testing.assert_allclose(residuals, four_numbers.residuals(FOUR, EVERYTHING))
     bounds = bounds_of(*fitted.model.model.drives)
     method = along_slopes(model, fitted, bounds)
     smooth = RateProblem(model, four_numbers.recordings)
-    step = 1e-4 * numbers
-    differences = [
-        (
-            smooth.residuals(fitted_four(numbers + change), EVERYTHING)
-            - smooth.residuals(fitted_four(numbers - change), EVERYTHING)
-        )
-        / (2.0 * change.sum())
-        for change in np.diag(step)
-    ]
     found = method.jacobian(numbers, EVERYTHING)
-    np.testing.assert_allclose(found, np.column_stack(differences), rtol=1e-3, atol=1e-5 * abs(found).max())
-
-
-def test_no_fit_within_the_bounds_fires_at_rest(four_numbers):
-    bounds = bounds_of(*AfferentModel.of_traces(traces()).drives)
+    for slope, step in zip(found.T, np.diag(1e-4 * numbers), strict=True):
+        above, below = (smooth.residuals(fitted_four(numbers + sign * step), EVERYTHING) for sign in (1, -1))
+        difference = (above - below) / (2.0 * step.sum())
+        np.testing.assert_allclose(slope, difference, rtol=1e-3, atol=1e-5 * abs(found).max())
+    # No fit within the bounds fires at rest.
     highest = np.array([bounds.high[0], 0.0, 0.0, 40.0])
     untouched = SedTraces([0.0, 3000.0], [[0.0], [0.0]])
     assert sed_driven(fitted_six(highest)).spikes(untouched).times_ms.size == 0

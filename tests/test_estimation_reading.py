@@ -67,10 +67,8 @@ def test_shifts_that_are_equal_are_one_stimulus_however_they_are_written(written
 
 
 def test_spikes_end_with_the_motion_or_with_their_recording(written):
-    path = written(
-        "spikes.csv", "stimulus,spike_times_ms,duration_ms\nedge,1.5 40 1001,\nflat,,900\nedge,3,900\n"
-    )
-    recorded = read_recordings(path, TWO)
+    rows = "stimulus,spike_times_ms,duration_ms\nedge,1.5 40 1001,\nflat,,900\nedge,3,900\n"
+    recorded = read_recordings(written("spikes.csv", rows), TWO)
     assert isinstance(recorded.recordings, SpikeRecordings)
     assert [train.tolist() for train in recorded.recordings.trains] == [[1.5, 40.0], [], [3.0]]
     assert recorded.recordings.duration_ms.tolist() == [1000.0, 900.0, 900.0]
@@ -84,8 +82,6 @@ RATE_ROWS = "stimulus,static_rate_hz,fold\nedge,60,1\n"
     ("content", "said"),
     [
         ("", "mine.csv must hold a header and at least one row: it has 0 of them."),
-        ("# nothing\n\n", "it has 0 of them."),
-        ("stimulus,static_rate_hz\n", "it has 1 of them."),
         (b"stimulus,static_rate_hz\ncaf\xe9,1\n", "mine.csv must be text in UTF-8: byte 28 is not"),
         ('stimulus,static_rate_hz\n"edge,1\n', "mine.csv, line 2: cannot be read as CSV"),
         ("static_rate_hz\n1\n", "mine.csv must have the column stimulus: it has static_rate_hz."),
@@ -96,29 +92,17 @@ RATE_ROWS = "stimulus,static_rate_hz,fold\nedge,60,1\n"
         ("fold,stimulus,fold\n1,edge,1\n", "mine.csv, line 1: column fold is repeated"),
         ("stimulus,static_rate_hz\nedge,1\nflat\n", "mine.csv, line 3: must have 2 entries"),
         ("stimulus,static_rate_hz\nedge,1\n,2\n", "mine.csv, line 3: stimulus must be given"),
-        ("stimulus,static_rate_hz\nedge,1\nflat,\n", "mine.csv, line 3: static_rate_hz must be given"),
         ("stimulus,static_rate_hz\nedge,-3\n", "mine.csv, line 2: static_rate_hz must not be negative"),
-        ("stimulus,static_rate_hz\nedge,nan\n", "mine.csv, line 2: static_rate_hz must be a finite number"),
         ("stimulus,static_rate_hz\n#\nedge,many\n", "mine.csv, line 3: static_rate_hz must be a finite"),
-        (
-            "stimulus,static_rate_hz\nside,3\n",
-            "mine.csv, line 2: stimulus must be one of two.csv, edge, flat",
-        ),
+        ("stimulus,static_rate_hz\nside,3\n", "mine.csv, line 2: stimulus must be one of two.csv, edge"),
         (RATE_ROWS + "flat,60,1.5\n", "mine.csv, line 3: fold must be a whole number from 1: got '1.5'"),
-        (RATE_ROWS + "flat,60,0\n", "mine.csv, line 3: fold must be a whole number from 1: got '0'"),
         (RATE_ROWS + "flat,60,\n", "mine.csv, line 3: fold must be given"),
         (RATE_ROWS + "flat,60,3\n", "fold must number at least two folds from 1 without a gap: no row is in"),
-        (RATE_ROWS + "flat,60,1\n", "no row is in fold 2"),
-        (
-            RATE_ROWS + "flat,1,2\nedge,61,2\n",
-            "mine.csv, line 4: fold must be the same for all presentations of edge, which would be fitted "
-            "and judged at once: got 2, and 1 in mine.csv, line 2.",
-        ),
+        (RATE_ROWS + "flat,1,2\nedge,61,2\n", "mine.csv, line 4: fold must be the same for all"),
         ("stimulus,spike_times_ms\nedge,5 4\n", "line 2: spike_times_ms must increase: 4 ms follows 5 ms"),
         ("stimulus,spike_times_ms\nedge,-1 4\n", "line 2: spike_times_ms must not be negative"),
         ("stimulus,spike_times_ms\nedge,1;4\n", "line 2: spike_times_ms must be a finite number"),
         ("stimulus,spike_times_ms,duration_ms\nedge,1 4,3\n", "line 2: spike_times_ms must end with"),
-        ("stimulus,spike_times_ms,duration_ms\nedge,1,0\n", "line 2: duration_ms must be greater than 0"),
     ],
     ids=lambda value: str(value)[-40:],
 )
@@ -130,13 +114,11 @@ def test_recordings_that_cannot_be_are_named_by_line_and_column(written, content
     assert str(refused.value)[-1] in ".?"
 
 
-def test_a_shift_must_be_a_number(written):
-    path = written("mine.csv", "shift_mm,static_rate_hz\nleft,1\n")
+def test_a_file_that_is_not_there_or_has_no_shift_or_unit_is_named(written, tmp_path):
     with pytest.raises(InputError, match=r"mine.csv, line 2: shift_mm must be a finite number \[mm\]"):
-        read_recordings(path, ShiftedBar())
-
-
-def test_a_file_that_is_not_there_is_named(tmp_path):
+        read_recordings(written("mine.csv", "shift_mm,static_rate_hz\nleft,1\n"), ShiftedBar())
+    with pytest.raises(InputError, match="unit belongs to NWB files"):
+        read_recordings(written("mine.csv", "stimulus,static_rate_hz\nedge,1\n"), TWO, unit=1)
     with pytest.raises(InputError, match=r"none\.csv must be a file that can be read: No such file"):
         read_recordings(tmp_path / "none.csv", TWO)
     with pytest.raises(InputError, match=r"none\.nwb must be a file that can be read"):
@@ -166,17 +148,12 @@ stimuli:
 def test_stimuli_are_the_same_from_csv_and_yaml(written, name, content):
     written("course.csv", "time_ms,depth_mm\n0,0\n50,0.4\n900,0.4\n")
     listed = read_stimuli(written(name, content))
-    found = {
-        "ball": NamedStimulus(
-            Sphere(curvature_per_m=340.0), RampAndHold(depth_mm=0.5), -0.5, 1.0, 0.0, name="ball"
-        ),
-        "probe": NamedStimulus(
-            FlatPunch(1.0), ForceRampAndHold(200.0, hold_ms=500.0), friction=0.2, name="probe"
-        ),
-        "bar": NamedStimulus(Bar(), name="bar"),
-    }
-    moved = listed.stimuli["moved"]
-    assert {key: each for key, each in listed.stimuli.items() if key != "moved"} == found
+    *others, moved = listed.stimuli.values()
+    assert others == [
+        NamedStimulus(Sphere(curvature_per_m=340.0), RampAndHold(0.5), -0.5, 1.0, 0.0, name="ball"),
+        NamedStimulus(FlatPunch(1.0), ForceRampAndHold(200.0, hold_ms=500.0), friction=0.2, name="probe"),
+        NamedStimulus(Bar(), name="bar"),
+    ]
     assert (moved.motion.depth_mm, moved.files[0].name) == ((0.0, 0.4, 0.4), "course.csv")
     assert list(listed.stimuli) == ["ball", "probe", "bar", "moved"]
 
@@ -200,35 +177,15 @@ def test_stimuli_name_finger_tissues_and_resolution_and_options_replace_them(wri
 @pytest.mark.parametrize(
     ("name", "content", "said"),
     [
-        (
-            "a.csv",
-            "name,object\ntip,cone\n",
-            "a.csv, line 2, object: indenter must be one of sphere, cylinder",
-        ),
+        ("a.csv", "name,object\ntip,cone\n", "a.csv, line 2, object: indenter must be one of sphere"),
         ("a.csv", "name,object\ntip,\n", "a.csv, line 2, object must be given"),
-        ("a.csv", "name\ntip\n", "a.csv, line 2, object must be given"),
-        ("a.csv", "name,object\n,bar\n", "a.csv, line 2, name must be given"),
         ("a.csv", "name,object\ntip,bar\ntip,bar\n", "a.csv, line 3, stimuli must differ: 'tip' is repeated"),
-        (
-            "a.csv",
-            "name,object,radius_mm\ntip,bar,1\n",
-            "line 1: column 'radius_mm' is unknown: did you mean obj",
-        ),
+        ("a.csv", "name,object,radius_mm\ntip,bar,1\n", "line 1: column 'radius_mm' is unknown: did you"),
         ("a.csv", "name,object,object.width_mm\ntip,sphere,1\n", "line 2, object.width_mm is unknown"),
-        (
-            "a.csv",
-            "name,object,object.width_mm\ntip,bar,0\n",
-            "line 2, object: width_mm must be greater than 0",
-        ),
+        ("a.csv", "name,object,object.width_mm\ntip,bar,0\n", "line 2, object: width_mm must be greater"),
         ("a.csv", "name,object,object.fillet_mm\ntip,bar,9\n", "line 2, object: fillet_mm must not exceed"),
-        ("a.csv", "name,object\ntip,plate:3\n", "line 2, object: indenter must be written plate, sizes from"),
         ("a.csv", "name,object,object.width_mm\ntip,bar:2,1\n", "line 2: object: sizes must stand in"),
-        ("a.csv", "name,object,motion.depth_mm\ntip,bar,deep\n", "line 2, motion.depth_mm must be a finite"),
-        (
-            "a.csv",
-            "name,object,motion.depth_mm\ntip,bar,[\n",
-            "line 2, motion.depth_mm cannot be read as YAML",
-        ),
+        ("a.csv", "name,object,motion.depth_mm\ntip,bar,[\n", "line 2, motion.depth_mm cannot be read as"),
         ("a.csv", "name,object,motion.depth_mm,motion.force_mn\ntip,bar,1,1\n", "exclude each other"),
         (
             "a.csv",
@@ -239,14 +196,8 @@ def test_stimuli_name_finger_tissues_and_resolution_and_options_replace_them(wri
         ("a.yaml", "- {name: tip}\n", "a.yaml, the file must be a mapping of keys to values: got "),
         ("a.yaml", "stimuli:\n- tip\n", "a.yaml, line 2, stimuli[1] must be a mapping"),
         ("a.yaml", "stimuli: []\n", "a.yaml, line 1, stimuli must have at least one entry"),
-        (
-            "a.yaml",
-            "object: bar\nstimuli:\n- {nane: tip}\n",
-            "line 3, stimuli[1].nane is unknown: did you mean",
-        ),
-        ("a.yaml", "finger: own.inp\nstimuli: [{name: tip, object: bar}]\n", "line 1, finger"),
+        ("a.yaml", "object: bar\nstimuli:\n- {nane: tip}\n", "line 3, stimuli[1].nane is unknown: did you"),
         ("a.yaml", "stimuli: {name: tip, name: bar}\n", "line 1: name is repeated"),
-        ("a.yaml", "stimuli: {\n", "a.yaml cannot be read as YAML"),
         (
             "a.yaml",
             "object: bar\nstimuli:\n- {name: tip, motion: {depth_mm: yes}}\n",
@@ -292,39 +243,38 @@ TABLE = [
 ]
 
 
+ODD = st.sampled_from(["[", "{a: 1}", "bar:3", "~", "''"])
+ENTRIES = st.one_of(st.text(max_size=8), st.floats().map(str), ODD)
+
+
 def possible(path):
     """What is said of a file of stimuli, and of their touches."""
     try:
         listed = read_stimuli(path)
         listed.touches(list(listed.stimuli.values()), listed.conditions)
     except InputError as error:
-        return str(error)
-    return f"{path}, possible."
+        said = str(error)
+    else:
+        said = f"{path}, possible."
+    assert "\n" not in said
+    assert said[-1] in ".?"
+    return said
 
 
 @pytest.mark.filterwarnings("ignore::fingerpad.core.errors.InertiaWarning")
-@settings(max_examples=100, deadline=None, suppress_health_check=list(HealthCheck))
+@settings(max_examples=50, deadline=None, suppress_health_check=list(HealthCheck))
 @given(st.sampled_from([place for place in places(LIST) if place]), VALUES, CHANGES)
 def test_any_change_of_listed_stimuli_is_possible_or_refused_in_one_sentence(
     tmp_path_factory, place, value, change
 ):
     path = tmp_path_factory.getbasetemp() / "list.yaml"
     path.write_text(json.dumps(changed(LIST, place, value, change)), encoding="utf-8")
-    said = possible(path)
-    assert said.startswith(str(path)) or said.startswith("reach_mm")
-    assert "\n" not in said
-    assert said[-1] in ".?"
+    assert possible(path).startswith((str(path), "reach_mm"))
 
 
 @pytest.mark.filterwarnings("ignore::fingerpad.core.errors.InertiaWarning")
-@settings(max_examples=80, deadline=None, suppress_health_check=list(HealthCheck))
-@given(
-    st.integers(0, 3),
-    st.integers(0, 6),
-    st.one_of(
-        st.text(max_size=8), st.floats().map(str), st.sampled_from(["[", "{a: 1}", "bar:3", "~", "''"])
-    ),
-)
+@settings(max_examples=40, deadline=None, suppress_health_check=list(HealthCheck))
+@given(st.integers(0, 3), st.integers(0, 6), ENTRIES)
 def test_any_change_of_a_table_of_stimuli_is_possible_or_refused_in_one_sentence(
     tmp_path_factory, row, column, entry
 ):
@@ -333,10 +283,7 @@ def test_any_change_of_a_table_of_stimuli_is_possible_or_refused_in_one_sentence
     rows[row][column] = entry
     with path.open("w", newline="", encoding="utf-8", errors="surrogatepass") as file:
         csv.writer(file).writerows(rows)
-    said = possible(path)
-    assert said.startswith(str(path))
-    assert "\n" not in said
-    assert said[-1] in ".?"
+    assert possible(path).startswith(str(path))
 
 
 @pytest.fixture(scope="module")
@@ -367,12 +314,9 @@ def nwb(tmp_path_factory):
 
 
 def test_nwb_units_become_trains_that_count_from_the_onset_of_their_trial(nwb):
-    path = nwb(
-        "good",
-        [(10.0, 11.5, "flat", 2), (20.0, 20.9, "edge", 1)],
-        {3: [1.0, 10.04, 10.25, 11.4, 20.5, 21.0], 4: [10.1]},
-        ("stimulus", "fold"),
-    )
+    trials = [(10.0, 11.5, "flat", 2), (20.0, 20.9, "edge", 1)]
+    units = {3: [1.0, 10.04, 10.25, 11.4, 20.5, 21.0], 4: [10.1]}
+    path = nwb("good", trials, units, ("stimulus", "fold"))
     recorded = read_recordings(path, TWO, unit=3)
     trains = recorded.recordings.trains
     np.testing.assert_allclose(trains[0], [40.0, 250.0], rtol=0, atol=1e-9)
@@ -406,24 +350,16 @@ def test_spikes_that_count_from_their_trial_are_refused_unless_observation_says_
 
 
 def test_nwb_files_that_cannot_be_are_named(nwb, tmp_path):
-    trials, two = [(0.0, 1.0, "edge")], {3: [0.1], 4: [0.2]}
+    trials, two, late = [(0.0, 1.0, "edge")], {3: [0.1], 4: [0.2]}, {3: {"obs_intervals": [[5.0, 6.0]]}}
     cases = [
         (nwb("several", trials, two), None, "has the units 3, 4: choose one by --unit"),
         (nwb("other", trials, two), 7, "unit must be one of 3, 4: got 7"),
         (nwb("silent", trials, {}), None, "must have a table of units with spike_times"),
         (nwb("untried", [], two, ()), None, "must have a table of trials"),
         (nwb("column", trials, two, ("object",)), 3, "trials must have the column stimulus: got start_time"),
-        (
-            nwb("unknown", [(0.0, 1.0, "side")], two),
-            3,
-            "trial 0: stimulus must be one of two.csv, edge, flat",
-        ),
+        (nwb("unknown", [(0.0, 1.0, "side")], two), 3, "trial 0: stimulus must be one of two.csv"),
         (nwb("unsorted", trials, {3: [0.3, 0.2]}), 3, "spike_times of unit 3 must be finite and increase"),
-        (
-            nwb("unseen", trials, {3: [0.1]}, options={3: {"obs_intervals": [[5.0, 6.0]]}}),
-            3,
-            "a trial must start while the unit is observed: none does",
-        ),
+        (nwb("unseen", trials, {3: [0.1]}, options=late), 3, "while the unit is observed: none does"),
         (nwb("endless", [(0.0, np.nan, "edge")], two), 3, "trial 0: duration_ms must be a finite number"),
     ]
     damaged = tmp_path / "damaged.nwb"
@@ -434,9 +370,3 @@ def test_nwb_files_that_cannot_be_are_named(nwb, tmp_path):
             read_recordings(path, TWO, unit)
         assert said in str(refused.value)
         assert str(refused.value).startswith(str(path))
-
-
-def test_a_unit_belongs_to_nwb(written):
-    path = written("mine.csv", "stimulus,static_rate_hz\nedge,1\n")
-    with pytest.raises(InputError, match="unit belongs to NWB files"):
-        read_recordings(path, TWO, unit=1)

@@ -17,20 +17,28 @@ def test_chosen_rows_keep_names_rates_and_a_phase_that_was_not_recorded():
     assert (recordings.phases, recordings.n_rates, recordings.source) == (("static",), 2, "bench")
 
 
+def spikes(trains, duration_ms):
+    return SpikeRecordings(("a", "b"), SpikeTrains.from_lists(trains), duration_ms)
+
+
 @pytest.mark.parametrize(
-    ("arguments", "said"),
+    ("call", "said"),
     [
-        ((("a", "a"), [1.0, 2.0], None), "'a' is repeated"),
-        ((("a", "b"), [1.0], None), "dynamic_rate_hz needs one rate per stimulus: got 1 for 2"),
-        ((("a", "b"), None, [1.0, -2.0]), "static_rate_hz must not be negative: the smallest is -2"),
-        ((("a", "b"), [1.0, np.nan], None), "dynamic_rate_hz must hold finite numbers only"),
-        ((("a", "b"), None, None), "got neither"),
+        (lambda: RateRecordings(("a", "a"), [1.0, 2.0], None), "'a' is repeated"),
+        (lambda: RateRecordings(("a", "b"), [1.0], None), "dynamic_rate_hz needs one rate per stimulus"),
+        (lambda: RateRecordings(("a",), None, [-2.0]), "static_rate_hz must not be negative: the smallest"),
+        (lambda: RateRecordings(("a",), [np.nan], None), "dynamic_rate_hz must hold finite numbers only"),
+        (lambda: RateRecordings(("a", "b"), None, None), "got neither"),
+        (lambda: spikes([[1.0]], 1000.0), "one train per presentation: got 1 for 2"),
+        (lambda: spikes([[1.0], [-1.0, 2.0]], 1000.0), "'b' has one at -1 ms"),
+        (lambda: spikes([[1.0], [2.0, 1001.0]], 1000.0), "'b' has one at 1001 ms"),
+        (lambda: spikes([[1.0], [2.0]], [1000.0, 0.0]), "duration_ms must be above 0"),
+        (lambda: spikes([[1.0], [2.0]], [1.0, 1.0, 1.0]), "one for all or for each of 2"),
     ],
-    ids=["twice", "size", "negative", "nan", "neither"],
 )
-def test_rates_that_cannot_be_are_refused(arguments, said):
+def test_recordings_that_cannot_be_are_refused(call, said):
     with pytest.raises(InputError, match=said):
-        RateRecordings(*arguments)
+        call()
 
 
 def test_rates_of_spikes_are_means_over_presentations_in_the_order_of_their_first():
@@ -42,32 +50,12 @@ def test_rates_of_spikes_are_means_over_presentations_in_the_order_of_their_firs
     assert rates.static_rate_hz.tolist() == [0.0, 20.0]
 
 
-@pytest.mark.parametrize(
-    ("trains", "duration_ms", "said"),
-    [
-        ([[1.0]], 1000.0, "one train per presentation: got 1 for 2"),
-        ([[1.0], [-1.0, 2.0]], 1000.0, "'b' has one at -1 ms"),
-        ([[1.0], [2.0, 1001.0]], 1000.0, "'b' has one at 1001 ms"),
-        ([[1.0], [2.0]], [1000.0, 0.0], "duration_ms must be above 0"),
-        ([[1.0], [2.0]], [1.0, 1.0, 1.0], "duration_ms must be above 0, one for all or for each of 2"),
-    ],
-    ids=["size", "before", "after", "no time", "sizes"],
-)
-def test_spikes_that_cannot_be_are_refused(trains, duration_ms, said):
-    with pytest.raises(InputError, match=said):
-        SpikeRecordings(("a", "b"), SpikeTrains.from_lists(trains), duration_ms)
-
-
-def test_window_may_end_with_a_recording_whose_seconds_were_rounded():
-    """A trial from 1.35 to 1.7 s lasts 349.9999999999999 ms."""
-    trains = SpikeTrains.from_lists([[160.0, 200.0]])
-    recordings = SpikeRecordings(("a",), trains, (1.7 - 1.35) * 1e3)
-    assert recordings.duration_ms[0] < 350.0
-    assert recordings.rates(((30.0, 50.0), (150.0, 350.0))).static_rate_hz[0] > 0.0
-
-
 def test_a_window_beyond_the_recording_has_no_rate():
     recordings = SpikeRecordings(("a",), SpikeTrains.from_lists([[1.0]]), 900.0)
     with pytest.raises(InputError, match="one ends at 950 ms"):
         recordings.rates(PAPER_WINDOWS_MS)
     assert recordings.rates(((30.0, 50.0), (600.0, 900.0))).static_rate_hz.tolist() == [0.0]
+    # A trial from 1.35 to 1.7 s lasts 349.9999999999999 ms.
+    rounded = SpikeRecordings(("a",), SpikeTrains.from_lists([[160.0, 200.0]]), (1.7 - 1.35) * 1e3)
+    assert rounded.duration_ms[0] < 350.0
+    assert rounded.rates(((30.0, 50.0), (150.0, 350.0))).static_rate_hz[0] > 0.0

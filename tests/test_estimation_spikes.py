@@ -15,9 +15,11 @@ from fingerpad.core import threads
 from fingerpad.core.errors import ConvergenceError, InputError
 from fingerpad.core.random_streams import Presentations
 from fingerpad.core.signals import SedTraces, SpikeTrains
+from fingerpad.inference.spike_fit import SpikeFit, fit_spikes
+from fingerpad.inference.spike_likelihood import SpikeLikelihood, time_rescaling
 from fingerpad.inference.identifiable import (
+    six_parameters,
     SPIKE_PARAMETER_NAMES,
-    SPIKE_PARAMETER_UNITS,
     canonical,
     canonical_jacobian,
     from_canonical,
@@ -105,13 +107,10 @@ def test_the_likelihood_is_that_of_a_slow_integrator(escape_ms):
     driven = Drive(times, seds, rates)
     train = np.array([9.0, 20.0, 24.5, 44.3, 60.0])  # on a knot, and at rest over one
     for parameters in (TRUTH, [-0.01, 2.0, 0.06, 8.0, 0.6]):
-        found = SpikeLikelihood(
-            driven, SpikeTrains.from_lists([train, []]), [0, 0], [70.0, 33.0], REFRACTORY, escape_ms
-        )
-        expected = sum(
-            slow_log_likelihood(driven, spikes, end, parameters, escape_ms)
-            for spikes, end in ((train, 70.0), (np.empty(0), 33.0))
-        )
+        trains = SpikeTrains.from_lists([train, []])
+        found = SpikeLikelihood(driven, trains, [0, 0], [70.0, 33.0], REFRACTORY, escape_ms)
+        expected = slow_log_likelihood(driven, train, 70.0, parameters, escape_ms)
+        expected += slow_log_likelihood(driven, np.empty(0), 33.0, parameters, escape_ms)
         assert_allclose(found.log_likelihood(parameters), expected, rtol=1e-8)
 
 
@@ -201,11 +200,11 @@ def test_operational_times_add_up_to_the_integral_of_the_hazard():
     """Silent recordings count too: the last time is that of the last spike, trains end to end."""
     parts = [[40.0, 90.0], [], [33.0]]
     whole = SpikeLikelihood(touched(), SpikeTrains.from_lists(parts), [2, 4, 3])
-    integrals = [
-        SpikeLikelihood(touched(), SpikeTrains.from_lists([[]]), [site], end)
-        for site, end in ((2, 40.0), (4, 300.0))
-    ]
-    first, silent = (-one.log_likelihood(TRUTH) for one in integrals)
+    none = SpikeTrains.from_lists([[]])
+    first, silent, third = (
+        -SpikeLikelihood(touched(), none, [site], end_ms).log_likelihood(TRUTH)
+        for site, end_ms in ((2, 40.0), (4, 300.0), (3, 33.0))
+    )
     alone = SpikeLikelihood(touched(), SpikeTrains.from_lists([parts[0]]), [2])
     spikes_only = alone.operational_times(TRUTH)
     # log L = sum ln h - integral, and d log L/dG tells the integral: by its difference at two G.
@@ -213,9 +212,7 @@ def test_operational_times_add_up_to_the_integral_of_the_hazard():
     assert_allclose(found[:2], spikes_only, rtol=1e-12)
     assert_allclose(found[0], first, rtol=1e-10)
     _, gradient, _ = alone.canonical_derivatives(canonical(TRUTH))
-    before_last_train = gradient[3] + 2 + silent
-    third = SpikeLikelihood(touched(), SpikeTrains.from_lists([[]]), [3], 33.0)
-    assert_allclose(found[2], before_last_train - third.log_likelihood(TRUTH), rtol=1e-10)
+    assert_allclose(found[2], gradient[3] + 2 + silent + third, rtol=1e-10)
 
 
 # The fit
@@ -232,11 +229,6 @@ def test_a_fit_ends_on_top_from_near_and_far():
     assert far.log_likelihood > recorded().log_likelihood(TRUTH)
 
 
-@cache
-def forty_fits():
-    return [fit_spikes(simulated(seed), START) for seed in range(100, 140)]
-
-
 def interval(fit, level):
     """Confidence interval of each parameter (5, 2), in the logarithm for tau and the width."""
     reach = ndtri(0.5 + 0.5 * level) * fit.standard_errors
@@ -246,18 +238,15 @@ def interval(fit, level):
     return np.stack([low, high], axis=1)
 
 
-@pytest.mark.parametrize("level", [0.5, 0.8, 0.95])
-def test_intervals_have_their_nominal_coverage(level):
+def test_intervals_have_their_nominal_coverage_and_estimates_scatter_by_their_errors():
     """Recovery: how many of forty data sets hold each true parameter is a binomial number."""
-    intervals = np.array([interval(fit, level) for fit in forty_fits()])
-    holds = ((intervals[:, :, 0] < TRUTH) & (intervals[:, :, 1] > TRUTH)).sum(axis=0)
-    fewest, most = binom.ppf([0.001, 0.999], 40, level)
-    assert np.all((fewest <= holds) & (holds <= most)), dict(zip(SPIKE_PARAMETER_NAMES, holds, strict=True))
-
-
-def test_estimates_scatter_by_their_standard_errors():
-    """Mean and spread of (estimate - truth)/error: 0 and 1, within what forty fits can tell."""
-    scores = np.array([(fit.parameters - TRUTH) / fit.standard_errors for fit in forty_fits()])
+    fits = [fit_spikes(simulated(seed), START) for seed in range(100, 140)]
+    for level in (0.5, 0.8, 0.95):
+        intervals = np.array([interval(fit, level) for fit in fits])
+        holds = ((intervals[:, :, 0] < TRUTH) & (intervals[:, :, 1] > TRUTH)).sum(axis=0)
+        fewest, most = binom.ppf([0.001, 0.999], 40, level)
+        assert np.all((fewest <= holds) & (holds <= most)), (level, holds)
+    scores = np.array([(fit.parameters - TRUTH) / fit.standard_errors for fit in fits])
     assert np.all(np.abs(scores.mean(axis=0)) < 3.5 / math.sqrt(40))
     assert np.all(np.abs(scores.std(axis=0) - 1.0) < 3.5 / math.sqrt(80))
 
@@ -265,18 +254,14 @@ def test_estimates_scatter_by_their_standard_errors():
 # What cannot be fitted
 
 
-def test_a_clock_has_no_width():
-    afferent = sed_driven(six_parameters(TRUTH[:4]), REFRACTORY)
-    exact = SpikeLikelihood(touched(), afferent.spikes(touched()))
-    with pytest.raises(ConvergenceError, match="too regular"):
-        fit_spikes(exact, START)
-
-
 def test_one_strength_without_a_ramp_does_not_determine_both_gains():
     held = Drive([0.0, 1e4], [[1.0], [1.0]], [[0.0], [0.0]])
     spikes = EscapeRate(SED_DRIVEN.membrane, 0.2).spikes(SED_DRIVEN.transduction.current(held), 1)
     with pytest.raises(ConvergenceError, match="determine all parameters: these do not"):
         fit_spikes(SpikeLikelihood(held, spikes), START)
+    afferent = sed_driven(six_parameters(TRUTH[:4]), REFRACTORY)
+    with pytest.raises(ConvergenceError, match="too regular"):  # a clock has no width
+        fit_spikes(SpikeLikelihood(touched(), afferent.spikes(touched())), START)
 
 
 @pytest.mark.parametrize(
@@ -295,11 +280,7 @@ def test_one_strength_without_a_ramp_does_not_determine_both_gains():
     ],
 )
 def test_recordings_that_make_no_sense_are_refused(change, said):
-    sound = {
-        "drive": touched(),
-        "trains": SpikeTrains.from_lists([[10.0, 20.0], [60.0]]),
-        "sites": [0, 1],
-    }
+    sound = {"drive": touched(), "trains": SpikeTrains.from_lists([[10.0, 20.0], [60.0]]), "sites": [0, 1]}
     assert SpikeLikelihood(**sound).n_spikes == 3
     with pytest.raises(InputError, match=said):
         SpikeLikelihood(**(sound | change))

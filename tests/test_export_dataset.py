@@ -2,6 +2,8 @@
 
 import json
 import re
+import sys
+from dataclasses import replace
 from pathlib import Path
 
 import h5py
@@ -19,7 +21,7 @@ from fingerpad.geometry.indenters import Sphere
 from fingerpad.geometry.motion import RampAndHold
 from fingerpad.mechanics.press_settings import PressSettings
 from fingerpad.mechanics.tissues import named_tissues
-from fingerpad.skin.fields import FIELDS, Place, stored_fields
+from fingerpad.skin.fields import Place, stored_fields
 from fingerpad.skin.indentation import Touch
 
 TOUCH = Touch(
@@ -46,7 +48,7 @@ def skin():
 
 
 @pytest.fixture(scope="module")
-def file(skin, tmp_path_factory) -> Path:
+def file(skin, tmp_path_factory):
     return write_touch(tmp_path_factory.mktemp("touch") / "touch.nc", skin, RESPONSE, seed=7)[0]
 
 
@@ -55,17 +57,21 @@ def written(file):
     return read_touch(file)
 
 
-@pytest.mark.parametrize("name", ["touch.nc", "touch.zarr"])
-def test_what_is_written_is_read_back(skin, tmp_path, name):
+@pytest.mark.parametrize("file_name", ["touch.nc", "touch.zarr"])
+def test_what_is_written_is_read_back(skin, tmp_path, file_name):
     written = touch_dataset(skin, RESPONSE, quantities=("stress",))
-    assert write_touch(tmp_path / name, skin, RESPONSE, quantities=("stress",)) == (tmp_path / name,)
+    files = write_touch(tmp_path / file_name, skin, RESPONSE, quantities=("stress",))
+    assert files == (tmp_path / file_name,)
     again = read_touch(tmp_path)
     xarray.testing.assert_equal(written, again)
     assert written.sizes == again.sizes
-    assert [path.name for path in tmp_path.iterdir()] == [name]
+    assert [path.name for path in tmp_path.iterdir()] == [file_name]
     for name, variable in again.variables.items():
         assert variable.attrs["long_name"], name
-        assert ("units" in variable.attrs) != (PARTS.get(name) is not None and PARTS[name].unit == ""), name
+        assert ("units" in variable.attrs) != (name in PARTS and PARTS[name].unit == ""), name
+    write_touch(tmp_path / file_name, skin)  # an older file is replaced as a whole
+    assert "spike_count" not in read_touch(tmp_path)
+    assert [path.name for path in tmp_path.iterdir()] == [file_name]
 
 
 def test_every_stored_field_has_its_values_and_unit(skin, written):
@@ -81,61 +87,48 @@ def test_every_stored_field_has_its_values_and_unit(skin, written):
     np.testing.assert_allclose(data.displacement_mm, skin.deformation.displacement_mm, atol=1e-6)
 
 
-def test_attributes_describe_the_touch(written):
+def test_attributes_describe_the_touch_and_its_spikes(file, written):
     attributes = written.attrs
     assert json.loads(attributes["indenter"]) == {"class": "Sphere", "curvature_per_m": 287}
     assert json.loads(attributes["motion"])["depth_mm"] == 0.3
     assert json.loads(attributes["tissues"])["dermis"]["law"]["class"] == "Polynomial"
     assert [phase["name"] for phase in json.loads(attributes["phases"])] == ["ramp", "hold"]
-    assert attributes["seed"] == 7
+    assert (attributes["seed"], attributes["half_finger"]) == (7, 1)
     assert re.fullmatch(r"fingerpad [\d.]+", attributes["source"])
-
-
-def test_spikes_are_a_contiguous_ragged_array(written):
-    data = written
-    assert data.spike_count.sample_dimension == "spike"
-    assert data.spike_count.values.tolist() == [3, 0, 1]
-    assert [train.tolist() for train in spike_trains(data)] == [train.tolist() for train in RESPONSE.spikes]
+    assert written.spike_count.sample_dimension == "spike"
+    assert written.spike_count.values.tolist() == [3, 0, 1]
+    trains = [train.tolist() for train in spike_trains(written)]
+    assert trains == [train.tolist() for train in RESPONSE.spikes]
+    with h5py.File(file) as opened:  # as any program of NetCDF
+        assert opened["contact_area_mm2"].attrs["units"] == "mm2"
 
 
 def test_the_object_lies_where_the_press_had_it(skin, file):
     """No node of the skin penetrates the mapped face by more than the press says; one is at it."""
     data = read_touch(file)
     skin_mm = data.node_mm.values[data.skin_node] + data.skin_displacement_mm.values
-    mapped = data.object_front_mm.interp(object_x=0.0, object_z=[0.0, 1.0, 2.0]).values
+    beside = np.array([0.0, 1.0, 2.0])
+    mapped = data.object_front_mm.interp(object_x=0.0, object_z=beside).values
     radius = Sphere(curvature_per_m=287).radius_mm
-    np.testing.assert_allclose(
-        mapped, np.sqrt(radius**2 - np.array([0.0, 1.0, 2.0]) ** 2) - radius, atol=1e-3
-    )
+    np.testing.assert_allclose(mapped, np.sqrt(radius**2 - beside**2) - radius, atol=1e-3)
     for step in range(1, data.time.size):
         local = (skin_mm[step] - data.object_tip_mm.values[step]) @ data.object_axes.values[step]
         gap = Sphere(curvature_per_m=287).gap(local)[0]
         assert -1.1 * skin.penetration_mm <= gap.min() <= 1e-5
 
 
-def test_any_netcdf_program_opens_the_file(file):
-    with h5py.File(file) as opened:
-        assert opened["sed_kpa"].dims[0].label == "" or opened["sed_kpa"].dims[0].keys() == ["time"]
-        assert opened["contact_area_mm2"].attrs["units"] == "mm2"
-    with xarray.open_dataset(file) as opened:
-        assert opened["time"].dtype == np.float64
-
-
-def test_without_the_deformation_the_last_displacement_is_there(skin):
-    data = touch_dataset(TOUCH.solve())
+def test_without_the_deformation_the_last_displacement_is_there(skin, monkeypatch):
+    without = replace(skin, deformation=None)
+    data = touch_dataset(without)
     assert data.displacement_mm.dims == ("node", "axis")
     assert data.displacement_mm.at_time_ms == 1000.0
     with pytest.raises(InputError, match=r"quantity stress needs .* whole=True"):
-        touch_dataset(TOUCH.solve(), quantities=("stress",))
+        touch_dataset(without, quantities=("stress",))
     with pytest.raises(InputError, match="quantity must be one of"):
         touch_dataset(skin, quantities=("stres",))
-
-
-def test_an_older_store_is_replaced_as_a_whole(skin, tmp_path):
-    write_touch(tmp_path / "touch.zarr", skin, RESPONSE)
-    write_touch(tmp_path / "touch.zarr", skin)
-    assert "spike_count" not in read_touch(tmp_path / "touch.zarr")
-    assert [path.name for path in tmp_path.iterdir()] == ["touch.zarr"]
+    monkeypatch.setitem(sys.modules, "xarray", None)
+    with pytest.raises(InputError, match=r"needs xarray: .*fingerpad\[netcdf\]"):
+        touch_dataset(skin)
 
 
 @pytest.mark.parametrize("name", ["touch.nc", "touch.zarr"])
@@ -159,12 +152,6 @@ def test_no_place_to_write_and_no_known_ending_are_refused(skin, tmp_path):
         write_touch(tmp_path / "touch.h5", skin)
 
 
-def test_a_missing_library_says_what_to_install(skin, monkeypatch):
-    monkeypatch.setitem(__import__("sys").modules, "xarray", None)
-    with pytest.raises(InputError, match=r"needs xarray: .*fingerpad\[netcdf\]"):
-        touch_dataset(skin)
-
-
 def _changed(change):
     """Return the touch with one change in the data set, as a file would hold it."""
     return lambda path, data: change(data)
@@ -184,79 +171,56 @@ def _with_attribute(name, key, value):
 
 
 def _bytes(content):
-    def make(path: Path, data: xarray.Dataset) -> Path:
+    def make(path, data):
         (path / "touch.nc").write_bytes(content(Path(data.encoding["source"]).read_bytes()))
         return path / "touch.nc"
 
     return make
 
 
-def _renamed(path: Path, data: xarray.Dataset) -> Path:
+def _renamed(path, data):
     """A file of spikes, which is HDF5 as well."""
     (path / "touch.nwb").write_bytes(Path(data.encoding["source"]).read_bytes())
     return path / "touch.nwb"
 
 
-def _other_program(path: Path, data: xarray.Dataset) -> Path:
+def _other_program(path, data):
     xarray.Dataset({"t": ("x", [1.0, 2.0])}).to_netcdf(path / "touch.nc", engine="h5netcdf")
     return path
 
 
-def _empty_zarr(path: Path, data: xarray.Dataset) -> Path:
+def _empty_zarr(path, data):
     (path / "touch.zarr").mkdir()
     return path / "touch.zarr"
 
 
-def _damaged_zarr(path: Path, data: xarray.Dataset) -> Path:
+def _damaged_zarr(path, data):
     data[["time", "depth_mm"]].to_zarr(path / "touch.zarr", consolidated=False)
     (path / "touch.zarr" / "zarr.json").write_text("{")
     return path
 
 
-def _directory(path: Path, data: xarray.Dataset) -> Path:
-    (path / "touch.nc").mkdir()
-    return path / "touch.nc"
-
-
 MALFORMED = {
     "no such file": (lambda path, data: path / "none.nc", "there is no such file"),
     "a folder without a touch": (lambda path, data: path, r"must hold touch.nc or touch.zarr"),
-    "a folder named like a file": (_directory, "must hold touch.nc or touch.zarr"),
     "a device": (lambda path, data: Path("/dev/null"), "neither"),
     "empty": (_bytes(lambda content: b""), "cannot be read"),
-    "text": (_bytes(lambda content: b"time,force\n0,1\n"), "cannot be read"),
     "half of the file": (_bytes(lambda content: content[: len(content) // 2]), "cannot be read"),
-    "the first 100 bytes": (_bytes(lambda content: content[:100]), "cannot be read"),
-    "zeros amid the file": (
-        _bytes(lambda content: content[:600] + bytes(3000) + content[3600:]),
-        "cannot be read|must ",
-    ),
+    "zeros": (_bytes(lambda content: content[:600] + bytes(3000) + content[3600:]), "cannot be read|mu"),
     "another ending": (_renamed, "its name has another ending"),
-    "an image": (_bytes(lambda content: b"\x89PNG\r\n\x1a\n" + bytes(64)), "cannot be read"),
     "a file of another program": (_other_program, "another program wrote this file"),
     "an empty store": (_empty_zarr, "cannot be read|another program"),
     "a damaged store": (_damaged_zarr, "cannot be read"),
     "another version": (
         _changed(lambda data: data.assign_attrs(format_version=99)), "format_version 1: got 99"),
-    "no version": (
-        _changed(lambda data: data.assign_attrs(format_version="new")), "format_version 1: got new"),
     "no time": (_changed(lambda data: data.drop_vars("time")), "variable time: it is missing"),
-    "no nodes": (_changed(lambda data: data.drop_vars("node_mm")), "variable node_mm: it is missing"),
-    "no energy": (_changed(lambda data: data.drop_vars("sed_kpa")), "variable sed_kpa: it is missing"),
     "half of the object": (
         _changed(lambda data: data.drop_vars("object_axes")), "variable object_axes: it is missing"),
-    "half of the afferents": (
-        _changed(lambda data: data.drop_vars("spike_count")), "variable spike_count: it is missing"),
     "another unit": (_with_attribute("sed_kpa", "units", "MPa"), "the unit 'kPa': got 'MPa'"),
-    "no unit": (_with_attribute("depth_mm", "units", ""), "the unit 'mm': got ''"),
     "NaN": (_with_value("sed_kpa", np.nan), "variable sed_kpa must be finite"),
-    "infinite force": (_with_value("force_mn", np.inf), "variable force_mn must be finite"),
     "a node that does not exist": (
         _with_value("element_nodes", 10**6), "element_nodes must hold whole numbers"),
-    "a negative node": (_with_value("facet_nodes", -3), "facet_nodes must hold whole numbers"),
     "time that falls": (_changed(lambda data: data.isel(time=[0, 2, 1])), "time must increase from 0"),
-    "one time": (_changed(lambda data: data.isel(time=[0])), "time must increase from 0"),
-    "time from 1": (_changed(lambda data: data.isel(time=[1, 2])), "time must increase from 0"),
     "text for numbers": (
         _changed(lambda data: data.assign(
             depth_mm=("time", np.full(data.time.size, "deep"), data.depth_mm.attrs))), "must hold numbers"),
@@ -268,7 +232,6 @@ MALFORMED = {
         "must have the dimensions"),
     "spikes that are not counted": (
         _with_value("spike_count", 9), "spike_count must add up to the 4 of spike"),
-    "a negative count": (_with_value("spike_count", -1), "spike_count must add up"),
     "no side": (
         _changed(lambda data: data.assign_attrs(half_finger=3)), "half_finger must be 0 or 1: got 3"),
     "an impossible name": (lambda path, data: Path("a\0b"), "must be a file or folder that can be read"),
@@ -287,9 +250,3 @@ def test_a_malformed_file_is_refused_in_one_sentence(case, written, tmp_path):
     assert "\n" not in said
     assert said.endswith(".")
     assert str(tmp_path) in said or "/dev/" in said or repr("a\0b") in said
-
-
-def test_fields_are_declared_once():
-    """A field that is added to `FIELDS` is written without a change here."""
-    assert not set(FIELDS) & set(PARTS)
-    assert all(field.long_name for field in FIELDS.values())

@@ -16,7 +16,7 @@ TRUTH = np.array([0.15, 2.0, 1.8])
 STARTS = np.array([[0.0, 1.5, 1.5], [0.0, 3.0, 2.2]])
 
 
-def toy_rates(parameters: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def toy_rates(parameters):
     """Two bumps over a floor: rates of an imagined afferent in two phases."""
     floor, height, width = parameters
     shape = np.exp(-((SHIFTS / width) ** 2))
@@ -31,33 +31,32 @@ class Scored:
     n_observations: int = 36
     names: tuple[str, ...] = ("floor", "height", "width")
 
-    def residuals(self, parameters: np.ndarray, chosen: np.ndarray) -> np.ndarray:
+    def residuals(self, parameters, chosen):
         raise AssertionError("the response surface method needs no residuals")
 
 
-def toy_problem(observed: tuple[np.ndarray, np.ndarray]) -> Scored:
-    def score(parameters: np.ndarray, chosen: np.ndarray) -> float:
-        dynamic, static = toy_rates(parameters)
-        return 0.25 * fractional_sum_of_squares(
-            observed[0][chosen], dynamic[chosen]
-        ) + 0.75 * fractional_sum_of_squares(observed[1][chosen], static[chosen])
+def toy_problem(observed):
+    def score(parameters, chosen):
+        pairs = zip(observed, toy_rates(parameters), strict=True)
+        shares = [fractional_sum_of_squares(seen[chosen], told[chosen]) for seen, told in pairs]
+        return 0.25 * shares[0] + 0.75 * shares[1]
 
     return Scored(score)
 
 
-def toy_method(smallest_gain: float = 1e-4) -> ResponseSurface:
+def toy_method(smallest_gain=1e-4):
     increments = [coding_increments(start, 0.01, where_zero=[0.01, 0.0, 0.0]) for start in STARTS]
     return ResponseSurface(STARTS, increments, smallest_gain=smallest_gain)
 
 
-def test_interleaved_folds_part_36_shifts_into_six_equal_sets() -> None:
+def test_interleaved_folds_part_36_shifts_into_six_equal_sets():
     folds = interleaved_folds(36)
     assert np.bincount(folds).tolist() == [6] * 6
     for fold in range(6):
         np.testing.assert_array_equal(np.flatnonzero(folds == fold), np.arange(fold, 36, 6))
 
 
-def test_synthetic_truth_is_recovered_in_every_fold() -> None:
+def test_synthetic_truth_is_recovered_in_every_fold():
     result = cross_validate(toy_problem(toy_rates(TRUTH)), toy_method(1e-7), interleaved_folds(36))
     assert len(result.folds) == 6
     for fold in result.folds:
@@ -68,7 +67,7 @@ def test_synthetic_truth_is_recovered_in_every_fold() -> None:
     assert result.score_train == pytest.approx(np.mean([fold.score_train for fold in result.folds]))
 
 
-def test_each_fold_is_fitted_without_its_own_observations() -> None:
+def test_each_fold_is_fitted_without_its_own_observations():
     observed = toy_rates(TRUTH)
     clean = cross_validate(toy_problem(observed), toy_method(), interleaved_folds(36))
     spoiled_dynamic = observed[0].copy()
@@ -78,13 +77,19 @@ def test_each_fold_is_fitted_without_its_own_observations() -> None:
     assert spoiled.folds[2].score_train == clean.folds[2].score_train
     assert spoiled.folds[2].score_test < clean.folds[2].score_test - 0.01
     assert spoiled.folds[0].fit.parameters.tobytes() != clean.folds[0].fit.parameters.tobytes()
+    fit, training, method = clean.folds[3].fit, clean.folds[3].training, toy_method()
+    score = toy_problem(observed).score
+    increments = np.asarray(method.increments)[fit.start]
+    alone = maximise(lambda parameters: score(parameters, training), STARTS[fit.start], increments)
+    assert alone.parameters.tobytes() == fit.parameters.tobytes()
+    assert [row.score for row in alone.history] == [row.score for row in fit.history]
 
 
-def test_training_and_testing_sets_part_the_observations() -> None:
+def test_training_and_testing_sets_part_the_observations():
     memberships = np.array([0, 0, 1, 2, 1, 2, 2])
     asked: list[tuple[int, ...]] = []
 
-    def score(parameters: np.ndarray, chosen: np.ndarray) -> float:
+    def score(parameters, chosen):
         asked.append(tuple(chosen.tolist()))
         return -float(parameters[0] ** 2)
 
@@ -98,8 +103,8 @@ def test_training_and_testing_sets_part_the_observations() -> None:
     assert set(asked) == expected
 
 
-def test_the_better_start_on_the_training_set_is_taken() -> None:
-    def two_hills(parameters: np.ndarray, chosen: np.ndarray) -> float:
+def test_the_better_start_on_the_training_set_is_taken():
+    def two_hills(parameters, chosen):
         x = float(parameters[0])
         return max(0.5 - (x + 2.0) ** 2, 1.0 - (x - 2.0) ** 2)
 
@@ -114,34 +119,23 @@ def test_the_better_start_on_the_training_set_is_taken() -> None:
         assert low.score == pytest.approx(0.5, abs=0.01)
 
 
-def test_a_fold_is_the_same_as_a_climb_on_its_training_set() -> None:
-    problem, method = toy_problem(toy_rates(TRUTH)), toy_method()
-    fit = cross_validate(problem, method, interleaved_folds(36)).folds[3].fit
-    training = np.setdiff1d(np.arange(36), np.arange(3, 36, 6))
-    alone = maximise(
-        lambda parameters: problem.score(parameters, training),
-        STARTS[fit.start],
-        np.asarray(method.increments)[fit.start],
-    )
-    assert alone.parameters.tobytes() == fit.parameters.tobytes()
-    assert [row.score for row in alone.history] == [row.score for row in fit.history]
+def none_scored(n_observations, memberships):
+    cross_validate(Scored(lambda *_: 0.0, n_observations), ResponseSurface([[0.0]], [0.1]), memberships)
 
 
-@pytest.mark.parametrize("memberships", [[0, 0, 0], [0, 2, 2], [1, 2, 1], [0.5, 0, 1], [-1, 0, 1]])
-def test_memberships_with_a_gap_are_refused(memberships: list[float]) -> None:
-    with pytest.raises(InputError, match="memberships must number at least two folds"):
-        cross_validate(Scored(lambda *_: 0.0, 3), ResponseSurface([[0.0]], [0.1]), memberships)
-
-
-def test_memberships_that_miss_an_observation_are_refused() -> None:
-    with pytest.raises(InputError, match="memberships needs one fold per observation: got 3 for 4"):
-        cross_validate(Scored(lambda *_: 0.0, 4), ResponseSurface([[0.0]], [0.1]), [0, 1, 0])
-
-
-def test_other_wrong_shapes_are_refused() -> None:
-    with pytest.raises(InputError, match="increments must match starts"):
-        ResponseSurface([[0.0], [1.0]], [0.1, 0.1, 0.1])
-    with pytest.raises(InputError, match="n_folds must be at most the number of stimuli"):
-        interleaved_folds(5)
-    with pytest.raises(InputError, match="n_folds must be a whole number of at least 2"):
-        interleaved_folds(5, 1)
+@pytest.mark.parametrize(
+    ("call", "said"),
+    [
+        (lambda: none_scored(3, [0, 0, 0]), "memberships must number at least two folds"),
+        (lambda: none_scored(3, [0, 2, 2]), "memberships must number at least two folds"),
+        (lambda: none_scored(3, [0.5, 0, 1]), "memberships must number at least two folds"),
+        (lambda: none_scored(3, [-1, 0, 1]), "memberships must number at least two folds"),
+        (lambda: none_scored(4, [0, 1, 0]), "memberships needs one fold per observation: got 3 for 4"),
+        (lambda: ResponseSurface([[0.0], [1.0]], [0.1, 0.1, 0.1]), "increments must match starts"),
+        (lambda: interleaved_folds(5), "n_folds must be at most the number of stimuli"),
+        (lambda: interleaved_folds(5, 1), "n_folds must be a whole number of at least 2"),
+    ],
+)
+def test_wrong_folds_and_shapes_are_refused(call, said):
+    with pytest.raises(InputError, match=said):
+        call()

@@ -5,7 +5,6 @@
 
 import contextlib
 import io
-import json
 import os
 import struct
 import sys
@@ -51,12 +50,13 @@ LONGEST = 2600
 MANY = int(os.environ.get("FUZZ", "1"))
 
 
-def examples(count: int) -> settings:
+def examples(count):
     return settings(max_examples=count * MANY, deadline=None, suppress_health_check=list(HealthCheck))
 
 
 # -- value types ---------------------------------------------------------------------------------------------
 
+BALL = fp.Sphere(curvature_per_m=287)
 VALUES = {
     fp.Sphere: {"curvature_per_m": 287.0},
     fp.Cylinder: {"diameter_mm": 3.0},
@@ -67,19 +67,10 @@ VALUES = {
     fp.Gap: {"gap_mm": 1.0, "width_mm": 8.0, "fillet_mm": 0.1, "lip_mm": 0.1},
     fp.Grating: {"ridge_mm": 1.0, "groove_mm": 1.0, "lip_mm": 0.1},
     fp.Dots: {"at_mm": ((0.0, 0.0), (2.5, 0.0)), "diameter_mm": 1.4, "height_mm": 0.5},
-    fp.Embossed: {
-        "outlines_mm": (((-1.0, -1.0), (1.0, -1.0), (1.0, 1.0), (-1.0, 1.0)),),
-        "height_mm": 0.5,
-        "edge_radius_mm": 0.1,
-    },
-    fp.Union: {
-        "parts": (fp.Sphere(curvature_per_m=287), fp.Sphere(curvature_per_m=400)),
-        "at_mm": ((0, 0, 0), (3, 0, 0)),
-        "seam_mm": 0.0,
-    },
+    fp.Embossed: {"outlines_mm": (((-1, -1), (1, -1), (1, 1.0)),), "height_mm": 0.5, "edge_radius_mm": 0.1},
+    fp.Union: {"parts": (BALL, fp.Plate()), "at_mm": ((0, 0, 0), (3, 0, 0)), "seam_mm": 0.0},
     fp.Surface: {
-        "vertices_mm": [[-1.0, 0, -1], [1.0, 0, -1], [0.0, 0, 1]],
-        "faces": [[0, 2, 1]],
+        "vertices_mm": [[-1.0, 0, -1], [1.0, 0, -1], [0.0, 0, 1]], "faces": [[0, 2, 1]],
         "smooth_below_deg": 10.0,
     },
     fp.RampAndHold: {"depth_mm": 1.0, "ramp_ms": 50.0, "hold_ms": 950.0},
@@ -89,31 +80,18 @@ VALUES = {
     fp.Phase: {"name": "ramp", "start_ms": 0.0, "end_ms": 50.0},
     fp.Fingertip: {"length_mm": 31.78, "dermis_mm": 1.1, "nail_x_mm": (16.5, 29.25), "spine_y_mm": -2.0},
     fp.Grading: {
-        "centre_mm": 17.0,
-        "half_length_mm": 2.0,
-        "half_width_mm": 2.0,
-        "size_x_mm": 0.5,
-        "size_z_mm": 0.5,
-        "dermis": 3,
-        "full": True,
-        "finer_along": ((16.0, 18.0, 0.1),),
+        "centre_mm": 17.0, "half_length_mm": 2.0, "half_width_mm": 2.0, "size_x_mm": 0.5, "size_z_mm": 0.5,
+        "dermis": 3, "full": True, "finer_along": ((16.0, 18.0, 0.1),),
     },
     fp.Polynomial: {"c10": 5.0, "c01": 0.0, "bulk_linear": 100.0, "bulk_cubic": 0.0},
     fp.Ogden: {"moduli_kpa": (5.0, 1.0), "exponents": (2.0, -2.0), "bulk_kpa": 100.0},
     fp.Hyperfoam: {"moduli_kpa": (5.0,), "exponents": (2.0,), "poisson": 0.3},
     fp.Hencky: {"shear_kpa": 5.0, "bulk_kpa": 100.0},
-    fp.Energy: {
-        "formula": "m / 2 * (I1 - 3) + k / 2 * (J - 1)**2",
-        "coefficients": (("m", 5.0), ("k", 100.0)),
-    },
+    fp.Energy: {"formula": "m * (I1 - 3) + k * (J - 1)**2", "coefficients": (("m", 5.0), ("k", 100.0))},
     fp.Prony: {"shares": (0.3, 0.1), "times_ms": (25.0, 300.0)},
     fp.Material: {"law": fp.Hencky(5.0, 100.0), "prony": fp.Prony(), "moduli": "long_term"},
-    fp.Tissues: dict(
-        zip(
-            ("stratum_corneum", "living_epidermis", "dermis", "subcutis"),
-            [fp.Material(fp.Hencky(5.0, 100.0))] * 4,
-            strict=True,
-        )
+    fp.Tissues: dict.fromkeys(
+        ("stratum_corneum", "living_epidermis", "dermis", "subcutis"), fp.Material(fp.Hencky(5.0, 100.0))
     ),
     fp.PressSettings: {"ramp_steps": 5, "hold_steps": 5, "times_ms": (1.0, 2.0), "cycle_tolerance": 0.01},
     NewtonSettings: {"residual_tolerance": 1e-5, "most_iterations": 40, "persistent": False},
@@ -123,10 +101,7 @@ VALUES = {
     fp.SAI: {"smoothing_ms": 2.0, "static_gain": 5e-7},
     Transduction: {"intercept_ma": 0.0, "dynamic_gain": 1.0, "static_gain": 1.0},
     LeakyIntegrateAndFire: {
-        "time_constant_ms": 80.0,
-        "capacitance_mf": 1e-6,
-        "threshold_mv": 30.0,
-        "refractory_ms": 1.0,
+        "time_constant_ms": 80.0, "capacitance_mf": 1e-6, "threshold_mv": 30.0, "refractory_ms": 1.0,
     },
     BandPass: {"corner_hz": 30.0, "rise": 2, "fall": 2},
     fp.Population: {"positions_mm": [[17.0, 0.0], [18.0, 0.0]], "pitch_mm": 1.0, "sensitivity": [1.0, 2.0]},
@@ -146,19 +121,9 @@ VALUES = {
     RateRecordings: {"stimuli": ("a", "b"), "dynamic_rate_hz": [1.0, 2.0], "static_rate_hz": [1.0, 2.0]},
     SurfaceProfile: {"distance_mm": [0.0, 1.0], "deflection_mm": [0.1, 0.2]},
     Conditions: {"resolution": "quick", "seed": 3, "tissues": "human"},
-    TactileStimulus: {
-        "indenter": fp.Sphere(curvature_per_m=287),
-        "x_mm": 1.0,
-        "tilt_deg": 3.0,
-        "friction": 0.3,
-    },
-    fp.ReducedRange: {
-        "depth_mm": 1.0,
-        "x_mm": (-1.0, 1.0),
-        "parameter": "curvature_per_m",
-        "values": (200, 300),
-    },
-}
+    TactileStimulus: {"indenter": BALL, "x_mm": 1.0, "tilt_deg": 3.0, "friction": 0.3},
+    fp.ReducedRange: {"depth_mm": 1.0, "x_mm": (-1, 1), "parameter": "curvature_per_m", "values": (200, 300)},
+}  # fmt: skip
 
 numbers = st.one_of(
     st.floats(),
@@ -187,7 +152,7 @@ oddities = st.one_of(
 )  # fmt: skip
 
 
-def changed(value: object, odd: object, place: int) -> object:
+def changed(value, odd, place):
     """Value with an odd one in its place, or somewhere within it."""
     if isinstance(value, tuple | list) and value and place % 3:
         items = list(value)
@@ -196,11 +161,12 @@ def changed(value: object, odd: object, place: int) -> object:
     return odd
 
 
-@examples(1100)
+@examples(500)
 @given(st.sampled_from(list(VALUES)), st.integers(0, 999), oddities, st.integers(0, 80))
 @pytest.mark.filterwarnings("ignore::fingerpad.core.errors.MaterialWarning")
 def test_a_value_type_takes_a_value_or_refuses_it_in_one_sentence(kind, which, odd, place):
     fields = VALUES[kind]
+    kind(**fields)
     name = list(fields)[which % len(fields)]
     given_values = fields | {name: changed(fields[name], odd, place)}
     try:
@@ -226,11 +192,6 @@ def test_a_value_type_takes_a_value_or_refuses_it_in_one_sentence(kind, which, o
     repr(made)
 
 
-def test_unchanged_values_are_taken():
-    for kind, fields in VALUES.items():
-        kind(**fields)
-
-
 # -- files ---------------------------------------------------------------------------------------------------
 
 STL = b"\0" * 80 + struct.pack("<I", 1) + struct.pack("<12fH", 0, 0, 1, 0, 0, 0, 2, 0, 0, 0, 2, 0, 0)
@@ -239,15 +200,10 @@ PLY = (
     b"ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n"
     b"element face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0\n2 0 0\n0 2 0\n3 0 1 2\n"
 )
-FIT = json.dumps(
-    {
-        "format": "fingerpad fit",
-        "format_version": 3,
-        "fit": {"parameters": {"intercept_ma": 0.0}},
-        "dynamic_quantity": "stored",
-        "static_quantity": "stored",
-    }
-).encode()
+FIT = (
+    b'{"format": "fingerpad fit", "format_version": 3, "fit": {"parameters": {"intercept_ma": 0.0}},'
+    b'"dynamic_quantity": "stored", "static_quantity": "stored"}'
+)
 MESH = (
     b'$MeshFormat\n4.1 0 8\n$EndMeshFormat\n$PhysicalNames\n1\n3 1 "dermis"\n$EndPhysicalNames\n'
     b"$Nodes\n1 4 1 4\n3 1 0 4\n1\n2\n3\n4\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n$EndNodes\n"
@@ -256,13 +212,13 @@ MESH = (
 INP = b"*NODE\n1, 0., 0., 0.\n2, 1., 0., 0.\n*ELEMENT, TYPE=C3D8, ELSET=dermis\n1, 1, 2, 1, 2, 1, 2, 1, 2\n"
 
 
-def _array(values: object) -> bytes:
+def _array(values):
     stored = io.BytesIO()
     np.save(stored, values)
     return stored.getvalue()
 
 
-def _picture() -> bytes:
+def _picture():
     from PIL import Image
 
     stored = io.BytesIO()
@@ -301,15 +257,14 @@ FILES = {
 
 TOKENS = [
     b"", b"\n", b"\0", b"\xff\xfe", b"nan", b"inf", b"-1", b"1e400", b"9" * 5000, b"1_0", b"1:30",
-    b"2001-13-45",
-    b"!!int x", b"&a [*a]", b"*a", b"<<: *a", b"{", b"[" * 50, b"- " * 50, b"'", b'"', b",", b";", b"\t",
-    b": ",
-    b"#", b"~", b"0x_", "１".encode(), "\u202e".encode(), b"$\\nope{ $", b"..", b"/", b"%s", b"a" * 3000,
+    b"2001-13-45", b"!!int x", b"&a [*a]", b"*a", b"<<: *a", b"{", b"[" * 50, b"- " * 50, b"'", b'"', b",",
+    b";", b"\t", b": ", b"#", b"~", b"0x_", "１".encode(), "\u202e".encode(), b"$\\nope{ $", b"..", b"/",
+    b"%s", b"a" * 3000,
 ]  # fmt: skip
 
 
 @st.composite
-def damaged(draw: st.DrawFn, content: bytes) -> bytes:
+def damaged(draw, content):
     """Content with some bytes replaced, inserted, repeated or cut away."""
     for _ in range(draw(st.integers(1, 3))):
         begin = draw(st.integers(0, len(content)))
@@ -319,7 +274,7 @@ def damaged(draw: st.DrawFn, content: bytes) -> bytes:
     return content
 
 
-@examples(900)
+@examples(400)
 @given(st.sampled_from(list(FILES)), st.data())
 @pytest.mark.filterwarnings("ignore::fingerpad.core.errors.InertiaWarning")
 def test_a_damaged_file_is_read_or_refused_in_one_sentence(tmp_path_factory, name, data):
@@ -340,23 +295,20 @@ COMMANDS = [
     "reduce", "store",
 ]  # fmt: skip
 OPTIONS = [
-    "--out", "--resolution", "--tissues", "--jobs", "--seed", "--stimulus", "--depth", "--width",
-    "--fillet",
+    "--out", "--resolution", "--tissues", "--jobs", "--seed", "--stimulus", "--depth", "--width", "--fillet",
     "--folds", "--method", "--unit", "--static-window", "--finger", "--list", "--example", "--format",
-    "--touch",
-    "--extended", "--dry-run", "--help", "--version", "--scheduler", "--posterior", "list", "verify", "prune",
+    "--touch", "--extended", "--dry-run", "--help", "--version", "--scheduler", "--posterior", "list",
+    "verify", "prune",
 ]  # fmt: skip
 WORDS = [
     "", "-1", "0", "1", "nan", "inf", "1e400", "9" * 400, "quick", "human", "bar", "x", "none.yaml",
-    "touch.yaml",
-    "task.yaml", "rates.csv", "/dev/zero", "/dev/null", ".", "..", "a\0b", "$\\nope{ $", "--", "-", "１",
-    "\ud800",
-    "sphere_curvature", "gap_detection", "paper", "adult:width_mm=18", "child", "30", "50", "a" * 3000,
-    "vtu", "csv",
+    "touch.yaml", "task.yaml", "rates.csv", "/dev/zero", "/dev/null", ".", "..", "a\0b", "$\\nope{ $", "--",
+    "-", "１", "\ud800", "sphere_curvature", "gap_detection", "paper", "adult:width_mm=18", "child", "30",
+    "50", "a" * 3000, "vtu", "csv",
 ]  # fmt: skip
 
 
-@examples(300)
+@examples(150)
 @given(st.sampled_from(COMMANDS), st.lists(st.sampled_from(OPTIONS + 2 * WORDS), max_size=6))
 def test_a_command_line_ends_with_a_status_and_at_most_one_sentence(tmp_path_factory, command, words):
     folder = tmp_path_factory.mktemp("cli", numbered=True)
@@ -364,7 +316,7 @@ def test_a_command_line_ends_with_a_status_and_at_most_one_sentence(tmp_path_fac
         (folder / name).write_bytes(FILES[name][0])
     said, errors = io.StringIO(), io.StringIO()
 
-    def refuse(*args: object, **kwargs: object) -> None:
+    def refuse(*args, **kwargs):
         raise FingerpadError("This would press.")
 
     with pytest.MonkeyPatch.context() as patched:

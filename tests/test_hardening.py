@@ -1,6 +1,6 @@
 """Defects that scripted odd inputs found, each closed where the value enters; named by what is checked."""
 
-import io
+import os
 import re
 import subprocess
 import sys
@@ -18,8 +18,7 @@ import fingerpad as fp
 from fingerpad.cli import main, run
 from fingerpad.core.errors import LONGEST_MESSAGE, FingerpadError, InputError, closest
 from fingerpad.core.files import read_text
-from fingerpad.core.layouts import Layout
-from fingerpad.core.patterns import hexagonal, poisson_disc, rectangular
+from fingerpad.core.patterns import poisson_disc, rectangular
 from fingerpad.core.plain_yaml import DEEPEST, LARGEST_TEXT, read_yaml
 from fingerpad.core.regions import Rectangle
 from fingerpad.core.signals import CurrentTraces
@@ -43,21 +42,15 @@ from fingerpad.psychophysics.ideal_observer import GaussianResponses
 from fingerpad.psychophysics.psychometric import fit_psychometric
 from fingerpad.report.style import new_figure, png
 from fingerpad.skin.sampling import SurfaceProfile
-from fingerpad.skin.store import Store
+from fingerpad.skin.store import Store, touch_key
 
 HUGE = 10**400
 PAIRS = np.array([[0, 1], [1, 2]])
 TRAINS = fp.SpikeTrains.from_lists([[12.0, 40.0], []])
-TRACES = fp.SedTraces(
-    [0.0, 50.0, 1000.0], [[0.0] * 4, [3.0, 5.0, 7.0, 9.0], [3.0, 5.0, 7.0, 9.0]], kinks_ms=[50.0]
-)
-MANY = fp.SedTraces(
-    [0.0, 50.0, 1000.0],
-    np.outer([0.0, 20.0, 20.0], np.ones(18)),
-    kinks_ms=[50.0],
-    dynamic_quantity="compressive_stress",
-    static_quantity="compressive_stress",
-)
+TIMES_MS, COURSE = [0.0, 50.0, 1000.0], [0.0, 1.0, 1.0]
+TRACES = fp.SedTraces(TIMES_MS, np.outer(COURSE, [3.0, 5.0, 7.0, 9.0]), [50.0])
+STRESS = {"dynamic_quantity": "compressive_stress", "static_quantity": "compressive_stress"}
+MANY = fp.SedTraces(TIMES_MS, np.outer(COURSE, np.full(18, 20.0)), [50.0], **STRESS)
 TASK = """
 question: Which spheres?
 object: {kind: sphere}
@@ -68,21 +61,12 @@ resolution: quick
 """
 
 
-def task_run(tmp_path, more: str) -> DiscriminationRun:
+def task_run(tmp_path, more):
     return DiscriminationRun(parse_task(read_yaml(TASK + more, "task")), tmp_path, source="task", text=TASK)
 
 
-# D2, D22
-
-
 @pytest.mark.parametrize(
-    "body",
-    [
-        fp.FlatPunch(0.1, 0.0),
-        fp.Sphere(radius_mm=0.02),
-        fp.Cylinder(0.02),
-        fp.Bar(0.02, 0.0),
-    ],
+    "body", [fp.FlatPunch(0.1, 0.0), fp.Sphere(radius_mm=0.02), fp.Cylinder(0.02), fp.Bar(0.02, 0.0)]
 )
 def test_a_body_between_the_nodes_is_refused_before_it_is_pressed(body):
     with pytest.raises(InputError):
@@ -95,10 +79,7 @@ def test_a_body_between_the_nodes_is_refused_before_it_is_pressed(body):
         lambda: fp.Grading(17.37, 5.0, 1.0, 1e-4, 1e-4),
         lambda: poisson_disc(Rectangle(30.0, 30.0), 1e5, 0, 0.8),
         lambda: rectangular(Rectangle(1e9, 1e-6), 100.0),
-        lambda: hexagonal(Rectangle(1e9, 1e-6), 100.0),
         lambda: fp.Population.grid(rows=10**6, columns=10**6),
-        lambda: sensitivities(10**12, 0.1, 1),
-        lambda: Experiment(presentations=10**12),
         lambda: Experiment(presentations=10**5, distributions=10**5),
         lambda: parse_task(read_yaml(TASK + "experiment: {trials: 1000000000000}", "task")),
     ],
@@ -108,9 +89,6 @@ def test_sizes_without_memory_or_end_are_refused_at_once(make):
     with pytest.raises(InputError, match=r"at most|may have|more than"):
         make()
     assert time.process_time() - began < 2.0
-
-
-# D3
 
 
 @pytest.mark.parametrize("window", [(50, 30), (np.nan, 50), (-100, -50), (50, 50), (30,), (600, 9500), "ab"])
@@ -127,29 +105,17 @@ def test_windows_of_rates_lie_in_what_was_recorded(window):
             ask()
 
 
-# D5, D10, D15
-
-
-def test_codes_and_measures_of_a_task_are_named_once(tmp_path):
-    for key, names in (("code", "[gradient_sum, gradient_sum]"), ("measure", "[static, static]")):
-        with pytest.raises(InputError, match=f"{key} must name each once"):
-            task_run(tmp_path, f"{key}: {names}\n")
-
-
 @pytest.mark.parametrize(
     ("more", "said"),
     [
+        ("code: [gradient_sum, gradient_sum]", "code must name each once"),
+        ("measure: [static, static]", "measure must name each once"),
         ("population: {offset_mm: [99, 0]}", "population.*must lie on the volar skin"),
         ("population: {density_per_cm2: 1.0e-6}", "population.*must lie on the volar skin"),
     ],
 )
-def test_a_population_beside_the_finger_is_refused_before_anything_is_pressed(
-    tmp_path, monkeypatch, more, said
-):
-    def press(*args, **kwargs):
-        raise AssertionError("pressed")
-
-    monkeypatch.setattr("fingerpad.experiments.runner.Runner.solve", press)
+def test_an_impossible_task_is_refused_before_anything_is_pressed(tmp_path, monkeypatch, more, said):
+    monkeypatch.setattr("fingerpad.experiments.runner.Runner.solve", pytest.fail)
     with pytest.raises(InputError, match=said):
         discriminate(task_run(tmp_path, more))
 
@@ -162,9 +128,6 @@ def test_seeds_fit_into_63_bits_where_they_enter():
     ):
         with pytest.raises(InputError, match="seed must"):
             make()
-
-
-# D6, D8, D20, D30
 
 
 @pytest.mark.parametrize(
@@ -180,9 +143,8 @@ def test_yaml_has_decimal_numbers_words_and_nothing_else(text, value):
     assert read_yaml(text, "f") == value
 
 
-ALIASES = "\n".join(
-    ["a: &a [1]"]
-    + [f"{b}: &{b} [{','.join(['*' + a] * 9)}]" for a, b in zip("abcdefghi", "bcdefghij", strict=True)]
+ALIASES = "a: &a [1]\n" + "\n".join(
+    f"{b}: &{b} [{','.join(['*' + a] * 9)}]" for a, b in zip("abcdefghi", "bcdefghij", strict=True)
 )
 
 
@@ -215,14 +177,14 @@ def test_a_mapping_of_many_keys_is_read_in_linear_time():
     assert took[1] < 24 * max(took[0], 0.02)  # 64 times if each key were compared with each
 
 
-# D7, D20, D27
-
-
-def test_a_large_fold_is_named_at_once(tmp_path):
+def test_a_large_fold_and_a_table_of_semicolons_are_named_at_once(tmp_path):
     for fold in ("1000000000", "1e18", "1e300"):
         (tmp_path / "r.csv").write_text(f"shift_mm,static_rate_hz,fold\n0,1,1\n1,2,{fold}\n")
         with pytest.raises(InputError, match="no row is in fold 2"):
             read_recordings(tmp_path / "r.csv", ShiftedBar())
+    (tmp_path / "r.csv").write_text("a;b;c\n1;2;3\n")
+    with pytest.raises(InputError, match="Separate entries by commas"):
+        read_csv(tmp_path / "r.csv", ("a", "b", "c"))
 
 
 def test_recordings_of_many_shifts_are_read_in_linear_time(tmp_path):
@@ -233,20 +195,8 @@ def test_recordings_of_many_shifts_are_read_in_linear_time(tmp_path):
     assert len(recorded.recordings.stimuli) == 4_000
     assert set(recorded.presentations.values()) == {2}
     assert time.process_time() - began < 6.0
-
-
-def test_shifts_that_differ_in_the_ninth_digit_are_two_stimuli():
     names = [ShiftedBar().named(text).name for text in ("0.123456789", "0.123456788", "1.50", "-2", "1e-5")]
     assert names == ["0.123456789", "0.123456788", "1.5", "-2", "1e-05"]
-
-
-def test_a_table_of_semicolons_is_told_to_have_commas(tmp_path):
-    (tmp_path / "r.csv").write_text("a;b;c\n1;2;3\n")
-    with pytest.raises(InputError, match="Separate entries by commas"):
-        read_csv(tmp_path / "r.csv", ("a", "b", "c"))
-
-
-# D9
 
 
 def test_names_with_dollars_are_drawn_as_they_are():
@@ -262,8 +212,6 @@ def test_names_with_dollars_are_drawn_as_they_are():
     assert png(draw, r"$\nope{ $").startswith(b"\x89PNG")
 
 
-# D11, D12, D28
-
 NO_NUMBERS = [
     HUGE, -HUGE, "3", b"3", True, np.bool_(True), None, ["3.0"], 1j, np.complex128(1.0),
     np.datetime64("2001-01-01"), np.timedelta64(3, "ms"), np.ma.masked, np.array("3"), np.array([[[3.0]]]),
@@ -272,7 +220,6 @@ NO_NUMBERS = [
 ]  # fmt: skip
 
 
-@pytest.mark.parametrize("odd", NO_NUMBERS, ids=[str(number) for number in range(len(NO_NUMBERS))])
 @pytest.mark.parametrize(
     "make",
     [
@@ -287,23 +234,16 @@ NO_NUMBERS = [
         lambda odd: Experiment(criterion=odd),
     ],
 )
-def test_what_is_no_finite_real_number_is_refused_where_it_enters(make, odd):
-    with pytest.raises(InputError) as error:
-        make(odd)
-    assert len(str(error.value)) < 300
+def test_what_is_no_finite_real_number_is_refused_where_it_enters(make):
+    for odd in NO_NUMBERS:
+        with pytest.raises(InputError) as error:
+            make(odd)
+        assert len(str(error.value)) < 300
 
 
 @pytest.mark.parametrize(
     "half",
-    [
-        0.5,
-        np.float32(0.5),
-        np.float16(0.5),
-        np.longdouble(0.5),
-        Decimal("0.5"),
-        Fraction(1, 2),
-        np.array(0.5),
-    ],
+    [np.float32(0.5), np.float16(0.5), np.longdouble(0.5), Decimal("0.5"), Fraction(1, 2), np.array(0.5)],
 )
 def test_numbers_of_any_real_type_become_the_same_float(half):
     for made, plain in (
@@ -317,26 +257,17 @@ def test_numbers_of_any_real_type_become_the_same_float(half):
 
 
 def test_an_integer_a_numpy_number_and_a_float_have_one_key():
-    from fingerpad.skin.store import touch_key
-
-    keys = {
-        touch_key(
-            fp.touch_of(
-                fp.Fingertip(), fp.Sphere(curvature_per_m=curvature), fp.RampAndHold(half), tilt_deg=zero
-            )
-        )
-        for curvature, half, zero in (
-            (287.0, 0.5, 0.0),
-            (287, np.float32(0.5), 0),
-            (np.float32(287), 0.5, np.int8(0)),
-        )
-    }
+    keys = set()
+    for curvature, half, zero in (
+        (287.0, 0.5, 0.0),
+        (287, np.float32(0.5), 0),
+        (np.float32(287), 0.5, np.int8(0)),
+    ):
+        ball, motion = fp.Sphere(curvature_per_m=curvature), fp.RampAndHold(half)
+        keys.add(touch_key(fp.touch_of(fp.Fingertip(), ball, motion, tilt_deg=zero)))
     assert len(keys) == 1
     with pytest.raises(InputError, match="friction must be a finite number"):
         fp.touch_of(fp.Fingertip(), fp.Sphere(curvature_per_m=287), friction="0.3")
-
-
-# D13, D14
 
 
 def test_sequences_become_tuples_so_that_values_hash():
@@ -354,27 +285,28 @@ def test_sequences_become_tuples_so_that_values_hash():
         lambda: fp.PressSettings(newton=None),
         lambda: fp.Population.grid(afferent="x"),
         lambda: TactileStimulus(None),
-        lambda: fp.Afferent(dynamic_quantity=3),
         lambda: fp.Afferent(dynamic_quantity="x"),
-        lambda: fp.OwnAfferent(len, static_quantity="sed"),
-        lambda: fp.Fingertip(bone_width_mm=9.0),
         lambda: fp.Union([fp.Sphere()], at_mm=None),
         lambda: gradient_sum([1.0, np.nan, 2.0], PAIRS),
-        lambda: gradient_sum([1.0, 2.0], [[1, 1]]),
         lambda: discriminate_gradient_sum([[1, 2, 3], [3, 4, 2]], PAIRS, 0.1, 1, silent_value=np.nan),
         lambda: discriminate_gradient_sum([[1, 2, 3], [3, 4, 2]], np.empty((0, 2), int), 0.1, 1),
-        lambda: TRAINS.counted_hz((50.0, 30.0)),
         lambda: replace(fp.Population.grid().respond_to(MANY), windows_ms=((50.0, 30.0), (600.0, 950.0))),
-        lambda: Layout([[1, 2]], 1, "nonsense", None),
-        lambda: Layout([[1, 2]], 1, "uniform", -5),
         lambda: SurfaceProfile([2, 1], [np.nan]),
-        lambda: SurfaceProfile([2, 1], [0.1, 0.1]),
-        lambda: RateRecordings((), [], None),
         lambda: RateRecordings("ab", [1.0, 2.0], None),
-        lambda: fp.Material("soft"),
-        lambda: fp.PressSettings(ramp_steps=5.0),
         lambda: fp.Grading(17.0, 1.0, 1.0, 0.5, 0.5, full="yes"),
         lambda: fp.Phase(3, 0.0, 1.0),
+        lambda: fp.SpikeTrains([1.0, 2.0], [0, 0.5, 2]),
+        lambda: fp.SedTraces([0, 1], np.ma.array([[1.0], [2.0]], mask=[[0], [1]])),
+        lambda: fp.SedTraces(np.array(["2001-01-01", "2001-01-02"], dtype="datetime64[D]"), [[1.0], [2.0]]),
+        lambda: CurrentTraces([0.0, 1.0], [[1j], [2.0]]),
+        lambda: fp.SedTraces([0.0, HUGE], [[1.0], [2.0]]),
+        lambda: GaussianResponses([1.0, 2.0], [[1.0, 99.0], [0.1, 1.0]]),
+        lambda: fp.reduced([0.0, 1.0]),
+        lambda: fp.sampled(100.0, depth_mm=(1, 2)),
+        lambda: fp.chirp(0.8, 0.05, (5.0, "6"), sweep_ms=1000.0),
+        lambda: fp.braille(3),
+        lambda: fp.braille([["a"]]),
+        lambda: fp.named_tissues(np.array([1.0, 2.0])),
     ],
 )
 def test_a_value_of_another_kind_is_refused_where_it_enters(make):
@@ -382,25 +314,25 @@ def test_a_value_of_another_kind_is_refused_where_it_enters(make):
         make()
 
 
-# D16, D18, D24, D26
-
-
-def test_devices_pipes_folders_and_null_characters_are_no_files(tmp_path):
-    import os
-
+def test_devices_pipes_folders_large_files_and_null_characters_are_no_files(tmp_path, monkeypatch):
     os.mkfifo(tmp_path / "pipe")
     for path in ("/dev/zero", tmp_path / "pipe", tmp_path, "a\0b", tmp_path / "none"):
         with pytest.raises(InputError, match=r"must be a file that can be read|null character"):
             read_text(path)
+    monkeypatch.setattr("fingerpad.core.files.LARGEST_TEXT_MB", 1e-6)
+    (tmp_path / "a.csv").write_text("long enough")
+    with pytest.raises(InputError, match="at most 1e-06 MB"):
+        read_text(tmp_path / "a.csv")
 
 
 def test_a_pipe_in_the_place_of_an_archive_does_not_hang(tmp_path):
-    import os
-
     pipe = tmp_path / "model.npz"
     os.mkfifo(pipe)
     with pytest.raises(InputError, match="it is a device or a pipe"):
         fp.read_reduced(pipe)
+    np.save(tmp_path / "text.npy", np.array([["a", "b"]]))
+    with pytest.raises(InputError, match="must hold real numbers"):
+        fp.read_height_map(tmp_path / "text.npy", 0.5)
     for ending in (".npy", ".png"):
         os.mkfifo(pipe.with_suffix(ending))
         with pytest.raises(InputError):
@@ -410,13 +342,6 @@ def test_a_pipe_in_the_place_of_an_archive_does_not_hang(tmp_path):
     store.path(touch).parent.mkdir()
     os.mkfifo(store.path(touch))
     assert store.missing([touch])
-
-
-def test_a_large_file_is_refused_by_its_size(tmp_path, monkeypatch):
-    monkeypatch.setattr("fingerpad.core.files.LARGEST_TEXT_MB", 1e-6)
-    (tmp_path / "a.csv").write_text("long enough")
-    with pytest.raises(InputError, match="at most 1e-06 MB"):
-        read_text(tmp_path / "a.csv")
 
 
 def test_an_error_of_the_system_is_one_sentence(capsys):
@@ -432,12 +357,8 @@ def test_an_error_of_the_system_is_one_sentence(capsys):
 @pytest.mark.skipif(sys.platform != "linux", reason="it needs /dev/full")
 def test_a_full_output_is_one_sentence():
     with open("/dev/full", "w") as full:
-        done = subprocess.run(
-            [sys.executable, "-m", "fingerpad", "discriminate", "--example", "gap_detection"],
-            stdout=full,
-            stderr=subprocess.PIPE,
-            text=True,
-        )
+        command = [sys.executable, "-m", "fingerpad", "discriminate", "--example", "gap_detection"]
+        done = subprocess.run(command, stdout=full, stderr=subprocess.PIPE, text=True)
     assert done.returncode == 2
     assert done.stderr == "fingerpad: The output cannot be used (No space left on device).\n"
 
@@ -479,32 +400,6 @@ def test_no_message_has_a_value_at_full_length(tmp_path):
         assert len(str(error.value)) <= 0.8 * LONGEST_MESSAGE
 
 
-# D17
-
-
-@pytest.mark.parametrize(
-    "make",
-    [
-        lambda: fp.SpikeTrains([1.0, 2.0], [0, 0.5, 2]),
-        lambda: fp.SedTraces([0, 1], np.ma.array([[1.0], [2.0]], mask=[[0], [1]])),
-        lambda: fp.SedTraces(np.array(["2001-01-01", "2001-01-02"], dtype="datetime64[D]"), [[1.0], [2.0]]),
-        lambda: fp.SedTraces(["0", "1"], [[1.0], [2.0]]),
-        lambda: fp.SedTraces([0.0, True], [[1.0], [2.0]]),
-        lambda: CurrentTraces([0.0, 1.0], [[1j], [2.0]]),
-        lambda: fp.SedTraces([0.0, HUGE], [[1.0], [2.0]]),
-        lambda: fp.SedTraces([0.0, 1.0], [[1.0], [1.0, 2.0]]),
-        lambda: fp.SedTraces([0.0, np.ma.masked], [[1.0], [2.0]]),
-        lambda: GaussianResponses([1.0, 2.0], [[1.0, 99.0], [0.1, 1.0]]),
-    ],
-)
-def test_arrays_of_other_things_than_real_numbers_are_refused(make):
-    with pytest.raises(InputError):
-        make()
-
-
-# D19
-
-
 @pytest.mark.parametrize(
     ("formula", "coefficients"),
     [
@@ -521,9 +416,6 @@ def test_a_formula_that_is_none_is_refused(formula, coefficients):
     assert len(str(error.value)) < 600
 
 
-# D23, D30
-
-
 def test_times_and_levels_beyond_use_are_refused():
     with pytest.raises(InputError, match="ramp_ms must lie within"):
         fp.RampAndHold(0.2, 1e300, 1e300)
@@ -536,9 +428,6 @@ def test_times_and_levels_beyond_use_are_refused():
             ShiftedBar().named(text)
 
 
-# D25
-
-
 @pytest.mark.parametrize(
     "words", [("discriminate", "x", "--out", ""), ("export", ""), ("fit", "--example", "")]
 )
@@ -546,18 +435,9 @@ def test_an_empty_word_is_no_folder(run_program, is_refused, words):
     is_refused(run_program(main, "fingerpad", *words), "fingerpad", "must not be empty", "")
 
 
-def test_arrays_of_texts_in_files_of_numpy_are_no_heights(tmp_path):
-    stored = io.BytesIO()
-    np.save(stored, np.array([["a", "b"]]))
-    (tmp_path / "map.npy").write_bytes(stored.getvalue())
-    with pytest.raises(InputError, match="must hold real numbers"):
-        fp.read_height_map(tmp_path / "map.npy", 0.5)
-
-
 # Values of another kind than a function takes
 
 
-@pytest.mark.parametrize("path", [None, 3, 2.5, True, b"touch.csv", [], {}, np.float32(1)], ids=repr)
 @pytest.mark.parametrize(
     "read",
     [
@@ -567,12 +447,12 @@ def test_arrays_of_texts_in_files_of_numpy_are_no_heights(tmp_path):
     ],
     ids=lambda read: getattr(read, "__name__", ""),
 )  # fmt: skip
-def test_what_is_no_path_is_refused(read, path):
-    with pytest.raises(InputError, match=r"must be a path, as a text or a Path: got"):
-        read(path)
+def test_what_is_no_path_is_refused(read):
+    for path in (None, 3, 2.5, True, b"touch.csv", [], {}, np.float32(1)):
+        with pytest.raises(InputError, match=r"must be a path, as a text or a Path: got"):
+            read(path)
 
 
-@pytest.mark.parametrize("data", [None, 3, [], {}, "study.zarr", np.zeros(2)], ids=repr)
 @pytest.mark.parametrize(
     "use",
     [
@@ -583,34 +463,13 @@ def test_what_is_no_path_is_refused(read, path):
     ],
     ids=lambda use: getattr(use, "__name__", ""),
 )  # fmt: skip
-def test_what_is_no_data_set_of_a_sweep_is_refused(use, data):
-    with pytest.raises(InputError, match="must be a data set from open_sweep: got"):
-        use(data)
-
-
-@pytest.mark.parametrize(
-    "make",
-    [
-        lambda: fp.reduced([0.0, 1.0]),
-        lambda: fp.sampled(100.0, depth_mm=(1, 2)),
-        lambda: fp.chirp(0.8, 0.05, 5.0, sweep_ms=1000.0),
-        lambda: fp.chirp(0.8, 0.05, (5.0, "6"), sweep_ms=1000.0),
-        lambda: fp.braille(3),
-        lambda: fp.braille([["a"]]),
-        lambda: fp.named_tissues(np.array([1.0, 2.0])),
-        lambda: fp.named_tissues(["human"]),
-    ],
-)
-def test_arguments_of_another_kind_are_refused(make):
-    with pytest.raises(InputError):
-        make()
+def test_what_is_no_data_set_of_a_sweep_is_refused(use):
+    for data in (None, 3, [], {}, "study.zarr", np.zeros(2)):
+        with pytest.raises(InputError, match="must be a data set from open_sweep: got"):
+            use(data)
 
 
 # What a first user met
-
-
-def test_a_name_without_its_unit_means_the_first_unit():
-    assert closest("depth", ["time_ms", "depth_mm", "depth_um"]) == "depth_mm"
 
 
 def test_an_estimate_counts_the_cycles_that_are_solved():
@@ -618,6 +477,7 @@ def test_an_estimate_counts_the_cycles_that_are_solved():
     many = estimate_press(described_touch({"object": "sphere", "motion": motion}))
     ten = estimate_press(described_touch({"object": "sphere", "motion": motion | {"cycles": 10}}))
     assert many.steps == ten.steps
+    assert closest("depth", ["time_ms", "depth_mm", "depth_um"]) == "depth_mm"
 
 
 def test_a_command_shows_a_warning_as_one_sentence_without_its_place(run_program, tmp_path):

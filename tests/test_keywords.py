@@ -24,25 +24,13 @@ SAME = [
     (fp.Sphere(diameter_mm=8.0), fp.Sphere(curvature_per_m=250.0), "sphere:diameter_mm=8.0"),
     (fp.Cylinder(radius_mm=1.5), fp.Cylinder(3.0), "cylinder: radius_mm = 1.5"),
     (fp.Bar(4.0, edge_radius_mm=0.2), fp.Bar(4.0, 0.2), "bar:4:edge_radius_mm=0.2"),
-    (
-        fp.FlatPunch(radius_mm=2.0, edge_radius_mm=0.1),
-        fp.FlatPunch(4.0, 0.1),
-        "punch:radius_mm=2:fillet_mm=.1",
-    ),
+    (fp.FlatPunch(radius_mm=2.0, edge_radius_mm=0.1), fp.FlatPunch(4.0, 0.1), "punch:4:fillet_mm=.1"),
     (fp.Edge(edge_radius_mm=0.4), fp.Edge(0.4), "edge:edge_radius_mm=0.4"),
-    (
-        fp.Gap(gap_mm=1.0, edge_radius_mm=0.3, lip_radius_mm=0.1),
-        fp.Gap(1.0, fillet_mm=0.3, lip_mm=0.1),
-        "gap:1:edge_radius_mm=0.3:lip_radius_mm=0.1",
-    ),
+    (fp.Gap(1.0, lip_radius_mm=0.1), fp.Gap(1.0, lip_mm=0.1), "gap:1:lip_radius_mm=0.1"),
     (fp.Grating(period_mm=2.0), fp.Grating(1.0, 1.0), "grating:period_mm=2"),
-    (
-        fp.Grating(period_mm=2.0, duty=0.25, edge_radius_mm=0.1),
-        fp.Grating(0.5, 1.5, 0.1),
-        "grating:duty=0.25:period_mm=2:edge_radius_mm=0.1",
-    ),
+    (fp.Grating(period_mm=2.0, duty=0.25), fp.Grating(0.5, 1.5), "grating:duty=0.25:period_mm=2"),
     (fp.Grating(duty=0.5), fp.Grating(1.5, 1.5), "grating:duty=0.5"),
-]
+]  # fmt: skip
 
 
 @pytest.mark.parametrize(("friendly", "stored", "text"), SAME, ids=[text for _, _, text in SAME])
@@ -53,14 +41,8 @@ def test_a_body_is_the_same_by_either_name_in_python_and_in_text(friendly, store
     assert vars(friendly) == vars(stored)
     assert indenter_named(text) == stored
     assert pickle.loads(pickle.dumps(friendly)) == stored
-
-
-def test_the_store_finds_a_body_by_either_name():
-    keys = {
-        touch_key(fp.touch_of(fp.Fingertip(), body))
-        for body in (fp.Sphere(radius_mm=4.0), fp.Sphere(curvature_per_m=250.0))
-    }
-    assert len(keys) == 1
+    touches = [fp.touch_of(fp.Fingertip(), body) for body in (friendly, stored)]
+    assert touch_key(touches[0]) == touch_key(touches[1])
 
 
 def test_every_other_name_reads_back_what_was_given():
@@ -70,6 +52,8 @@ def test_every_other_name_reads_back_what_was_given():
             given = values.get(other, 1.75)
             body = kind(**{other: given})
             assert getattr(body, other) == pytest.approx(given, rel=1e-15), (name, other)
+        assert tuple(inspect.signature(kind).parameters) == sizes_of(name)  # editors see every name
+    assert replace(fp.Sphere(radius_mm=4.0), curvature_per_m=200.0) == fp.Sphere(radius_mm=5.0)
 
 
 def test_fields_are_the_papers_and_units_cover_every_name():
@@ -80,94 +64,47 @@ def test_fields_are_the_papers_and_units_cover_every_name():
         assert (unit == "mm") == name.endswith("_mm"), name
 
 
-def test_editors_see_every_name():
-    for name, kind in INDENTERS.items():
-        assert tuple(inspect.signature(kind).parameters) == sizes_of(name)
-
-
 @pytest.mark.parametrize(
     ("make", "said"),
     [
         (lambda: fp.Sphere(raduis_mm=4.0), "Sphere has no raduis_mm: did you mean radius_mm?"),
         (lambda: fp.Sphere(radius=4.0), "Sphere has no radius: did you mean radius_mm?"),
-        (lambda: fp.Bar(edge=0.2), "Bar has no edge: did you mean edge_radius_mm?"),
         (lambda: fp.Plate(width_mm=3.0), "Plate has no width_mm: Plate has no keyword."),
-        (
-            lambda: fp.Sphere(colour=1),
-            "Sphere has no colour: Sphere has curvature_per_m, radius_mm, diameter_mm.",
-        ),
-        (
-            lambda: fp.Sphere(curvature_per_m=250.0, radius_mm=4.0),
-            "radius_mm and curvature_per_m exclude each other: give one.",
-        ),
+        (lambda: fp.Sphere(colour=1), "Sphere has no colour: Sphere has curvature_per_m, radius_mm"),
+        (lambda: fp.Sphere(curvature_per_m=250.0, radius_mm=4.0), "radius_mm and curvature_per_m exclude"),
         (lambda: fp.Sphere(radius_mm=4.0, diameter_mm=8.0), "diameter_mm and radius_mm exclude each other"),
-        (
-            lambda: fp.Bar(fillet_mm=0.2, edge_radius_mm=0.2),
-            "edge_radius_mm and fillet_mm exclude each other",
-        ),
-        (lambda: fp.Grating(groove_mm=1.0, duty=0.5), "duty and groove_mm exclude each other: give one."),
+        (lambda: fp.Bar(fillet_mm=0.2, edge_radius_mm=0.2), "edge_radius_mm and fillet_mm exclude each"),
+        (lambda: fp.Grating(groove_mm=1.0, duty=0.5), "duty and groove_mm exclude each other"),
         (lambda: fp.Sphere(radius_mm=-1.0), "radius_mm must be greater than 0 [mm]: got -1.0."),
-        (
-            lambda: fp.Bar(edge_radius_mm=2.0),
-            "edge_radius_mm must not exceed half of width_mm, 1.5 mm: got 2 mm.",
-        ),
+        (lambda: fp.Bar(edge_radius_mm=2.0), "edge_radius_mm must not exceed half of width_mm, 1.5 mm"),
         (lambda: fp.Gap(edge_radius_mm=-0.1), "edge_radius_mm must not be negative [mm]: got -0.1."),
         (lambda: fp.Grating(period_mm=2.0, duty=1.0), "duty must be below 1"),
-        (lambda: fp.Grating(period_mm=0.0), "period_mm must be greater than 0 [mm]: got 0.0."),
         (lambda: fp.indent(fp.Fingertip(), fp.Sphere(), resolutoin="quick"), "did you mean resolution?"),
         (lambda: fp.indent(fp.Fingertip(), fp.Sphere(), materials=""), "materials: did you mean tissues?"),
-        (lambda: fp.touch_of(fp.Fingertip(), fp.Sphere(), tilt=3.0), "did you mean tilt_deg?"),
         (lambda: fp.Population.grid(dens=3), "Population.grid has no dens: did you mean density_per_cm2?"),
-        (lambda: fp.Population.grid(zzz=3), "Population.grid has density_per_cm2, rows, columns"),
-        (lambda: fp.RampAndHold(depth=1.0), "RampAndHold has no depth: did you mean depth_mm?"),
-        (lambda: fp.sine(0.8, 0.1, 20.0, cycels=3), "sine has no cycels: did you mean cycles?"),
-        (lambda: fp.Fingertip(lenght_mm=30.0), "Fingertip has no lenght_mm: did you mean length_mm?"),
         (lambda: fp.Trajectory([0, 1], depths_mm=[0, 1]), "did you mean depth_mm?"),
         (lambda: indenter_named("sphere:raduis_mm=4"), "Sphere has no raduis_mm: did you mean radius_mm?"),
-        (
-            lambda: indenter_named("bar:3:width_mm=4"),
-            "indenter must have width_mm once: got 'bar:3:width_mm=4'.",
-        ),
+        (lambda: indenter_named("bar:3:width_mm=4"), "indenter must have width_mm once"),
         (lambda: indenter_named("sphere:=4"), "Sphere has no :"),
-        (lambda: fp.sine(0.8, 0.1, 20.0), "sine needs cycles: it is not given."),
         (lambda: fp.sine(0.8, 0.1), "sine needs frequency_hz, cycles: they are not given."),
-        (lambda: fp.Union([]), "Union needs at_mm: it is not given."),
         (lambda: fp.ReducedRange(), "ReducedRange needs depth_mm: it is not given."),
-        (lambda: fp.ReducedRange(depth=1.0), "ReducedRange has no depth: did you mean depth_mm?"),
         (lambda: fp.save_figure("a.png", None), "save_figure needs response: it is not given."),
         (lambda: fp.read_height_map("x.png"), "read_height_map needs pitch_mm: it is not given."),
-        (lambda: fp.embossed_text("T", cap_mm=5), "embossed_text has no cap_mm: did you mean capital_mm?"),
         (lambda: fp.Fingertip("child"), "got 'child', write Fingertip.of('child')."),
         (lambda: fp.RampAndHold(force_mn=60), "RampAndHold has no force_mn: take ForceRampAndHold."),
-        (lambda: fp.ForceRampAndHold(depth_mm=1), "ForceRampAndHold has no depth_mm: take RampAndHold."),
         (lambda: fp.indent(fp.Fingertip, fp.Sphere()), "finger must be made from its class: got Fingertip, "),
         (lambda: fp.indent(fp.Fingertip(), fp.Sphere), "got Sphere, call it: Sphere()."),
-        (lambda: fp.Hencky(10.0), "Hencky needs bulk_kpa: it is not given."),
-        (
-            lambda: fp.Fingertip.of("child", like="adult"),
-            "dermis_mm: got multiple values for argument 'like'.",
-        ),
+        (lambda: fp.Fingertip.of("child", like="adult"), "got multiple values for argument 'like'"),
         (lambda: fp.Sphere(3.5), "Sphere takes curvature_per_m=, radius_mm=, diameter_mm=: got too many"),
-        (
-            lambda: fp.Sphere(curvature_per_m=3.5),
-            "has a radius of 286 mm, outside 0.005 to 200 mm: write",
-        ),
-        (
-            lambda: indenter_named("sphere:3.5"),
-            "has a radius of 286 mm, outside 0.005 to 200 mm: write",
-        ),
-        (lambda: fp.Sphere(curvature_per_m=1e6), "a radius of 0.001 mm, outside 0.005 to 200 mm"),
+        (lambda: fp.Sphere(curvature_per_m=3.5), "has a radius of 286 mm, outside 0.005 to 200 mm"),
+        (lambda: indenter_named("sphere:3.5"), "has a radius of 286 mm, outside 0.005 to 200 mm"),
         (lambda: fp.Cylinder(1e-6), "diameter_mm must lie within 0.01 to 400 mm: got 1e-06; check its unit."),
-        (lambda: fp.Bar(3000.0), "width_mm must lie within 0.01 to 400 mm: got 3000; check its unit."),
         (lambda: fp.RampAndHold(0.0005), "depth_mm must lie within 0.001 to 20 mm: got 0.0005; check its"),
-        (
-            lambda: fp.ForceRampAndHold(0.5),
-            "force_mn must lie within 1 to 100000 mN: got 0.5; check its unit",
-        ),
+        (lambda: fp.ForceRampAndHold(0.5), "force_mn must lie within 1 to 100000 mN"),
         (lambda: fp.Trajectory([0, 50], [0, 5e-4]), "the largest depth_mm must lie within 0.001 to 20 mm"),
         (lambda: fp.notebook_progress(1), "notebook_progress takes no argument: got too many"),
     ],
-)
+)  # fmt: skip
 def test_what_a_class_or_function_does_not_have_is_refused_in_one_sentence(make, said):
     with pytest.raises(fp.InputError) as refused:
         make()
@@ -176,14 +113,17 @@ def test_what_a_class_or_function_does_not_have_is_refused_in_one_sentence(make,
     assert "\n" not in str(refused.value)
 
 
+COARSE = fp.Grading(17.37, 3.0, 3.0, 0.8, 0.8, 6.0, 1.3, 1, 1, 1, 1, full=True)
+
+
 def test_a_touch_and_its_press_take_the_same_arguments():
     described, pressed = (inspect.signature(each).parameters for each in (fp.touch_of, fp.indent))
     assert described == pressed
     turned = {"tilt_deg": 5.0, "spin_deg": 10.0, "friction": 0.2, "whole": True, "times_ms": [30.0]}
     motion = fp.RampAndHold(depth_mm=0.1, ramp_ms=50, hold_ms=50)
-    settings = fp.PressSettings(1, 1)
-    skin = fp.indent(fp.Fingertip(), fp.Sphere(), motion, settings=settings, **turned)
-    assert skin.touch == fp.touch_of(fp.Fingertip(), fp.Sphere(), motion, settings=settings, **turned)
+    turned |= {"settings": fp.PressSettings(1, 1), "grading": COARSE}
+    skin = fp.indent(fp.Fingertip(), fp.Sphere(), motion, **turned)
+    assert skin.touch == fp.touch_of(fp.Fingertip(), fp.Sphere(), motion, **turned)
     assert skin.deformation is not None
 
 
@@ -209,26 +149,17 @@ PUBLIC = {
 """Functions and classes of the reference, without results, which users do not make."""
 
 MADE = (
-    fp.Fingertip(),
-    fp.Bar(),
-    fp.Sphere(),
-    fp.sine(0.8, 0.1, 20.0, cycles=3),
-    fp.Afferent(),
-    fp.PC(),
-    fp.Population.grid(rows=1, columns=2),
+    fp.Fingertip(), fp.Bar(), fp.Sphere(), fp.sine(0.8, 0.1, 20.0, cycles=3), fp.Afferent(), fp.PC(),
+    fp.Population.grid(rows=1, columns=2), fp.SpikeTrains.from_lists([[12.0, 40.0], []]),
     fp.SedTraces([0.0, 50.0, 1000.0], [[0.0], [2.0], [1.8]]),
-    fp.SpikeTrains.from_lists([[12.0, 40.0], []]),
-)
+)  # fmt: skip
 
 
 def methods_of(made):
     """Public methods of a value that take an argument."""
     found = {name: getattr(made, name) for name in dir(type(made)) if not name.startswith("_")}
-    return [
-        method
-        for method in found.values()
-        if inspect.ismethod(method) and inspect.signature(method).parameters
-    ]
+    methods = filter(inspect.ismethod, found.values())
+    return [method for method in methods if inspect.signature(method).parameters]
 
 
 @pytest.mark.parametrize("name", sorted(PUBLIC.keys() - {"Indenter"}))
@@ -254,14 +185,6 @@ def ends_in_one_sentence(function):
             function(*[odd] * count)
 
 
-def test_a_type_error_of_the_function_itself_stays():
-    def course(time_ms):
-        return len(time_ms)
-
-    with pytest.raises(TypeError, match="has no len"):
-        fp.sampled(100.0, course)
-
-
 def test_a_body_of_ones_own_has_the_hint_and_its_own_other_names():
     @dataclass(frozen=True)
     class Cone(fp.Indenter):
@@ -276,22 +199,18 @@ def test_a_body_of_ones_own_has_the_hint_and_its_own_other_names():
         Cone(openning_deg=80.0)
 
 
-def test_a_copy_with_another_size_is_made_by_the_field():
-    assert replace(fp.Sphere(radius_mm=4.0), curvature_per_m=200.0) == fp.Sphere(radius_mm=5.0)
+EITHER_NAME = {
+    "csv": "name,object,object.radius_mm,object.period_mm,object.duty\n"
+    "ball,sphere,4,,\nrows,grating,,2,0.25\n",
+    "yaml": "stimuli:\n- {name: ball, object: {kind: sphere, radius_mm: 4}}\n"
+    "- {name: rows, object: {kind: grating, period_mm: 2, duty: 0.25}}\n",
+}
 
 
 @pytest.mark.parametrize("suffix", ["csv", "yaml"])
 def test_files_of_stimuli_take_either_name(tmp_path, suffix):
     path = tmp_path / f"stimuli.{suffix}"
-    path.write_text(
-        {
-            "csv": "name,object,object.radius_mm,object.period_mm,object.duty\n"
-            "ball,sphere,4,,\nrows,grating,,2,0.25\n",
-            "yaml": "stimuli:\n- {name: ball, object: {kind: sphere, radius_mm: 4}}\n"
-            "- {name: rows, object: {kind: grating, period_mm: 2, duty: 0.25}}\n",
-        }[suffix],
-        encoding="utf-8",
-    )
+    path.write_text(EITHER_NAME[suffix], encoding="utf-8")
     stimuli = read_stimuli(path).stimuli
     assert stimuli["ball"].indenter == fp.Sphere(curvature_per_m=250.0)
     assert stimuli["rows"].indenter == fp.Grating(0.5, 1.5)

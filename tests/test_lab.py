@@ -16,11 +16,7 @@ import sys
 import threading
 import time
 import urllib.request
-from collections.abc import Callable, Iterator
 from dataclasses import asdict, replace
-from importlib import resources
-from pathlib import Path
-from typing import Any
 
 import numpy as np
 import psutil
@@ -29,14 +25,12 @@ from tornado.httpclient import HTTPRequest
 from tornado.websocket import websocket_connect
 
 import fingerpad as fp
-from fingerpad.experiments.descriptions.reduction import DescribedReduction
-from fingerpad.experiments.runner import Runner
 from fingerpad.lab.answer import Answer, compared
 from fingerpad.lab.laboratory import Laboratory, Making, shipped
 from fingerpad.lab.server import HOST, reply_to, serve, spec_of
 from fingerpad.lab.state import LabState, state_of
 from fingerpad.lab.static import write_static
-from fingerpad.lab.view import View, view_of
+from fingerpad.lab.view import view_of
 from fingerpad.skin.store import Store
 
 RANGE = "object: {kind: sphere, curvature_per_m: %g}\nrange: {depth_mm: 0.5, x_mm: [-1, 1]}\ncalibration: 0\n"
@@ -44,7 +38,7 @@ PRESS = LabState("ball", depth_mm=0.4)
 
 
 @pytest.fixture(scope="module")
-def laboratory(tmp_path_factory: pytest.TempPathFactory) -> Laboratory:
+def laboratory(tmp_path_factory):
     """Two objects: a ball, and one that presses a fifth harder everywhere."""
     folder = tmp_path_factory.mktemp("lab")
     for name, curvature in (("ball", 287.0), ("flat", 180.0)):
@@ -58,13 +52,17 @@ def laboratory(tmp_path_factory: pytest.TempPathFactory) -> Laboratory:
     return made
 
 
-def waited(laboratory: Laboratory, state: LabState, exact: bool = False) -> View:
-    """View of a state once its presses are done."""
+def until(is_done):
     end = time.monotonic() + 60.0
-    while isinstance(view := view_of(laboratory, state, exact), Making):
+    while not is_done():
         assert time.monotonic() < end
-        time.sleep(0.05)
-    return view
+        time.sleep(0.02)
+
+
+def waited(laboratory, state, exact=False):
+    """View of a state once its presses are done."""
+    until(lambda: not isinstance(view_of(laboratory, state, exact), Making))
+    return view_of(laboratory, state, exact)
 
 
 @pytest.mark.parametrize(
@@ -81,12 +79,9 @@ def waited(laboratory: Laboratory, state: LabState, exact: bool = False) -> View
         ({"object": "ball", "afferent": "PC"}, "afferent must be SAI or RA, because .*: got 'PC'"),
     ],
 )
-def test_a_wrong_state_is_one_sentence(asked: object, said: str) -> None:
+def test_a_wrong_state_is_one_sentence(asked, said):
     with pytest.raises(fp.InputError, match=said.replace("(", r"\(")):
         state_of(asked)
-
-
-def test_a_state_is_what_the_address_says() -> None:
     assert state_of({name: str(value) for name, value in asdict(PRESS).items()}) == PRESS
 
 
@@ -102,23 +97,21 @@ def test_a_state_is_what_the_address_says() -> None:
         ({"id": 3, "state": {"object": "ball", "finger": "thumb"}}, "finger must be one of adult"),
     ],
 )
-def test_a_broken_message_is_one_sentence(laboratory: Laboratory, message: object, said: str) -> None:
+def test_a_broken_message_is_one_sentence(laboratory, message, said):
     reply = reply_to(laboratory, message)
     assert said in reply["error"]
     assert reply["id"] == (message["id"] if isinstance(message, dict) else None)
     json.dumps(reply)
 
 
-def test_a_defect_is_told_and_does_not_stop(
-    laboratory: Laboratory, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
-) -> None:
+def test_a_defect_is_told_and_does_not_stop(laboratory, monkeypatch, caplog):
     monkeypatch.setattr(laboratory, "poll", lambda state: 1 / 0)
     reply = reply_to(laboratory, {"id": 1, "state": {"object": "ball"}})
     assert "the terminal says why" in reply["error"]
     assert "ZeroDivisionError" in caplog.text
 
 
-def test_the_page_gets_all_that_it_draws(laboratory: Laboratory) -> None:
+def test_the_page_gets_all_that_it_draws(laboratory):
     reply = json.loads(json.dumps(reply_to(laboratory, {"id": 7, "state": asdict(PRESS)})))
     view, shown = reply["view"], reply["view"]["answer"]
     n, points = len(shown["times_ms"]), len(view["x_mm"]) * len(view["z_mm"])
@@ -133,9 +126,7 @@ def test_the_page_gets_all_that_it_draws(laboratory: Laboratory) -> None:
     assert spec_of(laboratory)["objects"]["ball"]["depth_mm"] == [0.05, 0.5]
 
 
-def test_a_deeper_press_is_stronger_and_another_afferent_is_silent_in_the_hold(
-    laboratory: Laboratory,
-) -> None:
+def test_a_deeper_press_is_stronger_and_another_afferent_is_silent_in_the_hold(laboratory):
     light, deep = (laboratory.answer(replace(PRESS, depth_mm=depth)) for depth in (0.2, 0.5))
     assert deep.force_mn.max() > 2.0 * light.force_mn.max()
     rapid = laboratory.answer(replace(PRESS, afferent="RA")).response
@@ -143,7 +134,7 @@ def test_a_deeper_press_is_stronger_and_another_afferent_is_silent_in_the_hold(
     assert rapid.static_rate_hz.max() < 5.0 < deep.response.static_rate_hz.max()
 
 
-def test_the_full_solution_stands_beside_the_reduced_one(laboratory: Laboratory) -> None:
+def test_the_full_solution_stands_beside_the_reduced_one(laboratory):
     assert isinstance(view_of(laboratory, PRESS, exact=True), Making)
     view = waited(laboratory, PRESS, exact=True)
     assert view.exact is not None
@@ -152,9 +143,7 @@ def test_the_full_solution_stands_beside_the_reduced_one(laboratory: Laboratory)
     assert np.abs(forces - view.exact.force_mn).max() < 0.02 * max(view.exact.force_mn)
 
 
-def test_the_full_solution_is_shown_until_there_is_a_reduced_touch(
-    laboratory: Laboratory, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_the_full_solution_is_shown_until_there_is_a_reduced_touch(laboratory, monkeypatch):
     exact, model, go_on = laboratory.answer(PRESS, exact=True), laboratory.model(PRESS), threading.Event()
     monkeypatch.setattr("fingerpad.lab.laboratory.run_reduction", lambda *_: go_on.wait(60.0) and model)
     source = laboratory.source(PRESS).with_name("first.yaml")
@@ -165,16 +154,13 @@ def test_the_full_solution_is_shown_until_there_is_a_reduced_touch(
     assert view.making.what == "a reduced touch of first"
     np.testing.assert_allclose(view.answer.force_mn, exact.force_mn, atol=1e-3)
     go_on.set()
-    end = time.monotonic() + 60.0
-    while begun.making(state) is not None:
-        assert time.monotonic() < end
-        time.sleep(0.02)
+    until(lambda: begun.making(state) is None)
     assert waited(begun, state).making is None
     with pytest.raises(fp.InputError, match="x_mm must lie within -1 to 1"):
         Laboratory(laboratory.folder / "none", [source]).answer(replace(state, x_mm=2.0), exact=True)
 
 
-def test_observers_tell_what_differs(laboratory: Laboratory) -> None:
+def test_observers_tell_what_differs(laboratory):
     ball, flat = (laboratory.answer(replace(PRESS, object=name)) for name in ("ball", "flat"))
     assert (compared(ball, ball).ideal, compared(ball, ball).summed) == (0.5, 0.5)
     found = compared(ball, flat)
@@ -182,7 +168,7 @@ def test_observers_tell_what_differs(laboratory: Laboratory) -> None:
     assert f"ball from flat in {found.ideal:.0%}" in waited(laboratory, replace(PRESS, other="flat")).compared
 
 
-def test_the_python_lines_reproduce_the_view(laboratory: Laboratory) -> None:
+def test_the_python_lines_reproduce_the_view(laboratory):
     view = waited(laboratory, PRESS)
     printed, names = io.StringIO(), {}
     with contextlib.redirect_stdout(printed):
@@ -195,7 +181,7 @@ def test_the_python_lines_reproduce_the_view(laboratory: Laboratory) -> None:
     assert Store(laboratory.folder / "indentations").holds(names["exact"])
 
 
-def test_what_was_made_is_not_pressed_again(laboratory: Laboratory, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_what_was_made_is_not_pressed_again(laboratory, monkeypatch):
     again = Laboratory(laboratory.folder, [laboratory.source(LabState(name)) for name in laboratory.names])
     monkeypatch.setattr("fingerpad.lab.laboratory.run_reduction", None)
     kept, known = again.answer(PRESS), laboratory.answer(PRESS)
@@ -206,12 +192,10 @@ def test_what_was_made_is_not_pressed_again(laboratory: Laboratory, monkeypatch:
 
 
 @pytest.mark.parametrize("kept", [False, True], ids=["asked meanwhile", "answered before"])
-def test_errors_are_measured_while_the_answer_is_there(
-    laboratory: Laboratory, monkeypatch: pytest.MonkeyPatch, kept: bool
-) -> None:
+def test_errors_are_measured_while_the_answer_is_there(laboratory, monkeypatch, kept):
     asked = []
 
-    def run(described: DescribedReduction, runner: Runner) -> fp.ReducedModel:
+    def run(described, runner):
         asked.append(described.description.calibration)
         return model if asked[-1] == 0 else replace(model, error=np.full(3, 0.02))
 
@@ -226,21 +210,12 @@ def test_errors_are_measured_while_the_answer_is_there(
     if kept:
         measuring.answer(state)
     first = waited(measuring, state)
-    end = time.monotonic() + 60.0
-    while not measuring.measured(state):
-        assert time.monotonic() < end
-        time.sleep(0.02)
+    until(lambda: measuring.measured(state))
     assert asked == [0, 20]
     assert max(first.answer.error_mn) == 0.0 < max(waited(measuring, state).answer.error_mn)
 
 
-def test_the_shipped_ranges_are_whole(tmp_path: Path) -> None:
-    assert Laboratory(tmp_path).names == tuple(path.stem for path in shipped())
-    with pytest.raises(fp.InputError, match="different names"):
-        Laboratory(tmp_path, [shipped()[0], shipped()[0]])
-
-
-def test_a_thin_plate_from_a_file_can_be_pressed(tmp_path: Path) -> None:
+def test_a_thin_plate_from_a_file_can_be_pressed(tmp_path):
     """It ended in a traceback: the skin was behind the plate where its first touch was sought."""
     corners = [f"v {x} {y} {z}" for x in (-2, 2) for y in (-1, 0) for z in (-2, 2)]
     faces = ["f 1 2 4 3", "f 5 7 8 6", "f 1 5 6 2", "f 3 4 8 7", "f 1 3 7 5", "f 2 6 8 4"]
@@ -252,7 +227,10 @@ def test_a_thin_plate_from_a_file_can_be_pressed(tmp_path: Path) -> None:
     assert [-edge_mm < pose.first_touch_mm <= 0.0 for pose in training.poses()] == [True] * 3
 
 
-def test_a_laboratory_that_is_refused_leaves_no_folder(tmp_path: Path) -> None:
+def test_a_laboratory_that_is_refused_leaves_no_folder(tmp_path):
+    assert Laboratory(tmp_path).names == tuple(path.stem for path in shipped())
+    with pytest.raises(fp.InputError, match="different names"):
+        Laboratory(tmp_path, [shipped()[0], shipped()[0]])
     folder = tmp_path / "lab"
     command = [sys.executable, "-m", "fingerpad", "lab", str(tmp_path / "none.yaml"), "--folder", str(folder)]
     refused = subprocess.run(command, capture_output=True, text=True, check=False)
@@ -262,7 +240,7 @@ def test_a_laboratory_that_is_refused_leaves_no_folder(tmp_path: Path) -> None:
 
 
 @pytest.fixture(scope="module")
-def served(laboratory: Laboratory) -> Iterator[tuple[str, subprocess.Popen[str]]]:
+def served(laboratory):
     """Start the command, and give the address of the page."""
     files = [str(laboratory.source(LabState(name))) for name in laboratory.names]
     command = [sys.executable, "-m", "fingerpad", "lab", *files, "--folder", str(laboratory.folder)]
@@ -276,14 +254,12 @@ def served(laboratory: Laboratory) -> Iterator[tuple[str, subprocess.Popen[str]]
         assert "Traceback" not in process.stdout.read()
 
 
-def test_the_server_listens_on_loopback_alone_and_survives_users(
-    served: tuple[str, subprocess.Popen[str]],
-) -> None:
+def test_the_server_listens_on_loopback_alone_and_survives_users(served):
     address, process = served
     connections = psutil.Process(process.pid).net_connections()
     assert {each.laddr.ip for each in connections if each.status == "LISTEN"} == {"127.0.0.1"}
 
-    async def use() -> None:
+    async def use():
         first, second = await session(address), await session(address)
         await first.write_message("no message of the protocol")
         second.stream.close()  # as if the browser was killed
@@ -299,70 +275,49 @@ def test_the_server_listens_on_loopback_alone_and_survives_users(
         assert page.status == 200
 
 
-@pytest.mark.parametrize("taken", [True, False])
-def test_a_port_that_cannot_be_is_one_sentence(laboratory: Laboratory, taken: bool) -> None:
+def test_a_port_that_cannot_be_is_one_sentence(laboratory):
     with socket.socket() as held:
         held.bind((HOST, 0))
         held.listen()
-        port = held.getsockname()[1] if taken else 70000
-        with pytest.raises(fp.InputError, match=f"--port must be a free port: got {port}"):
-            serve(laboratory, port)
-
-
-def test_a_page_of_another_origin_is_refused(served: tuple[str, subprocess.Popen[str]]) -> None:
-    connection = http.client.HTTPConnection(served[0][len("http://") : -1])
-    connection.request("GET", "/ws", headers={
-        "Origin": "http://elsewhere.org", "Connection": "Upgrade", "Upgrade": "websocket",
-        "Sec-WebSocket-Version": "13", "Sec-WebSocket-Key": "x" * 22 + "==",
-    })  # fmt: skip
-    with connection.getresponse() as answer:
-        assert answer.status == 403
-    connection.close()
+        for port in (held.getsockname()[1], 70000):
+            with pytest.raises(fp.InputError, match=f"--port must be a free port: got {port}"):
+                serve(laboratory, port)
 
 
 @pytest.mark.parametrize(
-    "wrong",
+    ("changes", "status"),
     [
-        {},
-        {"Sec-WebSocket-Protocol": "bokeh"},
-        {"Sec-WebSocket-Protocol": "bokeh, a.b"},
-        {"Sec-WebSocket-Protocol": "bokeh, eyJzZXNzaW9uX2lkIjogIngiLCAic2Vzc2lvbl9leHBpcnkiOiAxfQ"},
-        {"Origin": "http://[::1"},
+        ({}, 400),
+        ({"Sec-WebSocket-Protocol": "bokeh"}, 400),
+        ({"Sec-WebSocket-Protocol": "bokeh, a.b"}, 400),
+        ({"Sec-WebSocket-Protocol": "bokeh, eyJzZXNzaW9uX2lkIjogIngiLCAic2Vzc2lvbl9leHBpcnkiOiAxfQ"}, 400),
+        ({"Origin": "http://[::1"}, 400),
+        ({"Origin": "http://elsewhere.org"}, 403),
     ],
-    ids=["none", "no token", "no JSON", "expired", "broken origin"],
+    ids=["none", "no token", "no JSON", "expired", "broken origin", "another origin"],
 )
-def test_a_wrong_header_of_a_websocket_is_answered_by_400(
-    served: tuple[str, subprocess.Popen[str]], wrong: dict[str, str]
-) -> None:
-    """It was a traceback of the server."""
+def test_a_wrong_header_of_a_websocket_is_refused(served, changes, status):
     connection = http.client.HTTPConnection(served[0][len("http://") : -1])
     connection.request("GET", "/ws", headers={
         "Origin": served[0][:-1], "Connection": "Upgrade", "Upgrade": "websocket",
         "Sec-WebSocket-Version": "13", "Sec-WebSocket-Key": "x" * 22 + "==",
-    } | wrong)  # fmt: skip
+    } | changes)  # fmt: skip
     with connection.getresponse() as answer:
-        assert answer.status == 400
+        assert answer.status == status
     connection.close()
 
 
-async def session(address: str) -> Any:
+async def session(address):
     """Open a session as a browser does, and wait for the first word of the server."""
     with urllib.request.urlopen(address) as page:
-        token = re.search(r'"token":"([^"]+)"', page.read().decode())[1]  # type: ignore[index]
+        token = re.search(r'"token":"([^"]+)"', page.read().decode())[1]
     wanted = HTTPRequest(address.replace("http", "ws") + "ws", headers={"Origin": address[:-1]})
     opened = await websocket_connect(wanted, subprotocols=["bokeh", token])
     assert "ACK" in str(await opened.read_message())
     return opened
 
 
-def test_the_colours_keep_their_order_in_greys() -> None:
-    page = (resources.files("fingerpad.lab") / "page.js").read_text("utf-8")
-    stops = np.array(json.loads(re.search(r"STOPS = (\[.*\]);", page)[1]))  # type: ignore[index]
-    grey = stops @ [0.2126, 0.7152, 0.0722]
-    assert (np.diff(grey) < -10.0).all()
-
-
-def test_the_static_page_holds_its_answers(laboratory: Laboratory, tmp_path: Path) -> None:
+def test_the_static_page_holds_its_answers(laboratory, tmp_path):
     written = write_static(laboratory, tmp_path)
     assert written == tmp_path / "index.html"
     assert written.stat().st_size < 5e6
@@ -376,7 +331,7 @@ needs_browser = pytest.mark.skipif(
 
 
 @pytest.fixture(scope="module")
-def browser() -> Iterator[Any]:
+def browser():
     from playwright.sync_api import sync_playwright
 
     with sync_playwright() as play:
@@ -388,7 +343,7 @@ def browser() -> Iterator[Any]:
 class Watched:
     """A page of the laboratory, and what went wrong in it."""
 
-    def __init__(self, browser: Any, address: str, width: int = 1280):
+    def __init__(self, browser, address, width=1280):
         self.page = browser.new_page(viewport={"width": width, "height": 800})
         self.wrong: list[str] = []
         self.asked: list[str] = []
@@ -399,14 +354,14 @@ class Watched:
         self.page.locator(".lab div[role=status] p").first.wait_for(timeout=60000)
 
     @property
-    def words(self) -> str:
+    def words(self):
         return str(self.page.locator(".lab div[role=status]").inner_text())
 
     @property
-    def said(self) -> str:
+    def said(self):
         return str(self.page.locator(".lab .said").inner_text())
 
-    def changes(self, action: Callable[[], object], of: Callable[[], str]) -> str:
+    def changes(self, action, of):
         """Do something, and wait until what is shown differs."""
         before, end = of(), time.monotonic() + 20.0
         action()
@@ -415,14 +370,12 @@ class Watched:
             self.page.wait_for_timeout(20)
         return of()
 
-    def picture(self, number: int = 0) -> str:
+    def picture(self, number=0):
         return str(self.page.locator(".lab canvas").nth(number).evaluate("canvas => canvas.toDataURL()"))
 
 
 @needs_browser
-def test_the_page_works_with_keys_and_mouse(
-    browser: Any, served: tuple[str, subprocess.Popen[str]], tmp_path: Path
-) -> None:
+def test_the_page_works_with_keys_and_mouse(browser, served, tmp_path):
     address = served[0]
     watched = Watched(browser, f"{address}#depth_mm=0.3")
     page = watched.page
@@ -460,9 +413,10 @@ def test_the_page_works_with_keys_and_mouse(
 
 
 @needs_browser
-def test_the_mouse_drags_the_object_over_the_skin(
-    browser: Any, served: tuple[str, subprocess.Popen[str]]
-) -> None:
+def test_the_mouse_drags_the_object_over_the_skin(browser, served):
+    small = Watched(browser, served[0], width=360)
+    assert small.page.evaluate("document.documentElement.scrollWidth") <= 360  # it scrolls only downwards
+    small.page.close()
     watched = Watched(browser, f"{served[0]}#depth_mm=0.4")
     page, along = watched.page, watched.page.locator("input[name=x_mm]")
     box = page.locator(".lab canvas").first.bounding_box()
@@ -488,16 +442,7 @@ def test_the_mouse_drags_the_object_over_the_skin(
 
 
 @needs_browser
-def test_a_small_screen_scrolls_only_downwards(
-    browser: Any, served: tuple[str, subprocess.Popen[str]]
-) -> None:
-    watched = Watched(browser, served[0], width=360)
-    assert watched.page.evaluate("document.documentElement.scrollWidth") <= 360
-    watched.page.close()
-
-
-@needs_browser
-def test_the_static_page_works_from_a_file(browser: Any, laboratory: Laboratory, tmp_path: Path) -> None:
+def test_the_static_page_works_from_a_file(browser, laboratory, tmp_path):
     watched = Watched(browser, write_static(laboratory, tmp_path).as_uri())
     page = watched.page
     skin = watched.picture()

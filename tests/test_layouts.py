@@ -30,12 +30,6 @@ def nearest_mm(layout, k=1):
     return cKDTree(layout.places_mm).query(layout.places_mm, k=k + 1)[0][:, 1:]
 
 
-def test_every_pattern_has_a_function_of_its_name():
-    assert tuple(MAKERS) == PATTERNS
-    for pattern, make in MAKERS.items():
-        assert make(PAD, 70.0).pattern == pattern
-
-
 @settings(deadline=None, max_examples=25)
 @given(
     pattern=st.sampled_from(PATTERNS),
@@ -62,6 +56,8 @@ def test_a_rectangle_of_whole_pitches_holds_the_papers_grid():
     assert_allclose(layout.places_mm, paper.positions_mm, rtol=0, atol=1e-12)
     assert layout.pitch_mm == paper.pitch_mm
     assert_array_equal(Population.of_layout(layout).positions_mm, layout.places_mm)
+    assert tuple(MAKERS) == PATTERNS
+    assert [make(PAD, 70.0).pattern for make in MAKERS.values()] == list(PATTERNS)
 
 
 @pytest.mark.parametrize("density", [25.0, 70.0, 140.0])
@@ -102,6 +98,15 @@ def test_poisson_discs_keep_their_distance(separation):
     assert nearest_mm(layout).min() >= separation * layout.pitch_mm * (1.0 - 1e-9)
     assert len(layout) == round(400.0 * PAD.area_mm2 / 100.0)
 
+    def stretched(places):
+        return np.column_stack([places[:, 0], np.zeros(len(places)), 3.0 * places[:, 1]])
+
+    # Distances count on the skin where the skin is given.
+    layout = poisson_disc(PAD, 100.0, seed=2, place=stretched)
+    there = stretched(layout.places_mm)
+    assert cKDTree(there).query(there, k=2)[0][:, 1].min() >= 0.75 * layout.pitch_mm
+    assert nearest_mm(layout).min() < 0.75 * layout.pitch_mm
+
 
 def test_poisson_discs_are_those_of_one_dart_after_the_other():
     """Slow reference: each candidate against all that were kept before it."""
@@ -119,16 +124,6 @@ def test_poisson_discs_are_those_of_one_dart_after_the_other():
     assert_array_equal(layout.places_mm, kept[: len(layout)])
 
 
-def test_distances_count_on_the_skin_where_the_skin_is_given():
-    def stretched(places):
-        return np.column_stack([places[:, 0], np.zeros(len(places)), 3.0 * places[:, 1]])
-
-    layout = poisson_disc(PAD, 100.0, seed=2, place=stretched)
-    there = stretched(layout.places_mm)
-    assert cKDTree(there).query(there, k=2)[0][:, 1].min() >= 0.75 * layout.pitch_mm
-    assert nearest_mm(layout).min() < 0.75 * layout.pitch_mm
-
-
 @pytest.mark.parametrize(
     "make", [lambda seed: uniform(PAD, 70.0, seed), lambda seed: jittered(PAD, 70.0, seed),
              lambda seed: poisson_disc(PAD, 70.0, seed)],
@@ -138,11 +133,8 @@ def test_the_seed_decides(make):
     assert first.seed == 4
     assert_array_equal(first.places_mm, same.places_mm)
     assert not np.isin(first.places_mm[:, 0], other.places_mm[:, 0]).any()
-
-
-def test_a_receptor_keeps_its_place_when_others_join():
     few, many = uniform(Rectangle(10.0, 10.0), 50.0, 1), uniform(Rectangle(10.0, 10.0), 90.0, 1)
-    assert_array_equal(many.places_mm[: len(few)], few.places_mm)
+    assert_array_equal(many.places_mm[: len(few)], few.places_mm)  # the others keep their places
 
 
 THIN_CORNER = Polygon(((0, 0), (100, 0), (100, 0.02), (0.02, 0.02), (0.02, 100), (0, 100)))

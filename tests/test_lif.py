@@ -1,5 +1,6 @@
 import math
-import time
+import timeit
+from dataclasses import replace
 from decimal import Decimal, localcontext
 
 import numpy as np
@@ -7,7 +8,6 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
-from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
 from benchmarks.runge_kutta import runge_kutta_spikes
@@ -36,6 +36,12 @@ def test_constant_current_fires_at_the_closed_form_interval(current_ma):
     assert_allclose(spikes, expected, rtol=1e-11)
 
 
+def test_too_little_current_is_silent_and_too_much_fires_once_per_refractory_period():
+    for current_ma in (0.0, 0.5 * RHEOBASE, RHEOBASE * (1.0 - 1e-9), -1e-5):
+        assert NEURON.spikes(constant(current_ma, 1e4)).times_ms.size == 0
+    assert_allclose(NEURON.spikes(constant(1e300, 10.5))[0], np.arange(11.0), atol=1e-9)
+
+
 def test_a_knot_in_the_middle_of_a_straight_line_changes_nothing():
     rng = np.random.default_rng(0)
     times = np.concatenate([[0.0], np.sort(rng.uniform(0.0, 200.0, 500)), [200.0]])
@@ -54,11 +60,6 @@ def test_first_spike_of_a_current_ramp_solves_its_closed_form():
 
     spikes = NEURON.spikes(CurrentTraces([0.0, 200.0], [[0.0], [200.0 * slope]]))[0]
     assert_allclose(spikes[0], brentq(lambda t: potential(t) - THRESHOLD, 1.0, 200.0, xtol=1e-13), rtol=1e-12)
-
-
-@pytest.mark.parametrize("current_ma", [0.0, 0.5 * RHEOBASE, RHEOBASE * (1.0 - 1e-9), -1e-5])
-def test_too_little_current_is_silent(current_ma):
-    assert NEURON.spikes(constant(current_ma, 1e4)).times_ms.size == 0
 
 
 def peak_of_falling_current(first, slope):
@@ -91,21 +92,6 @@ def test_negative_current_pulls_the_potential_below_zero_and_delays_the_spike():
     assert_allclose(NEURON.spikes(current)[0][0], expected, rtol=1e-12)
 
 
-def test_a_jump_acts_at_once():
-    spikes = NEURON.spikes(CurrentTraces([0.0, 40.0, 40.0, 100.0], [[0.0], [0.0], [5e-6], [5e-6]]))
-    steady = NEURON.spikes(constant(5e-6, 60.0))
-    assert_allclose(spikes.times_ms, 40.0 + steady.times_ms, rtol=1e-13)
-
-
-def test_shifting_time_shifts_the_spikes():
-    times = np.array([0.0, 20.0, 60.0, 60.0, 300.0])
-    current = np.array([[0.0], [6e-6], [4e-6], [1.5e-6], [1e-6]])
-    here = NEURON.spikes(CurrentTraces(times, current)).times_ms
-    there = NEURON.spikes(CurrentTraces(times + 128.0, current)).times_ms
-    assert here.size > 5
-    assert_allclose(there - 128.0, here, rtol=0.0, atol=1e-9)
-
-
 def test_no_spike_falls_into_the_refractory_period_even_across_knots():
     resting = LeakyIntegrateAndFire(TAU, CAPACITANCE, THRESHOLD, 7.0)
     times = np.linspace(0.0, 100.0, 201)
@@ -114,67 +100,23 @@ def test_no_spike_falls_into_the_refractory_period_even_across_knots():
     assert_allclose(np.diff(spikes), 7.0 + charging, rtol=1e-11)
 
 
-def test_currents_beyond_all_measure_fire_once_per_refractory_period():
-    spikes = NEURON.spikes(constant(1e300, 10.5))[0]
-    assert_allclose(spikes, np.arange(11.0), atol=1e-9)
-
-
-def test_only_three_numbers_and_the_time_constant_matter():
-    """Threshold and capacitance only scale the current: they cannot be told apart by spikes."""
-    current = CurrentTraces([0.0, 50.0, 500.0], [[0.0], [8e-6], [1e-6]])
-    scaled = CurrentTraces(current.times_ms, 6.0 * current.current_ma)
-    same = LeakyIntegrateAndFire(TAU, 2.0 * CAPACITANCE, 3.0 * THRESHOLD, REFRACTORY).spikes(scaled)
-    assert_allclose(same.times_ms, NEURON.spikes(current).times_ms, rtol=1e-11)
-
-
-def test_a_general_integrator_with_event_location_agrees():
-    times = np.array([0.0, 15.0, 50.0, 50.0, 120.0, 250.0])
-    current = np.array([0.0, 9e-6, 7e-6, 3e-6, -1e-6, 4e-6])
-    spikes = NEURON.spikes(CurrentTraces(times, current[:, np.newaxis]))[0]
-
-    def reached(t, u):
-        return u[0] - THRESHOLD
-
-    reached.terminal, reached.direction = True, 1.0
-    found, ready, potential = [], 0.0, 0.0
-    for start, end, first, last in zip(times[:-1], times[1:], current[:-1], current[1:], strict=True):
-        begin = max(start, ready)
-        while begin < end:
-            answer = solve_ivp(
-                lambda t, u, s=start, e=end, a=first, b=last: (
-                    -u / TAU + (a + (b - a) * (t - s) / (e - s)) / CAPACITANCE
-                ),
-                (begin, end),
-                [potential],
-                events=reached,
-                rtol=1e-10,
-                atol=1e-10,
-                max_step=1.0,
-            )
-            if answer.t_events[0].size == 0:
-                potential = answer.y[0, -1]
-                break
-            found.append(answer.t_events[0][0])
-            ready, potential = found[-1] + REFRACTORY, 0.0
-            begin = ready
-    assert len(found) > 8
-    assert_allclose(spikes, found, rtol=1e-7)
+def test_time_may_be_shifted_and_capacitance_and_threshold_only_scale_the_current():
+    times = np.array([0.0, 20.0, 60.0, 60.0, 300.0])
+    current = np.array([[0.0], [6e-6], [4e-6], [1.5e-6], [1e-6]])
+    here = NEURON.spikes(CurrentTraces(times, current)).times_ms
+    there = NEURON.spikes(CurrentTraces(times + 128.0, current)).times_ms
+    assert here.size > 5
+    assert_allclose(there - 128.0, here, rtol=0.0, atol=1e-9)
+    scaled = LeakyIntegrateAndFire(TAU, 2.0 * CAPACITANCE, 3.0 * THRESHOLD, REFRACTORY)
+    assert_allclose(scaled.spikes(CurrentTraces(times, 6.0 * current)).times_ms, here, rtol=1e-11)
+    jump = NEURON.spikes(CurrentTraces([0.0, 40.0, 40.0, 100.0], [[0.0], [0.0], [5e-6], [5e-6]]))
+    assert_allclose(jump.times_ms, 40.0 + NEURON.spikes(constant(5e-6, 60.0)).times_ms, rtol=1e-13)
 
 
 def bumpy_current(n_sites=4):
     rng = np.random.default_rng(7)
     times = np.sort(np.concatenate([[0.0, 50.0, 50.0, 300.0], rng.uniform(0.0, 300.0, 40)]))
     return CurrentTraces(times, rng.uniform(-1e-6, 6e-6, (times.size, n_sites)))
-
-
-def test_runge_kutta_spikes_are_late_by_less_than_a_step_each():
-    """A delay is handed on: spike k is late by at most k + 1 steps under a steady current."""
-    current = constant(3e-6, 300.0)
-    exact, stepped = NEURON.spikes(current)[0], runge_kutta_spikes(NEURON, current, 0.001)[0]
-    late = stepped - exact
-    assert exact.size == stepped.size > 10
-    assert (late > -1e-9).all()
-    assert (late < 0.001 * np.arange(1, exact.size + 1) + 1e-9).all()
 
 
 def test_runge_kutta_approaches_the_exact_spikes_as_its_step_shrinks():
@@ -188,6 +130,14 @@ def test_runge_kutta_approaches_the_exact_spikes_as_its_step_shrinks():
     assert exact.times_ms.size > 20
     assert errors[0] < 0.01 * 20
     assert errors[1] < 0.3 * errors[0]
+    # A delay is handed on: spike k is late by at most k + 1 steps under a steady current.
+    steady = constant(3e-6, 300.0)
+    late = runge_kutta_spikes(NEURON, steady, 0.001)[0] - NEURON.spikes(steady)[0]
+    assert late.size > 10
+    assert (late > -1e-9).all()
+    assert (late < 0.001 * np.arange(1, late.size + 1) + 1e-9).all()
+    with pytest.raises(InputError, match="step_ms"):
+        runge_kutta_spikes(NEURON, steady, 0.0)
 
 
 def slow_reference(times, current, neuron, samples=4000):
@@ -223,11 +173,7 @@ def slow_reference(times, current, neuron, samples=4000):
 
 
 @settings(max_examples=25, deadline=None)
-@given(
-    st.lists(st.floats(-3e-6, 9e-6), min_size=3, max_size=7),
-    st.floats(3.0, 200.0),
-    st.floats(5.0, 60.0),
-)
+@given(st.lists(st.floats(-3e-6, 9e-6), min_size=3, max_size=7), st.floats(3.0, 200.0), st.floats(5.0, 60.0))
 def test_random_currents_match_the_slow_reference(current, tau, spacing):
     neuron = LeakyIntegrateAndFire(tau, 1e-6, 50.0, 1.0)
     times = spacing * np.arange(len(current))
@@ -237,14 +183,6 @@ def test_random_currents_match_the_slow_reference(current, tau, spacing):
     shared = min(len(slow), fast.size)
     assert abs(len(slow) - fast.size) <= 1
     assert_allclose(fast[:shared], slow[:shared], rtol=1e-7)
-
-
-def test_every_column_is_a_neuron_of_its_own():
-    current = bumpy_current(5)
-    together = NEURON.spikes(current)
-    for site, train in enumerate(together):
-        alone = NEURON.spikes(CurrentTraces(current.times_ms, current.current_ma[:, [site]]))
-        assert_array_equal(alone.times_ms, train)
 
 
 def test_many_neurons_fire_as_each_does_alone_on_any_number_of_threads(monkeypatch):
@@ -329,21 +267,12 @@ def test_spike_times_are_exact_to_the_round_off_of_the_potential():
 def test_a_thousand_afferents_take_a_fraction_of_a_second():
     times = np.linspace(0.0, 1000.0, 400)
     current = CurrentTraces(times, np.linspace(0.5e-6, 4e-6, 1000) * np.ones((400, 1)))
-    NEURON.spikes(bumpy_current())  # compile
-    start = time.perf_counter()
-    spikes = NEURON.spikes(current)
-    assert spikes.times_ms.size > 20_000
-    assert time.perf_counter() - start < 0.5
+    assert NEURON.spikes(current).times_ms.size > 20_000
+    assert min(timeit.repeat(lambda: NEURON.spikes(current), number=1, repeat=3)) < 0.5
 
 
 @pytest.mark.parametrize("name", ["time_constant_ms", "capacitance_mf", "threshold_mv", "refractory_ms"])
-@pytest.mark.parametrize("value", [0.0, -1.0, math.inf])
-def test_a_membrane_needs_positive_numbers(name, value):
-    numbers = {"time_constant_ms": 1.0, "capacitance_mf": 1.0, "threshold_mv": 1.0, "refractory_ms": 1.0}
-    with pytest.raises(InputError, match=name):
-        LeakyIntegrateAndFire(**(numbers | {name: value}))
-
-
-def test_runge_kutta_needs_a_positive_step():
-    with pytest.raises(InputError, match="step_ms"):
-        runge_kutta_spikes(NEURON, constant(1e-6), 0.0)
+def test_a_membrane_needs_positive_numbers(name):
+    for value in (0.0, -1.0, math.inf):
+        with pytest.raises(InputError, match=name):
+            replace(NEURON, **{name: value})
