@@ -81,107 +81,77 @@ def discrimination_section() -> dict:
     rise = 1.0 - 0.5 * np.exp(-(np.array(CURVATURE_PER_M[1:]) - 287.0) / 30.0)
 
     def rates(shift: float, spread: float) -> dict:
-        return {
-            "hit_rate": rise.tolist(),
-            "hit_rate_sd": [spread] * 6,
-            "hit_rate_shifted": (rise - shift).tolist(),
-            "hit_rate_shifted_sd": [spread] * 6,
-        }
+        deviations = dict.fromkeys(("hit_rate_sd", "hit_rate_shifted_sd"), [spread] * 6)
+        return {"hit_rate": rise.tolist(), "hit_rate_shifted": (rise - shift).tolist()} | deviations
 
+    def named(names: tuple[str, ...], values: tuple[float, ...]) -> dict:
+        return dict(zip(names, map(sure, values), strict=True))
+
+    goodwin = {
+        "curvature_per_m": [296.0, 365.0], "hit_rate": [0.58, 0.95], "trials": 100, "low": [0.48, 0.89],
+        "high": [0.68, 0.98], "line": [0.58, 0.67, 0.76, 0.84, 0.90, 0.95],
+    }  # fmt: skip
+    target = {
+        "at_goodwin": [sure(0.58), sure(0.95)], "from_line": [sure(0.01)] * 6,
+        "largest_from_line": sure(0.02),
+    }  # fmt: skip
+    statistics = {
+        "misfit": named(CODES, (0.01, 0.06, 0.08, 0.02)),
+        "misfit_above_static": named(CODES[1:], (0.05, 0.07, 0.01)),
+        "shift": named(CODES, (0.01, 0.1, 0.12, 0.01)),
+        "shift_above_static": named(CODES[1:], (0.09, 0.11, 0.0)),
+        "smallest_rise": {name: [sure(0.05), sure(0.04)] for name in CODES},
+        "noise_lowers": {"noise_sigma": [0.015, 0.025, 0.085], "smallest_fall": sure(0.02)},
+        "ten_matrices": {"ratio": sure(3.2), "change": sure(0.01)},
+        "criterion": {"ratio": sure(2.0), "change": sure(0.005)},
+        "unsteadiness": {"hit_rates": [10, 100]} | named(("few", "many", "ratio"), (0.007, 0.002, 3.2)),
+        "targets": [target, target],
+        "sweep": {
+            "noise_sigma": [0.015, 0.055, 0.085],
+            "misfit": [[sure(value + place) for value in (0.3, 0.15, 0.08)] for place in (0.0, 0.01)],
+        },
+    }
+    readings = {
+        "static, eight neighbours (used)": 0.01,
+        "static, four neighbours": None,
+        "dynamic, eight neighbours (used)": 0.06,
+        "latency of receptors that fire under every sphere (used)": 0.08,
+        "latency, waiting until the ramp ends": 0.12,
+    }
+    shared = {"receptors": [18, 17], "rise": [0.46, 0.43], "hit_rate": [[0.6] * 6] * 2, "largest_shift": 0.01}
+    of_noise = ("noise_sigma", "misfit", "own_largest_shift")
+    reasons = {
+        "criterion": {
+            "criterion_sigma": [0.01, 0.02], "point": [0.05, 0.1], "fraction": [0.002, 0.004],
+            "likelihood": [0.003, 0.006],
+        },
+        "euclidean": {"noise_sigma": 0.05, "misfit": 0.02, "hit_rate": [[0.6] * 6] * 2},
+        "rise": {"static": [0.46, 0.43]},
+        "rise_for_paper_noise": {"static": [0.16, None]},
+        "misfit_curve": {
+            "noise_sigma": [0.01, 0.1, 0.2],
+            "misfit": {name: [0.3, 0.1, 0.2] for name in ("static", "latency", "euclidean")},
+        },
+        "readings": [
+            {"reading": name} | shared | dict.fromkeys(of_noise, noise) for name, noise in readings.items()
+        ],
+    }  # fmt: skip
     return {
-        "curvature_per_m": CURVATURE_PER_M,
-        "seed": 1,
-        "noise_sigma": 0.12,
-        "noise_fit_error": 0.01,
-        "noise_sigma_paper": 0.055,
-        "sessions": 5,
-        "goodwin": {
-            "curvature_per_m": [296.0, 365.0],
-            "hit_rate": [0.58, 0.95],
-            "trials": 100,
-            "low": [0.48, 0.89],
-            "high": [0.68, 0.98],
-            "line": [0.58, 0.67, 0.76, 0.84, 0.90, 0.95],
-        },
-        "silent": [],
+        "curvature_per_m": CURVATURE_PER_M, "seed": 1, "noise_sigma": 0.12, "noise_fit_error": 0.01,
+        "noise_sigma_paper": 0.055, "sessions": 5, "goodwin": goodwin, "silent": [],
         "gradient_sums": {name: [[1400.0 + 100.0 * n for n in range(7)]] * 2 for name in CODES[:3]},
-        "statistics": {
-            "misfit": dict(zip(CODES, map(sure, (0.01, 0.06, 0.08, 0.02)), strict=True)),
-            "misfit_above_static": dict(zip(CODES[1:], map(sure, (0.05, 0.07, 0.01)), strict=True)),
-            "shift": dict(zip(CODES, map(sure, (0.01, 0.1, 0.12, 0.01)), strict=True)),
-            "shift_above_static": dict(zip(CODES[1:], map(sure, (0.09, 0.11, 0.0)), strict=True)),
-            "smallest_rise": {name: [sure(0.05), sure(0.04)] for name in CODES},
-            "noise_lowers": {"noise_sigma": [0.015, 0.025, 0.085], "smallest_fall": sure(0.02)},
-            "ten_matrices": {"ratio": sure(3.2), "change": sure(0.01)},
-            "criterion": {"ratio": sure(2.0), "change": sure(0.005)},
-            "unsteadiness": {
-                "hit_rates": [10, 100],
-                "few": sure(0.007),
-                "many": sure(0.002),
-                "ratio": sure(3.2),
-            },
-            "targets": [
-                {
-                    "at_goodwin": [sure(0.58), sure(0.95)],
-                    "from_line": [sure(0.01) for _ in range(6)],
-                    "largest_from_line": sure(0.02),
-                }
-                for _ in range(2)
-            ],
-            "sweep": {
-                "noise_sigma": [0.015, 0.055, 0.085],
-                "misfit": [[sure(value + place) for value in (0.3, 0.15, 0.08)] for place in (0.0, 0.01)],
-            },
-        },
-        "reasons": {
-            "criterion": {
-                "criterion_sigma": [0.01, 0.02],
-                "point": [0.05, 0.1],
-                "fraction": [0.002, 0.004],
-                "likelihood": [0.003, 0.006],
-            },
-            "euclidean": {"noise_sigma": 0.05, "misfit": 0.02, "hit_rate": [[0.6] * 6] * 2},
-            "rise": {"static": [0.46, 0.43]},
-            "rise_for_paper_noise": {"static": [0.16, None]},
-            "misfit_curve": {
-                "noise_sigma": [0.01, 0.1, 0.2],
-                "misfit": {name: [0.3, 0.1, 0.2] for name in ("static", "latency", "euclidean")},
-            },
-            "readings": [
-                {
-                    "reading": name,
-                    "receptors": [18, 17],
-                    "rise": [0.46, 0.43],
-                    "hit_rate": [[0.6] * 6] * 2,
-                    "largest_shift": 0.01,
-                    "noise_sigma": noise,
-                    "misfit": noise,
-                    "own_largest_shift": noise,
-                }
-                for name, noise in (
-                    ("static, eight neighbours (used)", 0.01),
-                    ("static, four neighbours", None),
-                    ("dynamic, eight neighbours (used)", 0.06),
-                    ("latency of receptors that fire under every sphere (used)", 0.08),
-                    ("latency, waiting until the ramp ends", 0.12),
-                )
-            ],
-        },
+        "statistics": statistics,
+        "reasons": reasons,
         "gradient_sum": {
-            "static": rates(0.01, 0.02),
-            "dynamic": rates(0.1, 0.03),
-            "latency": rates(0.08, 0.04),
+            "static": rates(0.01, 0.02), "dynamic": rates(0.1, 0.03), "latency": rates(0.08, 0.04),
         },
         "euclidean": {"static": rates(0.02, 0.02)},
         "variants": {
-            "sigma_0.025": rates(0.0, 0.01),
-            "sigma_0.055": rates(0.0, 0.01),
-            "sigma_0.085": rates(0.0, 0.02),
-            "ten_matrices": rates(0.02, 0.06),
-            "criterion_0.01": rates(0.01, 0.03),
+            "sigma_0.025": rates(0.0, 0.01), "sigma_0.055": rates(0.0, 0.01), "sigma_0.085": rates(0.0, 0.02),
+            "ten_matrices": rates(0.02, 0.06), "criterion_0.01": rates(0.01, 0.03),
             "criterion_0.02": rates(0.01, 0.06),
         },
-    }
+    }  # fmt: skip
 
 
 def nail_section() -> dict:
@@ -201,35 +171,20 @@ def nail_section() -> dict:
     nail = np.array([[[17.0, 3.0, 0.0], [17.0, 2.5, 5.0]], [[17.0, 2.5, 5.0], [28.0, 1.0, 5.0]]])
     distance = np.arange(-1.75, 5.0, 0.5)
     course = [[0.2, 0.4 + 0.1 * np.exp(-abs(d)), 0.6] if abs(d) > 0.3 else [None] * 3 for d in distance]
+    across = corners_y[:12].tolist()
     return {
-        "x_mm": along.tolist(),
-        "y_mm": y.tolist(),
-        "z_mm": z.tolist(),
-        "von_mises_kpa": stress(x_faces, y_faces, z_faces).tolist(),
-        "nail_mm": nail.tolist(),
-        "ratio": 1.8,
-        "ratio_range": [1.5, 3.9],
-        "ratio_living_epidermis": 1.2,
-        "ratio_energy": 1.5,
-        "border_kpa": 0.8,
-        "far_kpa": 0.4,
-        "border_energy_kpa": 0.001,
-        "peak_kpa": 20.0,
+        "x_mm": along.tolist(), "y_mm": y.tolist(), "z_mm": z.tolist(),
+        "von_mises_kpa": stress(x_faces, y_faces, z_faces).tolist(), "nail_mm": nail.tolist(),
+        "ratio": 1.8, "ratio_range": [1.5, 3.9], "ratio_living_epidermis": 1.2, "ratio_energy": 1.5,
+        "border_kpa": 0.8, "far_kpa": 0.4, "border_energy_kpa": 0.001, "peak_kpa": 20.0,
         "text": "Skin at the border bears 1.8 times what skin beside it bears.",
-        "profile": {
-            "distance_mm": distance.tolist(),
-            "surface_kpa": course,
-            "living_epidermis_kpa": course,
-        },
+        "profile": {"distance_mm": distance.tolist(), "surface_kpa": course, "living_epidermis_kpa": course},
         "middle": {
-            "x_mm": corners_x.tolist(),
-            "y_mm": corners_y.tolist(),
+            "x_mm": corners_x.tolist(), "y_mm": corners_y.tolist(),
             "von_mises_kpa": stress(columns, rows, 0.0).ravel().tolist(),
         },
         "across": {
-            "x_mm": 22.0,
-            "y_mm": corners_y[:12].tolist(),
-            "z_mm": corners_y[:12].tolist(),
+            "x_mm": 22.0, "y_mm": across, "z_mm": across,
             "von_mises_kpa": np.linspace(0.0, 0.8, 12).tolist(),
         },
-    }
+    }  # fmt: skip

@@ -19,7 +19,6 @@ from fingerpad.psychophysics.discrimination import (
     Experiment,
     discriminate_euclidean,
     discriminate_gradient_sum,
-    hit_rates_of_sums,
     likelihood_point,
 )
 from fingerpad.psychophysics.encoding import gradient_sum, neighbour_pairs

@@ -6,7 +6,6 @@ import pytest
 from fingerpad.core.errors import ConvergenceError, InputError
 from fingerpad.core.threads import compiled_threads
 from fingerpad.inference.fitting.posterior import (
-    Chains,
     credible_band,
     effective_size,
     effective_sizes,

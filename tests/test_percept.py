@@ -9,7 +9,6 @@ from scipy.special import ndtri
 
 from fingerpad.core.errors import InputError
 from fingerpad.core.random_streams import Purpose, normals
-from fingerpad.experiments.gerling2014 import discrepancy
 from fingerpad.experiments.gerling2014 import discrimination_statistics as goodwin
 from fingerpad.experiments.gerling2014.discrepancy import (
     discrepancy_analysis,

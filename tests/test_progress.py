@@ -30,11 +30,7 @@ def test_lines_tell_the_way_and_the_end_of_a_long_stage_only():
     with Lines(told.append, every_s=0.0).stage("presses", 3) as advance:
         for _ in range(3):
             advance()
-    assert [line.partition(",")[0] for line in told] == [
-        "presses: 1 of 3",
-        "presses: 2 of 3",
-        "presses: 3 of 3",
-    ]
+    assert [line.partition(",")[0] for line in told] == [f"presses: {n} of 3" for n in (1, 2, 3)]
     with Lines(told.append, every_s=60.0, short=False).stage("short", 2) as advance:
         advance()
         advance()
@@ -68,13 +64,8 @@ def wait_until(true, most_s=5.0):
 def test_a_press_tells_how_far_it_is(monkeypatch, caplog):
     told = []
     caplog.set_level(logging.DEBUG, "fingerpad.mechanics.press")
-    progress = Lines(told.append, every_s=0.0)
-    skin = fp.indent(
-        fp.Fingertip(),
-        fp.Sphere(curvature_per_m=287.0),
-        fp.RampAndHold(depth_mm=0.2, hold_ms=60),
-        progress=progress,
-    )
+    motion = fp.RampAndHold(depth_mm=0.2, hold_ms=60)
+    skin = fp.indent(fp.Fingertip(), fp.Sphere(), motion, progress=Lines(told.append, every_s=0.0))
     shares = [int(line.removeprefix("press: ").partition(" %")[0]) for line in told if "%" in line]
     assert shares == sorted(shares)
     assert shares[-1] == 100
@@ -101,8 +92,5 @@ def test_quiet_says_nothing_but_results_and_verbose_tells_of_stages(run_program,
     assert status == 0
     assert any(name == "fingerpad.experiments.runner" and " took " in text for name, text in told)
     assert any(name == "fingerpad.skin.store" and text.startswith("stored ") for name, text in told)
-
-
-def test_quiet_and_verbose_exclude_each_other(run_program):
     status, _, errors = run_program(main, "fingerpad", "--quiet", "--verbose", "store", "list")
     assert (status, errors) == (2, "fingerpad: --quiet and --verbose exclude each other: leave one out.\n")

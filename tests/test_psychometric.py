@@ -19,8 +19,6 @@ from fingerpad.psychophysics import (
     posterior,
 )
 from fingerpad.psychophysics.functions import SIGMOIDS, log_probability
-from fingerpad.psychophysics.maximum_likelihood import _gradient, maximise_likelihood
-from fingerpad.psychophysics.psychometric import working_point
 from fingerpad.psychophysics.uncertainty import STEEPEST, weighted_quantiles
 
 LEVELS = np.array([2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0])

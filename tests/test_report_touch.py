@@ -39,16 +39,13 @@ def area(quads):
     return 0.5 * np.abs((x * np.roll(y, -1, -1) - y * np.roll(x, -1, -1)).sum(-1))
 
 
-def test_the_section_of_a_block_is_one_of_its_sides():
+def test_the_section_of_a_block_is_one_of_its_sides_and_a_body_without_its_plane_has_none():
     mesh = block_mesh([0.0, 1.0, 3.0], [0.0, 2.0], [0.0, 1.0], layers=[0], symmetric=True)
     section = middle_section(mesh, np.zeros_like(mesh.nodes_mm))
     assert_allclose(area(section.corners_mm), [2.0, 4.0])
     assert section.bone_mm[..., 1].tolist() == [[2.0, 2.0]] * 2
     assert section.skin_mm[..., 1].tolist() == [[0.0, 0.0]] * 2
     assert section.nail_mm.shape == (0, 2, 2)
-
-
-def test_a_body_without_its_middle_plane_has_no_section():
     mesh = block_mesh([0.0, 1.0], [0.0, 1.0], [1.0, 2.0], layers=[0])
     with pytest.raises(InputError, match="face on the plane z = 0"):
         middle_section(mesh, np.zeros_like(mesh.nodes_mm))
@@ -112,9 +109,8 @@ def test_a_body_that_moved_is_drawn_where_it_is_at_the_end_if_that_is_on_the_mid
         touch_figure.draw_section(axes, replace(skin, pose=pose), touch.indenter)
         return axes
 
-    middles = [
-        axes.patches[0].get_xy()[:-3, 0].mean() for axes in map(drawn, (Pose(), Pose(x_mm=2.0, tilt_deg=3.0)))
-    ]
+    moved = map(drawn, (Pose(), Pose(x_mm=2.0, tilt_deg=3.0)))
+    middles = [axes.patches[0].get_xy()[:-3, 0].mean() for axes in moved]
     # A tilt of 3 degrees lays the body of the sphere over by a little.
     assert middles[1] - middles[0] == pytest.approx(2.0, abs=0.6)
     assert not drawn(Pose(z_mm=1.0)).patches
@@ -137,11 +133,8 @@ def test_a_hole_through_a_body_is_drawn_as_a_hole(skin):
 
 def test_trains_stand_in_the_order_of_their_distance_and_silent_ones_are_counted(skin):
     trains = {2.0: [3.0, 9.0], 0.5: [1.0], 9.0: [], 4.0: [7.0]}
-    response = SimpleNamespace(
-        types=(),
-        positions_mm=np.array([[skin.axis_x_mm, -z] for z in trains]),
-        spikes=[np.array(train) for train in trains.values()],
-    )
+    places, spikes = [[skin.axis_x_mm, -z] for z in trains], [np.array(train) for train in trains.values()]
+    response = SimpleNamespace(types=(), positions_mm=np.array(places), spikes=spikes)
     axes = new_figure(4.0, 3.0).subplots()
     touch_figure.draw_spikes(axes, skin, response)
     rows = sorted(
@@ -151,41 +144,23 @@ def test_trains_stand_in_the_order_of_their_distance_and_silent_ones_are_counted
     )
     assert rows == [(1, [1.0]), (2, [3.0, 9.0]), (3, [7.0])]
     assert axes.get_ylabel().startswith("3 of 4 afferents")
-
-
-def test_a_silent_population_is_reported_silent(skin):
-    response = SimpleNamespace(types=(), positions_mm=np.zeros((1, 2)), spikes=[np.empty(0)])
+    silent = SimpleNamespace(types=(), positions_mm=np.zeros((1, 2)), spikes=[np.empty(0)])
     axes = new_figure(4.0, 3.0).subplots()
-    touch_figure.draw_spikes(axes, skin, response)
+    touch_figure.draw_spikes(axes, skin, silent)
     assert [text.get_text() for text in axes.texts] == ["no afferent fires a spike"]
 
 
-@pytest.mark.parametrize(
-    ("name", "change", "said"),
-    [
-        (
-            "a.png",
-            lambda skin, response: (response, skin),
-            "skin must be of type SkinResponse: got ResponseMap",
-        ),
-        (
-            "a.png",
-            lambda skin, response: (skin, fp.Sphere(), response),
-            "response must be of type ResponseMap",
-        ),
-        ("a.png", lambda skin, response: (skin, response, response), "indenter must be of type Indenter"),
-        ("a.xyz", lambda skin, response: (skin, response), r"A figure is written as \.png: got a\.xyz\."),
-        ("a", lambda skin, response: (skin, response), r"A figure is written as \.png: got a\."),
-    ],
-)
-def test_what_cannot_be_drawn_is_refused_and_nothing_is_written(skin, tmp_path, name, change, said):
+def test_the_picture_is_saved_with_folders_on_the_way_or_nothing_is_written(skin, tmp_path):
     response = fp.Population.grid(density_per_cm2=10).respond(skin)
-    with pytest.raises(fp.InputError, match=said):
-        fp.save_figure(tmp_path / name, *change(skin, response))
+    for name, given, said in (
+        ("a.png", (response, skin), "skin must be of type SkinResponse: got ResponseMap"),
+        ("a.png", (skin, fp.Sphere(), response), "response must be of type ResponseMap"),
+        ("a.png", (skin, response, response), "indenter must be of type Indenter"),
+        ("a.xyz", (skin, response), r"A figure is written as \.png: got a\.xyz\."),
+        ("a", (skin, response), r"A figure is written as \.png: got a\."),
+    ):
+        with pytest.raises(fp.InputError, match=said):
+            fp.save_figure(tmp_path / name, *given)
     assert list(tmp_path.iterdir()) == []
-
-
-def test_the_picture_is_saved_with_folders_on_the_way(skin, tmp_path):
-    response = fp.Population.grid(density_per_cm2=100).respond(skin)
     saved = fp.save_figure(tmp_path / "new" / "touch.png", skin, response)
     assert saved.read_bytes().startswith(b"\x89PNG")

@@ -30,11 +30,7 @@ def descendants(program: subprocess.Popen[str]) -> list[psutil.Process]:
 
 @pytest.mark.parametrize(
     ("sent", "status", "after_s", "jobs"),
-    [
-        (signal.SIGINT, 130, 2.0, 1),
-        (signal.SIGINT, 130, 6.0, 2),
-        (signal.SIGTERM, 143, 6.0, 2),
-    ],
+    [(signal.SIGINT, 130, 2.0, 1), (signal.SIGINT, 130, 6.0, 2), (signal.SIGTERM, 143, 6.0, 2)],
     ids=["while it starts", "Ctrl-C in presses", "SIGTERM in presses"],
 )
 def test_a_signal_ends_everything_at_once_with_a_sentence(
@@ -61,19 +57,18 @@ def test_a_signal_ends_everything_at_once_with_a_sentence(
         program.communicate()
 
 
-def import_that_hides(sent: signal.Signals) -> None:
-    """Behave as a module in C whose import a signal breaks off."""
-    try:
-        signal.raise_signal(sent)
-    except KeyboardInterrupt:
-        raise ImportError("initialization failed") from None
-
-
 @pytest.mark.parametrize("sent", [signal.SIGINT, signal.SIGTERM])
 def test_a_signal_that_an_import_hides_still_stops(sent: signal.Signals) -> None:
-    """It ended a command with a traceback and status 1."""
+    """A module in C whose import a signal breaks off ended a command with a traceback and status 1."""
+
+    def import_that_hides() -> None:
+        try:
+            signal.raise_signal(sent)
+        except KeyboardInterrupt:
+            raise ImportError("initialization failed") from None
+
     with pytest.raises(KeyboardInterrupt) as caught, signals_raise():
-        import_that_hides(sent)
+        import_that_hides()
     assert isinstance(caught.value, Terminated) == (sent == signal.SIGTERM)
     with pytest.raises(ImportError), signals_raise():
         raise ImportError("no signal came")
@@ -93,9 +88,10 @@ def test_a_worker_that_is_just_starting_ignores_ctrl_c(tmp_path: Path) -> None:
         "    time.sleep(1)\n"
     )
     (tmp_path / "starting.py").write_text(script, encoding="utf-8")
-    command = [sys.executable, "starting.py"]
-    pipe = subprocess.PIPE
-    program = subprocess.Popen(command, cwd=tmp_path, stdout=pipe, stderr=pipe, text=True)
+    program = subprocess.Popen(
+        [sys.executable, "starting.py"], cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE,
+        text=True,
+    )  # fmt: skip
     try:
         assert program.stdout is not None
         assert program.stdout.readline() == "starts\n"

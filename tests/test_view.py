@@ -46,18 +46,18 @@ def file(tmp_path_factory):
     return write_touch(tmp_path_factory.mktemp("touch") / "touch.nc", TOUCH.solve(), RESPONSE)[0]
 
 
-@pytest.mark.parametrize("field", ["sed", "displacement", "pressure", "shear"])
-def test_points_are_marked_where_the_scene_shows_them(data, field):
+def test_points_are_marked_where_the_scene_shows_them(data):
     """The projection of labels and afferents is that of the renderer, within a pixel."""
-    drawn = view._View(data, view._variable(data, field))
-    assert drawn.scene(50.0).shape == (*view.PIXELS[::-1], 3)
-    renderer = drawn._plotter.renderer
     points = np.array([[17.37, -9.0, 0.0], [25.0, 2.0, -4.0], [3.0, -5.0, 3.0]])
-    for point, spot in zip(points, drawn._spots(points), strict=True):
-        renderer.SetWorldPoint(*point, 1.0)
-        renderer.WorldToDisplay()
-        x, up, _ = renderer.GetDisplayPoint()
-        np.testing.assert_allclose(spot, [x, view.PIXELS[1] - up], atol=1.0)
+    for field in ("sed", "displacement", "pressure", "shear"):
+        drawn = view._View(data, view._variable(data, field))
+        assert drawn.scene(50.0).shape == (*view.PIXELS[::-1], 3)
+        renderer = drawn._plotter.renderer
+        for point, spot in zip(points, drawn._spots(points), strict=True):
+            renderer.SetWorldPoint(*point, 1.0)
+            renderer.WorldToDisplay()
+            x, up, _ = renderer.GetDisplayPoint()
+            np.testing.assert_allclose(spot, [x, view.PIXELS[1] - up], atol=1.0)
 
 
 def test_the_scene_follows_time_and_shows_the_field(data):
@@ -135,26 +135,22 @@ def test_without_the_deformation_the_skin_is_shown_at_any_time(file, tmp_path):
     assert sorted(path.name for path in tmp_path.iterdir()) == ["end.png", "skin.png"]
 
 
-def test_a_touch_without_afferents_and_object_is_drawn(data, tmp_path):
-    bare = touch_dataset(replace(TOUCH.solve(), touch=None))
+def test_a_response_without_afferents_and_object_is_drawn(tmp_path):
+    skin = TOUCH.solve()
+    (picture,) = save_view(tmp_path / "a.png", skin, field="pressure")
+    assert picture.stat().st_size > 10_000
+    bare = touch_dataset(replace(skin, touch=None))
     assert "object_front_mm" not in bare
     assert save_view(tmp_path / "bare.png", bare, time_ms=1000.0)
 
 
-def test_a_response_of_the_skin_is_drawn_without_afferents(tmp_path):
-    skin = fp.indent(fp.Fingertip(), fp.Sphere(curvature_per_m=287), fp.RampAndHold(depth_mm=0.3))
-    (picture,) = save_view(tmp_path / "a.png", skin, field="pressure")
-    assert picture.stat().st_size > 10_000
-
-
-def test_what_is_no_data_set_is_refused_and_a_changed_description_is_not(data, tmp_path):
+def test_what_is_no_data_set_or_has_no_library_is_refused_and_a_changed_description_is_not(
+    data, tmp_path, file, monkeypatch
+):
     with pytest.raises(fp.InputError, match="touch must be of type Dataset"):
         save_view(tmp_path / "a.png", 5)
     assert view._named("Sphere") == view._named("[1]") == "object"
     assert view._named(data.attrs["indenter"]) == "Sphere"
-
-
-def test_a_missing_library_says_what_to_install(file, tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "pyvista", None)
     with pytest.raises(fp.InputError, match=r"needs pyvista: .*fingerpad\[view\]"):
         save_view(tmp_path / "a.png", file)
