@@ -29,7 +29,11 @@ def abaqus_deck(job: Job) -> str:
     lines = ["*HEADING", job.summary[2], *cards.comments(["For Abaqus/Standard.", *job.summary])]
     lines += cards.nodes(job.mesh.nodes_mm, 1, "BODY")
     for layer, name in job.layer_names.items():
-        lines += _layer(job, layer, name)
+        material = job.materials[layer]
+        hybrid = "" if isinstance(material.law, Hyperfoam) else "H"
+        lines += cards.body_elements(job, layer, f"C3D8{hybrid}", f"C3D6{hybrid}")
+        lines += [f"*SOLID SECTION, ELSET={name}, MATERIAL={name}", f"*MATERIAL, NAME={name}"]
+        lines += _material(material)
     lines += cards.support_sets(job)
     # Not needed by Abaqus: with these sets `read_finger` reads the deck as a finger.
     for name in ("skin", "bone", "nail"):
@@ -45,14 +49,6 @@ def abaqus_deck(job: Job) -> str:
     for phase in job.phases:
         lines += _step(job, phase, relaxes)
     return cards.text(lines)
-
-
-def _layer(job: Job, layer: int, name: str) -> list[str]:
-    material = job.materials[layer]
-    hybrid = "" if isinstance(material.law, Hyperfoam) else "H"
-    lines = cards.body_elements(job, layer, f"C3D8{hybrid}", f"C3D6{hybrid}")
-    lines += [f"*SOLID SECTION, ELSET={name}, MATERIAL={name}", f"*MATERIAL, NAME={name}"]
-    return lines + _material(material)
 
 
 def _material(material: Material) -> list[str]:

@@ -37,9 +37,15 @@ _WEDGE_EDGES = ((0, 1), (1, 2), (2, 0), (3, 4), (4, 5), (5, 3), (0, 3), (1, 4), 
 
 def calculix_deck(job: Job, elastic_moduli: str | None = None, element: str = "C3D8I") -> str:
     one_of("element", element, tuple(ELEMENTS))
-    points, bricks, wedges = _with_middle_nodes(job) if element == "C3D20R" else _of_mesh(job)
+    points, bricks, wedges = job.mesh.nodes_mm, job.mesh.elements, job.wedges
+    if element == "C3D20R":
+        points, bricks, wedges = _with_middle_nodes(job)
     first = len(points) + 1
-    lines = cards.comments(["For CalculiX.", *job.summary, *_remarks(elastic_moduli)])
+    lines = cards.comments(["For CalculiX.", *job.summary])
+    if elastic_moduli is not None:
+        lines += cards.comments(
+            [f"Elastic, with {elastic_moduli} moduli: relaxation and the hold are left out."]
+        )
     lines += cards.nodes(points, 1, "BODY")
     for layer, name in job.layer_names.items():
         lines += cards.body_elements(job, layer, element, ELEMENTS[element], (bricks, wedges))
@@ -68,12 +74,6 @@ def calculix_deck(job: Job, elastic_moduli: str | None = None, element: str = "C
     return cards.text(lines)
 
 
-def _remarks(elastic_moduli: str | None) -> list[str]:
-    if elastic_moduli is None:
-        return []
-    return [f"Elastic, with {elastic_moduli} moduli: relaxation and the hold are left out."]
-
-
 def _law(material: Material, name: str, elastic_moduli: str | None) -> list[str]:
     material = replace(material, law=_in_two_terms(material.law))
     if not material.prony.shares:
@@ -95,10 +95,6 @@ def _in_two_terms(law: Law) -> Law:
     if not isinstance(law, Hyperfoam) or len(law.exponents) > 1:
         return law
     return replace(law, moduli_kpa=(law.moduli_kpa[0] / 2,) * 2, exponents=law.exponents * 2)
-
-
-def _of_mesh(job: Job) -> tuple[FloatArray, IntArray, IntArray]:
-    return job.mesh.nodes_mm, job.mesh.elements, job.wedges
 
 
 def _with_middle_nodes(job: Job) -> tuple[FloatArray, IntArray, IntArray]:

@@ -136,9 +136,6 @@ class Job:
         """Section of the indenter, if it has one of lines and arcs."""
         return outline_of(self.indenter, self.reach_mm)
 
-    def _local(self, points_mm: FloatArray) -> FloatArray:
-        return self.placement.to_local(points_mm, depth_mm=0.0)
-
     @cached_property
     def rigid(self) -> RigidMesh:
         """Facets of the indenter where it may touch, at first touch in the frame of the body."""
@@ -177,7 +174,8 @@ class Job:
                 f"A deck needs skin on one face of an element, and a triangle of a wedge: element "
                 f"{top[strange[0]]} has another; export vtu, csv or npz."
             )
-        local = self._local(mesh.nodes_mm[faces].reshape(-1, 3)).reshape(*faces.shape, 3)
+        local = self.placement.to_local(mesh.nodes_mm[faces].reshape(-1, 3), depth_mm=0.0)
+        local = local.reshape(*faces.shape, 3)
         if self.indenter.grips:
             may = self.indenter.may_touch(local.reshape(-1, 3)).reshape(faces.shape).all(axis=1)
         else:

@@ -321,7 +321,11 @@ def observe_sweep(data: xarray.Dataset, observer: Content, grid: Content | None 
     check_sweep_data(data)
     content = json.loads(data.attrs["sweep"])
     varied = {f"{OBSERVER}.{field}": values for field, values in (grid or {}).items()}
-    own = {field: values for field, values in content.get("grid", {}).items() if not _of_observer(field)}
+    own = {
+        field: values
+        for field, values in content.get("grid", {}).items()
+        if field.partition(".")[0] != OBSERVER
+    }
     sweep = sweep_of({**content, OBSERVER: dict(observer), "grid": own | varied}, "observe_sweep")
     kept = [name for name in data.dims if name in {axis.name for axis in sweep.axes}]
     responses = {name: data[name].values for name in MEASURED.values() if name in data}
@@ -330,10 +334,6 @@ def observe_sweep(data: xarray.Dataset, observer: Content, grid: Content | None 
     coords |= {axis.name: next(iter(axis.values.values())) for axis in sweep.observer_axes}
     dims = [axis.name for axis in (*sweep.axes, *sweep.observer_axes)]
     return library("xarray").DataArray(values, dims=dims, coords=coords, name=HIT_RATE)
-
-
-def _of_observer(field: str) -> bool:
-    return field.partition(".")[0] == OBSERVER
 
 
 def sweep_settings(data: xarray.Dataset) -> Sweep:

@@ -85,7 +85,8 @@ class CorrelatedResiduals:
         """Draw sigma and length (n_points,) given rows of residuals (n_points, n_residuals)."""
         squares = self._squares(residuals)
         n_points = len(squares)
-        shares = np.cumsum(np.exp(_normalised(self._log_shares(squares))), axis=1)
+        logarithms = self._log_shares(squares)
+        shares = np.cumsum(np.exp(logarithms - logsumexp(logarithms, axis=1, keepdims=True)), axis=1)
         which = (random.uniform(size=(n_points, 1)) > shares[:, :-1]).sum(axis=1)
         total = PRIOR_OBSERVATIONS * self.deviation**2 + squares[np.arange(n_points), which]
         deviation = np.sqrt(total / random.chisquare(PRIOR_OBSERVATIONS + self.n_residuals, size=n_points))
@@ -181,7 +182,3 @@ def _whitening(distances_mm: FloatArray, length_mm: float) -> FloatArray:
         return np.eye(len(distances_mm))
     factor = np.linalg.cholesky(np.exp(-distances_mm / length_mm))
     return np.asarray(np.linalg.inv(factor), dtype=np.float64)
-
-
-def _normalised(logarithms: FloatArray) -> FloatArray:
-    return np.asarray(logarithms - logsumexp(logarithms, axis=1, keepdims=True), dtype=np.float64)

@@ -65,7 +65,8 @@ def neighbour_pairs(positions_mm: ArrayLike, pitch_mm: float, count: int = 8) ->
     reach = _BETWEEN_FIRST_AND_SECOND_NEIGHBOUR[count] * positive("pitch_mm", pitch_mm, "mm")
     # The tree's reach includes its end.
     found = cKDTree(positions).query_pairs(np.nextafter(reach, 0.0), p=_METRIC[count], output_type="ndarray")
-    return _in_order(found)
+    ordered = np.sort(found.astype(np.int64), axis=1)
+    return ordered[np.lexsort((ordered[:, 1], ordered[:, 0]))]
 
 
 def delaunay_pairs(positions_mm: ArrayLike, pitch_mm: float) -> np.ndarray:
@@ -103,12 +104,6 @@ def _plane(positions_mm: ArrayLike) -> FloatArray:
             f"positions_mm must have rows of two numbers, such as x and z: got shape {positions.shape}."
         )
     return positions
-
-
-def _in_order(pairs: np.ndarray) -> np.ndarray:
-    """Pairs by their first, then by their second receptor, the lower first."""
-    ordered = np.sort(pairs.astype(np.int64), axis=1)
-    return ordered[np.lexsort((ordered[:, 1], ordered[:, 0]))]
 
 
 def taking_part(responses: ArrayLike, neighbours: np.ndarray) -> tuple[FloatArray, np.ndarray]:

@@ -288,13 +288,9 @@ def present(
         )
     trials = session_trials(session, 2, whole("n_trials", n_trials, 2))
     first, second = standard.draw(seed, trials[0]), comparison.draw(seed, trials[1])
-    ratios = [_log_ratio(standard, comparison, responses) for responses in (first, second)]
-    return Presentation(first, second, ratios[0], ratios[1], seed)
-
-
-def _log_ratio(standard: ResponseModel, comparison: ResponseModel, responses: FloatArray) -> FloatArray:
     # One likelihood may be -inf, but not both: the responses come from one of the models.
-    return comparison.log_likelihood(responses) - standard.log_likelihood(responses)
+    ratios = [comparison.log_likelihood(each) - standard.log_likelihood(each) for each in (first, second)]
+    return Presentation(first, second, ratios[0], ratios[1], seed)
 
 
 @known_keywords

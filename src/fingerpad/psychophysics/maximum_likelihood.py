@@ -86,7 +86,8 @@ def maximise_likelihood(model: Model, n_correct: FloatArray) -> tuple[FloatArray
     history: list[str] = []
     for step in range(MOST_STEPS):
         gradient = _gradient(model, n_correct[running], points[running])
-        held = ~model.free | _pushed_out(model, points[running], gradient)
+        now = points[running]
+        held = ~model.free | (now <= model.lower) & (gradient < 0.0) | (now >= model.upper) & (gradient > 0.0)
         curvature = _curvature(model, n_correct[running], points[running], held)
         move = _damped_step(model, points[running], gradient, curvature, held, damping[running])
         tried = np.clip(points[running] + move, model.lower, model.upper)
@@ -132,10 +133,6 @@ def _inner_points(lower: float, upper: float, count: int) -> FloatArray:
     if lower == upper:
         return np.array([lower])
     return lower + (upper - lower) * (np.arange(count) + 0.5) / count
-
-
-def _pushed_out(model: Model, points: FloatArray, gradient: FloatArray) -> np.ndarray:
-    return ((points <= model.lower) & (gradient < 0.0)) | ((points >= model.upper) & (gradient > 0.0))
 
 
 def _gradient(model: Model, n_correct: FloatArray, points: FloatArray) -> FloatArray:

@@ -97,7 +97,7 @@ def reduce_touch(
             f"calibration must be 0 or at least {FEWEST_CALIBRATED} touches, fewer have no bound for "
             f"{COVERAGE:.0%} of touches: got {calibration}."
         )
-    solve = solve or _in_turn
+    solve = solve or (lambda touches, stage: [touch.solve() for touch in touches])
     poses = list(training.poses())
     shape, again = training.pressed_again()
     *pressed, repressed = solve([*(touch for pose in poses for touch in pose.touches), again], "training")
@@ -133,10 +133,6 @@ def with_exponents(model: ReducedModel, skin: SkinResponse, shape: Iterable[floa
         wrong = np.array([row.wrong for row in _compared(tried, skin, shape)])
         sums.append((wrong**2).sum(axis=0))
     return replace(model, exponents=np.array(EXPONENTS)[np.argmin(sums, axis=0)])
-
-
-def _in_turn(touches: Sequence[Touch], stage: str) -> list[SkinResponse]:
-    return [touch.solve() for touch in touches]
 
 
 def draw_touch(

@@ -342,13 +342,11 @@ class SkinResponse(Result):
         """Several quantities at the same sites, (n_times, n_sites) each."""
         known = [self._of_sheet(quantity) for quantity in quantities]
         places = places_below(self._receptors, sites)
-        return [self._not_negative(self._receptors.read(places, values)) for values in known]
-
-    @staticmethod
-    def _not_negative(read: FloatArray) -> FloatArray:
-        """Freeze values of a spline, which may dip below zero beside a steep front; no quantity can."""
-        np.maximum(read, 0.0, out=read)
-        read.setflags(write=False)
+        read = [self._receptors.read(places, values) for values in known]
+        for values in read:
+            # A spline may dip below zero beside a steep front; no quantity can.
+            np.maximum(values, 0.0, out=values)
+            values.setflags(write=False)
         return read
 
     def _of_sheet(self, quantity: str) -> FloatArray:

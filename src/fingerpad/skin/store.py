@@ -19,7 +19,7 @@ import math
 import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import closing
-from dataclasses import Field, dataclass, fields, is_dataclass
+from dataclasses import dataclass, fields, is_dataclass
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -94,7 +94,8 @@ def _plain(value: Any, name_of: Callable[[type], str], is_float: bool = False) -
         return [value.dtype.str, list(value.shape), hashlib.sha256(content.tobytes()).hexdigest()]
     if is_dataclass(value):
         parts = {
-            field.name: _plain(getattr(value, field.name), name_of, _holds_floats(field))
+            # Whole numbers in fields of floats are floats: 287 and 287.0 describe the same sphere.
+            field.name: _plain(getattr(value, field.name), name_of, "float" in str(field.type))
             for field in fields(value)
             if field.compare
         }
@@ -109,11 +110,6 @@ def _plain(value: Any, name_of: Callable[[type], str], is_float: bool = False) -
         "An indentation can only be stored if its parts are frozen dataclasses, numbers, text or arrays: got "
         f"{type(value).__name__}."
     )
-
-
-def _holds_floats(field: Field[Any]) -> bool:
-    """Whether whole numbers in this field are floats: 287 and 287.0 describe the same sphere."""
-    return "float" in str(field.type)
 
 
 class Store(metaclass=KnownKeywords):

@@ -200,7 +200,8 @@ def sample(
     positive("smallest_effective_size", smallest_effective_size)
     density = _Checked(log_density)
     seeds = independent_keys(whole("seed", seed, at_least=0), n_ensembles)
-    proposals = list(moves) if moves is not None else _moves()
+    usual = [(emcee.moves.StretchMove(), 0.5), (emcee.moves.KDEMove(bw_method=BANDWIDTH), 0.5)]
+    proposals = usual if moves is None else list(moves)
     ensembles = [_ensemble(density, middle, scale, n_walkers, one, proposals) for one in seeds]
     history: list[str] = []
     done, wanted = 0, n_steps
@@ -246,10 +247,6 @@ def sample(
                 tuple(history),
             )
         wanted = min(2 * done, most_steps)
-
-
-def _moves() -> list[tuple[Any, float]]:
-    return [(emcee.moves.StretchMove(), 0.5), (emcee.moves.KDEMove(bw_method=BANDWIDTH), 0.5)]
 
 
 @dataclass

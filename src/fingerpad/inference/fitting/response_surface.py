@@ -93,7 +93,8 @@ def maximise(
         n_evaluations += len(design) + n_trials
         if highest - at_base <= smallest_gain:
             return Fit(base, at_base, n_evaluations, time.perf_counter() - clock, tuple(history))
-        base = _read_only(best)
+        base = best
+        base.setflags(write=False)
         history.append(FitStep(base, highest))
     raise ConvergenceError(
         f"maximise has not converged after {most_iterations} iterations: give more, "
@@ -202,8 +203,3 @@ def _floor(lower_bounds: ArrayLike | None, base: FloatArray, units: FloatArray) 
             f"got {base.tolist()} for {bounds.tolist()}."
         )
     return floor
-
-
-def _read_only(array: FloatArray) -> FloatArray:
-    array.setflags(write=False)
-    return array
