@@ -38,7 +38,11 @@ def tissue_table(layers: Sequence[TissueLayer]) -> Table:
             number(layer.shear_at_once_kpa) if layer.prony_shares else ABSENT,
             fixed(layer.poisson, 2),
             fixed(layer.poisson_at_once, 2) if layer.prony_shares else ABSENT,
-            _prony(layer),
+            ", ".join(
+                f"{number(share)} ({number(time)})"
+                for share, time in zip(layer.prony_shares, layer.prony_times_s, strict=True)
+            )
+            or "none",
             " / ".join(
                 status or ABSENT
                 for status in (layer.modulus_status, layer.poisson_status, layer.prony_status)
@@ -48,8 +52,3 @@ def tissue_table(layers: Sequence[TissueLayer]) -> Table:
         for layer in layers
     ]
     return Table("Tissues by set and layer (in place of the paper's Tables 1 and 2)", COLUMNS, rows, NOTE)
-
-
-def _prony(layer: TissueLayer) -> str:
-    terms = zip(layer.prony_shares, layer.prony_times_s, strict=True)
-    return ", ".join(f"{number(share)} ({number(time)})" for share, time in terms) or "none"

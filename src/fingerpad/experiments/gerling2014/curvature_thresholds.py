@@ -197,12 +197,16 @@ def _thresholds_of(
     draws = normals(seed, 1, len(population.positions_mm), Purpose.RESPONSE, NOISE_DRAWS)[0].T
     found: list[CurvatureThreshold] = []
     missed: list[MissingThreshold] = []
-    try:
-        noise = _fitted_noise(curvatures, static, neighbours, draws) if noise_sigma is None else noise_sigma
-    except ConvergenceError as error:
-        noise, missed = math.nan, [MissingThreshold(standard_per_m=None, why_not=str(error))]
-    observer = Observer(interpolated(curvatures, static), neighbours, noise, draws)
-    for standard in STANDARDS_PER_M if math.isfinite(noise) else ():
+    if noise_sigma is None:
+        spheres = (psychophysics.SPHERE_287.value, *psychophysics.GOODWIN_CURVATURES.value)
+        table = static[[int(np.flatnonzero(curvatures == sphere)[0]) for sphere in spheres]]
+        try:
+            fit = fit_noise_sigma(lambda sigma: expected_hit_rates(table, neighbours, sigma, draws))
+            noise_sigma = fit.noise_sigma
+        except ConvergenceError as error:
+            noise_sigma, missed = math.nan, [MissingThreshold(standard_per_m=None, why_not=str(error))]
+    observer = Observer(interpolated(curvatures, static), neighbours, noise_sigma, draws)
+    for standard in STANDARDS_PER_M if math.isfinite(noise_sigma) else ():
         try:
             found.append(threshold_at(observer, standard))
         except ConvergenceError as error:
@@ -211,20 +215,11 @@ def _thresholds_of(
         layout=name,
         rows=LAYOUTS[name][0],
         columns=LAYOUTS[name][1],
-        noise_sigma=noise,
+        noise_sigma=noise_sigma,
         gradient_sum=gradient_sum(static, neighbours),
         standards=tuple(found),
         without_threshold=tuple(missed),
     )
-
-
-def _fitted_noise(
-    curvatures: FloatArray, static: FloatArray, neighbours: np.ndarray, draws: FloatArray
-) -> float:
-    """Noise with which a population meets Goodwin's two points."""
-    spheres = (psychophysics.SPHERE_287.value, *psychophysics.GOODWIN_CURVATURES.value)
-    table = static[[int(np.flatnonzero(curvatures == sphere)[0]) for sphere in spheres]]
-    return fit_noise_sigma(lambda sigma: expected_hit_rates(table, neighbours, sigma, draws)).noise_sigma
 
 
 def interpolated(curvature_per_m: FloatArray, table: FloatArray) -> PchipInterpolator:

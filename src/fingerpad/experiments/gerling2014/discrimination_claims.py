@@ -22,7 +22,7 @@ from fingerpad.experiments.gerling2014.claim_row import (
     measured,
     two_digits,
 )
-from fingerpad.experiments.gerling2014.discrepancy import USED, DiscrepancyAnalysis, Interpretation
+from fingerpad.experiments.gerling2014.discrepancy import USED, DiscrepancyAnalysis
 from fingerpad.experiments.gerling2014.discrimination_statistics import DiscriminationStatistics, Estimate
 from fingerpad.experiments.gerling2014.sphere_discrimination import SphereDiscrimination
 
@@ -139,7 +139,8 @@ def _targets(found: SphereDiscrimination, fitted_to: str) -> list[ClaimRow]:
 def _fits_best(found: SphereDiscrimination, before: str) -> ClaimRow:
     """Judge the three measures at one noise, and each at the noise that fits it best."""
     misfit, above = found.statistics.misfit, found.statistics.misfit_above_static
-    at_own = {name: reading for name in MEASURES if (reading := _used(found.reasons, name))}
+    readings = {reading.reading: reading for reading in found.reasons.readings}
+    at_own = {name: readings[USED[name]] for name in MEASURES if USED[name] in readings}
     at_one_noise = _all(*(_above(above[name], 0.0) for name in MEASURES[1:] if name in above), Verdict.MET)
     # A measure that no noise fits has no misfit of its own, and fits worse than any other.
     own = {name: np.nan_to_num(reading.misfit, nan=np.inf) for name, reading in at_own.items()}
@@ -325,11 +326,6 @@ def _euclidean(
         if fitted_to_people
         else "",
     )
-
-
-def _used(reasons: DiscrepancyAnalysis, measure: str) -> Interpretation | None:
-    """Return the reading by which the study decodes a measure, None if the measure is silent."""
-    return next((reading for reading in reasons.readings if reading.reading == USED[measure]), None)
 
 
 def _or_none(value: float) -> str:

@@ -95,13 +95,17 @@ def deflection_r2(profile: SurfaceProfile, proximal_positive: bool = True) -> fl
 def deflection_result(responses: dict[tuple[str, str], SkinResponse]) -> SkinDeflectionResult:
     """Profiles, forces and R², with distances in the direction of the observations."""
     observed = cylinder_deflection()
-    trials = {
-        trial: TrialDeflection(
-            line=_under_indenter(responses[trial, "line"]),
-            cylinder=_under_cylinder(responses[trial, "cylinder"]),
+    trials = {}
+    for trial in TRIALS:
+        skin = responses[trial, "cylinder"]
+        profile = skin.surface_profile()
+        cylinder = CylinderDeflection(
+            **vars(_under_indenter(skin)),
+            r2=deflection_r2(profile),
+            r2_mirrored=deflection_r2(profile, proximal_positive=False),
         )
-        for trial in TRIALS
-    }
+        line = _under_indenter(responses[trial, "line"])
+        trials[trial] = TrialDeflection(line=line, cylinder=cylinder)
     return SkinDeflectionResult(
         **trials,
         observed=ObservedDeflection(
@@ -121,15 +125,6 @@ def _under_indenter(skin: SkinResponse) -> IndenterDeflection:
         force_mn=float(skin.force_mn[-1]),
         peak_force_mn=float(skin.force_mn.max()),
         penetration_mm=skin.penetration_mm,
-    )
-
-
-def _under_cylinder(skin: SkinResponse) -> CylinderDeflection:
-    profile = skin.surface_profile()
-    return CylinderDeflection(
-        **vars(_under_indenter(skin)),
-        r2=deflection_r2(profile),
-        r2_mirrored=deflection_r2(profile, proximal_positive=False),
     )
 
 

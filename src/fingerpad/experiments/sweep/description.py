@@ -231,7 +231,7 @@ class Sweep:
         found = []
         for field, values in asked.grid.items():
             with self.origin.located(), at("grid", field):
-                found.append(Axis(_dimension(field), {field: _listed(values)}))
+                found.append(Axis(field.replace(".", "_"), {field: _listed(values)}))
         if asked.zip:
             with self.origin.located(), at("zip"):
                 together = {field: _listed(values) for field, values in asked.zip.items()}
@@ -464,10 +464,6 @@ def _listed(values: Any) -> list[Any]:
             f"a field that varies must have a list of values, or start, stop and count: got {values!r}."
         )
     return list(found)
-
-
-def _dimension(field: str) -> str:
-    return field.replace(".", "_")
 
 
 def _with(content: Content, keys: list[str], value: Any) -> Content:
