@@ -12,9 +12,7 @@ from fingerpad.cli.running import interruptible
 from fingerpad.core.errors import closest
 from fingerpad.skin.fields import sampled_fields
 
-DEFAULT_TISSUES = "human"
-"""Tissues of every command; as in `fingerpad.data.tissues`."""
-
+DEFAULT_TISSUES = "human"  # Tissues of every command; as in `fingerpad.data.tissues`.
 RESOLUTION_CHOICES = ("quick", "standard", "paper")
 INDENTER_CHOICES = ("sphere", "cylinder", "bar", "line", "punch", "plate", "edge", "gap", "grating")
 FINGER_CHOICES = ("adult", "small", "large", "child", "macaque", "aged")

@@ -10,8 +10,7 @@ import typer
 from fingerpad.cli.options import Jobs, Scheduler, option
 from fingerpad.cli.running import command_line, engine, interruptible, make_writable, progress
 
-MOST_FAILED = 99
-"""Largest exit status for settings that failed: larger ones have other meanings."""
+MOST_FAILED = 99  # Largest exit status for settings that failed: larger ones have other meanings.
 
 
 def sweep_command(

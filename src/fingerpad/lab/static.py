@@ -18,11 +18,8 @@ from fingerpad.lab.laboratory import Laboratory
 from fingerpad.lab.state import AFFERENTS, LabState
 from fingerpad.lab.view import comparison, view_of_answer
 
-DEPTHS, PLACES = 6, 5
-"""Depths, and places along the finger, of every object."""
-
-FRAMES = 24
-"""Pictures of the skin over time in each answer."""
+DEPTHS, PLACES = 6, 5  # Depths, and places along the finger, of every object.
+FRAMES = 24  # Pictures of the skin over time in each answer.
 
 CONTROLS = (
     ("object", "object", "", 0),

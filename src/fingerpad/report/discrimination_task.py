@@ -209,12 +209,8 @@ def _population(found: TaskResult) -> Table:
 
 
 _CHANCE = 0.5
-MOST_MAPS = 4
-"""Stimuli in the figure of responses: the standard, and comparisons from the first to the last."""
-
-MARGIN_MM = 0.6
-"""About the outermost afferents of a map. [mm]"""
-
+MOST_MAPS = 4  # Stimuli in the figure of responses: the standard, and comparisons from the first to the last.
+MARGIN_MM = 0.6  # About the outermost afferents of a map. [mm]
 CODE_LABELS = {"gradient_sum": "Gradient Sum", "euclidean": "Euclidean Distance", "ideal": "ideal observer"}
 MEASURE_LABELS = {
     "static": ("static rate", "spikes/s"),

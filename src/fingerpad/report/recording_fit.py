@@ -32,8 +32,7 @@ from fingerpad.report.style import BLACK, BLUE, GREY, ORANGE, draw_rates, new_fi
 
 _PAGE = "fit.html"
 IDENTIFIABLE = IDENTIFIABLE_SYMBOLS | {"time_constant_ms": "time constant τ"}
-LONGEST_LABEL = 12
-"""Names of stimuli are cut to so many letters at an axis."""
+LONGEST_LABEL = 12  # Names of stimuli are cut to so many letters at an axis.
 
 
 def draw_fit(found: FitResult) -> Figure:

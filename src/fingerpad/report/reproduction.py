@@ -41,8 +41,7 @@ LINES: dict[str, LineStyle] = {
 }
 """How the two sets are drawn on the first screen."""
 
-IN_THE_PAPER = "Trial 3"
-"""The trial that is closest to the observed deflection in the paper."""
+IN_THE_PAPER = "Trial 3"  # The trial that is closest to the observed deflection in the paper.
 
 
 def write_report(result: ReproductionResult, folder: Path) -> Path:

@@ -17,11 +17,8 @@ from fingerpad.report.population import QUANTITIES, with_round_ticks
 from fingerpad.report.style import GREY, new_figure
 
 PANEL_IN = (3.9, 3.3)
-POINTS_PER_PANEL = 180.0
-"""Side of the picture within a panel. [1/72 inch]"""
-
-ROOM_MM = 0.5
-"""Least skin to be seen about the receptors. [mm]"""
+POINTS_PER_PANEL = 180.0  # Side of the picture within a panel. [1/72 inch]
+ROOM_MM = 0.5  # Least skin to be seen about the receptors. [mm]
 
 
 def draw_responses(responses: Mapping[str, ResponseMap]) -> Figure:

@@ -31,14 +31,12 @@ SKIN = LinearSegmentedColormap.from_list(
 )
 """From pale skin to dark violet; the lightness falls all the way, so that the order survives greyscale."""
 
-DECADES = 2.5
-"""Values that are further below the largest share the palest colour."""
+DECADES = 2.5  # Values that are further below the largest share the palest colour.
 
 REACH_MM, ROOM_BELOW_MM, MARGIN_MM = 16.0, 2.0, 0.5
 """Skin to either side of the indenter's axis, room below and beside the finger that is shown. [mm]"""
 
-BODY_MM = 40.0
-"""Farther than this from its face no body is drawn. [mm]"""
+BODY_MM = 40.0  # Farther than this from its face no body is drawn. [mm]
 
 BONE, BONE_INSIDE = "#9a9488", "#d9dde0"
 """Colours of the outline of bone and nail, and of the bone itself, unlike any of `SKIN` and the paper."""

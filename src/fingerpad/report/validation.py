@@ -16,11 +16,8 @@ from fingerpad.report.parts import Chapter, Page, Row, Table, illustrated, liste
 from fingerpad.report.style import BLACK, BLUE, GREY, ORANGE, new_figure, say_nothing_to_draw
 
 _PAGE = "validate.html"
-LONGEST_TABLE = 200
-"""Conditions that the page lists; validate.json has all rows."""
-
-QUANTITIES = {"N": "force", "mm": "deflection", "spikes/s": "firing rate"}
-"""What was observed, by its unit."""
+LONGEST_TABLE = 200  # Conditions that the page lists; validate.json has all rows.
+QUANTITIES = {"N": "force", "mm": "deflection", "spikes/s": "firing rate"}  # What was observed, by its unit.
 
 
 def draw_validation(results: ValidationFile) -> Figure:

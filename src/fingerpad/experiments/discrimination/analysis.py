@@ -57,8 +57,7 @@ _UNITS = {
 }
 """Unit of a key that varies, by its end."""
 
-SESSION = 2
-"""Session of the random numbers of efficiencies; that of the hit rates is another."""
+SESSION = 2  # Session of the random numbers of efficiencies; that of the hit rates is another.
 
 Encoded = tuple[FloatArray, np.ndarray]
 """A measure of all receptors under every stimulus, and the pairs of neighbours that take part."""

@@ -35,9 +35,7 @@ IDEAL = "ideal"
 CODES = ("gradient_sum", "euclidean", IDEAL)
 MEASURES = ("static", "dynamic", "latency")
 FREE = "free"
-FITTED = "fitted"
-"""Value of `noise` where it is fitted to observed hit rates."""
-
+FITTED = "fitted"  # Value of `noise` where it is fitted to observed hit rates.
 _REPETITIONS = int(psychophysics.REPETITIONS.value)
 
 

@@ -38,8 +38,7 @@ from fingerpad.neuron.rate_windows import Window, Windows, common_rate_windows_m
 from fingerpad.skin.fields import sampled_fields
 from fingerpad.skin.indentation import Touch
 
-EXAMPLE = "bar.csv"
-"""Name of the file of `example_recordings`."""
+EXAMPLE = "bar.csv"  # Name of the file of `example_recordings`.
 
 
 @result_class

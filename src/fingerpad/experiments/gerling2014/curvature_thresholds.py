@@ -48,8 +48,7 @@ STEPS = (0.03, 0.06, 0.09, 0.12, 0.16, 0.21)
 """Comparisons of an experiment: how much more curved than the standard, as a share of it."""
 
 PROPORTION = 0.75
-JUDGEMENTS = int(psychophysics.GOODWIN_TRIALS.value)
-"""Per comparison of an experiment."""
+JUDGEMENTS = int(psychophysics.GOODWIN_TRIALS.value)  # Per comparison of an experiment.
 
 LEFT_OUT_PER_M = (296.0, 305.0, 316.0, 328.0, 340.0)
 """Spheres whose responses are also predicted from the others, which gives the error of interpolation."""

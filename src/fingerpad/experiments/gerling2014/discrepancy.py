@@ -35,11 +35,8 @@ from fingerpad.psychophysics.discrimination import (
 from fingerpad.psychophysics.encoding import gradient_sum, neighbour_pairs, taking_part
 from fingerpad.psychophysics.noise_fit import expected_euclidean_hit_rates, expected_hit_rates
 
-PATIENCE_MS = protocol.RAMP.value
-"""Time that an observer waits for first spikes: until the ramp ends. [ms]"""
-
-DRAWS = 1000
-"""Common random presentations behind each interpretation."""
+PATIENCE_MS = protocol.RAMP.value  # Time that an observer waits for first spikes: until the ramp ends. [ms]
+DRAWS = 1000  # Common random presentations behind each interpretation.
 
 CURVE_NOISE = tuple(round(0.01 * step, 2) for step in range(1, 31))
 """Noise at which the misfit of every code is computed."""
@@ -51,8 +48,7 @@ USED = {
 }
 """The interpretation by which the study decodes each measure."""
 
-STEEPEST = 20.0
-"""Largest multiple of the model's rise that is tried."""
+STEEPEST = 20.0  # Largest multiple of the model's rise that is tried.
 
 
 @result_class

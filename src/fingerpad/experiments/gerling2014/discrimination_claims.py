@@ -27,18 +27,10 @@ from fingerpad.experiments.gerling2014.discrimination_statistics import Discrimi
 from fingerpad.experiments.gerling2014.sphere_discrimination import SphereDiscrimination
 
 STATUS = MATERIALS + "; curvatures 316, 328, 340 /m assumed"
-ERRORS = 2.0
-"""Monte-Carlo errors by which two numbers must differ for the difference to count."""
-
-CLOSE_POINTS = 0.03
-"""Within this of people's hit rates, and of each other, hit rates count as the same."""
-
-FROM_LINE = 0.05
-"""Within this of the line in z, hit rates between the two points count as on it."""
-
-SAME = 1e-9
-"""Changes of hit rates that differ by less are those of one reading."""
-
+ERRORS = 2.0  # Monte-Carlo errors by which two numbers must differ for the difference to count.
+CLOSE_POINTS = 0.03  # Within this of people's hit rates, and of each other, hit rates count as the same.
+FROM_LINE = 0.05  # Within this of the line in z, hit rates between the two points count as on it.
+SAME = 1e-9  # Changes of hit rates that differ by less are those of one reading.
 PLACES = ("0.0 mm", "0.2 mm")
 MEASURES = ("static", "dynamic", "latency")
 JUDGED_RISE = "judged against two Monte-Carlo errors, at both positions"
@@ -84,8 +76,7 @@ def _all(*verdicts: Verdict) -> Verdict:
     return min(verdicts, key=order.index)
 
 
-_row = partial(claim, status=STATUS)
-"""All rows rest on the same inputs."""
+_row = partial(claim, status=STATUS)  # All rows rest on the same inputs.
 
 
 def _noise(found: SphereDiscrimination, fitted_to: str) -> ClaimRow:

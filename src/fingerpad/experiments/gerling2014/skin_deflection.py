@@ -128,8 +128,7 @@ def _under_indenter(skin: SkinResponse) -> IndenterDeflection:
     )
 
 
-PLATE_DEPTHS_MM = (1.0, 2.0)
-"""Depths of the flat plate, at which forces of people were observed. [mm]"""
+PLATE_DEPTHS_MM = (1.0, 2.0)  # Depths of the flat plate, at which forces of people were observed. [mm]
 
 
 @result_class

@@ -42,21 +42,13 @@ from fingerpad.experiments.discrimination.task import CODES, IDEAL, MEASURES, Ex
 from fingerpad.psychophysics.noise import LARGEST_NOISE
 from fingerpad.skin.fields import stored_fields
 
-AFFERENTS = "afferents"
-"""Block of a touch whose fields do not change the skin."""
-
-OBSERVER = "observer"
-"""Block of a sweep whose fields change hit rates alone."""
-
+AFFERENTS = "afferents"  # Block of a touch whose fields do not change the skin.
+OBSERVER = "observer"  # Block of a sweep whose fields change hit rates alone.
 NOT_SWEPT = ("title", "outputs")
 LINEAR, LOGARITHMIC = "linear", "logarithmic"
 SOBOL, LATIN_HYPERCUBE = "sobol", "latin_hypercube"
-ZIP, SAMPLE = "zip", "sample"
-"""Dimensions of fields that vary together."""
-
-MOST_CHECKED = 1000
-"""Most points of an axis whose values are checked before anything is pressed."""
-
+ZIP, SAMPLE = "zip", "sample"  # Dimensions of fields that vary together.
+MOST_CHECKED = 1000  # Most points of an axis whose values are checked before anything is pressed.
 _COMPARED = "a constraint must be a comparison such as a.b < 2 * c.d"
 _ARITHMETIC = "a constraint must have fields, numbers, + - * / and comparisons"
 _COMPARISONS = {

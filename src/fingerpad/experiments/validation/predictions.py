@@ -81,9 +81,7 @@ class Reading:
     """Reads the prediction from the response of the skin, None without a touch."""
 
 
-Plan = Reading | InputError
-"""How a condition is predicted, or why it cannot be pressed."""
-
+Plan = Reading | InputError  # How a condition is predicted, or why it cannot be pressed.
 Condition = tuple[Value, ...]
 
 
