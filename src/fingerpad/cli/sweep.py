@@ -53,15 +53,9 @@ def sweep_command(
     make_writable(out.parent)
     with interruptible():
         done = run_sweep(
-            described,
-            out,
-            by,
-            retry_failed=retry_failed,
-            any_size=yes,
-            store=store,
-            progress=progress(),
+            described, out, by, retry_failed=retry_failed, any_size=yes, store=store, progress=progress(),
             command=command_line(),
-        )
+        )  # fmt: skip
     for line in done.lines:
         typer.echo(line)
     if done.done and table is not None:

@@ -15,19 +15,14 @@ import numpy as np
 from fingerpad.core.files import write_atomically
 from fingerpad.core.progress import NoProgress, Progress
 from fingerpad.lab.laboratory import Laboratory
+from fingerpad.lab.server import CONTROLS as ALL
 from fingerpad.lab.state import AFFERENTS, LabState
 from fingerpad.lab.view import comparison, view_of_answer
 
 DEPTHS, PLACES = 6, 5  # Depths, and places along the finger, of every object.
 FRAMES = 24  # Pictures of the skin over time in each answer.
 
-CONTROLS = (
-    ("object", "object", "", 0),
-    ("depth_mm", "depth", "mm", 0),
-    ("x_mm", "along the finger", "mm", 0),
-    ("other", "compared with", "", 0),
-    ("afferent", "afferents", "", 0),
-)
+CONTROLS = [each for each in ALL if each[0] in ("object", "depth_mm", "x_mm", "other", "afferent")]
 
 
 def write_static(laboratory: Laboratory, folder: Path, progress: Progress | None = None) -> Path:

@@ -74,21 +74,9 @@ def spelled(key: str) -> str:
 
 
 _UNITS = {
-    "per_m": "1/m",
-    "per_mm": "1/mm",
-    "mm": "mm",
-    "mm2": "mm²",
-    "mm3": "mm³",
-    "ms": "ms",
-    "s": "s",
-    "mb": "MB",
-    "hz": "spikes/s",
-    "kpa": "kPa",
-    "mn": "mN",
-    "ma": "mA",
-    "mf": "mF",
-    "mv": "mV",
-}
+    "per_m": "1/m", "per_mm": "1/mm", "mm": "mm", "mm2": "mm²", "mm3": "mm³", "ms": "ms", "s": "s",
+    "mb": "MB", "hz": "spikes/s", "kpa": "kPa", "mn": "mN", "ma": "mA", "mf": "mF", "mv": "mV",
+}  # fmt: skip
 
 
 def plain(value: Any, digits: int = 3, longest: int = 8) -> str:

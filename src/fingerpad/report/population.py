@@ -71,17 +71,9 @@ def _surface(
     along, lateral = np.meshgrid(x, z, indexing="ij")
     # Surfaces have no logarithmic axis: the heights are logarithms, and the ticks show the values.
     logarithmic = isinstance(scale, LogNorm)
-    axes.plot_surface(
-        along,
-        lateral,
-        np.log10(values) if logarithmic else values,
-        facecolors=colormaps[colours](scale(values)),
-        rcount=60,
-        ccount=60,
-        edgecolor="#00000030",
-        linewidth=0.3,
-        shade=False,
-    )
+    heights, faces = np.log10(values) if logarithmic else values, colormaps[colours](scale(values))
+    grid: Any = {"rcount": 60, "ccount": 60, "edgecolor": "#00000030", "linewidth": 0.3, "shade": False}
+    axes.plot_surface(along, lateral, heights, facecolors=faces, **grid)
     axes.locator_params(nbins=3)
     if logarithmic:
         shown = round_ticks(scale)

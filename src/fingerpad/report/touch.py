@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 from textwrap import fill
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -120,15 +120,7 @@ def draw_section(
     section, (name, values) = skin.section(), skin.at_end(quantity)
     shown = values[section.elements]
     largest = float(shown.max()) or 1.0
-    faces = PolyCollection(
-        list(section.corners_mm),
-        array=shown,
-        cmap=SKIN,
-        norm=LogNorm(largest / 10.0**DECADES, largest, clip=True),
-        edgecolors="face",
-        linewidths=0.3,
-    )
-    axes.add_collection(faces)
+    faces = paint_skin(axes, section.corners_mm, shown, largest, edgecolors="face", linewidths=0.3)
     _fill_bone(axes, section)
     for edges, colour, width in (
         (section.skin_mm, BLACK, 1.0),
@@ -148,8 +140,21 @@ def draw_section(
     if indenter is not None:
         _draw_indenter(axes, skin, section, indenter)
     axes.grid(visible=False)
-    bar = axes.figure.colorbar(faces, ax=axes, shrink=0.75, aspect=18, pad=0.02, extend="min")
-    bar.set_label(f"{name} [kPa]")
+    label_skin(axes, faces, f"{name} [kPa]", 0.75)
+
+
+def paint_skin(axes: Axes, corners: FloatArray, values: Any, largest: float, **edges: Any) -> PolyCollection:
+    """Colour faces by their values on a logarithmic scale."""
+    norm = LogNorm(largest / 10.0**DECADES, largest, clip=True)
+    faces = PolyCollection(list(corners), array=values, cmap=SKIN, norm=norm, **edges)
+    axes.add_collection(faces)
+    return faces
+
+
+def label_skin(axes: Axes, faces: PolyCollection, label: str, shrink: float) -> None:
+    """Put the scale of colours beside painted skin."""
+    bar = axes.figure.colorbar(faces, ax=axes, shrink=shrink, aspect=18, pad=0.02, extend="min")
+    bar.set_label(label)
     bar.ax.yaxis.set_major_formatter("{x:g}")
 
 

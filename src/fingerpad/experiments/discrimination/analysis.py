@@ -47,14 +47,9 @@ from fingerpad.psychophysics.ideal_observer import Presentation
 from fingerpad.psychophysics.response_models import multiplied_responses
 
 _UNITS = {
-    "_per_m": "1/m",
-    "_mm_per_s": "mm/s",
-    "_mm": "mm",
-    "_ms": "ms",
-    "_mn": "mN",
-    "_hz": "Hz",
+    "_per_m": "1/m", "_mm_per_s": "mm/s", "_mm": "mm", "_ms": "ms", "_mn": "mN", "_hz": "Hz",
     "_deg": "degrees",
-}
+}  # fmt: skip
 """Unit of a key that varies, by its end."""
 
 SESSION = 2  # Session of the random numbers of efficiencies; that of the hit rates is another.
@@ -383,21 +378,15 @@ def _noise(
             f"noise cannot be fitted: by the measure {measure} the population is silent under "
             f"{_named(prepared.stimuli, silent[measure])}; give a number, or another measure first."
         )
-    fit = fit_task_noise(
-        code,
-        *encoded[measure],
-        [row - 1 for row in points],
-        list(points.values()),
-        task.experiment.seed,
-        prepared.plan,
-    )
+    rows, observed = [row - 1 for row in points], list(points.values())
+    fit = fit_task_noise(code, *encoded[measure], rows, observed, task.experiment.seed, prepared.plan)
     return TaskNoise(
         sigma=fit.noise_sigma,
         fitted_to=FittedNoise(
             code=code,
             measure=measure,
             stimulus=tuple(prepared.stimuli[row].name for row in points),
-            observed=np.array(list(points.values())),
+            observed=np.array(observed),
             hit_rate=np.asarray(fit.hit_rates),
         ),
         root_mean_square_error=fit.root_mean_square_error,
