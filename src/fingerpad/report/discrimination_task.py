@@ -33,7 +33,6 @@ from fingerpad.report.style import (
     shared_legend,
 )
 
-_PAGE = "discriminate.html"
 SEVERAL = {"static": "static rates", "dynamic": "dynamic rates", "latency": "first-spike latencies"}
 
 
@@ -60,7 +59,7 @@ def write_task_page(results: DiscriminationFile, folder: Path) -> Path:
         task_summary(found),
         [Chapter("Results", parts), manifest_chapter(results.manifest)],
     )
-    return write_html(page, Path(folder) / _PAGE)
+    return write_html(page, Path(folder) / "discriminate.html")
 
 
 def task_summary(found: TaskResult) -> list[str]:

@@ -81,14 +81,9 @@ class FitRequest(metaclass=KnownKeywords):
     dynamic_quantity, static_quantity : str
         What each term follows: strain energy density, "stored", as in the paper, or another quantity of
         `SkinResponse.sample` as an extension. Default: that of the tissues.
-    with_posterior : bool
-        Whether credible intervals are drawn as well.
-    with_profiles : bool
-        Whether the likelihood of each number is profiled.
-    with_sensitivity : bool
-        Whether Sobol indices of FSS are computed.
-    with_offset : bool
-        Whether the receptor's offset along the finger is fitted as well.
+    with_posterior, with_profiles, with_sensitivity, with_offset : bool
+        Whether credible intervals, profile likelihoods and Sobol indices of FSS are computed, and whether the
+        receptor's offset along the finger is fitted.
     afferent_type : str, optional
         Type of the afferent, such as "RA", for a fit of chosen numbers by `fit_chosen_numbers`.
     free : tuple of str

@@ -313,9 +313,7 @@ def _euclidean(
         _brief(ours),
         _all(_at_most(ours, FROM_LINE), *closer),
         f"judged: at most {FROM_LINE:g} and closer than dynamic rates and latencies; {alone}",
-        fitted_to="the afferent was fitted to people's hit rates by this code, too"
-        if fitted_to_people
-        else "",
+        fitted_to=FITTED_BY_CODE if fitted_to_people else "",
     )
 
 
