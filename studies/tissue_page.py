@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from fingerpad.experiments.tissue_sets import tissue_layers
 from fingerpad.report.parts import Chapter, Page
-from fingerpad.report.tissues import tissue_table
+from fingerpad.report.reproduction import tissue_table
 from studies.pages.markdown import markdown
 
 INTRODUCTION = (

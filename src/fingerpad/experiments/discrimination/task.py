@@ -1,6 +1,6 @@
 """A discrimination task: which stimuli, which afferents, which codes and which noise.
 
-Each class is a part of the file that `task_files` reads. docs/discriminate.md explains every key.
+Each class is a part of the file that `task_stimuli.read_task` reads. docs/discriminate.md explains every key.
 """
 
 from __future__ import annotations
