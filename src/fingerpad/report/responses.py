@@ -1,4 +1,4 @@
-"""Figures of any population: where its afferents lie and how each of them responds to a touch."""
+"""Figures of populations: Figure 6, and those of any population."""
 
 from __future__ import annotations
 

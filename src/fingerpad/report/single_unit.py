@@ -1,4 +1,4 @@
-"""Level 2, Figure 5: firing rates of one afferent as a bar moves across its receptive field."""
+"""Level 2, Figure 5: firing rates of one afferent as a bar moves, and uncertainty of its fit."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Uncertainty of a fit to rates without draws: profile likelihoods, and sensitivity of FSS."""
+"""Uncertainty of a fit to rates: credible intervals, profile likelihoods, and sensitivity of FSS."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""One row of the table that holds our numbers beside the paper's: its group and its verdict."""
+"""Rows of the table that holds our numbers beside the paper: group and verdict, both sets side by side."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Level 2: one afferent under a shifted bar, fitted and cross-validated (paper, 2.2.2, 3.2 and Figure 5)."""
+"""Level 2: one afferent under a shifted bar, its fit and its firing (paper, 2.1, 2.2.2, 3.2, 4.4)."""
 
 from __future__ import annotations
 

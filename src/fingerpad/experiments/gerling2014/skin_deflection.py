@@ -1,4 +1,4 @@
-"""Level 1: deflection of the skin under a line load and a cylinder (paper, 2.2.1, 3.1 and Figure 4)."""
+"""Level 1: deflection of the skin (paper, 2.2.1, 3.1, Figure 4); beyond the paper, force of indenters."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Figure 2: one sphere on all levels: pressed skin, one afferent below it, and three afferents."""
+"""Figures 1, 2 and 6: the mesh, one sphere on all levels, and afferents all over the pad."""
 
 from __future__ import annotations
 
