@@ -22,8 +22,13 @@ from fingerpad.experiments.discrimination import run as task_run
 from fingerpad.experiments.discrimination.analysis import PreparedTask, analyse, forced_choice_of
 from fingerpad.experiments.discrimination.decoding import SESSION, side_curves
 from fingerpad.experiments.discrimination.task import CurveSettings
-from fingerpad.experiments.discrimination.task_files import example_tasks, parse_task
-from fingerpad.experiments.discrimination.task_stimuli import task_population, task_stimuli, task_touches
+from fingerpad.experiments.discrimination.task_stimuli import (
+    example_tasks,
+    parse_task,
+    task_population,
+    task_stimuli,
+    task_touches,
+)
 from fingerpad.psychophysics.code_efficiency import SMALLEST_SPREAD, code_efficiency, noisy_presentations
 from fingerpad.psychophysics.discrimination import (
     Experiment,

@@ -9,8 +9,7 @@ from matplotlib.figure import Figure
 import fingerpad as fp
 from fingerpad.core.errors import InputError
 from fingerpad.experiments.discrimination.analysis import PreparedTask, analyse
-from fingerpad.experiments.discrimination.task_files import parse_task
-from fingerpad.experiments.discrimination.task_stimuli import task_population, task_stimuli
+from fingerpad.experiments.discrimination.task_stimuli import parse_task, task_population, task_stimuli
 from fingerpad.experiments.fit.fit import fit_recordings
 from fingerpad.export.result_tables import TABLES
 from fingerpad.inference.recordings import RateRecordings

@@ -29,7 +29,7 @@ from fingerpad.experiments.conditions import Conditions
 from fingerpad.experiments.descriptions.example import EXAMPLE
 from fingerpad.experiments.descriptions.reduction import read_reduction
 from fingerpad.experiments.descriptions.stimulus import TactileStimulus
-from fingerpad.experiments.discrimination.task_files import example_tasks, read_task
+from fingerpad.experiments.discrimination.task_stimuli import example_tasks, read_task
 from fingerpad.experiments.recording_files import read_recordings
 from fingerpad.experiments.runner import Runner
 from fingerpad.experiments.stimuli import ShiftedBar, read_stimuli

@@ -29,7 +29,7 @@ from fingerpad.experiments.descriptions.estimate import estimate_press
 from fingerpad.experiments.descriptions.stimulus import TactileStimulus
 from fingerpad.experiments.descriptions.touch import described_touch
 from fingerpad.experiments.discrimination.run import DiscriminationRun, discriminate
-from fingerpad.experiments.discrimination.task_files import parse_task
+from fingerpad.experiments.discrimination.task_stimuli import parse_task
 from fingerpad.experiments.fit.fit import fit_recordings
 from fingerpad.experiments.recording_files import read_recordings
 from fingerpad.experiments.stimuli import ShiftedBar

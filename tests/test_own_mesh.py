@@ -9,7 +9,7 @@ import fingerpad as fp
 from fingerpad.core.errors import InputError
 from fingerpad.experiments.descriptions.touch import described_touch
 from fingerpad.experiments.discrimination.run import DiscriminationRun
-from fingerpad.experiments.discrimination.task_files import input_hashes, read_task, task_text
+from fingerpad.experiments.discrimination.task_stimuli import input_hashes, read_task, task_text
 from fingerpad.experiments.stimuli import read_stimuli
 from fingerpad.export.abaqus import abaqus_deck
 from fingerpad.export.formats import export_touch

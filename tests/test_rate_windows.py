@@ -10,8 +10,7 @@ from fingerpad.core.phases import Phase, phase_named
 from fingerpad.core.signals import SedTraces
 from fingerpad.data import protocol
 from fingerpad.experiments.discrimination.analysis import PreparedTask
-from fingerpad.experiments.discrimination.task_files import parse_task
-from fingerpad.experiments.discrimination.task_stimuli import task_population, task_stimuli
+from fingerpad.experiments.discrimination.task_stimuli import parse_task, task_population, task_stimuli
 from fingerpad.geometry.motion import ForceRampAndHold, RampAndHold
 from fingerpad.geometry.motions import repeated, sine
 from fingerpad.geometry.trajectory import Trajectory

@@ -32,7 +32,6 @@ from fingerpad.geometry.mesh import finger_mesh
 from fingerpad.report import (
     discrimination,
     nail,
-    population,
     reproduction,
     single_unit,
     skin_deflection,
@@ -41,6 +40,7 @@ from fingerpad.report import (
 from fingerpad.report import formatting as words
 from fingerpad.report import mesh_picture as mesh_picture_figure
 from fingerpad.report import page as page_module
+from fingerpad.report import responses as population
 from fingerpad.report.comparison import MEANINGS, SIGNS, TITLES
 from fingerpad.report.discrimination import draw_steps
 from fingerpad.report.page import VERDICTS, write_html

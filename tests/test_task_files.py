@@ -20,8 +20,15 @@ from fingerpad.experiments.descriptions.reading import parts_in
 from fingerpad.experiments.discrimination.analysis import PreparedTask
 from fingerpad.experiments.discrimination.run import DiscriminationRun
 from fingerpad.experiments.discrimination.task import DiscriminationTask
-from fingerpad.experiments.discrimination.task_files import example_tasks, input_hashes, parse_task, read_task
-from fingerpad.experiments.discrimination.task_stimuli import task_population, task_stimuli, task_touches
+from fingerpad.experiments.discrimination.task_stimuli import (
+    example_tasks,
+    input_hashes,
+    parse_task,
+    read_task,
+    task_population,
+    task_stimuli,
+    task_touches,
+)
 from fingerpad.experiments.fit.session import FitFile
 from fingerpad.experiments.gerling2014.reproduction import ReproductionResult
 from fingerpad.experiments.gerling2014.sphere_discrimination import discrimination_touches

@@ -10,7 +10,7 @@ from fingerpad.data import tissues as published
 from fingerpad.experiments.tissue_sets import ELASTICITY, tissue_layers
 from fingerpad.geometry.mesh import LAYERS
 from fingerpad.mechanics.tissues import TISSUES, named_tissues
-from fingerpad.report.tissues import tissue_table
+from fingerpad.report.reproduction import tissue_table
 
 
 def shear_kpa(numbers, poisson):

@@ -32,8 +32,7 @@ from fingerpad.experiments.descriptions.pressing import MOTIONS, OBJECTS
 from fingerpad.experiments.descriptions.reading import part_from
 from fingerpad.experiments.descriptions.stimuli import StimulusSet, named_stimuli
 from fingerpad.experiments.descriptions.touch import OUTPUTS, described_touch
-from fingerpad.experiments.discrimination.task_files import parse_task
-from fingerpad.experiments.discrimination.task_stimuli import task_population
+from fingerpad.experiments.discrimination.task_stimuli import parse_task, task_population
 from fingerpad.export.formats import export_touch
 from fingerpad.export.touch_outputs import WRITERS, as_described, check_described, run_touch
 from fingerpad.geometry import surface_files

@@ -21,8 +21,8 @@ from fingerpad.core.signals import Traces as Traces
 from fingerpad.experiments.cluster import Cluster as Cluster
 from fingerpad.experiments.descriptions.touch import TouchDescription as TouchDescription
 from fingerpad.experiments.descriptions.touch import read_touch_description as read_touch_description
-from fingerpad.experiments.discrimination.task_files import parse_task as parse_task
-from fingerpad.experiments.discrimination.task_files import read_task as read_task
+from fingerpad.experiments.discrimination.task_stimuli import parse_task as parse_task
+from fingerpad.experiments.discrimination.task_stimuli import read_task as read_task
 from fingerpad.experiments.recording_files import read_recordings as read_recordings
 from fingerpad.experiments.stimuli import read_stimuli as read_stimuli
 from fingerpad.export.dataset import read_touch as read_touch

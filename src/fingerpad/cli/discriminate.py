@@ -34,7 +34,7 @@ def discriminate_command(
     from fingerpad.core.checks import one_of
     from fingerpad.experiments import schemas
     from fingerpad.experiments.discrimination.run import DiscriminationRun, discriminate
-    from fingerpad.experiments.discrimination.task_files import (
+    from fingerpad.experiments.discrimination.task_stimuli import (
         example_tasks,
         input_hashes,
         read_task,

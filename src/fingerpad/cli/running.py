@@ -25,9 +25,7 @@ from fingerpad.core.progress import Bars, Lines, NoProgress, Progress
 if TYPE_CHECKING:
     from fingerpad.core.engine import Engine
 
-INTERRUPTED, TERMINATED = 130, 143
-"""Exit statuses after Ctrl-C and after SIGTERM, by convention."""
-
+INTERRUPTED, TERMINATED = 130, 143  # Exit statuses after Ctrl-C and after SIGTERM, by convention.
 CONTINUES = "The same command continues after the last finished indentation."
 
 

@@ -10,8 +10,7 @@ import typer
 from fingerpad.cli.options import Jobs, Scheduler, option
 from fingerpad.cli.running import command_line, engine, interruptible, make_writable, progress
 
-MOST_FAILED = 99
-"""Largest exit status for settings that failed: larger ones have other meanings."""
+MOST_FAILED = 99  # Largest exit status for settings that failed: larger ones have other meanings.
 
 
 def sweep_command(
@@ -54,15 +53,9 @@ def sweep_command(
     make_writable(out.parent)
     with interruptible():
         done = run_sweep(
-            described,
-            out,
-            by,
-            retry_failed=retry_failed,
-            any_size=yes,
-            store=store,
-            progress=progress(),
+            described, out, by, retry_failed=retry_failed, any_size=yes, store=store, progress=progress(),
             command=command_line(),
-        )
+        )  # fmt: skip
     for line in done.lines:
         typer.echo(line)
     if done.done and table is not None:

@@ -28,8 +28,7 @@ from fingerpad.cli.running import (
 )
 from fingerpad.core.errors import InputError
 
-INCOMPLETE = 3
-"""Exit status if some rows have no prediction; all others are scored."""
+INCOMPLETE = 3  # Exit status if some rows have no prediction; all others are scored.
 
 
 def validate_command(

@@ -29,26 +29,16 @@ from fingerpad.reduction.streaming import ReducedTouch
 from fingerpad.reduction.training import first_touch_mm
 from fingerpad.skin.sampling import SkinResponse
 
-ABOVE_MS = 10.0
-"""Time to move aside above the skin, and time to approach it. [ms]"""
-
-CLEARANCE_MM = 0.5
-"""How far above the skin the object moves aside. [mm]"""
-
-RAMP_PARTS, HOLD_PARTS = 20, 25
-"""Samples of the ramp, of the lift and of the hold."""
+ABOVE_MS = 10.0  # Time to move aside above the skin, and time to approach it. [ms]
+CLEARANCE_MM = 0.5  # How far above the skin the object moves aside. [mm]
+RAMP_PARTS, HOLD_PARTS = 20, 25  # Samples of the ramp, of the lift and of the hold.
 
 MAP_MM, MAP_STEP_MM = (8.0, 7.0), 0.5
 """Half-extent of the map about the middle of the pad, along and across, and distance of its points. [mm]"""
 
-ROWS, COLUMNS = 15, 13
-"""Afferents along and across, 1 mm apart."""
-
-TRIALS = 1000
-"""Presentations of each object to an observer."""
-
-SPREAD_SPIKES = 1.0
-"""Standard deviation of the number of spikes that does not depend on it; assumed."""
+ROWS, COLUMNS = 15, 13  # Afferents along and across, 1 mm apart.
+TRIALS = 1000  # Presentations of each object to an observer.
+SPREAD_SPIKES = 1.0  # Standard deviation of the number of spikes that does not depend on it; assumed.
 
 
 @dataclass(frozen=True)

@@ -36,8 +36,7 @@ from fingerpad.mechanics.tissues import TISSUES
 from fingerpad.reduction.model import ReducedModel, read_reduced, write_reduced
 from fingerpad.skin.code_hash import code_hash
 
-KEPT_ANSWERS = 16
-"""Answers that are kept, so that a comparison and a second user do not compute again."""
+KEPT_ANSWERS = 16  # Answers that are kept, so that a comparison and a second user do not compute again.
 
 
 @dataclass(frozen=True)

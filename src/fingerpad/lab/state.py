@@ -10,8 +10,7 @@ from typing import Any
 
 from fingerpad.core.errors import InputError
 
-AFFERENTS = ("SAI", "RA")
-"""Types of afferents that follow what a reduced touch keeps."""
+AFFERENTS = ("SAI", "RA")  # Types of afferents that follow what a reduced touch keeps.
 
 BOUNDS = {
     "depth_mm": (0.05, 5.0),

@@ -16,22 +16,14 @@ from fingerpad.core.files import write_atomically
 from fingerpad.core.progress import NoProgress, Progress
 from fingerpad.core.units import unit_of
 from fingerpad.lab.laboratory import Laboratory
+from fingerpad.lab.server import CONTROLS as ALL
 from fingerpad.lab.state import AFFERENTS, LabState
 from fingerpad.lab.view import comparison, view_of_answer
 
-DEPTHS, PLACES = 6, 5
-"""Depths, and places along the finger, of every object."""
+DEPTHS, PLACES = 6, 5  # Depths, and places along the finger, of every object.
+FRAMES = 24  # Pictures of the skin over time in each answer.
 
-FRAMES = 24
-"""Pictures of the skin over time in each answer."""
-
-CONTROLS = (
-    ("object", "object"),
-    ("depth_mm", "depth"),
-    ("x_mm", "along the finger"),
-    ("other", "compared with"),
-    ("afferent", "afferents"),
-)
+CONTROLS = [each for each in ALL if each[0] in ("object", "depth_mm", "x_mm", "other", "afferent")]
 
 
 def write_static(laboratory: Laboratory, folder: Path, progress: Progress | None = None) -> Path:

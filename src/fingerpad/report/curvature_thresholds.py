@@ -27,8 +27,7 @@ from fingerpad.report.style import (
 
 PER_CENT = 100.0
 CHANCE = 50.0
-_TOP = 45.0
-"""End of the axis of Weber fractions; an interval without an upper bound extends beyond it. [%]"""
+_TOP = 45.0  # End of the axis of Weber fractions; an interval without an upper bound extends beyond it. [%]
 
 STYLES: tuple[Any, ...] = (
     {"color": BLACK, "linestyle": "-", "marker": "o"},

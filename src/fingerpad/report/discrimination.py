@@ -1,4 +1,4 @@
-"""Level 3, Figures 7 and 8: hit rates of spheres against the standard."""
+"""Level 3, Figures 3, 7 and 8: the steps to a hit rate, and hit rates of spheres against the standard."""
 
 from __future__ import annotations
 

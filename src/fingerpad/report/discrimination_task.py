@@ -33,7 +33,6 @@ from fingerpad.report.style import (
     shared_legend,
 )
 
-_PAGE = "discriminate.html"
 SEVERAL = {"static": "static rates", "dynamic": "dynamic rates", "latency": "first-spike latencies"}
 
 
@@ -60,7 +59,7 @@ def write_task_page(results: DiscriminationFile, folder: Path) -> Path:
         task_summary(found),
         [Chapter("Results", parts), manifest_chapter(results.manifest)],
     )
-    return write_html(page, Path(folder) / _PAGE)
+    return write_html(page, Path(folder) / "discriminate.html")
 
 
 def task_summary(found: TaskResult) -> list[str]:
@@ -209,12 +208,8 @@ def _population(found: TaskResult) -> Table:
 
 
 _CHANCE = 0.5
-MOST_MAPS = 4
-"""Stimuli in the figure of responses: the standard, and comparisons from the first to the last."""
-
-MARGIN_MM = 0.6
-"""About the outermost afferents of a map. [mm]"""
-
+MOST_MAPS = 4  # Stimuli in the figure of responses: the standard, and comparisons from the first to the last.
+MARGIN_MM = 0.6  # About the outermost afferents of a map. [mm]
 CODE_LABELS = {"gradient_sum": "Gradient Sum", "euclidean": "Euclidean Distance", "ideal": "ideal observer"}
 MEASURE_LABELS = {
     "static": ("static rate", "spikes/s"),

@@ -26,8 +26,7 @@ MAP_AXES: Any = {"xlabel": "x, distal [mm]", "ylabel": "z, lateral [mm]", "aspec
 LARGEST_MARK, SILENT_MARK = 60.0, 4.0
 """Area of the mark of the most active afferent of a type, and of a silent one. [points²]"""
 
-ROW_DRAWN = 0.85
-"""Length of the mark of a spike, over the height of the row of its afferent."""
+ROW_DRAWN = 0.85  # Length of the mark of a spike, over the height of the row of its afferent.
 
 
 @known_keywords

@@ -30,7 +30,9 @@ def draw_nail(section: NailBorder) -> Figure:
     profile = figure.add_subplot(grid[2, :])
     middle, across, nail = section.middle, section.across, section.nail_mm
     stress = section.von_mises_kpa.ravel()
-    wide = _logarithmic(np.concatenate([stress, middle.von_mises_kpa]))
+    peak = float(np.nanmax([*stress, *middle.von_mises_kpa], initial=0.0)) or 1.0
+    # Values below these decades have the darkest colour.
+    wide = LogNorm(vmin=peak / 10.0**DECADES, vmax=peak, clip=True)
     near = Normalize(0.0, section.border_kpa or 1.0)
     x, y, z = (corners(grid) for grid in (section.x_mm, section.y_mm, section.z_mm))
     both = np.concatenate([np.stack([x, sign * z], axis=-1) for sign in (1.0, -1.0)])
@@ -57,13 +59,6 @@ def draw_nail(section: NailBorder) -> Figure:
         bar = figure.colorbar(row[0].collections[0], ax=row, extend=ends, pad=0.02, aspect=15)
         bar.set_label(text, fontsize=9.0)
     return figure
-
-
-def _logarithmic(stress: FloatArray) -> LogNorm:
-    """Colours over a fixed number of decades below the peak; smaller values have the darkest colour."""
-    known = stress[np.isfinite(stress)]
-    peak = known.max() if known.size and known.max() > 0.0 else 1.0
-    return LogNorm(vmin=peak / 10.0**DECADES, vmax=peak, clip=True)
 
 
 def _seen(axes: Axes, both: FloatArray, near: FloatArray, stress: FloatArray, scale: Normalize) -> None:

@@ -14,8 +14,7 @@ from fingerpad.core.files import write_atomically
 from fingerpad.report.parts import COLUMNS, Drawing, Page, Table
 from fingerpad.report.style import png
 
-VERDICTS = {"✓": "met", "✗": "missed", "?": "open"}
-"""How a cell is marked by the sign that it begins with."""
+VERDICTS = {"✓": "met", "✗": "missed", "?": "open"}  # How a cell is marked by the sign that it begins with.
 
 
 def write_html(page: Page, path: Path) -> Path:

@@ -12,8 +12,7 @@ from fingerpad.report.formatting import IDENTIFIABLE_SYMBOLS, fixed, number
 from fingerpad.report.parts import Row, Table
 from fingerpad.report.style import BLACK, BLUE, GREY, ORANGE
 
-LARGEST_LOSS = 5.0
-"""Losses of log likelihood that are drawn."""
+LARGEST_LOSS = 5.0  # Losses of log likelihood that are drawn.
 
 ALLOWED_LOSS = 1.92
 """Loss at which an interval of 95 % ends: half the quantile of chi-square with one degree of freedom."""

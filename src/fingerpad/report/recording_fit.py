@@ -30,10 +30,8 @@ from fingerpad.report.parts import Chapter, Page, Row, Table, illustrated, liste
 from fingerpad.report.rate_uncertainty import draw_indices, draw_profile, profile_ends, sensitivity_table
 from fingerpad.report.style import BLACK, BLUE, GREY, ORANGE, draw_rates, new_figure
 
-_PAGE = "fit.html"
 IDENTIFIABLE = IDENTIFIABLE_SYMBOLS | {"time_constant_ms": "time constant τ"}
-LONGEST_LABEL = 12
-"""Names of stimuli are cut to so many letters at an axis."""
+LONGEST_LABEL = 12  # Names of stimuli are cut to so many letters at an axis.
 
 
 def draw_fit(found: FitResult) -> Figure:
@@ -151,7 +149,7 @@ def write_fit_page(results: FitFile, folder: Path) -> Path:
         fit_summary(results.fit),
         [*_chapters(results.fit), manifest_chapter(results.manifest)],
     )
-    return write_html(page, Path(folder) / _PAGE)
+    return write_html(page, Path(folder) / "fit.html")
 
 
 def _in_words(quantity: str) -> str:

@@ -14,23 +14,23 @@ from matplotlib.figure import Figure
 
 from fingerpad.data import STATUSES, paper, psychophysics
 from fingerpad.experiments.gerling2014.reproduction import PublishedNumber, ReproductionResult
+from fingerpad.experiments.tissue_sets import TissueLayer
 from fingerpad.report import (
     curvature_thresholds,
     discrimination,
     mesh_picture,
     nail,
-    population,
+    responses,
     single_unit,
     skin_deflection,
     three_levels,
 )
 from fingerpad.report.comparison import comparison_tables, notes_table, statement_table, verdict_table
-from fingerpad.report.formatting import fixed, joined, number, plain
+from fingerpad.report.formatting import ABSENT, fixed, joined, number, plain
 from fingerpad.report.manifest import edition, manifest_chapter
 from fingerpad.report.page import write_html
 from fingerpad.report.parts import COLUMNS, Chapter, Drawing, Page, Paragraph, Part, Row, Table
 from fingerpad.report.style import BLUE, ORANGE, LineStyle, draw_observed_rates, new_figure
-from fingerpad.report.tissues import tissue_table
 
 # Inputs are the record of what was used: nothing of them is rounded or left out.
 ALL_DIGITS, ALL_VALUES = 12, 1000
@@ -41,8 +41,7 @@ LINES: dict[str, LineStyle] = {
 }
 """How the two sets are drawn on the first screen."""
 
-IN_THE_PAPER = "Trial 3"
-"""The trial that is closest to the observed deflection in the paper."""
+IN_THE_PAPER = "Trial 3"  # The trial that is closest to the observed deflection in the paper.
 
 
 def write_report(result: ReproductionResult, folder: Path) -> Path:
@@ -104,7 +103,7 @@ def reproduction_page(result: ReproductionResult) -> Page:
     )  # fmt: skip
     maps = pair(
         6, "population", "Rates and latencies under a sphere", "population",
-        population.draw_population, partial(population.caption_population, human=human.population),
+        responses.draw_population, partial(responses.caption_population, human=human.population),
     )  # fmt: skip
     observers = pair(
         7, "discrimination", "Discrimination of spheres", "discrimination",
@@ -255,3 +254,39 @@ def _draw_percept(axes: Axes, result: ReproductionResult) -> None:
     axes.set(title="Level 3: percept", xlabel="curvature of the sphere [1/m]", ylabel="hit rate [fraction]")
     axes.set_ylim(top=1.02)
     axes.legend(loc="lower right", fontsize=8.0)
+
+
+TISSUE_NOTE = (
+    "Moduli and Poisson's ratio nu are those for small strains. Only the deviator relaxes: the bulk modulus "
+    "is the same at once and in the long term, so that nu is smaller at once. The sets trial1, trial2 and "
+    "trial3 stand for the paper's three trials; the numbers of its Tables 1 and 2 are lost."
+)
+
+
+def tissue_table(layers: Sequence[TissueLayer]) -> Table:
+    """Return each layer of each named set with its law, moduli, relaxation and status."""
+    rows = []
+    for layer in layers:
+        terms = zip(layer.prony_shares, layer.prony_times_s, strict=True)
+        statuses = (layer.modulus_status, layer.poisson_status, layer.prony_status)
+        rows.append(
+            Row.of(
+                layer.tissues,
+                layer.layer,
+                layer.law,
+                number(layer.shear_kpa),
+                number(layer.shear_at_once_kpa) if layer.prony_shares else ABSENT,
+                fixed(layer.poisson, 2),
+                fixed(layer.poisson_at_once, 2) if layer.prony_shares else ABSENT,
+                ", ".join(f"{number(share)} ({number(time)})" for share, time in terms) or "none",
+                " / ".join(status or ABSENT for status in statuses),
+                layer.source,
+            )
+        )
+    columns = (
+        "set", "layer", "law", "shear modulus, long-term [kPa]", "shear modulus, at once [kPa]",
+        "nu, long-term", "nu, at once", "Prony shares (times [s])", "status: modulus / nu / Prony",
+        "source of the modulus",
+    )  # fmt: skip
+    title = "Tissues by set and layer (in place of the paper's Tables 1 and 2)"
+    return Table(title, columns, rows, TISSUE_NOTE)

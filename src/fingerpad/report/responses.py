@@ -1,4 +1,4 @@
-"""Figures of any population: where its afferents lie and how each of them responds to a touch."""
+"""Figures of populations: Figure 6, and those of any population."""
 
 from __future__ import annotations
 
@@ -6,22 +6,25 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
+from matplotlib import colormaps
+from matplotlib.axes import Axes
+from matplotlib.colorbar import Colorbar
 from matplotlib.colors import LogNorm, Normalize
 from matplotlib.figure import Figure
+from matplotlib.patches import Rectangle
 
 from fingerpad.core.checks import FloatArray
 from fingerpad.core.errors import InputError
 from fingerpad.core.signals import ResponseMap
+from fingerpad.data import protocol
+from fingerpad.experiments.gerling2014.three_levels import PopulationMaps
+from fingerpad.report.formatting import number
 from fingerpad.report.mixed_responses import MAP_AXES
-from fingerpad.report.population import QUANTITIES, with_round_ticks
-from fingerpad.report.style import GREY, new_figure
+from fingerpad.report.style import COLUMN_IN, GREY, PALE, new_figure, say_nothing_to_draw
 
 PANEL_IN = (3.9, 3.3)
-POINTS_PER_PANEL = 180.0
-"""Side of the picture within a panel. [1/72 inch]"""
-
-ROOM_MM = 0.5
-"""Least skin to be seen about the receptors. [mm]"""
+POINTS_PER_PANEL = 180.0  # Side of the picture within a panel. [1/72 inch]
+ROOM_MM = 0.5  # Least skin to be seen about the receptors. [mm]
 
 
 def draw_responses(responses: Mapping[str, ResponseMap]) -> Figure:
@@ -71,3 +74,104 @@ def _dots(axes: Any, response: ResponseMap, values: FloatArray, colours: str, sc
     axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), **MAP_AXES)
     axes.grid(visible=False)
     return dots
+
+
+QUANTITIES = {
+    "dynamic_rate_hz": ("dynamic ramp", "rate [spikes/s]", "viridis", Normalize),
+    "static_rate_hz": ("static hold", "rate [spikes/s]", "viridis", Normalize),
+    # Most first spikes come within a few tens of milliseconds, those at the rim after hundreds.
+    "first_spike_latency_ms": ("first spike", "latency [ms]", "viridis_r", LogNorm),
+}
+
+TICKS_MS = (1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0, 500.0, 1000.0)
+
+
+def draw_population(section: PopulationMaps) -> Figure:
+    """Draw Figure 6: each quantity as a surface, and flat with the receptors."""
+    figure = new_figure(COLUMN_IN, 8.4)
+    grid = figure.add_gridspec(3, 2, width_ratios=(1.15, 1.0))
+    x, z, receptors = section.x_mm, section.z_mm, section.receptors_mm
+    for row, (key, (phase, label, colours, scaling)) in enumerate(QUANTITIES.items()):
+        values = getattr(section, key)
+        surface = figure.add_subplot(grid[row, 0], projection="3d")
+        surface.set_title(f"({'abc'[row]}) {phase}")
+        plane = figure.add_subplot(grid[row, 1])
+        if np.isnan(values).all():
+            say_nothing_to_draw(plane, "no afferent fires")
+            surface.set_axis_off()
+            continue
+        low, high = float(np.nanmin(values)), float(np.nanmax(values))
+        scale = scaling(low, max(high, 1.001 * low, 1e-3), clip=True)  # apart, as logarithms need it
+        _surface(surface, x, z, values, label, colours, scale)
+        _map(plane, x, z, values, label, colours, scale, receptors)
+        # Until it is drawn, Matplotlib 3.11.0 lays a surface out as if it filled the figure.
+        surface.draw(figure.canvas.get_renderer())  # type: ignore[attr-defined]
+    return figure
+
+
+def round_ticks(scale: Normalize) -> list[float]:
+    """Return the round numbers within a logarithmic scale."""
+    return [tick for tick in TICKS_MS if 0.0 <= float(scale(tick, clip=False)) <= 1.0]
+
+
+def with_round_ticks(bar: Colorbar, scale: Normalize) -> None:
+    """Put round numbers beside the colours of a logarithmic scale."""
+    if isinstance(scale, LogNorm):
+        bar.set_ticks(round_ticks(scale))
+        bar.minorticks_off()
+        bar.ax.yaxis.set_major_formatter("{x:g}")
+
+
+def _surface(
+    axes: Any, x: FloatArray, z: FloatArray, values: FloatArray, label: str, colours: str, scale: Normalize
+) -> None:
+    along, lateral = np.meshgrid(x, z, indexing="ij")
+    # Surfaces have no logarithmic axis: the heights are logarithms, and the ticks show the values.
+    logarithmic = isinstance(scale, LogNorm)
+    heights, faces = np.log10(values) if logarithmic else values, colormaps[colours](scale(values))
+    grid: Any = {"rcount": 60, "ccount": 60, "edgecolor": "#00000030", "linewidth": 0.3, "shade": False}
+    axes.plot_surface(along, lateral, heights, facecolors=faces, **grid)
+    axes.locator_params(nbins=3)
+    if logarithmic:
+        shown = round_ticks(scale)
+        axes.set_zticks(np.log10(shown), labels=[f"{tick:g}" for tick in shown])
+    axes.set_xlabel("x, distal [mm]", labelpad=4.0)
+    axes.set_ylabel("z, lateral [mm]", labelpad=4.0)
+    axes.set_zlabel(label, labelpad=4.0)
+    axes.view_init(elev=28.0, azim=-58.0)
+    axes.set_box_aspect((1.25, 1.05, 0.85), zoom=0.85)
+
+
+def _map(
+    axes: Axes, x: FloatArray, z: FloatArray, values: FloatArray, label: str, colours: str, scale: Normalize,
+    receptors: FloatArray,
+) -> None:  # fmt: skip
+    picture = axes.pcolormesh(
+        x, z, np.ma.masked_where(~(values.T > 0.0), values.T), cmap=colours, norm=scale, shading="nearest"
+    )
+    silent = Rectangle((0, 0), 1, 1, transform=axes.transAxes, facecolor=PALE, hatch="//", edgecolor=GREY)
+    silent.set(zorder=0, linewidth=0.0)
+    axes.add_patch(silent)
+    dots: Any = {"markersize": 4.5, "color": "white", "markeredgecolor": "black"}
+    axes.plot(receptors[:, 0], receptors[:, 1], "o", label=f"{len(receptors)} receptors", **dots)
+    axes.set(**MAP_AXES)
+    axes.grid(visible=False)
+    with_round_ticks(axes.figure.colorbar(picture, ax=axes, label=label, shrink=0.85), scale)
+    axes.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), borderaxespad=0.1)
+
+
+def caption_population(section: PopulationMaps, human: PopulationMaps) -> str:
+    """Caption of Figure 6."""
+    resting = "".join(
+        f" The afferent of {name} also fires without touch, {number(each.at_rest.static_rate_hz)} spikes/s "
+        f"from {number(each.at_rest.first_spike_latency_ms)} ms on."
+        for name, each in (("paper", section), ("human", human))
+        if np.isfinite(each.at_rest.first_spike_latency_ms)
+    )
+    return (
+        f"Predicted response of afferents all over the pad to a sphere of {number(section.curvature_per_m)} "
+        f"1/m, at a depth of {protocol.DEPTH.value} mm. Left: the quantity as a height, as in the paper, but "
+        "latencies on a logarithmic scale. Right: the same seen from above; circles are the receptors of "
+        "Figures 7 and 8, hatched skin does not respond. All afferents have the parameters of the fitted "
+        f"afferent; nothing here was observed.{resting}"
+    )

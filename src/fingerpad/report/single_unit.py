@@ -1,4 +1,4 @@
-"""Level 2, Figure 5: firing rates of one afferent as a bar moves across its receptive field."""
+"""Level 2, Figure 5: firing rates of one afferent as a bar moves, and uncertainty of its fit."""
 
 from __future__ import annotations
 
@@ -38,17 +38,13 @@ from fingerpad.report.rate_uncertainty import draw_profile, profile_ends, sensit
 from fingerpad.report.style import BLACK, BLUE, COLUMN_IN, ORANGE, PALE, draw_rates, new_figure, shared_legend
 
 BAR_HALF_WIDTH_MM = protocol.BAR_WIDTH.value / 2.0
-STATIC_MARK_MM = 2.9
-"""Position at which the paper's static difference is drawn, where no rates are. [mm]"""
+STATIC_MARK_MM = 2.9  # Position at which the paper's static difference is drawn, where no rates are. [mm]
 
 ALONG = "place of the bar, distal [mm]"
 """Results count shifts proximal positive; all figures have the distal side on the right."""
 
-FITTED = "model (fitted)"
-"""Name of the line of the model, whose afferent was fitted to what was observed."""
-
-PAPER_FOLD, PAPER_START = 3, 2
-"""Fold and start point whose steps the paper's Table 4 lists."""
+FITTED = "model (fitted)"  # Name of the line of the model, whose afferent was fitted to what was observed.
+PAPER_FOLD, PAPER_START = 3, 2  # Fold and start point whose steps the paper's Table 4 lists.
 
 
 def draw_single_unit(section: SingleUnitResult) -> Figure:

@@ -20,8 +20,7 @@ from fingerpad.core.files import path_of, write_atomically
 from fingerpad.core.keywords import known_keywords
 
 RESOLUTION_DPI = 150
-COLUMN_IN = 6.4
-"""Width of a figure of one set of tissues; two of them stand side by side. [in]"""
+COLUMN_IN = 6.4  # Width of a figure of one set of tissues; two of them stand side by side. [in]
 
 # Three hues that differ for any colour vision, and in grey.
 BLACK = "#1a1a1a"

@@ -6,8 +6,6 @@ from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.collections import PolyCollection
-from matplotlib.colors import LogNorm
 from matplotlib.figure import Figure
 from matplotlib.patches import Circle
 
@@ -17,7 +15,7 @@ from fingerpad.experiments.gerling2014.three_levels import ThreeLevels
 from fingerpad.report.formatting import fixed, joined, number
 from fingerpad.report.mesh_picture import corners
 from fingerpad.report.style import BLACK, BLUE, COLUMN_IN, GREY, PALE, new_figure
-from fingerpad.report.touch import DECADES, SKIN
+from fingerpad.report.touch import label_skin, paint_skin
 
 NANOAMPERE_PER_MA = 1e6
 SHOWN_MM = (7.0, 4.5)
@@ -41,15 +39,8 @@ def _draw_skin(axes: Axes, section: ThreeLevels) -> None:
     """Draw the pressed section coloured by what they follow, the sphere, and the three afferents' places."""
     values = section.pressed_kpa.ravel()
     largest = float(np.max(values[values > 0.0], initial=0.0)) or 1.0
-    faces = PolyCollection(
-        list(corners(np.stack([section.x_mm, section.y_mm], axis=-1))),
-        array=np.ma.masked_invalid(values),
-        cmap=SKIN,
-        norm=LogNorm(largest / 10.0**DECADES, largest, clip=True),
-        edgecolors="#00000030",
-        linewidths=0.2,
-    )
-    axes.add_collection(faces)
+    places, shown = corners(np.stack([section.x_mm, section.y_mm], axis=-1)), np.ma.masked_invalid(values)
+    faces = paint_skin(axes, places, shown, largest, edgecolors="#00000030", linewidths=0.2)
     radius = MM_PER_M / section.curvature_per_m
     axes.add_patch(Circle(section.centre_mm, radius, facecolor="#c9d1d8", edgecolor=BLACK, linewidth=1.0))
     x, y = section.centre_mm
@@ -64,9 +55,7 @@ def _draw_skin(axes: Axes, section: ThreeLevels) -> None:
     )
     axes.text(x, y + 0.4, f"sphere, {number(section.curvature_per_m)} 1/m", ha="center", fontsize=9.0)
     axes.grid(visible=False)
-    bar = axes.figure.colorbar(faces, ax=axes, shrink=0.9, aspect=18, pad=0.02, extend="min")
-    bar.set_label(f"{section.pressed}\n[kPa]")
-    bar.ax.yaxis.set_major_formatter("{x:g}")
+    label_skin(axes, faces, f"{section.pressed}\n[kPa]", 0.9)
 
 
 def _draw_afferent(current: Axes, potential: Axes, train: Axes, section: ThreeLevels) -> None:
@@ -82,12 +71,11 @@ def _draw_afferent(current: Axes, potential: Axes, train: Axes, section: ThreeLe
     train.eventplot([section.spikes_ms[0]], colors=BLACK, linewidths=1.2, linelengths=0.8)
     train.set(xlabel="time [ms]", ylabel="spikes", yticks=[], xlim=(0.0, section.until_ms))
     for axes in (current, potential):
+        axes.tick_params(labelbottom=False)
         axes.legend(loc="upper right", borderaxespad=0.0)
     for axes in (current, potential, train):
         axes.axvspan(0.0, section.ramp_ms, color=PALE, zorder=0)
         axes.grid(visible=False)
-    for axes in (current, potential):
-        axes.tick_params(labelbottom=False)
 
 
 def _draw_population(axes: Axes, section: ThreeLevels) -> None:

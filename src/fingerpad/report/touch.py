@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 from textwrap import fill
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -31,14 +31,12 @@ SKIN = LinearSegmentedColormap.from_list(
 )
 """From pale skin to dark violet; the lightness falls all the way, so that the order survives greyscale."""
 
-DECADES = 2.5
-"""Values that are further below the largest share the palest colour."""
+DECADES = 2.5  # Values that are further below the largest share the palest colour.
 
 REACH_MM, ROOM_BELOW_MM, MARGIN_MM = 16.0, 2.0, 0.5
 """Skin to either side of the indenter's axis, room below and beside the finger that is shown. [mm]"""
 
-BODY_MM = 40.0
-"""Farther than this from its face no body is drawn. [mm]"""
+BODY_MM = 40.0  # Farther than this from its face no body is drawn. [mm]
 
 BONE, BONE_INSIDE = "#9a9488", "#d9dde0"
 """Colours of the outline of bone and nail, and of the bone itself, unlike any of `SKIN` and the paper."""
@@ -122,15 +120,7 @@ def draw_section(
     section, (name, values) = skin.section(), skin.at_end(quantity)
     shown = values[section.elements]
     largest = float(shown.max()) or 1.0
-    faces = PolyCollection(
-        list(section.corners_mm),
-        array=shown,
-        cmap=SKIN,
-        norm=LogNorm(largest / 10.0**DECADES, largest, clip=True),
-        edgecolors="face",
-        linewidths=0.3,
-    )
-    axes.add_collection(faces)
+    faces = paint_skin(axes, section.corners_mm, shown, largest, edgecolors="face", linewidths=0.3)
     _fill_bone(axes, section)
     for edges, colour, width in (
         (section.skin_mm, BLACK, 1.0),
@@ -150,8 +140,21 @@ def draw_section(
     if indenter is not None:
         _draw_indenter(axes, skin, section, indenter)
     axes.grid(visible=False)
-    bar = axes.figure.colorbar(faces, ax=axes, shrink=0.75, aspect=18, pad=0.02, extend="min")
-    bar.set_label(f"{name} [kPa]")
+    label_skin(axes, faces, f"{name} [kPa]", 0.75)
+
+
+def paint_skin(axes: Axes, corners: FloatArray, values: Any, largest: float, **edges: Any) -> PolyCollection:
+    """Colour faces by their values on a logarithmic scale."""
+    norm = LogNorm(largest / 10.0**DECADES, largest, clip=True)
+    faces = PolyCollection(list(corners), array=values, cmap=SKIN, norm=norm, **edges)
+    axes.add_collection(faces)
+    return faces
+
+
+def label_skin(axes: Axes, faces: PolyCollection, label: str, shrink: float) -> None:
+    """Put the scale of colours beside painted skin."""
+    bar = axes.figure.colorbar(faces, ax=axes, shrink=shrink, aspect=18, pad=0.02, extend="min")
+    bar.set_label(label)
     bar.ax.yaxis.set_major_formatter("{x:g}")
 
 

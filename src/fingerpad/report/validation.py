@@ -15,12 +15,8 @@ from fingerpad.report.page import write_html
 from fingerpad.report.parts import Chapter, Page, Row, Table, illustrated, listed
 from fingerpad.report.style import BLACK, BLUE, GREY, ORANGE, new_figure, say_nothing_to_draw
 
-_PAGE = "validate.html"
-LONGEST_TABLE = 200
-"""Conditions that the page lists; validate.json has all rows."""
-
-QUANTITIES = {"N": "force", "mm": "deflection", "spikes/s": "firing rate"}
-"""What was observed, by its unit."""
+LONGEST_TABLE = 200  # Conditions that the page lists; validate.json has all rows.
+QUANTITIES = {"N": "force", "mm": "deflection", "spikes/s": "firing rate"}  # What was observed, by its unit.
 
 
 def draw_validation(results: ValidationFile) -> Figure:
@@ -75,7 +71,7 @@ def write_validation_page(results: ValidationFile, folder: Path) -> Path:
         validation_summary(results),
         [Chapter("Scores", parts), manifest_chapter(results.manifest)],
     )
-    return write_html(page, Path(folder) / _PAGE)
+    return write_html(page, Path(folder) / "validate.html")
 
 
 def validation_summary(results: ValidationFile) -> list[str]:

@@ -46,8 +46,7 @@ from fingerpad.psychophysics.encoding import taking_part
 from fingerpad.psychophysics.functions import binomial_interval
 from fingerpad.psychophysics.ideal_observer import Presentation, multiplied_responses
 
-SESSION = 2
-"""Session of the random numbers of efficiencies; that of the hit rates is another."""
+SESSION = 2  # Session of the random numbers of efficiencies; that of the hit rates is another.
 
 Encoded = tuple[FloatArray, np.ndarray]
 """A measure of all receptors under every stimulus, and the pairs of neighbours that take part."""
@@ -370,21 +369,15 @@ def _noise(
             f"noise cannot be fitted: by the measure {measure} the population is silent under "
             f"{_named(prepared.stimuli, silent[measure])}; give a number, or another measure first."
         )
-    fit = fit_task_noise(
-        code,
-        *encoded[measure],
-        [row - 1 for row in points],
-        list(points.values()),
-        task.experiment.seed,
-        prepared.plan,
-    )
+    rows, observed = [row - 1 for row in points], list(points.values())
+    fit = fit_task_noise(code, *encoded[measure], rows, observed, task.experiment.seed, prepared.plan)
     return TaskNoise(
         sigma=fit.noise_sigma,
         fitted_to=FittedNoise(
             code=code,
             measure=measure,
             stimulus=tuple(prepared.stimuli[row].name for row in points),
-            observed=np.array(list(points.values())),
+            observed=np.array(observed),
             hit_rate=np.asarray(fit.hit_rates),
         ),
         root_mean_square_error=fit.root_mean_square_error,

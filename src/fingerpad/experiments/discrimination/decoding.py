@@ -24,12 +24,8 @@ from fingerpad.psychophysics.noisy_responses import noisy_gradient_sums, noisy_r
 from fingerpad.psychophysics.psychometric import fit_psychometric
 from fingerpad.psychophysics.uncertainty import bootstrap, posterior
 
-SESSION = 1
-"""Session of the random numbers: that of the reproduction's spheres at 0.0 mm."""
-
-SHOWN_PRESENTATIONS = 1000
-"""Presentations behind the mean and spread of a statistic that a figure shows."""
-
+SESSION = 1  # Session of the random numbers: that of the reproduction's spheres at 0.0 mm.
+SHOWN_PRESENTATIONS = 1000  # Presentations behind the mean and spread of a statistic that a figure shows.
 CURVE_POINTS = 61
 CREDIBLE = 0.95
 

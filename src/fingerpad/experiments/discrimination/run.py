@@ -41,7 +41,7 @@ class DiscriminationFile:
 class DiscriminationRun:
     """A task with all that it takes to run it."""
 
-    task: DiscriminationTask  # From `task_files.read_task`.
+    task: DiscriminationTask  # From `task_stimuli.read_task`.
     folder: Path
     jobs: int | Engine = 1
     """Processes, or the engine that solves the indentations; the numbers do not depend on it."""

@@ -1,6 +1,6 @@
 """A discrimination task: which stimuli, which afferents, which codes and which noise.
 
-Each class is a part of the file that `task_files` reads. docs/discriminate.md explains every key.
+Each class is a part of the file that `task_stimuli.read_task` reads. docs/discriminate.md explains every key.
 """
 
 from __future__ import annotations
@@ -35,9 +35,7 @@ IDEAL = "ideal"
 CODES = ("gradient_sum", "euclidean", IDEAL)
 MEASURES = ("static", "dynamic", "latency")
 FREE = "free"
-FITTED = "fitted"
-"""Value of `noise` where it is fitted to observed hit rates."""
-
+FITTED = "fitted"  # Value of `noise` where it is fitted to observed hit rates.
 _REPETITIONS = int(psychophysics.REPETITIONS.value)
 
 

@@ -59,12 +59,9 @@ def fit_recordings(
         the paper's for the paper's motion. [ms]
     seed : int, optional
         Of methods that draw.
-    with_posterior : bool, optional
-        Whether credible intervals are drawn as well, of the four numbers and of the rates.
-    with_profiles : bool, optional
-        Whether the likelihood of each of the four numbers is profiled.
-    with_sensitivity : bool, optional
-        Whether Sobol indices of FSS are computed.
+    with_posterior, with_profiles, with_sensitivity : bool, optional
+        Whether credible intervals of the four numbers and of the rates, profile likelihoods of the numbers
+        and Sobol indices of FSS are computed as well.
     beside : mapping of float to Traces or to a sequence of Traces, optional
         The same quantities at places beside the receptor, by their offset along the finger, distal
         positive [mm], on both sides of 0: with it the receptor's offset is fitted as a seventh parameter,

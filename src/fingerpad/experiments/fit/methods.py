@@ -1,4 +1,4 @@
-"""Methods of fitting recordings: each a problem, a method, and the meaning of its parameters."""
+"""Methods of fitting recordings: each a problem, a method, and the meaning of its parameters; the offset."""
 
 from __future__ import annotations
 

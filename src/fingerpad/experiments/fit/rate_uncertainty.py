@@ -1,4 +1,4 @@
-"""Uncertainty of a fit to rates without draws: profile likelihoods, and sensitivity of FSS."""
+"""Uncertainty of a fit to rates: credible intervals, profile likelihoods, and sensitivity of FSS."""
 
 from __future__ import annotations
 
@@ -28,11 +28,8 @@ from fingerpad.inference.rate_problem import RateProblem
 from fingerpad.inference.recordings import RateRecordings
 from fingerpad.inference.start_points import start_points
 
-LEVEL = 0.95
-"""Probability within every interval and band."""
-
-SEEDS_OF_PROFILES = 300
-"""Draws from the posterior that profiles start from."""
+LEVEL = 0.95  # Probability within every interval and band.
+SEEDS_OF_PROFILES = 300  # Draws from the posterior that profiles start from.
 
 CLOUDS, POINTS_OF_CLOUD, BEST_POINTS, MOST_LOSS = 5, 1200, 150, 4.0
 """Of `likely_points`: nine draws of ten from a posterior of four numbers lose less than that."""
@@ -40,11 +37,8 @@ CLOUDS, POINTS_OF_CLOUD, BEST_POINTS, MOST_LOSS = 5, 1200, 150, 4.0
 FIRST_CLOUD = (0.05, 0.4, 0.2, 0.5)
 """Standard deviations of the first cloud of `likely_points`, in the coordinates of the posterior."""
 
-SENSITIVITY_SHARE = 0.25
-"""Sobol's ranges reach from this share below the fit to this share above. [1]"""
-
-SENSITIVITY_POINTS = 512
-"""Base points of Sobol's design."""
+SENSITIVITY_SHARE = 0.25  # Sobol's ranges reach from this share below the fit to this share above. [1]
+SENSITIVITY_POINTS = 512  # Base points of Sobol's design.
 
 MOST_RESTING_SHARE = 0.9
 """Potential at rest over the threshold, at most, where a search begins: untouched skin elicits no spike."""

@@ -161,14 +161,9 @@ class FitResult(Result):
         The cross validation.
     spikes : SpikeFitSummary, optional
         Of the likelihood of spikes.
-    posterior : RatePosterior, optional
-        Credible intervals, where they were asked for.
-    profiles : tuple of ParameterProfile, optional
-        Profile likelihoods, where they were asked for.
-    sensitivity : FssSensitivity, optional
-        Sobol indices, where they were asked for.
-    offset : OffsetFit, optional
-        The fit with the receptor's offset as a further parameter.
+    posterior, profiles, sensitivity, offset : optional
+        Credible intervals, profile likelihoods, Sobol indices, and the fit with the receptor's offset as a
+        further parameter, where they were asked for.
     shift_mm : array (n_stimuli,), optional
         Shift of each stimulus, proximal positive, where stimuli differ in nothing else. [mm]
     presentations : tuple of int

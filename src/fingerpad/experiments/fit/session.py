@@ -38,8 +38,7 @@ from fingerpad.neuron.rate_windows import Window, Windows, common_rate_windows_m
 from fingerpad.skin.fields import sampled_fields
 from fingerpad.skin.indentation import Touch
 
-EXAMPLE = "bar.csv"
-"""Name of the file of `example_recordings`."""
+EXAMPLE = "bar.csv"  # Name of the file of `example_recordings`.
 
 
 @result_class
@@ -82,14 +81,9 @@ class FitRequest(metaclass=KnownKeywords):
     dynamic_quantity, static_quantity : str
         What each term follows: strain energy density, "stored", as in the paper, or another quantity of
         `SkinResponse.sample` as an extension. Default: that of the tissues.
-    with_posterior : bool
-        Whether credible intervals are drawn as well.
-    with_profiles : bool
-        Whether the likelihood of each number is profiled.
-    with_sensitivity : bool
-        Whether Sobol indices of FSS are computed.
-    with_offset : bool
-        Whether the receptor's offset along the finger is fitted as well.
+    with_posterior, with_profiles, with_sensitivity, with_offset : bool
+        Whether credible intervals, profile likelihoods and Sobol indices of FSS are computed, and whether the
+        receptor's offset along the finger is fitted.
     afferent_type : str, optional
         Type of the afferent, such as "RA", for a fit of chosen numbers by `fit_chosen_numbers`.
     free : tuple of str

@@ -1,4 +1,4 @@
-"""One row of the table that holds our numbers beside the paper's: its group and its verdict."""
+"""Rows of the table that holds our numbers beside the paper: group and verdict, both sets side by side."""
 
 from __future__ import annotations
 
@@ -8,9 +8,7 @@ from enum import StrEnum
 from fingerpad.core.results import result_class
 from fingerpad.data.published import Published
 
-CLOSE = 0.2
-"""A number of the paper counts as met within this share of it, unless more is better."""
-
+CLOSE = 0.2  # A number of the paper counts as met within this share of it, unless more is better.
 MATERIALS = "materials assumed (Tables 1 and 2 are lost), geometry read"
 
 

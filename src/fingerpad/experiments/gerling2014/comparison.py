@@ -29,8 +29,7 @@ from fingerpad.experiments.gerling2014.sphere_discrimination import SphereDiscri
 from fingerpad.inference.fitting.response_surface import ResponseSurface
 from fingerpad.inference.rates_and_hit_rates import ToRatesAndHitRates
 
-LEAST_R2 = 0.93
-"""R² that Trial 3 must reach under the cylinder: the laboratory's own later fit."""
+LEAST_R2 = 0.93  # R² that Trial 3 must reach under the cylinder: the laboratory's own later fit.
 
 CHOSEN_BY_DEFLECTION = ("trial2", "trial3", "trial3_stiffening", "paper", "human")
 """Sets of tissues whose moduli were identified from the deflection under the cylinder
@@ -147,9 +146,7 @@ def _force(materials: str, found: SkinForce) -> list[ClaimRow]:
     ]
 
 
-SESSION_START = 2
-"""Start point of the session of fold 3 that the paper tells of, counted from 1."""
-
+SESSION_START = 2  # Start point of the session of fold 3 that the paper tells of, counted from 1.
 FITTED_TO_RATES = "the afferent was fitted to the rates at all 36 shifts"
 RECORDED = MATERIALS + "; recordings read, from monkeys"
 _recorded = partial(claim, status=RECORDED)
@@ -239,8 +236,7 @@ def _fold_3(found: SingleUnitResult) -> list[ClaimRow]:
     ]
 
 
-MOST = 0.5
-"""A statement on single shifts holds if more than this share of them agree."""
+MOST = 0.5  # A statement on single shifts holds if more than this share of them agree.
 
 WELL_R2 = 0.81
 """R² from which SED "well correlates" with rates: the paper's own FSS, which it calls favourable."""

@@ -48,8 +48,7 @@ STEPS = (0.03, 0.06, 0.09, 0.12, 0.16, 0.21)
 """Comparisons of an experiment: how much more curved than the standard, as a share of it."""
 
 PROPORTION = 0.75
-JUDGEMENTS = int(psychophysics.GOODWIN_TRIALS.value)
-"""Per comparison of an experiment."""
+JUDGEMENTS = int(psychophysics.GOODWIN_TRIALS.value)  # Per comparison of an experiment.
 
 LEFT_OUT_PER_M = (296.0, 305.0, 316.0, 328.0, 340.0)
 """Spheres whose responses are also predicted from the others, which gives the error of interpolation."""
@@ -197,12 +196,16 @@ def _thresholds_of(
     draws = normals(seed, 1, len(population.positions_mm), Purpose.RESPONSE, NOISE_DRAWS)[0].T
     found: list[CurvatureThreshold] = []
     missed: list[MissingThreshold] = []
-    try:
-        noise = _fitted_noise(curvatures, static, neighbours, draws) if noise_sigma is None else noise_sigma
-    except ConvergenceError as error:
-        noise, missed = math.nan, [MissingThreshold(standard_per_m=None, why_not=str(error))]
-    observer = Observer(interpolated(curvatures, static), neighbours, noise, draws)
-    for standard in STANDARDS_PER_M if math.isfinite(noise) else ():
+    if noise_sigma is None:
+        spheres = (psychophysics.SPHERE_287.value, *psychophysics.GOODWIN_CURVATURES.value)
+        table = static[[int(np.flatnonzero(curvatures == sphere)[0]) for sphere in spheres]]
+        try:
+            fit = fit_noise_sigma(lambda sigma: expected_hit_rates(table, neighbours, sigma, draws))
+            noise_sigma = fit.noise_sigma
+        except ConvergenceError as error:
+            noise_sigma, missed = math.nan, [MissingThreshold(standard_per_m=None, why_not=str(error))]
+    observer = Observer(interpolated(curvatures, static), neighbours, noise_sigma, draws)
+    for standard in STANDARDS_PER_M if math.isfinite(noise_sigma) else ():
         try:
             found.append(threshold_at(observer, standard))
         except ConvergenceError as error:
@@ -211,20 +214,11 @@ def _thresholds_of(
         layout=name,
         rows=LAYOUTS[name][0],
         columns=LAYOUTS[name][1],
-        noise_sigma=noise,
+        noise_sigma=noise_sigma,
         gradient_sum=gradient_sum(static, neighbours),
         standards=tuple(found),
         without_threshold=tuple(missed),
     )
-
-
-def _fitted_noise(
-    curvatures: FloatArray, static: FloatArray, neighbours: np.ndarray, draws: FloatArray
-) -> float:
-    """Noise with which a population meets Goodwin's two points."""
-    spheres = (psychophysics.SPHERE_287.value, *psychophysics.GOODWIN_CURVATURES.value)
-    table = static[[int(np.flatnonzero(curvatures == sphere)[0]) for sphere in spheres]]
-    return fit_noise_sigma(lambda sigma: expected_hit_rates(table, neighbours, sigma, draws)).noise_sigma
 
 
 def interpolated(curvature_per_m: FloatArray, table: FloatArray) -> PchipInterpolator:

@@ -7,6 +7,7 @@ interpretations of steps that the paper leaves open would give.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import replace
 from functools import partial
 
@@ -34,11 +35,8 @@ from fingerpad.psychophysics.discrimination import (
 from fingerpad.psychophysics.encoding import gradient_sum, neighbour_pairs, taking_part
 from fingerpad.psychophysics.noise_fit import expected_euclidean_hit_rates, expected_hit_rates
 
-PATIENCE_MS = protocol.RAMP.value
-"""Time that an observer waits for first spikes: until the ramp ends. [ms]"""
-
-DRAWS = 1000
-"""Common random presentations behind each interpretation."""
+PATIENCE_MS = protocol.RAMP.value  # Time that an observer waits for first spikes: until the ramp ends. [ms]
+DRAWS = 1000  # Common random presentations behind each interpretation.
 
 CURVE_NOISE = tuple(round(0.01 * step, 2) for step in range(1, 31))
 """Noise at which the misfit of every code is computed."""
@@ -50,8 +48,7 @@ USED = {
 }
 """The interpretation by which the study decodes each measure."""
 
-STEEPEST = 20.0
-"""Largest multiple of the model's rise that is tried."""
+STEEPEST = 20.0  # Largest multiple of the model's rise that is tried.
 
 
 @result_class
@@ -148,6 +145,11 @@ def discrepancy_analysis(
         name: np.array([goodwin_misfit(rates(noise_sigma=sigma)[:, columns]) for sigma in CURVE_NOISE])
         for name, rates in codes.items()
     }
+    apart, euclidean = codes["euclidean"], EuclideanFit()
+    with suppress(ConvergenceError):
+        own = fit_noise_to_goodwin(apart, curvature_per_m, len(measures["static"]))
+        sigma, misses = own.noise_sigma, own.root_mean_square_error
+        euclidean = EuclideanFit(noise_sigma=sigma, misfit=misses, hit_rate=apart(noise_sigma=sigma))
     interpretations = _interpretations(measures, latency_ms, positions_mm, pitch_mm)
     return DiscrepancyAnalysis(
         rise={name: _rises(both) for name, both in measures.items()},
@@ -160,24 +162,12 @@ def discrepancy_analysis(
         ),
         criterion=_criterion(measures["static"][0], noise_sigma, seed),
         misfit_curve=MisfitCurve(noise_sigma=np.array(CURVE_NOISE), misfit=misfit),
-        euclidean=_euclidean_fit(measures["static"], curvature_per_m),
+        euclidean=euclidean,
     )
 
 
 def _expected_euclidean(static: Sequence[Measured], noise_sigma: float) -> FloatArray:
     return np.array([expected_euclidean_hit_rates(one.responses, noise_sigma) for one in static])
-
-
-def _euclidean_fit(static: Sequence[Measured], curvature_per_m: Sequence[float]) -> EuclideanFit:
-    """Noise that fits the Euclidean Distance best, and what it reaches with it."""
-    rates = partial(_expected_euclidean, static)
-    try:
-        own = fit_noise_to_goodwin(rates, curvature_per_m, len(static))
-    except ConvergenceError:
-        return EuclideanFit()
-    return EuclideanFit(
-        noise_sigma=own.noise_sigma, misfit=own.root_mean_square_error, hit_rate=rates(own.noise_sigma)
-    )
 
 
 def rise_needed(measured: Measured, noise_sigma: float, standard_normals: FloatArray) -> float:
@@ -273,14 +263,9 @@ def _judged(
 
 def _criterion(static: Measured, noise_sigma: float, seed: int) -> CriterionErrorBars:
     """Mean error bar for each quantity that the criterion may multiply."""
-
-    def mean_error_bar(sigma: float, moves: str) -> float:
-        plan = Experiment(criterion_sigma=sigma, criterion_moves=moves)
-        rates = discriminate_gradient_sum(static.responses, static.neighbours, noise_sigma, seed, plan)
-        return float(rates.hit_rate_sd.mean())
-
-    bars = {
-        moves: np.array([mean_error_bar(sigma, moves) for sigma in CRITERION_SIGMAS])
-        for moves in CRITERION_MOVES
-    }
+    bars = {}
+    for moves in CRITERION_MOVES:
+        plans = [Experiment(criterion_sigma=sigma, criterion_moves=moves) for sigma in CRITERION_SIGMAS]
+        given = static.responses, static.neighbours, noise_sigma, seed
+        bars[moves] = np.array([discriminate_gradient_sum(*given, plan).hit_rate_sd.mean() for plan in plans])
     return CriterionErrorBars(criterion_sigma=np.array(CRITERION_SIGMAS), **bars)

@@ -22,23 +22,15 @@ from fingerpad.experiments.gerling2014.claim_row import (
     measured,
     two_digits,
 )
-from fingerpad.experiments.gerling2014.discrepancy import USED, DiscrepancyAnalysis, Interpretation
+from fingerpad.experiments.gerling2014.discrepancy import USED, DiscrepancyAnalysis
 from fingerpad.experiments.gerling2014.discrimination_statistics import DiscriminationStatistics, Estimate
 from fingerpad.experiments.gerling2014.sphere_discrimination import SphereDiscrimination
 
 STATUS = MATERIALS + "; curvatures 316, 328, 340 /m assumed"
-ERRORS = 2.0
-"""Monte-Carlo errors by which two numbers must differ for the difference to count."""
-
-CLOSE_POINTS = 0.03
-"""Within this of people's hit rates, and of each other, hit rates count as the same."""
-
-FROM_LINE = 0.05
-"""Within this of the line in z, hit rates between the two points count as on it."""
-
-SAME = 1e-9
-"""Changes of hit rates that differ by less are those of one reading."""
-
+ERRORS = 2.0  # Monte-Carlo errors by which two numbers must differ for the difference to count.
+CLOSE_POINTS = 0.03  # Within this of people's hit rates, and of each other, hit rates count as the same.
+FROM_LINE = 0.05  # Within this of the line in z, hit rates between the two points count as on it.
+SAME = 1e-9  # Changes of hit rates that differ by less are those of one reading.
 PLACES = ("0.0 mm", "0.2 mm")
 MEASURES = ("static", "dynamic", "latency")
 JUDGED_RISE = "judged against two Monte-Carlo errors, at both positions"
@@ -84,8 +76,7 @@ def _all(*verdicts: Verdict) -> Verdict:
     return min(verdicts, key=order.index)
 
 
-_row = partial(claim, status=STATUS)
-"""All rows rest on the same inputs."""
+_row = partial(claim, status=STATUS)  # All rows rest on the same inputs.
 
 
 def _noise(found: SphereDiscrimination, fitted_to: str) -> ClaimRow:
@@ -139,7 +130,8 @@ def _targets(found: SphereDiscrimination, fitted_to: str) -> list[ClaimRow]:
 def _fits_best(found: SphereDiscrimination, before: str) -> ClaimRow:
     """Judge the three measures at one noise, and each at the noise that fits it best."""
     misfit, above = found.statistics.misfit, found.statistics.misfit_above_static
-    at_own = {name: reading for name in MEASURES if (reading := _used(found.reasons, name))}
+    readings = {reading.reading: reading for reading in found.reasons.readings}
+    at_own = {name: readings[USED[name]] for name in MEASURES if USED[name] in readings}
     at_one_noise = _all(*(_above(above[name], 0.0) for name in MEASURES[1:] if name in above), Verdict.MET)
     # A measure that no noise fits has no misfit of its own, and fits worse than any other.
     own = {name: np.nan_to_num(reading.misfit, nan=np.inf) for name, reading in at_own.items()}
@@ -321,15 +313,8 @@ def _euclidean(
         _brief(ours),
         _all(_at_most(ours, FROM_LINE), *closer),
         f"judged: at most {FROM_LINE:g} and closer than dynamic rates and latencies; {alone}",
-        fitted_to="the afferent was fitted to people's hit rates by this code, too"
-        if fitted_to_people
-        else "",
+        fitted_to=FITTED_BY_CODE if fitted_to_people else "",
     )
-
-
-def _used(reasons: DiscrepancyAnalysis, measure: str) -> Interpretation | None:
-    """Return the reading by which the study decodes a measure, None if the measure is silent."""
-    return next((reading for reading in reasons.readings if reading.reading == USED[measure]), None)
 
 
 def _or_none(value: float) -> str:

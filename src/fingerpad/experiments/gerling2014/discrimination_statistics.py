@@ -203,23 +203,17 @@ def _targets(hit_rates: FloatArray, columns: list[int], curvature_per_m: Sequenc
     )
 
 
-SESSIONS = 5
-"""Sessions of a study. The first is drawn; all of them give the Monte-Carlo error."""
+SESSIONS = 5  # Sessions of a study. The first is drawn; all of them give the Monte-Carlo error.
 
 SWEPT_NOISE = tuple(round(0.015 + 0.01 * step, 3) for step in range(8))
 """Noise sigma_1 that is tried, over the paper's range."""
 
-FEW = 10
-"""Noise matrices, and hit rates, of the paper's smaller experiments."""
-
-AGAIN = 20
-"""Repetitions of the judgements of one session, which show how stable their mean is."""
-
+FEW = 10  # Noise matrices, and hit rates, of the paper's smaller experiments.
+AGAIN = 20  # Repetitions of the judgements of one session, which show how stable their mean is.
 CRITERION_SIGMAS = psychophysics.DECISION_CRITERION_SIGMA.value
 
 _PAPER = Experiment()
-_FIRST_SESSION = 1
-"""Session 0 of a seed belongs to the fit of the noise."""
+_FIRST_SESSION = 1  # Session 0 of a seed belongs to the fit of the noise.
 
 
 @dataclass(frozen=True)
@@ -327,8 +321,7 @@ CURVATURES = psychophysics.GOODWIN_CURVATURES.value
 HIT_RATES = psychophysics.GOODWIN_HIT_RATES.value
 TRIALS = int(psychophysics.GOODWIN_TRIALS.value)
 
-SMALLEST_NOISE, LARGEST_NOISE = 1e-4, 2.0
-"""Bounds of the noise fitted to the observed hit rates."""
+SMALLEST_NOISE, LARGEST_NOISE = 1e-4, 2.0  # Bounds of the noise fitted to the observed hit rates.
 
 
 @result_class

@@ -23,11 +23,8 @@ from fingerpad.geometry.grading import resolution_grading
 from fingerpad.geometry.mesh import Mesh
 from fingerpad.skin.sampling import SkinResponse
 
-BESIDE_MM = 1.5
-"""Skin nearer than this to the nail counts as its border. [mm]"""
-
-FAR_MM = (2.0, 3.0)
-"""Skin at these distances is what the border is compared with. [mm]"""
+BESIDE_MM = 1.5  # Skin nearer than this to the nail counts as its border. [mm]
+FAR_MM = (2.0, 3.0)  # Skin at these distances is what the border is compared with. [mm]
 
 ELEMENT_MM = {"quick": 0.8, "standard": 0.6, "paper": 0.6}
 """Largest elements on the skin: the other studies' grow to several mm on the back of the finger. [mm]"""

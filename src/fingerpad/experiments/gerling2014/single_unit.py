@@ -1,4 +1,4 @@
-"""Level 2: one afferent under a shifted bar, fitted and cross-validated (paper, 2.2.2, 3.2 and Figure 5)."""
+"""Level 2: one afferent under a shifted bar, its fit and its firing (paper, 2.1, 2.2.2, 3.2, 4.4)."""
 
 from __future__ import annotations
 
@@ -33,8 +33,7 @@ from fingerpad.neuron.rate_windows import PAPER_WINDOWS_MS
 from fingerpad.neuron.spikes import modulation_difference, modulation_index
 from fingerpad.skin.sampling import SkinResponse
 
-RECEPTOR = ((RECEPTOR_X_MM, 0.0),)
-"""Position of the end organ: x and z on the skin. [mm]"""
+RECEPTOR = ((RECEPTOR_X_MM, 0.0),)  # Position of the end organ: x and z on the skin. [mm]
 
 
 def bar_touches(conditions: Conditions) -> list[Touch]:

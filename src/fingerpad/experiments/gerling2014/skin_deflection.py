@@ -1,4 +1,4 @@
-"""Level 1: deflection of the skin under a line load and a cylinder (paper, 2.2.1, 3.1 and Figure 4)."""
+"""Level 1: deflection of the skin (paper, 2.2.1, 3.1, Figure 4); beyond the paper, force of indenters."""
 
 from __future__ import annotations
 
@@ -95,13 +95,17 @@ def deflection_r2(profile: SurfaceProfile, proximal_positive: bool = True) -> fl
 def deflection_result(responses: dict[tuple[str, str], SkinResponse]) -> SkinDeflectionResult:
     """Profiles, forces and R², with distances in the direction of the observations."""
     observed = cylinder_deflection()
-    trials = {
-        trial: TrialDeflection(
-            line=_under_indenter(responses[trial, "line"]),
-            cylinder=_under_cylinder(responses[trial, "cylinder"]),
+    trials = {}
+    for trial in TRIALS:
+        skin = responses[trial, "cylinder"]
+        profile = skin.surface_profile()
+        cylinder = CylinderDeflection(
+            **vars(_under_indenter(skin)),
+            r2=deflection_r2(profile),
+            r2_mirrored=deflection_r2(profile, proximal_positive=False),
         )
-        for trial in TRIALS
-    }
+        line = _under_indenter(responses[trial, "line"])
+        trials[trial] = TrialDeflection(line=line, cylinder=cylinder)
     return SkinDeflectionResult(
         **trials,
         observed=ObservedDeflection(
@@ -124,17 +128,7 @@ def _under_indenter(skin: SkinResponse) -> IndenterDeflection:
     )
 
 
-def _under_cylinder(skin: SkinResponse) -> CylinderDeflection:
-    profile = skin.surface_profile()
-    return CylinderDeflection(
-        **vars(_under_indenter(skin)),
-        r2=deflection_r2(profile),
-        r2_mirrored=deflection_r2(profile, proximal_positive=False),
-    )
-
-
-PLATE_DEPTHS_MM = (1.0, 2.0)
-"""Depths of the flat plate, at which forces of people were observed. [mm]"""
+PLATE_DEPTHS_MM = (1.0, 2.0)  # Depths of the flat plate, at which forces of people were observed. [mm]
 
 
 @result_class

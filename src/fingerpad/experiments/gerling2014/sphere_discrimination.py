@@ -21,7 +21,6 @@ from fingerpad.experiments.gerling2014.discrimination_statistics import (
     DiscriminationStatistics,
     GoodwinHitRates,
     Measured,
-    Observers,
     discrimination_statistics,
     fit_noise_to_goodwin,
     goodwin_hit_rates_at,
@@ -156,7 +155,12 @@ def discriminate_spheres(
         lambda sigma: expected_of_measure(measures["static"], sigma, draws), CURVATURES, len(POSITIONS_MM)
     )
     observers = observe(measures, noise.noise_sigma, seed, sessions)
-    drawn = {name: _first_session(observers, name) for name in observers.mean}
+    drawn = {}
+    for name in observers.mean:
+        (rate, shifted), (spread, spread_shifted) = observers.mean[name][0], observers.spread[name][0]
+        drawn[name] = ObserverHitRates(
+            hit_rate=rate, hit_rate_sd=spread, hit_rate_shifted=shifted, hit_rate_shifted_sd=spread_shifted
+        )
     codes = (*measures, "euclidean")
     return SphereDiscrimination(
         seed=seed,
@@ -185,12 +189,4 @@ def discriminate_spheres(
             draws,
             seed,
         ),
-    )
-
-
-def _first_session(observers: Observers, name: str) -> ObserverHitRates:
-    """Hit rates of one observer in the first session, at both positions."""
-    (rate, shifted), (spread, spread_shifted) = observers.mean[name][0], observers.spread[name][0]
-    return ObserverHitRates(
-        hit_rate=rate, hit_rate_sd=spread, hit_rate_shifted=shifted, hit_rate_shifted_sd=spread_shifted
     )

@@ -1,4 +1,4 @@
-"""Figure 2: one sphere on all levels: pressed skin, one afferent below it, and three afferents."""
+"""Figures 1, 2 and 6: the mesh, one sphere on all levels, and afferents all over the pad."""
 
 from __future__ import annotations
 
@@ -18,8 +18,7 @@ from fingerpad.neuron.rate_windows import PAPER_WINDOWS_MS
 from fingerpad.neuron.spikes import first_spike_latency_ms
 from fingerpad.skin.sampling import SkinResponse
 
-OFFSETS_MM = (0.0, 1.0, 2.0)
-"""Distances of the three afferents from the axis of the sphere, distal. [mm]"""
+OFFSETS_MM = (0.0, 1.0, 2.0)  # Distances of the three afferents from the axis of the sphere, distal. [mm]
 
 UNTIL_MS, POTENTIAL_STEP_MS = 200.0, 0.5
 """Current and potential are given from the onset up to this time, at this spacing and about spikes. [ms]"""
@@ -134,8 +133,7 @@ def _centre(skin: SkinResponse, radius_mm: float) -> tuple[float, float]:
     return float(x), float(y)
 
 
-DECIMALS = 4
-"""Decimals of coordinates in files: 0.1 µm. [mm]"""
+DECIMALS = 4  # Decimals of coordinates in files: 0.1 µm. [mm]
 
 
 @result_class
@@ -211,8 +209,7 @@ def _plane(mesh: Mesh, nodes: IntArray, right: int) -> MeshPlane:
     )
 
 
-REACH_MM, STEP_MM = 5.0, 0.25
-"""Half the side of the sheet, and its pitch. [mm]"""
+REACH_MM, STEP_MM = 5.0, 0.25  # Half the side of the sheet, and its pitch. [mm]
 
 
 @result_class

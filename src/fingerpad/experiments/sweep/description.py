@@ -42,21 +42,13 @@ from fingerpad.experiments.discrimination.task import CODES, IDEAL, MEASURES, Ex
 from fingerpad.psychophysics.noisy_responses import LARGEST_NOISE
 from fingerpad.skin.fields import stored_fields
 
-AFFERENTS = "afferents"
-"""Block of a touch whose fields do not change the skin."""
-
-OBSERVER = "observer"
-"""Block of a sweep whose fields change hit rates alone."""
-
+AFFERENTS = "afferents"  # Block of a touch whose fields do not change the skin.
+OBSERVER = "observer"  # Block of a sweep whose fields change hit rates alone.
 NOT_SWEPT = ("title", "outputs")
 LINEAR, LOGARITHMIC = "linear", "logarithmic"
 SOBOL, LATIN_HYPERCUBE = "sobol", "latin_hypercube"
-ZIP, SAMPLE = "zip", "sample"
-"""Dimensions of fields that vary together."""
-
-MOST_CHECKED = 1000
-"""Most points of an axis whose values are checked before anything is pressed."""
-
+ZIP, SAMPLE = "zip", "sample"  # Dimensions of fields that vary together.
+MOST_CHECKED = 1000  # Most points of an axis whose values are checked before anything is pressed.
 _COMPARED = "a constraint must be a comparison such as a.b < 2 * c.d"
 _ARITHMETIC = "a constraint must have fields, numbers, + - * / and comparisons"
 _COMPARISONS = {
@@ -233,7 +225,7 @@ class Sweep:
         found = []
         for field, values in asked.grid.items():
             with self.origin.located(), at("grid", field):
-                found.append(Axis(_dimension(field), {field: _listed(values)}))
+                found.append(Axis(field.replace(".", "_"), {field: _listed(values)}))
         if asked.zip:
             with self.origin.located(), at("zip"):
                 together = {field: _listed(values) for field, values in asked.zip.items()}
@@ -466,10 +458,6 @@ def _listed(values: Any) -> list[Any]:
             f"a field that varies must have a list of values, or start, stop and count: got {values!r}."
         )
     return list(found)
-
-
-def _dimension(field: str) -> str:
-    return field.replace(".", "_")
 
 
 def _with(content: Content, keys: list[str], value: Any) -> Content:

@@ -11,11 +11,8 @@ from fingerpad.experiments.descriptions.estimate import estimate_press
 from fingerpad.experiments.sweep.description import Sweep
 from fingerpad.skin.fields import Place, stored_fields
 
-MOST_LOOKED_AT = 8
-"""Presses whose meshes are built for the estimate, spread evenly over the sweep."""
-
-CORES = 2
-"""Cores that the time of a single press is for. On one of them it takes twice as long at most."""
+MOST_LOOKED_AT = 8  # Presses whose meshes are built for the estimate, spread evenly over the sweep.
+CORES = 2  # Cores that the time of a single press is for. On one of them it takes twice as long at most.
 
 
 @dataclass(frozen=True)

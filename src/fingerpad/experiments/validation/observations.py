@@ -61,12 +61,16 @@ class Kind:
     conditions: tuple[str, ...]  # Columns that say under what was observed.
     observed: str  # Column of what was observed.
     example: tuple[str, ...]  # Rows of an example file, with made-up numbers.
-    axis: str = ""  # Condition that is a place along the finger, whose direction a source may leave open.
 
     @property
     def columns(self) -> tuple[str, ...]:
         """All columns, in the order of the documented header."""
         return (*self.conditions, self.observed)
+
+    @property
+    def axis(self) -> str:
+        """Condition that is a place along the finger, whose direction a source may leave open."""
+        return next((name for name in self.conditions if name in ("distance_mm", "position_mm")), "")
 
     @property
     def unit(self) -> str:
@@ -83,45 +87,27 @@ KINDS: dict[str, Kind] = {
     kind.name: kind
     for kind in (
         Kind(
-            "force",
-            (INDENTER, "depth_mm"),
-            "force_n",
+            "force", (INDENTER, "depth_mm"), "force_n",
             ("plate,0.5,0.10", "plate,0.5,0.20", "punch:6.35,1,0.25", "sphere:287,0.8,0.05"),
         ),
         Kind(
-            "deflection",
-            (INDENTER, "depth_mm", "distance_mm"),
-            "deflection_mm",
-            (
-                "cylinder:3.17,0.5,-4,0.1",
-                "cylinder:3.17,0.5,0,0.5",
-                "cylinder:3.17,0.5,0,0.48",
-                "cylinder:3.17,0.5,4,0.1",
-            ),
-            axis="distance_mm",
+            "deflection", (INDENTER, "depth_mm", "distance_mm"), "deflection_mm",
+            tuple(f"cylinder:3.17,0.5,{made_up}" for made_up in ("-4,0.1", "0,0.5", "0,0.48", "4,0.1")),
         ),
         Kind(
-            "rate_curvature",
-            ("force_n", "curvature_per_m"),
-            "rate_hz",
+            "rate_curvature", ("force_n", "curvature_per_m"), "rate_hz",
             ("0.2,0,10", "0.2,287,40", "0.2,287,50"),
         ),
         Kind(
-            "rate_position",
-            ("force_n", "curvature_per_m", "position_mm"),
-            "rate_hz",
+            "rate_position", ("force_n", "curvature_per_m", "position_mm"), "rate_hz",
             ("0.2,287,0,45", "0.2,287,0,50", "0.2,287,2,10"),
-            axis="position_mm",
         ),
         Kind(
-            "grating",
-            ("force_n", "ridge_mm", "groove_mm", "position_mm"),
-            "rate_hz",
+            "grating", ("force_n", "ridge_mm", "groove_mm", "position_mm"), "rate_hz",
             ("0.2,1.5,1.5,0,30", "0.2,1.5,1.5,0.75,60", "0.2,1.5,1.5,1.5,5"),
-            axis="position_mm",
         ),
     )
-}
+}  # fmt: skip
 """Kinds by name."""
 
 

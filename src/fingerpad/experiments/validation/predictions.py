@@ -81,9 +81,7 @@ class Reading:
     """Reads the prediction from the response of the skin, None without a touch."""
 
 
-Plan = Reading | InputError
-"""How a condition is predicted, or why it cannot be pressed."""
-
+Plan = Reading | InputError  # How a condition is predicted, or why it cannot be pressed.
 Condition = tuple[Value, ...]
 
 
@@ -218,15 +216,9 @@ def _rate(given: Mapping[str, Value], model: FingertipModel) -> Reading:
     conditions.finger.skin_point(*site)
     if force_n == 0.0:
         return Reading(None, lambda _: _resting_rate(model))
-    touch = touch_of(
-        conditions.finger,
-        body,
-        ForceRampAndHold(force_mn=MN_PER_N * force_n),
-        conditions.tissues,
-        conditions.resolution,
-        grading=grading,
-        tilt_deg=conditions.skin_tilt_deg,
-    )
+    motion, tilt_deg = ForceRampAndHold(force_mn=MN_PER_N * force_n), conditions.skin_tilt_deg
+    pressed = conditions.finger, body, motion, conditions.tissues, conditions.resolution
+    touch = touch_of(*pressed, grading=grading, tilt_deg=tilt_deg)
     receptor = Population(np.array([site]), 1.0, model.responding)
 
     def read(skin: SkinResponse | None) -> float:

@@ -160,6 +160,10 @@ def validate(
         command=command,
         inputs=inputs,
     )
+    r2_mirrored = np.nan
+    if found.mirrored is not None:
+        turned = np.isfinite(found.mirrored)
+        r2_mirrored = coefficient_of_determination(observed[turned], found.mirrored[turned])
     motion = RampAndHold()
     of_rates = {
         "afferent": asdict(model.responding),
@@ -180,7 +184,7 @@ def validate(
         correlation=correlation(*scored),
         gain=gain,
         r2_after_gain=coefficient_of_determination(scored[0], gain * scored[1]),
-        r2_mirrored=_r2_mirrored(observed, found.mirrored),
+        r2_mirrored=r2_mirrored,
         inside_range=all(judged) if judged else None,
         n_judged=len(judged),
         share_inside=sum(judged) / len(judged) if judged else np.nan,
@@ -199,10 +203,3 @@ def validate(
         ),
         manifest=manifest,
     )
-
-
-def _r2_mirrored(observed: np.ndarray, mirrored: np.ndarray | None) -> float:
-    if mirrored is None:
-        return np.nan
-    known = np.isfinite(mirrored)
-    return coefficient_of_determination(observed[known], mirrored[known])
