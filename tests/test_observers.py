@@ -187,6 +187,10 @@ def test_no_code_beats_the_ideal_observer(standard, change, noise_sigma, seed):
     first = np.array(standard)
     second = np.maximum(first + 0.2 * (np.array(change) - 40.0) * noise_sigma, 1.0)
     models = multiplied_responses(first, noise_sigma), multiplied_responses(second, noise_sigma)
+    assert_no_code_beats_the_ideal_observer(models, first, seed)
+
+
+def assert_no_code_beats_the_ideal_observer(models, first, seed):
     shown = present(*models, seed=seed, n_trials=2000)
     pairs = neighbour_pairs(POSITIONS, 1.0)
     ideal = shown.ideal()
