@@ -11,7 +11,7 @@ import numpy as np
 
 from benchmarks.measuring import Spread, run_job
 from benchmarks.results import Report, Table
-from fingerpad.core.signals import SedTraces
+from fingerpad.core.signals import Traces
 from fingerpad.experiments.conditions import Conditions
 from fingerpad.experiments.fit.methods import FOUR_NUMBER_METHODS
 from fingerpad.experiments.gerling2014 import single_unit
@@ -44,8 +44,8 @@ def press(folder: str, traces: str) -> dict[str, Any]:
     """
     touches, store = single_unit.bar_touches(Conditions(resolution=RESOLUTION)), Store(Path(folder))
     solve_missing(store.missing(touches), JOBS)
-    sed = single_unit.receptor_sed([store.load(touch) for touch in touches])
-    np.savez(traces, times_ms=sed.times_ms, sed_kpa=sed.sed_kpa, kinks_ms=sed.kinks_ms)
+    sed = single_unit.traces_at_receptor([store.load(touch) for touch in touches])
+    np.savez(traces, times_ms=sed.times_ms, sed_kpa=sed.values, kinks_ms=sed.kinks_ms)
     return {"times": sed.times_ms.size, "shifts": sed.n_sites}
 
 
@@ -63,7 +63,7 @@ def fit(traces: str) -> dict[str, Any]:
         By method: seconds, runs of the model and FSS on the testing positions; seconds of one run.
     """
     with np.load(traces) as stored:
-        sed = SedTraces(stored["times_ms"], stored["sed_kpa"], stored["kinks_ms"])
+        sed = Traces(stored["times_ms"], stored["sed_kpa"], stored["kinks_ms"])
     driven = drive(sed)
     model, bounds = AfferentModel.of_drive(driven), bounds_of(driven)
     six = single_unit.rate_problem(sed)

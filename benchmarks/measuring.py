@@ -26,12 +26,7 @@ ROOT = Path(__file__).parents[1]
 SAMPLE_EVERY_S = 0.05
 """Time between two looks at the memory of a process and its descendants. [s]"""
 
-THREAD_COUNTS = (
-    "OMP_NUM_THREADS",
-    "OPENBLAS_NUM_THREADS",
-    "NUMBA_NUM_THREADS",
-    "CCX_NPROC_EQUATION_SOLVER",
-)
+THREAD_COUNTS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "NUMBA_NUM_THREADS", "CCX_NPROC_EQUATION_SOLVER")
 """What the libraries of the jobs call their number of threads."""
 
 

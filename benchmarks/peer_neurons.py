@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from benchmarks.runge_kutta import runge_kutta_spikes
-from fingerpad.core.signals import CurrentTraces, SpikeTrains
+from fingerpad.core.signals import SpikeTrains, Traces
 from fingerpad.neuron.lif import LeakyIntegrateAndFire
 
 TIME_CONSTANT_MS, CAPACITANCE_MF, THRESHOLD_MV, REFRACTORY_MS = 68.0, 1e-6, 50.0, 1.0
@@ -38,12 +38,12 @@ def write_currents(path: Path, afferents: int) -> Path:
     return path
 
 
-def read_currents(path: Path, every: int = 1) -> tuple[LeakyIntegrateAndFire, CurrentTraces]:
+def read_currents(path: Path, every: int = 1) -> tuple[LeakyIntegrateAndFire, Traces]:
     """Read the membrane and every so manieth current."""
     with np.load(path) as stored:
         current_ma = stored["course"][:, None] * stored["strength_ma"][None, ::every]
-        return LeakyIntegrateAndFire(*stored["membrane"].tolist()), CurrentTraces(
-            stored["knots_ms"], current_ma
+        return LeakyIntegrateAndFire(*stored["membrane"].tolist()), Traces(
+            stored["knots_ms"], current_ma, quantity="current"
         )
 
 
@@ -56,7 +56,9 @@ def fire(currents: str, found: str) -> dict[str, Any]:
         Seconds of `LeakyIntegrateAndFire.spikes`, and the number of spikes.
     """
     neuron, current = read_currents(Path(currents))
-    neuron.spikes(CurrentTraces(current.times_ms, current.current_ma[:, :2]))  # loads compiled kernels
+    neuron.spikes(
+        Traces(current.times_ms, current.values[:, :2], quantity="current")
+    )  # loads compiled kernels
     started = perf_counter()
     spikes = neuron.spikes(current)
     solve_s = perf_counter() - started
@@ -78,7 +80,7 @@ def check(currents: str, every: int) -> dict[str, Any]:
     for step_ms in STEPS_MS:
         stepped = runge_kutta_spikes(neuron, current, step_ms)
         differences.append(largest_difference_ms(exact, stepped))
-    return {"afferents": current.current_ma.shape[1], "differences_ms": differences}
+    return {"afferents": current.values.shape[1], "differences_ms": differences}
 
 
 def largest_difference_ms(one: SpikeTrains, other: SpikeTrains) -> float:

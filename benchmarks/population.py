@@ -9,7 +9,7 @@ import numpy as np
 
 from benchmarks.measuring import Spread, run_job
 from benchmarks.results import Report, Table
-from fingerpad.core.signals import SedTraces
+from fingerpad.core.signals import Traces
 from fingerpad.data import psychophysics
 from fingerpad.neuron.afferent import Afferent
 from fingerpad.neuron.population import Population
@@ -31,18 +31,18 @@ RESPONSES_HZ = (20.0, 60.0)
 """Range of the static rates that the observers compare; their number matters, not their values. [spikes/s]"""
 
 
-def traces(receptors: int) -> SedTraces:
+def traces(receptors: int) -> Traces:
     """Ramp of 50 ms and hold of 950 ms at the 8 + 8 steps of standard resolution, from nothing to strong.
 
     Examples
     --------
-    >>> traces(3).sed_kpa.shape
+    >>> traces(3).values.shape
     (17, 3)
     """
     ramp_ms, hold_ms = np.linspace(0.0, 50.0, 9), 50.0 + np.geomspace(10.0, 950.0, 8)
     times_ms = np.append(ramp_ms, hold_ms)
     course = np.append((ramp_ms / 50.0) ** 1.6, 0.85 + 0.15 * np.exp(-(hold_ms - 50.0) / 120.0))
-    return SedTraces(times_ms, np.outer(course, np.linspace(0.0, STRONGEST_KPA, receptors)), np.array([50.0]))
+    return Traces(times_ms, np.outer(course, np.linspace(0.0, STRONGEST_KPA, receptors)), np.array([50.0]))
 
 
 def fire(receptors: int) -> dict[str, Any]:

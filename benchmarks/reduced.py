@@ -118,8 +118,8 @@ def _rate_errors(model: fp.ReducedModel, skin: fp.SkinResponse) -> list[list[flo
     full = skin.sed(sites, quantity, quantity)
     wanted = np.array(afferent.rates(full))
     errors = []
-    for stress_kpa in (np.array(values), *((1.0 + change) * full.sed_kpa for change in STRESS_CHANGES)):
-        wrong = np.abs(np.array(afferent.rates(replace(full, sed_kpa=stress_kpa))) - wanted)
+    for stress_kpa in (np.array(values), *((1.0 + change) * full.values for change in STRESS_CHANGES)):
+        wrong = np.abs(np.array(afferent.rates(replace(full, values=stress_kpa))) - wanted)
         within = (wrong <= np.array(RATE_ERRORS)[:, None]).mean(axis=1)
         errors.append([*wrong.max(axis=1).tolist(), *within.tolist()])
     return errors
@@ -198,7 +198,7 @@ def measure() -> Report:
         notes=[
             "A rate is read from the spikes in a window: a spike that passes its end, or the second spike of "
             "an afferent near its threshold, changes it at once. The rows of the full touch show by how much "
-            "the largest of so many afferents changes if nothing but its stress changes a little.",
+            "the largest of so many afferents changes if nothing but its stress changes a little."
         ],
         measured={
             "reduced_sed_share": float(within[1]),

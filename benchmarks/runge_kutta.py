@@ -6,13 +6,11 @@ import numpy as np
 from numba import njit
 
 from fingerpad.core.checks import FloatArray, positive
-from fingerpad.core.signals import CurrentTraces, SpikeTrains
+from fingerpad.core.signals import SpikeTrains, Traces
 from fingerpad.neuron.lif import LeakyIntegrateAndFire
 
 
-def runge_kutta_spikes(
-    neuron: LeakyIntegrateAndFire, current: CurrentTraces, step_ms: float = 0.001
-) -> SpikeTrains:
+def runge_kutta_spikes(neuron: LeakyIntegrateAndFire, current: Traces, step_ms: float = 0.001) -> SpikeTrains:
     """Spike times by the paper's scheme: fourth-order Runge-Kutta with a fixed step.
 
     A spike is placed at the end of the step in which the threshold is reached. Each spike is therefore
@@ -22,7 +20,7 @@ def runge_kutta_spikes(
     ----------
     neuron : LeakyIntegrateAndFire
         The membrane.
-    current : CurrentTraces
+    current : Traces
         One column per neuron.
     step_ms : float, optional
         Time step; the paper's is 0.001 ms. [ms]
@@ -42,8 +40,8 @@ def runge_kutta_spikes(
         # The kernel reads one neuron after the other: a row per neuron is contiguous in memory.
         *_runge_kutta_trains(
             current.times_ms,
-            np.ascontiguousarray(current.current_ma.T),
-            neuron.initial_potentials_mv(current.current_ma[0]),
+            np.ascontiguousarray(current.values.T),
+            neuron.initial_potentials_mv(current.values[0]),
             *neuron.constants()[:-1],
             step,
         )

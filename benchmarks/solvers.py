@@ -17,12 +17,7 @@ THREADS = 2
 MULTIGRID = "multigrid, coarsest by SuperLU"
 SUPERLU, PYAMG = "SuperLU (SciPy)", "smoothed aggregation (pyamg)"
 
-RUNS = (
-    ("quick", MULTIGRID),
-    ("quick", SUPERLU),
-    ("quick", PYAMG),
-    ("standard", MULTIGRID),
-)
+RUNS = (("quick", MULTIGRID), ("quick", SUPERLU), ("quick", PYAMG), ("standard", MULTIGRID))
 """Resolutions and preconditioners; SuperLU and pyamg take too long for more than `quick`."""
 
 

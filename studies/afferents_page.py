@@ -157,7 +157,7 @@ def draw_tuning(curves: dict[str, FloatArray]) -> Figure:
 DISTANCES_MM = np.arange(0.0, 8.01, 0.1)
 
 
-def indented_by(traces: fp.SedTraces, depth_um: float, speed_mm_per_s: float) -> fp.SedTraces:
+def indented_by(traces: fp.Traces, depth_um: float, speed_mm_per_s: float) -> fp.Traces:
     """Traces under an indentation to a depth at a speed, and a hold, from those of the slow ramp.
 
     Stress and strain at a depth hardly depend on the speed: relaxation takes seconds.
@@ -168,11 +168,11 @@ def indented_by(traces: fp.SedTraces, depth_um: float, speed_mm_per_s: float) ->
     times_ms = np.append(np.linspace(0.0, ramp_ms, 17), ramp_ms + 200.0)
     wanted_um = np.minimum(speed_mm_per_s * times_ms, depth_um)
     rises[np.argmax(~rises)] = True
-    values = interp1d(known_um[rises], traces.sed_kpa[rises], axis=0)(wanted_um)
-    return replace(traces, times_ms=times_ms, sed_kpa=values, kinks_ms=np.array([ramp_ms]), phases=())
+    values = interp1d(known_um[rises], traces.values[rises], axis=0)(wanted_um)
+    return replace(traces, times_ms=times_ms, values=values, kinks_ms=np.array([ramp_ms]), phases=())
 
 
-def threshold_depths_um(afferent: AnyAfferent, traces: fp.SedTraces, speed_mm_per_s: float) -> FloatArray:
+def threshold_depths_um(afferent: AnyAfferent, traces: fp.Traces, speed_mm_per_s: float) -> FloatArray:
     """Smallest depth of an indentation that elicits a spike at every site, inf if none does. [µm]"""
     depths = np.full(traces.n_sites, np.inf)
     for depth_um in DEPTHS_UM[::-1]:
@@ -181,7 +181,7 @@ def threshold_depths_um(afferent: AnyAfferent, traces: fp.SedTraces, speed_mm_pe
     return depths
 
 
-def ramp_traces(afferent: AnyAfferent, sites: Any) -> fp.SedTraces:
+def ramp_traces(afferent: AnyAfferent, sites: Any) -> fp.Traces:
     """Traces of the slow ramp at sites."""
     return slow_ramp().sed(sites, afferent.dynamic_quantity, afferent.static_quantity)
 
@@ -211,8 +211,8 @@ def branched_area_mm2(name: str, times: float, seed: int) -> float:
     away = np.linalg.norm(places[:, None] - ends, axis=2)
     profile = ramp_traces(afferent, profile_sites()[0])
     known = DISTANCES_MM[: profile.n_sites]
-    values = np.array([np.interp(away, known, row).max(axis=1) for row in profile.sed_kpa])
-    depths = threshold_depths_um(afferent, replace(profile, sed_kpa=values), PROBING_MM_PER_S)
+    values = np.array([np.interp(away, known, row).max(axis=1) for row in profile.values])
+    depths = threshold_depths_um(afferent, replace(profile, values=values), PROBING_MM_PER_S)
     return float((depths <= times * depths.min()).sum() * 0.25**2)
 
 
@@ -231,9 +231,7 @@ def fields() -> None:
         observed = published.INDENTATION_THRESHOLDS.value[published.TYPES.index(name)]
         rows.append([name, *(_micrometres(each) for each in best), f"{observed:g}"])
     _write_table(
-        "indentation",
-        ["type", "4 mm/s [µm]", "20 mm/s [µm]", "100 mm/s [µm]", "median of units [µm]"],
-        rows,
+        "indentation", ["type", "4 mm/s [µm]", "20 mm/s [µm]", "100 mm/s [µm]", "median of units [µm]"], rows
     )
     rows = []
     for name, units in (("RA", published.RA_VELOCITIES), ("PC", published.PC_VELOCITIES)):
@@ -396,7 +394,7 @@ def draw_vibrations(runs: Sequence[Vibrated]) -> Figure:
     loop.set(xlabel="depth [mm]", ylabel="force [mN]")
     loop.legend(loc="upper left")
     traces = skin.sed([(X_MM, 0.0)], afferent.dynamic_quantity, afferent.static_quantity)
-    density.plot(skin.times_ms, skin.sed([(X_MM, 0.0)]).sed_kpa[:, 0], color=BLUE)
+    density.plot(skin.times_ms, skin.sed([(X_MM, 0.0)]).values[:, 0], color=BLUE)
     density.set(xlabel="time [ms]", ylabel="stored energy density [kPa]")
     spikes = afferent.spikes(traces)[0]
     for time_ms in spikes:
@@ -436,13 +434,7 @@ def vibration() -> None:
     write_png(draw_vibrations, runs, IMAGES / "vibration.png")
 
 
-PARTS = {
-    "mixed": mixed,
-    "tuning": tuning,
-    "fields": fields,
-    "adaptation": adaptation,
-    "vibration": vibration,
-}
+PARTS = {"mixed": mixed, "tuning": tuning, "fields": fields, "adaptation": adaptation, "vibration": vibration}
 
 
 def main(names: Sequence[str]) -> None:

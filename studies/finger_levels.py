@@ -111,7 +111,7 @@ def outputs_of(
     force_n = [responses["plate", depth, 0.0].force_mn[-1] / MN_PER_N for depth in PLATE_DEPTHS_MM]
     (bars,) = bar_traces(responses, candidate, conditions)
     bar = drive(bars, pieces=PIECES)
-    largest = float(bar.sed_kpa.max())
+    largest = float(bar.values.max())
     spheres = [
         [
             drive(driven(responses["sphere", curvature, at], candidate, SITES.half_mm), pieces=PIECES)
@@ -135,7 +135,7 @@ def outputs_of(
 
 def _relative(driven_by: Drive, largest: float) -> FloatArray:
     """Stress and its rate of change over the ramp's time, (2, n_times, n_sites), over the largest stress."""
-    return np.array([driven_by.sed_kpa, RAMP_MS * driven_by.rate_kpa_per_ms]) / largest
+    return np.array([driven_by.values, RAMP_MS * driven_by.rate_per_ms]) / largest
 
 
 def deflection_distances_mm() -> FloatArray:

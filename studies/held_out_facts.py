@@ -42,9 +42,5 @@ FINEST_GRATING = Published(
     "recalled",
 )
 GAP_THRESHOLD = Published(
-    "gap that people detect in 75 % of trials",
-    0.87,
-    "mm",
-    "Johnson & Phillips 1981, summary",
-    "read",
+    "gap that people detect in 75 % of trials", 0.87, "mm", "Johnson & Phillips 1981, summary", "read"
 )

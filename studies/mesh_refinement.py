@@ -170,8 +170,8 @@ def read(responses: Mapping[Any, SkinResponse], receptors_mm: FloatArray, sheets
     return Reading(
         tuple(responses),
         {
-            "ramp": np.array([trace.sed_kpa[end] for trace, end in zip(traces, ramp_ends, strict=True)]),
-            "hold": np.array([trace.sed_kpa[-1] for trace in traces]),
+            "ramp": np.array([trace.values[end] for trace, end in zip(traces, ramp_ends, strict=True)]),
+            "hold": np.array([trace.values[-1] for trace in traces]),
         },
         {
             name: np.array([firing_rate_hz(train, window) for train in trains])

@@ -19,10 +19,7 @@ from fingerpad.experiments.gerling2014.curvature_thresholds import (
     interpolated,
     just_noticeable_difference,
 )
-from fingerpad.experiments.gerling2014.single_unit_uncertainty import (
-    CredibleInterval,
-    PosteriorConvergence,
-)
+from fingerpad.experiments.gerling2014.single_unit_uncertainty import CredibleInterval, PosteriorConvergence
 from fingerpad.experiments.manifest import Manifest
 from fingerpad.experiments.runner import Runner
 from fingerpad.experiments.scores import coefficient_of_determination
@@ -30,13 +27,7 @@ from fingerpad.inference.fitting.fractional_sum_of_squares import fractional_sum
 from fingerpad.inference.fitting.posterior import Chains, credible_band
 from fingerpad.inference.identifiable import LARGEST_RESTING_SHARE, identifiable
 from fingerpad.neuron.afferent import Afferent
-from studies.finger_levels import (
-    SITES,
-    Outputs,
-    euclidean_hit_rates,
-    largest_stress_kpa,
-    outputs_of,
-)
+from studies.finger_levels import SITES, Outputs, euclidean_hit_rates, largest_stress_kpa, outputs_of
 from studies.finger_posterior import (
     LOGARITHMIC,
     PARAMETERS,
@@ -54,14 +45,7 @@ from studies.finger_posterior import (
 )
 from studies.posterior_calibration import Calibration, calibrate
 from studies.tissue_candidates import HUMAN, Candidate
-from studies.tissue_design import (
-    RANGES,
-    design,
-    design_candidates,
-    point_of,
-    shares_of,
-    values_at,
-)
+from studies.tissue_design import RANGES, design, design_candidates, point_of, shares_of, values_at
 from studies.tissue_emulator import Emulator, left_out
 from studies.tissue_search import SPHERES_PER_M, flat_and_largest, targets, touches
 
@@ -73,12 +57,7 @@ N_DRAWN, N_REPLICATES = 300, 20
 
 SAMPLING = Sampling()
 REPEATED = Sampling(
-    n_walkers=50,
-    n_steps=80,
-    most_steps=640,
-    n_ensembles=2,
-    largest_r_hat=1.1,
-    smallest_effective_size=30.0,
+    n_walkers=50, n_steps=80, most_steps=640, n_ensembles=2, largest_r_hat=1.1, smallest_effective_size=30.0
 )
 """Of the posterior, and of those of synthetic experiments."""
 

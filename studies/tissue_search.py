@@ -18,7 +18,7 @@ from fingerpad.core.checks import FloatArray
 from fingerpad.core.errors import ConvergenceError
 from fingerpad.core.random_streams import Purpose, normals
 from fingerpad.core.results import Matrix, Number, Vector, result_class
-from fingerpad.core.signals import SedTraces
+from fingerpad.core.signals import Traces
 from fingerpad.core.units import MN_PER_N
 from fingerpad.data import protocol, psychophysics
 from fingerpad.experiments.conditions import RECEPTOR_X_MM, Conditions, Touch
@@ -111,18 +111,18 @@ def plate_range_n() -> FloatArray:
     return np.array([(min(forces), max(forces)) for forces in by_depth])
 
 
-def driven(skin: SkinResponse, candidate: Candidate, sites: FloatArray) -> SedTraces:
+def driven(skin: SkinResponse, candidate: Candidate, sites: FloatArray) -> Traces:
     """Quantity that drives the afferents of a candidate at sites (n_sites, 2) [mm], raised to its exponent.
 
     It stands in the place of SED, one column per site.
     """
     values = skin.sample(candidate.reading.quantity, sites) ** candidate.reading.exponent
-    return SedTraces(skin.times_ms, values, np.array(skin.kinks_ms))
+    return Traces(skin.times_ms, values, np.array(skin.kinks_ms))
 
 
 def bar_traces(
     responses: Mapping[Key, SkinResponse], candidate: Candidate, conditions: Conditions
-) -> list[SedTraces]:
+) -> list[Traces]:
     """Traces at the receptor, one column per shift of the bar.
 
     From one bar, the sites move instead of it: a bar shifted by s towards the proximal end has the receptor
@@ -142,16 +142,16 @@ class Skins:
 
     Parameters
     ----------
-    bars : list of SedTraces
+    bars : list of Traces
         At the receptor, one column per shift of the bar in all.
-    spheres : dict of SedTraces
+    spheres : dict of Traces
         At the receptors of the population, by curvature and position. [1/m, mm]
     seed : int
         Of the presentations behind expected hit rates.
     """
 
-    bars: list[SedTraces]
-    spheres: Mapping[tuple[float, float], SedTraces]
+    bars: list[Traces]
+    spheres: Mapping[tuple[float, float], Traces]
     seed: int = 0
 
     @cached_property

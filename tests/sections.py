@@ -7,7 +7,7 @@ from typing import TypeVar
 import numpy as np
 
 from fingerpad.core.results import from_json
-from fingerpad.core.signals import STORED_ENERGY, SedTraces
+from fingerpad.core.signals import STORED_ENERGY, Traces
 from fingerpad.geometry.mesh import block_mesh
 from fingerpad.neuron.afferent import Afferent
 
@@ -32,7 +32,7 @@ class SphereSkin:
     def sed(self, sites):
         squared = np.square(np.asarray(sites)[:, [0, -1]] - self.centre).sum(axis=1)
         peaks = self.peak_kpa * np.exp(-squared / self.width_mm**2)
-        return SedTraces([0.0, 50.0, 1000.0], np.outer([0.0, 1.0, 0.85], peaks), kinks_ms=[50.0])
+        return Traces([0.0, 50.0, 1000.0], np.outer([0.0, 1.0, 0.85], peaks), kinks_ms=[50.0])
 
 
 DEPTHS_MM = np.array([0.0, 0.2, 0.371, 0.471, 1.0, 1.624, 5.0])

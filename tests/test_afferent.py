@@ -7,7 +7,7 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from fingerpad.core.errors import InputError
-from fingerpad.core.signals import STORED_ENERGY, SedTraces
+from fingerpad.core.signals import STORED_ENERGY, Traces
 from fingerpad.core.threads import BLOCK
 from fingerpad.data import neuron
 from fingerpad.data.tissues import DEFAULT_TISSUES
@@ -19,7 +19,7 @@ from sections import SED_DRIVEN, sed_driven
 
 
 def ramp_and_hold(*peaks_kpa):
-    return SedTraces([0.0, 50.0, 1000.0], np.outer([0.0, 1.0, 1.0], peaks_kpa), kinks_ms=[50.0])
+    return Traces([0.0, 50.0, 1000.0], np.outer([0.0, 1.0, 1.0], peaks_kpa), kinks_ms=[50.0])
 
 
 def test_the_stages_are_chained():
@@ -48,7 +48,7 @@ def test_the_default_afferent_is_that_of_the_default_tissues():
     rheobase_ma = afferent.capacitance_mf * afferent.threshold_mv / afferent.time_constant_ms
     least_kpa = (rheobase_ma - afferent.intercept_ma) / afferent.static_gain
     energy = ramp_and_hold(*(least_kpa * np.array([0.0, 0.95, 1.05, 1.5, 2.0])))
-    stress = replace(energy, dynamic_quantity="compressive_stress", static_quantity="compressive_stress")
+    stress = replace(energy, quantity="compressive_stress")
     dynamic_hz, static_hz = afferent.rates(stress)
     assert dynamic_hz[0] == static_hz[0] == static_hz[1] == 0.0
     assert (np.diff(dynamic_hz[2:]) > 0).all()
@@ -108,7 +108,7 @@ def test_capacitance_and_threshold_only_scale_the_gains():
 
 
 def test_a_drive_gives_what_its_traces_give_and_a_fit_can_afford_it():
-    sed = SedTraces(
+    sed = Traces(
         np.append(np.linspace(0.0, 50.0, 9), 50.0 + np.geomspace(2.0, 950.0, 12)),
         np.outer(np.append(np.linspace(0.0, 1.0, 9), np.linspace(0.99, 0.85, 12)), np.linspace(0.3, 3.0, 36)),
         kinks_ms=[50.0],
@@ -120,7 +120,7 @@ def test_a_drive_gives_what_its_traces_give_and_a_fit_can_afford_it():
 
 def test_many_receptors_never_stand_on_all_knots_at_once():
     times = np.append(np.linspace(0.0, 50.0, 9), 50.0 + np.geomspace(2.0, 950.0, 12))
-    sed = SedTraces(times, np.outer(np.minimum(times, 50.0), np.linspace(0.0, 0.02, 24 * BLOCK)), [50.0])
+    sed = Traces(times, np.outer(np.minimum(times, 50.0), np.linspace(0.0, 0.02, 24 * BLOCK)), [50.0])
     SED_DRIVEN.spikes(sed.part(slice(0, 2)))  # compile
     tracemalloc.start()
     spikes = SED_DRIVEN.spikes(sed)
@@ -156,7 +156,12 @@ def test_impossible_afferents_and_traces_of_another_quantity_are_refused(call, s
 
 def test_an_afferent_and_its_traces_agree_on_what_the_dynamic_term_follows():
     energy = ramp_and_hold(1.0, 2.0)
-    both = SedTraces(energy.times_ms, energy.sed_kpa, energy.kinks_ms, 10.0 * energy.sed_kpa, "von_mises")
+    both = Traces(
+        energy.times_ms,
+        energy.values,
+        energy.kinks_ms,
+        dynamic=Traces(energy.times_ms, 10.0 * energy.values, quantity="von_mises"),
+    )
     gain = SED_DRIVEN.dynamic_gain / 10.0
     extended = replace(SED_DRIVEN, dynamic_gain=gain, dynamic_quantity="von_mises")
     # Ten times the quantity and a tenth of its gain are the paper's afferent.
@@ -175,8 +180,8 @@ def test_sites_that_are_not_simulated_would_be_silent():
     # Half of the peaks lie within 1 % of where the hold just reaches the threshold.
     near = afferent.static_threshold * np.concatenate([1.0 + np.geomspace(1e-12, 1e-2, 40), [1.0]])
     peaks = np.concatenate([near, 2.0 - near / near[-1], np.linspace(0.0, 0.2, 40)])
-    sed = SedTraces(times, course * np.maximum(peaks, 0.0), kinks_ms=[50.0])
-    slow = SedTraces(20.0 * times, sed.sed_kpa, kinks_ms=[1000.0])
+    sed = Traces(times, course * np.maximum(peaks, 0.0), kinks_ms=[50.0])
+    slow = Traces(20.0 * times, sed.values, kinks_ms=[1000.0])
     for traces in (sed, slow):
         found, all_simulated = afferent.spikes(traces), afferent.spikes(drive(traces))
         assert_array_equal(found.times_ms, all_simulated.times_ms)

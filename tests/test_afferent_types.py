@@ -33,7 +33,7 @@ FREQUENCIES_HZ = np.array(published.TUNING_FREQUENCIES.value)
 def traces(quantity, times_ms, values, kinks_ms=()):
     columns = np.array(values, np.float64).reshape(len(np.array(times_ms)), -1)
     both = {"dynamic_quantity": quantity, "static_quantity": quantity}
-    return fp.SedTraces(times_ms, columns, np.array(kinks_ms), **both)
+    return fp.Traces(times_ms, columns, np.array(kinks_ms), **both)
 
 
 def press(quantity, height, ramp_ms=50.0):
@@ -62,7 +62,7 @@ RESTED = {
     "PC": fp.PC(),
     "SAII": fp.SAII(),
     "own": fp.OwnAfferent(
-        lambda sed: fp.CurrentTraces(sed.times_ms, 1e-6 * sed.sed_kpa - 5e-7),
+        lambda sed: fp.Traces(sed.times_ms, 1e-6 * sed.values - 5e-7, quantity="current"),
         LeakyIntegrateAndFire(60.0, 1e-6, 50.0, 1.0),
     ),
     "soft": fp.OwnAfferent(
@@ -220,7 +220,7 @@ def test_an_own_afferent_returns_current_or_spikes():
     membrane = LeakyIntegrateAndFire(20.0, 1e-6, 5.0, 1.0)
 
     def current(sed):
-        return fp.CurrentTraces(sed.times_ms, 1e-6 * sed.sed_kpa)
+        return fp.Traces(sed.times_ms, 1e-6 * sed.values, quantity="current")
 
     own = fp.OwnAfferent(current, membrane)
     sed = press("stored", 2.0)
@@ -272,9 +272,9 @@ def test_no_input_gives_more_than_the_largest_share_of_its_range(rise, fall):
 def test_the_strongest_end_organ_leads_if_asked_for():
     sed = traces("stored", [0.0, 50.0], [[0.0, 0.0], [2.0, 3.0]])
     largest = fp.EndOrgans(ENDS, [0.8, 0.2], combine="largest").combined(sed)
-    assert largest.sed_kpa.tolist() == [[0.0], [2.0]]
+    assert largest.values.tolist() == [[0.0], [2.0]]
     equal = fp.EndOrgans(ENDS, combine="largest").combined(sed)
-    assert equal.sed_kpa.tolist() == [[0.0], [3.0]]
+    assert equal.values.tolist() == [[0.0], [3.0]]
 
 
 def test_scattered_end_organs_lie_within_reach_and_depend_on_seed_and_number_only():
@@ -320,10 +320,10 @@ BAD = [
     (lambda: fp.RA(rise=0), "rise must be a whole number of at least 1"),
     (lambda: fp.RA().spikes(ENERGY), "needs 'compressive_stress': got traces of 'stored'"),
     (lambda: fp.RA(treshold=0.1), "RA has no treshold: did you mean threshold"),
-    (lambda: fp.OwnAfferent("sum"), "respond must be a function of SedTraces: got 'sum'"),
-    (lambda: own(lambda sed: sed), "respond must return .* got SedTraces"),
+    (lambda: fp.OwnAfferent("sum"), "respond must be a function of Traces: got 'sum'"),
+    (lambda: own(lambda sed: sed), "respond must return .* got Traces"),
     (lambda: own(lambda sed: fp.SpikeTrains.from_lists([])), "respond must return .* 1 in all: got 0 trains"),
-    (lambda: own(lambda sed: fp.CurrentTraces(sed.times_ms, sed.sed_kpa)), "needs a membrane"),
+    (lambda: own(lambda sed: fp.Traces(sed.times_ms, sed.values, quantity="current")), "needs a membrane"),
     (lambda: fp.EndOrgans(ENDS, [0.5, 0.6]), "must sum to 1: got 1.1"),
     (lambda: fp.EndOrgans(ENDS, [1.5, -0.5]), "must not be negative: the smallest is -0.5"),
     (lambda: fp.EndOrgans(ENDS, combine="mean"), "combine must be one of sum, largest: got 'mean'"),

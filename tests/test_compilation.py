@@ -117,8 +117,8 @@ def test_messages_count_the_kernels_that_are_done(say):
 RESPOND = """
     import numpy as np
     import fingerpad as fp
-    from fingerpad.core.signals import SedTraces
-    traces = SedTraces(np.array([0.0, 50.0, 100.0]), np.array([[0.0], [40.0], [40.0]]), np.array([50.0]))
+    from fingerpad.core.signals import Traces
+    traces = Traces(np.array([0.0, 50.0, 100.0]), np.array([[0.0], [40.0], [40.0]]), np.array([50.0]))
     for _ in range(2):
         print(len(fp.Afferent.for_tissues("paper").spikes(traces)[0]) > 0)
 """

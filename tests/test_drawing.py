@@ -45,7 +45,7 @@ class Strength:
     def sed(self, sites, *quantities):
         squared = np.square(np.asarray(sites)[:, [0, -1]] - [17.37, 0.0]).sum(axis=1)
         peaks = self.peak_kpa * np.exp(-squared / 4.0)
-        return fp.SedTraces([0.0, 50.0, 1000.0], np.outer([0.0, 1.0, 0.9], peaks), kinks_ms=[50.0])
+        return fp.Traces([0.0, 50.0, 1000.0], np.outer([0.0, 1.0, 0.9], peaks), kinks_ms=[50.0])
 
 
 def discriminated():
@@ -58,7 +58,7 @@ def discriminated():
 def fitted():
     afferent = fp.Afferent.for_tissues("paper")
     times_ms = np.array([0.0, 25.0, 50.0, 100.0, 300.0, 1000.0])
-    traces = fp.SedTraces(times_ms, np.outer([0, 0.3, 1, 0.9, 0.8, 0.7], np.linspace(2, 9, 6)), [50.0])
+    traces = fp.Traces(times_ms, np.outer([0, 0.3, 1, 0.9, 0.8, 0.7], np.linspace(2, 9, 6)), [50.0])
     names = tuple(f"height {number}" for number in range(6))
     return fit_recordings(traces, RateRecordings(names, *afferent.rates(traces)), np.arange(6) % 2)
 
@@ -74,8 +74,7 @@ def results():
         "SkinResponse": skin,
         "ResponseMap": response,
         "SpikeTrains": response.spikes,
-        "SedTraces": skin.sed([(17.37, 0.0), (19.0, 0.0)]),
-        "CurrentTraces": fp.CurrentTraces([0.0, 50.0, 50.0, 90.0], [[0.0], [2e-3], [1e-3], [1e-3]]),
+        "Traces": fp.Traces([0.0, 50.0, 50.0, 90.0], [[0.0], [2e-3], [1e-3], [1e-3]], quantity="current"),
         "MixedResponse": fp.MixedResponse({"SAI": response, "RA": response}),
         "SurfaceProfile": skin.surface_profile(),
         "HitRates": fp.HitRates([0.6, 0.9], [0.05, 0.02], seed=1),
@@ -152,7 +151,7 @@ def test_drawings_show_the_numbers_of_the_result(results):
 
 def test_few_sites_have_a_key_and_many_have_none(results):
     times_ms, current_ma = [0.0, 50.0], np.outer([0.0, 2e-5], np.arange(1.0, 7.0))
-    few = fp.CurrentTraces(times_ms, current_ma).plot(Figure().add_subplot())
+    few = fp.Traces(times_ms, current_ma, quantity="current").plot(Figure().add_subplot())
     assert [text.get_text() for text in few.get_legend().get_texts()] == [f"site {n}" for n in range(1, 7)]
     styles = {(line.get_color(), str(line._dash_pattern)) for line in few.lines}
     assert len(styles) == 6
@@ -170,9 +169,9 @@ def test_few_sites_have_a_key_and_many_have_none(results):
     axes = results["SkinResponse"].plot()
     assert axes.figure is pyplot.gcf()
     pyplot.close(axes.figure)
-    many = fp.CurrentTraces(times_ms, np.ones((2, 7))).plot(Figure().add_subplot())
+    many = fp.Traces(times_ms, np.ones((2, 7)), quantity="current").plot(Figure().add_subplot())
     assert many.get_legend() is None
-    assert results["CurrentTraces"].plot(Figure().add_subplot()).get_legend() is None
+    assert results["Traces"].plot(Figure().add_subplot()).get_legend() is None
 
 
 @pytest.mark.parametrize("kind", DRAWINGS)
@@ -212,14 +211,14 @@ def test_progress_that_has_no_stages_is_refused():
 
 
 def test_tables_hold_the_numbers_of_the_result(results):
-    skin, response, traces = results["SkinResponse"], results["ResponseMap"], results["SedTraces"]
+    skin, response, traces = results["SkinResponse"], results["ResponseMap"], results["Traces"]
     table = response.to_pandas()
     assert table.static_rate_hz.tolist() == response.static_rate_hz.tolist()
     assert table.spikes.sum() == response.spikes.times_ms.size
     assert skin.to_pandas().force_mn.tolist() == skin.force_mn.tolist()
     assert np.array_equal(skin.to_xarray(response).force_mn.values, skin.force_mn)
-    assert np.array_equal(traces.to_pandas().values, traces.sed_kpa)
-    assert np.array_equal(traces.to_xarray().stored.values, traces.sed_kpa)
+    assert np.array_equal(traces.to_pandas().values, traces.values)
+    assert np.array_equal(traces.to_xarray().stored.values, traces.values)
     spikes = response.spikes.to_pandas()
     for number, train in enumerate(response.spikes):
         assert spikes.time_ms[spikes.index == number].tolist() == train.tolist()

@@ -199,6 +199,6 @@ def test_skin_rises_into_a_gap_and_energy_gathers_under_the_lips(bulges):
     assert flat.at(0.0) > narrow.at(0.0) + 0.02 > wide.at(0.0) + 0.04
     for profile in (narrow, wide):
         np.testing.assert_allclose(profile.at(1.3), flat.at(1.3), rtol=0, atol=0.03)
-    flat, wide = (bulges[gap].sed([[17.37, 0.0], [17.37 + 0.9, 0.0]]).sed_kpa[-1] for gap in (0.0, 1.8))
+    flat, wide = (bulges[gap].sed([[17.37, 0.0], [17.37 + 0.9, 0.0]]).values[-1] for gap in (0.0, 1.8))
     assert wide[1] > 1.3 * wide[0]
     assert wide[1] > 1.1 * flat[1]

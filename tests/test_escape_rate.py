@@ -12,7 +12,7 @@ from scipy.stats import kstest
 from fingerpad.core import threads
 from fingerpad.core.errors import InputError
 from fingerpad.core.random_streams import Presentations, Purpose, uniforms
-from fingerpad.core.signals import CurrentTraces
+from fingerpad.core.signals import Traces
 from fingerpad.neuron.escape_rate import EscapeRate, _integral, panels
 from fingerpad.neuron.exact_spikes import potential_at
 from fingerpad.neuron.lif import LeakyIntegrateAndFire
@@ -27,12 +27,12 @@ def touched(n_sites=1):
     """A ramp, a jump down and a decay."""
     times = [0.0, 20.0, 60.0, 60.0, 250.0]
     shape = np.array([[0.0], [8e-6], [6e-6], [3e-6], [2e-6]])
-    return CurrentTraces(times, shape * np.linspace(1.0, 0.5, n_sites))
+    return Traces(times, shape * np.linspace(1.0, 0.5, n_sites), quantity="current")
 
 
 def free_potential(current, site, begin, end):
     """Potential over threshold from 0 at `begin`, by a general integrator that stops at every knot."""
-    times, values = current.times_ms, current.current_ma[:, site]
+    times, values = current.times_ms, current.values[:, site]
     edges = [begin, *np.unique(times[(times > begin) & (times < end)]), end]
     pieces, u = [], 0.0
     for left, right in pairwise(edges):
@@ -85,7 +85,7 @@ def test_a_potential_at_its_limit_fires_like_a_poisson_process(width):
     """A time constant far below the refractory period: after each rest the hazard is the same."""
     neuron = LeakyIntegrateAndFire(0.02, CAPACITANCE, THRESHOLD, 1.0)
     current_ma = CAPACITANCE * THRESHOLD / 0.02 * (1.0 - width)  # holds u at 1 - width: hazard exp(-1)
-    current = CurrentTraces([0.0, 1e4], [[current_ma], [current_ma]])
+    current = Traces([0.0, 1e4], [[current_ma], [current_ma]], quantity="current")
     train = EscapeRate(neuron, width).spikes(current, SEED)[0]
     intervals = np.diff(train) - 1.0
     late = intervals[intervals > 0.4] - 0.4  # the potential has arrived

@@ -10,7 +10,7 @@ import pytest
 from scipy.stats import binom, chi2, multivariate_t, norm
 
 from fingerpad.core.errors import ConvergenceError, InputError
-from fingerpad.core.signals import SedTraces
+from fingerpad.core.signals import Traces
 from fingerpad.inference.afferent_posterior import (
     AfferentPrior,
     afferent_posterior,
@@ -32,7 +32,7 @@ COURSE = np.where(TIMES <= 50.0, (TIMES / 50.0) ** 2, 0.75 + 0.25 * np.exp(-(TIM
 
 def under(peaks):
     """The model under stimuli of these peaks of energy density [kPa]."""
-    traces = SedTraces(TIMES, COURSE[:, None] * peaks, [50.0])
+    traces = Traces(TIMES, COURSE[:, None] * peaks, [50.0])
     return four_number_model(AfferentModel.of_drive(drive(traces, pieces=3)))
 
 

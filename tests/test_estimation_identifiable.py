@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from fingerpad.core.errors import InputError
-from fingerpad.core.signals import SedTraces
+from fingerpad.core.signals import Traces
 from fingerpad.inference.identifiable import (
     LARGEST_RESTING_SHARE,
     identifiable,
@@ -14,7 +14,7 @@ from fingerpad.inference.identifiable import (
 from sections import sed_driven
 
 SIX = np.array([2.3e-7, 1.0e-4, 5.6e-7, 72.0, 6.0e-7, 30.0])
-SED = SedTraces([0.0, 25.0, 50.0, 1000.0], [[0.0, 0.0], [0.4, 0.9], [1.0, 2.0], [0.8, 1.7]], [50.0])
+SED = Traces([0.0, 25.0, 50.0, 1000.0], [[0.0, 0.0], [0.4, 0.9], [1.0, 2.0], [0.8, 1.7]], [50.0])
 
 
 @pytest.mark.parametrize(("capacitance", "threshold"), [(6.0e-7, 30.0), (1.0e-6, 50.0), (3.0e-7, 90.0)])
@@ -60,6 +60,6 @@ def test_an_afferent_at_rest_is_lowered_to_the_bound_and_another_one_is_kept():
     np.testing.assert_array_equal(lowered[1], quiet)
     np.testing.assert_array_equal(lowered[0, 1:], firing[1:])
     assert identifiable(lowered[0])[0] * 50.0 == pytest.approx(LARGEST_RESTING_SHARE)
-    untouched = SedTraces([0.0, 2000.0], [[0.0], [0.0]])
+    untouched = Traces([0.0, 2000.0], [[0.0], [0.0]])
     assert sed_driven(lowered[0]).spikes(untouched).times_ms.size == 0
     assert sed_driven(firing).spikes(untouched).times_ms.size > 0

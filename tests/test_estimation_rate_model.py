@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from fingerpad.core.errors import InputError
-from fingerpad.core.signals import SedTraces
+from fingerpad.core.signals import Traces
 from fingerpad.inference.closed_form import ClosedFormModel
 from fingerpad.inference.identifiable import identifiable
 from fingerpad.inference.rate_model import AfferentModel, evaluate_rows, four_number_model
@@ -14,8 +14,8 @@ from sections import SED_DRIVEN, sed_driven
 PEAKS = np.array([0.0, 0.3, 0.8, 1.4, 1.9, 2.5])
 TIMES = np.array([0.0, 10.0, 20.0, 30.0, 40.0, 50.0, 60.0, 100.0, 200.0, 500.0, 1000.0])
 COURSE = np.where(TIMES <= 50.0, (TIMES / 50.0) ** 2, 0.75 + 0.25 * np.exp(-(TIMES - 50.0) / 150.0))
-SED = SedTraces(TIMES, COURSE[:, None] * PEAKS, [50.0])
-LONGER = SedTraces(np.append(TIMES, 1500.0), np.append(COURSE, COURSE[-1])[:, None] * PEAKS[2:4], [50.0])
+SED = Traces(TIMES, COURSE[:, None] * PEAKS, [50.0])
+LONGER = Traces(np.append(TIMES, 1500.0), np.append(COURSE, COURSE[-1])[:, None] * PEAKS[2:4], [50.0])
 MODEL = AfferentModel.of_traces(SED)
 SIX = SED_DRIVEN.parameters
 

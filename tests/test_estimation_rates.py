@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from fingerpad.core.errors import InputError
-from fingerpad.core.signals import CurrentTraces, SedTraces
+from fingerpad.core.signals import Traces
 from fingerpad.experiments.gerling2014.single_unit import bar_recordings
 from fingerpad.inference.afferent_methods import (
     along_slopes,
@@ -41,7 +41,7 @@ def traces(offset_mm=0.0):
     """SED of a ramp and a relaxing hold; over the shifts a bump that is steeper on one side."""
     place = SHIFT_MM + offset_mm
     peak_kpa = 0.2 + 1.8 * np.exp(-np.square(place / np.where(place < 0.0, 0.6, 0.9)))
-    return SedTraces(TIMES_MS, np.outer(COURSE, peak_kpa), kinks_ms=[50.0])
+    return Traces(TIMES_MS, np.outer(COURSE, peak_kpa), kinks_ms=[50.0])
 
 
 def problem(model, truth):
@@ -122,7 +122,7 @@ def test_static_phase_weighs_three_times_the_dynamic_phase():
 def test_a_constant_current_fires_at_the_rate_of_the_formula(drive_per_ms):
     membrane = LeakyIntegrateAndFire(50.0, 1e-6, 40.0, 1.0)
     current = np.full((2, 1), drive_per_ms * 1e-6 * 40.0)
-    spikes = membrane.spikes(CurrentTraces([0.0, 5000.0], current))
+    spikes = membrane.spikes(Traces([0.0, 5000.0], current, quantity="current"))
     rate, _, _ = constant_drive_rate([drive_per_ms], 50.0, 1.0)
     np.testing.assert_allclose(rate, firing_rate_hz(spikes, (0.0, 5000.0)), rtol=1e-9)
     assert (rate[0] > 0.0) == (drive_per_ms > 1.0 / 50.0)
@@ -193,7 +193,7 @@ def test_the_drive_is_the_sampled_one_and_interpolated_in_between():
         rates = model.evaluate(np.append(six, offset))
         np.testing.assert_array_equal(rates, AfferentModel.of_traces(traces(offset)).evaluate(six))
     middle = model.at(0.1).drives[0]
-    for name in ("sed_kpa", "rate_kpa_per_ms"):
+    for name in ("values", "rate_per_ms"):
         ends = [getattr(drive(traces(offset)), name) for offset in (0.0, 0.2)]
         np.testing.assert_allclose(getattr(middle, name), np.mean(ends, axis=0), rtol=1e-12, atol=1e-15)
 
@@ -218,7 +218,7 @@ def test_places_that_were_not_sampled_are_refused():
     with pytest.raises(InputError, match="got 1 offsets and 1 models"):
         ReceptorOffset.of_traces({0.0: traces()})
     with pytest.raises(InputError, match="got 2 offsets and 2 models of 2 kinds"):
-        ReceptorOffset.of_traces({0.0: traces(), 0.1: SedTraces([0, 1000], [[0], [1]])}, PAPER_WINDOWS_MS)
+        ReceptorOffset.of_traces({0.0: traces(), 0.1: Traces([0, 1000], [[0], [1]])}, PAPER_WINDOWS_MS)
     with pytest.raises(InputError, match="offsets_mm must increase strictly"):
         ReceptorOffset.of_traces({0.1: traces(), 0.0: traces()})
 
@@ -242,5 +242,5 @@ def test_slopes_along_the_numbers_of_a_fit_are_the_limits_of_differences(four_nu
         np.testing.assert_allclose(slope, difference, rtol=1e-3, atol=1e-5 * abs(found).max())
     # No fit within the bounds fires at rest.
     highest = np.array([bounds.high[0], 0.0, 0.0, 40.0])
-    untouched = SedTraces([0.0, 3000.0], [[0.0], [0.0]])
+    untouched = Traces([0.0, 3000.0], [[0.0], [0.0]])
     assert sed_driven(fitted_six(highest)).spikes(untouched).times_ms.size == 0

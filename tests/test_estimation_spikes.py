@@ -14,7 +14,7 @@ from scipy.stats import binom
 from fingerpad.core import threads
 from fingerpad.core.errors import ConvergenceError, InputError
 from fingerpad.core.random_streams import Presentations
-from fingerpad.core.signals import SedTraces, SpikeTrains
+from fingerpad.core.signals import SpikeTrains, Traces
 from fingerpad.inference.identifiable import (
     SPIKE_PARAMETER_NAMES,
     canonical,
@@ -23,10 +23,7 @@ from fingerpad.inference.identifiable import (
     six_parameters,
 )
 from fingerpad.inference.spike_fit import fit_spikes
-from fingerpad.inference.spike_likelihood import (
-    SpikeLikelihood,
-    time_rescaling,
-)
+from fingerpad.inference.spike_likelihood import SpikeLikelihood, time_rescaling
 from fingerpad.neuron.escape_rate import EscapeRate
 from fingerpad.neuron.transduction import Drive, drive
 from sections import SED_DRIVEN, sed_driven
@@ -45,7 +42,7 @@ def touched():
     times = np.concatenate([np.linspace(0.0, 50.0, 5), [60.0, 80.0, 150.0, 300.0]])
     hold = 0.8 + 0.2 * np.exp(-(times - 50.0) / 100.0)
     shape = np.where(times <= 50.0, (times / 50.0) ** 1.5, hold)
-    return drive(SedTraces(times, shape[:, np.newaxis] * strengths, [50.0]), pieces=8)
+    return drive(Traces(times, shape[:, np.newaxis] * strengths, [50.0]), pieces=8)
 
 
 def simulated(seed, n_repeats=12, parameters=TRUTH):
@@ -70,7 +67,7 @@ def slow_log_likelihood(driven, train, end, parameters, escape_ms):
     a, b, c, tau, width = parameters
     times = driven.times_ms
     value, ready = 0.0, times[0]
-    u = tau * (a + b * driven.rate_kpa_per_ms[0, 0] + c * driven.sed_kpa[0, 0])
+    u = tau * (a + b * driven.rate_per_ms[0, 0] + c * driven.values[0, 0])
     spikes = [*train, math.inf]
     events = np.unique([*times, *train, *(train + REFRACTORY), end])
     for left, right in pairwise(events[events <= end]):
@@ -83,7 +80,7 @@ def slow_log_likelihood(driven, train, end, parameters, escape_ms):
             return values[knot, 0] + share * (values[knot + 1, 0] - values[knot, 0])
 
         def growth(t, state, line=line):
-            drive_now = a + b * line(driven.rate_kpa_per_ms, t) + c * line(driven.sed_kpa, t)
+            drive_now = a + b * line(driven.rate_per_ms, t) + c * line(driven.values, t)
             return [-state[0] / tau + drive_now, math.exp((state[0] - 1.0) / width) / escape_ms]
 
         solved = solve_ivp(growth, (left, right), [u, 0.0], rtol=1e-10, atol=1e-12)

@@ -95,8 +95,8 @@ def test_force_grows_with_the_square_of_the_size():
     there = touch_of(PAPER.scaled(factor), small_ball, small_motion, grading=smaller)
     large, small = here.solve(), there.solve()
     np.testing.assert_allclose(small.force_mn, factor**2 * large.force_mn, rtol=2e-3, atol=1e-9)
-    density = small.sed([there.at_mm]).sed_kpa
-    np.testing.assert_allclose(density, large.sed([here.at_mm]).sed_kpa, rtol=5e-3, atol=1e-6)
+    density = small.sed([there.at_mm]).values
+    np.testing.assert_allclose(density, large.sed([here.at_mm]).values, rtol=5e-3, atol=1e-6)
 
 
 def test_place_population_and_pad_follow_the_finger():

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from fingerpad.core.errors import InputError
-from fingerpad.core.signals import SedTraces
+from fingerpad.core.signals import Traces
 from fingerpad.inference.fitting.sensitivity import identifiability, jacobian
 from fingerpad.inference.identifiable import IDENTIFIABLE_NAMES, identifiable, six_parameters
 from fingerpad.inference.rate_model import AfferentModel
@@ -14,7 +14,7 @@ from sections import SED_DRIVEN
 PEAKS = np.array([0.3, 0.8, 1.4, 1.9, 2.5])
 TIMES = np.array([0.0, 10.0, 20.0, 30.0, 40.0, 50.0, 60.0, 100.0, 200.0, 500.0, 1000.0])
 COURSE = np.where(TIMES <= 50.0, (TIMES / 50.0) ** 2, 0.75 + 0.25 * np.exp(-(TIMES - 50.0) / 150.0))
-MODEL = AfferentModel.of_traces(SedTraces(TIMES, COURSE[:, None] * PEAKS, [50.0]))
+MODEL = AfferentModel.of_traces(Traces(TIMES, COURSE[:, None] * PEAKS, [50.0]))
 
 
 def rates(six):

@@ -21,7 +21,7 @@ from fingerpad.core.files import read_text
 from fingerpad.core.patterns import poisson_disc, rectangular
 from fingerpad.core.plain_yaml import DEEPEST, LARGEST_TEXT, read_yaml
 from fingerpad.core.regions import Rectangle
-from fingerpad.core.signals import CurrentTraces
+from fingerpad.core.signals import Traces
 from fingerpad.core.tables import read_csv
 from fingerpad.experiments.afferent_files import fitted_afferent
 from fingerpad.experiments.conditions import Conditions
@@ -48,9 +48,9 @@ HUGE = 10**400
 PAIRS = np.array([[0, 1], [1, 2]])
 TRAINS = fp.SpikeTrains.from_lists([[12.0, 40.0], []])
 TIMES_MS, COURSE = [0.0, 50.0, 1000.0], [0.0, 1.0, 1.0]
-TRACES = fp.SedTraces(TIMES_MS, np.outer(COURSE, [3.0, 5.0, 7.0, 9.0]), [50.0])
+TRACES = fp.Traces(TIMES_MS, np.outer(COURSE, [3.0, 5.0, 7.0, 9.0]), [50.0])
 STRESS = {"dynamic_quantity": "compressive_stress", "static_quantity": "compressive_stress"}
-MANY = fp.SedTraces(TIMES_MS, np.outer(COURSE, np.full(18, 20.0)), [50.0], **STRESS)
+MANY = fp.Traces(TIMES_MS, np.outer(COURSE, np.full(18, 20.0)), [50.0], **STRESS)
 TASK = """
 question: Which spheres?
 object: {kind: sphere}
@@ -230,7 +230,7 @@ NO_NUMBERS = [
         lambda odd: fp.Hencky(odd, 100.0),
         lambda odd: TactileStimulus(fp.Sphere(curvature_per_m=287), friction=odd),
         lambda odd: fp.Trajectory((0.0, 1.0), odd),
-        lambda odd: fp.SedTraces([0.0, 1.0], odd),
+        lambda odd: fp.Traces([0.0, 1.0], odd),
         lambda odd: Experiment(criterion=odd),
     ],
 )
@@ -296,10 +296,10 @@ def test_sequences_become_tuples_so_that_values_hash():
         lambda: fp.Grading(17.0, 1.0, 1.0, 0.5, 0.5, full="yes"),
         lambda: fp.Phase(3, 0.0, 1.0),
         lambda: fp.SpikeTrains([1.0, 2.0], [0, 0.5, 2]),
-        lambda: fp.SedTraces([0, 1], np.ma.array([[1.0], [2.0]], mask=[[0], [1]])),
-        lambda: fp.SedTraces(np.array(["2001-01-01", "2001-01-02"], dtype="datetime64[D]"), [[1.0], [2.0]]),
-        lambda: CurrentTraces([0.0, 1.0], [[1j], [2.0]]),
-        lambda: fp.SedTraces([0.0, HUGE], [[1.0], [2.0]]),
+        lambda: fp.Traces([0, 1], np.ma.array([[1.0], [2.0]], mask=[[0], [1]])),
+        lambda: fp.Traces(np.array(["2001-01-01", "2001-01-02"], dtype="datetime64[D]"), [[1.0], [2.0]]),
+        lambda: Traces([0.0, 1.0], [[1j], [2.0]], quantity="current"),
+        lambda: fp.Traces([0.0, HUGE], [[1.0], [2.0]]),
         lambda: GaussianResponses([1.0, 2.0], [[1.0, 99.0], [0.1, 1.0]]),
         lambda: fp.reduced([0.0, 1.0]),
         lambda: fp.sampled(100.0, depth_mm=(1, 2)),

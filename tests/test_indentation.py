@@ -117,7 +117,7 @@ def test_quantities_that_may_drive_an_afferent_peak_below_the_indenter(skin):
         course = skin.sample(name, np.column_stack([x, np.zeros(45)]))
         assert course.shape == (skin.times_ms.size, 45)
         assert abs(x[course[2].argmax()] - 17.37) < 1.5
-    energy = skin.sed(np.column_stack([x, np.zeros(45)])).sed_kpa
+    energy = skin.sed(np.column_stack([x, np.zeros(45)])).values
     assert abs(x[energy[2].argmax()] - 17.37) < 1.0
     assert energy[2].max() > 10 * energy[2, [0, -1]].max()
 

@@ -14,9 +14,10 @@ import fingerpad as fp
 from docs.site.reference import public_names
 from fingerpad.core.displayed import Result
 from fingerpad.core.keywords import KnownKeywords, OtherName, other_names
+from fingerpad.core.units import unit_of
 from fingerpad.experiments.indenter_text import indenter_named
 from fingerpad.experiments.stimuli import read_stimuli
-from fingerpad.geometry.names import INDENTERS, SIZE_UNITS, sizes_of
+from fingerpad.geometry.names import INDENTERS, sizes_of
 from fingerpad.skin.store import touch_key
 
 SAME = [
@@ -59,9 +60,8 @@ def test_every_other_name_reads_back_what_was_given():
 def test_fields_are_the_papers_and_units_cover_every_name():
     assert [size.name for size in fields(fp.Sphere)] == ["curvature_per_m"]
     assert [size.name for size in fields(fp.Grating)] == ["ridge_mm", "groove_mm", "lip_mm"]
-    assert {size for name in INDENTERS for size in sizes_of(name)} == set(SIZE_UNITS)
-    for name, unit in SIZE_UNITS.items():
-        assert (unit == "mm") == name.endswith("_mm"), name
+    for size in {size for name in INDENTERS for size in sizes_of(name)}:
+        assert (unit_of(size) == "mm") == size.endswith("_mm"), size
 
 
 @pytest.mark.parametrize(
@@ -151,7 +151,7 @@ PUBLIC = {
 MADE = (
     fp.Fingertip(), fp.Bar(), fp.Sphere(), fp.sine(0.8, 0.1, 20.0, cycles=3), fp.Afferent(), fp.PC(),
     fp.Population.grid(rows=1, columns=2), fp.SpikeTrains.from_lists([[12.0, 40.0], []]),
-    fp.SedTraces([0.0, 50.0, 1000.0], [[0.0], [2.0], [1.8]]),
+    fp.Traces([0.0, 50.0, 1000.0], [[0.0], [2.0], [1.8]]),
 )  # fmt: skip
 
 

@@ -13,7 +13,7 @@ from scipy.optimize import brentq
 from benchmarks.runge_kutta import runge_kutta_spikes
 from fingerpad.core import threads
 from fingerpad.core.errors import InputError
-from fingerpad.core.signals import CurrentTraces
+from fingerpad.core.signals import Traces
 from fingerpad.core.threads import BLOCK
 from fingerpad.neuron.exact_spikes import _next_guess
 from fingerpad.neuron.lif import LeakyIntegrateAndFire
@@ -24,7 +24,7 @@ RHEOBASE = THRESHOLD * CAPACITANCE / TAU  # the steady current whose potential o
 
 
 def constant(current_ma, end_ms=1000.0):
-    return CurrentTraces([0.0, end_ms], [[current_ma], [current_ma]])
+    return Traces([0.0, end_ms], [[current_ma], [current_ma]], quantity="current")
 
 
 @pytest.mark.parametrize("current_ma", [1.001 * RHEOBASE, 2.0 * RHEOBASE, 1e-5, 1e-3])
@@ -46,8 +46,8 @@ def test_a_knot_in_the_middle_of_a_straight_line_changes_nothing():
     rng = np.random.default_rng(0)
     times = np.concatenate([[0.0], np.sort(rng.uniform(0.0, 200.0, 500)), [200.0]])
     line = 1e-6 + 2e-8 * times
-    plain = NEURON.spikes(CurrentTraces(times[[0, -1]], line[[0, -1], np.newaxis]))
-    cut = NEURON.spikes(CurrentTraces(times, line[:, np.newaxis]))
+    plain = NEURON.spikes(Traces(times[[0, -1]], line[[0, -1], np.newaxis], quantity="current"))
+    cut = NEURON.spikes(Traces(times, line[:, np.newaxis], quantity="current"))
     assert len(plain[0]) > 5
     assert_allclose(cut.times_ms, plain.times_ms, rtol=1e-11)
 
@@ -58,7 +58,7 @@ def test_first_spike_of_a_current_ramp_solves_its_closed_form():
     def potential(t):
         return TAU * slope / CAPACITANCE * (t - TAU * -math.expm1(-t / TAU))
 
-    spikes = NEURON.spikes(CurrentTraces([0.0, 200.0], [[0.0], [200.0 * slope]]))[0]
+    spikes = NEURON.spikes(Traces([0.0, 200.0], [[0.0], [200.0 * slope]], quantity="current"))[0]
     assert_allclose(spikes[0], brentq(lambda t: potential(t) - THRESHOLD, 1.0, 200.0, xtol=1e-13), rtol=1e-12)
 
 
@@ -73,7 +73,7 @@ def test_a_threshold_reached_only_between_two_knots_is_found():
     first, slope = 2e-6, -1.5e-8
     top, height = peak_of_falling_current(first, slope)
     end = 400.0
-    current = CurrentTraces([0.0, end], [[first], [first + slope * end]])
+    current = Traces([0.0, end], [[first], [first + slope * end]], quantity="current")
     assert 0.0 < top < end
     touching = LeakyIntegrateAndFire(TAU, CAPACITANCE, height * (1.0 - 1e-9), REFRACTORY).spikes(current)[0]
     missing = LeakyIntegrateAndFire(TAU, CAPACITANCE, height * (1.0 + 1e-9), REFRACTORY).spikes(current)[0]
@@ -85,7 +85,9 @@ def test_a_threshold_reached_only_between_two_knots_is_found():
 
 
 def test_negative_current_pulls_the_potential_below_zero_and_delays_the_spike():
-    current = CurrentTraces([0.0, 0.0, 30.0, 30.0, 200.0], 1e-6 * np.array([[0.0, -1.0, -1.0, 2.0, 2.0]]).T)
+    current = Traces(
+        [0.0, 0.0, 30.0, 30.0, 200.0], 1e-6 * np.array([[0.0, -1.0, -1.0, 2.0, 2.0]]).T, quantity="current"
+    )
     below = -1e-6 * TAU / CAPACITANCE * -math.expm1(-30.0 / TAU)
     target = 2e-6 * TAU / CAPACITANCE
     expected = 30.0 + TAU * math.log((target - below) / (target - THRESHOLD))
@@ -95,7 +97,7 @@ def test_negative_current_pulls_the_potential_below_zero_and_delays_the_spike():
 def test_no_spike_falls_into_the_refractory_period_even_across_knots():
     resting = LeakyIntegrateAndFire(TAU, CAPACITANCE, THRESHOLD, 7.0)
     times = np.linspace(0.0, 100.0, 201)
-    spikes = resting.spikes(CurrentTraces(times, np.full((201, 1), 1e-3)))[0]
+    spikes = resting.spikes(Traces(times, np.full((201, 1), 1e-3), quantity="current"))[0]
     charging = -TAU * math.log1p(-THRESHOLD * CAPACITANCE / (1e-3 * TAU))
     assert_allclose(np.diff(spikes), 7.0 + charging, rtol=1e-11)
 
@@ -103,20 +105,22 @@ def test_no_spike_falls_into_the_refractory_period_even_across_knots():
 def test_time_may_be_shifted_and_capacitance_and_threshold_only_scale_the_current():
     times = np.array([0.0, 20.0, 60.0, 60.0, 300.0])
     current = np.array([[0.0], [6e-6], [4e-6], [1.5e-6], [1e-6]])
-    here = NEURON.spikes(CurrentTraces(times, current)).times_ms
-    there = NEURON.spikes(CurrentTraces(times + 128.0, current)).times_ms
+    here = NEURON.spikes(Traces(times, current, quantity="current")).times_ms
+    there = NEURON.spikes(Traces(times + 128.0, current, quantity="current")).times_ms
     assert here.size > 5
     assert_allclose(there - 128.0, here, rtol=0.0, atol=1e-9)
     scaled = LeakyIntegrateAndFire(TAU, 2.0 * CAPACITANCE, 3.0 * THRESHOLD, REFRACTORY)
-    assert_allclose(scaled.spikes(CurrentTraces(times, 6.0 * current)).times_ms, here, rtol=1e-11)
-    jump = NEURON.spikes(CurrentTraces([0.0, 40.0, 40.0, 100.0], [[0.0], [0.0], [5e-6], [5e-6]]))
+    assert_allclose(
+        scaled.spikes(Traces(times, 6.0 * current, quantity="current")).times_ms, here, rtol=1e-11
+    )
+    jump = NEURON.spikes(Traces([0.0, 40.0, 40.0, 100.0], [[0.0], [0.0], [5e-6], [5e-6]], quantity="current"))
     assert_allclose(jump.times_ms, 40.0 + NEURON.spikes(constant(5e-6, 60.0)).times_ms, rtol=1e-13)
 
 
 def bumpy_current(n_sites=4):
     rng = np.random.default_rng(7)
     times = np.sort(np.concatenate([[0.0, 50.0, 50.0, 300.0], rng.uniform(0.0, 300.0, 40)]))
-    return CurrentTraces(times, rng.uniform(-1e-6, 6e-6, (times.size, n_sites)))
+    return Traces(times, rng.uniform(-1e-6, 6e-6, (times.size, n_sites)), quantity="current")
 
 
 def test_runge_kutta_approaches_the_exact_spikes_as_its_step_shrinks():
@@ -177,7 +181,7 @@ def slow_reference(times, current, neuron, samples=4000):
 def test_random_currents_match_the_slow_reference(current, tau, spacing):
     neuron = LeakyIntegrateAndFire(tau, 1e-6, 50.0, 1.0)
     times = spacing * np.arange(len(current))
-    fast = neuron.spikes(CurrentTraces(times, np.array(current)[:, np.newaxis]))[0]
+    fast = neuron.spikes(Traces(times, np.array(current)[:, np.newaxis], quantity="current"))[0]
     slow = slow_reference(times, current, neuron)
     # A maximum that only grazes the threshold may be missed by the samples; everything before must agree.
     shared = min(len(slow), fast.size)
@@ -195,7 +199,7 @@ def test_many_neurons_fire_as_each_does_alone_on_any_number_of_threads(monkeypat
     assert_array_equal(one.times_ms, several.times_ms)
     assert_array_equal(one.offsets, several.offsets)
     for neuron in (0, BLOCK - 1, BLOCK, 2 * BLOCK + 2):
-        alone = NEURON.spikes(CurrentTraces(current.times_ms, current.current_ma[:, [neuron]]))
+        alone = NEURON.spikes(Traces(current.times_ms, current.values[:, [neuron]], quantity="current"))
         assert_array_equal(alone.times_ms, one[neuron])
 
 
@@ -205,7 +209,7 @@ def test_neurons_side_by_side_match_the_slow_reference_each():
     shapes = np.random.default_rng(3).uniform(-0.2, 1.0, (times.size, 24))
     current = shapes * np.geomspace(0.8 * RHEOBASE, 60.0 * RHEOBASE, 24)
     neuron = LeakyIntegrateAndFire(TAU, CAPACITANCE, THRESHOLD, 2.0)
-    trains = neuron.spikes(CurrentTraces(times, current))
+    trains = neuron.spikes(Traces(times, current, quantity="current"))
     counts = np.diff(trains.offsets)
     assert (counts == 0).any()
     assert counts.max() >= 100
@@ -248,7 +252,7 @@ def test_a_guess_called_exact_is_exact_and_one_step_makes_most_guesses_so():
 def test_spike_times_are_exact_to_the_round_off_of_the_potential():
     """Against the crossing of the closed form itself, bisected with fifty digits."""
     first, slope = 2e-6, 3e-9
-    spike = NEURON.spikes(CurrentTraces([0.0, 200.0], [[first], [first + 200.0 * slope]]))[0][0]
+    spike = NEURON.spikes(Traces([0.0, 200.0], [[first], [first + 200.0 * slope]], quantity="current"))[0][0]
     with localcontext(prec=50):
         tau, capacitance, threshold = Decimal(TAU), Decimal(CAPACITANCE), Decimal(THRESHOLD)
         m = (Decimal(first + 200.0 * slope) - Decimal(first)) / 200
@@ -266,7 +270,7 @@ def test_spike_times_are_exact_to_the_round_off_of_the_potential():
 
 def test_a_thousand_afferents_take_a_fraction_of_a_second():
     times = np.linspace(0.0, 1000.0, 400)
-    current = CurrentTraces(times, np.linspace(0.5e-6, 4e-6, 1000) * np.ones((400, 1)))
+    current = Traces(times, np.linspace(0.5e-6, 4e-6, 1000) * np.ones((400, 1)), quantity="current")
     assert NEURON.spikes(current).times_ms.size > 20_000
     assert min(timeit.repeat(lambda: NEURON.spikes(current), number=1, repeat=3)) < 0.5
 

@@ -96,9 +96,7 @@ def test_a_shifted_tangent_leads_to_the_same_equilibrium(monkeypatch):
     found = _Search.found
     monkeypatch.setattr("fingerpad.mechanics.newton.MOST_STRAIGHT", 0)
     monkeypatch.setattr(
-        _Search,
-        "found",
-        lambda search, *how: shifted.append(search.was_shifted) or found(search, *how),
+        _Search, "found", lambda search, *how: shifted.append(search.was_shifted) or found(search, *how)
     )
     done = pressed(block(), Bar(1.7, 0.1), NewtonSettings(persistent=True), ramp_steps=steps)
     assert any(shifted)
@@ -147,15 +145,7 @@ def test_a_search_about_a_small_body_may_take_more_newton_steps(monkeypatch):
     mesh, few = block(), NewtonSettings(most_iterations=5)
     placement = place(BALL, mesh.nodes_mm[mesh.skin_nodes], np.zeros(3), np.eye(3))
     small_body = partial(
-        press,
-        mesh,
-        RELAXING,
-        BALL,
-        placement,
-        MOTION,
-        PressSettings(1, 1, few),
-        friction=0.5,
-        finest_mm=0.08,
+        press, mesh, RELAXING, BALL, placement, MOTION, PressSettings(1, 1, few), friction=0.5, finest_mm=0.08
     )
     assert small_body().force_mn[-1] > 0.0
     monkeypatch.setattr("fingerpad.mechanics.press_settings.MORE_NEWTON_STEPS", 1)

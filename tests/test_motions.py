@@ -196,8 +196,7 @@ def test_a_hold_that_drifts_is_solved_in_growing_steps():
 
 def test_a_file_is_read_with_its_units_from_its_first_row(tmp_path):
     path = written(
-        tmp_path,
-        "# robot\nx_mm,time_s,depth_um,tilt_deg\n7,3.0,-100,1\n7,3.1,900,1\n9.5,3.6,900,6\n",
+        tmp_path, "# robot\nx_mm,time_s,depth_um,tilt_deg\n7,3.0,-100,1\n7,3.1,900,1\n9.5,3.6,900,6\n"
     )
     motion = read_trajectory(path, phases=[Phase("all", 0.0, 600.0)])
     np.testing.assert_allclose(motion.times_ms, (0.0, 100.0, 600.0))

@@ -91,12 +91,12 @@ def test_our_own_finger_comes_back_with_its_numbers(sent, name):
     np.testing.assert_allclose(np.sort(read.sed_kpa), np.sort(skin.sed_kpa), rtol=1e-3, atol=1e-5)
     # The same elements, interpolated otherwise: by a cubic spline on the grid there.
     sites = [[17.37, 0.0], [18.0, 0.5], [16.5, -0.5], [17.37, 1.0]]
-    np.testing.assert_allclose(read.sed(sites).sed_kpa, skin.sed(sites).sed_kpa, rtol=0.03, atol=2e-3)
+    np.testing.assert_allclose(read.sed(sites).values, skin.sed(sites).values, rtol=0.03, atol=2e-3)
     for quantity in SURFACE_QUANTITIES:
         values = skin.sample(quantity, sites)
         np.testing.assert_allclose(read.sample(quantity, sites), values, atol=0.06 * values.max())
     on_skin = Fingertip().skin_point(*np.transpose(sites))
-    np.testing.assert_allclose(read.sed(on_skin).sed_kpa, skin.sed(on_skin).sed_kpa, rtol=0.03, atol=2e-3)
+    np.testing.assert_allclose(read.sed(on_skin).values, skin.sed(on_skin).values, rtol=0.03, atol=2e-3)
 
 
 def test_a_finger_of_gmsh_is_a_finger(made, parts):
@@ -140,7 +140,7 @@ def test_the_finger_of_gmsh_yields_as_ours_of_the_same_shape(tmp_path):
     here = touch_of(own, BALL, MOTION, at_mm=place, settings=STEPS).solve()
     there = touch_of(ours, BALL, MOTION, at_mm=place, settings=STEPS, grading=grading).solve()
     assert here.force_mn[-1] == pytest.approx(there.force_mn[-1], rel=0.005)
-    assert here.sed([place]).sed_kpa[-1] == pytest.approx(there.sed([place]).sed_kpa[-1], rel=0.015)
+    assert here.sed([place]).values[-1] == pytest.approx(there.sed([place]).values[-1], rel=0.015)
 
 
 def test_older_files_units_and_axes_give_the_same_finger(made, parts, tmp_path):
@@ -165,7 +165,7 @@ def test_a_whole_finger_of_gmsh_gives_the_force_of_the_half(tmp_path):
     one, both = (touch_of(own, BALL, MOTION, at_mm=place, settings=STEPS).solve() for own in (half, whole))
     np.testing.assert_allclose(both.force_mn, one.force_mn, rtol=1e-4, atol=1e-9)
     sites = [[10.0, 0.0], [11.0, 1.0], [10.0, -2.0]]
-    np.testing.assert_allclose(both.sed(sites).sed_kpa, one.sed(sites).sed_kpa, rtol=1e-3, atol=1e-6)
+    np.testing.assert_allclose(both.sed(sites).values, one.sed(sites).values, rtol=1e-3, atol=1e-6)
     # A body of revolution yields alike on every side.
     turned = touch_of(finger_from(mirrored(parts), axes="x z -y"), BALL, MOTION, at_mm=place, settings=STEPS)
     np.testing.assert_allclose(turned.solve().force_mn, both.force_mn, rtol=1e-4, atol=1e-9)

@@ -75,7 +75,7 @@ HEAVY = (
     [
         ("import fingerpad; fingerpad.InputError, fingerpad.__version__, dir(fingerpad)", set()),
         ("import fingerpad.cli", {"typer"}),
-        ("from fingerpad import Fingertip, SedTraces", {"numpy", "scipy"}),
+        ("from fingerpad import Fingertip, Traces", {"numpy", "scipy"}),
     ],
     ids=["package", "command line", "values"],
 )

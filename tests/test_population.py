@@ -8,7 +8,7 @@ from scipy.stats import kstest
 from fingerpad.core.errors import InputError, TissuesWarning
 from fingerpad.core.patterns import jittered
 from fingerpad.core.regions import Ellipse
-from fingerpad.core.signals import SedTraces
+from fingerpad.core.signals import Traces
 from fingerpad.neuron.afferent import Afferent
 from fingerpad.neuron.end_organs import EndOrgans
 from fingerpad.neuron.mixed_population import MixedPopulation
@@ -25,7 +25,7 @@ class Bump:
     def sed(self, sites):
         squared = np.square(np.asarray(sites) - self.centre).sum(axis=1)
         peaks = self.peak_kpa * np.exp(-squared / self.width_mm**2)
-        return SedTraces([0.0, 50.0, 1000.0], np.outer([0.0, 1.0, 0.9], peaks), kinks_ms=[50.0])
+        return Traces([0.0, 50.0, 1000.0], np.outer([0.0, 1.0, 0.9], peaks), kinks_ms=[50.0])
 
 
 def test_the_papers_population_is_3_by_6_at_1_mm_and_any_lattice_is_symmetric_at_its_density():
@@ -92,7 +92,7 @@ def test_a_mirrored_touch_gives_a_mirrored_map():
 
 class OneTrace:
     def sed(self, sites):
-        return SedTraces([0.0, 1.0], [[0.0], [1.0]])
+        return Traces([0.0, 1.0], [[0.0], [1.0]])
 
 
 @pytest.mark.parametrize(
@@ -123,12 +123,13 @@ class BumpWithStress(Bump):
 
     def sed(self, sites, dynamic_quantity="stored", static_quantity="stored"):
         traces = super().sed(sites)
-        values = {"stored": traces.sed_kpa, "compressive_stress": np.sqrt(traces.sed_kpa)}
-        dynamic_kpa = None if dynamic_quantity == static_quantity else values[dynamic_quantity]
-        return SedTraces(
-            traces.times_ms, values[static_quantity], traces.kinks_ms, dynamic_kpa, dynamic_quantity,
-            static_quantity,
-        )  # fmt: skip
+        values = {"stored": traces.values, "compressive_stress": np.sqrt(traces.values)}
+        followed = {
+            name: Traces(traces.times_ms, values[name], traces.kinks_ms, quantity=name)
+            for name in (dynamic_quantity, static_quantity)
+        }
+        dynamic = None if dynamic_quantity == static_quantity else followed[dynamic_quantity]
+        return replace(followed[static_quantity], dynamic=dynamic)
 
 
 def test_the_default_afferent_warns_of_other_tissues_and_their_own_does_not():

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from fingerpad.core.errors import InputError
 from fingerpad.core.phases import Phase, phase_named
-from fingerpad.core.signals import SedTraces
+from fingerpad.core.signals import Traces
 from fingerpad.data import protocol
 from fingerpad.experiments.discrimination.analysis import PreparedTask
 from fingerpad.experiments.discrimination.task_stimuli import parse_task, task_population, task_stimuli
@@ -24,7 +24,7 @@ from sections import SED_DRIVEN
 
 def traces(ramp_ms, end_ms=1150.0):
     """Energy density that grows linearly in the ramp and stays."""
-    return SedTraces([0.0, ramp_ms, end_ms], [[0.0], [2.0], [2.0]], [ramp_ms])
+    return Traces([0.0, ramp_ms, end_ms], [[0.0], [2.0], [2.0]], [ramp_ms])
 
 
 def test_windows_of_the_papers_motion_are_the_papers_to_the_bit():
@@ -69,13 +69,13 @@ def test_a_slow_ramp_is_not_read_in_the_papers_window_and_a_population_follows_i
 
 
 def test_without_phases_windows_must_be_given():
-    unnamed = SedTraces([0.0, 50.0, 100.0, 1000.0], [[0.0], [2.0], [1.0], [1.0]], [50.0, 100.0])
+    unnamed = Traces([0.0, 50.0, 100.0, 1000.0], [[0.0], [2.0], [1.0], [1.0]], [50.0, 100.0])
     with pytest.raises(InputError, match="dynamic_window_ms must be given where no phase is called 'ramp'"):
         SED_DRIVEN.rates(unnamed)
     with pytest.raises(InputError, match="static_window_ms must be given where no phase is called 'hold'"):
         SED_DRIVEN.rates(unnamed, dynamic_window_ms=(30.0, 50.0))
     assert SED_DRIVEN.rates(unnamed, *PAPER_WINDOWS_MS)[1] > 0.0
-    course = SedTraces([0.0, 9.0], [[0.0], [2.0]], phases=(Phase("press", 0.0, 9.0),))
+    course = Traces([0.0, 9.0], [[0.0], [2.0]], phases=(Phase("press", 0.0, 9.0),))
     with pytest.raises(InputError, match="the phases are press"):
         SED_DRIVEN.rates(course)
 
@@ -103,11 +103,11 @@ def test_each_stimulus_of_a_task_has_its_own_windows():
             self.phases, self.end_ms = motion.phases, motion.end_ms
             self.asked = []
 
-        def sed(self, sites, *quantities):
+        def sed(self, sites, quantity, _):
             ones = np.ones((3, len(sites)))
             times, kinks = [0.0, self.phases[0].end_ms, self.end_ms], [self.phases[0].end_ms]
             height = 50.0 * ones * np.array([[0.0], [1.0], [1.0]])
-            return SedTraces(times, height, kinks, None, *quantities)
+            return Traces(times, height, kinks, quantity=quantity)
 
     ready = prepared()
     quick, slow = ready.responses({each.name: Pressed(each.motion) for each in ready.stimuli})

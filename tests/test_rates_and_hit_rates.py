@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from fingerpad.core.errors import InputError
-from fingerpad.core.signals import SedTraces
+from fingerpad.core.signals import Traces
 from fingerpad.inference.fitting.cross_validation import cross_validate
 from fingerpad.inference.identifiable import LARGEST_RESTING_SHARE, identifiable
 from fingerpad.inference.rate_model import AfferentModel, four_number_model
@@ -23,15 +23,15 @@ DRAWS = np.random.default_rng(3).standard_normal((400, 9))
 NOISE = 0.05
 
 
-def traces(heights_kpa) -> SedTraces:
-    return SedTraces(TIMES_MS, np.outer(RAMP, heights_kpa), kinks_ms=[50.0])
+def traces(heights_kpa) -> Traces:
+    return Traces(TIMES_MS, np.outer(RAMP, heights_kpa), kinks_ms=[50.0])
 
 
 BARS = AfferentModel.of_traces(traces(np.linspace(0.6, 3.0, 8)))
 RATES = RateProblem(BARS, RateRecordings(tuple("abcdefgh"), *BARS.evaluate(SIX), "simulated"))
 
 
-def sphere(sharpness: float, aside_mm: float) -> SedTraces:
+def sphere(sharpness: float, aside_mm: float) -> Traces:
     distance = np.hypot(SITES[:, 0] - aside_mm, SITES[:, 1])
     return traces(3.0 * np.exp(-sharpness * distance))
 

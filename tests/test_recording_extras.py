@@ -7,7 +7,7 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from fingerpad.core.errors import InputError
-from fingerpad.core.signals import SedTraces
+from fingerpad.core.signals import Traces
 from fingerpad.experiments.fit import rate_uncertainty
 from fingerpad.experiments.fit.fit import fit_recordings
 from fingerpad.experiments.fit.methods import check_offset, fit_offset
@@ -36,7 +36,7 @@ def felt(offset_mm, times_ms=TIMES_MS):
     """Energy density where a receptor lies: two peaks below the edges of a bar, none below its middle."""
     place = SHIFTS_MM - offset_mm
     height_kpa = 0.8 + 2.0 * np.exp(-(((np.abs(place) - 1.2) / 0.6) ** 2))
-    return SedTraces(times_ms, np.outer(COURSE, height_kpa), kinks_ms=[50.0])
+    return Traces(times_ms, np.outer(COURSE, height_kpa), kinks_ms=[50.0])
 
 
 BESIDE = {offset: felt(offset) for offset in PLACES_MM}
@@ -62,8 +62,8 @@ def test_between_two_places_the_drive_is_linear_and_at_a_place_it_is_that_of_the
         there = AfferentModel.of_traces(felt(offset)).evaluate(KNOWN)
         assert_allclose(TRUTH.at(offset).evaluate(KNOWN), there, rtol=1e-12)
     (between,) = TRUTH.at(0.06).drives
-    ends = [AfferentModel.of_traces(felt(offset)).drives[0].sed_kpa for offset in (0.0, 0.3)]
-    assert_allclose(between.sed_kpa, 0.8 * ends[0] + 0.2 * ends[1], rtol=1e-12)
+    ends = [AfferentModel.of_traces(felt(offset)).drives[0].values for offset in (0.0, 0.3)]
+    assert_allclose(between.values, 0.8 * ends[0] + 0.2 * ends[1], rtol=1e-12)
     assert TRUTH.names[-1] == "offset_mm"
     with pytest.raises(InputError, match=r"offset_mm must lie within -0.3 ... 0.3 mm"):
         TRUTH.at(0.5)

@@ -18,7 +18,7 @@ from fingerpad.cli import options as choices
 from fingerpad.core.compilation import SHORT_NOTICE, SUBJECT
 from fingerpad.core.errors import ConvergenceError, InputError
 from fingerpad.core.random_streams import Presentations
-from fingerpad.core.signals import SedTraces, SpikeTrains
+from fingerpad.core.signals import SpikeTrains, Traces
 from fingerpad.data import bar_firing_rates
 from fingerpad.experiments import runner
 from fingerpad.experiments.afferent_files import fitted_afferent
@@ -61,7 +61,7 @@ def traces(height_kpa, times_ms=TIMES_MS, **more):
     """Energy density that rises with the square of time in 50 ms and relaxes by a third, one column each."""
     ramp = np.minimum(times_ms / 50.0, 1.0) ** 2
     relaxed = 1.0 - 0.3 * (1.0 - np.exp(-np.maximum(times_ms - 50.0, 0.0) / 300.0))
-    return SedTraces(times_ms, np.outer(ramp * relaxed, height_kpa), kinks_ms=[50.0], **more)
+    return Traces(times_ms, np.outer(ramp * relaxed, height_kpa), kinks_ms=[50.0], **more)
 
 
 N = 10
@@ -235,13 +235,14 @@ def test_stimuli_that_move_in_their_own_time_are_answered_each_in_theirs():
 
 
 def test_another_quantity_for_the_dynamic_term_reaches_the_afferent():
-    more = {"dynamic_kpa": 2.0 * SED.sed_kpa, "dynamic_quantity": "work"}
-    doubled = AfferentModel.of_traces([traces(HEIGHT_KPA, **more)])
+    doubled = AfferentModel.of_traces(
+        [replace(SED, dynamic=replace(SED, values=2.0 * SED.values, quantity="work"))]
+    )
     halved = [KNOWN[0], KNOWN[1] / 2.0, *KNOWN[2:]]
     for rates, expected in zip(doubled.evaluate(np.array(halved)), AFFERENT.rates(SED), strict=True):
         np.testing.assert_allclose(rates, expected, rtol=1e-9)
     with pytest.raises(InputError, match="got stored and stored, work and stored"):
-        AfferentModel.of_traces([SED, traces([1.0], dynamic_kpa=SED.sed_kpa[:, :1], dynamic_quantity="work")])
+        AfferentModel.of_traces([SED, replace(SED, dynamic=replace(SED, quantity="work"))])
 
 
 # What it refuses
@@ -341,9 +342,7 @@ class Pressed:
         assert [offset for offset, (_, across) in zip(offsets, sites, strict=True) if across == 0.0].count(
             0.0
         )
-        return replace(
-            traces(self.height(offsets)), dynamic_quantity=dynamic_quantity, static_quantity=static_quantity
-        )
+        return replace(traces(self.height(offsets)), quantity=static_quantity)
 
 
 @pytest.fixture

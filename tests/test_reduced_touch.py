@@ -10,7 +10,7 @@ from scipy.integrate import solve_ivp
 
 import fingerpad as fp
 from fingerpad.cli import main
-from fingerpad.core.signals import SedTraces
+from fingerpad.core.signals import Traces
 from fingerpad.geometry.motion import Pose
 from fingerpad.neuron.mixed_population import types_of_afferents
 from fingerpad.reduction.building import joint_bounds, largest_errors
@@ -331,7 +331,7 @@ def test_a_wire_meets_the_skin_at_its_place() -> None:
 
 OWN = fp.OwnAfferent(
     lambda sed: fp.SpikeTrains.from_lists(
-        [sed.times_ms[1:][np.diff(course) > 0.5] for course in sed.sed_kpa.T]
+        [sed.times_ms[1:][np.diff(course) > 0.5] for course in sed.values.T]
     )
 )
 
@@ -347,7 +347,8 @@ def test_streamed_spikes_are_those_of_one_go(afferent: fp.Afferent) -> None:
     sed = np.vstack([np.zeros(5), np.abs(np.cumsum(random.normal(0.0, 0.4, (400, 5)), axis=0))])
     quantities = afferent.dynamic_quantity, afferent.static_quantity
     other = None if quantities[0] == quantities[1] else sed[:, ::-1]
-    whole = afferent.spikes(SedTraces(times, sed, times[1:-1], other, *quantities))
+    dynamic = None if other is None else Traces(times, other, quantity=quantities[0])
+    whole = afferent.spikes(Traces(times, sed, times[1:-1], quantity=quantities[1], dynamic=dynamic))
     stream = fp.AfferentStream(afferent, 5)
     rows = enumerate(times[1:].tolist(), start=1)
     parts = [stream.step(time, sed[row], None if other is None else other[row]) for row, time in rows]

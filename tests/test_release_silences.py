@@ -41,6 +41,6 @@ def test_its_skin_is_unloaded_then_and_holds_less_and_less_energy(skin):
     released = np.flatnonzero(skin.times_ms >= PAUSES[1][0])
     assert not skin.force_mn[released].any()
     assert not skin.contact_area_mm2[released].any()
-    sed = skin.sed([CONTACT_POINT_MM]).sed_kpa[:, 0]
+    sed = skin.sed([CONTACT_POINT_MM]).values[:, 0]
     assert (np.diff(sed[released]) < 0.0).all()
     assert sed[released[0]] < 0.05 * sed.max()

@@ -29,14 +29,7 @@ from fingerpad.experiments.tissue_sets import tissue_layers
 from fingerpad.geometry.fingertip import Fingertip
 from fingerpad.geometry.grading import resolution_grading
 from fingerpad.geometry.mesh import finger_mesh
-from fingerpad.report import (
-    discrimination,
-    nail,
-    reproduction,
-    single_unit,
-    skin_deflection,
-    three_levels,
-)
+from fingerpad.report import discrimination, nail, reproduction, single_unit, skin_deflection, three_levels
 from fingerpad.report import formatting as words
 from fingerpad.report import mesh_picture as mesh_picture_figure
 from fingerpad.report import page as page_module

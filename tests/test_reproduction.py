@@ -20,9 +20,7 @@ from fingerpad import __version__
 from fingerpad.core.compilation import SHORT_NOTICE, SUBJECT
 from fingerpad.core.results import read_results, to_json
 from fingerpad.data import all_published
-from fingerpad.experiments.conditions import Conditions
 from fingerpad.experiments.discrimination.task_stimuli import read_task, task_touches
-from fingerpad.experiments.gerling2014 import single_unit
 from fingerpad.experiments.gerling2014.claim_row import Group, Verdict
 from fingerpad.experiments.gerling2014.reproduction import Reproduction, ReproductionResult, reproduce
 from fingerpad.experiments.runner import STORE_FOLDER

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from fingerpad.core.signals import SedTraces
+from fingerpad.core.signals import Traces
 from fingerpad.data import bar_firing_rates
 from fingerpad.experiments.fit import rate_uncertainty
 from fingerpad.experiments.gerling2014 import single_unit, single_unit_uncertainty
@@ -21,7 +21,7 @@ SHIFTS = bar_firing_rates().shift_mm
 TIMES = np.array([0.0, 10.0, 20.0, 30.0, 40.0, 50.0, 60.0, 100.0, 200.0, 500.0, 1000.0])
 COURSE = np.where(TIMES <= 50.0, (TIMES / 50.0) ** 2, 0.75 + 0.25 * np.exp(-(TIMES - 50.0) / 150.0))
 PEAKS = 0.05 + 1.5 * np.exp(-(((np.abs(SHIFTS) - 1.6) / 0.5) ** 2)) + 0.4 * (np.abs(SHIFTS) < 1.5)
-SED = SedTraces(TIMES, COURSE[:, None] * PEAKS, [50.0])
+SED = Traces(TIMES, COURSE[:, None] * PEAKS, [50.0])
 TRUTH = SED_DRIVEN.parameters
 
 

@@ -19,7 +19,7 @@ from fingerpad.skin.indentation import touch_of
     [
         # The force on a mesh with elements half as long, 0.05 mm at the rim.
         (FlatPunch(1.0, 0.1), "human", 1.0, 36.9),
-        # The force at standard resolution. With contact at nodes alone the ball went through a facet at 1.13 mm.
+        # The force at standard resolution. With contact at nodes alone the ball pierced a facet at 1.13 mm.
         (Sphere(curvature_per_m=2000.0), "trial1", 2.0, 220.0),
     ],
     ids=["punch of 1 mm", "ball on stiff skin"],

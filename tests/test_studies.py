@@ -8,7 +8,7 @@ import pytest
 
 from fingerpad.core.errors import InputError
 from fingerpad.core.results import from_json, to_json
-from fingerpad.core.signals import SedTraces
+from fingerpad.core.signals import Traces
 from fingerpad.data import bar_firing_rates, cylinder_deflection, neuron
 from fingerpad.experiments.conditions import RECEPTOR_X_MM, Conditions
 from fingerpad.experiments.gerling2014 import (
@@ -241,7 +241,7 @@ def bar_traces(shift_mm):
     peak_kpa = 0.4 + 1.6 * edges + 0.5 * (np.abs(shift_mm) < 1.5) + 0.1 * np.tanh(shift_mm)
     times_ms = np.array([0.0, 10.0, 20.0, 30.0, 40.0, 50.0, 100.0, 300.0, 1000.0])
     course = np.array([0.0, 0.06, 0.2, 0.42, 0.7, 1.0, 0.92, 0.85, 0.8])
-    return SedTraces(times_ms, np.outer(course, peak_kpa), kinks_ms=[50.0])
+    return Traces(times_ms, np.outer(course, peak_kpa), kinks_ms=[50.0])
 
 
 @pytest.fixture(scope="module")
@@ -335,10 +335,10 @@ def test_sed_of_the_receptor_is_one_column_per_touch():
 
         def sed(self, sites):
             assert np.array_equal(sites, [[17.37, 0.0]])
-            return SedTraces([0.0, 50.0, 1000.0], [[0.0], [self.peak_kpa], [1.0]], kinks_ms=[50.0])
+            return Traces([0.0, 50.0, 1000.0], [[0.0], [self.peak_kpa], [1.0]], kinks_ms=[50.0])
 
-    sed = single_unit.receptor_sed([Skin(1.5), Skin(2.5), Skin(3.5)])
-    np.testing.assert_array_equal(sed.sed_kpa, [[0.0, 0.0, 0.0], [1.5, 2.5, 3.5], [1.0, 1.0, 1.0]])
+    sed = single_unit.traces_at_receptor([Skin(1.5), Skin(2.5), Skin(3.5)])
+    np.testing.assert_array_equal(sed.values, [[0.0, 0.0, 0.0], [1.5, 2.5, 3.5], [1.0, 1.0, 1.0]])
     assert sed.kinks_ms.tolist() == [50.0]
 
 
@@ -594,7 +594,7 @@ def _area(x, y):
 
 def test_charges_of_both_terms_and_the_shortest_interval_are_those_of_closed_forms():
     """SED rises by 2 kPa in 50 ms and stays: the terms have charges of 2 k_d and of 50 k_s in the ramp."""
-    sed = SedTraces([0.0, 50.0, 1000.0], [[0.0], [2.0], [2.0]], [50.0])
+    sed = Traces([0.0, 50.0, 1000.0], [[0.0], [2.0], [2.0]], [50.0])
     afferent = Afferent.from_parameters(
         [1e-7, 2e-4, 1e-6, 60.0, 1e-6, 50.0], dynamic_quantity="stored", static_quantity="stored"
     )
@@ -784,10 +784,7 @@ READINGS = ("discrimination", "reasons", "readings")
         (worse(*READINGS, 0, "misfit", 0.061), {BEST}),
         (worse(*READINGS, 0, "misfit", None), {BEST}),
         (worse(*READINGS, 2, "misfit", None), set()),
-        (
-            worse(*STATISTICS, "smallest_rise", "static", 0, "value", -0.0021),
-            {RISES.format("static")},
-        ),
+        (worse(*STATISTICS, "smallest_rise", "static", 0, "value", -0.0021), {RISES.format("static")}),
         (worse(*STATISTICS, "noise_lowers", "smallest_fall", "value", -0.02), {LOWERS}),
         (worse(*STATISTICS, "ten_matrices", "ratio", "value", 0.997), {MATRICES}),
         (worse(*STATISTICS, "criterion", "ratio", "value", 0.9), {WIDER}),

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
-from fingerpad.core.signals import CurrentTraces
+from fingerpad.core.signals import Traces
 from fingerpad.experiments.gerling2014.three_levels import (
     membrane_potential,
     mesh_picture,
@@ -53,7 +53,7 @@ def test_the_potential_meets_the_threshold_at_every_spike_and_nowhere_before(see
     random = np.random.default_rng(seed)
     membrane = LeakyIntegrateAndFire(20.0 + 60.0 * random.random(), 1e-6, 50.0, 1.0)
     knots = np.concatenate([[0.0, 0.0], np.cumsum(random.uniform(1.0, 30.0, 12))])
-    current = CurrentTraces(knots, random.uniform(0.0, 1.2e-5, (knots.size, 1)))
+    current = Traces(knots, random.uniform(0.0, 1.2e-5, (knots.size, 1)), quantity="current")
     spikes = membrane.spikes(current)[0]
     assert spikes.size > 10
     assert_allclose(membrane_potential(membrane, current, spikes, spikes), membrane.threshold_mv, rtol=1e-9)

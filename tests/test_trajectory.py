@@ -154,10 +154,7 @@ def test_solved_times_increase_and_hold_all_samples(steps, ramp_steps, hold_step
         (((0.0, 1.0), (0.0, -1.0)), "would never press"),
         (((0.0, 1.0), (0.0, 1.0), (0.0, 1.0)), "either depth_mm or force_mn"),
         (((0.0, 1.0),), "either depth_mm or force_mn"),
-        (
-            ((0.0, 1.0, 2.0), None, (0.0, -1.0, 1.0)),
-            "force_mn must not be negative: got -1 mN at 1 ms",
-        ),
+        (((0.0, 1.0, 2.0), None, (0.0, -1.0, 1.0)), "force_mn must not be negative: got -1 mN at 1 ms"),
     ],
 )
 def test_impossible_trajectories_are_refused_in_one_sentence(given_values, said):

@@ -1,10 +1,12 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy.interpolate import PchipInterpolator
 
 from fingerpad.core.errors import InputError
-from fingerpad.core.signals import CurrentTraces, SedTraces
+from fingerpad.core.signals import Traces
 from fingerpad.neuron.lif import LeakyIntegrateAndFire
 from fingerpad.neuron.transduction import Drive, Transduction, drive
 
@@ -16,29 +18,29 @@ def ramp_and_hold(peaks_kpa=(1.0, 2.0, 3.0)):
     """SED that accelerates in the ramp and relaxes in the hold, at one site per peak."""
     rise = np.clip(TIMES_MS / RAMP_MS, 0.0, 1.0) ** 1.6
     relaxed = 1.0 - 0.15 * (1.0 - np.exp(-np.maximum(TIMES_MS - RAMP_MS, 0.0) / 120.0))
-    return SedTraces(TIMES_MS, np.outer(rise * relaxed, peaks_kpa), kinks_ms=[RAMP_MS])
+    return Traces(TIMES_MS, np.outer(rise * relaxed, peaks_kpa), kinks_ms=[RAMP_MS])
 
 
 def test_a_straight_ramp_has_its_slope_and_the_rate_jumps_at_a_kink_and_nowhere_else():
-    driven = drive(SedTraces([0.0, 50.0, 1000.0], [[0.0], [2.0], [2.0]], kinks_ms=[50.0]))
+    driven = drive(Traces([0.0, 50.0, 1000.0], [[0.0], [2.0], [2.0]], kinks_ms=[50.0]))
     ramp = (driven.times_ms > 0.0) & (driven.times_ms < 50.0)
-    assert driven.rate_kpa_per_ms[0] == 0.0
-    assert_allclose(driven.rate_kpa_per_ms[ramp], 0.04, rtol=1e-12)
-    assert_allclose(driven.sed_kpa[ramp, 0], 0.04 * driven.times_ms[ramp], rtol=1e-12)
-    assert_array_equal(driven.rate_kpa_per_ms[driven.times_ms > 50.0], 0.0)
+    assert driven.rate_per_ms[0] == 0.0
+    assert_allclose(driven.rate_per_ms[ramp], 0.04, rtol=1e-12)
+    assert_allclose(driven.values[ramp, 0], 0.04 * driven.times_ms[ramp], rtol=1e-12)
+    assert_array_equal(driven.rate_per_ms[driven.times_ms > 50.0], 0.0)
     driven = drive(ramp_and_hold())
     repeated = np.flatnonzero(np.diff(driven.times_ms) == 0.0)
     assert_array_equal(driven.times_ms[repeated], [0.0, RAMP_MS])
-    before, after = driven.rate_kpa_per_ms[repeated[1]], driven.rate_kpa_per_ms[repeated[1] + 1]
+    before, after = driven.rate_per_ms[repeated[1]], driven.rate_per_ms[repeated[1] + 1]
     assert (before > 5.0 * after).all()
-    assert_allclose(driven.sed_kpa[repeated], driven.sed_kpa[repeated + 1], rtol=1e-15)
-    smooth = SedTraces(TIMES_MS, ramp_and_hold().sed_kpa)
+    assert_allclose(driven.values[repeated], driven.values[repeated + 1], rtol=1e-15)
+    smooth = Traces(TIMES_MS, ramp_and_hold().values)
     times = drive(smooth).times_ms
     assert_array_equal(times[:-1][np.diff(times) == 0.0], [0.0])
-    plain = drive(SedTraces([0.0, 10.0], [[0.0], [1.0]]))
-    marked = drive(SedTraces([0.0, 10.0], [[0.0], [1.0]], kinks_ms=[0.0, 10.0]))
+    plain = drive(Traces([0.0, 10.0], [[0.0], [1.0]]))
+    marked = drive(Traces([0.0, 10.0], [[0.0], [1.0]], kinks_ms=[0.0, 10.0]))
     assert_array_equal(plain.times_ms, marked.times_ms)
-    assert_array_equal(plain.rate_kpa_per_ms, marked.rate_kpa_per_ms)
+    assert_array_equal(plain.rate_per_ms, marked.rate_per_ms)
 
 
 def test_given_times_keep_their_energy_and_between_them_it_stays_between_their_values():
@@ -46,22 +48,22 @@ def test_given_times_keep_their_energy_and_between_them_it_stays_between_their_v
     driven = drive(sed)
     assert np.isin(sed.times_ms, driven.times_ms).all()
     knots = np.searchsorted(driven.times_ms, sed.times_ms)
-    assert_allclose(driven.sed_kpa[knots], sed.sed_kpa, rtol=1e-14)
+    assert_allclose(driven.values[knots], sed.values, rtol=1e-14)
     rng = np.random.default_rng(3)
-    sed = SedTraces(np.arange(12.0), rng.uniform(0.0, 3.0, (12, 20)))
+    sed = Traces(np.arange(12.0), rng.uniform(0.0, 3.0, (12, 20)))
     driven = drive(sed, shortest_piece_ms=0.01)
     interval = np.clip(np.searchsorted(sed.times_ms, driven.times_ms, side="right") - 1, 0, 10)
-    low = np.minimum(sed.sed_kpa[interval], sed.sed_kpa[interval + 1])
-    high = np.maximum(sed.sed_kpa[interval], sed.sed_kpa[interval + 1])
-    assert (driven.sed_kpa >= low - 1e-12).all()
-    assert (driven.sed_kpa <= high + 1e-12).all()
+    low = np.minimum(sed.values[interval], sed.values[interval + 1])
+    high = np.maximum(sed.values[interval], sed.values[interval + 1])
+    assert (driven.values >= low - 1e-12).all()
+    assert (driven.values <= high + 1e-12).all()
 
 
 def test_the_rate_is_absolute_and_its_integral_the_path_that_energy_travels():
-    sed = SedTraces([0.0, 10.0, 20.0], [[1.0], [3.0], [0.5]], kinks_ms=[10.0])
+    sed = Traces([0.0, 10.0, 20.0], [[1.0], [3.0], [0.5]], kinks_ms=[10.0])
     driven = drive(sed)
-    assert (driven.rate_kpa_per_ms >= 0.0).all()
-    travelled = np.trapezoid(driven.rate_kpa_per_ms[:, 0], driven.times_ms)
+    assert (driven.rate_per_ms >= 0.0).all()
+    travelled = np.trapezoid(driven.rate_per_ms[:, 0], driven.times_ms)
     assert_allclose(travelled, 2.0 + 2.5, rtol=1e-12)
 
 
@@ -73,19 +75,19 @@ def test_the_printed_difference_approaches_the_derivative_at_first_order(step_ms
     calm = ~np.isin(exact.times_ms, [0.0, RAMP_MS])
     shared = np.searchsorted(printed.times_ms, exact.times_ms[calm])
     assert_array_equal(printed.times_ms[shared], exact.times_ms[calm])
-    difference = np.abs(printed.rate_kpa_per_ms[shared] - exact.rate_kpa_per_ms[calm]).max()
+    difference = np.abs(printed.rate_per_ms[shared] - exact.rate_per_ms[calm]).max()
     largest_curvature = 3.0 * 1.6 * 0.6 * 8**0.4 / RAMP_MS**2  # of the steepest site, in the second interval
     assert 0.05 * step_ms * largest_curvature < difference < 2.0 * step_ms * largest_curvature
 
 
 def test_the_printed_difference_is_the_formula_of_the_paper_read_literally():
-    sed = SedTraces([0.0, 50.0, 100.0], [[0.0], [2.0], [2.0]], kinks_ms=[50.0])
+    sed = Traces([0.0, 50.0, 100.0], [[0.0], [2.0], [2.0]], kinks_ms=[50.0])
     step = 0.5
     printed = drive(sed, difference_step_ms=step)
-    energy = np.interp(printed.times_ms, sed.times_ms, sed.sed_kpa[:, 0])
-    earlier = np.interp(np.maximum(printed.times_ms - step, 0.0), sed.times_ms, sed.sed_kpa[:, 0])
-    assert_allclose(printed.rate_kpa_per_ms[:, 0], np.abs(energy - earlier) / step, atol=1e-13)
-    assert printed.rate_kpa_per_ms[0] == 0.0
+    energy = np.interp(printed.times_ms, sed.times_ms, sed.values[:, 0])
+    earlier = np.interp(np.maximum(printed.times_ms - step, 0.0), sed.times_ms, sed.values[:, 0])
+    assert_allclose(printed.rate_per_ms[:, 0], np.abs(energy - earlier) / step, atol=1e-13)
+    assert printed.rate_per_ms[0] == 0.0
     assert 50.5 in printed.times_ms
 
 
@@ -113,29 +115,27 @@ def test_twice_as_many_pieces_move_no_spike_by_more_than_the_documented_bound():
 def test_current_is_the_linear_combination_of_equation_1_of_traces_or_their_drive():
     driven = Drive([0.0, 1.0], [[2.0], [4.0]], [[0.0], [3.0]])
     current = Transduction(0.5, 10.0, 0.25).current(driven)
-    assert_array_equal(current.current_ma, [[1.0], [0.5 + 30.0 + 1.0]])
+    assert_array_equal(current.values, [[1.0], [0.5 + 30.0 + 1.0]])
     assert_array_equal(current.times_ms, driven.times_ms)
     sed, gains = ramp_and_hold(), Transduction(1e-7, 2e-4, 1e-6)
-    assert_array_equal(gains.current(sed).current_ma, gains.current(drive(sed)).current_ma)
+    assert_array_equal(gains.current(sed).values, gains.current(drive(sed)).values)
+
+
+ONE = Traces([0.0, 1.0], [[0.0], [1.0]])
 
 
 @pytest.mark.parametrize(
     ("wrong", "message"),
     [
-        (lambda: SedTraces([0.0, 1.0], [[0.0], [1.0]], kinks_ms=[0.5]), "kinks_ms must be among times_ms"),
-        (lambda: SedTraces([0.0, 1.0], [[0.0], [1.0]], kinks_ms=[1.0, 0.0]), "kinks_ms must increase"),
-        (lambda: SedTraces([0.0, 1.0], [[0.0], [1.0]], dynamic_kpa=[[0.0], [1.0]]),
-         "dynamic_kpa is needed if dynamic_quantity is not static_quantity.*'stored' with it"),
-        (lambda: SedTraces([0.0, 1.0], [[0.0], [1.0]], dynamic_quantity="work"),
-         "dynamic_kpa is needed .* got 'work' and 'stored' without it"),
-        (lambda: SedTraces([0.0, 1.0], [[0.0], [1.0]], (), [[0.0, 1.0], [1.0, 1.0]], "work"),
-         "dynamic_kpa must match sed_kpa"),
-        (lambda: SedTraces([0.0, 1.0], [[0.0], [1.0]], (), [[0.0], [-1.0]], "work"),
-         "dynamic_kpa .* must not be negative"),
-        (lambda: SedTraces([0.0, 50.0], [[np.inf, 1.0], [-np.inf, 1.0]]),
+        (lambda: Traces([0.0, 1.0], [[0.0], [1.0]], kinks_ms=[0.5]), "kinks_ms must be among times_ms"),
+        (lambda: Traces([0.0, 1.0], [[0.0], [1.0]], kinks_ms=[1.0, 0.0]), "kinks_ms must increase"),
+        (lambda: replace(ONE, dynamic=ONE), "dynamic must follow another quantity"),
+        (lambda: replace(ONE, dynamic=Traces([0.0, 1.0], np.ones((2, 2)), quantity="work")), "dynamic must"),
+        (lambda: Traces([0.0, 1.0], [[0.0], [-1.0]], quantity="work"), "must not be negative"),
+        (lambda: Traces([0.0, 50.0], [[np.inf, 1.0], [-np.inf, 1.0]]),
          "finite numbers only: 2 are not, first in row and column 1, 1"),
-        (lambda: CurrentTraces([0.0, 0.0, 0.0], np.zeros((3, 1))), "nor repeat more than once"),
-        (lambda: CurrentTraces([0.0, 2.0, 1.0], np.zeros((3, 1))), "must not decrease"),
+        (lambda: Traces([0.0, 0.0, 0.0], np.zeros((3, 1)), quantity="current"), "nor repeat more than once"),
+        (lambda: Traces([0.0, 2.0, 1.0], np.zeros((3, 1)), quantity="current"), "must not decrease"),
         (lambda: Drive([0.0, 1.0], np.zeros((2, 1)), np.zeros((2, 2))), "Drive needs one row"),
         (lambda: Transduction(np.nan, 0.0, 0.0), "intercept_ma must be a finite number"),
         (lambda: drive(ramp_and_hold(), pieces=0), "pieces must be a whole number"),
@@ -152,73 +152,83 @@ def test_the_fast_evaluation_is_that_of_the_interpolants_themselves():
     """SciPy evaluates value and derivative one after the other; the kernel writes both at once."""
     rng = np.random.default_rng(11)
     times = np.array([0.0, 3.0, 20.0, 50.0, 51.0, 90.0, 400.0])
-    sed = SedTraces(times, rng.uniform(0.0, 4.0, (7, 5)), kinks_ms=[50.0])
+    sed = Traces(times, rng.uniform(0.0, 4.0, (7, 5)), kinks_ms=[50.0])
     fast = drive(sed)
     for first, last in ((0, 3), (3, 6)):
-        plain = PchipInterpolator(times[first : last + 1], sed.sed_kpa[first : last + 1], axis=0)
+        plain = PchipInterpolator(times[first : last + 1], sed.values[first : last + 1], axis=0)
         # The first knot of all is repeated, before and after the onset; the kink ends one phase, begins one.
         at = np.flatnonzero((fast.times_ms >= times[first]) & (fast.times_ms <= times[last]))
         at = at[1:-1] if first == 0 else at[1:]
-        assert_allclose(fast.sed_kpa[at], plain(fast.times_ms[at]), rtol=1e-14)
-        assert_allclose(fast.rate_kpa_per_ms[at], abs(plain(fast.times_ms[at], nu=1)), rtol=1e-13, atol=1e-17)
+        assert_allclose(fast.values[at], plain(fast.times_ms[at]), rtol=1e-14)
+        assert_allclose(fast.rate_per_ms[at], abs(plain(fast.times_ms[at], nu=1)), rtol=1e-13, atol=1e-17)
     assert (fast.times_ms == 50.0).sum() == 2
 
 
 def test_traces_share_the_memory_of_checked_values_only():
     given = np.array([[0.0, 0.0], [1.0, 2.0]])
-    sed = SedTraces([0.0, 50.0], given)
+    sed = Traces([0.0, 50.0], given)
     given[1] = 9.0
-    assert sed.sed_kpa[1].tolist() == [1.0, 2.0]
-    assert np.shares_memory(sed.part(slice(1, 2)).sed_kpa, sed.sed_kpa)
+    assert sed.values[1].tolist() == [1.0, 2.0]
+    assert np.shares_memory(sed.part(slice(1, 2)).values, sed.values)
     frozen = given[:, :1]
     frozen.setflags(write=False)
-    held = SedTraces([0.0, 50.0], frozen)
+    held = Traces([0.0, 50.0], frozen)
     given[1] = 7.0
-    assert held.sed_kpa[1, 0] == 9.0
+    assert held.values[1, 0] == 9.0
     huge = np.full((2, 2), 1e308)
-    assert_array_equal(SedTraces([0.0, 50.0], huge).sed_kpa, huge)
+    assert_array_equal(Traces([0.0, 50.0], huge).values, huge)
 
 
 def test_a_part_of_traces_or_of_their_drive_is_that_of_its_sites():
     energy = ramp_and_hold()
-    both = SedTraces(TIMES_MS, energy.sed_kpa, [RAMP_MS], energy.sed_kpa[:, ::-1] ** 2, "von_mises")
+    both = Traces(
+        TIMES_MS,
+        energy.values,
+        [RAMP_MS],
+        dynamic=Traces(TIMES_MS, energy.values[:, ::-1] ** 2, quantity="von_mises"),
+    )
     for sed in (energy, both):
-        assert_array_equal(sed.part(slice(1, 3)).sed_kpa, sed.sed_kpa[:, 1:])
+        assert_array_equal(sed.part(slice(1, 3)).values, sed.values[:, 1:])
         assert_array_equal(sed.part(slice(1, 3)).kinks_ms, sed.kinks_ms)
         part, whole = drive(sed).part(slice(0, 2)), drive(sed.part(slice(0, 2)))
-        assert_array_equal(part.rate_kpa_per_ms, whole.rate_kpa_per_ms)
-        assert_array_equal(part.rate_kpa_per_ms, drive(sed).rate_kpa_per_ms[:, :2])
-        assert_array_equal(part.sed_kpa, whole.sed_kpa)
+        assert_array_equal(part.rate_per_ms, whole.rate_per_ms)
+        assert_array_equal(part.rate_per_ms, drive(sed).rate_per_ms[:, :2])
+        assert_array_equal(part.values, whole.values)
         assert part.dynamic_quantity == whole.dynamic_quantity == sed.dynamic_quantity
         assert part.n_sites == 2
 
 
 def test_the_dynamic_term_follows_what_the_traces_bring_and_the_static_term_energy():
-    energy, stress = ramp_and_hold(), SedTraces(TIMES_MS, np.sqrt(ramp_and_hold().sed_kpa), [RAMP_MS])
-    both = SedTraces(TIMES_MS, energy.sed_kpa, [RAMP_MS], stress.sed_kpa, "compressive_stress")
+    energy, stress = ramp_and_hold(), Traces(TIMES_MS, np.sqrt(ramp_and_hold().values), [RAMP_MS])
+    both = Traces(
+        TIMES_MS,
+        energy.values,
+        [RAMP_MS],
+        dynamic=Traces(TIMES_MS, stress.values, quantity="compressive_stress"),
+    )
     for options in ({}, {"difference_step_ms": 0.001}, {"pieces": 4}):
         driven = drive(both, **options)
-        assert_array_equal(driven.sed_kpa, drive(energy, **options).sed_kpa)
-        assert_array_equal(driven.rate_kpa_per_ms, drive(stress, **options).rate_kpa_per_ms)
+        assert_array_equal(driven.values, drive(energy, **options).values)
+        assert_array_equal(driven.rate_per_ms, drive(stress, **options).rate_per_ms)
         assert driven.dynamic_quantity == "compressive_stress"
 
 
 def test_a_dynamic_term_that_follows_energy_under_another_name_is_the_papers_to_the_last_bit():
     energy = ramp_and_hold()
-    renamed = SedTraces(TIMES_MS, energy.sed_kpa, [RAMP_MS], energy.sed_kpa, "work")
+    renamed = Traces(
+        TIMES_MS, energy.values, [RAMP_MS], dynamic=Traces(TIMES_MS, energy.values, quantity="work")
+    )
     gains = Transduction(1e-7, 1e-4, 6e-7)
-    assert_array_equal(gains.current(renamed).current_ma, gains.current(energy).current_ma)
+    assert_array_equal(gains.current(renamed).values, gains.current(energy).values)
     assert drive(energy).dynamic_quantity == drive(energy).static_quantity == "stored"
 
 
 @pytest.mark.parametrize("options", [{}, {"difference_step_ms": 0.001}])
 def test_both_terms_may_follow_one_other_quantity(options):
     energy = ramp_and_hold()
-    stress = SedTraces(
-        TIMES_MS, energy.sed_kpa, [RAMP_MS], dynamic_quantity="von_mises", static_quantity="von_mises"
-    )
+    stress = Traces(TIMES_MS, energy.values, [RAMP_MS], quantity="von_mises")
     driven = drive(stress, **options)
-    assert_array_equal(driven.rate_kpa_per_ms, drive(energy, **options).rate_kpa_per_ms)
+    assert_array_equal(driven.rate_per_ms, drive(energy, **options).rate_per_ms)
     for kept in (driven, driven.part(slice(0, 1)), stress.part(slice(0, 1)), stress.scaled(np.ones(3))):
         assert kept.dynamic_quantity == kept.static_quantity == "von_mises"
 
@@ -228,13 +238,11 @@ def test_the_current_is_nowhere_above_its_bound_which_is_at_most_three_times_as_
     rng = np.random.default_rng(4)
     times = np.concatenate([[0.0], np.cumsum(rng.uniform(0.2, 20.0, 20))])
     energy, strain = rng.exponential(size=(2, 21, 500)) * rng.integers(0, 2, (2, 21, 500))
-    mixed = SedTraces(
-        times, energy, times[[7]], strain, dynamic_quantity="skin_stretch", static_quantity="stored"
-    )
+    mixed = Traces(times, energy, times[[7]], dynamic=Traces(times, strain, quantity="skin_stretch"))
     chain = Transduction(*gains)
-    for sed in (mixed, SedTraces(times, energy)):
-        assert (chain.largest_current_ma(sed) >= chain.current(sed).current_ma.max(axis=0)).all()
+    for sed in (mixed, Traces(times, energy)):
+        assert (chain.largest_current_ma(sed) >= chain.current(sed).values.max(axis=0)).all()
     chain = Transduction(0.0, 2e-4, 7e-7)
-    ratio = chain.largest_current_ma(ramp_and_hold()) / chain.current(ramp_and_hold()).current_ma.max(axis=0)
+    ratio = chain.largest_current_ma(ramp_and_hold()) / chain.current(ramp_and_hold()).values.max(axis=0)
     assert (ratio > 1.0).all()
     assert (ratio < 3.0).all()

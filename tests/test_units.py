@@ -14,7 +14,7 @@ from fingerpad.skin.surface_motion import SURFACE_QUANTITIES
 
 def traces(quantity):
     values = np.array([[0.0], [0.5], [0.4]])
-    return fp.SedTraces([0.0, 50.0, 1000.0], values, dynamic_quantity=quantity, static_quantity=quantity)
+    return fp.Traces([0.0, 50.0, 1000.0], values, quantity=quantity)
 
 
 def test_every_quantity_that_skin_has_is_in_the_table_with_its_unit():

@@ -24,12 +24,7 @@ from fingerpad.experiments.indenter_text import indenter_named
 from fingerpad.experiments.runner import STORE_FOLDER, Runner
 from fingerpad.experiments.schemas import read
 from fingerpad.experiments.validation import observations, predictions
-from fingerpad.experiments.validation.observations import (
-    COLUMNS,
-    KINDS,
-    example_file,
-    read_observations,
-)
+from fingerpad.experiments.validation.observations import COLUMNS, KINDS, example_file, read_observations
 from fingerpad.experiments.validation.predictions import LOADINGS, FingertipModel, predict
 from fingerpad.experiments.validation.validation import ValidationRequest, validate
 from fingerpad.geometry.edged_indenters import Gap, Grating
@@ -143,10 +138,7 @@ UNFIT = [
         "mine.csv, header: must be that of one kind (indenter,depth_mm,force_n;",
     ),
     ("indenter,depth_mm\nplate,1\n", "got indenter,depth_mm; for the kind force, add force_n."),
-    (
-        "indenter,depth_mm,position_mm,force_n\nplate,1,0,1\n",
-        "for the kind force, leave out position_mm.",
-    ),
+    ("indenter,depth_mm,position_mm,force_n\nplate,1,0,1\n", "for the kind force, leave out position_mm."),
     ("indenter;depth_mm;force_n\nplate;1;2\n", "line 1: column 'indenter;depth_mm;force_n' is unknown"),
     ("indenter;depth_mm;force_n\nplate;1;2\n", "Separate entries by commas, not by ';'."),
     ("indenter,depth,force_n\nplate,1,1\n", "mine.csv, line 1: column 'depth' is unknown"),

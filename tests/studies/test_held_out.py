@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from fingerpad.core.results import from_json, to_json
-from fingerpad.core.signals import SedTraces
+from fingerpad.core.signals import Traces
 from fingerpad.experiments.conditions import RECEPTOR_X_MM, Conditions
 from fingerpad.experiments.runner import Runner
 from fingerpad.experiments.validation.predictions import FingertipModel
@@ -160,7 +160,7 @@ class WavySkin:
     def sed(self, sites):
         along = np.asarray(sites)[:, self.axis] - (RECEPTOR_X_MM if self.axis == 0 else 0.0)
         peaks = 2.0 + self.depth * np.cos(2.0 * np.pi * along / self.period_mm)
-        return SedTraces([0.0, 50.0, 1000.0], np.outer([0.0, 1.0, 1.0], peaks), kinks_ms=[50.0])
+        return Traces([0.0, 50.0, 1000.0], np.outer([0.0, 1.0, 1.0], peaks), kinks_ms=[50.0])
 
 
 @pytest.mark.parametrize(("axis", "spin"), [(0, 0.0), (1, 90.0)])

@@ -73,8 +73,8 @@ def test_a_receptor_reads_the_mean_over_the_living_epidermis(pressed):
     by_depth = np.array([5.0, 1.0, 4.0, 7.0, 7.0])  # corneum, two sheets of living epidermis, the rest
     skin = skin_with(pressed, np.tile(by_depth, (3, mesh.shape[0] * mesh.shape[1])), mesh)
     place = [[RECEPTOR_X_MM, 0.0]]
-    assert skin.sed(place).sed_kpa[-1, 0] == pytest.approx(4.0)
-    assert over_thickness(skin, 2).sed(place).sed_kpa[-1, 0] == pytest.approx(2.5)
+    assert skin.sed(place).values[-1, 0] == pytest.approx(4.0)
+    assert over_thickness(skin, 2).sed(place).values[-1, 0] == pytest.approx(2.5)
     assert np.array_equal(over_thickness(skin, 1).sed_kpa, skin.sed_kpa)
 
 
@@ -90,10 +90,7 @@ def test_reading_takes_both_ends_and_lets_the_afferent_answer(pressed):
 
 
 def test_comparison_uses_common_touches_and_the_peak_of_the_finer_mesh():
-    readings = {
-        "fine": reading([[2.0], [4.0]], [3, 7]),
-        "coarse": reading([[9.0], [2.2], [3.8]], [1, 3, 7]),
-    }
+    readings = {"fine": reading([[2.0], [4.0]], [3, 7]), "coarse": reading([[9.0], [2.2], [3.8]], [1, 3, 7])}
     found = compare(readings, "coarse", "fine")
     assert found.touches == 2
     assert (found.sed["ramp"].max, found.sed["ramp"].rms) == pytest.approx((0.05, 0.05))

@@ -9,7 +9,7 @@ import pytest
 
 from fingerpad.core.errors import InputError
 from fingerpad.core.results import from_json, to_json
-from fingerpad.core.signals import SedTraces
+from fingerpad.core.signals import Traces
 from fingerpad.experiments.conditions import RECEPTOR_X_MM, Conditions
 from fingerpad.experiments.gerling2014.single_unit_uncertainty import PIECES
 from fingerpad.experiments.runner import Runner
@@ -50,15 +50,7 @@ from studies.finger_posterior import (
 from studies.pages import DOCS
 from studies.posterior_calibration import Calibration, calibrate
 from studies.tissue_candidates import HUMAN, LEVELS
-from studies.tissue_design import (
-    RANGES,
-    REFERENCE_KPA,
-    design,
-    point_of,
-    shares_of,
-    tissues_at,
-    values_at,
-)
+from studies.tissue_design import RANGES, REFERENCE_KPA, design, point_of, shares_of, tissues_at, values_at
 from studies.tissue_emulator import Emulator, GaussianProcess, left_out
 from studies.tissue_page import POSTERIOR_COLUMNS, posterior_blocks
 from studies.tissue_posterior import Pressed, TissuePosterior, like_human
@@ -324,10 +316,10 @@ def test_rates_of_a_point_are_those_of_the_papers_model():
     """The same traces through `AfferentModel`, which resamples them more finely."""
     times = np.array([0.0, 10.0, 20.0, 30.0, 40.0, 50.0, 100.0, 300.0, 1000.0])
     course = np.concatenate([np.linspace(0.0, 1.0, 6) ** 2, [0.98, 0.96, 0.95]])
-    traces = SedTraces(times, np.outer(course, np.linspace(0.5, 2.0, 36)), np.array([50.0]))
+    traces = Traces(times, np.outer(course, np.linspace(0.5, 2.0, 36)), np.array([50.0]))
     dynamic, static = Skins([traces], {}).model.evaluate(np.array([1e-7, 2e-4, 2e-6, 50.0, 1e-6, 50.0]))
     driven = drive(traces, pieces=8)
-    relative = np.array([driven.sed_kpa, RAMP_MS * driven.rate_kpa_per_ms]) / 2.0
+    relative = np.array([driven.values, RAMP_MS * driven.rate_per_ms]) / 2.0
     own = Afferents(
         np.array([1e-7 * 50.0 / 5e-5]), np.array([4.0 * 2.0]), np.array([0.04 * 2.0]), np.array([50.0])
     )

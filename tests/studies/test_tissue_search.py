@@ -9,7 +9,7 @@ import pytest
 
 from fingerpad.core.errors import InputError
 from fingerpad.core.results import from_json, to_json
-from fingerpad.core.signals import SedTraces
+from fingerpad.core.signals import Traces
 from fingerpad.data import protocol
 from fingerpad.experiments.conditions import RECEPTOR_X_MM, Conditions
 from fingerpad.experiments.runner import Runner
@@ -97,12 +97,12 @@ def test_a_quantity_is_read_and_raised_to_its_exponent():
 
 def test_one_bar_is_read_where_a_shifted_bar_would_have_the_receptor():
     (traces,) = bar_traces({ONE_BAR: Skin()}, SED_DRIVEN, SimpleNamespace(skin_tilt_deg=60.0))
-    assert traces.sed_kpa[-1] == pytest.approx(RECEPTOR_X_MM + 0.5 * np.array(protocol.BAR_SHIFTS.value))
+    assert traces.values[-1] == pytest.approx(RECEPTOR_X_MM + 0.5 * np.array(protocol.BAR_SHIFTS.value))
 
 
 def test_shifted_bars_are_read_at_the_receptor_in_the_order_of_the_shifts():
     bars = {("bar", shift, 0.0): Skin(offset=shift) for shift in reversed(protocol.BAR_SHIFTS.value)}
-    found = [float(traces.sed_kpa[-1, 0]) for traces in bar_traces(bars, SED_DRIVEN, None)]
+    found = [float(traces.values[-1, 0]) for traces in bar_traces(bars, SED_DRIVEN, None)]
     assert found == pytest.approx(RECEPTOR_X_MM + np.array(protocol.BAR_SHIFTS.value))
 
 
@@ -113,7 +113,7 @@ TIMES_MS = np.array([0.0, 10.0, 20.0, 30.0, 40.0, 50.0, 100.0, 300.0, 1000.0])
 
 def ramp_and_hold(peaks_kpa):
     course = np.concatenate([np.linspace(0.0, 1.0, 6) ** 2, [0.98, 0.96, 0.95]])
-    return SedTraces(TIMES_MS, np.outer(course, peaks_kpa), np.array([50.0]))
+    return Traces(TIMES_MS, np.outer(course, peaks_kpa), np.array([50.0]))
 
 
 def synthetic_skins(scale=1.0):

@@ -60,11 +60,7 @@ def ordinary(name):
     return pressed(block(), INDENTERS[name], RELAXING)
 
 
-@case(
-    THEME,
-    "Contact force and reaction of the supports",
-    "Newton's third law",
-)
+@case(THEME, "Contact force and reaction of the supports", "Newton's third law")
 def force_balance() -> list[Row]:
     """A relaxing layered block under every indenter, ramp and hold, default settings: largest difference at
     any time between contact force and reaction of the supports, over the contact force. Every indentation
@@ -150,12 +146,7 @@ def energy_adds_up() -> list[Row]:
     ]
 
 
-@case(
-    THEME,
-    "Energy balance with many steps",
-    "Conservation of energy",
-    slow=True,
-)
+@case(THEME, "Energy balance with many steps", "Conservation of energy", slow=True)
 def energy_balance_many_steps() -> list[Row]:
     """The same with 24 + 12 steps and a smaller penetration tolerance."""
     tight = PressSettings(24, 12, NewtonSettings(residual_tolerance=1e-6, penetration_tolerance=1e-3))

@@ -411,12 +411,7 @@ def cylinder() -> list[Row]:
     return cylinder_rows(0.3)
 
 
-@case(
-    THEME,
-    "Cylinder on nearly incompressible tissue",
-    "Hertz, McEwen; Johnson 1985, ch. 4",
-    slow=True,
-)
+@case(THEME, "Cylinder on nearly incompressible tissue", "Hertz, McEwen; Johnson 1985, ch. 4", slow=True)
 def cylinder_nearly_incompressible() -> list[Row]:
     """The same at nu = 0.48."""
     return cylinder_rows(0.48)

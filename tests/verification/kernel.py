@@ -55,11 +55,7 @@ def rigid_rotation() -> list[Row]:
     return [at_most(name, 1e-12, value) for name, value in worst(force).items()]
 
 
-@case(
-    THEME,
-    "Energy, forces and tangent of a rotated body",
-    "Objectivity of a hyperelastic law",
-)
+@case(THEME, "Energy, forces and tangent of a rotated body", "Objectivity of a hyperelastic law")
 def objectivity() -> list[Row]:
     """A patch is deformed at random, then rotated as well: largest relative change of the energy, of the
     rotated forces and of the rotated tangent times a direction.

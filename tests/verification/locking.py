@@ -100,11 +100,7 @@ def cook_membrane_fine() -> list[Row]:
     return [near("tip deflection on 32 x 32", COOK_REFERENCE_MM, cook_tip_mm(32), 0.01, "mm")]
 
 
-@case(
-    THEME,
-    "Pressure of Cook's membrane",
-    "Bound of our own",
-)
+@case(THEME, "Pressure of Cook's membrane", "Bound of our own")
 def cook_pressure() -> list[Row]:
     """Share of the pressure that alternates from element to element (rms of mixed second differences over
     rms), without the quarter at the clamped side. It must decrease with the mesh size: then it is noise, not

@@ -52,7 +52,9 @@ def discriminate_command(
         typer.echo(known[one_of("--example", example, tuple(known))], nl=False)
         return
     if task is None:
-        raise InputError(f"discriminate needs a task, a YAML file or one of {', '.join(known)}: see --help.")
+        raise InputError(
+            "discriminate", f"needs a task, a YAML file or one of {', '.join(known)}", remedy="see --help"
+        )
     asked = read_task(task, resolution=resolution)
     run = DiscriminationRun(asked, out, engine(jobs, scheduler), task, task_text(task))
     make_writable(out)

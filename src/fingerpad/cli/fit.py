@@ -151,7 +151,7 @@ def fit_command(
         return
     if recordings is None:
         raise InputError(
-            "fit needs recordings and --stimulus, or --example FOLDER: see fingerpad fit --help."
+            "fit", "needs recordings and --stimulus, or --example FOLDER", remedy="see fingerpad fit --help"
         )
     if stimulus is None:
         raise InputError(

@@ -28,7 +28,7 @@ def reduce_command(
     from fingerpad.reduction.model import write_reduced
 
     if out.suffix != ".npz":
-        raise InputError(f"--out must be a file .npz: got {out}.")
+        raise InputError("--out", "must be a file .npz", str(out))
     described = read_reduction(config)
     make_writable(out.parent)
     with interruptible():

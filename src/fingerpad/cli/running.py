@@ -125,7 +125,9 @@ def make_writable(folder: Path, name: str = "--out") -> None:
         with tempfile.TemporaryFile(dir=folder):
             pass
     except OSError as error:
-        raise InputError(f"{name} must be a writable folder: {folder} is not ({error.strerror}).") from error
+        raise InputError(
+            name, "must be a writable folder", remedy=f"{folder} is not ({error.strerror})"
+        ) from error
 
 
 def write_examples(folder: Path, files: Mapping[str, bytes], name: str = "--out") -> None:

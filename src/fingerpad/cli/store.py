@@ -76,7 +76,7 @@ def prune_command(
     from fingerpad.skin.store import pruned
 
     if days is None and size is None:
-        raise InputError("prune needs --days, --size or both: got neither.")
+        raise InputError("prune", "needs --days, --size or both", "neither")
     before_s = None if days is None else time.time() - SECONDS_PER_DAY * not_negative("--days", days, "days")
     most = None if size is None else int(1e6 * not_negative("--size", size, "MB"))
     files = _store(folder).files()

@@ -80,10 +80,10 @@ def validate_command(
         typer.echo(f"Try: fingerpad validate {out / example}.csv --resolution quick --out {out / example}")
         return
     if observations is None:
-        raise InputError("validate needs a file of observations, or --example KIND: see --help.")
+        raise InputError("validate", "needs a file of observations, or --example KIND", remedy="see --help")
     fitted = None if afferent is None else fitted_afferent(afferent, tissues)
     if not isinstance(fitted, Afferent | None):
-        raise InputError(f"--afferent must hold an SAI afferent: {afferent} holds another type.")
+        raise InputError("--afferent", "must hold an SAI afferent", remedy=f"{afferent} holds another type")
     model = FingertipModel(Conditions(resolution=resolution, tissues=tissues), fitted, loading, static_window)
     request = ValidationRequest(read_observations(observations), model, out, engine(jobs, scheduler))
     make_writable(out)

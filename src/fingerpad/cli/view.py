@@ -35,7 +35,7 @@ def view_command(
 
     path = Path("view.png") if out is None else out
     if path.is_dir():
-        raise InputError(f"--out must be a file: {path} is a folder.")
+        raise InputError("--out", "must be a file", remedy=f"{path} is a folder")
     with interruptible("Nothing was written."):
         (written,) = save_view(path, result, field=field, time_ms=time, frames=frames, progress=progress())
     typer.echo(f"Open: {written}")

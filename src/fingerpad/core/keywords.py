@@ -107,9 +107,7 @@ class OtherName:
     """A size under another name than its field: a class takes it as a keyword, an instance has it."""
 
     def __init__(
-        self,
-        meaning: str | Callable[..., Mapping[str, float]],
-        read: Callable[[Any], float] | None = None,
+        self, meaning: str | Callable[..., Mapping[str, float]], read: Callable[[Any], float] | None = None
     ):
         self.meaning, self.read = meaning, read
 

@@ -76,9 +76,4 @@ def four_normals(
     u0, u1, u2, u3 = four_uniforms(seed, trial, receptor, purpose, block)
     r0, r1 = math.sqrt(-2.0 * math.log1p(-u0)), math.sqrt(-2.0 * math.log1p(-u2))
     angle_0, angle_1 = 2.0 * math.pi * u1, 2.0 * math.pi * u3
-    return (
-        r0 * math.cos(angle_0),
-        r0 * math.sin(angle_0),
-        r1 * math.cos(angle_1),
-        r1 * math.sin(angle_1),
-    )
+    return (r0 * math.cos(angle_0), r0 * math.sin(angle_0), r1 * math.cos(angle_1), r1 * math.sin(angle_1))

@@ -149,7 +149,7 @@ class Presentations:
 def checked_sites(sites: IntArray, n_sites: int) -> IntArray:
     """Return the sites of spike trains if a current has these columns, else raise `InputError`."""
     if sites.size and (sites.min() < 0 or sites.max() >= n_sites):
-        raise InputError(f"sites must be within 0 ... {n_sites - 1}: got {sites.min()} ... {sites.max()}.")
+        raise InputError("sites", f"must be within 0 ... {n_sites - 1}", f"{sites.min()} ... {sites.max()}")
     return sites
 
 
@@ -215,5 +215,5 @@ def numbered(name: str, which: Numbers) -> IntArray:
 def _number(name: str, value: int) -> int:
     number = whole(name, value, 0)
     if number > LARGEST_SEED:
-        raise InputError(f"{name} must not exceed {LARGEST_SEED}: got {number}.")
+        raise InputError(name, f"must not exceed {LARGEST_SEED}", str(number))
     return number

@@ -56,8 +56,7 @@ def _array(dtype: type, ndim: int | None, item: JsonSchema) -> GetPydanticSchema
 
     def schema(source: Any, handler: Any) -> core_schema.CoreSchema:
         return core_schema.no_info_plain_validator_function(
-            validated,
-            serialization=core_schema.plain_serializer_function_ser_schema(_listed),
+            validated, serialization=core_schema.plain_serializer_function_ser_schema(_listed)
         )
 
     json_schema = dict(item)

@@ -41,10 +41,7 @@ class Skin(Protocol):
     """Any object that returns the strain energy density below points of its surface."""
 
     def sed(
-        self,
-        sites: ArrayLike,
-        dynamic_quantity: str = STORED_ENERGY,
-        static_quantity: str = STORED_ENERGY,
+        self, sites: ArrayLike, dynamic_quantity: str = STORED_ENERGY, static_quantity: str = STORED_ENERGY
     ) -> Traces:
         """Strain energy density over time below `sites` of the skin. [mm]
 
@@ -125,16 +122,16 @@ class Traces(Result):
         if self.quantity in CURRENTS:
             if (np.diff(times) < 0.0).any() or (times[2:] == times[:-2]).any():
                 raise InputError(
-                    f"times_ms must not decrease, nor repeat more than once: got {times[:4]} ..."
+                    "times_ms", "must not decrease, nor repeat more than once", f"{times[:4]} .."
                 )
         else:
             increasing("times_ms", times)
             if values.min(initial=0.0) < 0.0:
                 smallest = with_unit(f"{values.min():.3g}", self.quantity, " {}")
-                raise InputError(f"values must not be negative: the smallest is {smallest}.")
+                raise InputError("values", "must not be negative", remedy=f"the smallest is {smallest}")
         kinks = increasing("kinks_ms", float_array("kinks_ms", self.kinks_ms, 1))
         if not np.isin(kinks, times).all():
-            raise InputError(f"kinks_ms must be among times_ms: got {kinks[~np.isin(kinks, times)]}.")
+            raise InputError("kinks_ms", "must be among times_ms", str(kinks[~np.isin(kinks, times)]))
         _freeze(self, times_ms=times, values=values, kinks_ms=kinks)
         if self.dynamic is not None:
             self._check_dynamic(self.dynamic)
@@ -151,14 +148,17 @@ class Traces(Result):
     def _check_dynamic(self, dynamic: Traces) -> None:
         if dynamic.quantity == self.quantity or dynamic.dynamic is not None:
             raise InputError(
-                f"dynamic must hold another quantity than {self.quantity!r}, and one only: got "
-                f"{dynamic.quantity!r}; leave it out where both terms follow one quantity."
+                "dynamic",
+                f"must hold another quantity than {self.quantity!r}, and one only",
+                repr(dynamic.quantity),
+                "leave it out where both terms follow one quantity",
             )
         if dynamic.values.shape != self.values.shape or (dynamic.times_ms != self.times_ms).any():
             raise InputError(
-                "dynamic must have the times and sites of the static term: got values of shape "
-                f"{dynamic.values.shape} to {dynamic.times_ms[-1]:g} ms for {self.values.shape} to "
-                f"{self.times_ms[-1]:g} ms."
+                "dynamic",
+                "must have the times and sites of the static term",
+                f"values of shape {dynamic.values.shape} to {dynamic.times_ms[-1]:g} ms for "
+                f"{self.values.shape} to {self.times_ms[-1]:g} ms",
             )
 
     def _first_touch_ms(self) -> float:
@@ -270,7 +270,7 @@ class Traces(Result):
         """
         each = float_array("factors", factors, 1)
         if each.size != self.n_sites:
-            raise InputError(f"factors needs one number per site: got {each.size} for {self.n_sites}.")
+            raise InputError("factors", "needs one number per site", f"{each.size} for {self.n_sites}")
         return self.with_values(lambda values: values * each)
 
 
@@ -278,7 +278,7 @@ def traces_below(skin: Skin, sites: ArrayLike, dynamic_quantity: str, static_qua
     """Traces of two quantities below sites of a skin."""
     if not callable(getattr(skin, "sed", None)):
         raise InputError(
-            f"skin must have a method sed(sites), as a solved indentation has: got {skin!r:.60}."
+            "skin", "must have a method sed(sites), as a solved indentation has", f"{skin!r:.60}"
         )
     if (dynamic_quantity, static_quantity) == (STORED_ENERGY, STORED_ENERGY):
         return skin.sed(sites)
@@ -286,10 +286,12 @@ def traces_below(skin: Skin, sites: ArrayLike, dynamic_quantity: str, static_qua
         signature(skin.sed).bind(sites, dynamic_quantity, static_quantity)
     except TypeError as error:
         raise InputError(
-            "skin.sed must accept dynamic_quantity and static_quantity, since the afferent follows "
-            f"{dynamic_quantity!r} and {static_quantity!r}: got {type(skin).__name__}.sed"
-            f"{signature(skin.sed)}; add them, or use an afferent that follows {STORED_ENERGY!r}, such as "
-            "Afferent.for_tissues('paper')."
+            "skin.sed",
+            "must accept dynamic_quantity and static_quantity, since the afferent follows "
+            f"{dynamic_quantity!r} and {static_quantity!r}",
+            f"{type(skin).__name__}.sed{signature(skin.sed)}",
+            f"add them, or use an afferent that follows {STORED_ENERGY!r}, such as "
+            "Afferent.for_tissues('paper')",
         ) from error
     return skin.sed(sites, dynamic_quantity, static_quantity)
 
@@ -298,7 +300,7 @@ def window_bounds(window_ms: Sequence[float]) -> tuple[float, float]:
     """Return start and end of a window, or raise `InputError`."""
     bounds = [finite("window_ms", bound, "ms") for bound in window_ms]
     if len(bounds) != 2 or bounds[1] <= bounds[0]:
-        raise InputError(f"window_ms must be a start and a later end: got {window_ms!r}.")
+        raise InputError("window_ms", "must be a start and a later end", repr(window_ms))
     return bounds[0], bounds[1]
 
 
@@ -328,16 +330,20 @@ class SpikeTrains(Result):
         times = float_array("times_ms", self.times_ms, 1)
         offsets = int_array("offsets", self.offsets, 1)
         if offsets.ndim != 1 or offsets.size == 0 or offsets[0] != 0 or offsets[-1] != times.size:
-            raise InputError(f"offsets must run from 0 to the number of spikes, {times.size}: got {offsets}.")
+            raise InputError(
+                "offsets", f"must run from 0 to the number of spikes, {times.size}", str(offsets)
+            )
         if (np.diff(offsets) < 0).any():
-            raise InputError(f"offsets must not decrease: got {offsets}.")
+            raise InputError("offsets", "must not decrease", str(offsets))
         offsets.setflags(write=False)
         _freeze(self, times_ms=times, offsets=offsets)
         falls = np.diff(times) <= 0.0
         falls[offsets[(offsets > 0) & (offsets < times.size)] - 1] = False  # from one train to the next
         if falls.any():
             raise InputError(
-                f"times_ms must increase within each afferent: it does not at {times[1:][falls][:4]}."
+                "times_ms",
+                "must increase within each afferent",
+                remedy=f"it does not at {times[1:][falls][:4]}",
             )
 
     def __repr__(self) -> str:
@@ -516,7 +522,7 @@ class ResponseMap(Result):
         positions = float_array("positions_mm", self.positions_mm, 2)
         if positions.shape[1] not in (2, 3):
             raise InputError(
-                f"positions_mm needs columns x and z, or x, y and z: got shape {positions.shape}."
+                "positions_mm", "needs columns x and z, or x, y and z", f"shape {positions.shape}"
             )
         positive("pitch_mm", self.pitch_mm, "mm")
         dynamic = float_array("dynamic_rate_hz", self.dynamic_rate_hz, 1)
@@ -568,7 +574,7 @@ class HitRates(Result):
         if mean.shape != spread.shape:
             raise InputError(f"hit_rate and hit_rate_sd must match: got {mean.shape} and {spread.shape}.")
         if ((mean < 0) | (mean > 1)).any() or (spread < 0).any():
-            raise InputError("hit_rate must lie within 0 ... 1 and hit_rate_sd must not be negative.")
+            raise InputError("hit_rate", "must lie within 0 ... 1 and hit_rate_sd must not be negative")
         _freeze(self, hit_rate=mean, hit_rate_sd=spread)
 
     def __repr__(self) -> str:

@@ -79,5 +79,5 @@ def _numbers(name: str, value: float | tuple[float, ...]) -> float | tuple[float
     if not isinstance(value, tuple):
         return finite(name, value)
     if not value:
-        raise InputError(f"{name} must hold at least one number: got an empty tuple.")
+        raise InputError(name, "must hold at least one number", "an empty tuple")
     return tuple(finite(name, number) for number in value)

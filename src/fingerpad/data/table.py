@@ -36,17 +36,15 @@ def parsed_table(name: str, text: str) -> Table:
     story = dict(_labelled(line) for line in lines if line.startswith("#"))
     for label in ("content", "source", "status"):
         if not story.get(label):
-            raise InputError(f"{name} needs a line '# {label}: ...': it has {sorted(story)}.")
+            raise InputError(name, f"needs a line '# {label}", remedy=f"...': it has {sorted(story)}")
     one_of(f"status of {name}", story["status"], tuple(STATUSES))
     records = list(csv.reader(line for line in lines if not line.startswith("#")))
     if len(records) < 2:
-        raise InputError(
-            f"{name} needs a header and at least one row of numbers: got {len(records)} line(s)."
-        )
+        raise InputError(name, "needs a header and at least one row of numbers", f"{len(records)} line(s)")
     header, *rows = records
     for row in rows:
         if len(row) != len(header):
-            raise InputError(f"{name} needs {len(header)} entries per row: got {row}.")
+            raise InputError(name, f"needs {len(header)} entries per row", str(row))
     columns = {
         column: float_array(column, [number_in(f"{column} of {name}", value) for value in values], 1)
         for column, values in zip(header, zip(*rows, strict=True), strict=True)

@@ -103,8 +103,9 @@ class Cluster(metaclass=KnownKeywords):
                         "again; what was finished is kept."
                     ) from error
                 raise InputError(
-                    f"--scheduler must be the address of a Dask scheduler that runs: {self.address} cannot "
-                    "be reached; start it with dask scheduler."
+                    "--scheduler",
+                    "must be the address of a Dask scheduler that runs",
+                    remedy=f"{self.address} cannot be reached; start it with dask scheduler",
                 ) from error
         # That it reconnects, fails and cancels is told here, in one line.
         said = logging.getLogger("distributed.client")
@@ -130,7 +131,7 @@ def _check_address(address: str) -> None:
         import_module("distributed.comm").get_address_host_port(address)
     except ValueError as error:
         raise InputError(
-            f"--scheduler must be an address with a port, such as tcp://localhost:8786: got {address!r}."
+            "--scheduler", "must be an address with a port, such as tcp://localhost:8786", repr(address)
         ) from error
 
 

@@ -20,14 +20,15 @@ def indenter_named(text: str) -> Indenter:
     sizes = [size.name for size in fields(body)]  # type: ignore[arg-type]
     if len(given) > len(sizes):
         raise InputError(
-            f"indenter must be written {':'.join([name, *sizes])}, sizes from the right may be left out: "
-            f"got {text!r}."
+            "indenter",
+            f"must be written {':'.join([name, *sizes])}, sizes from the right may be left out",
+            repr(text),
         )
     written: dict[str, str] = {}
     for place, part in enumerate(given):
         size, equals, value = (word.strip() for word in part.rpartition("="))
         size = size if equals else sizes[place]
         if size in written:
-            raise InputError(f"indenter must have {size} once: got {text!r}.")
+            raise InputError("indenter", f"must have {size} once", repr(text))
         written[size] = value
     return body(**{size: number_in(size, value, unit_of(size)) for size, value in written.items()})

@@ -113,12 +113,16 @@ def read_recordings(path: str | Path, stimuli: Stimuli, unit: int | None = None)
 def _check_columns(path: Path, column: str, first: TableRow) -> None:
     given = first.entries
     if column not in given:
-        raise InputError(f"{path} must have the column {column}: it has {', '.join(given)}.")
+        raise InputError(path, f"must have the column {column}", remedy=f"it has {', '.join(given)}")
     rates = [name for name in RATES if name in given]
     if SPIKES in given and rates:
-        raise InputError(f"{path} must have {SPIKES} or rates, not both: leave {' and '.join(rates)} out.")
+        raise InputError(
+            path, f"must have {SPIKES} or rates, not both", remedy=f"leave {' and '.join(rates)} out"
+        )
     if SPIKES not in given and not rates:
-        raise InputError(f"{path} must have {', '.join(RATES)} or {SPIKES}: it has {', '.join(given)}.")
+        raise InputError(
+            path, f"must have {', '.join(RATES)} or {SPIKES}", remedy=f"it has {', '.join(given)}"
+        )
     if DURATION in given and SPIKES not in given:
         raise InputError(f"{path} has {DURATION}, which belongs to {SPIKES}: leave it out.")
 
@@ -221,7 +225,9 @@ def _nwb_lines(path: Path, column: str, unit: int | None) -> list[TableRow]:
     try:
         from pynwb import NWBHDF5IO
     except ImportError as error:
-        raise InputError(f"{path} needs pynwb: install the extra, pip install 'fingerpad[nwb]'.") from error
+        raise InputError(
+            path, "needs pynwb", remedy="install the extra, pip install 'fingerpad[nwb]'"
+        ) from error
     try:
         # What the libraries warn of (cached namespaces, types of old files) is not about what is read here.
         with warnings.catch_warnings():
@@ -239,7 +245,9 @@ def _nwb_lines(path: Path, column: str, unit: int | None) -> list[TableRow]:
 def _trials(path: Path, content: Any, column: str, unit: int | None) -> list[TableRow]:
     trials = content.trials
     if trials is None or not len(trials):
-        raise InputError(f"{path} must have a table of trials with start_time and {column}: it has none.")
+        raise InputError(
+            path, f"must have a table of trials with start_time and {column}", remedy="it has none"
+        )
     if column not in trials.colnames:
         raise InputError(f"{path}: trials must have the column {column}: got {', '.join(trials.colnames)}.")
     row = _row_of_unit(path, content.units, unit)
@@ -306,7 +314,7 @@ def _row_of_unit(path: Path, units: Any, unit: int | None) -> int:
     """Row of the unit that was chosen, or of the only one."""
     ids = [] if units is None else [int(number) for number in units.id[:]]
     if not ids or "spike_times" not in units.colnames:
-        raise InputError(f"{path} must have a table of units with spike_times: it has none.")
+        raise InputError(path, "must have a table of units with spike_times", remedy="it has none")
     if unit is None and len(ids) > 1:
         raise InputError(f"{path} has the units {', '.join(map(str, ids))}: choose one by --unit.")
     chosen = ids[0] if unit is None else unit

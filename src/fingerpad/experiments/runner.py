@@ -53,10 +53,7 @@ class Runner:
         self._stages.append(StageSummary(name=name, wall_s=wall_s))
 
     def solve(
-        self,
-        touches: Iterable[Touch],
-        stage: str = "indentations",
-        on_failed: OnFailed | None = None,
+        self, touches: Iterable[Touch], stage: str = "indentations", on_failed: OnFailed | None = None
     ) -> Collection[Path]:
         """Solve and store the touches that are not stored yet."""
         missing = self.store.missing(touches)

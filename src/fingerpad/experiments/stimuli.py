@@ -17,12 +17,7 @@ from fingerpad.core.plain_yaml import read_yaml
 from fingerpad.core.tables import TableRow, read_csv
 from fingerpad.experiments.conditions import Conditions
 from fingerpad.experiments.descriptions.pressing import named_files
-from fingerpad.experiments.descriptions.reading import (
-    Origin,
-    at,
-    merged,
-    part_from,
-)
+from fingerpad.experiments.descriptions.reading import Origin, at, merged, part_from
 from fingerpad.experiments.descriptions.stimuli import (
     NamedStimulus,
     StimulusSet,

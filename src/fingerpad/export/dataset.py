@@ -258,8 +258,9 @@ def read_touch(path: str | Path) -> xarray.Dataset:
     found = touch_file(path_of("path", path))
     if found.suffix not in SUFFIXES:
         raise InputError(
-            f"{found} must be a touch that fingerpad wrote, as {' or '.join(SUFFIXES)}: its name has another "
-            "ending."
+            found,
+            f"must be a touch that fingerpad wrote, as {' or '.join(SUFFIXES)}",
+            remedy="its name has another ending",
         )
     xarray = library("xarray")
     engine = "zarr" if found.is_dir() else "h5netcdf"
@@ -270,8 +271,9 @@ def read_touch(path: str | Path) -> xarray.Dataset:
             data = opened.load()
     except Exception as error:  # a file of unknown content may fail in any way
         raise InputError(
-            f"{found} must be a touch that fingerpad wrote, as {' or '.join(SUFFIXES)}: it cannot be read "
-            f"({first_line(error)})."
+            found,
+            f"must be a touch that fingerpad wrote, as {' or '.join(SUFFIXES)}",
+            remedy=f"it cannot be read ({first_line(error)})",
         ) from error
     check_touch(str(found), data)
     return data
@@ -283,16 +285,18 @@ def touch_file(path: Path) -> Path:
         path.stat()
         held = [path / name for name in FILE_NAMES if (path / name).exists()]
     except FileNotFoundError as error:
-        raise InputError(f"{path} must be a touch that fingerpad wrote: there is no such file.") from error
+        raise InputError(
+            path, "must be a touch that fingerpad wrote", remedy="there is no such file"
+        ) from error
     except (OSError, ValueError) as error:  # no right to look, or no possible name
         said = getattr(error, "strerror", None) or error
         raise InputError(f"{str(path)[:200]!r} must be a file or folder that can be read: {said}.") from error
     if path.is_dir() and path.suffix != ".zarr":
         if not held:
-            raise InputError(f"{path} must hold {' or '.join(FILE_NAMES)}: there is neither.")
+            raise InputError(path, f"must hold {' or '.join(FILE_NAMES)}", remedy="there is neither")
         return held[0]
     if not (path.is_dir() or path.is_file()):
-        raise InputError(f"{path} must be a file or a folder: it is neither.")
+        raise InputError(path, "must be a file or a folder", remedy="it is neither")
     return path
 
 
@@ -462,11 +466,15 @@ def _write_zarr(path: Path, data: xarray.Dataset) -> None:
 def check_touch(path: str, data: xarray.Dataset) -> None:
     """Raise `InputError` unless a data set is what `touch_dataset` makes; `path` says where it came from."""
     if data.attrs.get("format") != FORMAT:
-        raise InputError(f"{path} must be a touch that fingerpad wrote: another program wrote this file.")
+        raise InputError(
+            path, "must be a touch that fingerpad wrote", remedy="another program wrote this file"
+        )
     if data.attrs.get("format_version") != FORMAT_VERSION:
         raise InputError(
-            f"{path} must have format_version {FORMAT_VERSION}: got {data.attrs.get('format_version')}; "
-            "read it with the version of fingerpad that wrote it."
+            path,
+            f"must have format_version {FORMAT_VERSION}",
+            str(data.attrs.get("format_version")),
+            "read it with the version of fingerpad that wrote it",
         )
     if data.attrs.get("half_finger") not in (0, 1):
         raise InputError(
@@ -478,7 +486,7 @@ def check_touch(path: str, data: xarray.Dataset) -> None:
     needed = ["time", *(field.name for field in stored_fields()), *(name for part in groups for name in part)]
     for name in needed:
         if name not in data.variables and name != "times_ms":
-            raise InputError(f"{path} must hold the variable {name}: it is missing.")
+            raise InputError(path, f"must hold the variable {name}", remedy="it is missing")
     for key, values in data.variables.items():
         _check_variable(f"{path}, variable {key}", key, values, data)
     times = data["time"].values
@@ -513,18 +521,18 @@ def _check_variable(where: str, name: Hashable, values: xarray.Variable, data: x
     else:
         return  # a variable that somebody added
     if values.dims not in allowed:
-        raise InputError(f"{where} must have the dimensions {sorted(allowed)[0]}: got {values.dims}.")
+        raise InputError(where, f"must have the dimensions {sorted(allowed)[0]}", str(values.dims))
     if values.attrs.get("units", "") != unit:
-        raise InputError(f"{where} must have the unit {unit!r}: got {values.attrs.get('units', '')!r}.")
+        raise InputError(where, f"must have the unit {unit!r}", repr(values.attrs.get("units", "")))
     numbers = values.values
     if numbers.dtype.kind not in "fiu":
-        raise InputError(f"{where} must hold numbers: got {numbers.dtype}.")
+        raise InputError(where, "must hold numbers", str(numbers.dtype))
     if numbers.dtype.kind == "f" and not (np.isnan(numbers) & holes | np.isfinite(numbers)).all():
-        raise InputError(f"{where} must be finite everywhere: some values are not.")
+        raise InputError(where, "must be finite everywhere", remedy="some values are not")
     if part is not None and part.points_into and numbers.size:
         count = data.sizes[part.points_into]
         if numbers.dtype.kind == "f" or numbers.min() < 0 or numbers.max() >= count:
-            raise InputError(f"{where} must hold whole numbers from 0 to {count - 1}: some are not.")
+            raise InputError(where, f"must hold whole numbers from 0 to {count - 1}", remedy="some are not")
 
 
 def udunits(unit: str) -> str:

@@ -82,10 +82,12 @@ class Job:
                 f"got {times.size} times from {times[:1]} and {depths.size} depths from {depths[:1]}."
             )
         if depths.max() <= 0.0:
-            raise InputError(f"depths_mm must exceed 0 at some time: the largest is {depths.max():g} mm.")
+            raise InputError(
+                "depths_mm", "must exceed 0 at some time", remedy=f"the largest is {depths.max():g} mm"
+            )
         if len(self.materials) <= self.mesh.layer.max():
             raise InputError(
-                f"materials needs one per layer: got {len(self.materials)} for layer {self.mesh.layer.max()}."
+                "materials", "needs one per layer", f"{len(self.materials)} for layer {self.mesh.layer.max()}"
             )
         check_friction(self.friction, self.indenter)
         object.__setattr__(self, "times_ms", times)
@@ -254,8 +256,9 @@ def wedge_nodes(mesh: Mesh) -> IntArray:
     strange = np.flatnonzero(different != np.where(is_wedge, 6, 8))
     if strange.size:
         raise InputError(
-            f"mesh must consist of bricks and of wedges, bricks with one collapsed side, to be exported: "
-            f"element {strange[0]} has the nodes {elements[strange[0]].tolist()}."
+            "mesh",
+            "must consist of bricks and of wedges, bricks with one collapsed side, to be exported",
+            remedy=f"element {strange[0]} has the nodes {elements[strange[0]].tolist()}",
         )
     return wedges
 

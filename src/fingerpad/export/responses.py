@@ -123,8 +123,9 @@ def read_response_csv(path: Path) -> ResponseMap | MixedResponse:
     for column in ("x_mm", "z_mm", PITCH, *MEASURED, SPIKES):
         if column not in have:
             raise InputError(
-                f"{path} must have the column {column}, as write_response_csv writes it: got "
-                f"{', '.join(have) or 'no row'}."
+                path,
+                f"must have the column {column}, as write_response_csv writes it",
+                str(", ".join(have) or "no row"),
             )
 
     def numbers(column: str) -> FloatArray:
@@ -202,7 +203,7 @@ def write_responses_nwb(
     instance("responses", responses, Mapping)
     began = started or datetime.now(UTC)
     if began.tzinfo is None:
-        raise InputError(f"started must have a time zone, such as datetime.UTC: got {began.isoformat()}.")
+        raise InputError("started", "must have a time zone, such as datetime.UTC", str(began.isoformat()))
     touches = {name: one_map(response) for name, response in responses.items()}
     positions_mm, durations_ms = _places(touches), _durations(touches, duration_ms)
     first = next(iter(touches.values()))
@@ -282,7 +283,7 @@ def read_responses_nwb(path: Path) -> dict[str, ResponseMap | MixedResponse]:
     except Exception as error:  # a file of any other kind may fail in any way
         said = " ".join(str(error).split()).rstrip(".")
         raise InputError(
-            f"{path} must be a session of write_responses_nwb: it cannot be read as one ({said})."
+            path, "must be a session of write_responses_nwb", remedy=f"it cannot be read as one ({said})"
         ) from error
 
 
@@ -322,12 +323,14 @@ def _responses(session: Any) -> dict[str, ResponseMap | MixedResponse]:
 def _places(responses: Mapping[str, ResponseMap]) -> np.ndarray:
     """Places of the receptors, after a check that all touches have the same ones. [mm]"""
     if not responses:
-        raise InputError("responses must hold at least one touch: it is empty.")
+        raise InputError("responses", "must hold at least one touch", remedy="it is empty")
     first = next(iter(responses.values()))
     for name, response in responses.items():
         instance(f"responses[{name!r}]", response, ResponseMap)
         if not np.array_equal(response.positions_mm, first.positions_mm) or response.types != first.types:
-            raise InputError(f"responses must come from the same receptors: those of {name!r} lie elsewhere.")
+            raise InputError(
+                "responses", "must come from the same receptors", remedy=f"those of {name!r} lie elsewhere"
+            )
     return first.positions_mm
 
 
@@ -337,15 +340,18 @@ def _durations(responses: Mapping[str, ResponseMap], duration_ms: float | None) 
     for name, response in responses.items():
         lasts_ms = response.duration_ms if duration_ms is None else duration_ms
         if lasts_ms is None:
-            raise InputError(f"duration_ms must be given: the response to {name!r} does not know its own.")
+            raise InputError(
+                "duration_ms", "must be given", remedy=f"the response to {name!r} does not know its own"
+            )
         positive("duration_ms", lasts_ms, "ms")
         latest_ms = max(
             response.spikes.times_ms.max(initial=0.0), *(phase.end_ms for phase in response.phases), 0.0
         )
         if latest_ms > lasts_ms:
             raise InputError(
-                f"duration_ms must reach to the last spike and phase, at {latest_ms:g} ms under {name!r}: "
-                f"got {lasts_ms:g} ms."
+                "duration_ms",
+                f"must reach to the last spike and phase, at {latest_ms:g} ms under {name!r}",
+                f"{lasts_ms:g} ms",
             )
         durations_ms.append(lasts_ms)
     return np.array(durations_ms)

@@ -297,7 +297,7 @@ def open_sweep(path: str | Path) -> xarray.Dataset:
 
 def check_sweep_data(data: xarray.Dataset) -> None:
     if not isinstance(data, library("xarray").Dataset) or "sweep" not in data.attrs or "status" not in data:
-        raise InputError(f"data must be a data set from open_sweep: got {shown(data)}.")
+        raise InputError("data", "must be a data set from open_sweep", shown(data))
 
 
 @known_keywords
@@ -382,11 +382,13 @@ def setting_spikes(data: xarray.Dataset) -> SpikeTrains:
 def check_format(path: str | Path, attributes: Mapping[str, Any]) -> None:
     """Raise `InputError` unless attributes are those of a sweep of this version."""
     if attributes.get("format") != FORMAT:
-        raise InputError(f"{path} must be a sweep that fingerpad wrote: it has another content.")
+        raise InputError(path, "must be a sweep that fingerpad wrote", remedy="it has another content")
     if attributes.get("format_version") != FORMAT_VERSION:
         raise InputError(
-            f"{path} must have format_version {FORMAT_VERSION}: got {attributes.get('format_version')}; read "
-            "it with the version of fingerpad that wrote it."
+            path,
+            f"must have format_version {FORMAT_VERSION}",
+            str(attributes.get("format_version")),
+            "read it with the version of fingerpad that wrote it",
         )
 
 
@@ -394,11 +396,14 @@ def check_same(path: Path, found: Mapping[str, Any], expected: Mapping[str, Any]
     """Raise `InputError` unless a data set is of the same sweep and the same program."""
     check_format(path, found)
     if found["inputs_sha256"] != expected["inputs_sha256"]:
-        raise InputError(f"{path} must be of the same sweep: it is of another one; choose another --out.")
+        raise InputError(
+            path, "must be of the same sweep", remedy="it is of another one; choose another --out"
+        )
     if found["code_hash"] != expected["code_hash"]:
         raise InputError(
-            f"{path} must be continued with the same program: version {found['version']} began it; choose "
-            "another --out."
+            path,
+            "must be continued with the same program",
+            remedy=f"version {found['version']} began it; choose another --out",
         )
 
 
@@ -409,7 +414,7 @@ def _opened(path: Path) -> Any:
         return zarr.open_group(path, mode="r+", zarr_format=3, use_consolidated=False)
     except Exception as error:  # a folder of unknown content may fail in any way
         raise InputError(
-            f"{path} must be a sweep that fingerpad wrote: it cannot be read ({first_line(error)})."
+            path, "must be a sweep that fingerpad wrote", remedy=f"it cannot be read ({first_line(error)})"
         ) from error
 
 

@@ -101,14 +101,18 @@ def read_sweep_table(path: str | Path) -> pandas.DataFrame:
             table = pandas.read_parquet(path)
     except (OSError, ValueError, AttributeError) as error:
         raise InputError(
-            f"{path} must be a table of a sweep: it cannot be read ({first_line(error)})."
+            path, "must be a table of a sweep", remedy=f"it cannot be read ({first_line(error)})"
         ) from error
     if table.attrs.get("format") != TABLE:
-        raise InputError(f"{path} must be a table of a sweep that fingerpad wrote: it has another content.")
+        raise InputError(
+            path, "must be a table of a sweep that fingerpad wrote", remedy="it has another content"
+        )
     if table.attrs.get("format_version") != TABLE_VERSION:
         raise InputError(
-            f"{path} must have format_version {TABLE_VERSION}: got {table.attrs.get('format_version')}; read "
-            f"it with the version of fingerpad that wrote it, this is {__version__}."
+            path,
+            f"must have format_version {TABLE_VERSION}",
+            str(table.attrs.get("format_version")),
+            f"read it with the version of fingerpad that wrote it, this is {__version__}",
         )
     return table
 

@@ -138,7 +138,7 @@ def save_view(
         write_atomically(path, view.png(view.checked(deepest_ms if time_ms is None else time_ms)))
         return (path,)
     if whole("frames", frames, at_least=2) > MOST_FRAMES:
-        raise InputError(f"frames must be at most {MOST_FRAMES}: got {frames}.")
+        raise InputError("frames", f"must be at most {MOST_FRAMES}", str(frames))
     times = data["time"].values
     steps = np.linspace(0.0, times.size - 1.0, frames)
     shown = np.interp(steps, np.arange(times.size), times)
@@ -183,7 +183,7 @@ class _View:
     def checked(self, time_ms: float) -> float:
         times = self.data["time"].values
         if not 0.0 <= finite("time_ms", time_ms, "ms") <= times[-1]:
-            raise InputError(f"time_ms must lie within 0 ... {times[-1]:g} ms: got {time_ms:g} ms.")
+            raise InputError("time_ms", f"must lie within 0 ... {times[-1]:g} ms", f"{time_ms:g} ms")
         lacking = [
             name
             for name in {self.variable, *(() if self.on_skin else ("displacement_mm",))}

@@ -91,12 +91,14 @@ def read_vtu_series(path: str | Path) -> VtuSeries:
         listed = [dict(entry.attrib) for entry in ElementTree.fromstring(read_text(path)).iter("DataSet")]
         files = [(float(entry["timestep"]), path.with_name(Path(entry["file"]).name)) for entry in listed]
     except (ElementTree.ParseError, KeyError, ValueError) as error:
-        raise InputError(f"{path} must be an index of VTU files: it cannot be read ({error}).") from error
+        raise InputError(
+            path, "must be an index of VTU files", remedy=f"it cannot be read ({error})"
+        ) from error
     found: list[tuple[np.ndarray, list[dict[str, np.ndarray]]]] = []
     for _, name in files:
         reader = vtkXMLUnstructuredGridReader()
         if not reader.CanReadFile(str(name)):
-            raise InputError(f"{name} must be a VTU file: it is missing or cannot be read.")
+            raise InputError(name, "must be a VTU file", remedy="it is missing or cannot be read")
         reader.SetFileName(str(name))
         reader.Update()
         grid = reader.GetOutput()
@@ -106,7 +108,7 @@ def read_vtu_series(path: str | Path) -> VtuSeries:
         ]
         found.append((vtk_to_numpy(grid.GetPoints().GetData()), groups))
     if not found:
-        raise InputError(f"{path} must list a VTU file or more: it lists none.")
+        raise InputError(path, "must list a VTU file or more", remedy="it lists none")
     points, cells, press = (
         {name: np.stack([groups[kind][name] for _, groups in found]) for name in found[0][1][kind]}
         for kind in range(3)

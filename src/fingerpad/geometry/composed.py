@@ -166,7 +166,7 @@ def ridges(
     centres, widths = float_array("centres_mm", centres_mm, 1), float_array("widths_mm", widths_mm, 1)
     if centres.shape != widths.shape or not centres.size:
         raise InputError(
-            f"ridges needs one of widths_mm for each of centres_mm: got {widths.size} and {centres.size}."
+            "ridges", "needs one of widths_mm for each of centres_mm", f"{widths.size} and {centres.size}"
         )
     positive("height_mm", height_mm, "mm")
     bars = [Bar(width, fillet_mm) for width in widths.tolist()]

@@ -52,12 +52,13 @@ class Dots(Indenter):
     def __post_init__(self) -> None:
         at = float_array("at_mm", self.at_mm, 2)
         if not len(at) or at.shape[1] != 2:
-            raise InputError(f"at_mm must hold a pair x, z for each dot: got shape {at.shape}.")
+            raise InputError("at_mm", "must hold a pair x, z for each dot", f"shape {at.shape}")
         plausible("diameter_mm", self.diameter_mm, "mm", SIZES_MM)
         if positive("height_mm", self.height_mm, "mm") > self.diameter_mm / 2:
             raise InputError(
-                f"height_mm must not exceed half of diameter_mm, {self.diameter_mm / 2:g} mm: got "
-                f"{self.height_mm:g} mm."
+                "height_mm",
+                f"must not exceed half of diameter_mm, {self.diameter_mm / 2:g} mm",
+                f"{self.height_mm:g} mm",
             )
         object.__setattr__(self, "at_mm", tuple(map(tuple, at.tolist())))
 
@@ -111,7 +112,7 @@ def braille(text: str, along_finger: bool = True) -> Dots:
     if unknown or not text.strip():
         low = text.lower()
         instead = f"; write {low!r}" if low != text and not set(low) - set(_LETTERS) - {" "} else ""
-        raise InputError(f"text must have letters a to z and spaces: got {text!r}{instead}.")
+        raise InputError("text", "must have letters a to z and spaces", f"{text!r}{instead}")
     places = [
         (cell * BRAILLE_CELL_MM + (int(dot) > 3) * BRAILLE_PITCH_MM, (int(dot) - 1) % 3 * BRAILLE_PITCH_MM)
         for cell, letter in enumerate(text)

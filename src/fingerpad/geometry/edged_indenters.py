@@ -146,8 +146,9 @@ class Gap(Indenter):
         widest = self.width_mm - 2 * self.fillet_mm - 2 * self.lip_radius_mm
         if self.gap_mm > 0.0 and self.gap_mm >= widest:
             raise InputError(
-                f"gap_mm must leave two flat ridges of the bar, so be below {widest:g} mm: "
-                f"got {self.gap_mm:g} mm."
+                "gap_mm",
+                f"must leave two flat ridges of the bar, so be below {widest:g} mm",
+                f"{self.gap_mm:g} mm",
             )
 
     @property
@@ -187,7 +188,7 @@ class Gap(Indenter):
 def _of_period(period_mm: float = 2 * protocol.RIDGE_WIDTH.value, duty: float = 0.5) -> dict[str, float]:
     """Widths of ridge and groove from the period of a grating and the share of a ridge in it."""
     if positive("duty", duty) >= 1.0:
-        raise InputError(f"duty must be below 1, the share of a ridge in the period: got {duty!r}.")
+        raise InputError("duty", "must be below 1, the share of a ridge in the period", repr(duty))
     ridge = positive("period_mm", period_mm, "mm") * duty
     return {"ridge_mm": ridge, "groove_mm": period_mm - ridge}
 
@@ -243,7 +244,7 @@ class Grating(Indenter):
         plausible("groove_mm", self.groove_mm, "mm", SIZES_MM)
         if not_negative("lip_mm", self.lip_mm, "mm") > self.ridge_mm / 2:
             raise InputError(
-                f"lip_mm must not exceed half of ridge_mm, {self.ridge_mm / 2:g} mm: got {self.lip_mm:g} mm."
+                "lip_mm", f"must not exceed half of ridge_mm, {self.ridge_mm / 2:g} mm", f"{self.lip_mm:g} mm"
             )
 
     @property

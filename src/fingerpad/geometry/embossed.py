@@ -59,12 +59,14 @@ class Embossed(Indenter):
     def __post_init__(self) -> None:
         outlines = [_closed(f"outlines_mm[{number}]", line) for number, line in enumerate(self.outlines_mm)]
         if not outlines:
-            raise InputError("outlines_mm must hold at least one outline: got none.")
+            raise InputError("outlines_mm", "must hold at least one outline", "none")
         corners = sum(map(len, outlines))
         if corners > MOST_CORNERS:
             raise InputError(
-                f"outlines_mm must have at most {MOST_CORNERS} corners: got {corners}; take fewer letters or "
-                "coarser outlines."
+                "outlines_mm",
+                f"must have at most {MOST_CORNERS} corners",
+                str(corners),
+                "take fewer letters or coarser outlines",
             )
         object.__setattr__(self, "outlines_mm", tuple(tuple(map(tuple, line.tolist())) for line in outlines))
         positive("height_mm", self.height_mm, "mm")
@@ -75,7 +77,7 @@ class Embossed(Indenter):
         for name, most in sizes.items():
             if self.edge_radius_mm > most * (1.0 + 1e-9):
                 raise InputError(
-                    f"edge_radius_mm must not exceed {name}, {most:.3g} mm: got {self.edge_radius_mm:g} mm."
+                    "edge_radius_mm", f"must not exceed {name}, {most:.3g} mm", f"{self.edge_radius_mm:g} mm"
                 )
 
     @property
@@ -184,12 +186,12 @@ def embossed_text(
 
     positive("capital_mm", capital_mm, "mm")
     if not isinstance(text, str) or not text.strip():
-        raise InputError(f"text must have at least one letter: got {text!r}.")
+        raise InputError("text", "must have at least one letter", repr(text))
     font = FontProperties(family="DejaVu Sans", weight=one_of("weight", weight, ("normal", "bold")))
     known = get_font(findfont(font)).get_charmap()
     unknown = sorted(character for character in set(text) if ord(character) not in known)
     if unknown:
-        raise InputError(f"text must have characters of DejaVu Sans: got {unknown[0]!r}.")
+        raise InputError("text", "must have characters of DejaVu Sans", repr(unknown[0]))
 
     def drawn(line: str) -> list[FloatArray]:
         corners, codes = text_to_path.get_text_path(font, line)
@@ -198,7 +200,7 @@ def embossed_text(
 
     outlines = drawn(text)
     if not outlines:
-        raise InputError(f"text must have letters with an outline: got {text!r}.")
+        raise InputError("text", "must have letters with an outline", repr(text))
     scale = capital_mm / np.ptp(np.concatenate(drawn("H"))[:, 1])
     every = np.concatenate(outlines)
     middle = 0.5 * (every.min(axis=0) + every.max(axis=0))
@@ -230,10 +232,10 @@ def _closed(name: str, outline: Sequence[tuple[float, float]]) -> FloatArray:
     if len(corners) > 1 and corners.shape[1] == 2 and (corners[0] == corners[-1]).all():
         corners = corners[:-1]
     if len(corners) < 3 or corners.shape[1] != 2:
-        raise InputError(f"{name} must have at least three corners x, z: got shape {np.shape(outline)}.")
+        raise InputError(name, "must have at least three corners x, z", f"shape {np.shape(outline)}")
     ahead = np.roll(corners, -1, axis=0)
     if (corners == ahead).all(axis=1).any():
-        raise InputError(f"{name} must not have one corner twice in a row: it has.")
+        raise InputError(name, "must not have one corner twice in a row", remedy="it has")
     return corners
 
 

@@ -72,7 +72,7 @@ class Profile:
         length = positive("length_mm", self.length_mm, "mm")
         table = float_array("readings_mm", self.readings_mm, 2)
         if table.shape[1] != 2 or table.shape[0] < 5:
-            raise InputError(f"readings_mm needs at least five pairs (x, value): got shape {table.shape}.")
+            raise InputError("readings_mm", "needs at least five pairs (x, value)", f"shape {table.shape}")
         stations = increasing("x of readings_mm", table[:, 0])
         if stations[0] < 0.0 or stations[-1] >= length:
             raise InputError(
@@ -80,7 +80,9 @@ class Profile:
                 f"got {stations[0]} to {stations[-1]} mm."
             )
         if (table[:, 1] <= 0.0).any():
-            raise InputError(f"readings_mm must be greater than 0: the smallest is {table[:, 1].min()} mm.")
+            raise InputError(
+                "readings_mm", "must be greater than 0", remedy=f"the smallest is {table[:, 1].min()} mm"
+            )
 
     @cached_property
     def _spline(self) -> tuple[BSpline, BSpline, float, float]:
@@ -199,10 +201,10 @@ class Fingertip(Displayed, Finger):
         for name in ("bone_height_mm", "bone_width_mm", "nail_half_width_mm"):
             positive(name, getattr(self, name), "mm")
         if finite("spine_y_mm", self.spine_y_mm, "mm") >= 0.0:
-            raise InputError(f"spine_y_mm must lie below 0, the widest height: got {self.spine_y_mm!r}.")
+            raise InputError("spine_y_mm", "must lie below 0, the widest height", repr(self.spine_y_mm))
         nail = float_array("nail_x_mm", self.nail_x_mm, 1)
         if nail.size != 2 or not nail[0] < nail[1]:
-            raise InputError(f"nail_x_mm must be two increasing numbers: got {self.nail_x_mm}.")
+            raise InputError("nail_x_mm", "must be two increasing numbers", str(self.nail_x_mm))
         if not self.spine_end_x_mm < self.bone_tip_x_mm < self.length_mm:
             raise InputError(
                 "spine_end_x_mm, bone_tip_x_mm and length_mm must increase: "
@@ -419,8 +421,9 @@ class Fingertip(Displayed, Finger):
         outside = ~((x >= 0.0) & (x <= self.length_mm) & (np.abs(z) <= half_width))
         if outside.any():
             raise InputError(
-                f"A position must lie on the finger, x within 0 ... {self.length_mm} mm and |z| within its "
-                f"half-width: got x = {x[outside].flat[0]:.6g}, z = {z[outside].flat[0]:.6g} mm."
+                "position",
+                f"must lie on the finger, x within 0 ... {self.length_mm} mm and |z| within its half-width",
+                f"x = {x[outside].flat[0]:.6g}, z = {z[outside].flat[0]:.6g} mm",
             )
         # At the very tip width and depth are 0 together; the quotient is then taken as 0.
         share = z / np.where(half_width > 0.0, half_width, 1.0)

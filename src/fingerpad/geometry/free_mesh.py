@@ -169,8 +169,9 @@ class FingerMesh(Finger):
         for here_x, here_z, height in zip(x.ravel(), z.ravel(), heights, strict=True):
             if not height.size:
                 raise InputError(
-                    f"A position must lie on the finger, on the skin of its mesh: got x = {here_x:g}, "
-                    f"z = {here_z:g} mm."
+                    "position",
+                    "must lie on the finger, on the skin of its mesh",
+                    f"x = {here_x:g}, z = {here_z:g} mm",
                 )
         y = np.array([height.min() for height in heights]).reshape(x.shape)
         return np.stack([x, y, z], axis=-1)

@@ -79,7 +79,7 @@ class Grading(metaclass=KnownKeywords):
         for name in ("half_length_mm", "half_width_mm", "size_x_mm", "size_z_mm", "largest_mm"):
             positive(name, getattr(self, name), "mm")
         if not 1.0 < finite("growth", self.growth) <= 1.3:
-            raise InputError(f"growth must be above 1 and at most 1.3: got {self.growth!r}.")
+            raise InputError("growth", "must be above 1 and at most 1.3", repr(self.growth))
         for name in ("stratum_corneum", "living_epidermis", "dermis", "subcutis"):
             whole(name, getattr(self, name), 1)
         core = self.core_half_length_mm, self.core_size_mm
@@ -94,8 +94,9 @@ class Grading(metaclass=KnownKeywords):
             for begin, end, size in getattr(self, name):
                 if not (np.isfinite([begin, end]).all() and begin < end and 0.0 < size < np.inf):
                     raise InputError(
-                        f"{name} needs strips of from, to and size in mm, to above from and size above 0: "
-                        f"got {(begin, end, size)!r}."
+                        name,
+                        "needs strips of from, to and size in mm, to above from and size above 0",
+                        repr((begin, end, size)),
                     )
         if self.elements_about > MOST_ELEMENTS:
             raise InputError(
@@ -161,7 +162,7 @@ def covering(gradings: Sequence[Grading]) -> Grading:
     Stimuli that are compared should be pressed into one mesh, so that the error of the mesh is the same.
     """
     if not gradings:
-        raise InputError("covering needs at least one grading: got none.")
+        raise InputError("covering", "needs at least one grading", "none")
     first = gradings[0].centre_mm
     proximal = min(grading.centre_mm - grading.half_length_mm - first for grading in gradings)
     distal = max(grading.centre_mm + grading.half_length_mm - first for grading in gradings)

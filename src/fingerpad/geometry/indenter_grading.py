@@ -105,9 +105,11 @@ def grading_about(
     thin, edges = indenter.half_width_mm < grading.size_x_mm, indenter.edges_mm(reach)
     if thin and spin_deg % 180.0 != 0.0:
         raise InputError(
-            f"spin_deg must be 0 for {type(indenter).__name__}, because it is thinner than "
-            f"{2 * grading.size_x_mm:g} mm, two elements of {resolution}: got {spin_deg:g} degrees; "
-            "give a grading that is fine enough."
+            "spin_deg",
+            f"must be 0 for {type(indenter).__name__}, because it is thinner than "
+            f"{2 * grading.size_x_mm:g} mm, two elements of {resolution}",
+            f"{spin_deg:g} degrees",
+            "give a grading that is fine enough",
         )
     along, across = spin_deg % 180.0 == 0.0, spin_deg % 180.0 == 90.0
     if thin and not np.isfinite(size) and not edges:

@@ -512,5 +512,5 @@ def fillet_within(fillet_mm: float, width_mm: float, width_name: str) -> None:
     not_negative("fillet_mm", fillet_mm, "mm")
     if fillet_mm > width_mm / 2:
         raise InputError(
-            f"fillet_mm must not exceed half of {width_name}, {width_mm / 2:g} mm: got {fillet_mm:g} mm."
+            "fillet_mm", f"must not exceed half of {width_name}, {width_mm / 2:g} mm", f"{fillet_mm:g} mm"
         )

@@ -172,7 +172,7 @@ def block_mesh(
     layer = np.array([whole("layers", index, 0) for index in layers], dtype=np.int64)
     if layer.size != y.size - 1 or (layer >= len(LAYERS)).any():
         raise InputError(
-            f"layers needs an index below {len(LAYERS)} for each interval of y_edges: got {layers}."
+            "layers", f"needs an index below {len(LAYERS)} for each interval of y_edges", str(layers)
         )
     if symmetric and z[0] != 0.0:
         raise InputError(f"z_edges of a symmetric block must start at 0 mm: got {z[0]}.")
@@ -237,7 +237,7 @@ def finger_lines(finger: Fingertip, grading: Grading) -> GridLines:
     station, x, arc = _midline(finger)
     centre = grading.centre_mm
     if not 0.0 < centre < x[-1]:
-        raise InputError(f"centre_mm must lie between 0 and {x[-1]:.2f} mm: got {centre}.")
+        raise InputError("centre_mm", f"must lie between 0 and {x[-1]:.2f} mm", str(centre))
     middle = np.interp(centre, x, arc)
     proximal, distal = (
         lines_along(grading, length, _strips(grading.finer_along, x, way * (arc - middle)))

@@ -41,18 +41,19 @@ def _node_place(mesh: Mesh, node: int) -> str:
 def _check_arrays(mesh: Mesh) -> None:
     nodes, elements = mesh.nodes_mm, mesh.elements
     if nodes.ndim != 2 or nodes.shape[1] != 3 or not len(nodes):
-        raise InputError(f"nodes_mm needs one row of x, y and z per node: got shape {nodes.shape}.")
+        raise InputError("nodes_mm", "needs one row of x, y and z per node", f"shape {nodes.shape}")
     astray = np.flatnonzero(~np.isfinite(nodes).all(axis=1))
     if astray.size:
         raise InputError(
-            f"nodes_mm must hold finite numbers: node {astray[0]} is at {nodes[astray[0]].tolist()}, "
-            f"one of {astray.size} such nodes."
+            "nodes_mm",
+            "must hold finite numbers",
+            remedy=f"node {astray[0]} is at {nodes[astray[0]].tolist()}, one of {astray.size} such nodes",
         )
     if elements.ndim != 2 or elements.shape[1] != len(CORNERS) or not len(elements):
-        raise InputError(f"elements needs one row of 8 nodes per element: got shape {elements.shape}.")
+        raise InputError("elements", "needs one row of 8 nodes per element", f"shape {elements.shape}")
     if mesh.layer.shape != (len(elements),):
         raise InputError(
-            f"layer needs one entry per element: got {mesh.layer.size} for {len(elements)} elements."
+            "layer", "needs one entry per element", f"{mesh.layer.size} for {len(elements)} elements"
         )
 
 
@@ -62,14 +63,16 @@ def _check_elements(mesh: Mesh, n_materials: int) -> None:
     outside = np.flatnonzero(((mesh.elements < 0) | (mesh.elements >= n_nodes)).any(axis=1))
     if outside.size:
         raise InputError(
-            f"elements must refer to nodes 0 to {n_nodes - 1}: "
-            f"element {outside[0]} has {mesh.elements[outside[0]].tolist()}."
+            "elements",
+            f"must refer to nodes 0 to {n_nodes - 1}",
+            remedy=f"element {outside[0]} has {mesh.elements[outside[0]].tolist()}",
         )
     without = np.flatnonzero((mesh.layer < 0) | (mesh.layer >= n_materials))
     if without.size:
         raise InputError(
-            f"layer must be an index below {n_materials}, the number of materials: "
-            f"{element_place(mesh, without[0])} has {mesh.layer[without[0]]}."
+            "layer",
+            f"must be an index below {n_materials}, the number of materials",
+            remedy=f"{element_place(mesh, without[0])} has {mesh.layer[without[0]]}",
         )
     repeated = np.flatnonzero((np.diff(np.sort(mesh.elements, axis=1), axis=1) == 0).any(axis=1))
     wrong = repeated[~_is_wedge(mesh.elements[repeated])]
@@ -107,10 +110,10 @@ def _check_sets(mesh: Mesh) -> None:
         numbers = getattr(mesh, name).ravel()
         wrong = numbers[(numbers < 0) | (numbers >= last)]
         if wrong.size:
-            raise InputError(f"{name} must hold numbers from 0 to {last - 1}: got {wrong[0]}.")
+            raise InputError(name, f"must hold numbers from 0 to {last - 1}", str(wrong[0]))
     if not mesh.skin_grid.size:
         raise InputError(
-            "skin_grid must name the nodes of the skin, where the indenter touches: it is empty."
+            "skin_grid", "must name the nodes of the skin, where the indenter touches", remedy="it is empty"
         )
     if not mesh.fixed_nodes.size:
         raise InputError(
@@ -118,8 +121,9 @@ def _check_sets(mesh: Mesh) -> None:
         )
     if mesh.full != (not mesh.symmetry_nodes.size):
         raise InputError(
-            f"symmetry_nodes must be given for half a body and only then: got full={mesh.full} "
-            f"with {mesh.symmetry_nodes.size} of them."
+            "symmetry_nodes",
+            "must be given for half a body and only then",
+            f"full={mesh.full} with {mesh.symmetry_nodes.size} of them",
         )
     if not mesh.full:
         _check_plane(mesh)
@@ -133,14 +137,18 @@ def _check_plane(mesh: Mesh) -> None:
     listed[mesh.symmetry_nodes] = True
     off = np.flatnonzero(listed & (np.abs(z) > tolerance_mm))
     if off.size:
-        raise InputError(f"symmetry_nodes must lie at z = 0: {_node_place(mesh, off[0])} does not.")
+        raise InputError(
+            "symmetry_nodes", "must lie at z = 0", remedy=f"{_node_place(mesh, off[0])} does not"
+        )
     beyond = np.flatnonzero(z < -tolerance_mm)
     if beyond.size:
         raise InputError(f"Half a body must lie at z >= 0: {_node_place(mesh, beyond[0])} does not.")
     missing = np.flatnonzero(~listed & (np.abs(z) <= tolerance_mm))
     if missing.size:
         raise InputError(
-            f"symmetry_nodes must hold every node at z = 0: {_node_place(mesh, missing[0])} is missing."
+            "symmetry_nodes",
+            "must hold every node at z = 0",
+            remedy=f"{_node_place(mesh, missing[0])} is missing",
         )
 
 

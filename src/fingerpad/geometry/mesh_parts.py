@@ -147,8 +147,10 @@ class _Making:
             turn[row, column] = sign
         if len(ways) != 3 or round(float(np.linalg.det(turn))) != 1:
             raise InputError(
-                "axes must name the axes of the file that point to the tip, to the nail and to the side, and "
-                f"must not mirror it, as 'x y z' or 'z y -x': got {axes!r}."
+                "axes",
+                "must name the axes of the file that point to the tip, to the nail and to the side, and "
+                "must not mirror it, as 'x y z' or 'z y -x'",
+                repr(axes),
             )
         raw = self.parts.nodes[used]
         if not np.isfinite(raw).all():

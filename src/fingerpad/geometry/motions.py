@@ -109,14 +109,14 @@ def chirp(
     hold = _hold(depth_mm, amplitude_mm, force_mn, amplitude_mn)
     pair = float_array("frequencies_hz", frequencies_hz, 1)  # type: ignore[arg-type]
     if pair.size != 2:
-        raise InputError(f"frequencies_hz must be a pair, first and last: got {pair.size}.")
+        raise InputError("frequencies_hz", "must be a pair, first and last", str(pair.size))
     first, last = (positive("frequencies_hz", each, "Hz") for each in pair.tolist())
     duration_ms = positive("sweep_ms", sweep_ms, "ms")  # type: ignore[arg-type]
     seconds = duration_ms / MS_PER_S
     cycles = int((first + last) / 2.0 * seconds)
     if cycles < 1:
         raise InputError(
-            f"sweep_ms must leave time for a cycle of {first:g} to {last:g} Hz: got {duration_ms:g} ms."
+            "sweep_ms", f"must leave time for a cycle of {first:g} to {last:g} Hz", f"{duration_ms:g} ms"
         )
     turns = np.arange(1, SAMPLES_PER_CYCLE * cycles + 1) / SAMPLES_PER_CYCLE
     # turns = first t + rate t^2 / 2, solved for t in the form that also holds for a rate of 0.
@@ -271,7 +271,7 @@ def _check_given(name: str, **needed: object) -> None:
     missing = [parameter for parameter, value in needed.items() if value is None]
     if missing:
         those = "they are" if len(missing) > 1 else "it is"
-        raise InputError(f"{name} needs {', '.join(missing)}: {those} not given.")
+        raise InputError(name, f"needs {', '.join(missing)}", remedy=f"{those} not given")
 
 
 def _hold(
@@ -295,7 +295,7 @@ def _hold(
         (name, positive(name, value, "mN" if force_mn is not None else "mm")) for name, value in given.items()
     )
     if column == "force_mn" and amplitude > level:
-        raise InputError(f"{name} must be at most force_mn, {level:g} mN: got {amplitude:g}.")
+        raise InputError(name, f"must be at most force_mn, {level:g} mN", f"{amplitude:g}")
     return column, level, amplitude
 
 

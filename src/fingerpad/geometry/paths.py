@@ -46,8 +46,10 @@ def check_path(finger: Finger, motion: Motion, at_mm: tuple[float, float]) -> No
     worst = int((depths_mm - deepest_mm).argmax())
     if depths_mm[worst] > deepest_mm[worst]:
         raise InputError(
-            f"depth_mm must stay below {deepest_mm[worst]:.2f} mm at x = {x[worst]:g}, z = {z[worst]:g} mm, "
-            f"because of the bone: got {depths_mm[worst]:g} mm{_sample(motion, times[worst])}."
+            "depth_mm",
+            f"must stay below {deepest_mm[worst]:.2f} mm at x = {x[worst]:g}, z = {z[worst]:g} mm, "
+            "because of the bone",
+            f"{depths_mm[worst]:g} mm{_sample(motion, times[worst])}",
         )
 
 

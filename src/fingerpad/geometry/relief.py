@@ -152,8 +152,9 @@ def check_edge_radius(radius_mm: float, narrowest_mm: float) -> None:
     """Raise `InputError` if edges of this radius do not fit the narrowest part [mm]."""
     if radius_mm > narrowest_mm / 2 * (1.0 + 1e-9):
         raise InputError(
-            f"edge_radius_mm must not exceed half of the narrowest part, {narrowest_mm / 2:.3g} mm: got "
-            f"{radius_mm:g} mm."
+            "edge_radius_mm",
+            f"must not exceed half of the narrowest part, {narrowest_mm / 2:.3g} mm",
+            f"{radius_mm:g} mm",
         )
 
 

@@ -103,8 +103,9 @@ class Surface(Indenter):
             )
         if faces.min() < 0 or faces.max() >= len(vertices):
             raise InputError(
-                f"faces must hold numbers of vertices, 0 to {len(vertices) - 1}: got {faces.min()} to "
-                f"{faces.max()}."
+                "faces",
+                f"must hold numbers of vertices, 0 to {len(vertices) - 1}",
+                f"{faces.min()} to {faces.max()}",
             )
         corners = vertices[faces]
         first, second, third = corners.transpose(1, 0, 2)
@@ -123,8 +124,9 @@ class Surface(Indenter):
         self.__dict__["repairs"] = told
         if not 0.0 <= finite("smooth_below_deg", self.smooth_below_deg, "degrees") <= LARGEST_SMOOTH_DEG:
             raise InputError(
-                f"smooth_below_deg must be from 0 to {LARGEST_SMOOTH_DEG:g} degrees: got "
-                f"{self.smooth_below_deg:g}."
+                "smooth_below_deg",
+                f"must be from 0 to {LARGEST_SMOOTH_DEG:g} degrees",
+                f"{self.smooth_below_deg:g}",
             )
         for name, value in (("vertices_mm", vertices), ("faces", faces)):
             value.setflags(write=False)
@@ -284,8 +286,10 @@ def check_heights(name: str, heights: int) -> None:
     """Raise `InputError` if a map has more heights than become a body in reasonable time."""
     if heights > MOST_HEIGHTS:
         raise InputError(
-            f"{name} must have at most {MOST_HEIGHTS:,} heights: got {heights:,}; crop it or take every "
-            "second row and column with twice the pitch."
+            name,
+            f"must have at most {MOST_HEIGHTS:,} heights",
+            f"{heights:,}",
+            "crop it or take every second row and column with twice the pitch",
         )
 
 
@@ -318,7 +322,7 @@ def height_surface(
     positive("pitch_mm", pitch_mm, "mm")
     rows, columns = heights.shape
     if min(rows, columns) < 2:
-        raise InputError(f"heights_mm must have at least 2 rows and 2 columns: got {rows} and {columns}.")
+        raise InputError("heights_mm", "must have at least 2 rows and 2 columns", f"{rows} and {columns}")
     check_heights("heights_mm", heights.size)
     z, x = ((np.arange(count) - (count - 1) / 2) * pitch_mm for count in (rows, columns))
     vertices = np.stack([*np.broadcast_arrays(x[None, :], heights, z[:, None])], axis=-1).reshape(-1, 3)

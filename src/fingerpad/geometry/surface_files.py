@@ -76,7 +76,7 @@ def read_surface(
     number, sign = _AXES[one_of("up", up, tuple(_AXES))]
     at = float_array("at_mm", at_mm, 1)
     if at.shape != (2,):
-        raise InputError(f"at_mm must be two numbers, along and across the finger in mm: got {at_mm!r}.")
+        raise InputError("at_mm", "must be two numbers, along and across the finger in mm", repr(at_mm))
     _check_file(file, MESHES)
     try:
         vertices, faces = read_triangles(file)

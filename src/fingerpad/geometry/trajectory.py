@@ -134,7 +134,7 @@ class Trajectory(Motion):
     def __post_init__(self) -> None:
         times = increasing("times_ms", float_array("times_ms", self.times_ms, 1))
         if times.size < 2 or times[0] != 0.0:
-            raise InputError(f"times_ms must hold at least two times, the first of them 0: got {times}.")
+            raise InputError("times_ms", "must hold at least two times, the first of them 0", str(times))
         if (self.depth_mm is None) == (self.force_mn is None):
             raise InputError("A trajectory needs either depth_mm or force_mn: give one of them.")
         name = "force_mn" if self.depth_mm is None else "depth_mm"
@@ -143,10 +143,10 @@ class Trajectory(Motion):
                 continue
             values = float_array(column, getattr(self, column), 1)
             if values.size != times.size:
-                raise InputError(f"{column} must have one value per time, {times.size}: got {values.size}.")
+                raise InputError(column, f"must have one value per time, {times.size}", str(values.size))
             if column in POSE_COLUMNS and values[0] != 0.0:
                 raise InputError(
-                    f"{column} must begin with 0, since it is counted from first touch: got {values[0]:g}."
+                    column, "must begin with 0, since it is counted from first touch", f"{values[0]:g}"
                 )
             if column.endswith("_mm"):
                 check_speed(column, times, values)
@@ -154,18 +154,19 @@ class Trajectory(Motion):
         values = np.array(getattr(self, name))
         if values[0] > 0.0:
             raise InputError(
-                f"{name} must begin with 0 or less, without contact: it begins with {values[0]:g}."
+                name, "must begin with 0 or less, without contact", remedy=f"it begins with {values[0]:g}"
             )
         if name == "force_mn" and values.min() < 0.0:
             first = int(np.argmax(values < 0.0))
             raise InputError(
-                f"force_mn must not be negative: got {values[first]:g} mN at {times[first]:g} ms, sample "
-                f"{first + 1}."
+                "force_mn",
+                "must not be negative",
+                f"{values[first]:g} mN at {times[first]:g} ms, sample {first + 1}",
             )
         # Aside, the skin may lie higher than at first touch.
         aside = name == "depth_mm" and any(getattr(self, column) for column in POSE_COLUMNS)
         if values.max() <= 0.0 and not aside:
-            raise InputError(f"{name} must be above 0 at some time: the indenter would never press.")
+            raise InputError(name, "must be above 0 at some time", remedy="the indenter would never press")
         if values.max() > 0.0 and not aside:
             plausible(f"the largest {name}", values.max(), unit_of(name), PLAUSIBLE[name])
         object.__setattr__(self, "times_ms", tuple(times.tolist()))
@@ -173,8 +174,9 @@ class Trajectory(Motion):
         for phase in self.phases:
             if phase.end_ms > self.end_ms:
                 raise InputError(
-                    f"phases must end with the trajectory, at {self.end_ms:g} ms: {phase.name!r} ends at "
-                    f"{phase.end_ms:g} ms."
+                    "phases",
+                    f"must end with the trajectory, at {self.end_ms:g} ms",
+                    remedy=f"{phase.name!r} ends at {phase.end_ms:g} ms",
                 )
         if self.cycles is not None:
             self._check_cycles(self.cycles)
@@ -189,8 +191,10 @@ class Trajectory(Motion):
             if np.ptp(since, axis=0).max() < near and np.ptp(course, axis=0).max() < SAME_SPEED:
                 return
         raise InputError(
-            f"cycles must repeat the samples of the first of them {cycles.count} times, every "
-            f"{cycles.period_ms:g} ms from a sample at {cycles.start_ms:g} ms: they do not."
+            "cycles",
+            f"must repeat the samples of the first of them {cycles.count} times, every "
+            f"{cycles.period_ms:g} ms from a sample at {cycles.start_ms:g} ms",
+            remedy="they do not",
         )
 
     @property

@@ -117,12 +117,12 @@ def _columns(rows: Sequence[TableRow], path: str) -> dict[str, FloatArray]:
         name, factor = COLUMNS[column]
         if name in columns:
             raise InputError(
-                f"{path} must have one column for {name}: {column} is another one, leave it out."
+                path, f"must have one column for {name}", remedy=f"{column} is another one, leave it out"
             )
         columns[name] = factor * column_of(rows, column)
     if "times_ms" not in columns:
         raise InputError(
-            f"{path} must have the column time_ms or time_s: it has {', '.join(rows[0].entries)}."
+            path, "must have the column time_ms or time_s", remedy=f"it has {', '.join(rows[0].entries)}"
         )
     return columns
 
@@ -213,7 +213,7 @@ def sampled(
     courses = {name: course for name, course in given if course is not None}
     for name, course in courses.items():
         if not callable(course):
-            raise InputError(f"{name} must be a function of the time [ms]: got {shown(course)}.")
+            raise InputError(name, "must be a function of the time [ms]", shown(course))
     if not courses:
         raise InputError("A trajectory needs either depth_mm or force_mn: give one of them.")
 

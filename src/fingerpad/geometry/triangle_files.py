@@ -57,7 +57,7 @@ def _numbers(words: Any, place: str) -> FloatArray:
     try:
         return np.array(words, dtype=np.float64)
     except ValueError as error:
-        raise InputError(f"{place} must have three numbers each: {error}.") from error
+        raise InputError(place, "must have three numbers each", remedy=str(error)) from error
 
 
 def _stl(content: bytes) -> Mesh:
@@ -151,8 +151,9 @@ def _fans(polygons: list[list[int]], vertices: FloatArray) -> IntArray:
                 corners[todo] = np.roll(corners[todo], 1, axis=1)
             if todo.size:
                 raise InputError(
-                    f"faces must be triangles, or polygons that a fan of triangles fills: {todo.size:,} of "
-                    f"{size} vertices are not; divide them into triangles."
+                    "faces",
+                    "must be triangles, or polygons that a fan of triangles fills",
+                    remedy=f"{todo.size:,} of {size} vertices are not; divide them into triangles",
                 )
         faces.extend(corners[:, [0, k, k + 1]] for k in range(1, size - 1))
     return np.concatenate(faces)
@@ -174,7 +175,9 @@ def _ply(content: bytes) -> Mesh:
     try:
         numbers = [[int(corner) for corner in polygon] for polygon in polygons]
     except (TypeError, ValueError) as error:
-        raise InputError(f"faces must be lists of whole numbers, their vertices: {error}.") from error
+        raise InputError(
+            "faces", "must be lists of whole numbers, their vertices", remedy=str(error)
+        ) from error
     return points, _fans(numbers, points)
 
 

@@ -52,8 +52,9 @@ def to_coordinates(four: ArrayLike) -> FloatArray:
     numbers = np.asarray(four, dtype=np.float64)
     if numbers.shape[-1:] != (4,) or not (numbers[..., 1:] > 0.0).all():
         raise InputError(
-            f"four must hold {', '.join(IDENTIFIABLE_NAMES)}, all but the first greater than 0: "
-            f"got {numbers.tolist()}."
+            "four",
+            f"must hold {', '.join(IDENTIFIABLE_NAMES)}, all but the first greater than 0",
+            str(numbers.tolist()),
         )
     tau = numbers[..., 3:]
     return np.concatenate([numbers[..., :1] * tau, np.log(numbers[..., 1:])], axis=-1)
@@ -90,7 +91,7 @@ class AfferentPrior:
             positive(name, getattr(self, name))
         for name in ("gain_factor", "time_constant_factor"):
             if finite(name, getattr(self, name)) <= 1.0:
-                raise InputError(f"{name} must be greater than 1: got {getattr(self, name)!r}.")
+                raise InputError(name, "must be greater than 1", repr(getattr(self, name)))
 
     @property
     def centre(self) -> FloatArray:
@@ -127,8 +128,9 @@ class AfferentPosterior:
 def log_posterior(likelihood: RateLikelihood, prior: AfferentPrior) -> LogDensity:
     if likelihood.model.names != IDENTIFIABLE_NAMES:
         raise InputError(
-            f"likelihood needs a model of {', '.join(IDENTIFIABLE_NAMES)}, as four_number_model makes it: "
-            f"got one of {', '.join(likelihood.model.names)}."
+            "likelihood",
+            f"needs a model of {', '.join(IDENTIFIABLE_NAMES)}, as four_number_model makes it",
+            f"one of {', '.join(likelihood.model.names)}",
         )
 
     def log_density(points: FloatArray) -> FloatArray:

@@ -79,11 +79,13 @@ def _rows(name: str, values: ArrayLike, names: tuple[str, ...]) -> FloatArray:
     try:
         array = np.asarray(values, dtype=np.float64)
     except (TypeError, ValueError) as error:
-        raise InputError(f"{name} must hold numbers: got {type(values).__name__}.") from error
+        raise InputError(name, "must hold numbers", type(values).__name__) from error
     if array.ndim == 0 or array.shape[-1] != len(names):
-        raise InputError(f"{name} must hold {', '.join(names)} along its last axis: got shape {array.shape}.")
+        raise InputError(name, f"must hold {', '.join(names)} along its last axis", f"shape {array.shape}")
     if not np.isfinite(array).all():
-        raise InputError(f"{name} must hold finite numbers only: {(~np.isfinite(array)).sum()} are not.")
+        raise InputError(
+            name, "must hold finite numbers only", remedy=f"{(~np.isfinite(array)).sum()} are not"
+        )
     return array
 
 
@@ -119,7 +121,7 @@ def checked_spike_parameters(parameters: ArrayLike) -> FloatArray:
     numbers = float_array("parameters", parameters, 1)
     if numbers.size != N_PARAMETERS:
         raise InputError(
-            f"parameters must hold {', '.join(SPIKE_PARAMETER_NAMES)}: got {numbers.size} numbers."
+            "parameters", f"must hold {', '.join(SPIKE_PARAMETER_NAMES)}", f"{numbers.size} numbers"
         )
     positive(SPIKE_PARAMETER_NAMES[3], numbers[3], "ms")
     positive(SPIKE_PARAMETER_NAMES[4], numbers[4])

@@ -59,15 +59,16 @@ class CorrelatedResiduals:
         positive("deviation", self.deviation)
         lengths = float_array("lengths_mm", self.lengths_mm, 1)
         if not lengths.size or (lengths < 0.0).any():
-            raise InputError(f"lengths_mm must hold lengths of at least 0: got {self.lengths_mm}.")
+            raise InputError("lengths_mm", "must hold lengths of at least 0", str(self.lengths_mm))
         if self.positions_mm is None:
             lengths, distances = np.zeros(1), np.zeros((n, n))
         else:
             places = float_array("positions_mm", self.positions_mm, 1)
             if places.size != n or np.unique(places).size != n:
                 raise InputError(
-                    f"positions_mm needs a different position for each of {n} stimuli: "
-                    f"got {places.size} values, {np.unique(places).size} of them different."
+                    "positions_mm",
+                    f"needs a different position for each of {n} stimuli",
+                    f"{places.size} values, {np.unique(places).size} of them different",
                 )
             distances = np.abs(places[:, None] - places)
         whitening = np.array([_whitening(distances, length) for length in lengths])
@@ -123,8 +124,9 @@ class RateLikelihood:
         n = self.model.n_stimuli
         if len(self.recordings.stimuli) != n:
             raise InputError(
-                f"recordings needs one stimulus per column of the model's drive: "
-                f"got {len(self.recordings.stimuli)} for {n}."
+                "recordings",
+                "needs one stimulus per column of the model's drive",
+                f"{len(self.recordings.stimuli)} for {n}",
             )
         positive("deviation_hz", self.deviation_hz, "spikes/s")
         residuals = CorrelatedResiduals(n, self.positions_mm, self.lengths_mm, self.deviation_hz)

@@ -85,7 +85,7 @@ def checked_rows(model: RateModel, points: FloatArray) -> FloatArray:
     """Return rows with one entry per parameter of the model, else raise `InputError`."""
     rows = np.asarray(points, dtype=np.float64)
     if rows.ndim != 2 or rows.shape[1] != len(model.names):
-        raise InputError(f"points must have {len(model.names)} columns: got shape {rows.shape}.")
+        raise InputError("points", f"must have {len(model.names)} columns", f"shape {rows.shape}")
     return rows
 
 
@@ -131,8 +131,9 @@ class AfferentModel(metaclass=KnownKeywords):
         for group, columns in zip(self.drives, self.stimuli, strict=True):
             if group.times_ms[-1] < end:
                 raise InputError(
-                    f"windows_ms must end with the stimuli: one ends at {end:g} ms, stimulus "
-                    f"{columns[0] + 1} at {group.times_ms[-1]:g} ms."
+                    "windows_ms",
+                    "must end with the stimuli",
+                    remedy=f"one ends at {end:g} ms, stimulus {columns[0] + 1} at {group.times_ms[-1]:g} ms",
                 )
 
     @classmethod
@@ -167,8 +168,9 @@ class AfferentModel(metaclass=KnownKeywords):
         quantities = sorted({f"{part.dynamic_quantity} and {part.static_quantity}" for part in parts})
         if len(quantities) != 1:
             raise InputError(
-                "traces must bring one dynamic_quantity and one static_quantity: got "
-                f"{', '.join(quantities) or 'no traces'}."
+                "traces",
+                "must bring one dynamic_quantity and one static_quantity",
+                str(", ".join(quantities) or "no traces"),
             )
         groups: dict[tuple[object, ...], list[tuple[int, Traces]]] = {}
         first = 0

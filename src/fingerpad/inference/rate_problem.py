@@ -34,8 +34,9 @@ class RateProblem:
         observed = len(self.recordings.stimuli)
         if observed != self.model.n_stimuli:
             raise InputError(
-                "recordings needs one stimulus per column of the model's drive: "
-                f"got {observed} for {self.model.n_stimuli}."
+                "recordings",
+                "needs one stimulus per column of the model's drive",
+                f"{observed} for {self.model.n_stimuli}",
             )
         not_negative("dynamic_weight", self.dynamic_weight)
         not_negative("static_weight", self.static_weight)

@@ -93,8 +93,9 @@ class SphereHitRates:
     def __post_init__(self) -> None:
         if self.model.n_stimuli % (self.n_positions * self.n_receptors):
             raise InputError(
-                f"model must have one column per position, sphere and receptor: got {self.model.n_stimuli} "
-                f"for {self.n_positions} positions and {self.n_receptors} receptors."
+                "model",
+                "must have one column per position, sphere and receptor",
+                f"{self.model.n_stimuli} for {self.n_positions} positions and {self.n_receptors} receptors",
             )
 
     def __call__(self, parameters: FloatArray) -> FloatArray:
@@ -128,7 +129,7 @@ class ToRatesAndHitRates:
     def fit(self, problem: Problem, chosen: IntArray) -> Fit:
         """Fit the chosen rates, and all hit rates."""
         if not (isinstance(problem, RateProblem) and isinstance(problem.model, AfferentModel)):
-            raise InputError(f"problem must have the paper's six parameters: got {', '.join(problem.names)}.")
+            raise InputError("problem", "must have the paper's six parameters", str(", ".join(problem.names)))
         model = problem.model
         rates, bounds = four_number_problem(model, problem.recordings), bounds_of(*model.drives)
         both = RatesAndHitRates(rates, lambda numbers: self.hit_rates(fitted_six(numbers)), self.observed)

@@ -53,7 +53,9 @@ class RateRecordings(metaclass=KnownKeywords):
         object.__setattr__(self, "stimuli", tuple(self.stimuli))
         twice = sorted(name for name, count in Counter(self.stimuli).items() if count > 1)
         if twice:
-            raise InputError(f"stimuli must be named once each: {twice[0]!r} is repeated; take its mean.")
+            raise InputError(
+                "stimuli", "must be named once each", remedy=f"{twice[0]!r} is repeated; take its mean"
+            )
         if not self.stimuli:
             raise InputError("RateRecordings needs at least one stimulus: got none.")
         if not self.phases:
@@ -62,11 +64,11 @@ class RateRecordings(metaclass=KnownKeywords):
             name = f"{phase}_rate_hz"
             rates = float_array(name, getattr(self, name), 1)
             if rates.size != len(self.stimuli):
-                raise InputError(
-                    f"{name} needs one rate per stimulus: got {rates.size} for {len(self.stimuli)}."
-                )
+                raise InputError(name, "needs one rate per stimulus", f"{rates.size} for {len(self.stimuli)}")
             if (rates < 0.0).any():
-                raise InputError(f"{name} must not be negative: the smallest is {rates.min():g} spikes/s.")
+                raise InputError(
+                    name, "must not be negative", remedy=f"the smallest is {rates.min():g} spikes/s"
+                )
             object.__setattr__(self, name, rates)
 
     @property
@@ -125,13 +127,14 @@ class SpikeRecordings(metaclass=KnownKeywords):
         instance("trains", self.trains, SpikeTrains)
         if len(self.trains) != len(self.stimuli):
             raise InputError(
-                f"trains needs one train per presentation: got {len(self.trains)} for {len(self.stimuli)}."
+                "trains", "needs one train per presentation", f"{len(self.trains)} for {len(self.stimuli)}"
             )
         duration = float_array("duration_ms", np.atleast_1d(self.duration_ms), 1)
         if duration.size not in (1, len(self.stimuli)) or (duration <= 0.0).any():
             raise InputError(
-                f"duration_ms must be above 0, one for all or for each of {len(self.stimuli)} presentations: "
-                f"got {self.duration_ms!r}."
+                "duration_ms",
+                f"must be above 0, one for all or for each of {len(self.stimuli)} presentations",
+                repr(self.duration_ms),
             )
         duration = float_array("duration_ms", np.broadcast_to(duration, len(self.stimuli)), 1)
         object.__setattr__(self, "duration_ms", duration)
@@ -140,8 +143,9 @@ class SpikeRecordings(metaclass=KnownKeywords):
             if train.size and (train[0] < 0.0 or train[-1] > end):
                 outside = train[0] if train[0] < 0.0 else train[-1]
                 raise InputError(
-                    f"spikes must lie between 0 and duration_ms, {end:g} ms: {name!r} has one at "
-                    f"{outside:g} ms."
+                    "spikes",
+                    f"must lie between 0 and duration_ms, {end:g} ms",
+                    remedy=f"{name!r} has one at {outside:g} ms",
                 )
 
     def rates(self, windows_ms: Windows, measure: str = INTERVAL) -> RateRecordings:
@@ -157,8 +161,9 @@ class SpikeRecordings(metaclass=KnownKeywords):
         end = max(window[-1] for window in windows_ms)
         if self.duration_ms.size and end > self.duration_ms.min() + ROUNDING_MS:
             raise InputError(
-                f"windows_ms must end within the recordings of {self.duration_ms.min():g} ms: "
-                f"one ends at {end:g} ms."
+                "windows_ms",
+                f"must end within the recordings of {self.duration_ms.min():g} ms",
+                remedy=f"one ends at {end:g} ms",
             )
         names = tuple(dict.fromkeys(self.stimuli))
         owner = np.array([names.index(name) for name in self.stimuli], dtype=np.int64)

@@ -118,7 +118,9 @@ def fit_spikes(recorded: SpikeLikelihood, start: ArrayLike, most_steps: int = 10
     here = canonical(checked_spike_parameters(start))
     value = recorded.canonical_derivatives(here)[0]
     if not np.isfinite(value):
-        raise InputError(f"start must make the spikes possible: log L is {value}; take a wider threshold.")
+        raise InputError(
+            "start", "must make the spikes possible", remedy=f"log L is {value}; take a wider threshold"
+        )
     history = [value]
     # Far from the maximum, steps of tau are unreliable: fit the four concave parameters first.
     for free in (slice(0, 4), slice(0, N_PARAMETERS)):

@@ -239,14 +239,16 @@ class SpikeLikelihood:
             n_trains and not 0 <= sites.min() <= sites.max() < self.drive.n_sites
         ):
             raise InputError(
-                f"sites must name one of {self.drive.n_sites} columns of the drive for each of {n_trains} "
-                f"trains, from 0: got {sites}."
+                "sites",
+                f"must name one of {self.drive.n_sites} columns of the drive for each of {n_trains} "
+                "trains, from 0",
+                str(sites),
             )
         given = times[-1] if self.duration_ms is None else self.duration_ms
         ends = np.broadcast_to(float_array("duration_ms", np.atleast_1d(given), 1), n_trains)
         if n_trains and (ends.min() <= times[0] or ends.max() > times[-1]):
             raise InputError(
-                f"duration_ms must lie within the drive, {times[0]:g} ... {times[-1]:g} ms: got {given}."
+                "duration_ms", f"must lie within the drive, {times[0]:g} ... {times[-1]:g} ms", str(given)
             )
         _check_spikes(self.trains, times[0], ends, self.refractory_ms)
         intervals = cut(
@@ -354,7 +356,7 @@ def time_rescaling(recorded: SpikeLikelihood, parameters: ArrayLike) -> TimeResc
     [0.63, 0.86, 0.92]
     """
     if recorded.n_spikes == 0:
-        raise InputError("time_rescaling needs at least one spike: got none.")
+        raise InputError("time_rescaling", "needs at least one spike", "none")
     intervals = np.diff(recorded.operational_times(parameters), prepend=0.0)
     quantiles = np.sort(-np.expm1(-intervals))
     test = kstest(quantiles, "uniform")
@@ -367,12 +369,15 @@ def _check_spikes(trains: SpikeTrains, start_ms: float, ends_ms: FloatArray, ref
         if train.size and not start_ms < train[0] <= train[-1] <= end:
             outside = train[0] if train[0] <= start_ms else train[-1]
             raise InputError(
-                f"spikes must lie after {start_ms:g} and until {end:g} ms, where the recording ends: train "
-                f"{number} has one at {outside:g} ms."
+                "spikes",
+                f"must lie after {start_ms:g} and until {end:g} ms, where the recording ends",
+                remedy=f"train {number} has one at {outside:g} ms",
             )
         close = np.flatnonzero(np.diff(train) <= refractory_ms)
         if close.size:
             raise InputError(
-                f"spikes must lie further apart than refractory_ms, {refractory_ms:g} ms: train {number} has "
-                f"two at {train[close[0]]:g} and {train[close[0] + 1]:g} ms; give a shorter refractory_ms."
+                "spikes",
+                f"must lie further apart than refractory_ms, {refractory_ms:g} ms",
+                remedy=f"train {number} has two at {train[close[0]]:g} and {train[close[0] + 1]:g} ms; "
+                "give a shorter refractory_ms",
             )

@@ -140,7 +140,7 @@ def fit_afferent(
         afferent, tuple(free), (traces,) if isinstance(traces, Traces) else tuple(traces), windows_ms
     )
     if not model.names:
-        raise InputError(f"free must name at least one number of {type(afferent).__name__}: got none.")
+        raise InputError("free", f"must name at least one number of {type(afferent).__name__}", "none")
     problem = RateProblem(model, recordings)
     low = np.full(len(model.names), -np.log(LARGEST_FACTOR))
     high = np.log([_largest_factor(afferent, name) for name in model.names])

@@ -79,8 +79,9 @@ def motion_of(
     training = described.training
     if state.depth_mm > training.range.depth_mm:
         raise InputError(
-            f"depth_mm must be at most {training.range.depth_mm:g}, the depth of this reduced touch: got "
-            f"{state.depth_mm:g}."
+            "depth_mm",
+            f"must be at most {training.range.depth_mm:g}, the depth of this reduced touch",
+            f"{state.depth_mm:g}",
         )
     shape = shape_of(described, state.size)
     ways = (state.x_mm, state.x_mm + state.slide_mm)

@@ -111,7 +111,7 @@ class Laboratory(metaclass=KnownKeywords):
         ):
             if getattr(state, name) not in known:
                 words = ", ".join(each for each in known if each)
-                raise InputError(f"{name} must be one of {words}: got {getattr(state, name)[:40]!r}.")
+                raise InputError(name, f"must be one of {words}", repr(getattr(state, name)[:40]))
         key = state.object, state.finger, state.tissues
         with self._lock:
             if key not in self._described:

@@ -174,5 +174,5 @@ def _free_port(port: int) -> int:
         try:
             tried.bind((HOST, port))
         except (OSError, OverflowError) as error:
-            raise InputError(f"--port must be a free port: got {port} ({error}).") from error
+            raise InputError("--port", "must be a free port", f"{port} ({error})") from error
         return int(tried.getsockname()[1])

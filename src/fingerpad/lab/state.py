@@ -86,11 +86,13 @@ def state_of(asked: Mapping[str, Any] | Any) -> LabState:
             raise InputError(f"{str(name)[:40]!r} is nothing that can be set: {hint}")
         values[name] = str(value) if known[name] == "str" else _number(name, value)
     if not values.get("object"):
-        raise InputError("object must be given: the name of what is pressed in.")
+        raise InputError("object", "must be given", remedy="the name of what is pressed in")
     if values.get("afferent", AFFERENTS[0]) not in AFFERENTS:
         raise InputError(
-            f"afferent must be {' or '.join(AFFERENTS)}, because a reduced touch keeps what these two follow "
-            f"alone: got {values['afferent'][:40]!r}; fp.AfferentStream takes all types."
+            "afferent",
+            f"must be {' or '.join(AFFERENTS)}, because a reduced touch keeps what these two follow alone",
+            repr(values["afferent"][:40]),
+            "fp.AfferentStream takes all types",
         )
     return LabState(**values)
 
@@ -102,5 +104,5 @@ def _number(name: str, value: Any) -> float:
     except (TypeError, ValueError, OverflowError):
         number = math.nan
     if isinstance(value, bool) or not low <= number <= high:
-        raise InputError(f"{name} must be a number within {low:g} to {high:g}: got {str(value)[:40]!r}.")
+        raise InputError(name, f"must be a number within {low:g} to {high:g}", repr(str(value)[:40]))
     return number

@@ -89,7 +89,7 @@ def _spec(objects: dict[str, LabState], known: dict[str, tuple[list[float], list
     depths, places = known[labels[0]]
     steps = {"depth_mm": depths[0], "x_mm": max(np.diff(places), default=0.0)}
     return {
-        "controls": [(name, label, unit_of(name), steps.get(name, 0)) for name, label in CONTROLS],
+        "controls": [(name, label, unit_of(name), steps.get(name, 0)) for name, label, _ in CONTROLS],
         "objects": {
             label: {
                 "depth_mm": [depths[0], depths[-1]],

@@ -150,8 +150,10 @@ def check_friction(friction: float, indenter: Indenter) -> float:
     """Return the coefficient if it is not negative, and 0 for an indenter that grips the skin anyway."""
     if not_negative("friction", friction) > 0.0 and indenter.grips:
         raise InputError(
-            f"friction must be 0 for {type(indenter).__name__}, under which skin does not slide along the "
-            f"finger at all: got {friction:g}."
+            "friction",
+            f"must be 0 for {type(indenter).__name__}, under which skin does not slide along the "
+            "finger at all",
+            f"{friction:g}",
         )
     return float(friction)
 

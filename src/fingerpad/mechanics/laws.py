@@ -86,7 +86,9 @@ class Energy(metaclass=KnownKeywords):
     def __post_init__(self) -> None:
         for name, count in Counter(name for name, _ in self.coefficients).items():
             if count > 1:
-                raise InputError(f"coefficients must name each once: {name} is given {count} times.")
+                raise InputError(
+                    "coefficients", "must name each once", remedy=f"{name} is given {count} times"
+                )
         for logs in _PROBES:
             if not np.isfinite(self.derivatives(logs)).all():
                 stretches = ", ".join(f"{value:.3g}" for value in np.exp(logs[:3] + logs[3] / 3))
@@ -243,8 +245,7 @@ class _Powers(_OfModuli):
         name, moduli, exponents = type(self).__name__, tuple(self.moduli_kpa), tuple(self.exponents)
         if not 1 <= len(moduli) <= 3 or len(moduli) != len(exponents):
             raise InputError(
-                f"{name} needs one to three moduli and as many exponents: "
-                f"got {len(moduli)} and {len(exponents)}."
+                name, "needs one to three moduli and as many exponents", f"{len(moduli)} and {len(exponents)}"
             )
         for modulus, exponent in zip(moduli, exponents, strict=True):
             finite(f"each modulus of {name}", modulus, "kPa")
@@ -396,8 +397,10 @@ def check_poisson(poisson: float) -> float:
     ratio = finite("poisson", poisson)
     if not 0.0 < ratio < 0.5:
         raise InputError(
-            f"poisson must lie between 0 and 0.5, both excluded: got {poisson!r}; "
-            "take 0.4999 for a tissue that hardly changes its volume."
+            "poisson",
+            "must lie between 0 and 0.5, both excluded",
+            repr(poisson),
+            "take 0.4999 for a tissue that hardly changes its volume",
         )
     return ratio
 

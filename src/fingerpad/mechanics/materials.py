@@ -116,9 +116,7 @@ class Material(metaclass=KnownKeywords):
 
     def __post_init__(self) -> None:
         if not isinstance(self.law, Polynomial | Ogden | Hyperfoam | Hencky | Energy):
-            raise InputError(
-                f"law must be Polynomial, Ogden, Hyperfoam, Hencky or Energy: got {shown(self.law)}."
-            )
+            raise InputError("law", "must be Polynomial, Ogden, Hyperfoam, Hencky or Energy", shown(self.law))
         instance("prony", self.prony, Prony)
         one_of("moduli", self.moduli, ("long_term", "instantaneous"))
         unstable = instability(self.law)

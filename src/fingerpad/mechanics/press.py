@@ -236,9 +236,10 @@ class _Press:
         """Refuse a force as soon as it has pushed the indenter too deep."""
         if depth_mm > self.deepest_mm and self.stimulus.by_force and self.stimulus.stays:
             raise InputError(
-                f"force_mn must not push the indenter deeper than {self.deepest_mm:.2f} mm: it is there "
-                f"after {time_ms:.4g} ms, at {self.stimulus.prescribed_at(time_ms):.4g} of "
-                f"{self.stimulus.largest:g} mN; give less force, in mN."
+                "force_mn",
+                f"must not push the indenter deeper than {self.deepest_mm:.2f} mm",
+                remedy=f"it is there after {time_ms:.4g} ms, at {self.stimulus.prescribed_at(time_ms):.4g} "
+                f"of {self.stimulus.largest:g} mN; give less force, in mN",
             )
 
     def check_that_it_holds(self, start: _Moment, found: Equilibrium) -> None:
@@ -481,8 +482,9 @@ def _check_bone(mesh: Mesh, indenter: Indenter, placement: Placement, stimulus: 
         deepest_mm = brentq(clearance_mm, 0.0, depth_mm, xtol=1e-6) if reaches else 0.0
         at = "" if stimulus.stays else f" at sample {number}"
         raise InputError(
-            f"depth_mm must stay below {deepest_mm:.4g} mm{at}, where the {type(indenter).__name__} meets "
-            f"the bone: got {depth_mm:g} mm."
+            "depth_mm",
+            f"must stay below {deepest_mm:.4g} mm{at}, where the {type(indenter).__name__} meets the bone",
+            f"{depth_mm:g} mm",
         )
 
 

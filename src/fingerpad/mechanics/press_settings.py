@@ -138,14 +138,14 @@ class PressSettings(metaclass=KnownKeywords):
     def __post_init__(self) -> None:
         wanted = increasing("times_ms", float_array("times_ms", self.times_ms, 1))
         if wanted.size and wanted[0] <= 0.0:
-            raise InputError(f"times_ms must lie above 0, which is solved anyway: got {wanted[0]:g}.")
+            raise InputError("times_ms", "must lie above 0, which is solved anyway", f"{wanted[0]:g}")
         object.__setattr__(self, "times_ms", tuple(wanted.tolist()))
         whole("ramp_steps", self.ramp_steps, at_least=1)
         whole("hold_steps", self.hold_steps, at_least=1)
         for name in ("sed_tolerance", "cycle_tolerance"):
             tolerance = getattr(self, name)
             if tolerance is not None and positive(name, tolerance) >= 1.0:
-                raise InputError(f"{name} must be below 1: got {tolerance!r}.")
+                raise InputError(name, "must be below 1", repr(tolerance))
 
     def steps_ms(self, motion: Motion) -> FloatArray:
         """List the times to solve a motion at, from 0, without a tolerance of SED. [ms]"""
@@ -159,8 +159,9 @@ class PressSettings(metaclass=KnownKeywords):
         wanted = np.array(self.times_ms)
         if wanted.size and wanted[-1] > motion.end_ms:
             raise InputError(
-                f"times_ms must lie within the motion, which ends at {motion.end_ms:g} ms: got "
-                f"{wanted[-1]:g} ms."
+                "times_ms",
+                f"must lie within the motion, which ends at {motion.end_ms:g} ms",
+                f"{wanted[-1]:g} ms",
             )
         # A step of no length cannot be solved, so that a time which is there but for rounding stays as it is.
         apart = np.abs(wanted[:, None] - times_ms).min(axis=1) > SAME_TIME * motion.end_ms

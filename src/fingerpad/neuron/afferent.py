@@ -65,8 +65,9 @@ def checked_afferent(afferent: AnyAfferent) -> AnyAfferent:
     """Return an afferent, or raise `InputError` if it is none: a class without parameters, for example."""
     if isinstance(afferent, type) or not all(hasattr(afferent, name) for name in _NEEDED):
         raise InputError(
-            "afferent must be one such as Afferent(), RA(), PC(), SAII() or OwnAfferent(...): "
-            f"got {shown(afferent)}."
+            "afferent",
+            "must be one such as Afferent(), RA(), PC(), SAII() or OwnAfferent(...)",
+            shown(afferent),
         )
     return afferent
 
@@ -250,7 +251,9 @@ class Afferent(metaclass=KnownKeywords):
         """
         values = float_array("parameters", parameters, 1)
         if values.size != len(PARAMETER_NAMES):
-            raise InputError(f"parameters must hold {', '.join(PARAMETER_NAMES)}: got {values.size} numbers.")
+            raise InputError(
+                "parameters", f"must hold {', '.join(PARAMETER_NAMES)}", f"{values.size} numbers"
+            )
         fitted = dict(zip(PARAMETER_NAMES, values.tolist(), strict=True))
         return cls(
             refractory_ms=refractory_ms,
@@ -400,5 +403,5 @@ def spikes_where(
 def as_sai(afferent: AnyAfferent) -> Afferent:
     """Return an afferent if it has the chain of SAI, or raise `InputError`."""
     if not isinstance(afferent, Afferent):
-        raise InputError(f"afferent must have the chain of Afferent() here: got {shown(afferent)}.")
+        raise InputError("afferent", "must have the chain of Afferent() here", shown(afferent))
     return afferent

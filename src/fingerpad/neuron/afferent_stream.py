@@ -82,7 +82,7 @@ class AfferentStream(metaclass=KnownKeywords):
             If time does not go on, the number of values is wrong, or one quantity is missing.
         """
         if not finite("time_ms", time_ms, "ms") > self._time_ms:
-            raise InputError(f"time_ms must go on: got {time_ms:g} after {self._time_ms:g} ms.")
+            raise InputError("time_ms", "must go on", f"{time_ms:g} after {self._time_ms:g} ms")
         same = self._afferent.dynamic_quantity == self._afferent.static_quantity
         if same != (dynamic is None):
             wanted = "one quantity" if same else "a static and a dynamic quantity"
@@ -139,7 +139,7 @@ class AfferentStream(metaclass=KnownKeywords):
     def _values(self, name: str, values: ArrayLike) -> FloatArray:
         found = float_array(name, values, 1)
         if found.size != self._ready.size:
-            raise InputError(f"{name} must have one value per site, {self._ready.size}: got {found.size}.")
+            raise InputError(name, f"must have one value per site, {self._ready.size}", str(found.size))
         if (found < 0.0).any():
-            raise InputError(f"{name} must not be negative: the smallest value is {found.min():.3g}.")
+            raise InputError(name, "must not be negative", remedy=f"the smallest value is {found.min():.3g}")
         return found

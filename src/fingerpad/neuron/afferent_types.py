@@ -67,7 +67,7 @@ class RapidlyAdapting(metaclass=KnownKeywords):
     def __post_init__(self) -> None:
         positive("threshold", self.threshold)
         if not_negative("retraction", self.retraction) > 1.0:
-            raise InputError(f"retraction must lie within 0 ... 1: got {self.retraction:g}.")
+            raise InputError("retraction", "must lie within 0 ... 1", f"{self.retraction:g}")
         # Both stages check their parameters when they are made.
         self.band_pass, self.membrane  # noqa: B018
 
@@ -329,7 +329,7 @@ class OwnAfferent(metaclass=KnownKeywords):
 
     def __post_init__(self) -> None:
         if not callable(self.respond):
-            raise InputError(f"respond must be a function of Traces: got {shown(self.respond)}.")
+            raise InputError("respond", "must be a function of Traces", shown(self.respond))
         if self.membrane is not None:
             instance("membrane", self.membrane, LeakyIntegrateAndFire)
         one_of("rate_measure", self.rate_measure, (INTERVAL, COUNT))

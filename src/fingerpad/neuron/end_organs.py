@@ -64,11 +64,12 @@ class EndOrgans(metaclass=KnownKeywords):
         weights = float_array("weights", np.atleast_2d(float_array("weights", shares, None)), 2)
         if weights.shape not in ((1, n_ends), (n_afferents, n_ends)):
             raise InputError(
-                f"weights needs one number per end organ, {n_ends}, or a row of them per afferent, "
-                f"{n_afferents}: got shape {weights.shape}."
+                "weights",
+                f"needs one number per end organ, {n_ends}, or a row of them per afferent, {n_afferents}",
+                f"shape {weights.shape}",
             )
         if (weights < 0.0).any():
-            raise InputError(f"weights must not be negative: the smallest is {weights.min():g}.")
+            raise InputError("weights", "must not be negative", remedy=f"the smallest is {weights.min():g}")
         totals = weights.sum(axis=1)
         if (np.abs(totals - 1.0) > _SUM_TOLERANCE).any():
             worst = totals[np.argmax(np.abs(totals - 1.0))]

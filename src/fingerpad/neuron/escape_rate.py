@@ -219,10 +219,7 @@ def _escape_trains(
                 x = -1.0
                 for panel in range(n_panels):
                     left, right = length * panel / n_panels, length * (panel + 1) / n_panels
-                    highest = max(
-                        potential_at(left, u, steady, drift),
-                        potential_at(right, u, steady, drift),
-                    )
+                    highest = max(potential_at(left, u, steady, drift), potential_at(right, u, steady, drift))
                     if highest - 1.0 < (_NEGLIGIBLE - _HIGHEST_STEP) * width:
                         continue
                     part = _integral(left, right, u, steady, drift, width)

@@ -77,8 +77,10 @@ class LeakyIntegrateAndFire:
         positive("refractory_ms", self.refractory_ms, "ms")
         if self.initial_mv is not None and finite("initial_mv", self.initial_mv, "mV") >= self.threshold_mv:
             raise InputError(
-                f"initial_mv must be below the threshold, {self.threshold_mv:g} mV: got {self.initial_mv:g}; "
-                "leave it out to start at rest."
+                "initial_mv",
+                f"must be below the threshold, {self.threshold_mv:g} mV",
+                f"{self.initial_mv:g}",
+                "leave it out to start at rest",
             )
 
     def spikes(self, current: Traces) -> SpikeTrains:

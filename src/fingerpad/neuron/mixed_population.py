@@ -70,7 +70,7 @@ class MixedResponse(Result):
 
     def __getitem__(self, name: str) -> ResponseMap:
         if name not in self.maps:
-            raise InputError(f"type must be one of {', '.join(self.maps)}: got {name!r}.")
+            raise InputError("type", f"must be one of {', '.join(self.maps)}", repr(name))
         return self.maps[name]
 
     def __iter__(self) -> Iterator[str]:
@@ -155,9 +155,7 @@ class MixedPopulation(metaclass=KnownKeywords):
 
     def __post_init__(self) -> None:
         if not isinstance(self.parts, Mapping):
-            raise InputError(
-                f"parts must be a mapping from types to Population: got {type(self.parts).__name__}."
-            )
+            raise InputError("parts", "must be a mapping from types to Population", type(self.parts).__name__)
         if not self.parts:
             raise InputError("MixedPopulation needs at least one Population: got none.")
         for name, part in self.parts.items():
@@ -248,7 +246,7 @@ class MixedPopulation(metaclass=KnownKeywords):
             instance(f"{argument}, with a type as each key,", given, Mapping)
         if not hasattr(region, "area_mm2"):
             raise InputError(
-                f"region must be one of fingerpad.core.regions or UnrolledSkin(finger).pad(): got {region!r}."
+                "region", "must be one of fingerpad.core.regions or UnrolledSkin(finger).pad()", repr(region)
             )
         known = types_of_afferents() | dict(afferents or {})
         whole("seed", seed, 0)

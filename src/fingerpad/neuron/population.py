@@ -73,7 +73,7 @@ def sensitivities(count: int, spread: float, seed: int) -> FloatArray:
     """
     sigma = not_negative("spread", spread)
     if sigma > LARGEST_SPREAD:
-        raise InputError(f"spread must be at most {LARGEST_SPREAD:g}, a factor of 10^4: got {sigma:g}.")
+        raise InputError("spread", f"must be at most {LARGEST_SPREAD:g}, a factor of 10^4", f"{sigma:g}")
     drawn = normals(seed, 1, whole("count", count, 1, MOST_RECEPTORS), Purpose.SENSITIVITY, 1)[0, :, 0]
     return np.exp(sigma * drawn - 0.5 * sigma**2)
 
@@ -121,25 +121,26 @@ class Population(metaclass=KnownKeywords):
         positions = float_array("positions_mm", self.positions_mm, 2)
         if positions.shape[1] not in (2, 3) or len(positions) == 0:
             raise InputError(
-                f"positions_mm must have rows of x and z, or of x, y and z: got shape {positions.shape}."
+                "positions_mm", "must have rows of x and z, or of x, y and z", f"shape {positions.shape}"
             )
         positive("pitch_mm", self.pitch_mm, "mm")
         checked_afferent(self.afferent)
         if self.ends is not None and len(self.ends) != len(positions):
-            raise InputError(f"ends needs one row per afferent, {len(positions)}: got {len(self.ends)}.")
+            raise InputError("ends", f"needs one row per afferent, {len(positions)}", str(len(self.ends)))
         if self.sensitivity is not None:
             factors = float_array("sensitivity", self.sensitivity, 1)
             if factors.size != len(positions) or (factors <= 0.0).any():
                 raise InputError(
-                    f"sensitivity needs one factor above 0 per receptor, {len(positions)}: got {factors.size}"
-                    f", the smallest {factors.min(initial=math.inf):g}."
+                    "sensitivity",
+                    f"needs one factor above 0 per receptor, {len(positions)}",
+                    f"{factors.size}, the smallest {factors.min(initial=math.inf):g}",
                 )
             object.__setattr__(self, "sensitivity", factors)
         places = float_array(
             "places_mm", positions[:, [0, -1]] if self.places_mm is None else self.places_mm, 2
         )
         if places.shape != (len(positions), 2):
-            raise InputError(f"places_mm needs a pair per receptor, {len(positions)}: got {places.shape}.")
+            raise InputError("places_mm", f"needs a pair per receptor, {len(positions)}", str(places.shape))
         object.__setattr__(self, "positions_mm", positions)
         object.__setattr__(self, "places_mm", places)
 
@@ -239,7 +240,7 @@ class Population(metaclass=KnownKeywords):
         follows = centre_mm is None and finger is None
         if finger is not None and not hasattr(finger, "contact_mm"):
             raise InputError(
-                f"finger must be one such as Fingertip() or Fingertip.of('child'): got {shown(finger)}."
+                "finger", "must be one such as Fingertip() or Fingertip.of('child')", shown(finger)
             )
         centre = centre_mm or (CENTRE_MM if finger is None else finger.contact_mm)
         centre_x, centre_z = pair("centre_mm", centre)
@@ -281,10 +282,7 @@ class Population(metaclass=KnownKeywords):
         return replace(self, positions_mm=places, places_mm=places, centre_mm=pad_mm)
 
     def respond(
-        self,
-        skin: Skin,
-        dynamic_window_ms: Window | None = None,
-        static_window_ms: Window | None = None,
+        self, skin: Skin, dynamic_window_ms: Window | None = None, static_window_ms: Window | None = None
     ) -> ResponseMap:
         """Sample the skin at every receptor and simulate each afferent.
 
@@ -343,10 +341,7 @@ class Population(metaclass=KnownKeywords):
         return self.afferent.dynamic_quantity, self.afferent.static_quantity
 
     def respond_to(
-        self,
-        traces: Traces,
-        dynamic_window_ms: Window | None = None,
-        static_window_ms: Window | None = None,
+        self, traces: Traces, dynamic_window_ms: Window | None = None, static_window_ms: Window | None = None
     ) -> ResponseMap:
         """Simulate each afferent under traces that are known already.
 
@@ -365,7 +360,7 @@ class Population(metaclass=KnownKeywords):
         sites = self.sites_mm
         if traces.n_sites != len(sites):
             raise InputError(
-                f"skin.sed must give one trace per receptor: got {traces.n_sites} for {len(sites)}."
+                "skin.sed", "must give one trace per receptor", f"{traces.n_sites} for {len(sites)}"
             )
         if self.ends is not None:
             traces = self.ends.combined(traces)

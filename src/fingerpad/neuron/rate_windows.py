@@ -59,7 +59,7 @@ def check_windows(windows_ms: Windows, end_ms: float) -> Windows:
         if bounds.size != 2 or not 0.0 <= bounds[0] < bounds[1] <= end_ms:
             until = f", at most {end_ms:g} ms, where the touch ends" if np.isfinite(end_ms) else ""
             came = ", ".join(f"{bound:g}" for bound in bounds[:4])
-            raise InputError(f"{name} must be a start from 0 on and a later end{until}: got {came}.")
+            raise InputError(name, f"must be a start from 0 on and a later end{until}", str(came))
         checked.append((float(bounds[0]), float(bounds[1])))
     return checked[0], checked[1]
 

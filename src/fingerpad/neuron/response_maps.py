@@ -74,7 +74,7 @@ def evoked_latency_ms(latency_ms: ArrayLike, resting_latency_ms: float) -> Float
     """
     latency = _latencies("latency_ms", latency_ms)
     if resting_latency_ms < 0.0:
-        raise InputError(f"resting_latency_ms must not be negative [ms]: got {resting_latency_ms!r}.")
+        raise InputError("resting_latency_ms", "must not be negative [ms]", repr(resting_latency_ms))
     latest_ms = np.inf if np.isnan(resting_latency_ms) else 0.5 * resting_latency_ms
     return np.where(latency <= latest_ms, latency, np.nan)
 
@@ -123,7 +123,7 @@ def order_change(latency_ms: ArrayLike, other_latency_ms: ArrayLike) -> OrderCha
     """
     first, second = _latencies("latency_ms", latency_ms), _latencies("other_latency_ms", other_latency_ms)
     if first.size != second.size:
-        raise InputError(f"order_change needs the same afferents twice: got {first.size} and {second.size}.")
+        raise InputError("order_change", "needs the same afferents twice", f"{first.size} and {second.size}")
     fires, fires_too = ~np.isnan(first), ~np.isnan(second)
     both = fires & fires_too
     r, s = rankdata(first[both]), rankdata(second[both])
@@ -139,8 +139,9 @@ def _latencies(name: str, values: ArrayLike) -> FloatArray:
     latency = np.asarray(values, dtype=np.float64)
     if latency.ndim != 1 or np.isinf(latency).any():
         raise InputError(
-            f"{name} must be a one-dimensional array of times, NaN if silent: got shape {latency.shape}"
-            f"{' with infinite times' if latency.ndim == 1 else ''}."
+            name,
+            "must be a one-dimensional array of times, NaN if silent",
+            f"shape {latency.shape}{' with infinite times' if latency.ndim == 1 else ''}",
         )
     return latency
 
@@ -243,7 +244,7 @@ def population_rate(
     """
     edges = increasing("edges_ms", float_array("edges_ms", edges_ms, 1))
     if edges.size < 2:
-        raise InputError(f"edges_ms must hold the two edges of at least one bin: got {edges.size} numbers.")
+        raise InputError("edges_ms", "must hold the two edges of at least one bin", f"{edges.size} numbers")
     not_negative("smoothing_ms", smoothing_ms, "ms")
     group = _groups(groups, len(spikes))
     n_groups, n_bins = int(group.max(initial=0)) + 1, edges.size - 1
@@ -275,11 +276,12 @@ def _groups(groups: ArrayLike | None, n_afferents: int) -> np.ndarray:
     group = np.asarray(groups)
     if group.shape != (n_afferents,) or not np.issubdtype(group.dtype, np.integer):
         raise InputError(
-            f"groups must be one whole number per afferent, {n_afferents} in all: "
-            f"got {group.dtype} of shape {group.shape}."
+            "groups",
+            f"must be one whole number per afferent, {n_afferents} in all",
+            f"{group.dtype} of shape {group.shape}",
         )
     if (group < NO_GROUP).any():
-        raise InputError(f"groups must count from 0, {NO_GROUP} for none: got {group.min()}.")
+        raise InputError("groups", f"must count from 0, {NO_GROUP} for none", str(group.min()))
     return group.astype(np.int64)
 
 
@@ -325,12 +327,13 @@ def rings(positions_mm: ArrayLike, centre_mm: ArrayLike, radii_mm: ArrayLike) ->
     positions, centre = float_array("positions_mm", positions_mm, 2), float_array("centre_mm", centre_mm, 1)
     if positions.shape[1] != centre.size:
         raise InputError(
-            f"centre_mm must have the coordinates of the positions: got {centre.size} "
-            f"for {positions.shape[1]}."
+            "centre_mm",
+            "must have the coordinates of the positions",
+            f"{centre.size} for {positions.shape[1]}",
         )
     radii = increasing("radii_mm", float_array("radii_mm", radii_mm, 1))
     if radii.size < 2 or radii[0] < 0.0:
-        raise InputError(f"radii_mm must be at least two distances, none negative: got {radii_mm!r}.")
+        raise InputError("radii_mm", "must be at least two distances, none negative", repr(radii_mm))
     away = np.linalg.norm(positions - centre, axis=1)
     ring = np.searchsorted(radii, away, side="right") - 1
     return np.where(ring < radii.size - 1, ring, NO_GROUP)

@@ -89,8 +89,9 @@ def tuning_curve(
     checked_afferent(afferent)
     if afferent.dynamic_quantity != afferent.static_quantity:
         raise InputError(
-            "tuning_curve needs an afferent that follows one quantity: got "
-            f"{afferent.dynamic_quantity!r} and {afferent.static_quantity!r}."
+            "tuning_curve",
+            "needs an afferent that follows one quantity",
+            f"{afferent.dynamic_quantity!r} and {afferent.static_quantity!r}",
         )
     positive("per_um", per_um)
     positive("impulses", impulses)

@@ -162,7 +162,7 @@ def compare_gradient_sum_observers(
     values = checked_responses(responses, silent_value)
     pairs = check_neighbours(neighbours, values.shape[1])
     if not len(pairs):
-        raise InputError("neighbours must hold at least one pair of receptors: got none.")
+        raise InputError("neighbours", "must hold at least one pair of receptors", "none")
     whole("seed", seed, 0)
     found: dict[int, HitRates] = {}
     for (distributions, presentations), sigmas, owners in _alike(observers, attrgetter("sums_per_sphere")):
@@ -238,7 +238,9 @@ def compare_euclidean_observers(
     for _, plan in observers:
         if plan.criterion_sigma > 0.0:
             raise InputError(
-                "criterion_sigma must be 0 for Euclidean Distance: its decision point does not vary."
+                "criterion_sigma",
+                "must be 0 for Euclidean Distance",
+                remedy="its decision point does not vary",
             )
     found: dict[int, HitRates] = {}
     sizes_of = attrgetter("hit_rates", "presentations", "pairs")
@@ -259,26 +261,30 @@ def checked_responses(responses: ArrayLike, silent_value: float | None = None) -
     try:
         table = np.array(responses, dtype=np.float64)
     except (TypeError, ValueError) as error:
-        raise InputError(f"responses must be numbers: got {type(responses).__name__}.") from error
+        raise InputError("responses", "must be numbers", type(responses).__name__) from error
     silent = np.isnan(table)
     if silent_value is not None:
         finite("silent_value", silent_value)
     if table.size and (silent | (table == 0.0)).all():
         raise InputError(
-            "responses must not all be silent: the population stays silent under every sphere, so there is "
-            "no hit rate; increase the depth or use more sensitive afferents."
+            "responses",
+            "must not all be silent",
+            remedy="the population stays silent under every sphere, so there is no hit rate; increase the "
+            "depth or use more sensitive afferents",
         )
     if silent.any():
         if silent_value is None:
             raise InputError(
-                f"responses must be finite: {np.count_nonzero(silent)} are NaN, as of silent receptors; "
-                "give silent_value to replace them."
+                "responses",
+                "must be finite",
+                remedy=f"{np.count_nonzero(silent)} are NaN, as of silent receptors; give silent_value to "
+                "replace them",
             )
         table[silent] = silent_value
     table = float_array("responses", table, 2)
     if table.shape[0] < 2 or table.shape[1] == 0:
         raise InputError(
-            f"responses needs the standard, at least one comparison and a receptor: got {table.shape}."
+            "responses", "needs the standard, at least one comparison and a receptor", str(table.shape)
         )
     return table
 

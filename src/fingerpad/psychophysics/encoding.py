@@ -61,7 +61,7 @@ def neighbour_pairs(positions_mm: ArrayLike, pitch_mm: float, count: int = 8) ->
     """
     positions = _plane(positions_mm)
     if count not in _METRIC:
-        raise InputError(f"count must be 8, 4 or 6 neighbours: got {count!r}.")
+        raise InputError("count", "must be 8, 4 or 6 neighbours", repr(count))
     reach = _BETWEEN_FIRST_AND_SECOND_NEIGHBOUR[count] * positive("pitch_mm", pitch_mm, "mm")
     # The tree's reach includes its end.
     found = cKDTree(positions).query_pairs(np.nextafter(reach, 0.0), p=_METRIC[count], output_type="ndarray")
@@ -101,7 +101,7 @@ def _plane(positions_mm: ArrayLike) -> FloatArray:
     positions = float_array("positions_mm", positions_mm, 2)
     if positions.shape[1] != 2:
         raise InputError(
-            f"positions_mm must have rows of two numbers, such as x and z: got shape {positions.shape}."
+            "positions_mm", "must have rows of two numbers, such as x and z", f"shape {positions.shape}"
         )
     return positions
 
@@ -157,7 +157,7 @@ def distance(values_a: ArrayLike, values_b: ArrayLike, norm: str = "city-block")
     one_of("norm", norm, NORMS)
     first, second = np.asarray(values_a, dtype=np.float64), np.asarray(values_b, dtype=np.float64)
     if first.ndim == 0 or second.ndim == 0 or first.shape[-1] != second.shape[-1]:
-        raise InputError(f"distance needs the same receptors twice: got {first.shape} and {second.shape}.")
+        raise InputError("distance", "needs the same receptors twice", f"{first.shape} and {second.shape}")
     differences = first - second
     if norm == "euclidean":
         return np.sqrt(np.square(differences).sum(axis=-1))
@@ -169,12 +169,12 @@ def check_neighbours(neighbours: np.ndarray, n_receptors: int) -> np.ndarray:
     pairs = np.asarray(neighbours)
     if pairs.ndim != 2 or pairs.shape[1] != 2 or not np.issubdtype(pairs.dtype, np.integer):
         raise InputError(
-            f"neighbours must be rows of two receptor indices: got {pairs.dtype} of shape {pairs.shape}."
+            "neighbours", "must be rows of two receptor indices", f"{pairs.dtype} of shape {pairs.shape}"
         )
     if pairs.size and (pairs.min() < 0 or pairs.max() >= n_receptors):
         raise InputError(
-            f"neighbours must be within 0 ... {n_receptors - 1}: got {pairs.min()} ... {pairs.max()}."
+            "neighbours", f"must be within 0 ... {n_receptors - 1}", f"{pairs.min()} ... {pairs.max()}"
         )
     if (pairs[:, 0] == pairs[:, 1]).any():
-        raise InputError("neighbours must be pairs of two receptors: got a receptor with itself.")
+        raise InputError("neighbours", "must be pairs of two receptors", "a receptor with itself")
     return pairs

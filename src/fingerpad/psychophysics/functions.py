@@ -215,8 +215,9 @@ class PsychometricFunction:
         wanted = finite("proportion_correct", proportion_correct)
         if not self.guess < wanted < 1.0 - self.lapse:
             raise InputError(
-                f"proportion_correct must lie between guess and 1 - lapse, {self.guess:g} ... "
-                f"{1.0 - self.lapse:g}: got {wanted:g}."
+                "proportion_correct",
+                f"must lie between guess and 1 - lapse, {self.guess:g} ... {1.0 - self.lapse:g}",
+                f"{wanted:g}",
             )
         return float(level_at(self.shape, wanted, self.threshold, self.width, self.guess, self.lapse))
 
@@ -241,8 +242,9 @@ def checked_levels(levels: ArrayLike, sigmoid: str) -> FloatArray:
     checked = float_array("levels", levels, 1)
     if SIGMOIDS[sigmoid].logarithmic and (checked <= 0.0).any():
         raise InputError(
-            f"levels must be greater than 0 for {sigmoid!r}: the smallest is {checked.min():g}; shift them, "
-            "or choose another sigmoid."
+            "levels",
+            f"must be greater than 0 for {sigmoid!r}",
+            remedy=f"the smallest is {checked.min():g}; shift them, or choose another sigmoid",
         )
     return checked
 
@@ -287,16 +289,17 @@ class JudgementCounts:
             )
         if np.abs(levels).max() > LARGEST_LEVEL:
             raise InputError(
-                f"levels must lie within {LARGEST_LEVEL:g}: got {levels.tolist()}; change the unit."
+                "levels", f"must lie within {LARGEST_LEVEL:g}", str(levels.tolist()), "change the unit"
             )
         if (np.diff(levels) <= 0.0).any():
-            raise InputError(f"levels must increase strictly, each level once: got {levels.tolist()}.")
+            raise InputError("levels", "must increase strictly, each level once", str(levels.tolist()))
         if (correct != np.floor(correct)).any() or (trials != np.floor(trials)).any():
             raise InputError("n_correct and n_trials must be whole numbers: multiply rates by their trials.")
         if (trials < 1.0).any() or (correct < 0.0).any() or (correct > trials).any():
             raise InputError(
-                "n_trials must be at least 1 and n_correct within 0 ... n_trials: "
-                f"got {correct.tolist()} of {trials.tolist()}."
+                "n_trials",
+                "must be at least 1 and n_correct within 0 ... n_trials",
+                f"{correct.tolist()} of {trials.tolist()}",
             )
         for name, values in (("levels", levels), ("n_correct", correct), ("n_trials", trials)):
             object.__setattr__(self, name, values)

@@ -83,11 +83,12 @@ class GaussianResponses:
         mean, covariance = float_array("mean", self.mean, 1), float_array("covariance", self.covariance, 2)
         if covariance.shape != (mean.size, mean.size):
             raise InputError(
-                f"covariance must have one row and column per receptor: got {covariance.shape} for "
-                f"{mean.size}."
+                "covariance",
+                "must have one row and column per receptor",
+                f"{covariance.shape} for {mean.size}",
             )
         if np.abs(covariance - covariance.T).max(initial=0.0) > 1e-9 * np.abs(covariance).max(initial=0.0):
-            raise InputError("covariance must be symmetric: the two halves differ.")
+            raise InputError("covariance", "must be symmetric", remedy="the two halves differ")
         object.__setattr__(self, "mean", mean)
         object.__setattr__(self, "covariance", covariance)
         self.factor  # noqa: B018
@@ -99,7 +100,7 @@ class GaussianResponses:
             return np.asarray(np.linalg.cholesky(self.covariance), dtype=np.float64)
         except np.linalg.LinAlgError as error:
             raise InputError(
-                "covariance must be positive definite: a receptor has no noise, or two share it."
+                "covariance", "must be positive definite", remedy="a receptor has no noise, or two share it"
             ) from error
 
     @property
@@ -365,8 +366,10 @@ def gaussian_information(
     zeros = np.count_nonzero(values == 0.0) if floor == 0.0 else 0
     if values.size != rises.size or zeros:
         raise InputError(
-            f"responses must not be zero, and slopes be as many: got {rises.size} slopes for {values.size} "
-            f"responses, {zeros} of them zero; leave those out or give smallest_spread."
+            "responses",
+            "must not be zero, and slopes be as many",
+            f"{rises.size} slopes for {values.size} responses, {zeros} of them zero",
+            "leave those out or give smallest_spread",
         )
     variance = np.square(sigma * values) + floor**2
     return float((np.square(rises) / variance + 2.0 * np.square(sigma**2 * values * rises / variance)).sum())

@@ -58,8 +58,9 @@ def expected_hit_rates(
     draws = float_array("standard_normals", standard_normals, 2)
     if draws.shape[1] != values.shape[1] or len(draws) < 2:
         raise InputError(
-            f"standard_normals needs two rows or more and {values.shape[1]} columns, one per receptor: "
-            f"got shape {draws.shape}."
+            "standard_normals",
+            f"needs two rows or more and {values.shape[1]} columns, one per receptor",
+            f"shape {draws.shape}",
         )
     pairs = check_neighbours(neighbours, values.shape[1])
     sums = shared_noise_gradient_sums(values, pairs, checked_noise(noise_sigma), draws)
@@ -121,12 +122,12 @@ def fit_noise_sigma(
     targets = float_array("target_hit_rates", target_hit_rates, 1)
     smallest, largest = (positive("bounds", bound) for bound in bounds)
     if smallest >= largest:
-        raise InputError(f"bounds must be a smaller and a larger noise: got {bounds!r}.")
+        raise InputError("bounds", "must be a smaller and a larger noise", repr(bounds))
 
     def predict(sigma: float) -> FloatArray:
         rates = float_array("hit rates of hit_rates_of_sigma", hit_rates_of_sigma(sigma), 1)
         if rates.shape != targets.shape:
-            raise InputError(f"hit_rates_of_sigma must give {targets.size} hit rates: got {rates.size}.")
+            raise InputError("hit_rates_of_sigma", f"must give {targets.size} hit rates", str(rates.size))
         return rates
 
     def misfit(log_sigma: float) -> float:

@@ -32,7 +32,7 @@ _PRESENTATIONS_AT_ONCE = 128
 
 def session_trials(session: int, *shape: int) -> IntArray:
     if whole("session", session, 0) > LARGEST_SESSION:
-        raise InputError(f"session must not exceed {LARGEST_SESSION}: got {session}.")
+        raise InputError("session", f"must not exceed {LARGEST_SESSION}", str(session))
     return session * TRIALS_PER_SESSION + np.arange(int(np.prod(shape)), dtype=np.int64).reshape(shape)
 
 
@@ -141,6 +141,6 @@ def checked_noise(noise_sigma: float, above_zero: bool = False) -> float:
     sigma = (positive if above_zero else not_negative)("noise_sigma", noise_sigma)
     if sigma > LARGEST_NOISE:
         raise InputError(
-            f"noise_sigma must be at most {LARGEST_NOISE:g} times the response: got {noise_sigma:g}."
+            "noise_sigma", f"must be at most {LARGEST_NOISE:g} times the response", f"{noise_sigma:g}"
         )
     return sigma

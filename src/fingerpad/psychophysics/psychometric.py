@@ -184,8 +184,10 @@ def fit_psychometric(
     n_shaping = int(model.free[: WIDTH + 1].sum())
     if counts.levels.size < n_shaping:
         raise InputError(
-            f"levels must be at least {n_shaping}, one for each of threshold and width that is not given: "
-            f"got {counts.levels.size}; measure more levels, or give one of the two."
+            "levels",
+            f"must be at least {n_shaping}, one for each of threshold and width that is not given",
+            str(counts.levels.size),
+            "measure more levels, or give one of the two",
         )
     points, heights = maximise_likelihood(model, counts.n_correct[np.newaxis])
     fit = fit_at(counts, sigmoid, model, points[0], float(heights[0]))
@@ -254,7 +256,7 @@ def _given(
         sigmoid,
     )
     if overdispersion is not None and not 0.0 <= finite("overdispersion", overdispersion) < 1.0:
-        raise InputError(f"overdispersion must lie within 0 ... 1 and below 1: got {overdispersion:g}.")
+        raise InputError("overdispersion", "must lie within 0 ... 1 and below 1", f"{overdispersion:g}")
     middle = None if threshold is None else float(SIGMOIDS[sigmoid].coordinate(threshold))
     return [middle, None if width is None else float(np.log(width)), guess, lapse, overdispersion]
 

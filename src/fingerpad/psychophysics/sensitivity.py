@@ -101,7 +101,7 @@ def sensitivity(
 def _rate(of: str, count: int, among: str, total: int, correction: str) -> float:
     k, n = whole(of, count, 0), whole(among, total, 1)
     if k > n:
-        raise InputError(f"{of} must not exceed {among}: got {k} of {n}.")
+        raise InputError(of, f"must not exceed {among}", f"{k} of {n}")
     if correction == "log-linear":
         return (k + 0.5) / (n + 1.0)
     if correction == "half":
@@ -233,7 +233,7 @@ def d_prime_of_proportion(proportion_correct: float, task: Callable[[float], flo
     guessing, never_failed = task(0.0), task(LARGEST_D_PRIME)
     if not guessing - _SMALL <= wanted < never_failed:
         raise InputError(
-            f"proportion_correct must lie between the chance level, {guessing:g}, and 1: got {wanted:g}."
+            "proportion_correct", f"must lie between the chance level, {guessing:g}, and 1", f"{wanted:g}"
         )
     if wanted <= guessing:
         return 0.0

@@ -283,7 +283,7 @@ def _cloud(fit: PsychometricFit, points: FloatArray, weights: FloatArray) -> Fun
 
 def _share(name: str, value: float) -> float:
     if not 0.0 < finite(name, value) < 1.0:
-        raise InputError(f"{name} must lie between 0 and 1: got {value!r}.")
+        raise InputError(name, "must lie between 0 and 1", repr(value))
     return float(value)
 
 

@@ -91,11 +91,13 @@ def reduce_touch(
     instance("training", training, ReducedTraining)
     whole("seed", seed, at_least=0)
     if not quantities:
-        raise InputError("quantities must name at least one quantity: got none.")
+        raise InputError("quantities", "must name at least one quantity", "none")
     if whole("calibration", calibration, at_least=0) and calibration < FEWEST_CALIBRATED:
         raise InputError(
-            f"calibration must be 0 or at least {FEWEST_CALIBRATED} touches, fewer have no bound for "
-            f"{COVERAGE:.0%} of touches: got {calibration}."
+            "calibration",
+            f"must be 0 or at least {FEWEST_CALIBRATED} touches, fewer have no bound for "
+            f"{COVERAGE:.0%} of touches",
+            str(calibration),
         )
     solve = solve or (lambda touches, stage: [touch.solve() for touch in touches])
     poses = list(training.poses())

@@ -391,16 +391,21 @@ def read_reduced(path: str | Path, touch: Touch | None = None) -> ReducedModel:
         head = json.loads(text)
         found = head["format"], head["version"]
     except OSError as error:
-        raise InputError(f"{path} must be a file that can be read: {error.strerror or error}.") from error
+        raise InputError(
+            path, "must be a file that can be read", remedy=str(error.strerror or error)
+        ) from error
     except Exception as error:  # a file of unknown content may fail in any way
         raise InputError(
-            f"{path} must be a whole file of a reduced touch: it is another file, or was cut short; make it "
-            "again with `fingerpad reduce`."
+            path,
+            "must be a whole file of a reduced touch",
+            remedy="it is another file, or was cut short; make it again with `fingerpad reduce`",
         ) from error
     if found != (FORMAT, VERSION):
         raise InputError(
-            f"{path} must be a {FORMAT} of version {VERSION}: got {found[0]!r} of version {found[1]!r}; make "
-            "it again with `fingerpad reduce`."
+            path,
+            f"must be a {FORMAT} of version {VERSION}",
+            f"{found[0]!r} of version {found[1]!r}",
+            "make it again with `fingerpad reduce`",
         )
     if checksum != _checksum(text, arrays):
         raise InputError(f"{path} is damaged: its checksum is wrong; make it again with `fingerpad reduce`.")

@@ -101,7 +101,7 @@ class ReducedTouch(metaclass=KnownKeywords):
         instance("model", model, ReducedModel)
         receptors = float_array("receptors_mm", receptors_mm, 2)
         if receptors.shape[1] != 2:
-            raise InputError(f"receptors_mm needs columns x and z in mm: got shape {receptors.shape}.")
+            raise InputError("receptors_mm", "needs columns x and z in mm", f"shape {receptors.shape}")
         shape = model.axes[3:]
         if bool(shape) != (parameter is not None):
             wanted = f"needs {shape[0].name} as parameter" if shape else "has no parameter of the indenter"
@@ -151,7 +151,7 @@ class ReducedTouch(metaclass=KnownKeywords):
         """
         step_ms = finite("time_ms", time_ms, "ms") - self._time_ms
         if step_ms < 0.0:
-            raise InputError(f"time_ms must not go back: got {time_ms:g} after {self._time_ms:g} ms.")
+            raise InputError("time_ms", "must not go back", f"{time_ms:g} after {self._time_ms:g} ms")
         if (depth_mm is None) == (force_mn is None):
             raise InputError("A step needs either depth_mm or force_mn: give one of them.")
         model = self._model

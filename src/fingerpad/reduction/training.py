@@ -99,7 +99,7 @@ class ReducedRange(metaclass=KnownKeywords):
         for name in SPACING:
             low, high = _pair(name, getattr(self, name))
             if not low <= 0.0 <= high:
-                raise InputError(f"{name} must range over 0, the pose of the touch: got {low:g} to {high:g}.")
+                raise InputError(name, "must range over 0, the pose of the touch", f"{low:g} to {high:g}")
             object.__setattr__(self, name, (low, high))
         if (self.parameter is None) != (self.values is None):
             raise InputError("A range needs both a parameter of the indenter and its values, or neither.")
@@ -131,9 +131,9 @@ def _pair(name: str, values: tuple[float, float]) -> tuple[float, float]:
     try:
         low, high = values
     except (TypeError, ValueError):
-        raise InputError(f"{name} must be a pair, lowest and highest: got {values!r}.") from None
+        raise InputError(name, "must be a pair, lowest and highest", repr(values)) from None
     if finite(f"lowest {name}", low) > finite(f"highest {name}", high):
-        raise InputError(f"{name} must range from low to high: got {low:g} to {high:g}.")
+        raise InputError(name, "must range from low to high", f"{low:g} to {high:g}")
     return float(low), float(high)
 
 
@@ -176,24 +176,27 @@ class ReducedTraining(metaclass=KnownKeywords):
         one_of("resolution", self.resolution, RESOLUTIONS)
         if not isinstance(touch.finger, Fingertip):
             raise InputError(
-                f"finger must be a Fingertip to be reduced: got a {type(touch.finger).__name__}."
+                "finger", "must be a Fingertip to be reduced", f"a {type(touch.finger).__name__}"
             )
         if touch.friction > 0.0 and self.range.moves:
             raise InputError(
-                "friction must be 0 for a range of x_mm or z_mm, because what slides with friction depends "
-                f"on its way, which a reduced touch does not know: got {touch.friction:g}."
+                "friction",
+                "must be 0 for a range of x_mm or z_mm, because what slides with friction depends on its "
+                "way, which a reduced touch does not know",
+                f"{touch.friction:g}",
             )
         steepest = max(abs(touch.tilt_deg + tilt) for tilt in self.range.tilt_deg)
         if steepest > LARGEST_TILT_DEG:
             raise InputError(
-                f"tilt_deg must keep the indenter within {LARGEST_TILT_DEG:g} degrees: got {steepest:g}."
+                "tilt_deg", f"must keep the indenter within {LARGEST_TILT_DEG:g} degrees", f"{steepest:g}"
             )
         parameter = self.range.parameter
         if parameter is not None and parameter not in vars(touch.indenter):
             known = ", ".join(vars(touch.indenter))
             raise InputError(
-                f"parameter must be one of {known}, those of {type(touch.indenter).__name__}: "
-                f"got {parameter!r}."
+                "parameter",
+                f"must be one of {known}, those of {type(touch.indenter).__name__}",
+                repr(parameter),
             )
 
     def poses(self) -> Iterator[TrainingPose]:
@@ -307,6 +310,7 @@ def first_touch_mm(touch: Touch, pose: Pose) -> float:
             break
         before_mm, depth_mm = depth_mm, depth_mm + distance_mm
     raise InputError(
-        f"tilt_deg must keep {type(touch.indenter).__name__} on the skin: at {pose.tilt_deg:g} degrees "
-        "it never touches a node of the skin; take a smaller range."
+        "tilt_deg",
+        f"must keep {type(touch.indenter).__name__} on the skin",
+        remedy=f"at {pose.tilt_deg:g} degrees it never touches a node of the skin; take a smaller range",
     )

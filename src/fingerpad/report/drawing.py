@@ -265,7 +265,7 @@ def plot(result: Displayed, axes: Axes | None = None, what: str | None = None, *
         allowed = ", ".join(list(signature(draw).parameters)[2:]) or "none"
         raise InputError(f"Options of the drawing {name} are: {allowed}; got {option}.")
     if axes is not None and not isinstance(axes, Axes):
-        raise InputError(f"axes must be axes of Matplotlib: got {axes!r:.60}; name a drawing by what=.")
+        raise InputError("axes", "must be axes of Matplotlib", f"{axes!r:.60}", "name a drawing by what=")
     if axes is None:
         # Only a figure of pyplot is shown by a notebook or a window.
         from matplotlib import pyplot

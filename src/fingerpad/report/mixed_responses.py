@@ -47,7 +47,7 @@ def draw_mixed_responses(touches: Mapping[str, Mapping[str, ResponseMap]]) -> Fi
         If there is no touch.
     """
     if not touches:
-        raise InputError("touches must hold at least one response: it is empty.")
+        raise InputError("touches", "must hold at least one response", remedy="it is empty")
     width, height = ROW_IN
     figure = new_figure(width, height * len(touches))
     grid = figure.subplots(len(touches), 2, squeeze=False, width_ratios=(1.7, 1.0))

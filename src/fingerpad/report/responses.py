@@ -34,7 +34,7 @@ def draw_responses(responses: Mapping[str, ResponseMap]) -> Figure:
     ones do not respond. A column has one scale.
     """
     if not responses:
-        raise InputError("responses must hold at least one population: it is empty.")
+        raise InputError("responses", "must hold at least one population", remedy="it is empty")
     width, height = PANEL_IN
     figure = new_figure(3 * width, len(responses) * height)
     grid = figure.subplots(len(responses), 3, squeeze=False)

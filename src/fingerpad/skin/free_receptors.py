@@ -54,8 +54,9 @@ class FreeReceptors:
         if missed.any():
             x, y, z = sites_mm[np.argmax(missed)]
             raise InputError(
-                f"sites must lie on the skin of the mesh: (x, y, z) = ({x:g}, {y:g}, {z:g}) mm is "
-                f"{away[np.argmax(missed)]:.2g} mm beside it."
+                "sites",
+                "must lie on the skin of the mesh",
+                remedy=f"(x, y, z) = ({x:g}, {y:g}, {z:g}) mm is {away[np.argmax(missed)]:.2g} mm beside it",
             )
         return self._around(feet - self.mesh.receptor_depth_mm * normals, normals)
 
@@ -83,7 +84,9 @@ class FreeReceptors:
         if missed.any():
             x, z = organs_mm[np.argmax(missed)]
             raise InputError(
-                f"sites must lie on the volar skin of the mesh: (x, z) = ({x:g}, {z:g}) mm does not."
+                "sites",
+                "must lie on the volar skin of the mesh",
+                remedy=f"(x, z) = ({x:g}, {z:g}) mm does not",
             )
         return self._around(organs, normals)
 

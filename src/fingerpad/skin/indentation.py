@@ -123,14 +123,16 @@ class Touch(metaclass=KnownKeywords):
         x, z = _position(self.at_mm, self.finger)
         object.__setattr__(self, "at_mm", (x, z))
         if abs(finite("tilt_deg", self.tilt_deg, "degrees")) > LARGEST_TILT_DEG:
-            raise InputError(f"tilt_deg must lie within {LARGEST_TILT_DEG:g} degrees: got {self.tilt_deg:g}.")
+            raise InputError(
+                "tilt_deg", f"must lie within {LARGEST_TILT_DEG:g} degrees", f"{self.tilt_deg:g}"
+            )
         if z != 0.0 and not self.grading.full:
             raise InputError(f"at_mm beside the midline (z = {z:g} mm) needs a grading with full=True.")
         spin = finite("spin_deg", self.spin_deg, "degrees")
         body = type(self.indenter).__name__
         for name, angle in (("tilt_deg", self.tilt_deg), ("spin_deg", spin)):
             if self.indenter.grips and angle != 0.0:
-                raise InputError(f"{name} must be 0 for {body}: got {angle:g} degrees.")
+                raise InputError(name, f"must be 0 for {body}", f"{angle:g} degrees")
         if self.indenter.grips and not self.stimulus.stays:
             raise InputError(f"{body} may only be moved up and down: got a motion that moves or turns it.")
         # A class that was made by exec has no module.
@@ -152,8 +154,7 @@ class Touch(metaclass=KnownKeywords):
         check_friction(self.friction, self.indenter)
         if self.progress is not None and not callable(getattr(self.progress, "stage", None)):
             raise InputError(
-                "progress must have a method stage, as fp.notebook_progress() has: "
-                f"got {shown(self.progress)}."
+                "progress", "must have a method stage, as fp.notebook_progress() has", shown(self.progress)
             )
         check_path(self.finger, self.stimulus, self.at_mm)
         self.settings.steps_ms(self.stimulus)
@@ -185,15 +186,19 @@ class Touch(metaclass=KnownKeywords):
         largest_mm = 2 * self.indenter.half_width_mm / fewest
         if size_mm > largest_mm:
             raise InputError(
-                f"grading must have elements of at most {largest_mm:g} mm, because the "
-                f"{type(self.indenter).__name__} would go between the nodes: got {size_mm:g} mm; "
-                f"give a finer grading or a wider body than {2 * self.indenter.half_width_mm:g} mm."
+                "grading",
+                f"must have elements of at most {largest_mm:g} mm, because the "
+                f"{type(self.indenter).__name__} would go between the nodes",
+                f"{size_mm:g} mm",
+                f"give a finer grading or a wider body than {2 * self.indenter.half_width_mm:g} mm",
             )
         if size_mm > narrowest_mm / FEWEST_ACROSS_GROOVE:
             raise InputError(
-                f"grading must have elements of at most {narrowest_mm / FEWEST_ACROSS_GROOVE:g} mm across "
-                f"grooves and ridges of {narrowest_mm:g} mm: got {size_mm:g} mm; leave grading out or take "
-                "grading_about(...)."
+                "grading",
+                f"must have elements of at most {narrowest_mm / FEWEST_ACROSS_GROOVE:g} mm across grooves "
+                f"and ridges of {narrowest_mm:g} mm",
+                f"{size_mm:g} mm",
+                "leave grading out or take grading_about(...)",
             )
 
     def solve(self, threads: int | None = None, whole: bool | None = None) -> SkinResponse:

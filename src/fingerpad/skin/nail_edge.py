@@ -86,15 +86,16 @@ class NailEdge(metaclass=KnownKeywords):
         """
         places = float_array("places_mm", places_mm, 2)
         if places.shape[1] != 2:
-            raise InputError(f"places_mm needs two columns, along and distance: got shape {places.shape}.")
+            raise InputError("places_mm", "needs two columns, along and distance", f"shape {places.shape}")
         along, distance = np.abs(places[:, 0]), places[:, 1]
         outside = (distance < -_ROUND_OFF_MM) | (distance > self.reach_mm + _ROUND_OFF_MM)
         outside |= along > self.half_length_mm(distance) + _ROUND_OFF_MM
         if outside.any():
             wrong = places[np.argmax(outside)]
             raise InputError(
-                f"places_mm must lie within {self.reach_mm:g} mm of the edge of the nail and between its "
-                f"ends: got along = {wrong[0]:g}, distance = {wrong[1]:g} mm."
+                "places_mm",
+                f"must lie within {self.reach_mm:g} mm of the edge of the nail and between its ends",
+                f"along = {wrong[0]:g}, distance = {wrong[1]:g} mm",
             )
         lines, arcs = self._lines
         step = np.clip(distance / _STEP_MM, 0.0, arcs.shape[1] - 1 - 1e-9)
@@ -154,8 +155,10 @@ class NailEdge(metaclass=KnownKeywords):
     def _within_reach(self, name: str, distance_mm: float) -> float:
         if positive(name, distance_mm, "mm") > self.reach_mm:
             raise InputError(
-                f"{name} must not exceed the reach of {self.reach_mm:g} mm from the nail's edge: got "
-                f"{distance_mm:.3g} mm; raise reach_mm."
+                name,
+                f"must not exceed the reach of {self.reach_mm:g} mm from the nail's edge",
+                f"{distance_mm:.3g} mm",
+                "raise reach_mm",
             )
         return float(distance_mm)
 

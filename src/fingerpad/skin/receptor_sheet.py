@@ -203,8 +203,9 @@ class ReceptorSheet:
             first = np.argmax(missed)
             x, y, z = sites_mm[first]
             raise InputError(
-                f"sites must lie on the skin of the mesh: (x, y, z) = ({x:g}, {y:g}, {z:g}) mm is "
-                f"{away[first]:.2g} mm beside it."
+                "sites",
+                "must lie on the skin of the mesh",
+                remedy=f"(x, y, z) = ({x:g}, {y:g}, {z:g}) mm is {away[first]:.2g} mm beside it",
             )
         return self._below(uv)
 
@@ -219,7 +220,9 @@ class ReceptorSheet:
         if missed.any():
             x, z = organs_mm[np.argmax(missed)]
             raise InputError(
-                f"sites must lie on the volar skin of the mesh: (x, z) = ({x:g}, {z:g}) mm does not."
+                "sites",
+                "must lie on the volar skin of the mesh",
+                remedy=f"(x, z) = ({x:g}, {z:g}) mm does not",
             )
         return uv
 

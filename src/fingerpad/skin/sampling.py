@@ -383,8 +383,9 @@ def places_below(receptors: Receptors, sites: ArrayLike) -> Any:
     points = float_array("sites", sites, None)
     if points.ndim != 2 or points.shape[1] not in (2, 3):
         raise InputError(
-            "sites must be a list of places, such as [(x, z)] or [(x, y, z)], in mm: got shape "
-            f"{points.shape}."
+            "sites",
+            "must be a list of places, such as [(x, z)] or [(x, y, z)], in mm",
+            f"shape {points.shape}",
         )
     return _places_of(_Sites(receptors, points))
 

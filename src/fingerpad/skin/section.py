@@ -48,7 +48,7 @@ def middle_section(mesh: Mesh, displacement_mm: FloatArray) -> Section:
         nodes, cut = _next_to_plane(mesh)
         elements = [cut]
     if not len(nodes):
-        raise InputError("mesh must have elements with a face on the plane z = 0: it has none.")
+        raise InputError("mesh", "must have elements with a face on the plane z = 0", remedy="it has none")
     edges = np.unique(np.sort(np.stack([nodes, np.roll(nodes, -1, axis=1)], axis=-1).reshape(-1, 2)), axis=0)
     on_nail, on_bone = (np.isin(edges, fixed).all(axis=1) for fixed in (mesh.nail_nodes, mesh.bone_nodes))
     on_skin = np.isin(edges, mesh.skin_nodes).all(axis=1) & ~on_nail

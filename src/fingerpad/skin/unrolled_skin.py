@@ -121,7 +121,7 @@ class UnrolledSkin(metaclass=KnownKeywords):
             object.__setattr__(self, "origin_x_mm", self.finger.contact_mm[0])
         if not 0.0 < finite("origin_x_mm", self.origin_x_mm, "mm") < self.finger.length_mm:
             raise InputError(
-                f"origin_x_mm must lie between 0 and {self.finger.length_mm} mm: got {self.origin_x_mm}."
+                "origin_x_mm", f"must lie between 0 and {self.finger.length_mm} mm", str(self.origin_x_mm)
             )
 
     @property
@@ -144,7 +144,7 @@ class UnrolledSkin(metaclass=KnownKeywords):
         """
         places = float_array("places_mm", places_mm, 2)
         if places.shape[1] != 2:
-            raise InputError(f"places_mm needs two columns, along and around: got shape {places.shape}.")
+            raise InputError("places_mm", "needs two columns, along and around", f"shape {places.shape}")
         first, last = self.ends_mm
         along, around = places[:, 0], np.abs(places[:, 1])
         outside = (along < first - _ROUND_OFF_MM) | (along > last + _ROUND_OFF_MM)
@@ -154,8 +154,10 @@ class UnrolledSkin(metaclass=KnownKeywords):
         if outside.any():
             wrong = places[np.argmax(outside)]
             raise InputError(
-                f"places_mm must lie on the finger, along within {first:.2f} ... {last:.2f} mm and around up "
-                f"to the dorsal midline: got along = {wrong[0]:g}, around = {wrong[1]:g} mm."
+                "places_mm",
+                f"must lie on the finger, along within {first:.2f} ... {last:.2f} mm and around up to the "
+                "dorsal midline",
+                f"along = {wrong[0]:g}, around = {wrong[1]:g} mm",
             )
         return self._point(s, np.copysign(self._phi(s, np.minimum(around, half_girth)), places[:, 1]))
 
@@ -170,7 +172,7 @@ class UnrolledSkin(metaclass=KnownKeywords):
         """
         points = float_array("points_mm", points_mm, 2)
         if points.shape[1] != 3:
-            raise InputError(f"points_mm needs three columns, x, y and z: got shape {points.shape}.")
+            raise InputError("points_mm", "needs three columns, x, y and z", f"shape {points.shape}")
         x, y, z = points.T
         if (x < -_ROUND_OFF_MM).any() or (x > self.finger.length_mm + _ROUND_OFF_MM).any():
             raise InputError(f"x of points_mm must lie within 0 ... {self.finger.length_mm} mm.")
@@ -199,9 +201,9 @@ class UnrolledSkin(metaclass=KnownKeywords):
             x_mm = first, last
         ends = increasing("x_mm", float_array("x_mm", x_mm, 1))
         if ends.size != 2 or ends[0] < 0.0 or ends[1] > self.finger.length_mm:
-            raise InputError(f"x_mm must be two ends within 0 ... {self.finger.length_mm} mm: got {x_mm}.")
+            raise InputError("x_mm", f"must be two ends within 0 ... {self.finger.length_mm} mm", str(x_mm))
         if not 0.0 < finite("faces_deg", faces_deg, "degrees") <= 90.0:
-            raise InputError(f"faces_deg must be above 0 and at most 90 degrees: got {faces_deg!r}.")
+            raise InputError("faces_deg", "must be above 0 and at most 90 degrees", repr(faces_deg))
         s = np.sqrt(1.0 - np.linspace(ends[0], ends[1], 61) / self.finger.length_mm)
         low, high = np.zeros_like(s), np.full_like(s, _HALF)
         for _ in range(_MOST_STEPS):

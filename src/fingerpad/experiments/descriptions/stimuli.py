@@ -13,12 +13,7 @@ from fingerpad.core.errors import InputError, Place, closest, spelled
 from fingerpad.data import protocol
 from fingerpad.experiments.conditions import Conditions
 from fingerpad.experiments.descriptions.pressing import RAMP_AND_HOLD
-from fingerpad.experiments.descriptions.reading import (
-    at,
-    merged,
-    moved,
-    part_from,
-)
+from fingerpad.experiments.descriptions.reading import at, merged, moved, part_from
 from fingerpad.experiments.descriptions.stimulus import (
     FingerDescription,
     MadeObjects,
@@ -230,10 +225,7 @@ def pressed_with(stimulus: NamedStimulus, conditions: Conditions, grading: Gradi
 
 
 def _grading(
-    stimuli: Sequence[NamedStimulus],
-    conditions: Conditions,
-    reach_mm: float | None,
-    receptor: Grading | None,
+    stimuli: Sequence[NamedStimulus], conditions: Conditions, reach_mm: float | None, receptor: Grading | None
 ) -> Grading:
     """Mesh that is fine at every contact, the same for all: meshes that differ would be discriminated."""
     zones = list(dict.fromkeys(_zone(stimulus, conditions) for stimulus in stimuli))

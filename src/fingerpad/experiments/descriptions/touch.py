@@ -42,19 +42,7 @@ from fingerpad.neuron.population import Population
 from fingerpad.neuron.rate_windows import rate_windows_ms
 from fingerpad.skin.indentation import Touch
 
-OUTPUTS = (
-    "figures",
-    "csv",
-    "spikes",
-    "npz",
-    "netcdf",
-    "zarr",
-    "nwb",
-    "vtu",
-    "abaqus",
-    "calculix",
-    "febio",
-)
+OUTPUTS = ("figures", "csv", "spikes", "npz", "netcdf", "zarr", "nwb", "vtu", "abaqus", "calculix", "febio")
 """What can be written of a touch."""
 
 

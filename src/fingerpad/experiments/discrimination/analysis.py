@@ -220,7 +220,7 @@ class PreparedTask(metaclass=KnownKeywords):
         for key, names in (("code", task.code), ("measure", task.measure)):
             for name, count in Counter(names).items():
                 if count > 1:
-                    raise InputError(f"{key} must name each once: {name} is given {count} times.")
+                    raise InputError(key, "must name each once", remedy=f"{name} is given {count} times")
         self._check_windows()
         for number, point in enumerate(task.observed.points if task.observed else (), start=1):
             if isinstance(point.at, str) or self.stimuli[0].level is None:
@@ -231,13 +231,16 @@ class PreparedTask(metaclass=KnownKeywords):
                 f"{', '.join(stimulus.name for stimulus in self.stimuli[1:])}: observed.points has none."
             )
         if IDEAL in task.code and task.noise == 0.0:
-            raise InputError("noise must be greater than 0 where code has ideal: got 0.")
+            raise InputError("noise", "must be greater than 0 where code has ideal", "0")
         if task.noise == FITTED and task.code[0] == IDEAL:
-            raise InputError("code must not begin with ideal where noise is fitted: put another first.")
+            raise InputError(
+                "code", "must not begin with ideal where noise is fitted", remedy="put another first"
+            )
         if task.experiment.criterion_sigma > 0.0 and "euclidean" in task.code:
             raise InputError(
-                "experiment.criterion_sigma must be 0 where code has euclidean, whose decision point "
-                f"does not vary: got {task.experiment.criterion_sigma:g}."
+                "experiment.criterion_sigma",
+                "must be 0 where code has euclidean, whose decision point does not vary",
+                f"{task.experiment.criterion_sigma:g}",
             )
 
     def _check_windows(self) -> None:

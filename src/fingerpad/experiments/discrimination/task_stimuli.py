@@ -56,12 +56,13 @@ def task_stimuli(task: DiscriminationTask, beside: Path = Path()) -> tuple[Named
     """
     found = named_stimuli(task, beside)
     if len(found) < 2:
-        raise InputError(f"stimuli must be two or more to be discriminated: got {len(found)}.")
+        raise InputError("stimuli", "must be two or more to be discriminated", str(len(found)))
     with_level = [stimulus.level is not None for stimulus in found]
     if any(with_level) and not all(with_level):
         raise InputError(
-            f"level must be given for all stimuli or for none: {found[with_level.index(False)].name!r} "
-            "has none."
+            "level",
+            "must be given for all stimuli or for none",
+            remedy=f"{found[with_level.index(False)].name!r} has none",
         )
     row = stimulus_index(found, task.standard, "standard")
     return (found[row], *found[:row], *found[row + 1 :])
@@ -73,7 +74,7 @@ def stimulus_index(stimuli: Sequence[NamedStimulus], place: float | str, key: st
         if place == stimulus.name or (stimulus.level is not None and place == stimulus.level):
             return row
     names = ", ".join(stimulus.name for stimulus in stimuli)
-    raise InputError(f"{key} must be one of the stimuli, {names}: got {place!r}.")
+    raise InputError(key, f"must be one of the stimuli, {names}", repr(place))
 
 
 @known_keywords

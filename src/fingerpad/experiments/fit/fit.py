@@ -152,14 +152,15 @@ def check_enough(rates: RateRecordings, memberships: IntArray, n_free: int = len
     """Raise `InputError` if a training set cannot be fitted, or a set not be judged."""
     if memberships.shape != (len(rates.stimuli),):
         raise InputError(
-            f"memberships needs one fold per stimulus: got {memberships.size} for {len(rates.stimuli)}."
+            "memberships", "needs one fold per stimulus", f"{memberships.size} for {len(rates.stimuli)}"
         )
     for fold in np.unique(memberships):
         training = rates.chosen(np.flatnonzero(memberships != fold))
         if training.n_rates < n_free:
             raise InputError(
-                f"recordings must leave at least {n_free} rates, one per free parameter, "
-                f"when a fold is left out: without fold {fold + 1} there are {training.n_rates}, record more."
+                "recordings",
+                f"must leave at least {n_free} rates, one per free parameter, when a fold is left out",
+                remedy=f"without fold {fold + 1} there are {training.n_rates}, record more",
             )
         for rows in (memberships == fold, memberships != fold):
             part = rates.chosen(np.flatnonzero(rows))

@@ -59,25 +59,29 @@ class Prepared:
 def check_spikes(recordings: Recordings, n_motions: int) -> SpikeRecordings:
     """Return the recordings if the likelihood of their spikes is defined, else raise `InputError`."""
     if isinstance(recordings, RateRecordings):
-        raise InputError("likelihood needs spike times: got rates, choose another method.")
+        raise InputError("likelihood", "needs spike times", "rates, choose another method")
     if n_motions > 1:
         raise InputError(
-            f"likelihood needs stimuli that move alike: got {n_motions} motions, choose another method."
+            "likelihood", "needs stimuli that move alike", f"{n_motions} motions, choose another method"
         )
     if recordings.trains.times_ms.size < len(SPIKE_PARAMETER_NAMES):
         raise InputError(
-            f"likelihood needs at least {len(SPIKE_PARAMETER_NAMES)} spikes, one per parameter: "
-            f"got {recordings.trains.times_ms.size}."
+            "likelihood",
+            f"needs at least {len(SPIKE_PARAMETER_NAMES)} spikes, one per parameter",
+            str(recordings.trains.times_ms.size),
         )
     for presentation, name in enumerate(recordings.stimuli):
         train = recordings.trains[presentation]
         if train.size and train[0] <= 0.0:
-            raise InputError(f"likelihood needs spikes after the onset: {name} has one at {train[0]:g} ms.")
+            raise InputError(
+                "likelihood", "needs spikes after the onset", remedy=f"{name} has one at {train[0]:g} ms"
+            )
         closest = np.diff(train).min(initial=np.inf)
         if closest <= neuron.REFRACTORY.value:
             raise InputError(
-                f"likelihood needs spikes more than {neuron.REFRACTORY.value:g} ms apart, the rest after a "
-                f"spike: {name} has two that are {closest:.3g} ms apart; sort the unit again, or fit rates."
+                "likelihood",
+                f"needs spikes more than {neuron.REFRACTORY.value:g} ms apart, the rest after a spike",
+                remedy=f"{name} has two that are {closest:.3g} ms apart; sort the unit again, or fit rates",
             )
     return recordings
 
@@ -126,11 +130,12 @@ Beside = Mapping[float, Traces | Sequence[Traces]]
 def check_offset(method: str, places_mm: Sequence[float]) -> None:
     """Raise `InputError` if a receptor's offset cannot be determined."""
     if method not in OFFSET_METHODS:
-        raise InputError(f"offset needs a method that fits it, {' or '.join(OFFSET_METHODS)}: got {method}.")
+        raise InputError("offset", f"needs a method that fits it, {' or '.join(OFFSET_METHODS)}", str(method))
     if len(set(places_mm)) < 2:
         raise InputError(
-            "offset needs stimuli at several places along the finger, as those of the shifted bar are: all "
-            f"are at {places_mm[0]:g} mm, leave it out."
+            "offset",
+            "needs stimuli at several places along the finger, as those of the shifted bar are",
+            remedy=f"all are at {places_mm[0]:g} mm, leave it out",
         )
 
 
@@ -139,8 +144,9 @@ def check_beside(beside: Beside) -> FloatArray:
     beside_mm = np.array(sorted(beside), dtype=np.float64)
     if not (beside_mm.size and beside_mm[0] < 0.0 < beside_mm[-1]):
         raise InputError(
-            "beside needs energy density on both sides of the receptor, at offsets below and above 0 mm: "
-            f"got {', '.join(f'{offset:g}' for offset in beside_mm) or 'none'}."
+            "beside",
+            "needs energy density on both sides of the receptor, at offsets below and above 0 mm",
+            str(", ".join(f"{offset:g}" for offset in beside_mm) or "none"),
         )
     return beside_mm
 

@@ -123,14 +123,15 @@ class FitRequest(metaclass=KnownKeywords):
         for start, end in self.used_windows_ms:
             if not 0.0 <= start < end:
                 raise InputError(
-                    f"windows must be a start from 0 on and a later end: got {start:g}, {end:g}."
+                    "windows", "must be a start from 0 on and a later end", f"{start:g}, {end:g}"
                 )
         end = max(end for _, end in self.used_windows_ms)
         for name, stimulus in self.recorded.stimuli.items():
             if stimulus.motion.end_ms < end:
                 raise InputError(
-                    f"windows must end with the stimuli, not at {end:g} ms: {name} ends at "
-                    f"{stimulus.motion.end_ms:g} ms."
+                    "windows",
+                    f"must end with the stimuli, not at {end:g} ms",
+                    remedy=f"{name} ends at {stimulus.motion.end_ms:g} ms",
                 )
         if self.with_offset:
             check_offset(self.method, [stimulus.x_mm for stimulus in self.recorded.stimuli.values()])
@@ -147,7 +148,7 @@ class FitRequest(metaclass=KnownKeywords):
         numbers = tuple(getattr(self.afferent, "__dataclass_fields__", ()))
         if not self.free:
             raise InputError(
-                f"--free must name at least one number of {self.kind}, one of {', '.join(numbers)}: got none."
+                "--free", f"must name at least one number of {self.kind}, one of {', '.join(numbers)}", "none"
             )
         for name in self.free:
             positive(one_of("--free", name, numbers), getattr(self.afferent, name))
@@ -158,7 +159,7 @@ class FitRequest(metaclass=KnownKeywords):
                     "out with --free."
                 )
         if self.method != "least_squares":
-            raise InputError(f"--free needs the method least_squares: got {self.method}.")
+            raise InputError("--free", "needs the method least_squares", str(self.method))
 
     @property
     def kind(self) -> str:
@@ -192,7 +193,9 @@ class FitRequest(metaclass=KnownKeywords):
         """Fold of each stimulus."""
         given = self.recorded.memberships
         if given is not None and self.n_folds is not None:
-            raise InputError("folds must come from the column fold or from --folds, not both: leave one out.")
+            raise InputError(
+                "folds", "must come from the column fold or from --folds, not both", remedy="leave one out"
+            )
         return folds_in_turn(len(self.rates.stimuli), self.n_folds) if given is None else given
 
     @cached_property

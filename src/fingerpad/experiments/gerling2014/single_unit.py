@@ -53,9 +53,7 @@ def bar_touches(conditions: Conditions) -> list[Touch]:
 
 
 def traces_at_receptor(
-    responses: list[SkinResponse],
-    dynamic_quantity: str = STORED_ENERGY,
-    static_quantity: str = STORED_ENERGY,
+    responses: list[SkinResponse], dynamic_quantity: str = STORED_ENERGY, static_quantity: str = STORED_ENERGY
 ) -> Traces:
     """Quantities of the two terms at the one receptor, one column per shift of the bar."""
     quantities = (dynamic_quantity, static_quantity)

@@ -100,7 +100,7 @@ class SampleSettings(Part):
     def values(self) -> dict[str, list[float]]:
         """Values of each field."""
         if not self.fields:
-            raise InputError("fields must name a field or more: it is empty.")
+            raise InputError("fields", "must name a field or more", remedy="it is empty")
         from scipy.stats import qmc
 
         from fingerpad.core.random_streams import published_generator
@@ -111,7 +111,7 @@ class SampleSettings(Part):
         points = kind(len(self.fields), rng=published_generator(self.seed)).random(size)[: self.count]
         low, high = np.array(list(self.fields.values())).T
         if (low >= high).any():
-            raise InputError("fields must have a lower bound and then a higher one: one has not.")
+            raise InputError("fields", "must have a lower bound and then a higher one", remedy="one has not")
         scaled = low + (high - low) * points
         return dict(zip(self.fields, scaled.T.tolist(), strict=True))
 
@@ -242,7 +242,7 @@ class Sweep:
                 raise InputError("grid, zip or sample must name a field that varies: none does.")
             for field, count in Counter(fields).items():
                 if count > 1:
-                    raise InputError(f"{field} must vary in one way: it is given twice.")
+                    raise InputError(field, "must vary in one way", remedy="it is given twice")
                 if field.partition(".")[0] in NOT_SWEPT or field == f"{OBSERVER}.along":
                     raise InputError(f"{field} cannot vary: leave it out.")
             if all(axis.observes for axis in found):
@@ -281,7 +281,9 @@ class Sweep:
         if content is None:
             if self.observer_axes:
                 with self.origin.located():
-                    raise InputError("observer must be given where its fields vary: it is missing.")
+                    raise InputError(
+                        "observer", "must be given where its fields vary", remedy="it is missing"
+                    )
             return ()
         return tuple(self._observer(dict(content), place) for place in np.ndindex(self.observer_shape))
 
@@ -301,16 +303,18 @@ class Sweep:
                 values = axis.values[observer.along]
                 if values.count(observer.standard) != 1:
                     raise InputError(
-                        f"standard must be one of the values of {observer.along}, once: got "
-                        f"{observer.standard!r}."
+                        "standard",
+                        f"must be one of the values of {observer.along}, once",
+                        repr(observer.standard),
                     )
                 if len(values) < 2:
                     raise InputError(f"{observer.along} must have two values or more to be discriminated.")
                 return number, values.index(observer.standard)
         fields = [field for axis in self.axes if axis.presses for field in axis.values]
         raise InputError(
-            f"along must be a field that varies and changes the skin, {', '.join(fields)}: got "
-            f"{observer.along!r}."
+            "along",
+            f"must be a field that varies and changes the skin, {', '.join(fields)}",
+            repr(observer.along),
         )
 
     def settings_of(self, press: int) -> range:
@@ -470,7 +474,7 @@ def _with(content: Content, keys: list[str], value: Any) -> Content:
         inner = {"kind": inner}
     if not isinstance(inner, Mapping):
         raise InputError(
-            f"{first} must be a mapping of keys to values, so that {rest[0]} can vary: got {inner!r}."
+            first, f"must be a mapping of keys to values, so that {rest[0]} can vary", repr(inner)
         )
     return {**content, first: _with(inner, rest, value)}
 

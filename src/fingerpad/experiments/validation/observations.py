@@ -31,8 +31,10 @@ def not_concave(name: str, value: float, unit: str = "") -> float:
     """Return a curvature that is not negative, else raise `InputError`."""
     if finite(name, value, unit) < 0.0:
         raise InputError(
-            f"{name} must not be negative [{unit}], because indenters are spheres and, at 0, a flat plate: "
-            f"got {value!r}; leave concave surfaces out."
+            name,
+            f"must not be negative [{unit}], because indenters are spheres and, at 0, a flat plate",
+            repr(value),
+            "leave concave surfaces out",
         )
     return float(value)
 
@@ -173,7 +175,9 @@ def read_observations(path: str | Path) -> Observations:
     size_mb = path.stat().st_size / _BYTES_PER_MB if path.is_file() else 0.0
     if size_mb > LARGEST_FILE_MB:
         raise InputError(
-            f"{path} must be at most {LARGEST_FILE_MB:g} MB: it has {size_mb:.1f} MB; split it into several."
+            path,
+            f"must be at most {LARGEST_FILE_MB:g} MB",
+            remedy=f"it has {size_mb:.1f} MB; split it into several",
         )
     lines = read_csv(path, (INDENTER, *COLUMNS))
     kind = _kind(path, tuple(lines[0].entries))

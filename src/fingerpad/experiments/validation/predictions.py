@@ -62,8 +62,9 @@ class FingertipModel(metaclass=KnownKeywords):
         end_ms = RampAndHold().end_ms
         if not 0.0 <= start < end <= end_ms:
             raise InputError(
-                f"static_window must be a start from 0 on and a later end, at most {end_ms:g} ms, where the "
-                f"hold ends: got {start:g}, {end:g}."
+                "static_window",
+                f"must be a start from 0 on and a later end, at most {end_ms:g} ms, where the hold ends",
+                f"{start:g}, {end:g}",
             )
 
     @property
@@ -188,8 +189,9 @@ def _deflection(given: Mapping[str, Value], model: FingertipModel) -> Reading:
         first, last = -profile.distance_mm[-1], -profile.distance_mm[0]
         if not first <= distance_mm <= last:
             raise InputError(
-                f"distance_mm must lie on the finger, from {first:.1f} to {last:.1f} mm: got "
-                f"{distance_mm:g} mm."
+                "distance_mm",
+                f"must lie on the finger, from {first:.1f} to {last:.1f} mm",
+                f"{distance_mm:g} mm",
             )
         return float(profile.at(-distance_mm))
 

@@ -51,7 +51,7 @@ class CrossValidation:
 def interleaved_folds(n_observations: int, n_folds: int = int(protocol.FOLDS.value)) -> IntArray:
     """Assign observations to folds in turn: index modulo the number of folds."""
     if whole("n_folds", n_folds, at_least=2) > whole("n_observations", n_observations, at_least=2):
-        raise InputError(f"n_folds must be at most the number of stimuli, {n_observations}: got {n_folds}.")
+        raise InputError("n_folds", f"must be at most the number of stimuli, {n_observations}", str(n_folds))
     return np.arange(n_observations, dtype=np.int64) % n_folds
 
 
@@ -74,14 +74,15 @@ def _checked_memberships(memberships: ArrayLike, n_observations: int) -> IntArra
     given = float_array("memberships", memberships, 1)
     if given.size != n_observations:
         raise InputError(
-            f"memberships needs one fold per observation: got {given.size} for {n_observations}."
+            "memberships", "needs one fold per observation", f"{given.size} for {n_observations}"
         )
     folds = given.astype(np.int64)
     present = np.unique(folds)
     if (folds != given).any() or present.size < 2 or not np.array_equal(present, np.arange(present.size)):
         raise InputError(
-            "memberships must number at least two folds from 0 on without a gap: "
-            f"got {np.unique(given).tolist()}."
+            "memberships",
+            "must number at least two folds from 0 on without a gap",
+            str(np.unique(given).tolist()),
         )
     return folds
 

@@ -22,6 +22,8 @@ def fractional_sum_of_squares(observed: ArrayLike, predicted: ArrayLike) -> floa
         )
     observed_squares = float(observed_rate @ observed_rate)
     if observed_squares == 0.0:
-        raise InputError("observed must hold at least one value other than 0: FSS divides by its squares.")
+        raise InputError(
+            "observed", "must hold at least one value other than 0", remedy="FSS divides by its squares"
+        )
     residual = observed_rate - predicted_rate
     return 1.0 - float(residual @ residual) / observed_squares

@@ -49,7 +49,9 @@ class LeastSquares:
         outside = np.flatnonzero(((starts < self.bounds.low) | (starts > self.bounds.high)).any(axis=1))
         if outside.size:
             row = int(outside[0])
-            raise InputError(f"starts must lie between the bounds: row {row} is {starts[row].tolist()}.")
+            raise InputError(
+                "starts", "must lie between the bounds", remedy=f"row {row} is {starts[row].tolist()}"
+            )
         object.__setattr__(self, "starts", starts)
         for step in self.difference_steps:
             positive("difference_steps", step)

@@ -50,9 +50,7 @@ class Bounds:
         """Return points (n_points, n_parameters), or raise `InputError` if they have other parameters."""
         rows = float_array(name, points, 2)
         if rows.shape[1:] != self.scales.shape:
-            raise InputError(
-                f"{name} must have one entry per scale: got {rows.shape[1]} for {self.scales.size}."
-            )
+            raise InputError(name, "must have one entry per scale", f"{rows.shape[1]} for {self.scales.size}")
         return rows
 
 

@@ -83,8 +83,9 @@ def _checked(draws: FloatArray) -> FloatArray:
     values = np.asarray(draws, dtype=np.float64)
     if values.ndim != 3 or values.shape[0] < 2 or values.shape[1] < 4:
         raise InputError(
-            "draws must be of at least 2 ensembles and 4 steps, (n_ensembles, n_steps, n_walkers): "
-            f"got shape {values.shape}."
+            "draws",
+            "must be of at least 2 ensembles and 4 steps, (n_ensembles, n_steps, n_walkers)",
+            f"shape {values.shape}",
         )
     return values
 
@@ -168,7 +169,7 @@ class Chains:
 def credible_band(draws: FloatArray, level: float = 0.95) -> FloatArray:
     """Return the central interval that contains a share `level` of the draws, for each column."""
     if not 0.0 < finite("level", level) < 1.0:
-        raise InputError(f"level must lie between 0 and 1: got {level!r}.")
+        raise InputError("level", "must lie between 0 and 1", repr(level))
     return np.quantile(draws, [0.5 - level / 2.0, 0.5 + level / 2.0], axis=0)
 
 
@@ -194,7 +195,7 @@ def sample(
     whole("n_ensembles", n_ensembles, at_least=2)
     whole("n_walkers", n_walkers, at_least=4 * len(labels))
     if n_walkers % 2:
-        raise InputError(f"n_walkers must be even: got {n_walkers}.")
+        raise InputError("n_walkers", "must be even", str(n_walkers))
     whole("n_steps", n_steps, at_least=8)
     whole("most_steps", most_steps, at_least=n_steps)
     positive("smallest_effective_size", smallest_effective_size)
@@ -271,13 +272,7 @@ def _ensemble(
     """Start an ensemble at scattered points, with random numbers of its own."""
     start, moves = independent_keys(key, 2)
     walkers, heights = _start(density, centre, spread, n_walkers, generator(start))
-    sampler = emcee.EnsembleSampler(
-        n_walkers,
-        centre.size,
-        density,
-        moves=proposals,
-        vectorize=True,
-    )
+    sampler = emcee.EnsembleSampler(n_walkers, centre.size, density, moves=proposals, vectorize=True)
     sampler.random_state = emcee_state(moves)
     return _Ensemble(sampler, emcee.State(walkers, log_prob=heights, random_state=sampler.random_state))
 
@@ -292,12 +287,12 @@ class _Checked:
     def __call__(self, points: FloatArray) -> FloatArray:
         heights = np.asarray(self.log_density(points), dtype=np.float64)
         if heights.shape != points.shape[:1]:
-            raise InputError(f"log_density must return one number per point: got {heights.shape}.")
+            raise InputError("log_density", "must return one number per point", str(heights.shape))
         # A walker at +inf would never move again.
         wrong = np.isnan(heights) | (heights == np.inf)
         if wrong.any():
             raise InputError(
-                f"log_density must be a number or -inf: it is not at {points[wrong][0].tolist()}."
+                "log_density", "must be a number or -inf", remedy=f"it is not at {points[wrong][0].tolist()}"
             )
         self.count += len(points)
         return heights
@@ -310,7 +305,7 @@ def _check_sizes(centre: FloatArray, spread: FloatArray, names: tuple[str, ...])
             f"got {centre.size}, {spread.size} and {len(names)}."
         )
     if (spread <= 0.0).any():
-        raise InputError(f"spread must be greater than 0 for every parameter: got {spread.tolist()}.")
+        raise InputError("spread", "must be greater than 0 for every parameter", str(spread.tolist()))
 
 
 def _start(
@@ -326,6 +321,8 @@ def _start(
         walkers[lost] = centre + spread * random.normal(size=(int(lost.sum()), centre.size))
         heights[lost] = density(walkers[lost])
     raise InputError(
-        f"log_density must be finite near the centre: of {MOST_TRIES} points about {centre.tolist()} none "
-        "was. Move the centre, or make the spread smaller."
+        "log_density",
+        "must be finite near the centre",
+        remedy=f"of {MOST_TRIES} points about {centre.tolist()} none was. Move the centre, or make the "
+        "spread smaller",
     )

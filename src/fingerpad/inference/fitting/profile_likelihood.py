@@ -87,12 +87,14 @@ def profile_likelihoods(
             f"greater than 0: got {origins.shape[1]}, {units.tolist()} and {len(labels)}."
         )
     if not 0.0 < finite("level", level) < 1.0:
-        raise InputError(f"level must lie between 0 and 1: got {level!r}.")
+        raise InputError("level", "must lie between 0 and 1", repr(level))
     whole("most_steps", most_steps, at_least=2)
     search = _Search(log_likelihood, units, origins)
     best, highest = search.best_of(origins)
     if not np.isfinite(highest):
-        raise InputError(f"log_likelihood must be finite at a start: it is not at {best.tolist()}.")
+        raise InputError(
+            "log_likelihood", "must be finite at a start", remedy=f"it is not at {best.tolist()}"
+        )
     for _ in range(RESTARTS):
         point = search.maximise(best)
         gain, best = search.height(point) - search.height(best), point
@@ -131,7 +133,7 @@ class _Search:
         values = np.asarray(self.log_likelihood(points), dtype=np.float64)
         if np.isnan(values).any():
             wrong = points[np.isnan(values)][0].tolist()
-            raise InputError(f"log_likelihood must be a number or -inf: it is NaN at {wrong}.")
+            raise InputError("log_likelihood", "must be a number or -inf", remedy=f"it is NaN at {wrong}")
         return values
 
     def height(self, point: FloatArray) -> float:

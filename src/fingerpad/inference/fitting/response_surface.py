@@ -31,7 +31,7 @@ def factorial_design(n_parameters: int) -> FloatArray:
     whole("n_parameters", n_parameters, at_least=1)
     if n_parameters > _MOST_PARAMETERS:
         raise InputError(
-            f"n_parameters must be at most {_MOST_PARAMETERS}: got {n_parameters}, too many corners."
+            "n_parameters", f"must be at most {_MOST_PARAMETERS}", f"{n_parameters}, too many corners"
         )
     corners = np.indices((2,) * n_parameters).reshape(n_parameters, -1).T * 2.0 - 1.0
     return np.vstack([corners, np.zeros(n_parameters)])
@@ -129,7 +129,7 @@ class ResponseSurface:
         units = np.array(self.increments, dtype=np.float64)
         if units.shape not in (starts.shape, starts.shape[1:]):
             raise InputError(
-                f"increments must match starts {starts.shape} or one row of it: got {units.shape}."
+                "increments", f"must match starts {starts.shape} or one row of it", str(units.shape)
             )
         object.__setattr__(self, "starts", starts)
         object.__setattr__(self, "increments", np.broadcast_to(units, starts.shape))
@@ -183,9 +183,9 @@ def _value(objective: Objective, parameters: FloatArray) -> float:
 def _checked_increments(increments: ArrayLike, base: FloatArray) -> FloatArray:
     units = float_array("increments", increments, 1)
     if units.shape != base.shape:
-        raise InputError(f"increments needs one entry per parameter: got {units.size} for {base.size}.")
+        raise InputError("increments", "needs one entry per parameter", f"{units.size} for {base.size}")
     if (units <= 0.0).any():
-        raise InputError(f"increments must be greater than 0: got {units.tolist()}.")
+        raise InputError("increments", "must be greater than 0", str(units.tolist()))
     return units
 
 
@@ -195,11 +195,12 @@ def _floor(lower_bounds: ArrayLike | None, base: FloatArray, units: FloatArray) 
         return np.full(base.size, -np.inf)
     bounds = np.array(lower_bounds, dtype=np.float64)
     if bounds.shape != base.shape or np.isnan(bounds).any():
-        raise InputError(f"lower_bounds needs one number or -inf per parameter: got {lower_bounds!r}.")
+        raise InputError("lower_bounds", "needs one number or -inf per parameter", repr(lower_bounds))
     floor = bounds + units
     if (base < floor).any():
         raise InputError(
-            "start must lie at least one increment above lower_bounds: "
-            f"got {base.tolist()} for {bounds.tolist()}."
+            "start",
+            "must lie at least one increment above lower_bounds",
+            f"{base.tolist()} for {bounds.tolist()}",
         )
     return floor

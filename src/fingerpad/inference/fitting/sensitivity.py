@@ -72,9 +72,9 @@ def sobol_indices(
             f"got {low.tolist()}, {high.tolist()} for {len(labels)} names."
         )
     if whole("n_base", n_base, at_least=2) & (n_base - 1):
-        raise InputError(f"n_base must be a power of two: got {n_base}.")
+        raise InputError("n_base", "must be a power of two", str(n_base))
     if not 0.0 < finite("level", level) < 1.0:
-        raise InputError(f"level must lie between 0 and 1: got {level!r}.")
+        raise InputError("level", "must lie between 0 and 1", repr(level))
     random = generator(whole("seed", seed, at_least=0))
     values: list[FloatArray] = []  # at A, at B, and at A with each column of B: parts of Saltelli's design
 
@@ -86,7 +86,7 @@ def sobol_indices(
     found = stats.sobol_indices(func=evaluate, n=n_base, dists=uniform, rng=random)
     everything = np.concatenate(values)
     if np.ptp(everything) == 0.0:
-        raise InputError("objective must vary within the ranges: it is constant.")
+        raise InputError("objective", "must vary within the ranges", remedy="it is constant")
     at_a, at_b = values[0][None], values[1][None]
     at_ab = np.moveaxis(values[2].reshape(n_base, low.size), -1, 0)[:, None]
 
@@ -116,7 +116,7 @@ def sobol_indices(
 def _checked(values: ArrayLike, n_points: int) -> FloatArray:
     numbers = float_array("objective", values, 1)
     if numbers.size != n_points:
-        raise InputError(f"objective must return one number per point: got {numbers.size} for {n_points}.")
+        raise InputError("objective", "must return one number per point", f"{numbers.size} for {n_points}")
     return numbers
 
 
@@ -155,7 +155,7 @@ def jacobian(
     centre, units = float_array("parameters", parameters, 1), float_array("scales", scales, 1)
     if centre.shape != units.shape or (units <= 0.0).any():
         raise InputError(
-            f"scales must be greater than 0, one for each of {centre.size} parameters: got {units.tolist()}."
+            "scales", f"must be greater than 0, one for each of {centre.size} parameters", str(units.tolist())
         )
     width = positive("step", step)
     columns = [
@@ -179,10 +179,10 @@ def identifiability(
     centre = float_array("parameters", parameters, 1)
     labels = tuple(names)
     if len(labels) != centre.size:
-        raise InputError(f"names must name {centre.size} parameters: got {len(labels)}.")
+        raise InputError("names", f"must name {centre.size} parameters", str(len(labels)))
     table = jacobian(answer, centre, np.abs(centre) if scales is None else scales, step)
     if len(table) < centre.size:
-        raise InputError(f"answer must give at least {centre.size} numbers: got {len(table)}.")
+        raise InputError("answer", f"must give at least {centre.size} numbers", str(len(table)))
     _, values, directions = np.linalg.svd(table, full_matrices=False)
     rank = int((values > zero * values[0]).sum()) if values[0] > 0.0 else 0
     return Identifiability(labels, values, directions, rank)
