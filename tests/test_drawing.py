@@ -74,7 +74,7 @@ def results():
         "SkinResponse": skin,
         "ResponseMap": response,
         "SpikeTrains": response.spikes,
-        "Traces": fp.Traces([0.0, 50.0, 50.0, 90.0], [[0.0], [2e-3], [1e-3], [1e-3]], quantity="current"),
+        "Traces": skin.sed([(17.37, 0.0), (19.0, 0.0)]),
         "MixedResponse": fp.MixedResponse({"SAI": response, "RA": response}),
         "SurfaceProfile": skin.surface_profile(),
         "HitRates": fp.HitRates([0.6, 0.9], [0.05, 0.02], seed=1),
