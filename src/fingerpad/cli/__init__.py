@@ -41,8 +41,7 @@ MISUSE: Any = typer.BadParameter.__base__
 """What typer raises for options that it does not know or cannot read; it names only this child of it."""
 
 
-GENERAL_OPTIONS = ("--quiet", "--verbose")
-"""Options of every command, which may stand before its name or after it."""
+GENERAL_OPTIONS = ("--quiet", "--verbose")  # Of every command, before its name or after it.
 
 
 def _show_version(wanted: bool) -> None:

@@ -57,8 +57,7 @@ class Answer:
     middle_mm: FloatArray  # Middle of the contact, x and z, (n_times, 2). [mm]
     x_mm: FloatArray
     z_mm: FloatArray  # Points of the map, (nx,). [mm]
-    sed_kpa: FloatArray
-    """Strain energy density at the depth of the end organs; NaN beside the pad, (n_times, nx, nz). [kPa]"""
+    sed_kpa: FloatArray  # Energy density at the end organs; NaN off the pad, (n_times, nx, nz). [kPa]
     response: ResponseMap  # Spikes and rates of the afferents.
 
 

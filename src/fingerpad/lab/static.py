@@ -21,7 +21,6 @@ from fingerpad.lab.view import comparison, view_of_answer
 
 DEPTHS, PLACES = 6, 5  # Depths, and places along the finger, of every object.
 FRAMES = 24  # Pictures of the skin over time in each answer.
-
 CONTROLS = [each for each in ALL if each[0] in ("object", "depth_mm", "x_mm", "other", "afferent")]
 
 

@@ -257,8 +257,7 @@ def _interpretations(section: SphereDiscrimination) -> Table:
     return Table("Interpretations of steps that the paper leaves open", columns, rows, note)
 
 
-ROWS = {"gradient": 3.0, "start": 1.75, "euclidean": 0.5}
-"""Heights of the boxes of the two codes and of what they share."""
+ROWS = {"gradient": 3.0, "start": 1.75, "euclidean": 0.5}  # Heights of the boxes, by code.
 
 GRADIENT = (
     "(b) gradient of\neach receptor: sum of\n|differences| from\nits neighbours",

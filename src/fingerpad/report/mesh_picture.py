@@ -24,9 +24,7 @@ BONE, NAIL, SKIN = "#a9b4bd", "#0a5c99", "#f0d9c4"
 NAIL_WIDTH = 4.0
 
 LIGHT = np.array([0.35, -0.75, 0.56])  # Where the light comes from, in the order x, z, y.
-
-ENLARGED_MM, THIN_MM = (1.3, 2.0), 0.2
-"""Half the width and the height of the enlarged part; what is thinner is named beside it. [mm]"""
+ENLARGED_MM, THIN_MM = (1.3, 2.0), 0.2  # Half width, height; thinner is named beside it. [mm]
 
 
 def corners(points: np.ndarray) -> np.ndarray:

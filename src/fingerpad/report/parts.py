@@ -9,11 +9,8 @@ from typing import Literal, TypeVar
 
 from matplotlib.figure import Figure
 
-Kind = Literal["", "assumed", "final"]
-"""How a row is marked in HTML: an assumed input, or the row that is the result."""
-
-COLUMNS = ("paper", "human")
-"""The two sets of tissues of a reproduction, in the order of their columns in tables and figures."""
+Kind = Literal["", "assumed", "final"]  # An assumed input, or the row that is the result.
+COLUMNS = ("paper", "human")  # Sets of tissues of a reproduction, in the order of their columns.
 
 
 @dataclass(frozen=True)
@@ -54,10 +51,8 @@ class Drawing:
     title: str  # A few words.
     draw: Callable[[], Figure]
     caption: str
-    number: int | None = None
-    """Figures up to 9 of a reproduction have the paper's numbers; others go on from 10."""
-    human: Callable[[], Figure] | None = None
-    """Makes the same figure of the set `human`, to stand on the right; `draw` is then that of `paper`."""
+    number: int | None = None  # Up to 9 in a reproduction the paper's numbers; others from 10.
+    human: Callable[[], Figure] | None = None  # The same of `human`; `draw` is then of `paper`.
 
     @property
     def images(self) -> dict[str, Callable[[], Figure]]:

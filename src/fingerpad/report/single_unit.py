@@ -37,10 +37,7 @@ from fingerpad.report.style import BLACK, BLUE, COLUMN_IN, ORANGE, PALE, draw_ra
 
 BAR_HALF_WIDTH_MM = protocol.BAR_WIDTH.value / 2.0
 STATIC_MARK_MM = 2.9  # Position at which the paper's static difference is drawn, where no rates are. [mm]
-
-ALONG = "place of the bar, distal [mm]"
-"""Results count shifts proximal positive; all figures have the distal side on the right."""
-
+ALONG = "place of the bar, distal [mm]"  # Figures have the distal side on the right; results do not.
 FITTED = "model (fitted)"  # Name of the line of the model, whose afferent was fitted to what was observed.
 PAPER_FOLD, PAPER_START = 3, 2  # Fold and start point whose steps the paper's Table 4 lists.
 

@@ -53,9 +53,7 @@ _UNITS = {
 """Unit of a key that varies, by its end."""
 
 SESSION = 2  # Session of the random numbers of efficiencies; that of the hit rates is another.
-
-Encoded = tuple[FloatArray, np.ndarray]
-"""A measure of all receptors under every stimulus, and the pairs of neighbours that take part."""
+Encoded = tuple[FloatArray, np.ndarray]  # A measure (n_stimuli, n_receptors), and pairs of neighbours.
 
 
 @result_class
@@ -124,14 +122,11 @@ class Decoding:
     silent: tuple[str, ...] = ()  # Stimuli under which no afferent responds; there is no hit rate then.
     hit_rate: Vector | None = None
     hit_rate_sd: Vector | None = None  # Mean and standard deviation over repetitions, (n_comparisons,). [0-1]
-    statistic: TaskStatistic | None = None
-    """What the code computes for each stimulus; absent for the ideal observer."""
+    statistic: TaskStatistic | None = None  # What the code computes; absent for the ideal observer.
     d_prime: Vector | None = None  # Discriminability; NaN where it is infinite, (n_comparisons,).
-    forced_choice: ForcedChoice | None = None
-    """The same as proportion correct, with intervals; absent without noise."""
+    forced_choice: ForcedChoice | None = None  # As proportion correct; absent without noise.
     efficiency: Vector | None = None
-    efficiency_error: Vector | None = None
-    """Against the ideal observer; NaN where it cannot be estimated, (n_comparisons,)."""
+    efficiency_error: Vector | None = None  # NaN where it cannot be estimated, (n_comparisons,).
     curves: tuple[SideCurve, ...] = ()  # Psychometric curves above and below the standard.
 
 

@@ -45,8 +45,7 @@ class CurveThreshold:
     proportion: float  # Hit rate at the threshold. [0-1]
     difference: Number
     level: Number  # From the standard, and on the axis. [unit of what varies]
-    over_standard: float | None
-    """Difference over the standard (Weber fraction); absent where the standard is 0."""
+    over_standard: float | None  # Difference over standard (Weber fraction); absent where that is 0.
     bootstrap_interval: tuple[Number, Number] | None
     posterior_interval: tuple[Number, Number]
     """Confidence and credible interval of the difference; the former is absent where no comparison lies on
@@ -72,8 +71,7 @@ class CurveFit:
     sigmoid: str
     trials: int  # Judgements per comparison behind the intervals.
     threshold: CurveThreshold  # At the proportion that the task asks for.
-    slope: Number
-    """Of the hit rate at the threshold; NaN where no comparison lies on the rise. [1/unit of what varies]"""
+    slope: Number  # Of the hit rate at the threshold; NaN where no comparison lies on the rise.
     lapse: float  # What is missing to 1 far above the threshold. [0-1]
     at_bounds: tuple[str, ...]  # Parameters that ended at a bound.
     curve: CurvePoints
@@ -85,8 +83,7 @@ class SideCurve:
 
     side: str  # Of the standard.
     difference: Vector
-    hit_rate: Vector
-    """Distance from the standard and hit rate. [unit of what varies],, (n_comparisons,). [0-1]"""
+    hit_rate: Vector  # Distance from the standard, and hit rate, (n_comparisons,).
     fit: CurveFit | None = None
     why_not: str | None = None  # Why there is no curve.
 

@@ -92,13 +92,10 @@ class DiscriminationStatistics:
     """Statistics behind the paper's statements; dictionaries go by code."""
 
     misfit: dict[str, Estimate]
-    misfit_above_static: dict[str, Estimate]
-    """Root mean square distance to Goodwin's points, and what it has above that of static rates. [0-1]"""
+    misfit_above_static: dict[str, Estimate]  # Distance to Goodwin's points (rms). [0-1]
     shift: dict[str, Estimate]
-    shift_above_static: dict[str, Estimate]
-    """Largest change of a hit rate by the shift, and what it has above that of static rates. [0-1]"""
-    smallest_rise: dict[str, tuple[Estimate, ...]]
-    """Smallest step of the hit rate from one sphere to the next. [0-1]"""
+    shift_above_static: dict[str, Estimate]  # Largest change of a hit rate by the shift. [0-1]
+    smallest_rise: dict[str, tuple[Estimate, ...]]  # Smallest step from one sphere to the next. [0-1]
     noise_lowers: NoiseEffect
     ten_matrices: ErrorBarChange
     criterion: ErrorBarChange  # 10 noise matrices instead of 100; a criterion that varies more.
@@ -204,10 +201,7 @@ def _targets(hit_rates: FloatArray, columns: list[int], curvature_per_m: Sequenc
 
 
 SESSIONS = 5  # Sessions of a study. The first is drawn; all of them give the Monte-Carlo error.
-
-SWEPT_NOISE = tuple(round(0.015 + 0.01 * step, 3) for step in range(8))
-"""Noise sigma_1 that is tried, over the paper's range."""
-
+SWEPT_NOISE = tuple(round(0.015 + 0.01 * step, 3) for step in range(8))  # Over the paper's range of sigma_1.
 FEW = 10  # Noise matrices, and hit rates, of the paper's smaller experiments.
 AGAIN = 20  # Repetitions of the judgements of one session, which show how stable their mean is.
 CRITERION_SIGMAS = psychophysics.DECISION_CRITERION_SIGMA.value
@@ -333,8 +327,7 @@ class GoodwinHitRates:
     trials: int  # Trials behind each fraction (assumed).
     low: Vector
     high: Vector  # Observed fractions and their binomial 95 % intervals, (2,). [0-1]
-    line: Vector
-    """Hit rates at the spheres of the study on the line that is straight in z, (n_comparisons,). [0-1]"""
+    line: Vector  # Hit rates at the spheres of the study, on the line in z, (n_comparisons,). [0-1]
 
 
 def line_in_z(curvature_per_m: ArrayLike) -> FloatArray:

@@ -185,8 +185,7 @@ class SingleUnitResult:
     start_points: tuple[dict[str, Number], ...]  # Both start points, by name of the parameter.
     folds: tuple[FoldResult, ...]
     modulation: RateModulation
-    initial_mv: Number | None = None
-    """Potential of the membrane at the start; that at rest if there is none. [mV]"""
+    initial_mv: Number | None = None  # Potential of the membrane at the start; by default at rest. [mV]
 
 
 def single_unit_result(
@@ -277,17 +276,13 @@ def edge_modulation(shift_mm: FloatArray, rate_hz: FloatArray) -> Modulation:
 class FiringCourse:
     """Course of the firing and of the current under the bar, shift by shift, and rates by depth."""
 
-    peak_ms: Vector
-    """End of the shortest interval between spikes, (n_shifts,); NaN with fewer than two spikes. [ms]"""
+    peak_ms: Vector  # End of the shortest interval, (n_shifts,); NaN with fewer than two spikes. [ms]
     window_ms: tuple[float, float]  # The paper's window of the dynamic rate. [ms]
-    dynamic_share_ramp: Vector
-    """Share of the dynamic term in the charge of both terms in the ramp, (n_shifts,). [1]"""
+    dynamic_share_ramp: Vector  # Share of the dynamic term in the charge in the ramp, (n_shifts,). [1]
     dynamic_share_hold: Vector  # The same in the hold, (n_shifts,). [1]
-    sed_r2: Number
-    """R² of the line from SED in the middle of the static window to the observed static rates. [1]"""
+    sed_r2: Number  # R² of the line from SED in the static window to the observed static rates. [1]
     depth_mm: Vector  # Depths of a flat plate, (n_depths,). [mm]
-    static_rate_by_depth_hz: Vector
-    """Static rate at these depths, mean of the population, (n_depths,). [spikes/s]"""
+    static_rate_by_depth_hz: Vector  # At these depths, mean of the population, (n_depths,). [spikes/s]
 
     @property
     def fires(self) -> np.ndarray:

@@ -197,8 +197,7 @@ class Sweep:
     """
 
     description: SweepDescription
-    source: str = "sweep"
-    """File of the description: files that it names are searched beside it, and errors begin with it."""
+    source: str = "sweep"  # File of the description: beside it files are searched; errors begin with it.
     text: str = ""  # Content of that file, for the lines of errors.
 
     @property

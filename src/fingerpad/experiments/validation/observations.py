@@ -15,14 +15,10 @@ from fingerpad.core.keywords import known_keywords
 from fingerpad.core.tables import TableRow, read_csv
 from fingerpad.experiments.indenter_text import indenter_named
 
-LARGEST_FILE_MB = 1.0
-"""Larger files are refused: they hold no published table but, for example, a recording over time. [MB]"""
-
+LARGEST_FILE_MB = 1.0  # Larger files are refused: they hold no published table. [MB]
 _BYTES_PER_MB = 1e6
 
-STIFFEST_N_PER_MM = 10.0
-"""Force over depth that no fingertip has; plates have 0.05 to 0.5 (Dandekar 1995, as quoted). [N/mm]"""
-
+STIFFEST_N_PER_MM = 10.0  # No fingertip has it; plates have 0.05 to 0.5 (Dandekar 1995, as quoted).
 Value = float | str
 
 
@@ -115,8 +111,7 @@ class Observation:
     """One row of a file."""
 
     line: int
-    condition: tuple[Value, ...]
-    """Values of the kind's conditions, in their order; an indenter as it is written."""
+    condition: tuple[Value, ...]  # Values of the kind's conditions; an indenter as it is written.
     observed: float
 
 
