@@ -96,7 +96,6 @@ app.add_typer(store_app, name="store")
 
 
 def main() -> None:
-    """Run the command line `fingerpad`."""
     run(app, "fingerpad")
 
 

@@ -104,12 +104,10 @@ def option(help_text: str, name: str | None = None) -> Any:
 
 
 def number_option(help_text: str) -> Any:
-    """Make an option that takes a number."""
     return typer.Option(parser=to_number, metavar="NUMBER", help=help_text)
 
 
 def integer_option(help_text: str) -> Any:
-    """Make an option that takes a whole number."""
     return typer.Option(parser=to_whole, metavar="INTEGER", help=help_text)
 
 

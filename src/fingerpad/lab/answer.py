@@ -149,7 +149,6 @@ def finger_of(described: DescribedReduction) -> Fingertip:
 
 
 def map_axes(described: DescribedReduction) -> tuple[FloatArray, FloatArray]:
-    """Points of the map along and across. [mm]"""
     middle = described.training.touch.finger.contact_mm
     along, across = (
         centre + np.arange(-reach, reach + 0.5 * MAP_STEP_MM, MAP_STEP_MM)
@@ -159,7 +158,6 @@ def map_axes(described: DescribedReduction) -> tuple[FloatArray, FloatArray]:
 
 
 def reduced_answer(described: DescribedReduction, model: ReducedModel, state: LabState) -> Answer:
-    """Answer by the reduced touch."""
     motion, shape = motion_of(described, model, state)
     weights = [
         model.pose_weights((pose.x_mm, pose.z_mm, pose.tilt_deg, *shape))

@@ -90,7 +90,6 @@ def view_of(laboratory: Laboratory, state: LabState, exact: bool = False) -> Vie
 def view_of_answer(
     laboratory: Laboratory, state: LabState, answer: Answer, frames: int | None = None, path: str = ""
 ) -> View:
-    """Make the view of a reduced answer."""
     described = laboratory.described(state)
     touch, finger = described.training.touch, finger_of(described)
     x = np.linspace(0.3, finger.length_mm - 0.3, OUTLINE_POINTS)

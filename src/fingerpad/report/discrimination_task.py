@@ -37,7 +37,6 @@ SEVERAL = {"static": "static rates", "dynamic": "dynamic rates", "latency": "fir
 
 
 def task_tables(found: TaskResult) -> list[Table]:
-    """Tables of thresholds, hit rates, efficiencies and the population."""
     every = (_thresholds, _hit_rates, _forced_choices, _efficiencies, _population)
     return [table for make in every if (table := make(found)).rows]
 
@@ -349,7 +348,6 @@ def _people(axes: Axes, found: TaskResult) -> None:
 
 
 def caption_task_responses(found: TaskResult) -> str:
-    """Caption of the response maps."""
     main, n_stimuli = main_decoding(found), len(found.stimulus)
     left_out = n_stimuli - len(_shown(n_stimuli))
     return (
@@ -384,12 +382,10 @@ def caption_task_curves(found: TaskResult) -> str:
 
 
 def main_decoding(found: TaskResult) -> Decoding:
-    """Return the first decoding that has hit rates."""
     return next(decoding for decoding in found.decodings if decoding.hit_rate is not None)
 
 
 def titled(decoding: Decoding) -> str:
-    """Name a decoding by its code and measure."""
     return f"{CODE_LABELS[decoding.code]}, {MEASURE_LABELS[decoding.measure][0]}"
 
 

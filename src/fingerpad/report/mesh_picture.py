@@ -158,7 +158,6 @@ def _name_fixed_parts(axes: Axes, plane: MeshPlane, mirrored: bool) -> None:
 
 
 def caption_mesh(section: MeshPicture) -> str:
-    """Describe Figure 1."""
     return (
         "Finite-element mesh of the fingertip that the standard sphere presses, without load: "
         f"{number(section.nodes)} nodes and {number(section.elements)} elements"

@@ -64,7 +64,6 @@ class Drawing:
 
     @property
     def label(self) -> str:
-        """Number and title."""
         return self.title if self.number is None else f"Figure {self.number}. {self.title}"
 
 
@@ -116,7 +115,6 @@ class Chapter:
 
     @property
     def drawings(self) -> list[Drawing]:
-        """Figures of the chapter."""
         return [part for part in (*self.parts, *self.folded) if isinstance(part, Drawing)]
 
     @property
@@ -137,5 +135,4 @@ class Page:
 
     @property
     def drawings(self) -> list[Drawing]:
-        """Figures of the opening and of all chapters."""
         return [*self.opening, *(drawing for chapter in self.chapters for drawing in chapter.drawings)]

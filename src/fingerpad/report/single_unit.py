@@ -289,7 +289,6 @@ def caption_uncertainty(section: UncertaintyResult) -> str:
 
 
 def uncertainty_tables(section: UncertaintyResult) -> list[Table]:
-    """Return the numbers in both forms, the residuals, the sensitivity and the convergence."""
     return [
         _determined(section),
         _residuals(section),

@@ -91,7 +91,6 @@ def _draw_population(axes: Axes, section: ThreeLevels) -> None:
 
 
 def caption_levels(section: ThreeLevels) -> str:
-    """Describe Figure 2."""
     places = joined([f"{number(offset)} mm" for offset in section.offset_mm])
     return (
         f"One sphere of {number(section.curvature_per_m)} 1/m on the three levels of the model, pressed "

@@ -40,7 +40,6 @@ def write_touch_page(result: TouchFile, draw: Callable[[], Figure], folder: Path
 
 
 def touch_summary(result: TouchFile) -> list[str]:
-    """Summarise a touch in two sentences."""
     found = result.summary
     return [
         f"The largest force is {number(found.largest_force_mn)} mN, the largest depth "

@@ -354,7 +354,6 @@ def analyse(prepared: PreparedTask, skins: Mapping[str, Skin]) -> TaskResult:
 
 
 def _named(stimuli: Sequence[NamedStimulus], rows: Sequence[int] | IntArray) -> str:
-    """Name stimuli within a sentence."""
     if len(rows) == len(stimuli):
         return "any stimulus"
     return f"the stimulus {', '.join(stimuli[row].name for row in rows)}"
@@ -403,7 +402,6 @@ def _decodings(
 def _decoding(
     prepared: PreparedTask, code: str, measure: str, encoded: Encoded, sigma: float, shown: list[Presentation]
 ) -> Decoding:
-    """Hit rates of one code, their statistic, efficiency and psychometric curves."""
     settings, (table, neighbours) = prepared.task.experiment, encoded
     if code == IDEAL:
         best = np.array([presentation.ideal_hit_rate() for presentation in shown])

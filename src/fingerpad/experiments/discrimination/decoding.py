@@ -95,7 +95,6 @@ def response_table(maps: Sequence[ResponseMap], measure: str, latest_ms: float |
 
 
 def silent_stimuli(table: FloatArray, measure: str, latest_ms: float | None = None) -> IntArray:
-    """Find the stimuli under which no afferent responds by a measure."""
     if measure != "latency" or latest_ms is not None:
         return np.flatnonzero((table == (latest_ms if measure == "latency" else 0.0)).all(axis=1))
     missing = np.isnan(table)
@@ -107,7 +106,6 @@ def silent_stimuli(table: FloatArray, measure: str, latest_ms: float | None = No
 def code_hit_rates(
     code: str, table: FloatArray, neighbours: np.ndarray, noise_sigma: float, seed: int, plan: Experiment
 ) -> HitRates:
-    """Hit rates of every comparison by a code."""
     if code == "euclidean":
         return discriminate_euclidean(table, noise_sigma, seed, plan, session=SESSION)
     return discriminate_gradient_sum(table, neighbours, noise_sigma, seed, plan, session=SESSION)
@@ -122,7 +120,6 @@ def fit_task_noise(
     seed: int,
     plan: Experiment,
 ) -> NoiseFit:
-    """Noise that brings a code closest to observed hit rates."""
     chosen = list(comparisons)
 
     def by_distance(sigma: float) -> FloatArray:
@@ -191,7 +188,6 @@ def _curve_fit(
     settings: CurveSettings,
     seed: int,
 ) -> CurveFit:
-    """Fit one curve; estimate its threshold, intervals and band."""
     if difference.size < 2:
         raise InputError("A curve needs two comparisons on a side of the standard or more: got 1.")
     counts = np.round(rates * trials)

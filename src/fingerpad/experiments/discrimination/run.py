@@ -55,19 +55,16 @@ class DiscriminationRun:
 
     @cached_property
     def prepared(self) -> PreparedTask:
-        """The task with its stimuli and its population."""
         beside = Path(self.source).parent
         population = self.population or task_population(self.task, beside, self.conditions.finger)
         return PreparedTask(self.task, task_stimuli(self.task, beside), population)
 
     @cached_property
     def conditions(self) -> Conditions:
-        """Finger, tissues, accuracy and seed."""
         return task_conditions(self.task, Path(self.source).parent)
 
     @cached_property
     def touches(self) -> dict[str, Touch]:
-        """One touch per stimulus, the standard first."""
         return touches_of(self.prepared.stimuli, self.conditions, self.task.reach_mm)
 
 

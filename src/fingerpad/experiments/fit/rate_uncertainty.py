@@ -137,7 +137,6 @@ def rate_posterior(
     positions_mm: ArrayLike | None = None,
     **settings: Any,
 ) -> RatePosterior:
-    """Draw the four identifiable numbers from their posterior given the rates."""
     likelihood = _likelihood(model, rates, positions_mm)
     found = afferent_posterior(likelihood, admissible(four), seed=seed, **settings)
     ends = credible_band(found.four, LEVEL).T
@@ -161,7 +160,6 @@ def rate_posterior(
 def profiled(
     model: AfferentModel, rates: RateRecordings, four: ArrayLike, positions_mm: ArrayLike | None = None
 ) -> tuple[ParameterProfile, ...]:
-    """Profile the likelihood of each of the four identifiable numbers."""
     likelihood = _likelihood(model, rates, positions_mm)
     return profiles(likelihood, likely_points(likelihood, admissible(four)))
 

@@ -53,7 +53,6 @@ class ClaimRow:
 
 
 def judged(met: bool) -> Verdict:
-    """Return the verdict of a criterion that holds or does not."""
     return Verdict.MET if met else Verdict.MISSED
 
 

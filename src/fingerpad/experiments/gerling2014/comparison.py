@@ -49,7 +49,6 @@ def comparison(
     nail: NailBorder,
     curvature_thresholds: CurvatureThresholds | None = None,
 ) -> list[ClaimRow]:
-    """Rows of the table that compares a reproduction with the paper."""
     return [
         *_deflection(skin),
         *_force(materials, force),
@@ -108,7 +107,6 @@ def _mean_excess(
 
 
 def _force(materials: str, found: SkinForce) -> list[ClaimRow]:
-    """Judge deflection and force with the tissues of the run."""
     by_profile = materials in CHOSEN_BY_DEFLECTION
     by_force = (
         "the common factor on the moduli was chosen by this force" if materials in CHOSEN_BY_FORCE else ""

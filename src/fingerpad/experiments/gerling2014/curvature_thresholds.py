@@ -141,7 +141,6 @@ def sphere_touches(conditions: Conditions, curvatures_per_m: Sequence[float]) ->
 def curvature_thresholds(
     responses: Mapping[float, SkinResponse], afferent: Afferent, noise_sigma: float, seed: int
 ) -> CurvatureThresholds:
-    """Thresholds of the static Gradient Sum at several standards."""
     curvatures = np.array(sorted(responses))
     neighbours, static = _encoded(_population("paper", afferent), responses, curvatures)
     return CurvatureThresholds(
@@ -235,7 +234,6 @@ class Observer:
         return float(np.exp(self.rates.x[-1]))
 
     def responses(self, curvature_per_m: float) -> FloatArray:
-        """Rates (n_receptors,) under a sphere. [spikes/s]"""
         return self.rates(np.log(curvature_per_m))
 
     def slopes(self, curvature_per_m: float) -> FloatArray:
@@ -243,7 +241,6 @@ class Observer:
         return self.rates(np.log(curvature_per_m), 1) / curvature_per_m
 
     def hit_rate(self, standard_per_m: float, comparison_per_m: float) -> float:
-        """Hit rate of the comparison against the standard. [0-1]"""
         pair = [self.responses(standard_per_m), self.responses(comparison_per_m)]
         return float(expected_hit_rates(pair, self.neighbours, self.noise_sigma, self.draws)[0])
 

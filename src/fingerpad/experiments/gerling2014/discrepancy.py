@@ -127,7 +127,6 @@ def discrepancy_analysis(
     standard_normals: FloatArray,
     seed: int,
 ) -> DiscrepancyAnalysis:
-    """Compute the numbers behind the discrepancies."""
     draws = standard_normals[:DRAWS]
     columns = goodwin_columns(curvature_per_m)
     codes: dict[str, Callable[..., FloatArray]] = {

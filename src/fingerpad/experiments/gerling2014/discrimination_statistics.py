@@ -105,7 +105,6 @@ class DiscriminationStatistics:
 
 
 def estimate(by_session: FloatArray) -> Estimate:
-    """Mean over sessions and standard error of that mean."""
     by_session = np.asarray(by_session, dtype=np.float64)
     return Estimate(
         value=float(by_session.mean()), error=float(by_session.std(ddof=1) / np.sqrt(by_session.size))
@@ -120,7 +119,6 @@ def extreme(by_session: FloatArray, pick: Callable[[FloatArray], np.intp]) -> Es
 def discrimination_statistics(
     observers: Observers, curvature_per_m: Sequence[float], measures: Sequence[str]
 ) -> DiscriminationStatistics:
-    """Compute the statistics behind the paper's statements."""
     codes = [*measures, "euclidean"]
     others = [name for name in codes if name != "static"]
     columns = goodwin_columns(curvature_per_m)
@@ -338,7 +336,6 @@ def line_in_z(curvature_per_m: ArrayLike) -> FloatArray:
 
 
 def goodwin_hit_rates_at(curvature_per_m: ArrayLike) -> GoodwinHitRates:
-    """Observed hit rates of people, and the line at the comparison spheres."""
     low, high = binomial_interval(HIT_RATES, TRIALS)
     return GoodwinHitRates(
         curvature_per_m=np.array(CURVATURES),
@@ -351,12 +348,10 @@ def goodwin_hit_rates_at(curvature_per_m: ArrayLike) -> GoodwinHitRates:
 
 
 def goodwin_columns(curvature_per_m: Sequence[float]) -> list[int]:
-    """Find Goodwin's two spheres among the comparisons."""
     return [list(curvature_per_m).index(curvature) - 1 for curvature in CURVATURES]
 
 
 def goodwin_misfit(hit_rates: FloatArray, axis: int | tuple[int, ...] | None = None) -> FloatArray:
-    """Root mean square distance of hit rates to people's."""
     return np.sqrt(np.square(hit_rates - np.array(HIT_RATES)).mean(axis=axis))
 
 

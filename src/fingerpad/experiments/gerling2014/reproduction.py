@@ -74,12 +74,10 @@ class Reproduction:
 
     @property
     def goes_beyond(self) -> bool:
-        """Whether this run goes beyond the paper."""
         return self.resolution != "quick" if self.extended is None else self.extended
 
     @property
     def conditions(self) -> dict[str, Conditions]:
-        """Conditions of each column, by its name."""
         return {
             name: Conditions(self.resolution, self.seed, tissues, self.finger)
             for name, tissues in ((PAPER, self.tissues), (HUMAN, HUMAN))

@@ -92,7 +92,6 @@ def fit(
     method: Method | None = None,
     known: FloatArray | None = None,
 ) -> tuple[Fit, CrossValidation]:
-    """Best fit to all shifts, and the six folds."""
     method, everything = method or response_surface(), np.arange(problem.n_observations)
     folds = interleaved_folds(everything.size) if memberships is None else memberships
     if known is None:
@@ -191,7 +190,6 @@ class SingleUnitResult:
 def single_unit_result(
     problem: RateProblem, best: Fit, folds: CrossValidation, afferent: Afferent, method: str
 ) -> SingleUnitResult:
-    """Rates, fits and modulation."""
     shift_mm, recordings = bar_firing_rates().shift_mm, problem.recordings
     observed_dynamic, observed_static = recordings.dynamic_rate_hz, recordings.static_rate_hz
     assert observed_dynamic is not None
@@ -293,7 +291,6 @@ class FiringCourse:
 def firing_course(
     drive: SedTraces, sed: SedTraces, afferent: Afferent, pressed: Mapping[str, SkinResponse]
 ) -> FiringCourse:
-    """Read when the fitted afferent fires and what drives it."""
     observed, (dynamic_ms, static_ms) = bar_firing_rates(), PAPER_WINDOWS_MS
     population = Population.grid(afferent=afferent, centre_mm=(RECEPTOR_X_MM, 0.0))
     in_hold = interp1d(sed.times_ms, sed.sed_kpa, axis=0)(0.5 * (static_ms[0] + static_ms[1]))

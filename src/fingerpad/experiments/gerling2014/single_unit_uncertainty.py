@@ -108,7 +108,6 @@ class UncertaintyResult:
 def uncertainty_result(
     sed: SedTraces, fitted: ArrayLike, seed: int, *, quick: bool = False, initial_mv: float | None = None
 ) -> UncertaintyResult:
-    """Compute identifiability, posterior, profile likelihoods and sensitivity."""
     recordings, shift_mm = single_unit.bar_recordings(), bar_firing_rates().shift_mm
     six_model = AfferentModel.of_drive(drive(sed, pieces=PIECES), initial_mv=initial_mv)
     model = four_number_model(six_model)

@@ -164,7 +164,6 @@ def force_touches(conditions: Conditions) -> dict[str, Touch]:
 
 
 def skin_force(responses: Mapping[str, SkinResponse]) -> SkinForce:
-    """Read deflection and forces."""
     force_n = {name: float(skin.force_mn[-1]) / MN_PER_N for name, skin in responses.items()}
     return SkinForce(
         deflection_r2=deflection_r2(responses["cylinder"].surface_profile()),

@@ -248,7 +248,6 @@ def population_maps(standard: SkinResponse, afferent: Afferent) -> PopulationMap
 
 
 def resting_response(afferent: Afferent) -> RestingResponse:
-    """Simulate an afferent without any touch."""
     end_ms = protocol.RAMP.value + protocol.HOLD.value
     sed = SedTraces.at_rest(end_ms, afferent.dynamic_quantity, afferent.static_quantity)
     dynamic_hz, static_hz = afferent.rates(sed, *PAPER_WINDOWS_MS)

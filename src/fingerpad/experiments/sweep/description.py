@@ -98,7 +98,6 @@ class SampleSettings(Part):
 
     @property
     def values(self) -> dict[str, list[float]]:
-        """Values of each field."""
         if not self.fields:
             raise InputError("fields must name a field or more: it is empty.")
         from scipy.stats import qmc
@@ -202,7 +201,6 @@ class Sweep:
 
     @property
     def origin(self) -> Origin:
-        """Where it comes from, for errors."""
         return Origin(self.source, self.text)
 
     @property
@@ -248,12 +246,10 @@ class Sweep:
 
     @property
     def shape(self) -> tuple[int, ...]:
-        """Number of points of each axis."""
         return tuple(map(len, self.axes))
 
     @property
     def press_shape(self) -> tuple[int, ...]:
-        """Number of points of each axis that changes the skin."""
         return tuple(len(axis) for axis in self.axes if axis.presses)
 
     @property
@@ -268,7 +264,6 @@ class Sweep:
 
     @property
     def observer_shape(self) -> tuple[int, ...]:
-        """Number of points of each axis that changes the observer."""
         return tuple(map(len, self.observer_axes))
 
     @cached_property
@@ -316,7 +311,6 @@ class Sweep:
         return range(press * each, (press + 1) * each)
 
     def values(self, setting: int) -> Content:
-        """Values of the fields that vary, in a setting."""
         place = np.unravel_index(setting, self.shape)
         return {
             field: values[int(number)]
@@ -333,7 +327,6 @@ class Sweep:
         return content
 
     def described(self, setting: int) -> DescribedTouch:
-        """Touch of a setting."""
         return described_touch(self.content(setting), f"{self.source}, touch")
 
     def check(self) -> None:
@@ -348,7 +341,6 @@ class Sweep:
                 raise InputError("where leaves no setting: give other constraints.")
 
     def allowed(self, setting: int) -> bool:
-        """Whether a setting meets the constraints."""
         if not self._constraints:
             return True
         content = self.content(setting)
@@ -388,7 +380,6 @@ class Constraint:
             pass
 
     def __call__(self, content: Content) -> bool:
-        """Whether a touch meets it."""
         return bool(self._value(self._tree, content))
 
     def _fields(self, node: ast.AST) -> Iterator[str]:
@@ -448,7 +439,6 @@ def sweep_of(content: Content | Any, source: str = "sweep", text: str = "") -> S
 
 
 def _listed(values: Any) -> list[Any]:
-    """Values of a field that varies."""
     found = part_from(EvenValues, values).values if isinstance(values, Mapping) else values
     if not isinstance(found, list | tuple) or not found:
         raise InputError(

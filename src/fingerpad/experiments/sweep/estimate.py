@@ -29,7 +29,6 @@ class SweepEstimate:
 
     @property
     def lines(self) -> tuple[str, ...]:
-        """The estimate in words."""
         return (
             f"{self.settings} settings, {self.presses} presses.",
             f"If none is stored: about {_spelled(self.time_s)} with {self.processes} process(es), "
@@ -74,7 +73,6 @@ def estimate_sweep(sweep: Sweep, processes: int) -> SweepEstimate:
 
 
 def _spelled(seconds: float) -> str:
-    """Spell a time in a unit that suits it."""
     for unit, size in (("days", 86400.0), ("h", 3600.0), ("min", 60.0)):
         if seconds >= 2 * size:
             return f"{seconds / size:.1f} {unit}"

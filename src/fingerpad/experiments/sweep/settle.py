@@ -94,7 +94,6 @@ def skin_of(described: DescribedTouch, store: Store, threads: int | None) -> tup
 
 
 def _places(names: Iterable[str]) -> list[Place]:
-    """Places at which fields have values, each once."""
     return [place for place in dict.fromkeys(FIELDS[name].place for name in names) if place in PLACES_MM]
 
 

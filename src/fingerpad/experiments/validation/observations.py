@@ -69,12 +69,10 @@ class Kind:
 
     @property
     def unit(self) -> str:
-        """Unit of what was observed."""
         return COLUMNS[self.observed][0]
 
     @property
     def is_rate(self) -> bool:
-        """Whether an afferent was observed, not the skin."""
         return self.observed == "rate_hz"
 
 
@@ -175,7 +173,6 @@ def read_observations(path: str | Path) -> Observations:
 
 
 def _kind(path: Path, columns: tuple[str, ...]) -> Kind:
-    """Find the kind that has exactly these columns."""
 
     def differing(kind: Kind) -> set[str]:
         return set(kind.columns) ^ set(columns)
@@ -206,7 +203,6 @@ def _observation(line: TableRow, kind: Kind) -> Observation:
 
 
 def _value(line: TableRow, column: str) -> Value:
-    """Read an entry and check it."""
     if column != INDENTER:
         return line.number(column, *COLUMNS[column])
     text = line.text(column)

@@ -166,7 +166,6 @@ def _pressed_to(given: Mapping[str, Value], model: FingertipModel) -> Touch | No
 
 
 def _force(given: Mapping[str, Value], model: FingertipModel) -> Reading:
-    """Force at a depth. [N]"""
     return Reading(
         _pressed_to(given, model), lambda skin: float(skin.force_mn[-1]) / MN_PER_N if skin else 0.0
     )
