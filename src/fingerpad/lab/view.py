@@ -117,7 +117,6 @@ def _named(name: str, size: float) -> str:
 
 
 def comparison(name: str, other_name: str, answer: Answer, other: Answer) -> str:
-    """Say how well observers tell two touches apart."""
     found = compared(answer, other)
     return (
         f"An ideal observer tells {name} from {other_name} in {found.ideal:.0%} of trials of two "

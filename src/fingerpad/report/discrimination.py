@@ -332,7 +332,6 @@ def _row(axes: Axes, texts: Sequence[str], places: Any, row: str, colour: str) -
 
 
 def _arrow(axes: Axes, start: Text, end: Text) -> None:
-    """Draw an arrow from the edge of one box to that of another."""
     axes.annotate(
         "", end.get_position(), start.get_position(),
         arrowprops={

@@ -42,7 +42,6 @@ def task_tables(found: TaskResult) -> list[Table]:
 
 
 def write_task_page(results: DiscriminationFile, folder: Path) -> Path:
-    """Write the page of a task, `discriminate.html`, and its figures."""
     found = results.discrimination
     parts = illustrated(
         found,
@@ -82,7 +81,6 @@ def task_summary(found: TaskResult) -> list[str]:
 
 
 def _forced_choice_sentence(found: TaskResult, choice: ForcedChoice) -> str:
-    """Say what a two-alternative forced choice between two stimuli would find."""
     standard, comparison = found.stimulus
     rate, low, high = (whole_percent(share) for share in choice.proportions[:, 0])
     d_prime, d_low, d_high = (number(value) for value in choice.d_primes[:, 0])
@@ -390,7 +388,6 @@ def titled(decoding: Decoding) -> str:
 
 
 def why_silent(decoding: Decoding) -> str:
-    """Name the stimuli under which the population is silent."""
     return f"silent under {', '.join(decoding.silent[:3])}"
 
 

@@ -34,7 +34,6 @@ def corners(points: np.ndarray) -> np.ndarray:
 
 
 def draw_mesh(section: MeshPicture) -> Figure:
-    """Draw Figure 1 with the letters of the paper."""
     figure = new_figure(11.0, 6.4)
     grid = figure.add_gridspec(2, 6)
     whole = figure.add_subplot(grid[0, :3], projection="3d")
@@ -177,6 +176,5 @@ def _below_contact(section: MeshPicture) -> FloatArray:
 
 
 def _thicknesses(section: MeshPicture) -> list[float]:
-    """Thickness of each layer below the contact. [mm]"""
     steps = np.linalg.norm(np.diff(_below_contact(section), axis=0), axis=1)
     return [float(steps[section.layer == layer].sum().round(3)) for layer in range(len(section.layers))]

@@ -29,7 +29,6 @@ class Row:
 
     @classmethod
     def of(cls, *cells: str, kind: Kind = "") -> Row:
-        """Return a row of these cells."""
         return cls(cells, kind)
 
 
@@ -56,7 +55,6 @@ class Drawing:
 
     @property
     def images(self) -> dict[str, Callable[[], Figure]]:
-        """Drawing functions by the names of the image files."""
         if self.human is None:
             return {self.name: self.draw}
         draws = zip(COLUMNS, (self.draw, self.human), strict=True)
@@ -68,7 +66,6 @@ class Drawing:
 
 
 def listed(title: str, values: Mapping[str, str], columns: Sequence[str] = ("", ""), note: str = "") -> Table:
-    """Return a table of names and values."""
     return Table(title, columns, [Row(each) for each in values.items()], note)
 
 

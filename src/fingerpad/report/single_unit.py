@@ -88,7 +88,6 @@ def _mark_static_difference(axes: Axes, lowest_hz: float) -> None:
 
 
 def caption_single_unit(section: SingleUnitResult) -> str:
-    """Describe Figure 5 and what the paper found."""
     observed = section.modulation.dynamic.observed
     return (
         f"Firing rate of one SAI afferent under a bar {protocol.BAR_WIDTH.value} mm wide, pressed in by "
@@ -274,7 +273,6 @@ def draw_uncertainty(section: UncertaintyResult) -> Figure:
 
 
 def caption_uncertainty(section: UncertaintyResult) -> str:
-    """Describe the bands, the profiles and their marks."""
     level = whole_percent(section.level)
     return (
         f"Uncertainty of one afferent given its rates under a bar {protocol.BAR_WIDTH.value} mm wide at "

@@ -18,7 +18,6 @@ PAGE = "touch.html"
 
 
 def write_touch_page(result: TouchFile, draw: Callable[[], Figure], folder: Path) -> Path:
-    """Write the page of a touch, `touch.html`, and its figure."""
     caption = (
         "Left: the middle plane of the finger at the end of the touch. Right: depth "
         "over time, and the spikes of the afferents that fire."

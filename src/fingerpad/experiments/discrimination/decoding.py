@@ -89,7 +89,6 @@ class SideCurve:
 
 
 def response_table(maps: Sequence[ResponseMap], measure: str, latest_ms: float | None = None) -> FloatArray:
-    """Return one measure of every receptor under every stimulus."""
     table = np.array([RESPONSE_MEASURES[measure](answer) for answer in maps])
     return table if measure != "latency" or latest_ms is None else np.fmin(table, latest_ms)
 
@@ -136,7 +135,6 @@ def fit_task_noise(
 def task_statistic(
     code: str, table: FloatArray, neighbours: np.ndarray, noise_sigma: float, seed: int
 ) -> TaskStatistic:
-    """Compute the statistic of a code for every stimulus: Gradient Sum, or distance from the standard."""
     n_stimuli = len(table)
     if code == "euclidean":
         sets = noisy_responses(

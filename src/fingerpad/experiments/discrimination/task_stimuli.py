@@ -108,7 +108,6 @@ def example_tasks() -> dict[str, str]:
 
 
 def title(text: str) -> str:
-    """Return the question of an example task in words."""
     return parse_task(read_yaml(text, "task")).question
 
 

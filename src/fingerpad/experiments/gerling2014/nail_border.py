@@ -98,7 +98,6 @@ class Concentration:
 
     @property
     def ratios(self) -> FloatArray:
-        """Border over far, (n_sections,)."""
         return self.border_kpa / self.far_kpa
 
 

@@ -130,7 +130,6 @@ class ReproductionResult:
 
 
 def reproduce(run: Reproduction, progress: Progress | None = None) -> ReproductionResult:
-    """Run the three validations with both sets and compare them with the paper."""
     runner, columns = Runner(run.folder, run.jobs, progress), run.conditions
     trials = {"skin deflection": skin_deflection.deflection_touches(columns[PAPER])}
     parts = {name: set_touches(conditions, run.goes_beyond) for name, conditions in columns.items()}

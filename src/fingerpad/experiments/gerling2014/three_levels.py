@@ -52,7 +52,6 @@ class ThreeLevels:
 
 
 def three_levels(standard: SkinResponse, afferent: Afferent) -> ThreeLevels:
-    """Read one indentation by the standard sphere on all levels."""
     mesh, curvature = standard.mesh, protocol.STANDARD_CURVATURE.value
     nodes = outline_nodes(mesh)
     moved = (mesh.nodes_mm + standard.displacement_mm)[nodes].round(DECIMALS)
@@ -267,7 +266,6 @@ def sheet(afferent: Afferent, reach_mm: float = REACH_MM, step_mm: float = STEP_
 
 
 def response_sheet(response: ResponseMap) -> ResponseSheet:
-    """Arrange the responses of a `sheet` as tables."""
     x, z = (np.unique(coordinate) for coordinate in response.positions_mm.T)
     shape = (x.size, z.size)
     return ResponseSheet(

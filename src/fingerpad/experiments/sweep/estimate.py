@@ -38,7 +38,6 @@ class SweepEstimate:
 
 
 def estimate_sweep(sweep: Sweep, processes: int) -> SweepEstimate:
-    """Estimate a sweep; the meshes of a few presses are built for it."""
     kept = [press for press in range(sweep.presses) if any(map(sweep.allowed, sweep.settings_of(press)))]
     chosen = [kept[n] for n in np.unique(np.linspace(0, len(kept) - 1, MOST_LOOKED_AT).round().astype(int))]
     found, bytes_each = [], []
