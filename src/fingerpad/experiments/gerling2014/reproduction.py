@@ -253,7 +253,7 @@ def set_result(
         curvature_thresholds=thresholds,
         comparison=tuple(rows),
     )
-    return made, summary(force, unit, afferent, discrimination, thresholds)
+    return made, summary(made, afferent)
 
 
 def _method(conditions: Conditions, spheres: dict[tuple[float, float], SkinResponse]) -> Method:
@@ -297,14 +297,9 @@ class Summaries:
     peak_memory_mb: float
 
 
-def summary(
-    force: SkinForce,
-    unit: SingleUnitResult,
-    afferent: Afferent,
-    discrimination: SphereDiscrimination,
-    thresholds: CurvatureThresholds | None,
-) -> Summary:
+def summary(found: SetResult, afferent: Afferent) -> Summary:
     """Collect the numbers of one set; time and memory are known when the run ends."""
+    force, unit, discrimination = found.skin_force, found.single_unit, found.discrimination
     dynamic, static = unit.modulation.dynamic.ours, unit.modulation.static.ours
     centred, shifted = (place.at_goodwin for place in discrimination.statistics.targets)
     at_296, at_365 = ((here.value, aside.value) for here, aside in zip(centred, shifted, strict=True))
@@ -323,8 +318,8 @@ def summary(
         euclidean_rms_same_noise=discrimination.statistics.misfit["euclidean"].value,
         hit_rate_296=at_296,
         hit_rate_365=at_365,
-        weber_144=weber_fraction(thresholds, 144.0),
-        weber_287=weber_fraction(thresholds, 287.0),
+        weber_144=weber_fraction(found.curvature_thresholds, 144.0),
+        weber_287=weber_fraction(found.curvature_thresholds, 287.0),
     )
 
 
