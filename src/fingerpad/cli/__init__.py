@@ -41,8 +41,7 @@ MISUSE: Any = typer.BadParameter.__base__
 """What typer raises for options that it does not know or cannot read; it names only this child of it."""
 
 
-GENERAL_OPTIONS = ("--quiet", "--verbose")
-"""Options of every command, which may stand before its name or after it."""
+GENERAL_OPTIONS = ("--quiet", "--verbose")  # Of every command, before its name or after it.
 
 
 def _show_version(wanted: bool) -> None:
@@ -97,7 +96,6 @@ app.add_typer(store_app, name="store")
 
 
 def main() -> None:
-    """Run the command line `fingerpad`."""
     run(app, "fingerpad")
 
 

@@ -35,8 +35,7 @@ from fingerpad.core.errors import InputError
 if TYPE_CHECKING:
     from fingerpad.experiments.stimuli import Stimuli
 
-STANDARD, BAR = "standard", "bar"
-"""Default of `--resolution`; value of `--stimulus` for the bar of the paper, any other is a file."""
+STANDARD, BAR = "standard", "bar"  # Default resolution; the stimulus that is no file, the paper's bar.
 
 
 def fit_command(

@@ -44,7 +44,6 @@ class Group(_WholeSentence, typer.core.TyperGroup):
     """A command with commands of its own, which it names where none is given."""
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
-        """Read the words after the name of the command."""
         if not args:
             ctx.fail(f"{ctx.info_name} needs a command: {', '.join(self.list_commands(ctx))}")
         return super().parse_args(ctx, args)
@@ -54,7 +53,6 @@ class Command(_WholeSentence, typer.core.TyperCommand):
     """A command that does not take an option's name for the value of another, and ends well by a signal."""
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
-        """Read the words after the name of the command."""
         options = [each for each in self.get_params(ctx) if isinstance(each, typer.core.TyperOption)]
         names = {name for option in options for name in (*option.opts, *option.secondary_opts)}
         with_argument = {name for option in options if not option.is_flag for name in option.opts}
@@ -104,12 +102,10 @@ def option(help_text: str, name: str | None = None) -> Any:
 
 
 def number_option(help_text: str) -> Any:
-    """Make an option that takes a number."""
     return typer.Option(parser=to_number, metavar="NUMBER", help=help_text)
 
 
 def integer_option(help_text: str) -> Any:
-    """Make an option that takes a whole number."""
     return typer.Option(parser=to_whole, metavar="INTEGER", help=help_text)
 
 

@@ -108,7 +108,6 @@ def engine(jobs: int | None, scheduler: str | None) -> int | Engine:
 
 
 def command_line() -> str:
-    """Return the command line, for the manifest."""
     return shlex.join(["fingerpad", *sys.argv[1:]])
 
 

@@ -56,8 +56,7 @@ class Answer:
     middle_mm: FloatArray  # Middle of the contact, x and z, (n_times, 2). [mm]
     x_mm: FloatArray
     z_mm: FloatArray  # Points of the map, (nx,). [mm]
-    sed_kpa: FloatArray
-    """Strain energy density at the depth of the end organs; NaN beside the pad, (n_times, nx, nz). [kPa]"""
+    sed_kpa: FloatArray  # Energy density at the end organs; NaN off the pad, (n_times, nx, nz). [kPa]
     response: ResponseMap  # Spikes and rates of the afferents.
 
 
@@ -150,7 +149,6 @@ def finger_of(described: DescribedReduction) -> Fingertip:
 
 
 def map_axes(described: DescribedReduction) -> tuple[FloatArray, FloatArray]:
-    """Points of the map along and across. [mm]"""
     middle = described.training.touch.finger.contact_mm
     along, across = (
         centre + np.arange(-reach, reach + 0.5 * MAP_STEP_MM, MAP_STEP_MM)
@@ -160,7 +158,6 @@ def map_axes(described: DescribedReduction) -> tuple[FloatArray, FloatArray]:
 
 
 def reduced_answer(described: DescribedReduction, model: ReducedModel, state: LabState) -> Answer:
-    """Answer by the reduced touch."""
     motion, shape = motion_of(described, model, state)
     weights = [
         model.pose_weights((pose.x_mm, pose.z_mm, pose.tilt_deg, *shape))

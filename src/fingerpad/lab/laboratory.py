@@ -263,7 +263,6 @@ def _alone(state: LabState) -> LabState:
 
 
 def shipped() -> list[Path]:
-    """Files of the ranges of the package."""
     folder = Path(str(resources.files("fingerpad.lab") / "ranges"))
     return sorted(folder.glob("*.yaml"))
 
@@ -277,7 +276,6 @@ class _Worker:
         threading.Thread(target=self._run, daemon=True).start()
 
     def submit(self, work: Callable[[], Any]) -> Future[Any]:
-        """Do something later."""
         future: Future[Any] = Future()
         self._last = future
         self._queue.put((future, work))
@@ -285,7 +283,6 @@ class _Worker:
 
     @property
     def busy(self) -> bool:
-        """Whether something is not done."""
         return self._last is not None and not self._last.done()
 
     def _run(self) -> None:
@@ -305,7 +302,6 @@ class _Told:
 
     @contextmanager
     def stage(self, name: str, total: int) -> Iterator[Callable[[], None]]:
-        """Count the presses of one stage."""
         if total:
             self.making = replace(self.making, done=0, total=total)
 

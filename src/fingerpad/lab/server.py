@@ -44,7 +44,6 @@ CONTROLS = (
 
 
 def spec_of(laboratory: Laboratory) -> dict[str, Any]:
-    """Describe the controls to the page."""
     objects: dict[str, dict[str, Any]] = {}
     for name in laboratory.names:
         training = laboratory.described(LabState(name)).training

@@ -22,7 +22,6 @@ from fingerpad.lab.view import comparison, view_of_answer
 
 DEPTHS, PLACES = 6, 5  # Depths, and places along the finger, of every object.
 FRAMES = 24  # Pictures of the skin over time in each answer.
-
 CONTROLS = [each for each in ALL if each[0] in ("object", "depth_mm", "x_mm", "other", "afferent")]
 
 
@@ -76,7 +75,6 @@ def _sizes(laboratory: Laboratory, name: str) -> list[tuple[str, LabState]]:
 
 
 def _grid(laboratory: Laboratory, state: LabState) -> tuple[list[float], list[float]]:
-    """Depths and places of an object."""
     range_ = laboratory.described(state).training.range
     depths = np.round(range_.depth_mm * np.arange(1, DEPTHS + 1) / DEPTHS, 4).tolist()
     places = np.linspace(*range_.x_mm, PLACES).tolist() if range_.x_mm[0] < range_.x_mm[1] else [0.0]
@@ -84,7 +82,6 @@ def _grid(laboratory: Laboratory, state: LabState) -> tuple[list[float], list[fl
 
 
 def _spec(objects: dict[str, LabState], known: dict[str, tuple[list[float], list[float]]]) -> dict[str, Any]:
-    """Describe the controls to the page."""
     labels = list(objects)
     depths, places = known[labels[0]]
     steps = {"depth_mm": depths[0], "x_mm": max(np.diff(places), default=0.0)}

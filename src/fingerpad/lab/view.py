@@ -24,9 +24,7 @@ from fingerpad.lab.laboratory import Laboratory, Making
 from fingerpad.lab.state import LabState
 from fingerpad.reduction.model import ON_THE_PAD
 
-OFF_THE_PAD = 255
-"""Byte of a point of the map that lies beside the pad; the others are shares of the peak, 0 to 254."""
-
+OFF_THE_PAD = 255  # Byte of a point beside the pad; the others are shares of the peak, 0 to 254.
 OUTLINE_POINTS = 40
 
 
@@ -38,10 +36,8 @@ class Shown:
     force_mn: list[float]
     error_mn: list[float]
     area_mm2: list[float]
-    largest_kpa: list[float]
-    """Time, force with its error (0 if not measured), contact and largest strain energy density."""
-    contact_mm: list[list[float]]
-    """Middle x and z, half-axes and angle of an ellipse of the area of the contact. [mm, rad]"""
+    largest_kpa: list[float]  # Force error: 0 if not measured; largest: strain energy density.
+    contact_mm: list[list[float]]  # Middle, half-axes and angle of an ellipse of its area. [mm, rad]
     peak_kpa: float  # Value of the byte 254 of `frames`. [kPa]
     frames_ms: list[float]  # Times of the map. [ms]
     frames: str  # The map at these times, bytes (n_frames, nx, nz) in base 64.
@@ -66,8 +62,7 @@ class View:
     compared: str = ""  # What observers say of both.
     exact: Shown | None = None
     difference: str = ""  # How far the reduced answer is from it.
-    making: Making | None = None
-    """How far the reduced touch is, if the answer is the full solution because there is none yet."""
+    making: Making | None = None  # How far the reduced touch is, while the answer is in full.
 
 
 def view_of(laboratory: Laboratory, state: LabState, exact: bool = False) -> View | Making:
@@ -95,7 +90,6 @@ def view_of(laboratory: Laboratory, state: LabState, exact: bool = False) -> Vie
 def view_of_answer(
     laboratory: Laboratory, state: LabState, answer: Answer, frames: int | None = None, path: str = ""
 ) -> View:
-    """Make the view of a reduced answer."""
     described = laboratory.described(state)
     touch, finger = described.training.touch, finger_of(described)
     x = np.linspace(0.3, finger.length_mm - 0.3, OUTLINE_POINTS)
@@ -123,7 +117,6 @@ def _named(name: str, size: float) -> str:
 
 
 def comparison(name: str, other_name: str, answer: Answer, other: Answer) -> str:
-    """Say how well observers tell two touches apart."""
     found = compared(answer, other)
     return (
         f"An ideal observer tells {name} from {other_name} in {found.ideal:.0%} of trials of two "

@@ -38,7 +38,6 @@ STYLES: tuple[Any, ...] = (
 
 
 def draw_thresholds(section: CurvatureThresholds) -> Figure:
-    """Draw Weber fractions by standard, and the curves behind them."""
     figure = new_figure(COLUMN_IN, 8.0)
     fractions, curves = figure.subplots(2, 1)
     _fractions(fractions, section)
@@ -91,7 +90,6 @@ def _curves(axes: Axes, section: CurvatureThresholds) -> None:
 
 
 def caption_thresholds(section: CurvatureThresholds) -> str:
-    """Caption of the figure."""
     return (
         "(a) Difference in curvature that is discriminated from a standard in 75 % of trials, as a share of "
         "the standard: Gradient Sum of static rates of two populations, each with the noise fitted to the "
@@ -104,7 +102,6 @@ def caption_thresholds(section: CurvatureThresholds) -> str:
 
 
 def threshold_tables(section: CurvatureThresholds) -> list[Table]:
-    """Return thresholds by standard."""
     thresholds = [
         Row.of(
             _layout(population),

@@ -90,7 +90,6 @@ def draw_noise(section: SphereDiscrimination) -> Figure:
 
 
 def caption_noise(section: SphereDiscrimination) -> str:
-    """Caption of the noise figure."""
     return (
         "Root mean square distance of predicted hit rates from those of people (Goodwin et al. 1991) at 296 "
         "and 365 1/m, against the noise. (a) Each code has its own best noise. (b) The range of the paper, "
@@ -118,7 +117,6 @@ def observer_panels(section: SphereDiscrimination) -> list[Panel]:
 
 
 def criterion_panels(section: SphereDiscrimination) -> list[Panel]:
-    """Titles and hit rates of Figure 8."""
     names = sorted(name for name in section.variants if name.startswith("criterion_"))
     return [(f"β varies by {name.removeprefix('criterion_')}", section.variants[name]) for name in names]
 
@@ -160,7 +158,6 @@ def draw_hit_rates(axes: Axes, section: SphereDiscrimination, rates: ObserverHit
 
 
 def draw_people(axes: Axes, observed: GoodwinHitRates) -> None:
-    """Draw the hit rates of people with their intervals."""
     rate, label = observed.hit_rate, "observed (Goodwin et al. 1991)"
     bars = [rate - observed.low, observed.high - rate]
     axes.errorbar(
@@ -169,7 +166,6 @@ def draw_people(axes: Axes, observed: GoodwinHitRates) -> None:
 
 
 def caption_observers(section: SphereDiscrimination) -> str:
-    """Caption of Figure 7."""
     return (
         "Fraction of trials in which a sphere is discriminated from the standard of "
         f"{number(section.curvature_per_m[0])} 1/m; bars are one standard deviation over hit rates, within "
@@ -185,7 +181,6 @@ def caption_observers(section: SphereDiscrimination) -> str:
 
 
 def caption_criterion(_: SphereDiscrimination) -> str:
-    """Caption of Figure 8."""
     return (
         "Gradient Sum of static rates with a varied criterion: for each hit rate the decision point is "
         "multiplied by a new normal variable with mean 1 and the standard deviation in the title. Marks, "
@@ -257,8 +252,7 @@ def _interpretations(section: SphereDiscrimination) -> Table:
     return Table("Interpretations of steps that the paper leaves open", columns, rows, note)
 
 
-ROWS = {"gradient": 3.0, "start": 1.75, "euclidean": 0.5}
-"""Heights of the boxes of the two codes and of what they share."""
+ROWS = {"gradient": 3.0, "start": 1.75, "euclidean": 0.5}  # Heights of the boxes, by code.
 
 GRADIENT = (
     "(b) gradient of\neach receptor: sum of\n|differences| from\nits neighbours",
@@ -338,7 +332,6 @@ def _row(axes: Axes, texts: Sequence[str], places: Any, row: str, colour: str) -
 
 
 def _arrow(axes: Axes, start: Text, end: Text) -> None:
-    """Draw an arrow from the edge of one box to that of another."""
     axes.annotate(
         "", end.get_position(), start.get_position(),
         arrowprops={
@@ -349,7 +342,6 @@ def _arrow(axes: Axes, start: Text, end: Text) -> None:
 
 
 def caption_steps(sets: Mapping[str, SphereDiscrimination]) -> str:
-    """Caption of Figure 3."""
     standard = next(iter(sets.values())).curvature_per_m[0]
     return (
         "Steps from the responses of 18 receptors to hit rates, with the letters of the paper's section "

@@ -37,13 +37,11 @@ SEVERAL = {"static": "static rates", "dynamic": "dynamic rates", "latency": "fir
 
 
 def task_tables(found: TaskResult) -> list[Table]:
-    """Tables of thresholds, hit rates, efficiencies and the population."""
     every = (_thresholds, _hit_rates, _forced_choices, _efficiencies, _population)
     return [table for make in every if (table := make(found)).rows]
 
 
 def write_task_page(results: DiscriminationFile, folder: Path) -> Path:
-    """Write the page of a task, `discriminate.html`, and its figures."""
     found = results.discrimination
     parts = illustrated(
         found,
@@ -83,7 +81,6 @@ def task_summary(found: TaskResult) -> list[str]:
 
 
 def _forced_choice_sentence(found: TaskResult, choice: ForcedChoice) -> str:
-    """Say what a two-alternative forced choice between two stimuli would find."""
     standard, comparison = found.stimulus
     rate, low, high = (whole_percent(share) for share in choice.proportions[:, 0])
     d_prime, d_low, d_high = (number(value) for value in choice.d_primes[:, 0])
@@ -349,7 +346,6 @@ def _people(axes: Axes, found: TaskResult) -> None:
 
 
 def caption_task_responses(found: TaskResult) -> str:
-    """Caption of the response maps."""
     main, n_stimuli = main_decoding(found), len(found.stimulus)
     left_out = n_stimuli - len(_shown(n_stimuli))
     return (
@@ -384,17 +380,14 @@ def caption_task_curves(found: TaskResult) -> str:
 
 
 def main_decoding(found: TaskResult) -> Decoding:
-    """Return the first decoding that has hit rates."""
     return next(decoding for decoding in found.decodings if decoding.hit_rate is not None)
 
 
 def titled(decoding: Decoding) -> str:
-    """Name a decoding by its code and measure."""
     return f"{CODE_LABELS[decoding.code]}, {MEASURE_LABELS[decoding.measure][0]}"
 
 
 def why_silent(decoding: Decoding) -> str:
-    """Name the stimuli under which the population is silent."""
     return f"silent under {', '.join(decoding.silent[:3])}"
 
 

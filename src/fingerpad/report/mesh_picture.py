@@ -24,9 +24,7 @@ BONE, NAIL, SKIN = "#a9b4bd", "#0a5c99", "#f0d9c4"
 NAIL_WIDTH = 4.0
 
 LIGHT = np.array([0.35, -0.75, 0.56])  # Where the light comes from, in the order x, z, y.
-
-ENLARGED_MM, THIN_MM = (1.3, 2.0), 0.2
-"""Half the width and the height of the enlarged part; what is thinner is named beside it. [mm]"""
+ENLARGED_MM, THIN_MM = (1.3, 2.0), 0.2  # Half width, height; thinner is named beside it. [mm]
 
 
 def corners(points: np.ndarray) -> np.ndarray:
@@ -36,7 +34,6 @@ def corners(points: np.ndarray) -> np.ndarray:
 
 
 def draw_mesh(section: MeshPicture) -> Figure:
-    """Draw Figure 1 with the letters of the paper."""
     figure = new_figure(11.0, 6.4)
     grid = figure.add_gridspec(2, 6)
     whole = figure.add_subplot(grid[0, :3], projection="3d")
@@ -160,7 +157,6 @@ def _name_fixed_parts(axes: Axes, plane: MeshPlane, mirrored: bool) -> None:
 
 
 def caption_mesh(section: MeshPicture) -> str:
-    """Describe Figure 1."""
     return (
         "Finite-element mesh of the fingertip that the standard sphere presses, without load: "
         f"{number(section.nodes)} nodes and {number(section.elements)} elements"
@@ -180,6 +176,5 @@ def _below_contact(section: MeshPicture) -> FloatArray:
 
 
 def _thicknesses(section: MeshPicture) -> list[float]:
-    """Thickness of each layer below the contact. [mm]"""
     steps = np.linalg.norm(np.diff(_below_contact(section), axis=0), axis=1)
     return [float(steps[section.layer == layer].sum().round(3)) for layer in range(len(section.layers))]

@@ -23,9 +23,7 @@ STYLES = ((BLUE, "o"), (ORANGE, "^"), (BLACK, "s"), (GREEN, "D"), (GREY, "v"))
 MAP_AXES: Any = {"xlabel": "x, distal [mm]", "ylabel": "z, lateral [mm]", "aspect": "equal"}
 """Axes of a map of the pad: distal is to the right."""
 
-LARGEST_MARK, SILENT_MARK = 60.0, 4.0
-"""Area of the mark of the most active afferent of a type, and of a silent one. [points²]"""
-
+LARGEST_MARK, SILENT_MARK = 60.0, 4.0  # Areas: most active afferent of a type, silent. [points²]
 ROW_DRAWN = 0.85  # Length of the mark of a spike, over the height of the row of its afferent.
 
 

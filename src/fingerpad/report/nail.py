@@ -101,7 +101,6 @@ def _profiles(axes: Axes, profile: StressProfile) -> None:
 
 
 def caption_nail(section: NailBorder) -> str:
-    """Caption of Figure 9."""
     return (
         "Predicted von Mises stress at the end of the hold, on the finger that the standard sphere deforms; "
         "nothing here was observed: (a) in the outermost elements of the skin and (b) in the middle section, "

@@ -37,7 +37,6 @@ def write_html(page: Page, path: Path) -> Path:
 
 
 def images_of(page: Page) -> dict[str, bytes]:
-    """Draw all figures of a page, as PNG by their names."""
     return {name: png(draw) for drawing in page.drawings for name, draw in drawing.images.items()}
 
 

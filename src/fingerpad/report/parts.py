@@ -9,11 +9,8 @@ from typing import Literal, TypeVar
 
 from matplotlib.figure import Figure
 
-Kind = Literal["", "assumed", "final"]
-"""How a row is marked in HTML: an assumed input, or the row that is the result."""
-
-COLUMNS = ("paper", "human")
-"""The two sets of tissues of a reproduction, in the order of their columns in tables and figures."""
+Kind = Literal["", "assumed", "final"]  # An assumed input, or the row that is the result.
+COLUMNS = ("paper", "human")  # Sets of tissues of a reproduction, in the order of their columns.
 
 
 @dataclass(frozen=True)
@@ -32,7 +29,6 @@ class Row:
 
     @classmethod
     def of(cls, *cells: str, kind: Kind = "") -> Row:
-        """Return a row of these cells."""
         return cls(cells, kind)
 
 
@@ -54,14 +50,11 @@ class Drawing:
     title: str  # A few words.
     draw: Callable[[], Figure]
     caption: str
-    number: int | None = None
-    """Figures up to 9 of a reproduction have the paper's numbers; others go on from 10."""
-    human: Callable[[], Figure] | None = None
-    """Makes the same figure of the set `human`, to stand on the right; `draw` is then that of `paper`."""
+    number: int | None = None  # Up to 9 in a reproduction the paper's numbers; others from 10.
+    human: Callable[[], Figure] | None = None  # The same of `human`; `draw` is then of `paper`.
 
     @property
     def images(self) -> dict[str, Callable[[], Figure]]:
-        """Drawing functions by the names of the image files."""
         if self.human is None:
             return {self.name: self.draw}
         draws = zip(COLUMNS, (self.draw, self.human), strict=True)
@@ -69,12 +62,10 @@ class Drawing:
 
     @property
     def label(self) -> str:
-        """Number and title."""
         return self.title if self.number is None else f"Figure {self.number}. {self.title}"
 
 
 def listed(title: str, values: Mapping[str, str], columns: Sequence[str] = ("", ""), note: str = "") -> Table:
-    """Return a table of names and values."""
     return Table(title, columns, [Row(each) for each in values.items()], note)
 
 
@@ -121,7 +112,6 @@ class Chapter:
 
     @property
     def drawings(self) -> list[Drawing]:
-        """Figures of the chapter."""
         return [part for part in (*self.parts, *self.folded) if isinstance(part, Drawing)]
 
     @property
@@ -142,5 +132,4 @@ class Page:
 
     @property
     def drawings(self) -> list[Drawing]:
-        """Figures of the opening and of all chapters."""
         return [*self.opening, *(drawing for chapter in self.chapters for drawing in chapter.drawings)]

@@ -13,9 +13,7 @@ from fingerpad.report.parts import Row, Table
 from fingerpad.report.style import BLACK, BLUE, GREY, ORANGE
 
 LARGEST_LOSS = 5.0  # Losses of log likelihood that are drawn.
-
-ALLOWED_LOSS = 1.92
-"""Loss at which an interval of 95 % ends: half the quantile of chi-square with one degree of freedom."""
+ALLOWED_LOSS = 1.92  # Loss at the ends of a 95 % interval: half the quantile of chi-square, 1 degree.
 
 
 def draw_profile(

@@ -45,7 +45,6 @@ def draw_fit(found: FitResult) -> Figure:
 
 
 def recorded_phases(found: FitResult) -> list[str]:
-    """Names of the phases whose rates were recorded."""
     return [phase for phase, *_ in _recorded(found)]
 
 
@@ -86,7 +85,6 @@ def draw_fit_residuals(found: FitResult) -> Figure:
 
 
 def caption_fit(found: FitResult) -> str:
-    """Caption of the rates."""
     return (
         "Firing rates of the recorded afferent under each stimulus, mean of its presentations. Line: the "
         "afferent fitted to all stimuli. Crosses: each stimulus predicted by the fit that did not use its "
@@ -108,7 +106,6 @@ def caption_fit_residuals(found: FitResult) -> str:
 
 
 def fit_tables(found: FitResult) -> list[Table]:
-    """Return scores, parameters in both forms, folds and rates."""
     spikes = [_spikes(found.spikes)] if found.spikes else []
     return [_scores(found), *spikes, _identifiable(found), _parameters(found), _folds(found), _rates(found)]
 
@@ -157,7 +154,6 @@ def _in_words(quantity: str) -> str:
 
 
 def fit_summary(found: FitResult) -> list[str]:
-    """Summarise a fit in a few sentences."""
     method = found.method.replace("_", " ")
     said = [
         f"Fitted to {len(found.stimulus)} stimuli by {method}: FSS {fixed(found.fss_in_sample, 3)} in "
@@ -301,7 +297,6 @@ _Part = TypeVar("_Part")
 
 
 def draw_profiles(found: FitResult) -> Figure:
-    """Draw the profile of each of the four numbers."""
     figure = new_figure(10.0, 3.2)
     intervals = found.posterior.interval if found.posterior else {}
     panels = figure.subplots(1, len(_present(found.profiles)), sharey=True)
@@ -324,7 +319,6 @@ def caption_profiles(found: FitResult) -> str:
 
 
 def profile_tables(found: FitResult) -> list[Table]:
-    """Tables of the intervals of the profiles."""
     rows = [
         Row.of(
             f"{IDENTIFIABLE_SYMBOLS[profile.name]} [{found.identifiable_units[profile.name]}]",
@@ -337,14 +331,12 @@ def profile_tables(found: FitResult) -> list[Table]:
 
 
 def draw_sensitivity(found: FitResult) -> Figure:
-    """Draw the Sobol indices of the four numbers."""
     figure = new_figure(6.5, 3.8)
     draw_indices(figure.subplots(), _present(found.sensitivity))
     return figure
 
 
 def caption_sensitivity(found: FitResult) -> str:
-    """Caption of the Sobol indices."""
     total = _present(found.sensitivity).total
     most = max(zip(total, IDENTIFIABLE_SYMBOLS.values(), strict=True), key=lambda pair: pair[0])[1]
     return (
@@ -355,7 +347,6 @@ def caption_sensitivity(found: FitResult) -> str:
 
 
 def sensitivity_tables(found: FitResult) -> list[Table]:
-    """Tables of the indices and their ranges."""
     return [sensitivity_table(_present(found.sensitivity), found.identifiable_units)]
 
 
@@ -393,7 +384,6 @@ def caption_offset(found: FitResult) -> str:
 
 
 def offset_tables(found: FitResult) -> list[Table]:
-    """Tables of both fits side by side."""
     offset, units, phases = _present(found.offset), found.identifiable_units, ("dynamic", "static")
 
     def cells(fit: FitResult | OffsetFit, fss_by_phase: Sequence[float | None]) -> list[str]:

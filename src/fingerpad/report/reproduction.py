@@ -169,7 +169,6 @@ def reproduction_page(result: ReproductionResult) -> Page:
 
 
 def input_tables(inputs: Sequence[PublishedNumber]) -> list[Table]:
-    """Return the meaning of each status, and every published number with its own."""
     meanings = [
         Row.of(
             status,

@@ -110,7 +110,6 @@ def draw_population(section: PopulationMaps) -> Figure:
 
 
 def round_ticks(scale: Normalize) -> list[float]:
-    """Return the round numbers within a logarithmic scale."""
     return [tick for tick in TICKS_MS if 0.0 <= float(scale(tick, clip=False)) <= 1.0]
 
 
@@ -161,7 +160,6 @@ def _map(
 
 
 def caption_population(section: PopulationMaps, human: PopulationMaps) -> str:
-    """Caption of Figure 6."""
     resting = "".join(
         f" The afferent of {name} also fires without touch, {number(each.at_rest.static_rate_hz)} spikes/s "
         f"from {number(each.at_rest.first_spike_latency_ms)} ms on."

@@ -39,10 +39,7 @@ from fingerpad.report.style import BLACK, BLUE, COLUMN_IN, ORANGE, PALE, draw_ra
 
 BAR_HALF_WIDTH_MM = protocol.BAR_WIDTH.value / 2.0
 STATIC_MARK_MM = 2.9  # Position at which the paper's static difference is drawn, where no rates are. [mm]
-
-ALONG = "place of the bar, distal [mm]"
-"""Results count shifts proximal positive; all figures have the distal side on the right."""
-
+ALONG = "place of the bar, distal [mm]"  # Figures have the distal side on the right; results do not.
 FITTED = "model (fitted)"  # Name of the line of the model, whose afferent was fitted to what was observed.
 PAPER_FOLD, PAPER_START = 3, 2  # Fold and start point whose steps the paper's Table 4 lists.
 
@@ -93,7 +90,6 @@ def _mark_static_difference(axes: Axes, lowest_hz: float) -> None:
 
 
 def caption_single_unit(section: SingleUnitResult) -> str:
-    """Describe Figure 5 and what the paper found."""
     observed = section.modulation.dynamic.observed
     return (
         f"Firing rate of one SAI afferent under a bar {protocol.BAR_WIDTH.value} mm wide, pressed in by "
@@ -283,7 +279,6 @@ def draw_uncertainty(section: UncertaintyResult) -> Figure:
 
 
 def caption_uncertainty(section: UncertaintyResult) -> str:
-    """Describe the bands, the profiles and their marks."""
     level = whole_percent(section.level)
     return (
         f"Uncertainty of one afferent given its rates under a bar {protocol.BAR_WIDTH.value} mm wide at "
@@ -298,7 +293,6 @@ def caption_uncertainty(section: UncertaintyResult) -> str:
 
 
 def uncertainty_tables(section: UncertaintyResult) -> list[Table]:
-    """Return the numbers in both forms, the residuals, the sensitivity and the convergence."""
     return [
         _determined(section),
         _residuals(section),

@@ -35,7 +35,6 @@ def _trials(section: SkinDeflectionResult) -> dict[str, dict[str, IndenterDeflec
 
 
 def draw_skin_deflection(section: SkinDeflectionResult) -> Figure:
-    """Draw Figure 4: a panel per indenter."""
     figure = new_figure(11.0, 4.2)
     panels = figure.subplots(1, 2, sharey=True)
     for letter, axes, indenter in zip("ab", panels, (LINE, CYLINDER), strict=True):
@@ -68,7 +67,6 @@ def draw_profiles(axes: Axes, section: SkinDeflectionResult, indenter: str) -> N
 
 
 def caption_skin_deflection(_: SkinDeflectionResult) -> str:
-    """Describe Figure 4 and what the paper found."""
     return (
         "Deflection of the skin along the midline of the fingertip at the end of the indentation, drawn "
         "downwards, under (a) a line load and (b) a cylinder. Lines: the model with the paper's three "
@@ -81,7 +79,6 @@ def caption_skin_deflection(_: SkinDeflectionResult) -> str:
 
 
 def skin_deflection_tables(section: SkinDeflectionResult) -> list[Table]:
-    """Return fit and force of each material trial."""
     rows = []
     for name, trial in _trials(section).items():
         for indenter, profile in trial.items():

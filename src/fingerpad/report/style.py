@@ -132,7 +132,6 @@ def draw_rates(
 
 
 def draw_observed_rates(axes: Axes, where: FloatArray, observed_hz: FloatArray) -> None:
-    """Draw observed firing rates as open circles."""
     open_circles: Any = {"color": BLACK, "markerfacecolor": "white", "markersize": 5.0}
     axes.plot(where, observed_hz, "o", label="observed", **open_circles)
 

@@ -18,8 +18,7 @@ from fingerpad.report.style import BLACK, BLUE, COLUMN_IN, GREY, PALE, new_figur
 from fingerpad.report.touch import label_skin, paint_skin
 
 NANOAMPERE_PER_MA = 1e6
-SHOWN_MM = (7.0, 4.5)
-"""Half the width of the pressed skin that is shown, and its height above the contact. [mm]"""
+SHOWN_MM = (7.0, 4.5)  # Half the width of the skin that is shown, and height above the contact. [mm]
 
 
 def draw_levels(section: ThreeLevels) -> Figure:
@@ -92,7 +91,6 @@ def _draw_population(axes: Axes, section: ThreeLevels) -> None:
 
 
 def caption_levels(section: ThreeLevels) -> str:
-    """Describe Figure 2."""
     places = joined([f"{number(offset)} mm" for offset in section.offset_mm])
     return (
         f"One sphere of {number(section.curvature_per_m)} 1/m on the three levels of the model, pressed "

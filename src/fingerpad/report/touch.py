@@ -152,7 +152,6 @@ def paint_skin(axes: Axes, corners: FloatArray, values: Any, largest: float, **e
 
 
 def label_skin(axes: Axes, faces: PolyCollection, label: str, shrink: float) -> None:
-    """Put the scale of colours beside painted skin."""
     bar = axes.figure.colorbar(faces, ax=axes, shrink=shrink, aspect=18, pad=0.02, extend="min")
     bar.set_label(label)
     bar.ax.yaxis.set_major_formatter("{x:g}")
@@ -196,7 +195,6 @@ def _draw_indenter(axes: Axes, skin: SkinResponse, section: Section, indenter: I
 
 
 def draw_motion(axes: Axes, skin: SkinResponse) -> None:
-    """Draw the depth of the indenter over time."""
     axes.plot(skin.times_ms, skin.depth_mm, color=BLUE)
     axes.set(ylabel="depth\n[mm]", ylim=(0.0, 1.15 * float(skin.depth_mm.max())))
     axes.tick_params(labelbottom=False)

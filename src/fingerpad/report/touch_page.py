@@ -18,7 +18,6 @@ PAGE = "touch.html"
 
 
 def write_touch_page(result: TouchFile, draw: Callable[[], Figure], folder: Path) -> Path:
-    """Write the page of a touch, `touch.html`, and its figure."""
     caption = (
         "Left: the middle plane of the finger at the end of the touch. Right: depth "
         "over time, and the spikes of the afferents that fire."
@@ -40,7 +39,6 @@ def write_touch_page(result: TouchFile, draw: Callable[[], Figure], folder: Path
 
 
 def touch_summary(result: TouchFile) -> list[str]:
-    """Summarise a touch in two sentences."""
     found = result.summary
     return [
         f"The largest force is {number(found.largest_force_mn)} mN, the largest depth "

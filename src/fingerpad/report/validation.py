@@ -50,7 +50,6 @@ def draw_validation(results: ValidationFile) -> Figure:
 
 
 def caption_validation(results: ValidationFile) -> str:
-    """Caption of the figure."""
     left_out = results.n_rows - results.n_predicted
     return (
         "Each observation over the prediction for its condition. Lines join the lowest and the highest "
@@ -60,7 +59,6 @@ def caption_validation(results: ValidationFile) -> str:
 
 
 def write_validation_page(results: ValidationFile, folder: Path) -> Path:
-    """Write the page of a validation, `validate.html`, and its figure."""
     title = f"Observed and predicted {QUANTITIES[results.unit]}"
     figure = (1, "validation", title, draw_validation, caption_validation)
     parts = illustrated(results, _tables, figure)
@@ -75,7 +73,6 @@ def write_validation_page(results: ValidationFile, folder: Path) -> Path:
 
 
 def validation_summary(results: ValidationFile) -> list[str]:
-    """Summarise a validation in a few sentences."""
     said = [
         f"{results.kind}, {results.n_predicted} of {results.n_rows} rows predicted: R² "
         f"{fixed(results.r2, 3)}, {fixed(results.r2_after_gain, 3)} after a gain of {number(results.gain)}, "

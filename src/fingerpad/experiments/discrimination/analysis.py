@@ -47,9 +47,7 @@ from fingerpad.psychophysics.functions import binomial_interval
 from fingerpad.psychophysics.ideal_observer import Presentation, multiplied_responses
 
 SESSION = 2  # Session of the random numbers of efficiencies; that of the hit rates is another.
-
-Encoded = tuple[FloatArray, np.ndarray]
-"""A measure of all receptors under every stimulus, and the pairs of neighbours that take part."""
+Encoded = tuple[FloatArray, np.ndarray]  # A measure (n_stimuli, n_receptors), and pairs of neighbours.
 
 
 @result_class
@@ -118,14 +116,11 @@ class Decoding:
     silent: tuple[str, ...] = ()  # Stimuli under which no afferent responds; there is no hit rate then.
     hit_rate: Vector | None = None
     hit_rate_sd: Vector | None = None  # Mean and standard deviation over repetitions, (n_comparisons,). [0-1]
-    statistic: TaskStatistic | None = None
-    """What the code computes for each stimulus; absent for the ideal observer."""
+    statistic: TaskStatistic | None = None  # What the code computes; absent for the ideal observer.
     d_prime: Vector | None = None  # Discriminability; NaN where it is infinite, (n_comparisons,).
-    forced_choice: ForcedChoice | None = None
-    """The same as proportion correct, with intervals; absent without noise."""
+    forced_choice: ForcedChoice | None = None  # As proportion correct; absent without noise.
     efficiency: Vector | None = None
-    efficiency_error: Vector | None = None
-    """Against the ideal observer; NaN where it cannot be estimated, (n_comparisons,)."""
+    efficiency_error: Vector | None = None  # NaN where it cannot be estimated, (n_comparisons,).
     curves: tuple[SideCurve, ...] = ()  # Psychometric curves above and below the standard.
 
 
@@ -353,7 +348,6 @@ def analyse(prepared: PreparedTask, skins: Mapping[str, Skin]) -> TaskResult:
 
 
 def _named(stimuli: Sequence[NamedStimulus], rows: Sequence[int] | IntArray) -> str:
-    """Name stimuli within a sentence."""
     if len(rows) == len(stimuli):
         return "any stimulus"
     return f"the stimulus {', '.join(stimuli[row].name for row in rows)}"
@@ -402,7 +396,6 @@ def _decodings(
 def _decoding(
     prepared: PreparedTask, code: str, measure: str, encoded: Encoded, sigma: float, shown: list[Presentation]
 ) -> Decoding:
-    """Hit rates of one code, their statistic, efficiency and psychometric curves."""
     settings, (table, neighbours) = prepared.task.experiment, encoded
     if code == IDEAL:
         best = np.array([presentation.ideal_hit_rate() for presentation in shown])

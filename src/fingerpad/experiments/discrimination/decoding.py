@@ -45,8 +45,7 @@ class CurveThreshold:
     proportion: float  # Hit rate at the threshold. [0-1]
     difference: Number
     level: Number  # From the standard, and on the axis. [unit of what varies]
-    over_standard: float | None
-    """Difference over the standard (Weber fraction); absent where the standard is 0."""
+    over_standard: float | None  # Difference over standard (Weber fraction); absent where that is 0.
     bootstrap_interval: tuple[Number, Number] | None
     posterior_interval: tuple[Number, Number]
     """Confidence and credible interval of the difference; the former is absent where no comparison lies on
@@ -72,8 +71,7 @@ class CurveFit:
     sigmoid: str
     trials: int  # Judgements per comparison behind the intervals.
     threshold: CurveThreshold  # At the proportion that the task asks for.
-    slope: Number
-    """Of the hit rate at the threshold; NaN where no comparison lies on the rise. [1/unit of what varies]"""
+    slope: Number  # Of the hit rate at the threshold; NaN where no comparison lies on the rise.
     lapse: float  # What is missing to 1 far above the threshold. [0-1]
     at_bounds: tuple[str, ...]  # Parameters that ended at a bound.
     curve: CurvePoints
@@ -85,20 +83,17 @@ class SideCurve:
 
     side: str  # Of the standard.
     difference: Vector
-    hit_rate: Vector
-    """Distance from the standard and hit rate. [unit of what varies],, (n_comparisons,). [0-1]"""
+    hit_rate: Vector  # Distance from the standard, and hit rate, (n_comparisons,).
     fit: CurveFit | None = None
     why_not: str | None = None  # Why there is no curve.
 
 
 def response_table(maps: Sequence[ResponseMap], measure: str, latest_ms: float | None = None) -> FloatArray:
-    """Return one measure of every receptor under every stimulus."""
     table = np.array([RESPONSE_MEASURES[measure](answer) for answer in maps])
     return table if measure != "latency" or latest_ms is None else np.fmin(table, latest_ms)
 
 
 def silent_stimuli(table: FloatArray, measure: str, latest_ms: float | None = None) -> IntArray:
-    """Find the stimuli under which no afferent responds by a measure."""
     if measure != "latency" or latest_ms is not None:
         return np.flatnonzero((table == (latest_ms if measure == "latency" else 0.0)).all(axis=1))
     missing = np.isnan(table)
@@ -110,7 +105,6 @@ def silent_stimuli(table: FloatArray, measure: str, latest_ms: float | None = No
 def code_hit_rates(
     code: str, table: FloatArray, neighbours: np.ndarray, noise_sigma: float, seed: int, plan: Experiment
 ) -> HitRates:
-    """Hit rates of every comparison by a code."""
     if code == "euclidean":
         return discriminate_euclidean(table, noise_sigma, seed, plan, session=SESSION)
     return discriminate_gradient_sum(table, neighbours, noise_sigma, seed, plan, session=SESSION)
@@ -125,7 +119,6 @@ def fit_task_noise(
     seed: int,
     plan: Experiment,
 ) -> NoiseFit:
-    """Noise that brings a code closest to observed hit rates."""
     chosen = list(comparisons)
 
     def by_distance(sigma: float) -> FloatArray:
@@ -142,7 +135,6 @@ def fit_task_noise(
 def task_statistic(
     code: str, table: FloatArray, neighbours: np.ndarray, noise_sigma: float, seed: int
 ) -> TaskStatistic:
-    """Compute the statistic of a code for every stimulus: Gradient Sum, or distance from the standard."""
     n_stimuli = len(table)
     if code == "euclidean":
         sets = noisy_responses(
@@ -194,7 +186,6 @@ def _curve_fit(
     settings: CurveSettings,
     seed: int,
 ) -> CurveFit:
-    """Fit one curve; estimate its threshold, intervals and band."""
     if difference.size < 2:
         raise InputError("A curve needs two comparisons on a side of the standard or more: got 1.")
     counts = np.round(rates * trials)

@@ -32,8 +32,7 @@ class DiscriminationFile:
     format_version: Literal[2] = 2
     discrimination: TaskResult
     task: DiscriminationTask  # What was asked, defaults included.
-    afferent: dict[str, float | str]
-    """Parameters of the afferent; those of a mixed population begin with their type, as in "RA.threshold"."""
+    afferent: dict[str, float | str]  # By name; in a mixed population with the type, "RA.threshold".
     manifest: Manifest
 
 
@@ -43,13 +42,10 @@ class DiscriminationRun:
 
     task: DiscriminationTask  # From `task_stimuli.read_task`.
     folder: Path
-    jobs: int | Engine = 1
-    """Processes, or the engine that solves the indentations; the numbers do not depend on it."""
-    source: str = "task"
-    """File of the task: files that it names are searched beside it, and errors begin with it."""
+    jobs: int | Engine = 1  # Processes or engine that press; the numbers do not depend on it.
+    source: str = "task"  # File of the task: beside it files are searched; errors begin with it.
     text: str = ""  # Its content, for the lines of errors.
-    population: Population | MixedPopulation | None = None
-    """Afferents in the place of those of the task: of types of one's own, for example."""
+    population: Population | MixedPopulation | None = None  # In the place of those of the task.
 
     def __post_init__(self) -> None:
         engine_of(self.jobs)
@@ -59,19 +55,16 @@ class DiscriminationRun:
 
     @cached_property
     def prepared(self) -> PreparedTask:
-        """The task with its stimuli and its population."""
         beside = Path(self.source).parent
         population = self.population or task_population(self.task, beside, self.conditions.finger)
         return PreparedTask(self.task, task_stimuli(self.task, beside), population)
 
     @cached_property
     def conditions(self) -> Conditions:
-        """Finger, tissues, accuracy and seed."""
         return task_conditions(self.task, Path(self.source).parent)
 
     @cached_property
     def touches(self) -> dict[str, Touch]:
-        """One touch per stimulus, the standard first."""
         return touches_of(self.prepared.stimuli, self.conditions, self.task.reach_mm)
 
 

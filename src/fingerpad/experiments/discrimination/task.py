@@ -78,7 +78,6 @@ class ExperimentSettings(Part):
 
     @property
     def plan(self) -> Experiment:
-        """Repetitions and criterion."""
         own = dict(self)
         return Experiment(**{name: own[name] for name in own if name not in ("seed", "trials")})
 

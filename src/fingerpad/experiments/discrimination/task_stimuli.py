@@ -100,7 +100,6 @@ SUFFIX = ".yaml"
 
 
 def example_tasks() -> dict[str, str]:
-    """Tasks that come with the package."""
     folder = files("fingerpad.experiments.discrimination") / "tasks"
     return {
         entry.name.removesuffix(SUFFIX): entry.read_text(encoding="utf-8")
@@ -110,14 +109,12 @@ def example_tasks() -> dict[str, str]:
 
 
 def title(text: str) -> str:
-    """Return the question of an example task in words."""
     return parse_task(read_yaml(text, "task")).question
 
 
 def input_hashes(
     source: str | Path, task: DiscriminationTask, stimuli: Sequence[NamedStimulus]
 ) -> dict[str, str]:
-    """SHA-256 of the files on which a task rests."""
     hashes = {str(source): hashlib.sha256(task_text(source).encode()).hexdigest()}
     beside = path_of("source", source).parent
     named = [*named_files(task.finger, beside), *(path for stimulus in stimuli for path in stimulus.files)]

@@ -109,7 +109,6 @@ METHODS = ("least_squares", "response_surface", "closed_form", "cma_es", "likeli
 def prepare(
     method: str, model: AfferentModel, recordings: Recordings, rates: RateRecordings, seed: int
 ) -> Prepared:
-    """Prepare a method of fitting recordings."""
     one_of("method", method, METHODS)
     if method == "likelihood":
         # Only this method loads the module and its kernels.
@@ -159,7 +158,6 @@ def fit_offset(
     windows_ms: Windows | None,
     seed: int = 0,
 ) -> OffsetFit:
-    """Fit the four numbers and the receptor's offset together, on the same folds."""
     beside_mm = check_beside(beside)
     roving = ReceptorOffset.of_traces({offset: beside[offset] for offset in beside_mm}, windows_ms)
     problem, everything = five_number_problem(roving, rates), np.arange(roving.n_stimuli)

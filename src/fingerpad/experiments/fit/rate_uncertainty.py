@@ -34,14 +34,10 @@ SEEDS_OF_PROFILES = 300  # Draws from the posterior that profiles start from.
 CLOUDS, POINTS_OF_CLOUD, BEST_POINTS, MOST_LOSS = 5, 1200, 150, 4.0
 """Of `likely_points`: nine draws of ten from a posterior of four numbers lose less than that."""
 
-FIRST_CLOUD = (0.05, 0.4, 0.2, 0.5)
-"""Standard deviations of the first cloud of `likely_points`, in the coordinates of the posterior."""
-
+FIRST_CLOUD = (0.05, 0.4, 0.2, 0.5)  # Standard deviations, in the coordinates of the posterior.
 SENSITIVITY_SHARE = 0.25  # Sobol's ranges reach from this share below the fit to this share above. [1]
 SENSITIVITY_POINTS = 512  # Base points of Sobol's design.
-
-MOST_RESTING_SHARE = 0.9
-"""Potential at rest over the threshold, at most, where a search begins: untouched skin elicits no spike."""
+MOST_RESTING_SHARE = 0.9  # At most, where a search begins: untouched skin elicits no spike.
 
 
 def admissible(four: ArrayLike) -> FloatArray:
@@ -142,7 +138,6 @@ def rate_posterior(
     positions_mm: ArrayLike | None = None,
     **settings: Any,
 ) -> RatePosterior:
-    """Draw the four identifiable numbers from their posterior given the rates."""
     likelihood = _likelihood(model, rates, positions_mm)
     found = afferent_posterior(likelihood, admissible(four), seed=seed, **settings)
     ends = credible_band(found.four, LEVEL).T
@@ -166,7 +161,6 @@ def rate_posterior(
 def profiled(
     model: AfferentModel, rates: RateRecordings, four: ArrayLike, positions_mm: ArrayLike | None = None
 ) -> tuple[ParameterProfile, ...]:
-    """Profile the likelihood of each of the four identifiable numbers."""
     likelihood = _likelihood(model, rates, positions_mm)
     return profiles(likelihood, likely_points(likelihood, admissible(four)))
 

@@ -44,8 +44,7 @@ class RatePosterior:
     n_draws: int
     n_evaluations: int  # Draws that were kept, and evaluations of the likelihood.
     largest_r_hat: float
-    smallest_effective_size: float
-    """Convergence: split R-hat and effective number of draws, the worst of the four."""
+    smallest_effective_size: float  # Split R-hat and effective number of draws, the worst of four.
     median: dict[str, float]
     interval: dict[str, tuple[float, float]]  # Credible interval of each number.
     covariance: Matrix  # Of the draws, (4, 4).
@@ -91,8 +90,7 @@ class OffsetFit:
     """Fit of the four numbers and the receptor's offset."""
 
     offset_mm: float
-    standard_error_mm: Number
-    """Offset along the finger, distal positive, and its standard error, NaN where it is not known. [mm]"""
+    standard_error_mm: Number  # Distal positive; its error is NaN where not known. [mm]
     folds_mm: Vector  # Offsets that the folds give, (n_folds,). [mm]
     identifiable: dict[str, float]
     fss_in_sample: float
@@ -107,12 +105,10 @@ class OffsetFit:
 class PhaseRates:
     """Rates of one phase, in the ramp or in the hold."""
 
-    fss_in_sample: float | None
-    """Fractional sum of squares over all stimuli; absent where the phase was not recorded."""
+    fss_in_sample: float | None  # Over all stimuli; absent where the phase was not recorded.
     observed_hz: Vector | None  # Recorded rates, (n_stimuli,). [spikes/s]
     fitted_hz: Vector  # Rates of the afferent that is fitted to all stimuli, (n_stimuli,). [spikes/s]
-    out_of_sample_hz: Vector
-    """Rates that the fit without the stimulus' fold predicts, (n_stimuli,). [spikes/s]"""
+    out_of_sample_hz: Vector  # Rates predicted by the fit without its fold, (n_stimuli,). [spikes/s]
 
 
 @result_class

@@ -48,8 +48,7 @@ class FitFile:
     format: Literal["fingerpad fit"] = "fingerpad fit"
     format_version: Literal[2] = 2
     fit: FitResult
-    windows_ms: tuple[tuple[float, ...], tuple[float, ...]]
-    """Windows of the dynamic and of the static rate. [ms]"""
+    windows_ms: tuple[tuple[float, ...], tuple[float, ...]]  # Of the dynamic and of the static rate. [ms]
     dynamic_quantity: str
     static_quantity: str  # Quantities of the two terms.
     manifest: Manifest

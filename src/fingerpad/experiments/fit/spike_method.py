@@ -34,7 +34,6 @@ class MaximumLikelihood:
     name: str = "likelihood"
 
     def of(self, chosen: IntArray) -> SpikeLikelihood:
-        """Likelihood of the spikes under the chosen stimuli."""
         rows = np.flatnonzero(np.isin(self.sites, chosen))
         trains = SpikeTrains.from_lists([self.recordings.trains[int(row)] for row in rows])
         return SpikeLikelihood(self.drive, trains, self.sites[rows], self.recordings.duration_ms[rows])
@@ -68,7 +67,6 @@ class PreparedSpikes(Prepared):
         return self._covariance(fit)[:4, :4]
 
     def spikes(self, fit: Fit, folds: CrossValidation) -> SpikeFitSummary:
-        """Summary of the fit."""
         left_out = [(self.method.of(fold.testing), fold.fit.parameters) for fold in folds.folds]
         test = time_rescaling(self.everything, fit.parameters)
         return SpikeFitSummary(
@@ -88,7 +86,6 @@ class PreparedSpikes(Prepared):
 def prepare_spikes(
     model: AfferentModel, recordings: Recordings, rates: RateRecordings, seed: int
 ) -> PreparedSpikes:
-    """Prepare maximum likelihood of spike trains under a soft threshold."""
     trains, (drive,) = check_spikes(recordings, len(model.drives)), model.drives
     sites = np.array([rates.stimuli.index(name) for name in trains.stimuli], dtype=np.int64)
     method = MaximumLikelihood(drive, trains, sites)

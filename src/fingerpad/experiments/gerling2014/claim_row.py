@@ -15,14 +15,10 @@ MATERIALS = "materials assumed (Tables 1 and 2 are lost), geometry read"
 class Group(StrEnum):
     """What a row can show."""
 
-    STATEMENT = "statement"
-    """A statement of the paper that can fail; nothing was fitted to it."""
-    FITTED = "fitted"
-    """A number that was fitted, or by which something was chosen in sample."""
-    DEFINITION = "definition"
-    """A consequence of definitions: it holds for nearly any model."""
-    ADDITION = "addition"
-    """Our own addition, of which the paper says nothing that could be judged."""
+    STATEMENT = "statement"  # A statement of the paper that can fail; nothing was fitted to it.
+    FITTED = "fitted"  # A number that was fitted, or by which something was chosen in sample.
+    DEFINITION = "definition"  # A consequence of definitions: it holds for nearly any model.
+    ADDITION = "addition"  # Our own addition, of which the paper says nothing that could be judged.
 
 
 class Verdict(StrEnum):
@@ -30,10 +26,8 @@ class Verdict(StrEnum):
 
     MET = "met"
     MISSED = "missed"
-    NOT_DECIDABLE = "not decidable"
-    """The outcome depends on a reading that the paper leaves open, or lies within the Monte-Carlo error."""
-    NOT_APPLICABLE = "does not apply"
-    """The set of tissues has nothing to compare."""
+    NOT_DECIDABLE = "not decidable"  # A reading that the paper leaves open, or chance, decides.
+    NOT_APPLICABLE = "does not apply"  # The set of tissues has nothing to compare.
 
 
 @result_class
@@ -47,8 +41,7 @@ class ClaimRow:
     ours: str  # As they are printed.
     status: str = ""  # How far the inputs can be trusted.
     verdict: Verdict
-    fitted_to: str = ""
-    """What was fitted to the observed number, or chosen by it; in rows of the group `FITTED` alone."""
+    fitted_to: str = ""  # What was fitted to the number or chosen by it; in the group `FITTED` alone.
     note: str = ""
 
     def __post_init__(self) -> None:
@@ -60,7 +53,6 @@ class ClaimRow:
 
 
 def judged(met: bool) -> Verdict:
-    """Return the verdict of a criterion that holds or does not."""
     return Verdict.MET if met else Verdict.MISSED
 
 

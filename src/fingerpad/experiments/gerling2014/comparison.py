@@ -35,11 +35,8 @@ CHOSEN_BY_DEFLECTION = ("trial2", "trial3", "trial3_stiffening", "paper", "human
 """Sets of tissues whose moduli were identified from the deflection under the cylinder
 (docs/decisions.md#lost-hyperelastic-coefficients, docs/decisions/paper-and-human.md)."""
 
-CHOSEN_BY_RATES = ("paper", "human")
-"""Sets whose moduli, Poisson's ratio and drive were chosen by the rates under the bar, among others."""
-
-CHOSEN_BY_FORCE = ("human",)
-"""Sets of tissues with a common factor on the moduli that was chosen by the force of a flat plate."""
+CHOSEN_BY_RATES = ("paper", "human")  # Moduli, Poisson's ratio and drive, among others by the bar.
+CHOSEN_BY_FORCE = ("human",)  # With a common factor on the moduli, by the force of a flat plate.
 
 
 def comparison(
@@ -52,7 +49,6 @@ def comparison(
     nail: NailBorder,
     curvature_thresholds: CurvatureThresholds | None = None,
 ) -> list[ClaimRow]:
-    """Rows of the table that compares a reproduction with the paper."""
     return [
         *_deflection(skin),
         *_force(materials, force),
@@ -111,7 +107,6 @@ def _mean_excess(
 
 
 def _force(materials: str, found: SkinForce) -> list[ClaimRow]:
-    """Judge deflection and force with the tissues of the run."""
     by_profile = materials in CHOSEN_BY_DEFLECTION
     by_force = (
         "the common factor on the moduli was chosen by this force" if materials in CHOSEN_BY_FORCE else ""
@@ -237,9 +232,7 @@ def _fold_3(found: SingleUnitResult) -> list[ClaimRow]:
 
 
 MOST = 0.5  # A statement on single shifts holds if more than this share of them agree.
-
-WELL_R2 = 0.81
-"""R² from which SED "well correlates" with rates: the paper's own FSS, which it calls favourable."""
+WELL_R2 = 0.81  # R² from which SED "well correlates" with rates: the paper's FSS, which it calls favourable.
 
 
 def _firing(unit: SingleUnitResult, found: FiringCourse) -> list[ClaimRow]:

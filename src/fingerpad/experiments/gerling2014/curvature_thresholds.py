@@ -44,9 +44,7 @@ LAYOUTS = {"paper": (3, 6), "square": (6, 6)}
 """Receptors along the finger and across: the paper's 18, and as many along as across, which cover the larger
 contact of a flatter sphere on all sides."""
 
-STEPS = (0.03, 0.06, 0.09, 0.12, 0.16, 0.21)
-"""Comparisons of an experiment: how much more curved than the standard, as a share of it."""
-
+STEPS = (0.03, 0.06, 0.09, 0.12, 0.16, 0.21)  # Comparisons: shares by which they are more curved.
 PROPORTION = 0.75
 JUDGEMENTS = int(psychophysics.GOODWIN_TRIALS.value)  # Per comparison of an experiment.
 
@@ -69,14 +67,11 @@ class CurvatureThreshold:
     standard_per_m: float
     jnd_per_m: float  # The standard and the just noticeable difference of the model. [1/m]
     weber_fraction: float
-    ideal_weber_fraction: float
-    """Threshold over standard, and that of the ideal observer from Fisher's information."""
+    ideal_weber_fraction: float  # Threshold over standard; of the ideal observer by Fisher's information.
     step: Vector
-    hit_rate: Vector
-    """Comparisons of an experiment as shares of the standard, and their hit rates, (n_comparisons,). [0-1]"""
+    hit_rate: Vector  # Comparisons as shares of the standard, and hit rates, (n_comparisons,). [0-1]
     fitted_weber_fraction: Number
-    fitted_interval: tuple[Number, Number]
-    """Threshold of the Weibull function through the counts of that experiment, and its 95 % interval."""
+    fitted_interval: tuple[Number, Number]  # By a Weibull function through its counts, with 95 % interval.
     curve: PsychometricCurve
 
 
@@ -146,7 +141,6 @@ def sphere_touches(conditions: Conditions, curvatures_per_m: Sequence[float]) ->
 def curvature_thresholds(
     responses: Mapping[float, SkinResponse], afferent: Afferent, noise_sigma: float, seed: int
 ) -> CurvatureThresholds:
-    """Thresholds of the static Gradient Sum at several standards."""
     curvatures = np.array(sorted(responses))
     neighbours, static = _encoded(_population("paper", afferent), responses, curvatures)
     return CurvatureThresholds(
@@ -240,7 +234,6 @@ class Observer:
         return float(np.exp(self.rates.x[-1]))
 
     def responses(self, curvature_per_m: float) -> FloatArray:
-        """Rates (n_receptors,) under a sphere. [spikes/s]"""
         return self.rates(np.log(curvature_per_m))
 
     def slopes(self, curvature_per_m: float) -> FloatArray:
@@ -248,7 +241,6 @@ class Observer:
         return self.rates(np.log(curvature_per_m), 1) / curvature_per_m
 
     def hit_rate(self, standard_per_m: float, comparison_per_m: float) -> float:
-        """Hit rate of the comparison against the standard. [0-1]"""
         pair = [self.responses(standard_per_m), self.responses(comparison_per_m)]
         return float(expected_hit_rates(pair, self.neighbours, self.noise_sigma, self.draws)[0])
 

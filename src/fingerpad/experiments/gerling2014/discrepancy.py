@@ -37,9 +37,7 @@ from fingerpad.psychophysics.noise_fit import expected_euclidean_hit_rates, expe
 
 PATIENCE_MS = protocol.RAMP.value  # Time that an observer waits for first spikes: until the ramp ends. [ms]
 DRAWS = 1000  # Common random presentations behind each interpretation.
-
-CURVE_NOISE = tuple(round(0.01 * step, 2) for step in range(1, 31))
-"""Noise at which the misfit of every code is computed."""
+CURVE_NOISE = tuple(round(0.01 * step, 2) for step in range(1, 31))  # Noise of the misfits of codes.
 
 USED = {
     "static": "static, eight neighbours (used)",
@@ -57,8 +55,7 @@ class Interpretation:
 
     reading: str
     receptors: WholeVector  # Receptors that take part, (n_positions,).
-    rise: Vector
-    """Share by which the Gradient Sum rises from the standard to the farthest sphere, (n_positions,)."""
+    rise: Vector  # Rise of the Gradient Sum from the standard to the farthest sphere, (n_positions,).
     hit_rate: Matrix  # With the noise of the study, (n_positions, n_comparisons). [0-1]
     largest_shift: Number  # Largest change of these by the shift. [0-1]
     noise_sigma: Number = np.nan
@@ -103,12 +100,8 @@ class EuclideanFit:
 class DiscrepancyAnalysis:
     """Numbers behind the differences between the model's percept and the paper's."""
 
-    rise: dict[str, Vector]
-    """Share by which the Gradient Sum rises from the standard to the farthest sphere, by measure,
-    (n_positions,).
-    """
-    rise_for_paper_noise: dict[str, Vector]
-    """Rise with which the paper's noise would give Goodwin's hit rate; NaN if none does, (n_positions,)."""
+    rise: dict[str, Vector]  # Rise of the Gradient Sum to the farthest sphere, by measure, (n_positions,).
+    rise_for_paper_noise: dict[str, Vector]  # With which the paper's noise meets people's hit rate, or NaN.
     readings: tuple[Interpretation, ...]  # Interpretations of the steps that the paper leaves open.
     criterion: CriterionErrorBars
     misfit_curve: MisfitCurve
@@ -134,7 +127,6 @@ def discrepancy_analysis(
     standard_normals: FloatArray,
     seed: int,
 ) -> DiscrepancyAnalysis:
-    """Compute the numbers behind the discrepancies."""
     draws = standard_normals[:DRAWS]
     columns = goodwin_columns(curvature_per_m)
     codes: dict[str, Callable[..., FloatArray]] = {

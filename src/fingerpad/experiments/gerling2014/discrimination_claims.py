@@ -40,7 +40,6 @@ AFFERENT_FITTED = "the afferent to them at the paper's noise"
 
 
 def discrimination_claims(found: SphereDiscrimination, fitted_to_people: bool) -> list[ClaimRow]:
-    """Judge the paper's statements about discrimination."""
     statistics = found.statistics
     fitted_to = f"{NOISE_FITTED}, {AFFERENT_FITTED}" if fitted_to_people else NOISE_FITTED
     fitted = "noise and afferent" if fitted_to_people else "the noise"

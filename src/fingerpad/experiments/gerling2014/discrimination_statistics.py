@@ -92,13 +92,10 @@ class DiscriminationStatistics:
     """Statistics behind the paper's statements; dictionaries go by code."""
 
     misfit: dict[str, Estimate]
-    misfit_above_static: dict[str, Estimate]
-    """Root mean square distance to Goodwin's points, and what it has above that of static rates. [0-1]"""
+    misfit_above_static: dict[str, Estimate]  # Distance to Goodwin's points (rms). [0-1]
     shift: dict[str, Estimate]
-    shift_above_static: dict[str, Estimate]
-    """Largest change of a hit rate by the shift, and what it has above that of static rates. [0-1]"""
-    smallest_rise: dict[str, tuple[Estimate, ...]]
-    """Smallest step of the hit rate from one sphere to the next. [0-1]"""
+    shift_above_static: dict[str, Estimate]  # Largest change of a hit rate by the shift. [0-1]
+    smallest_rise: dict[str, tuple[Estimate, ...]]  # Smallest step from one sphere to the next. [0-1]
     noise_lowers: NoiseEffect
     ten_matrices: ErrorBarChange
     criterion: ErrorBarChange  # 10 noise matrices instead of 100; a criterion that varies more.
@@ -108,7 +105,6 @@ class DiscriminationStatistics:
 
 
 def estimate(by_session: FloatArray) -> Estimate:
-    """Mean over sessions and standard error of that mean."""
     by_session = np.asarray(by_session, dtype=np.float64)
     return Estimate(
         value=float(by_session.mean()), error=float(by_session.std(ddof=1) / np.sqrt(by_session.size))
@@ -123,7 +119,6 @@ def extreme(by_session: FloatArray, pick: Callable[[FloatArray], np.intp]) -> Es
 def discrimination_statistics(
     observers: Observers, curvature_per_m: Sequence[float], measures: Sequence[str]
 ) -> DiscriminationStatistics:
-    """Compute the statistics behind the paper's statements."""
     codes = [*measures, "euclidean"]
     others = [name for name in codes if name != "static"]
     columns = goodwin_columns(curvature_per_m)
@@ -204,10 +199,7 @@ def _targets(hit_rates: FloatArray, columns: list[int], curvature_per_m: Sequenc
 
 
 SESSIONS = 5  # Sessions of a study. The first is drawn; all of them give the Monte-Carlo error.
-
-SWEPT_NOISE = tuple(round(0.015 + 0.01 * step, 3) for step in range(8))
-"""Noise sigma_1 that is tried, over the paper's range."""
-
+SWEPT_NOISE = tuple(round(0.015 + 0.01 * step, 3) for step in range(8))  # Over the paper's range of sigma_1.
 FEW = 10  # Noise matrices, and hit rates, of the paper's smaller experiments.
 AGAIN = 20  # Repetitions of the judgements of one session, which show how stable their mean is.
 CRITERION_SIGMAS = psychophysics.DECISION_CRITERION_SIGMA.value
@@ -333,8 +325,7 @@ class GoodwinHitRates:
     trials: int  # Trials behind each fraction (assumed).
     low: Vector
     high: Vector  # Observed fractions and their binomial 95 % intervals, (2,). [0-1]
-    line: Vector
-    """Hit rates at the spheres of the study on the line that is straight in z, (n_comparisons,). [0-1]"""
+    line: Vector  # Hit rates at the spheres of the study, on the line in z, (n_comparisons,). [0-1]
 
 
 def line_in_z(curvature_per_m: ArrayLike) -> FloatArray:
@@ -345,7 +336,6 @@ def line_in_z(curvature_per_m: ArrayLike) -> FloatArray:
 
 
 def goodwin_hit_rates_at(curvature_per_m: ArrayLike) -> GoodwinHitRates:
-    """Observed hit rates of people, and the line at the comparison spheres."""
     low, high = binomial_interval(HIT_RATES, TRIALS)
     return GoodwinHitRates(
         curvature_per_m=np.array(CURVATURES),
@@ -358,12 +348,10 @@ def goodwin_hit_rates_at(curvature_per_m: ArrayLike) -> GoodwinHitRates:
 
 
 def goodwin_columns(curvature_per_m: Sequence[float]) -> list[int]:
-    """Find Goodwin's two spheres among the comparisons."""
     return [list(curvature_per_m).index(curvature) - 1 for curvature in CURVATURES]
 
 
 def goodwin_misfit(hit_rates: FloatArray, axis: int | tuple[int, ...] | None = None) -> FloatArray:
-    """Root mean square distance of hit rates to people's."""
     return np.sqrt(np.square(hit_rates - np.array(HIT_RATES)).mean(axis=axis))
 
 

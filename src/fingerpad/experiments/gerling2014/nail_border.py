@@ -25,9 +25,7 @@ from fingerpad.skin.sampling import SkinResponse
 
 BESIDE_MM = 1.5  # Skin nearer than this to the nail counts as its border. [mm]
 FAR_MM = (2.0, 3.0)  # Skin at these distances is what the border is compared with. [mm]
-
-ELEMENT_MM = {"quick": 0.8, "standard": 0.6, "paper": 0.6}
-"""Largest elements on the skin: the other studies' grow to several mm on the back of the finger. [mm]"""
+ELEMENT_MM = {"quick": 0.8, "standard": 0.6, "paper": 0.6}  # Largest on the skin, at its back too. [mm]
 
 
 @result_class
@@ -68,15 +66,13 @@ class NailBorder:
     von_mises_kpa: Matrix  # Stress of the element below each face, (n_along, n_around). [kPa]
     nail_mm: Stack  # Outline of the nail, (n_edges, 2, 3). [mm]
     ratio: Number
-    ratio_range: tuple[Number, Number]
-    """Stress of the skin at the border over that away from it: median and range over the sections."""
+    ratio_range: tuple[Number, Number]  # Stress at the border over that away from it, median and range.
     ratio_living_epidermis: Number
     ratio_energy: Number  # The same median in the living epidermis, for stress and for strain energy density.
     border_kpa: Number
     far_kpa: Number
     border_energy_kpa: Number  # Largest strain energy density at the border. [kPa]
-    peak_kpa: Number
-    """Largest stress at the border, median stress away from it, largest stress anywhere. [kPa]"""
+    peak_kpa: Number  # Stress: largest at the border, median away from it, largest anywhere. [kPa]
     text: str
     profile: StressProfile  # Stress over distance from the nail.
     middle: MiddleSection
@@ -96,15 +92,12 @@ def nail_touch(conditions: Conditions) -> Touch:
 class Concentration:
     """Stress at the border of the nail, section by section."""
 
-    station: np.ndarray
-    """Sections along the mesh that cross the border and reach the skin far from it, (n_sections,)."""
+    station: np.ndarray  # Sections that cross the border and reach the skin far from it, (n_sections,).
     border_kpa: FloatArray
-    far_kpa: FloatArray
-    """Largest stress at the border, and mean stress at `FAR_MM` from it, (n_sections,). [kPa]"""
+    far_kpa: FloatArray  # Largest stress at the border, mean at `FAR_MM` from it, (n_sections,). [kPa]
 
     @property
     def ratios(self) -> FloatArray:
-        """Border over far, (n_sections,)."""
         return self.border_kpa / self.far_kpa
 
 

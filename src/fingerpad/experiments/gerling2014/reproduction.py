@@ -46,8 +46,7 @@ from fingerpad.skin.sampling import SkinResponse
 
 STANDARD_SPHERE = (sphere_discrimination.POSITIONS_MM[0], sphere_discrimination.CURVATURES[0])
 
-PAPER, HUMAN = "paper", "human"
-"""The two columns of a reproduction: the paper's own system, and the set that serves all three levels."""
+PAPER, HUMAN = "paper", "human"  # The paper's own system; the set that serves all three levels.
 
 
 @dataclass(frozen=True)
@@ -62,8 +61,7 @@ class Reproduction:
     with a Poisson's ratio of 0.40, which is our reading; "trial3" is Trial 3 to the letter, 0.48.
     """
     finger: Finger = field(default_factory=Fingertip)
-    jobs: int | Engine = 1
-    """Processes, or the engine that solves the indentations; the numbers do not depend on it."""
+    jobs: int | Engine = 1  # Processes or engine that press; the numbers do not depend on it.
     extended: bool | None = None
     """Whether to go beyond the paper: uncertainty of the fit, and curvature thresholds at other standards. By
     default not at "quick" resolution, where this takes half as long again.
@@ -76,12 +74,10 @@ class Reproduction:
 
     @property
     def goes_beyond(self) -> bool:
-        """Whether this run goes beyond the paper."""
         return self.resolution != "quick" if self.extended is None else self.extended
 
     @property
     def conditions(self) -> dict[str, Conditions]:
-        """Conditions of each column, by its name."""
         return {
             name: Conditions(self.resolution, self.seed, tissues, self.finger)
             for name, tissues in ((PAPER, self.tissues), (HUMAN, HUMAN))
@@ -108,14 +104,12 @@ class SetResult:
     levels: ThreeLevels  # The mesh under the standard sphere, and that indentation on all levels.
     skin_force: SkinForce  # Level 1: deflection and force.
     single_unit: SingleUnitResult
-    firing: FiringCourse
-    """Level 2: rates under the bar and their fit; when the afferent fires, and what drives it."""
+    firing: FiringCourse  # Level 2: rates under the bar and their fit; when it fires, what drives it.
     discrimination: SphereDiscrimination
     population: PopulationMaps
     nail: NailBorder
     single_unit_uncertainty: UncertaintyResult | None = None
-    curvature_thresholds: CurvatureThresholds | None = None
-    """What goes beyond the paper, None where it was not asked for."""
+    curvature_thresholds: CurvatureThresholds | None = None  # Beyond the paper, where asked for.
     comparison: tuple[ClaimRow, ...]  # The paper's numbers beside ours.
 
 
@@ -126,19 +120,16 @@ class ReproductionResult:
     format: Literal["fingerpad reproduction"] = "fingerpad reproduction"
     format_version: Literal[5] = 5
     summary: Summaries  # A few plain numbers of both sets.
-    statements: tuple[Statement, ...]
-    """Every statement of the paper that can fail, with our value and verdict of both sets."""
+    statements: tuple[Statement, ...]  # What can fail, with our value and verdict of both sets.
     skin_deflection: SkinDeflectionResult  # Level 1: the paper's three trials.
     paper: SetResult
     human: SetResult  # The paper's own system, and the set that serves all three levels.
-    tissues: tuple[TissueLayer, ...]
-    """Every named set of tissues, those of the run and of the trials among them."""
+    tissues: tuple[TissueLayer, ...]  # Every named set of tissues, those of run and trials among them.
     inputs: tuple[PublishedNumber, ...]  # Published numbers on which all of it rests.
     manifest: Manifest
 
 
 def reproduce(run: Reproduction, progress: Progress | None = None) -> ReproductionResult:
-    """Run the three validations with both sets and compare them with the paper."""
     runner, columns = Runner(run.folder, run.jobs, progress), run.conditions
     trials = {"skin deflection": skin_deflection.deflection_touches(columns[PAPER])}
     parts = {name: set_touches(conditions, run.goes_beyond) for name, conditions in columns.items()}
@@ -263,7 +254,7 @@ def set_result(
         curvature_thresholds=thresholds,
         comparison=tuple(rows),
     )
-    return made, summary(force, unit, afferent, discrimination, thresholds)
+    return made, summary(made, afferent)
 
 
 def _method(conditions: Conditions, spheres: dict[tuple[float, float], SkinResponse]) -> Method:
@@ -280,25 +271,19 @@ class Summary:
     deflection_r2: Number  # R² of the deflection under the cylinder at 1.0 mm.
     force_plate_1mm_n: Number
     force_plate_2mm_n: Number
-    force_disc_1mm_n: Number
-    """Force at the end of the hold of a flat plate 1.0 and 2.0 mm deep, and of a disc of 6.35 mm. [N]"""
+    force_disc_1mm_n: Number  # Force of a flat plate and of a disc of 6.35 mm, end of the hold. [N]
     fss_out_of_sample: Number
-    fss_in_sample: Number
-    """Fractional sum of squares of the rates under the bar: mean of the folds, and all shifts."""
+    fss_in_sample: Number  # Fractional sum of squares under the bar: mean of folds, and all shifts.
     dynamic_flat_hz: Number
-    dynamic_max_hz: Number
-    """Smallest dynamic rate under the flat face of the bar, and the largest. [spikes/s]"""
+    dynamic_max_hz: Number  # Smallest dynamic rate under the flat face, and the largest. [spikes/s]
     static_difference_hz: Number  # Largest static rate less the smallest under the flat face. [spikes/s]
     resting_rate_hz: Number  # Rate without a touch. [spikes/s]
     noise_sigma: Number  # Noise that fits people's two points best.
-    euclidean_rms_same_noise: Number
-    """Root mean square distance of the Euclidean Distance to these points at that noise. [0-1]"""
+    euclidean_rms_same_noise: Number  # Euclidean Distance: rms distance to these points. [0-1]
     hit_rate_296: tuple[Number, Number]
-    hit_rate_365: tuple[Number, Number]
-    """Hit rates of the static Gradient Sum at that noise, spheres at 0.0 and at 0.2 mm. [0-1]"""
+    hit_rate_365: tuple[Number, Number]  # Static Gradient Sum, spheres at 0.0 and 0.2 mm. [0-1]
     weber_144: Number
-    weber_287: Number
-    """Curvature threshold at 75 % over the standard; NaN where it was not asked for or does not exist."""
+    weber_287: Number  # Curvature threshold at 75 % over the standard; NaN where there is none.
     wall_s: float = 0.0
     peak_memory_mb: float = 0.0  # Of the whole run, both sets. [s, MB]
 
@@ -313,14 +298,9 @@ class Summaries:
     peak_memory_mb: float
 
 
-def summary(
-    force: SkinForce,
-    unit: SingleUnitResult,
-    afferent: Afferent,
-    discrimination: SphereDiscrimination,
-    thresholds: CurvatureThresholds | None,
-) -> Summary:
+def summary(found: SetResult, afferent: Afferent) -> Summary:
     """Collect the numbers of one set; time and memory are known when the run ends."""
+    force, unit, discrimination = found.skin_force, found.single_unit, found.discrimination
     dynamic, static = unit.modulation.dynamic.ours, unit.modulation.static.ours
     centred, shifted = (place.at_goodwin for place in discrimination.statistics.targets)
     at_296, at_365 = ((here.value, aside.value) for here, aside in zip(centred, shifted, strict=True))
@@ -339,8 +319,8 @@ def summary(
         euclidean_rms_same_noise=discrimination.statistics.misfit["euclidean"].value,
         hit_rate_296=at_296,
         hit_rate_365=at_365,
-        weber_144=weber_fraction(thresholds, 144.0),
-        weber_287=weber_fraction(thresholds, 287.0),
+        weber_144=weber_fraction(found.curvature_thresholds, 144.0),
+        weber_287=weber_fraction(found.curvature_thresholds, 287.0),
     )
 
 

@@ -78,7 +78,6 @@ def fit(
     method: Method | None = None,
     known: FloatArray | None = None,
 ) -> tuple[Fit, CrossValidation]:
-    """Best fit to all shifts, and the six folds."""
     method, everything = method or response_surface(), np.arange(problem.n_observations)
     folds = interleaved_folds(everything.size) if memberships is None else memberships
     if known is None:
@@ -171,14 +170,12 @@ class SingleUnitResult:
     start_points: tuple[dict[str, Number], ...]  # Both start points, by name of the parameter.
     folds: tuple[FoldResult, ...]
     modulation: RateModulation
-    initial_mv: Number | None = None
-    """Potential of the membrane at the start; that at rest if there is none. [mV]"""
+    initial_mv: Number | None = None  # Potential of the membrane at the start; by default at rest. [mV]
 
 
 def single_unit_result(
     problem: RateProblem, best: Fit, folds: CrossValidation, afferent: Afferent, method: str
 ) -> SingleUnitResult:
-    """Rates, fits and modulation."""
     shift_mm, recordings = bar_firing_rates().shift_mm, problem.recordings
     observed_dynamic, observed_static = recordings.dynamic_rate_hz, recordings.static_rate_hz
     assert observed_dynamic is not None
@@ -263,17 +260,13 @@ def edge_modulation(shift_mm: FloatArray, rate_hz: FloatArray) -> Modulation:
 class FiringCourse:
     """Course of the firing and of the current under the bar, shift by shift, and rates by depth."""
 
-    peak_ms: Vector
-    """End of the shortest interval between spikes, (n_shifts,); NaN with fewer than two spikes. [ms]"""
+    peak_ms: Vector  # End of the shortest interval, (n_shifts,); NaN with fewer than two spikes. [ms]
     window_ms: tuple[float, float]  # The paper's window of the dynamic rate. [ms]
-    dynamic_share_ramp: Vector
-    """Share of the dynamic term in the charge of both terms in the ramp, (n_shifts,). [1]"""
+    dynamic_share_ramp: Vector  # Share of the dynamic term in the charge in the ramp, (n_shifts,). [1]
     dynamic_share_hold: Vector  # The same in the hold, (n_shifts,). [1]
-    sed_r2: Number
-    """R² of the line from SED in the middle of the static window to the observed static rates. [1]"""
+    sed_r2: Number  # R² of the line from SED in the static window to the observed static rates. [1]
     depth_mm: Vector  # Depths of a flat plate, (n_depths,). [mm]
-    static_rate_by_depth_hz: Vector
-    """Static rate at these depths, mean of the population, (n_depths,). [spikes/s]"""
+    static_rate_by_depth_hz: Vector  # At these depths, mean of the population, (n_depths,). [spikes/s]
 
     @property
     def fires(self) -> np.ndarray:
@@ -284,7 +277,6 @@ class FiringCourse:
 def firing_course(
     drive: Traces, sed: Traces, afferent: Afferent, pressed: Mapping[str, SkinResponse]
 ) -> FiringCourse:
-    """Read when the fitted afferent fires and what drives it."""
     observed, (dynamic_ms, static_ms) = bar_firing_rates(), PAPER_WINDOWS_MS
     population = Population.grid(afferent=afferent, centre_mm=(RECEPTOR_X_MM, 0.0))
     in_hold = interp1d(sed.times_ms, sed.values, axis=0)(0.5 * (static_ms[0] + static_ms[1]))

@@ -51,8 +51,7 @@ class ParameterIdentifiability:
 
     rank: int  # Singular values of the Jacobian of the rates that are not zero.
     relative_singular_values: Vector  # Over the largest, (6,). [1]
-    silent_directions: tuple[dict[str, Number], ...]
-    """Directions that do not change the rates, by name of the parameter."""
+    silent_directions: tuple[dict[str, Number], ...]  # They do not change the rates; by parameter.
 
 
 @result_class
@@ -77,14 +76,12 @@ class PhasePrediction:
     observed_hz: Vector
     median_hz: Vector
     low_hz: Vector
-    high_hz: Vector
-    """Observed rates; median and credible band of the predicted rates, (n_shifts,). [spikes/s]"""
+    high_hz: Vector  # Observed; median and credible band of predicted rates, (n_shifts,). [spikes/s]
     new_low_hz: Vector
     new_high_hz: Vector  # Credible band of a new recording, (n_shifts,). [spikes/s]
     share_within_new: Number  # Share of the observed rates within that band. [1]
     residual_deviation_hz: CredibleInterval
-    residual_length_mm: CredibleInterval
-    """Standard deviation and correlation length of the residuals. [spikes/s], [mm]"""
+    residual_length_mm: CredibleInterval  # Of the residuals; length: of their correlation.
     probability_of_independence: Number  # That residuals of neighbouring shifts are independent. [1]
 
 
@@ -100,8 +97,7 @@ class UncertaintyResult:
     capacitance_mf: Number
     threshold_mv: Number  # Of the fit; they set the common scale of the gains in `posterior`. [mF], [mV]
     identifiability: ParameterIdentifiability  # Of the six parameters.
-    posterior: dict[str, CredibleInterval]
-    """Of the four numbers, of the gains, and of the resting potential over the threshold, `resting_share`."""
+    posterior: dict[str, CredibleInterval]  # Of numbers, gains, and resting potential over threshold.
     convergence: PosteriorConvergence
     shift_mm: Vector  # Shifts of the bar, (n_shifts,). [mm]
     rates: dict[str, PhasePrediction]
@@ -113,7 +109,6 @@ class UncertaintyResult:
 def uncertainty_result(
     traces: Traces, fitted: ArrayLike, seed: int, *, quick: bool = False, initial_mv: float | None = None
 ) -> UncertaintyResult:
-    """Compute identifiability, posterior, profile likelihoods and sensitivity."""
     recordings, shift_mm = single_unit.bar_recordings(), bar_firing_rates().shift_mm
     six_model = AfferentModel.of_drive(drive(traces, pieces=PIECES), initial_mv=initial_mv)
     model = four_number_model(six_model)

@@ -18,8 +18,7 @@ from fingerpad.skin.sampling import SkinResponse, SurfaceProfile
 
 TRIALS = ("trial1", "trial2", "trial3")
 INDENTERS: dict[str, Indenter] = {"line": Line(), "cylinder": Cylinder()}
-SHOWN_MM = 10.0
-"""Distance from the indenter up to which the profile is kept; the observations end at 9.25 mm. [mm]"""
+SHOWN_MM = 10.0  # Distance to which the profile is kept; the observations end at 9.25 mm. [mm]
 
 
 @result_class
@@ -27,8 +26,7 @@ class IndenterDeflection:
     """Deflection of the skin under one indenter."""
 
     distance_mm: Vector
-    deflection_mm: Vector
-    """Profile along the midline: distance from the indenter's axis, proximal positive, (n_nodes,). [mm]"""
+    deflection_mm: Vector  # Along the midline; distance from the axis, proximal positive, (n_nodes,). [mm]
     force_mn: Number
     peak_force_mn: Number  # Force at the end of the hold, and the largest force. [mN]
     penetration_mm: Number  # Largest overlap of skin and indenter. [mm]
@@ -166,7 +164,6 @@ def force_touches(conditions: Conditions) -> dict[str, Touch]:
 
 
 def skin_force(responses: Mapping[str, SkinResponse]) -> SkinForce:
-    """Read deflection and forces."""
     force_n = {name: float(skin.force_mn[-1]) / MN_PER_N for name, skin in responses.items()}
     return SkinForce(
         deflection_r2=deflection_r2(responses["cylinder"].surface_profile()),

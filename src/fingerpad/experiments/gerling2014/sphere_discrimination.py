@@ -73,8 +73,7 @@ class SphereDiscrimination:
     gradient_sums: dict[str, Matrix]  # Without noise, by measure, (n_positions, 7). [spikes/s or ms]
     gradient_sum: dict[str, ObserverHitRates]
     euclidean: dict[str, ObserverHitRates]
-    variants: dict[str, ObserverHitRates]
-    """First session: by measure for the two codes, and variants of the static Gradient Sum by name."""
+    variants: dict[str, ObserverHitRates]  # First session; variants of the static Gradient Sum by name.
     silent: tuple[str, ...]  # Measures that are left out because the population stays silent.
     statistics: DiscriminationStatistics  # Behind the paper's statements.
     reasons: DiscrepancyAnalysis  # Why the numbers differ from the paper's.

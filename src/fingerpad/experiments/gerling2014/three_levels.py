@@ -46,15 +46,12 @@ class ThreeLevels:
     times_ms: Vector
     until_ms: float  # Times of the next two, and their end, (n_times,). [ms]
     current_ma: Vector
-    potential_mv: Vector
-    """Current through the membrane of the first afferent, and its potential, (n_times,). [mA, mV]"""
+    potential_mv: Vector  # Current and potential of the first afferent, (n_times,). [mA, mV]
     rheobase_ma: float
-    threshold_mv: float
-    """Smallest constant current that elicits spikes, and the potential that elicits one. [mA, mV]"""
+    threshold_mv: float  # Smallest constant current, and potential, that elicit spikes. [mA, mV]
 
 
 def three_levels(standard: SkinResponse, afferent: Afferent) -> ThreeLevels:
-    """Read one indentation by the standard sphere on all levels."""
     mesh, curvature = standard.mesh, protocol.STANDARD_CURVATURE.value
     nodes = outline_nodes(mesh)
     moved = (mesh.nodes_mm + standard.displacement_mm)[nodes].round(DECIMALS)
@@ -141,8 +138,7 @@ class MeshPlane:
     """Nodes of a mesh in one plane, in grid order."""
 
     right_mm: Matrix
-    up_mm: Matrix
-    """Coordinates in the plane, through from the skin to the bone, (n_outline, n_through + 1). [mm]"""
+    up_mm: Matrix  # In the plane, through from the skin to the bone, (n_outline, n_through + 1). [mm]
     under_nail: TruthVector  # Whether the node on the skin lies under the nail, (n_outline,).
 
 
@@ -154,8 +150,7 @@ class MeshPicture:
     y_mm: Matrix
     z_mm: Matrix  # Nodes of the skin, (n_along + 1, n_around + 1). [mm]
     under_nail: TruthMatrix  # Whether they lie under the nail, (n_along + 1, n_around + 1).
-    along: MeshPlane
-    """Plane z = 0; right is x, up is y. The outline runs from the volar side over the tip to the back."""
+    along: MeshPlane  # Plane z = 0, from the volar side over the tip to the back; right is x, up is y.
     across: MeshPlane  # Proximal end, beside the middle phalanx; right is z, up is y.
     half: bool  # Whether `across` is one half, whose other half is its mirror image.
     contact_mm: tuple[float, float]  # x and y of the skin at the contact. [mm]
@@ -252,7 +247,6 @@ def population_maps(standard: SkinResponse, afferent: Afferent) -> PopulationMap
 
 
 def resting_response(afferent: Afferent) -> RestingResponse:
-    """Simulate an afferent without any touch."""
     end_ms = protocol.RAMP.value + protocol.HOLD.value
     sed = Traces.at_rest(end_ms, afferent.dynamic_quantity, afferent.static_quantity)
     dynamic_hz, static_hz = afferent.rates(sed, *PAPER_WINDOWS_MS)
@@ -272,7 +266,6 @@ def sheet(afferent: Afferent, reach_mm: float = REACH_MM, step_mm: float = STEP_
 
 
 def response_sheet(response: ResponseMap) -> ResponseSheet:
-    """Arrange the responses of a `sheet` as tables."""
     x, z = (np.unique(coordinate) for coordinate in response.positions_mm.T)
     shape = (x.size, z.size)
     return ResponseSheet(

@@ -98,7 +98,6 @@ class SampleSettings(Part):
 
     @property
     def values(self) -> dict[str, list[float]]:
-        """Values of each field."""
         if not self.fields:
             raise InputError("fields", "must name a field or more", remedy="it is empty")
         from scipy.stats import qmc
@@ -199,13 +198,11 @@ class Sweep:
     """
 
     description: SweepDescription
-    source: str = "sweep"
-    """File of the description: files that it names are searched beside it, and errors begin with it."""
+    source: str = "sweep"  # File of the description: beside it files are searched; errors begin with it.
     text: str = ""  # Content of that file, for the lines of errors.
 
     @property
     def origin(self) -> Origin:
-        """Where it comes from, for errors."""
         return Origin(self.source, self.text)
 
     @property
@@ -251,12 +248,10 @@ class Sweep:
 
     @property
     def shape(self) -> tuple[int, ...]:
-        """Number of points of each axis."""
         return tuple(map(len, self.axes))
 
     @property
     def press_shape(self) -> tuple[int, ...]:
-        """Number of points of each axis that changes the skin."""
         return tuple(len(axis) for axis in self.axes if axis.presses)
 
     @property
@@ -271,7 +266,6 @@ class Sweep:
 
     @property
     def observer_shape(self) -> tuple[int, ...]:
-        """Number of points of each axis that changes the observer."""
         return tuple(map(len, self.observer_axes))
 
     @cached_property
@@ -323,7 +317,6 @@ class Sweep:
         return range(press * each, (press + 1) * each)
 
     def values(self, setting: int) -> Content:
-        """Values of the fields that vary, in a setting."""
         place = np.unravel_index(setting, self.shape)
         return {
             field: values[int(number)]
@@ -340,7 +333,6 @@ class Sweep:
         return content
 
     def described(self, setting: int) -> DescribedTouch:
-        """Touch of a setting."""
         return described_touch(self.content(setting), f"{self.source}, touch")
 
     def check(self) -> None:
@@ -355,7 +347,6 @@ class Sweep:
                 raise InputError("where leaves no setting: give other constraints.")
 
     def allowed(self, setting: int) -> bool:
-        """Whether a setting meets the constraints."""
         if not self._constraints:
             return True
         content = self.content(setting)
@@ -395,7 +386,6 @@ class Constraint:
             pass
 
     def __call__(self, content: Content) -> bool:
-        """Whether a touch meets it."""
         return bool(self._value(self._tree, content))
 
     def _fields(self, node: ast.AST) -> Iterator[str]:
@@ -455,7 +445,6 @@ def sweep_of(content: Content | Any, source: str = "sweep", text: str = "") -> S
 
 
 def _listed(values: Any) -> list[Any]:
-    """Values of a field that varies."""
     found = part_from(EvenValues, values).values if isinstance(values, Mapping) else values
     if not isinstance(found, list | tuple) or not found:
         raise InputError(

@@ -29,7 +29,6 @@ class SweepEstimate:
 
     @property
     def lines(self) -> tuple[str, ...]:
-        """The estimate in words."""
         return (
             f"{self.settings} settings, {self.presses} presses.",
             f"If none is stored: about {_spelled(self.time_s)} with {self.processes} process(es), "
@@ -39,7 +38,6 @@ class SweepEstimate:
 
 
 def estimate_sweep(sweep: Sweep, processes: int) -> SweepEstimate:
-    """Estimate a sweep; the meshes of a few presses are built for it."""
     kept = [press for press in range(sweep.presses) if any(map(sweep.allowed, sweep.settings_of(press)))]
     chosen = [kept[n] for n in np.unique(np.linspace(0, len(kept) - 1, MOST_LOOKED_AT).round().astype(int))]
     found, bytes_each = [], []
@@ -74,7 +72,6 @@ def estimate_sweep(sweep: Sweep, processes: int) -> SweepEstimate:
 
 
 def _spelled(seconds: float) -> str:
-    """Spell a time in a unit that suits it."""
     for unit, size in (("days", 86400.0), ("h", 3600.0), ("min", 60.0)):
         if seconds >= 2 * size:
             return f"{seconds / size:.1f} {unit}"

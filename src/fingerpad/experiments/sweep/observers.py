@@ -21,7 +21,6 @@ MEASURED = {"static": "static_rate_hz", "dynamic": "dynamic_rate_hz", "latency":
 def observe(
     sweep: Sweep, responses: Mapping[str, FloatArray], done: np.ndarray, on_finished: Callable[[], None]
 ) -> FloatArray:
-    """Compute the hit rates of all observers of a sweep."""
     observers = sweep.observers
     along, _ = sweep.stimuli_axis(observers[0])
     found = np.full((*sweep.shape, len(observers)), np.nan)

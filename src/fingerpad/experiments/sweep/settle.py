@@ -21,8 +21,7 @@ from fingerpad.skin.fields import FIELDS, Place
 from fingerpad.skin.sampling import SkinResponse
 from fingerpad.skin.store import Store
 
-TRACES = ("times_ms", "force_mn", "depth_mm", "contact_area_mm2")
-"""Fields of the skin that every sweep keeps."""
+TRACES = ("times_ms", "force_mn", "depth_mm", "contact_area_mm2")  # Fields that every sweep keeps.
 
 PLACES_MM: dict[Place, tuple[str, Callable[[Mesh], np.ndarray]]] = {
     Place.NODE: ("node_mm", lambda mesh: mesh.nodes_mm),
@@ -54,11 +53,9 @@ class Settled:
     press: int
     pressed: bool  # Whether it was pressed, and not loaded.
     seconds: float  # Time of the press. [s]
-    skin: Mapping[str, np.ndarray] = field(default_factory=dict)
-    """Traces and fields of the skin by name; empty if it failed."""
+    skin: Mapping[str, np.ndarray] = field(default_factory=dict)  # By name; empty if it failed.
     responses: Mapping[int, ResponseMap] = field(default_factory=dict)  # By number of the setting.
-    failures: Mapping[int, str] = field(default_factory=dict)
-    """Reason why there is no response, by number of the setting."""
+    failures: Mapping[int, str] = field(default_factory=dict)  # Why there is no response, by setting.
 
 
 def settle(case: Case, threads: int | None = None) -> Settled:
@@ -97,7 +94,6 @@ def skin_of(described: DescribedTouch, store: Store, threads: int | None) -> tup
 
 
 def _places(names: Iterable[str]) -> list[Place]:
-    """Places at which fields have values, each once."""
     return [place for place in dict.fromkeys(FIELDS[name].place for name in names) if place in PLACES_MM]
 
 

@@ -16,14 +16,10 @@ from fingerpad.core.tables import TableRow, read_csv
 from fingerpad.core.units import unit_of
 from fingerpad.experiments.indenter_text import indenter_named
 
-LARGEST_FILE_MB = 1.0
-"""Larger files are refused: they hold no published table but, for example, a recording over time. [MB]"""
-
+LARGEST_FILE_MB = 1.0  # Larger files are refused: they hold no published table. [MB]
 _BYTES_PER_MB = 1e6
 
-STIFFEST_N_PER_MM = 10.0
-"""Force over depth that no fingertip has; plates have 0.05 to 0.5 (Dandekar 1995, as quoted). [N/mm]"""
-
+STIFFEST_N_PER_MM = 10.0  # No fingertip has it; plates have 0.05 to 0.5 (Dandekar 1995, as quoted).
 Value = float | str
 
 
@@ -76,12 +72,10 @@ class Kind:
 
     @property
     def unit(self) -> str:
-        """Unit of what was observed."""
         return unit_of(self.observed)
 
     @property
     def is_rate(self) -> bool:
-        """Whether an afferent was observed, not the skin."""
         return self.observed == "rate_hz"
 
 
@@ -118,8 +112,7 @@ class Observation:
     """One row of a file."""
 
     line: int
-    condition: tuple[Value, ...]
-    """Values of the kind's conditions, in their order; an indenter as it is written."""
+    condition: tuple[Value, ...]  # Values of the kind's conditions; an indenter as it is written.
     observed: float
 
 
@@ -185,7 +178,6 @@ def read_observations(path: str | Path) -> Observations:
 
 
 def _kind(path: Path, columns: tuple[str, ...]) -> Kind:
-    """Find the kind that has exactly these columns."""
 
     def differing(kind: Kind) -> set[str]:
         return set(kind.columns) ^ set(columns)
@@ -216,7 +208,6 @@ def _observation(line: TableRow, kind: Kind) -> Observation:
 
 
 def _value(line: TableRow, column: str) -> Value:
-    """Read an entry and check it."""
     if column != INDENTER:
         return line.number(column, unit_of(column), COLUMNS[column])
     text = line.text(column)

@@ -28,11 +28,8 @@ from fingerpad.skin.indentation import Touch, settings_of, touch_of
 from fingerpad.skin.sampling import SkinResponse
 
 RAMP_AND_HOLD, QUASI_STATIC = "ramp_and_hold", "quasi_static"
-LOADINGS = (RAMP_AND_HOLD, QUASI_STATIC)
-"""How a depth is reached: by the paper's motion, read at the end of its hold, or with relaxed tissues."""
-
-QUASI_STATIC_MS = 1e12
-"""Duration of a quasi-static ramp, after which all Prony terms have relaxed to better than 1 in 10⁶. [ms]"""
+LOADINGS = (RAMP_AND_HOLD, QUASI_STATIC)  # Read at the end of the paper's hold, or with relaxed tissues.
+QUASI_STATIC_MS = 1e12  # After such a ramp all Prony terms have relaxed to 1 in 10⁶. [ms]
 
 
 @dataclass(frozen=True)
@@ -78,8 +75,7 @@ class Reading:
     """How the prediction of one row is obtained."""
 
     touch: Touch | None  # What is pressed; None if nothing is, at depth or force 0.
-    of: Callable[[SkinResponse | None], float]
-    """Reads the prediction from the response of the skin, None without a touch."""
+    of: Callable[[SkinResponse | None], float]  # Reads the prediction; None without a touch.
 
 
 Plan = Reading | InputError  # How a condition is predicted, or why it cannot be pressed.
@@ -91,8 +87,7 @@ class Predictions:
     """Predictions row by row."""
 
     values: FloatArray  # In the unit of the observations; NaN where there is none, (n_rows,).
-    mirrored: FloatArray | None
-    """The same with proximal and distal exchanged, for kinds with an axis, (n_rows,)."""
+    mirrored: FloatArray | None  # With proximal and distal exchanged, for kinds with an axis, (n_rows,).
     reasons: Mapping[int, str]  # Why a row has no prediction.
     meshed: SkinResponse | None  # One of the responses, for its mesh.
 
@@ -172,7 +167,6 @@ def _pressed_to(given: Mapping[str, Value], model: FingertipModel) -> Touch | No
 
 
 def _force(given: Mapping[str, Value], model: FingertipModel) -> Reading:
-    """Force at a depth. [N]"""
     return Reading(
         _pressed_to(given, model), lambda skin: float(skin.force_mn[-1]) / MN_PER_N if skin else 0.0
     )

@@ -45,8 +45,7 @@ class Prediction:
     predicted: Number  # In the unit of the kind; no prediction where a touch failed.
     observed_low: float
     observed_high: float  # Lowest and highest observation of this condition.
-    inside_range: bool | None
-    """Whether the prediction lies between them; null with fewer than two observations."""
+    inside_range: bool | None  # Whether the prediction lies between them; null with fewer than two.
     reason: str | None = None  # Why there is no prediction.
 
 
@@ -72,10 +71,8 @@ class ValidationFile:
     correlation: Number  # Pearson's correlation of o and p.
     gain: Number  # sum o p / sum p², the factor on p with the least squares.
     r2_after_gain: Number  # r2 of gain times p.
-    r2_mirrored: Number
-    """r2 with the direction of positive distances or positions reversed; null for kinds without either."""
-    inside_range: bool | None
-    """Whether all predictions that can be judged lie in the observed range of their condition."""
+    r2_mirrored: Number  # r2 with distances or positions reversed; null for kinds without either.
+    inside_range: bool | None  # Whether all that can be judged lie in their observed range.
     n_judged: int  # Conditions with a prediction and at least two observations.
     share_inside: Number  # Share of these with a prediction inside the observed range.
     predictions: tuple[Prediction, ...]
