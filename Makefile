@@ -1,5 +1,6 @@
 # make reproduce     run the studies of the paper      (ARGS="..." goes to `fingerpad reproduce`)
 # make test          check style, types, imports, behaviour and the wheel; stops at the first failure
+# make test-fast     only tests that press no body and start no program: at most two minutes, for daily work
 # make checks        only style, types and imports
 # make pages         only the examples and links of README and docs
 # make kernels       only the example of the README, which compiles all kernels
@@ -35,7 +36,7 @@ install := $(bin)/python -m pip install --quiet --disable-pip-version-check --no
 export PYTHONNOUSERSITE := 1
 unexport PYTHONPATH
 
-.PHONY: reproduce test checks pages kernels site wheel release results verification benchmarks perturbed fuzz lock audit sbom clean
+.PHONY: reproduce test test-fast checks pages kernels site wheel release results verification benchmarks perturbed fuzz lock audit sbom clean
 .DEFAULT_GOAL := test
 
 reproduce: .venv/installed
@@ -45,6 +46,9 @@ reproduce: .venv/installed
 test: .venv/installed-for-tests
 	$(MAKE) --jobs 2 wheel checks site release
 	$(bin)/pytest $(PYTEST_ARGS)
+
+test-fast: .venv/installed-for-tests
+	$(bin)/pytest $(PYTEST_ARGS) -m "not slow" tests
 
 checks: .venv/installed-for-tests
 	$(bin)/ruff check

@@ -1,13 +1,14 @@
-"""Order of the test files, the perturbation of presses, and the fixture that runs a command line.
+"""Order and speed of the test files, the perturbation of presses, and the fixture that runs a command line.
 
 The longest files come first, so that no process works alone at the end.
 """
 
 import os
+import re
 import sys
 from collections.abc import Callable
 from dataclasses import replace
-from functools import partial
+from functools import cache, partial
 from pathlib import Path
 
 import numpy as np
@@ -26,23 +27,30 @@ LONGEST = (
     "verification/test_oracles.py",
     "verification/test_verification.py",
     "studies/test_tissue_posterior.py",
-    "test_pose.py",
     "test_surfaces.py",
     "test_recording_fit.py",
     "studies/test_tissue_search.py",
+    "test_reduced_touch.py",
+    "test_small_bodies.py",
+    "test_store.py",
     "test_report.py",
+    "test_view.py",
+    "test_pose.py",
     "test_own_mesh.py",
     "test_validation.py",
-    "test_store.py",
     "test_discrimination_task.py",
     "test_estimation_afferent_posterior.py",
-    "test_psychometric.py",
     "test_compilation.py",
-    "test_small_bodies.py",
+    "test_psychometric.py",
+    "test_recording_extras.py",
+    "test_single_unit_uncertainty.py",
 )
 """Files by their processor time, the longest first; all others follow in the order of their names."""
 
 HERE = Path(__file__).parent
+
+SLOW = re.compile(r"\.solve\(|\b(press|press_into|pressed|indent)\(|run_touch|run_sweep|Notebook|subprocess")
+"""What a file holds that presses bodies or starts programs: it is marked `slow`, and so are the longest."""
 
 PERTURBED = int(os.environ.get("PERTURBED", "0"))
 """Seed of `make perturbed`; 0 for none."""
@@ -111,9 +119,21 @@ def is_refused(tmp_path) -> Callable[..., None]:
     return check
 
 
+@cache
+def is_slow(path: Path) -> bool:
+    """Whether `make test-fast` leaves a file out."""
+    if HERE not in path.parents:
+        return False
+    longest = path.relative_to(HERE).as_posix() in LONGEST
+    return longest or SLOW.search(path.read_text(encoding="utf-8")) is not None
+
+
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Sort the tests of whole files; within a file they keep their order."""
+    """Mark slow tests, and sort the tests of whole files; within a file they keep their order."""
     if missing := [name for name in LONGEST if not (HERE / name).exists()]:
         raise pytest.UsageError(f"LONGEST of tests/conftest.py must name test files: {', '.join(missing)}.")
+    for item in items:
+        if is_slow(item.path):
+            item.add_marker("slow")
     rank = {HERE / name: number for number, name in enumerate(LONGEST)}
     items.sort(key=lambda item: rank.get(item.path, len(LONGEST)))

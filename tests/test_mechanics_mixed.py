@@ -11,13 +11,12 @@ from fingerpad.geometry.mesh_quality import jacobian_at_gauss
 from fingerpad.geometry.motion import ForceRampAndHold, RampAndHold
 from fingerpad.mechanics import press as press_module
 from fingerpad.mechanics.assembly import Sparsity
-from fingerpad.mechanics.contact import place
 from fingerpad.mechanics.laws import Hencky, Polynomial
 from fingerpad.mechanics.materials import Material, MaterialTable
 from fingerpad.mechanics.mixed import Pressures, exchange_pressure
 from fingerpad.mechanics.newton import NewtonSettings
-from fingerpad.mechanics.press import press
 from fingerpad.mechanics.press_settings import PressSettings
+from presses import block, press_into
 
 SHEAR, BULK = 3.0, 700.0
 BLOCK = block_mesh([0.0, 1.0, 2.2], [0.0, 0.7, 1.9], [0.0, 1.3], layers=[0, 1])
@@ -41,18 +40,14 @@ MATERIALS = (Material(POLYNOMIAL), Material(Hencky(SHEAR, BULK)))
 FOAM = Material.hyperfoam([5.0], [4.0], 0.4)
 
 
-def test_pressure_is_the_slope_of_the_volumetric_energy():
+def test_pressure_and_its_slope_are_those_of_the_volumetric_energy():
     """U = K/2 (J-1)² + (J-1)⁴/D2 in the upper layer, K/2 ln² J in the lower."""
     displacement = crumpled()
     jacobian = volumes(displacement) / volumes(0.0)
     found = pressures(displacement, MATERIALS).pressure_kpa
-    change = jacobian - 1.0
-    upper = BULK * change + 4 * 90.0 * change**3
+    upper = BULK * (jacobian - 1.0) + 4 * 90.0 * (jacobian - 1.0) ** 3
     lower = BULK * np.log(jacobian) / jacobian
     np.testing.assert_allclose(found, np.where(BLOCK.layer == 0, upper, lower), rtol=1e-10)
-
-
-def test_slope_of_pressure_is_that_of_differences():
     displacement, step = crumpled(), 1e-6 * crumpled(seed=4)
     state = pressures(displacement, MATERIALS)
     ahead, behind = (pressures(displacement + sign * step, MATERIALS) for sign in (1.0, -1.0))
@@ -60,9 +55,6 @@ def test_slope_of_pressure_is_that_of_differences():
     change = state.after(BLOCK.elements, step) - state.pressure_kpa
     np.testing.assert_allclose(change, difference, rtol=1e-5)
     assert np.abs(change).max() > 1e-6
-
-
-def test_foam_has_no_pressure_of_its_own():
     state = pressures(crumpled(), (FOAM, FOAM))
     assert not state.pressure_kpa.any()
     assert not state.slope_kpa_per_mm.any()
@@ -77,9 +69,8 @@ def test_exchanged_pressure_acts_on_the_second_derivative_of_volume():
     exchange_pressure(BLOCK, displacement, change, sparsity, blocks)
     force = np.zeros_like(displacement)
     for sign in (1.0, -1.0):
-        volume_slope = (
-            pressures(displacement + sign * step, linear).slope_kpa_per_mm * volumes(0.0)[:, None, None]
-        )
+        slope = pressures(displacement + sign * step, linear).slope_kpa_per_mm
+        volume_slope = slope * volumes(0.0)[:, None, None]
         np.add.at(force, BLOCK.elements, sign / 2 * change[:, None, None] * volume_slope)
     found = sparsity.matrix(blocks) @ step.ravel()
     np.testing.assert_allclose(found, force.ravel(), rtol=0, atol=1e-7 * np.abs(force).max())
@@ -87,13 +78,9 @@ def test_exchanged_pressure_acts_on_the_second_derivative_of_volume():
 
 
 def pressed(poisson, motion):
-    lines = np.array([0.0, 0.4, 0.8, 1.3, 2.0, 3.0])
-    both = np.concatenate([-lines[:0:-1], lines])
-    mesh = block_mesh(both, [0.0, 0.3, 0.6, 1.2, 2.0, 3.0], lines, layers=[2] * 5, symmetric=True)
-    ball, layers = Sphere(curvature_per_m=500.0), (Material.neo_hooke(20.0, poisson),) * 4
-    placement = place(ball, mesh.nodes_mm[mesh.skin_nodes], np.zeros(3), np.eye(3))
-    tight = NewtonSettings(residual_tolerance=1e-6, penetration_tolerance=1e-4)
-    return press(mesh, layers, ball, placement, motion, PressSettings(4, 1, tight))
+    tissue, tight = (Material.neo_hooke(20.0, poisson),) * 4, NewtonSettings(1e-6, 1e-4)
+    ball = Sphere(curvature_per_m=500.0)
+    return press_into(block(layers=[2] * 5), tissue, ball, motion, PressSettings(4, 1, tight))
 
 
 @pytest.mark.parametrize(

@@ -114,39 +114,17 @@ def test_springs_never_hold_less_than_nothing_nor_more_than_was_put_in():
     assert held[-1] < 0.99 * supplied[-1]  # and some is lost
 
 
-def test_material_without_relaxation_is_elastic():
-    table = elastic(1.0)
-    assert StepCoefficients.of(table, 5.0).s.tolist() == [1.0]
-    forces, energies = march([1.0, 500.0], [shear(0.4)] * 2, table)
-    np.testing.assert_array_equal(forces[0], forces[1])
-    assert energies[0] == energies[1]
-
-
 FOAM = Material.hyperfoam((2.0, 3.0, 6.0), (-3.0, 7.0, 4.5), poisson=0.4, prony=PRONY)
 OGDEN = Material.ogden((3.0, 4.0, 5.0), (-2.0, 3.5, 1.5), poisson=0.45, prony=PRONY)
 SQUEEZED = CUBE.nodes_mm @ (np.diag([0.1, -0.15, 0.05]) + 0.2 * np.eye(3, k=1))
 
 
-@pytest.mark.parametrize("material", [FOAM, OGDEN], ids=["foam", "ogden"])
-def test_formulas_go_from_instantaneous_to_long_term(material):
-    relaxed, share = material.with_prony(Prony()), PRONY.long_term_share
-    (fast, slow), (_, stored) = march([FAST_MS, SLOW_MS], [SQUEEZED] * 2, MaterialTable.of([material]))
-    (long_term,), (energy,) = march([1.0], [SQUEEZED], MaterialTable.of([relaxed]))
-    np.testing.assert_allclose(slow, long_term, rtol=0, atol=1e-6 * np.abs(long_term).max())
-    np.testing.assert_allclose(stored, energy, rtol=1e-6)
-    if material is FOAM:  # shape and volume alike
-        np.testing.assert_allclose(fast, long_term / share, rtol=0, atol=1e-6 * np.abs(fast).max())
-
-
-def test_foam_relaxes_its_pressure_and_rubber_does_not():
+def test_foam_relaxes_as_a_whole_by_its_prony_series_and_rubber_keeps_its_pressure():
     swollen = 0.06 * CUBE.nodes_mm
     for material, expected in ((FOAM, PRONY.long_term_share), (OGDEN, 1.0)):
         (fast, slow), _ = march([FAST_MS, SLOW_MS], [swollen] * 2, MaterialTable.of([material]))
         np.testing.assert_allclose(slow, expected * fast, rtol=0, atol=1e-6 * np.abs(fast).max())
-
-
-def test_held_foam_relaxes_by_its_prony_series():
-    """The Kirchhoff stress of a held foam is that at once times g(t), whatever its deformation."""
+    # The Kirchhoff stress of a held foam is that at once times g(t), whatever its deformation.
     times = np.array([FAST_MS, 5.0, 60.0, 800.0])
     forces, _ = march(times, [SQUEEZED] * 4, MaterialTable.of([FOAM]))
     series = 1 - (SHARES * (1 - np.exp(-times[:, None] / TIMES_MS))).sum(axis=1)

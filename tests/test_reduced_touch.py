@@ -20,7 +20,6 @@ from fingerpad.reduction.relaxation import (
     LEVELS,
     Springs,
     amplitudes,
-    depth_scale,
     filtered,
     levels_mm,
     lost,
@@ -43,22 +42,27 @@ def model(training: ReducedTraining) -> fp.ReducedModel:
     return fp.reduce_touch(training, calibration=0)
 
 
-def pressed(training: ReducedTraining, times_ms: list[float], depth_mm: list[float]) -> fp.SkinResponse:
-    return training.touch_with((), fp.Trajectory(tuple(times_ms), depth_mm=tuple(depth_mm))).solve()
-
-
-def test_polynomials_up_to_the_number_of_points_are_exact() -> None:
+def test_the_model_s_interpolation_is_exact_within_its_range():
     points, at = chebyshev_points(5), np.linspace(0.0, 1.0, 11)
     for power in range(5):
         np.testing.assert_allclose(lagrange(points, at) @ points**power, at**power, atol=1e-13)
     assert np.abs(lagrange(points, at) @ points**5 - at**5).max() > 1e-4
-
-
-def test_an_axis_refuses_what_is_out_of_its_range() -> None:
     axis = Axis("x_mm", -1.0, 2.0, 4)
     np.testing.assert_allclose(axis.weights(1.3) @ axis.values, 1.3)
     with pytest.raises(fp.InputError, match=r"x_mm must lie within -1 to 2, .* got 2.5"):
         axis.weights(2.5)
+    i, j = np.meshgrid(np.arange(9.0), np.arange(9.0), indexing="ij")
+    places = np.array([[2.3, 4.7], [5.0, 5.0], [3.5, 1.25]])
+    u, v = places.T
+    field = (0.3 * i**2 - 0.1 * i * j + j)[..., None]
+    np.testing.assert_allclose(read_local(field, places)[0], 0.3 * u**2 - 0.1 * u * v + v, atol=1e-12)
+    assert (read_local(field, np.array([[-0.1, 3.0], [3.0, 8.2]])) == 0.0).all()
+    levels = levels_mm(1.5)
+    ends = np.append(levels, 1.5)
+    weights = slope_changes(levels, 1.5, np.stack([ends**1.5, ends**2], axis=1))
+    np.testing.assert_allclose(
+        np.maximum(ends[:, None] - levels, 0.0) @ weights, np.stack([ends**1.5, ends**2], axis=1), atol=1e-12
+    )
 
 
 def test_the_filter_solves_its_equation() -> None:
@@ -87,23 +91,6 @@ def test_the_energy_of_a_branch_is_the_square_of_its_strain() -> None:
     np.testing.assert_allclose(left[0, 0, hold], strain_left**2, rtol=1e-6)
 
 
-def test_what_relaxes_counts_alike_at_one_depth() -> None:
-    exponents = np.array([0.0, 0.5, 1.0])
-    np.testing.assert_allclose(depth_scale(0.8, 1.6, exponents), [1.0, 0.5**0.5, 0.5])
-    np.testing.assert_allclose(depth_scale(1.6, 1.6, exponents), 1.0)
-    assert (depth_scale(-1.0, 1.6, exponents) == depth_scale(0.0, 1.6, exponents)).all()
-    assert (depth_scale(0.0, 1.6, exponents) > 0.0).all()
-
-
-def test_springs_make_up_the_response() -> None:
-    levels = levels_mm(1.5)
-    ends = np.append(levels, 1.5)
-    weights = slope_changes(levels, 1.5, np.stack([ends**1.5, ends**2], axis=1))
-    np.testing.assert_allclose(
-        np.maximum(ends[:, None] - levels, 0.0) @ weights, np.stack([ends**1.5, ends**2], axis=1), atol=1e-12
-    )
-
-
 def test_a_released_spring_stays_behind_and_recovers_in_closed_form() -> None:
     constant, share, way_mm = 60.0, 0.4, 0.8
     times_ms, shares = np.array([constant]), np.array([share])
@@ -125,36 +112,16 @@ def test_a_released_spring_stays_behind_and_recovers_in_closed_form() -> None:
     np.testing.assert_allclose(met.way_mm, 0.3)
 
 
-def test_skin_that_has_slid_away_has_not_relaxed() -> None:
-    times_ms, shares, at_mm = np.array([60.0]), np.array([0.4]), np.full(LEVELS, 0.5)
-    springs = Springs.at_rest(1).followed(500.0, at_mm, times_ms, shares)
-    fresh = springs.followed(1e-6, at_mm, times_ms, shares, kept=0.0)
-    np.testing.assert_allclose(fresh.relaxed_mm, 0.0, atol=1e-6)
-
-
-def test_local_fields_are_read_exactly_up_to_the_second_degree() -> None:
-    i, j = np.meshgrid(np.arange(9.0), np.arange(9.0), indexing="ij")
-    places = np.array([[2.3, 4.7], [5.0, 5.0], [3.5, 1.25]])
-    u, v = places.T
-    field = (0.3 * i**2 - 0.1 * i * j + j)[..., None]
-    np.testing.assert_allclose(read_local(field, places)[0], 0.3 * u**2 - 0.1 * u * v + v, atol=1e-12)
-    assert (read_local(field, np.array([[-0.1, 3.0], [3.0, 8.2]])) == 0.0).all()
-
-
 @pytest.mark.parametrize(
     ("times_ms", "depth_mm", "bounds"),
     [
         ([0.0, 60.0, 800.0], [0.0, 0.8, 0.8], (0.009, 0.014, 0.005)),
         ([0.0, 40.0, 300.0, 340.0, 600.0], [0.0, 0.95, 0.95, 0.4, 0.4], (0.006, 0.012, 0.0035)),
-        ([0.0, 40.0, 1000.0, 1040.0, 1300.0], [0.0, 0.4, 0.4, 0.95, 0.95], (0.008, 0.015, 0.0035)),
-        (
-            [0.0, 40.0, 1000.0, 1030.0, 1300.0, 1330.0, 1600.0],
-            [0.0, 0.95, 0.95, 0.15, 0.15, 0.9, 0.9],
-            (0.015, 0.045, 0.015),
-        ),
+        ([0.0, 40.0, 1000.0, 1030.0, 1300.0, 1330.0, 1600.0], [0.0, 0.95, 0.95, 0.15, 0.15, 0.9, 0.9],
+         (0.015, 0.045, 0.015)),
     ],
-    ids=["press and hold", "partial release", "deeper after a hold", "almost released, and again"],
-)
+    ids=["press and hold", "partial release", "almost released, and again"],
+)  # fmt: skip
 def test_it_agrees_with_the_full_solver_on_touches_not_used(
     training: ReducedTraining,
     model: fp.ReducedModel,
@@ -162,14 +129,13 @@ def test_it_agrees_with_the_full_solver_on_touches_not_used(
     depth_mm: list[float],
     bounds: tuple[float, float, float],
 ) -> None:
-    found = largest_errors(model, pressed(training, times_ms, depth_mm))
+    skin = training.touch_with((), fp.Trajectory(tuple(times_ms), depth_mm=tuple(depth_mm))).solve()
+    found = largest_errors(model, skin)
     assert (found < np.array(bounds)).all(), found
-
-
-def test_without_relaxation_it_is_wrong(training: ReducedTraining, model: fp.ReducedModel) -> None:
-    elastic = replace(model, totals=model.totals * (np.arange(model.totals.shape[1]) < AT_ONCE)[:, None])
-    skin = pressed(training, [0.0, 60.0, 800.0], [0.0, 0.8, 0.8])
-    assert largest_errors(elastic, skin)[2] > 0.02
+    if len(times_ms) == 3:  # without relaxation it is wrong
+        at_once = np.arange(model.totals.shape[1]) < AT_ONCE
+        elastic = replace(model, totals=model.totals * at_once[:, None])
+        assert largest_errors(elastic, skin)[2] > 0.02
 
 
 def test_bounds_hold_for_all_quantities_together() -> None:
@@ -191,15 +157,9 @@ def test_a_force_finds_its_depth(model: fp.ReducedModel) -> None:
 
 def test_a_force_may_fall_to_nothing_and_come_back(model: fp.ReducedModel) -> None:
     stream = fp.ReducedTouch(model, [(17.37, 0.0)])
-    for until_ms, wanted_mn in (
-        (1000, 40.0),
-        (1020, 5.0),
-        (1040, 0.01),
-        (1060, 1e-9),
-        (1100, 0.0),
-        (1200, 20),
-    ):
-        sample = stream.step(float(until_ms), force_mn=wanted_mn)
+    forces_mn = {1000.0: 40.0, 1020.0: 5.0, 1040.0: 0.01, 1060.0: 1e-9, 1100.0: 0.0, 1200.0: 20.0}
+    for until_ms, wanted_mn in forces_mn.items():
+        sample = stream.step(until_ms, force_mn=wanted_mn)
         # A touch of a few micrometres of skin that is still behind is not resolved.
         assert sample.force_mn == pytest.approx(wanted_mn, abs=1e-3 if wanted_mn >= 5.0 else 0.05)
         assert -1e-6 < sample.depth_mm < DEEPEST_MM
@@ -222,64 +182,49 @@ def test_a_file_has_the_same_bits_and_tells_damage(tmp_path: Path, model: fp.Red
     path = tmp_path / "sphere.npz"
     fp.write_reduced(model, path)
     assert path.stat().st_size < 5e6
-    read = fp.read_reduced(path)
+    read = fp.read_reduced(path, fp.touch_of(fp.Fingertip(), fp.Sphere()))
     assert (read.modes == model.modes).all()
     assert read.axes == model.axes
     assert repr(read) == repr(model)
     assert "\n" not in repr(read)
     assert "errors not measured" in repr(read)
-    content = bytearray(path.read_bytes())
-    for damaged in (
-        content[:-200],
-        content[: len(content) // 2],
-        bytearray(b"nothing of this kind"),
-        bytearray(),
-    ):
+    with pytest.raises(fp.InputError, match="another finger"):
+        fp.read_reduced(path, fp.touch_of(fp.Fingertip.of("child"), fp.Sphere()))
+    content = path.read_bytes()
+    flipped = [
+        content[:place] + bytes([content[place] ^ 16]) + content[place + 1 :]
+        for place in range(100, len(content), len(content) // 7)
+    ]
+    for damaged in (content[:-200], content[: len(content) // 2], b"nothing of this kind", b"", *flipped):
         path.write_bytes(damaged)
-        with pytest.raises(fp.InputError, match=r"sphere\.npz"):
-            fp.read_reduced(path)
-    for place in range(100, len(content), len(content) // 7):
-        flipped = bytearray(content)
-        flipped[place] ^= 16
-        path.write_bytes(flipped)
         with pytest.raises(fp.InputError, match=r"sphere\.npz"):
             fp.read_reduced(path)
     with pytest.raises(fp.InputError, match="must be a file that can be read"):
         fp.read_reduced(tmp_path / "none.npz")
 
 
-def test_another_finger_is_refused(tmp_path: Path, model: fp.ReducedModel) -> None:
-    fp.write_reduced(model, tmp_path / "sphere.npz")
-    fp.read_reduced(tmp_path / "sphere.npz", fp.touch_of(fp.Fingertip(), fp.Sphere()))
-    with pytest.raises(fp.InputError, match="another finger"):
-        fp.read_reduced(tmp_path / "sphere.npz", fp.touch_of(fp.Fingertip.of("child"), fp.Sphere()))
-
-
 @pytest.mark.parametrize(
-    ("wrong", "said"),
+    ("call", "said"),
     [
-        (lambda: ReducedRange(0.0), "depth_mm must be greater than 0"),
-        (lambda: ReducedRange(1.0, x_mm=(1.0, 2.0)), "x_mm must range over 0"),
-        (lambda: ReducedRange(1.0, z_mm=(2.0, -2.0)), "z_mm must range from low to high"),
-        (lambda: ReducedRange(1.0, x_mm=3.0), "x_mm must be two numbers"),  # type: ignore[arg-type]
-        (lambda: ReducedRange(1.0, parameter="curvature_per_m"), "or neither"),
+        (lambda _: ReducedRange(0.0), "depth_mm must be greater than 0"),
+        (lambda _: ReducedRange(1.0, x_mm=(1.0, 2.0)), "x_mm must range over 0"),
+        (lambda _: ReducedRange(1.0, z_mm=(2.0, -2.0)), "z_mm must range from low to high"),
+        (lambda _: ReducedRange(1.0, x_mm=3.0), "x_mm must be two numbers"),  # type: ignore[arg-type]
+        (lambda _: ReducedRange(1.0, parameter="curvature_per_m"), "or neither"),
+        (lambda touch: ReducedTraining(replace(touch, friction=0.5), ReducedRange(1.0, x_mm=(-1.0, 1.0))),
+         "friction must be 0 for a range"),
+        (lambda touch: ReducedTraining(touch, ReducedRange(1.0, parameter="width", values=(1.0, 2.0))),
+         "parameter must be one of curvature_per_m"),
+        (lambda touch: fp.reduce_touch(ReducedTraining(touch, ReducedRange(1.0)), calibration=5),
+         "calibration must be 0 or at least 19"),
+        (lambda touch: list(ReducedTraining(touch, ReducedRange(9.0)).poses()), "bone"),
     ],
-)
-def test_an_impossible_range_is_one_sentence(wrong: object, said: str) -> None:
+)  # fmt: skip
+def test_what_cannot_be_reduced_is_told_before_a_press(
+    training: ReducedTraining, call: Callable[[fp.Touch], object], said: str
+) -> None:
     with pytest.raises(fp.InputError, match=said):
-        wrong()  # type: ignore[operator]
-
-
-def test_what_cannot_be_reduced_is_told_before_a_press(training: ReducedTraining) -> None:
-    sticky = replace(training.touch, friction=0.5)
-    with pytest.raises(fp.InputError, match="friction must be 0 for a range"):
-        ReducedTraining(sticky, ReducedRange(1.0, x_mm=(-1.0, 1.0)))
-    with pytest.raises(fp.InputError, match="parameter must be one of curvature_per_m"):
-        ReducedTraining(training.touch, ReducedRange(1.0, parameter="width", values=(1.0, 2.0)))
-    with pytest.raises(fp.InputError, match="calibration must be 0 or at least 19"):
-        fp.reduce_touch(training, calibration=5)
-    with pytest.raises(fp.InputError, match="bone"):
-        list(ReducedTraining(training.touch, ReducedRange(9.0)).poses())
+        call(training.touch)
 
 
 def test_a_pose_aside_is_met_as_by_an_indenter_that_moves_there() -> None:
@@ -376,17 +321,9 @@ def test_a_stream_refuses_wrong_samples() -> None:
         ("object: sphere\nrange: {depth_mm: -1}\n", "range.depth_mm must be a number greater than 0"),
         ("object: sphere\nrange: {depth_mm: 1, x_mm: 3}\n", "range.x_mm must be a pair of numbers"),
         ("object: sphere\nrange: {depth_mm: 1, y_mm: [0, 1]}\n", "y_mm"),
-        ("object: sphere\nrange: {depth_mm: 9}\n", "bone"),
         ("object: sphere\nrange: {depth_mm: 1}\nmotion: {depth_mm: 1}\n", "motion must be left out"),
-        ("object: sphere\nrange: {depth_mm: 1}\ncalibration: 3\n", "calibration must be 0 or at least 19"),
-        ("object: sphere\nrange: {depth_mm: 1, x_mm: [-1, 1]}\nfriction: 0.5\n", "friction must be 0"),
-        (
-            "object: sphere\nrange: {depth_mm: 1, parameter: size, values: [1, 2]}\n",
-            "parameter must be one of",
-        ),
         ("object: sphere\nrange: {depth_mm: 1, x_mm: [-30, 30]}\n", "finger"),
         ("object: sphere\nrange: [1]\n", "range must be a mapping"),
-        ("just text\n", "must be a mapping"),
     ],
 )
 def test_a_wrong_file_is_one_sentence_before_a_press(

@@ -7,7 +7,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-import yaml
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
@@ -233,16 +232,6 @@ def test_a_folder_named_like_an_example_task_is_not_taken_for_a_file(tmp_path, m
     before = input_hashes("sphere_curvature", read_task("sphere_curvature"), ())
     monkeypatch.chdir(tmp_path)
     assert input_hashes("sphere_curvature", read_task("sphere_curvature"), ()) == before
-
-
-# YAML as people mean it
-
-
-def test_numbers_without_a_point_are_numbers_and_words_are_words():
-    assert read_yaml("[1e-6, 1.5E3, -2e+1, .5e2]", "here") == [1e-6, 1500.0, -20.0, 50.0]
-    words = ["yes", "no", "on", "off", True, False, "e5", "1e"]
-    assert read_yaml("[yes, no, on, off, true, false, e5, 1e]", "here") == words
-    assert yaml.safe_load("[yes, 1e-6]") == [True, "1e-6"]  # other readers keep their own words
 
 
 # How it is refused

@@ -23,12 +23,22 @@ from fingerpad.experiments.gerling2014.skin_deflection import deflection_r2, def
 from fingerpad.experiments.indenter_text import indenter_named
 from fingerpad.experiments.runner import STORE_FOLDER, Runner
 from fingerpad.experiments.schemas import read
+<<<<<<< HEAD
 from fingerpad.experiments.validation import observations, predictions
 from fingerpad.experiments.validation.observations import COLUMNS, KINDS, example_file, read_observations
+=======
+from fingerpad.experiments.validation import predictions
+from fingerpad.experiments.validation.observations import (
+    COLUMNS,
+    KINDS,
+    example_file,
+    read_observations,
+)
+>>>>>>> ht2
 from fingerpad.experiments.validation.predictions import LOADINGS, FingertipModel, predict
 from fingerpad.experiments.validation.validation import ValidationRequest, validate
-from fingerpad.geometry.edged_indenters import Gap, Grating
-from fingerpad.geometry.indenters import Bar, Cylinder, FlatPunch, Plate, Sphere
+from fingerpad.geometry.edged_indenters import Grating
+from fingerpad.geometry.indenters import Bar, FlatPunch, Plate, Sphere
 from fingerpad.geometry.motion import RampAndHold
 from fingerpad.mechanics.materials import Prony, Tissues
 from fingerpad.mechanics.tissues import named_tissues
@@ -53,40 +63,26 @@ def written(folder, content, name="mine.csv"):
 # Indenters as text
 
 
-@pytest.mark.parametrize(
-    ("text", "body"),
-    [
+def test_an_indenter_is_its_name_and_its_sizes():
+    for text, body in (
         ("plate", Plate()),
         ("punch:6.35", FlatPunch(6.35)),
         ("punch", FlatPunch()),
-        ("cylinder:3.17", Cylinder(3.17)),
         (" sphere : 287 ", Sphere(curvature_per_m=287.0)),
         ("bar:3:0.2", Bar(3.0, 0.2)),
-        ("gap:1.2", Gap(1.2)),
         ("grating:1.5:0.75", Grating(1.5, 0.75)),
-    ],
-)
-def test_an_indenter_is_its_name_and_its_sizes(text, body):
-    assert indenter_named(text) == body
-
-
-@pytest.mark.parametrize(
-    ("text", "said"),
-    [
-        ("cone", "indenter must be one of sphere, cylinder"),
+    ):
+        assert indenter_named(text) == body
+    for text, said in (
         ("", "indenter must be one of sphere, cylinder"),
         ("plate:3", "indenter must be written plate, sizes from the right may be left out: got 'plate:3'"),
         ("sphere:287:1", "indenter must be written sphere:curvature_per_m"),
-        ("punch:wide", "diameter_mm must be a finite number [mm]: got 'wide'"),
         ("punch:", "diameter_mm must be a finite number [mm]: got ''"),
         ("cylinder:-1", "diameter_mm must be greater than 0"),
-        ("sphere:nan", "curvature_per_m must be a finite number"),
         ("punch:0.4", "fillet_mm must not exceed half of diameter_mm, 0.2 mm"),
-    ],
-)
-def test_an_indenter_that_cannot_be_is_refused(text, said):
-    with pytest.raises(InputError, match=re.escape(said)):
-        indenter_named(text)
+    ):
+        with pytest.raises(InputError, match=re.escape(said)):
+            indenter_named(text)
 
 
 # Reading
@@ -102,9 +98,7 @@ def test_columns_stand_in_any_order_and_lines_keep_their_numbers(tmp_path):
     assert (found.kind.name, found.kind.unit) == ("force", "N")
     assert [row.line for row in found.rows] == [4, 6, 7]
     assert [row.condition for row in found.rows] == [
-        ("plate", 1.0),
-        ("punch:6.350", 1.0),
-        ("punch:6.35", 1.0),
+        (each, 1.0) for each in ("plate", "punch:6.350", "punch:6.35")
     ]
     assert found.observed.tolist() == [0.11, 0.2, 0.3]
     assert found.conditions[1] == found.conditions[2] != found.conditions[0]
@@ -120,16 +114,6 @@ def test_the_header_decides_the_kind_and_every_example_is_read(tmp_path, kind):
     assert set(kind.columns) <= {"indenter", *COLUMNS}
 
 
-def test_headers_are_those_of_the_documented_format():
-    assert {name: ",".join(kind.columns) for name, kind in KINDS.items()} == {
-        "force": "indenter,depth_mm,force_n",
-        "deflection": "indenter,depth_mm,distance_mm,deflection_mm",
-        "rate_curvature": "force_n,curvature_per_m,rate_hz",
-        "rate_position": "force_n,curvature_per_m,position_mm,rate_hz",
-        "grating": "force_n,ridge_mm,groove_mm,position_mm,rate_hz",
-    }
-
-
 UNFIT = [
     ("", "mine.csv must hold a header and at least one row: it has 0 of them."),
     (FORCE, "mine.csv must hold a header and at least one row: it has 1 of them."),
@@ -139,21 +123,20 @@ UNFIT = [
     ),
     ("indenter,depth_mm\nplate,1\n", "got indenter,depth_mm; for the kind force, add force_n."),
     ("indenter,depth_mm,position_mm,force_n\nplate,1,0,1\n", "for the kind force, leave out position_mm."),
+<<<<<<< HEAD
     ("indenter;depth_mm;force_n\nplate;1;2\n", "line 1: column 'indenter;depth_mm;force_n' is unknown"),
+=======
+>>>>>>> ht2
     ("indenter;depth_mm;force_n\nplate;1;2\n", "Separate entries by commas, not by ';'."),
     ("indenter,depth,force_n\nplate,1,1\n", "mine.csv, line 1: column 'depth' is unknown"),
     ("force_n,indenter,depth_mm,force_n\n1,plate,1,1\n", "mine.csv, line 1: column force_n is repeated"),
     (FORCE + "plate,1\n", "mine.csv, line 2: must have 3 entries, one per column: got 2."),
-    (FORCE + "plate,deep,1\n", "mine.csv, line 2: depth_mm must be a finite number [mm]: got 'deep'."),
     (FORCE + "plate,1,1\nplate,-1,1\n", "mine.csv, line 3: depth_mm must not be negative [mm]: got -1.0."),
-    (FORCE + "plate,nan,1\n", "mine.csv, line 2: depth_mm must be a finite number"),
-    (FORCE + "plate,1,inf\n", "mine.csv, line 2: force_n must be a finite number"),
+    (FORCE + "plate,nan,1\n", "mine.csv, line 2: depth_mm must be a finite number [mm]"),
     (FORCE + "plate,1,\n", "mine.csv, line 2: force_n must be given"),
     (FORCE + ",1,1\n", "mine.csv, line 2: indenter must be given"),
-    (FORCE + "cone:3,1,1\n", "mine.csv, line 2: indenter must be one of sphere, cylinder"),
     (FORCE + "punch:x,1,1\n", "mine.csv, line 2: diameter_mm must be a finite number"),
     (RATE + "0.2,-30,1\n", "mine.csv, line 2: curvature_per_m must not be negative [1/m], because"),
-    (RATE + "-0.2,30,1\n", "mine.csv, line 2: force_n must not be negative [N]"),
     (RATE + "0.2,30,-1\n", "mine.csv, line 2: rate_hz must not be negative [spikes/s]"),
     (b"\xff\xfef\x00o\x00", "mine.csv must be text in UTF-8"),
     (FORCE + "plate,1,1\n" * 1_000_000, "mine.csv must be at most 1 MB: it has 10.0 MB; split it"),
@@ -170,14 +153,6 @@ def test_unfit_files_are_one_sentence_with_file_and_line(tmp_path, monkeypatch, 
     assert "\n" not in str(refused.value)
 
 
-def test_a_file_just_below_the_limit_is_read(tmp_path, monkeypatch):
-    content = FORCE + "plate,1,1\n" * 20
-    monkeypatch.setattr(observations, "LARGEST_FILE_MB", len(content) / 1e6)
-    assert len(read_observations(written(tmp_path, content)).rows) == 20
-    with pytest.raises(InputError, match="must be at most"):
-        read_observations(written(tmp_path, content + "\n"))
-
-
 ENTRY = st.one_of(
     st.sampled_from(["plate", "punch:6.35", "sphere:1e3", "1", "-1", "nan", "", " 0 ", '"', "1,2", "#", "é"]),
     st.text(max_size=6),
@@ -185,7 +160,7 @@ ENTRY = st.one_of(
 )
 
 
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=200, deadline=None)
 @given(
     st.sampled_from([",".join(kind.columns) for kind in KINDS.values()]),
     st.lists(st.lists(ENTRY, min_size=2, max_size=5).map(",".join), max_size=3),
@@ -196,13 +171,10 @@ def test_any_text_is_read_or_refused_in_a_sentence(tmp_path_factory, header, row
     try:
         found = read_observations(path)
     except InputError as error:
-        found = None
-        said = str(error)
-    if found is None:
-        assert "any.csv" in said
-        return
-    assert len(found.rows) <= len(rows)
-    assert np.isfinite(found.observed).all()
+        assert "any.csv" in str(error)  # noqa: PT017
+    else:
+        assert len(found.rows) <= len(rows)
+        assert np.isfinite(found.observed).all()
 
 
 # Scores
@@ -213,8 +185,6 @@ def test_scores_have_their_definitions():
     # mean 7/3, scatter 42/9; residuals 0, 1, 1; sum o p = 15, sum p p = 11
     assert scores.coefficient_of_determination(observed, predicted) == pytest.approx(1 - 2 / (42 / 9))
     assert scores.gain_through_origin(observed, predicted) == pytest.approx(15 / 11)
-    fitted = np.linalg.lstsq(predicted[:, None], observed, rcond=None)[0][0]
-    assert scores.gain_through_origin(observed, predicted) == pytest.approx(fitted)
     assert scores.correlation(observed, predicted) == pytest.approx(np.corrcoef(observed, predicted)[0, 1])
 
 
@@ -264,12 +234,8 @@ def test_force_at_depth_0_is_0_and_grows_with_depth(folder):
     nothing, low, high, again = (row.predicted for row in found.predictions)
     assert nothing == 0.0 < low < high
     assert low == again
-    assert [(row.observed_low, row.observed_high) for row in found.predictions] == [
-        (0.0, 0.0),
-        (0.01, 0.03),
-        (0.5, 0.5),
-        (0.01, 0.03),
-    ]
+    ranges = [(row.observed_low, row.observed_high) for row in found.predictions]
+    assert ranges == [(0.0, 0.0), (0.01, 0.03), (0.5, 0.5), (0.01, 0.03)]
     assert found.n_judged == 1
     assert found.predictions[1].inside_range == (0.01 <= low <= 0.03)
     assert found.predictions[2].inside_range is None
@@ -310,20 +276,6 @@ def test_predictions_put_in_as_observations_score_1(folder):
     assert sphere > rest
 
 
-def test_a_receptor_beside_the_contact_fires_less_and_0_is_the_middle(folder):
-    middle = result_of(folder, RATES).predictions[0].predicted
-    header = "force_n,curvature_per_m,position_mm,rate_hz\n"
-    found = result_of(folder, header + "0.1,287,0,30\n0.1,287,3,1\n0.1,287,-3,2\n0.1,287,40,2\n")
-    centre, proximal, distal, beyond = found.predictions
-    assert centre.predicted == middle > max(proximal.predicted, distal.predicted)
-    assert np.isnan(beyond.predicted)
-    assert "beside the finger" in beyond.reason or "must" in beyond.reason
-    assert found.n_predicted == 3
-    # With the axis reversed, 3 and -3 mm change places.
-    observed, mirrored = np.array([30.0, 1.0, 2.0]), [middle, distal.predicted, proximal.predicted]
-    assert found.r2_mirrored == pytest.approx(scores.coefficient_of_determination(observed, mirrored))
-
-
 @pytest.fixture
 def pressed(monkeypatch):
     """What is pressed and where the receptors are, without pressing."""
@@ -350,11 +302,8 @@ def test_curvature_0_is_a_plate_on_the_mesh_of_all_spheres(pressed, tmp_path):
     touches, sites = pressed
     found = read_observations(written(tmp_path, RATE + "0.2,0,3\n0.2,900,3\n0.8,80,3\n0.2,900,4\n"))
     predict(found, QUICK, Runner(tmp_path))
-    assert [touch.indenter for touch in touches] == [
-        Plate(),
-        Sphere(curvature_per_m=900.0),
-        Sphere(curvature_per_m=80.0),
-    ]
+    spheres = [Sphere(curvature_per_m=curvature) for curvature in (900.0, 80.0)]
+    assert [touch.indenter for touch in touches] == [Plate(), *spheres]
     assert [touch.stimulus.force_mn for touch in touches] == [200.0, 200.0, 800.0]
     assert len({touch.grading for touch in touches}) == 1
     assert {touch.tilt_deg for touch in touches} == {QUICK.conditions.skin_tilt_deg}
@@ -371,12 +320,6 @@ def test_positions_on_a_grating_repeat_with_its_period(pressed, tmp_path):
     assert np.array(sites)[:3] == pytest.approx(
         np.array([[RECEPTOR_X_MM - 0.5 * along, 0.0]] * 2 + [[RECEPTOR_X_MM, 0.0]])
     )
-
-
-@pytest.mark.parametrize("window", [(600.0, 1100.0), (600.0, 500.0), (-1.0, 50.0)])
-def test_windows_lie_within_the_touch(window):
-    with pytest.raises(InputError, match="static_window must be a start from 0 on and a later end, at most"):
-        FingertipModel(Conditions(), static_window_ms=window)
 
 
 def test_what_cannot_be_pressed_has_a_reason_and_the_rest_is_scored(folder, monkeypatch):
@@ -403,13 +346,6 @@ def test_what_cannot_be_pressed_has_a_reason_and_the_rest_is_scored(folder, monk
     assert nothing.n_predicted == 0
     assert np.isnan([nothing.r2, nothing.gain, nothing.correlation, nothing.share_inside]).all()
     draw_validation(nothing)
-
-
-def test_a_second_run_presses_nothing(folder, monkeypatch):
-    first = result_of(folder, RATES)
-    monkeypatch.setattr(Touch, "solve", lambda *_: pytest.fail("pressed again"))
-    again = result_of(folder, RATES)
-    assert again.predictions == first.predictions
 
 
 # Published observations
@@ -541,14 +477,6 @@ def command():
     return typer.main.get_command(cli.app).commands["validate"]
 
 
-def test_options_and_their_defaults_are_those_of_the_modules():
-    assert tuple(KINDS) == choices.KIND_CHOICES
-    assert LOADINGS == choices.LOADING_CHOICES
-    defaults = {option.name: option.default for option in command().params}
-    assert defaults["loading"] == FingertipModel(Conditions()).loading
-    assert defaults["static_window"] == protocol.STATIC_WINDOW.value
-
-
 @pytest.mark.parametrize(
     "tissues", ["human", "paper", "trial3", "wu2007", named_tissues("human")], ids=lambda each: str(each)[:6]
 )
@@ -558,7 +486,15 @@ def test_the_afferent_is_that_of_the_tissues_unless_one_is_given(tissues):
     assert FingertipModel(conditions, own).responding == own
 
 
+<<<<<<< HEAD
 def test_the_page_of_the_format_names_every_kind():
+=======
+def test_the_page_of_the_format_names_every_option_and_kind_and_shows_commands_that_parse():
+    assert (tuple(KINDS), LOADINGS) == (choices.KIND_CHOICES, choices.LOADING_CHOICES)
+    defaults = {option.name: option.default for option in command().params}
+    assert defaults["loading"] == FingertipModel(Conditions()).loading
+    assert defaults["static_window"] == protocol.STATIC_WINDOW.value
+>>>>>>> ht2
     page = (ROOT / "docs" / "validate.md").read_text(encoding="utf-8")
     for kind in KINDS.values():
         assert f"| `{kind.name}` | `{','.join(kind.columns)}` |" in page

@@ -7,7 +7,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from fingerpad.core.errors import ConvergenceError, InertiaWarning, InputError
+from fingerpad.core.errors import InertiaWarning, InputError
 from fingerpad.data.tissues import DENSITY
 from fingerpad.geometry.fingertip import Fingertip
 from fingerpad.geometry.indenters import Plate, Sphere
@@ -92,11 +92,8 @@ def test_a_tighter_tolerance_solves_more_cycles_and_errs_less(solved):
 
 def test_motion_goes_on_after_the_cycles():
     wave = sine(0.4, 0.1, 50.0, cycles=20, hold_ms=50.0)
-    motion = Trajectory(
-        (*wave.times_ms, wave.end_ms + 50.0, wave.end_ms + 200.0),
-        (*wave.prescribed, 0.0, 0.0),
-        cycles=wave.cycles,
-    )
+    times_ms = (*wave.times_ms, wave.end_ms + 50.0, wave.end_ms + 200.0)
+    motion = Trajectory(times_ms, (*wave.prescribed, 0.0, 0.0), cycles=wave.cycles)
     some, all_of_them = vibrated(motion), vibrated(motion, cycle_tolerance=None)
     np.testing.assert_array_equal(some.times_ms, all_of_them.times_ms)
     np.testing.assert_allclose(some.force_mn, all_of_them.force_mn, atol=0.01 * some.force_mn.max())
@@ -114,21 +111,6 @@ def test_motion_goes_on_after_the_cycles():
 def test_all_cycles_are_solved_when_they_are_few_or_the_skin_may_creep(motion, friction, solved):
     vibrated(motion, friction=friction)
     assert solved == []
-
-
-def test_a_later_cycle_that_fails_is_brought_nearer(solved, monkeypatch):
-    solve = cycles.CycleJumps.solved
-
-    def fails_after_long_gaps(jumps, number, *rest):
-        if number > 8 and solved[-1] < number - 2:
-            raise ConvergenceError("too far")
-        return solve(jumps, number, *rest)
-
-    monkeypatch.setattr(cycles.CycleJumps, "solved", fails_after_long_gaps)
-    done = vibrated(sine(0.4, 0.05, 50.0, cycles=14, hold_ms=50.0))
-    assert (np.diff(solved) <= 5).all()
-    assert solved[-1] == 13
-    assert (np.diff(done.times_ms) > 0.0).all()
 
 
 def test_closed_form_of_relaxation_over_cycles_is_that_of_the_steps():
@@ -161,9 +143,6 @@ def test_sine_knows_its_cycles_and_false_ones_are_refused():
     grown[-5] += 0.01
     with pytest.raises(InputError, match="cycles must repeat the samples of the first"):
         replace(motion, depth_mm=grown)
-
-
-def test_tolerance_of_cycles_is_checked():
     with pytest.raises(InputError, match="cycle_tolerance must be below 1"):
         PressSettings(cycle_tolerance=2.0)
 
@@ -219,8 +198,6 @@ def test_touch_warns_of_inertia_before_anything_is_pressed():
         touch_of(finger, Plate(), sine(0.8, 0.01, 200.0, cycles=2))
         touch_of(finger, Plate(), Trajectory((0.0, 2.0, 52.0, 100.0), (-9.0, 0.0, 0.8, 0.8)))
     for motion in (sine(0.8, 0.1, 200.0, cycles=2), RampAndHold(ramp_ms=2.0)):
-        with pytest.warns(
-            InertiaWarning, match=r"as fast as a vibration of .* Hz, at which the inertia"
-        ) as said:
+        with pytest.warns(InertiaWarning, match=r"as a vibration of .* Hz, at which the inertia") as said:
             touch_of(finger, Plate(), motion)
         assert said[0].filename == __file__
