@@ -4,7 +4,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from fingerpad.geometry.sampled_motions import reduced, sampled
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -14,6 +13,7 @@ from fingerpad.geometry.indenters import Bar, FlatPunch, Sphere
 from fingerpad.geometry.motion import ForceRampAndHold, RampAndHold
 from fingerpad.geometry.motions import sine, stroke
 from fingerpad.geometry.trajectory import Trajectory
+from fingerpad.geometry.trajectory_files import reduced, sampled
 from fingerpad.mechanics.newton import NewtonSettings
 from fingerpad.mechanics.press_settings import PressSettings
 from fingerpad.skin.indentation import touch_of

@@ -23,18 +23,8 @@ from fingerpad.experiments.gerling2014.skin_deflection import deflection_r2, def
 from fingerpad.experiments.indenter_text import indenter_named
 from fingerpad.experiments.runner import STORE_FOLDER, Runner
 from fingerpad.experiments.schemas import read
-<<<<<<< HEAD
-from fingerpad.experiments.validation import observations, predictions
-from fingerpad.experiments.validation.observations import COLUMNS, KINDS, example_file, read_observations
-=======
 from fingerpad.experiments.validation import predictions
-from fingerpad.experiments.validation.observations import (
-    COLUMNS,
-    KINDS,
-    example_file,
-    read_observations,
-)
->>>>>>> ht2
+from fingerpad.experiments.validation.observations import COLUMNS, KINDS, example_file, read_observations
 from fingerpad.experiments.validation.predictions import LOADINGS, FingertipModel, predict
 from fingerpad.experiments.validation.validation import ValidationRequest, validate
 from fingerpad.geometry.edged_indenters import Grating
@@ -123,10 +113,6 @@ UNFIT = [
     ),
     ("indenter,depth_mm\nplate,1\n", "got indenter,depth_mm; for the kind force, add force_n."),
     ("indenter,depth_mm,position_mm,force_n\nplate,1,0,1\n", "for the kind force, leave out position_mm."),
-<<<<<<< HEAD
-    ("indenter;depth_mm;force_n\nplate;1;2\n", "line 1: column 'indenter;depth_mm;force_n' is unknown"),
-=======
->>>>>>> ht2
     ("indenter;depth_mm;force_n\nplate;1;2\n", "Separate entries by commas, not by ';'."),
     ("indenter,depth,force_n\nplate,1,1\n", "mine.csv, line 1: column 'depth' is unknown"),
     ("force_n,indenter,depth_mm,force_n\n1,plate,1,1\n", "mine.csv, line 1: column force_n is repeated"),
@@ -486,15 +472,11 @@ def test_the_afferent_is_that_of_the_tissues_unless_one_is_given(tissues):
     assert FingertipModel(conditions, own).responding == own
 
 
-<<<<<<< HEAD
-def test_the_page_of_the_format_names_every_kind():
-=======
 def test_the_page_of_the_format_names_every_option_and_kind_and_shows_commands_that_parse():
     assert (tuple(KINDS), LOADINGS) == (choices.KIND_CHOICES, choices.LOADING_CHOICES)
     defaults = {option.name: option.default for option in command().params}
     assert defaults["loading"] == FingertipModel(Conditions()).loading
     assert defaults["static_window"] == protocol.STATIC_WINDOW.value
->>>>>>> ht2
     page = (ROOT / "docs" / "validate.md").read_text(encoding="utf-8")
     for kind in KINDS.values():
         assert f"| `{kind.name}` | `{','.join(kind.columns)}` |" in page
