@@ -32,8 +32,7 @@ FREQUENCIES_HZ = np.array(published.TUNING_FREQUENCIES.value)
 
 def traces(quantity, times_ms, values, kinks_ms=()):
     columns = np.array(values, np.float64).reshape(len(np.array(times_ms)), -1)
-    both = {"dynamic_quantity": quantity, "static_quantity": quantity}
-    return fp.Traces(times_ms, columns, np.array(kinks_ms), **both)
+    return fp.Traces(times_ms, columns, np.array(kinks_ms), quantity=quantity)
 
 
 def press(quantity, height, ramp_ms=50.0):

@@ -49,8 +49,7 @@ PAIRS = np.array([[0, 1], [1, 2]])
 TRAINS = fp.SpikeTrains.from_lists([[12.0, 40.0], []])
 TIMES_MS, COURSE = [0.0, 50.0, 1000.0], [0.0, 1.0, 1.0]
 TRACES = fp.Traces(TIMES_MS, np.outer(COURSE, [3.0, 5.0, 7.0, 9.0]), [50.0])
-STRESS = {"dynamic_quantity": "compressive_stress", "static_quantity": "compressive_stress"}
-MANY = fp.Traces(TIMES_MS, np.outer(COURSE, np.full(18, 20.0)), [50.0], **STRESS)
+MANY = fp.Traces(TIMES_MS, np.outer(COURSE, np.full(18, 20.0)), [50.0], quantity="compressive_stress")
 TASK = """
 question: Which spheres?
 object: {kind: sphere}

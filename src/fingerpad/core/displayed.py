@@ -34,11 +34,6 @@ class Displayed:
             Which of the drawings of `fingerpad.report.drawing.DRAWINGS`; by default the first.
         **options
             Of the drawing, such as the `quantity` of a map.
-
-        Raises
-        ------
-        InputError
-            If there is no such drawing.
         """
         from fingerpad.report.drawing import plot
 
@@ -61,24 +56,13 @@ class Result(Displayed):
         -------
         pandas.DataFrame
             With the rows that `fingerpad.export.result_tables.TABLES` says.
-
-        Raises
-        ------
-        InputError
-            Without the extra `fingerpad[netcdf]`, which brings pandas.
         """
         from fingerpad.export.result_tables import table
 
         return table(self)
 
     def to_xarray(self) -> xarray.Dataset:
-        """Return this result as a labelled data set; every variable has an attribute `units`.
-
-        Raises
-        ------
-        InputError
-            Without the extra `fingerpad[netcdf]`, which brings xarray.
-        """
+        """Return this result as a labelled data set; every variable has an attribute `units`."""
         from fingerpad.export.result_tables import dataset
 
         return dataset(self)

@@ -56,11 +56,6 @@ def hexagonal(region: Region, density_per_cm2: float) -> Layout:
         With a receptor in the middle of the region's bounds. One of three directions of neighbours is the
         second axis.
 
-    Raises
-    ------
-    InputError
-        As `rectangular`.
-
     Examples
     --------
     >>> from fingerpad.core.regions import Ellipse
@@ -134,8 +129,6 @@ def poisson_disc(
 
     Raises
     ------
-    InputError
-        As `rectangular`, or if the separation is not within 0 ... `LARGEST_SEPARATION`.
     ConvergenceError
         If the positions cannot be placed within the allowed number of attempts.
 

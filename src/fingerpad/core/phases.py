@@ -28,11 +28,6 @@ class Phase(metaclass=KnownKeywords):
         Its name.
     start_ms, end_ms : float
         From when until when, since the start of the touch. [ms]
-
-    Raises
-    ------
-    InputError
-        If it has no name, or does not end after its start.
     """
 
     name: str

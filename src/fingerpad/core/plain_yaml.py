@@ -34,12 +34,6 @@ def read_yaml(text: str, source: str) -> Any:
     source : str
         Name of the source, for errors.
 
-    Raises
-    ------
-    InputError
-        If the text is not YAML, is longer than `LARGEST_TEXT` or nested deeper than `DEEPEST`, holds a tag,
-        an anchor or an alias, or a mapping has a duplicate key.
-
     Examples
     --------
     Numbers such as 1e-6, without a point, are text in YAML 1.1. They are numbers here:

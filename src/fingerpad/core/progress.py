@@ -240,11 +240,6 @@ def notebook_progress() -> Progress:
     -------
     Progress
         For `indent(..., progress=fp.notebook_progress())`, `run_sweep` and others.
-
-    Raises
-    ------
-    InputError
-        If there is no notebook.
     """
     try:
         from IPython.display import display

@@ -52,11 +52,6 @@ class Rectangle(metaclass=KnownKeywords):
     centre_mm : (float, float), optional
         Its middle. [mm]
 
-    Raises
-    ------
-    InputError
-        If an extent is not positive or the middle not two finite numbers.
-
     Examples
     --------
     >>> patch = Rectangle(length_mm=3.0, width_mm=6.0)
@@ -100,11 +95,6 @@ class Ellipse(metaclass=KnownKeywords):
     centre_mm : (float, float), optional
         Its middle. [mm]
 
-    Raises
-    ------
-    InputError
-        If a semi-axis is not positive or the middle not two finite numbers.
-
     Examples
     --------
     >>> disc = Ellipse(2.0, 2.0)
@@ -145,11 +135,6 @@ class Polygon(metaclass=KnownKeywords):
     ----------
     corners_mm : sequence of (float, float)
         Three corners or more, in either direction; the last is joined to the first. [mm]
-
-    Raises
-    ------
-    InputError
-        If there are fewer than three corners, they enclose no area, or edges cross.
 
     Examples
     --------

@@ -86,12 +86,6 @@ class Traces(Result):
         Time of first touch, from which phases and latencies count; interpolation does not smooth it either.
         By default the last time until which all values are 0. [ms]
 
-    Raises
-    ------
-    InputError
-        If the quantity is unknown, shapes disagree, a value is not finite or negative, a kink is not among
-        the times, or `dynamic` has other times or sites, the same quantity, or a dynamic term of its own.
-
     Examples
     --------
     >>> Traces([0.0, 50.0, 1000.0], [[0.0], [2.0], [1.8]])

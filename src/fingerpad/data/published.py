@@ -36,11 +36,6 @@ class Published(Generic[Value]):
     status : {"paper", "read", "recalled", "assumed"}
         Reliability of the value; the four words are defined in `STATUSES`.
 
-    Raises
-    ------
-    InputError
-        If a text is empty, a number is not finite or the status is unknown.
-
     Examples
     --------
     >>> Published("time constant", 68, "ms", "Gerling et al. 2014, section 2.2.2", "paper").value

@@ -67,8 +67,6 @@ class Cluster(metaclass=KnownKeywords):
 
         Raises
         ------
-        InputError
-            If the scheduler cannot be reached, or a worker has another version.
         StoreError
             If the scheduler is lost for longer than `patience_s`.
         """

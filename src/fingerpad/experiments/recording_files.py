@@ -73,11 +73,6 @@ def read_recordings(path: str | Path, stimuli: Stimuli, unit: int | None = None)
     Recorded
         Rates are means over the presentations of a stimulus; spikes stay as they are.
 
-    Raises
-    ------
-    InputError
-        If anything in the file cannot be; with the line and the column.
-
     Examples
     --------
     >>> from tempfile import TemporaryDirectory

@@ -158,12 +158,6 @@ def read_stimuli(path: str | Path, **replacing: str | None) -> ListedStimuli:
     **replacing
         Values that replace those of the file: `resolution`, `tissues` or `finger`; None leaves them.
 
-    Raises
-    ------
-    InputError
-        If the file cannot be read, a key is unknown, a name is repeated, or a value cannot be; with the line
-        and the key.
-
     Examples
     --------
     >>> from tempfile import TemporaryDirectory

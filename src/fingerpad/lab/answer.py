@@ -51,8 +51,7 @@ class Answer:
     force_error_mn: FloatArray
     contact_area_mm2: FloatArray
     """Depth below the first touch of the range, force, what it lies within for 95 % of touches (0 in full,
-    infinite if not measured), and undeformed skin in contact, (n_times,). [mm, mN, mN, mm²]
-    """
+    infinite if not measured), and undeformed skin in contact, (n_times,). [mm, mN, mN, mm²]"""
     middle_mm: FloatArray  # Middle of the contact, x and z, (n_times, 2). [mm]
     x_mm: FloatArray
     z_mm: FloatArray  # Points of the map, (nx,). [mm]
@@ -236,8 +235,7 @@ class Comparison:
     ideal: float
     summed: float
     """Proportion correct of the observer that knows every afferent, and of the one that knows the sum of all
-    spikes. [0-1]
-    """
+    spikes. [0-1]"""
 
 
 @known_keywords

@@ -59,11 +59,6 @@ class Laboratory(metaclass=KnownKeywords):
         Files of `fingerpad reduce`, each an object by the name of its file; default: those of the package.
     jobs : int or Engine, optional
         Processes that press.
-
-    Raises
-    ------
-    InputError
-        If a file cannot be used, or two have one name.
     """
 
     def __init__(self, folder: str | Path, ranges: Sequence[Path] = (), jobs: int | Engine = 1):
@@ -97,13 +92,7 @@ class Laboratory(metaclass=KnownKeywords):
             process.kill()
 
     def described(self, state: LabState) -> DescribedReduction:
-        """Describe the range of a state.
-
-        Raises
-        ------
-        InputError
-            If the object, the finger or the tissues are unknown, or do not fit each other.
-        """
+        """Describe the range of a state."""
         for name, known in (
             ("object", self._contents),
             ("finger", ("", *FINGERS)),
@@ -129,13 +118,7 @@ class Laboratory(metaclass=KnownKeywords):
         return self.folder / f"{state.object}-{hashlib.sha256(text.encode()).hexdigest()[:16]}.npz"
 
     def model(self, state: LabState) -> ReducedModel | None:
-        """Return the reduced touch of a state, if it was made already.
-
-        Raises
-        ------
-        InputError
-            If its file is damaged.
-        """
+        """Return the reduced touch of a state, if it was made already."""
         path = self.path(state)
         with self._lock:
             if path not in self._models and path.exists():

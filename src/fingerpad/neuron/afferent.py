@@ -135,11 +135,6 @@ class Afferent(metaclass=KnownKeywords):
         Potential of the membrane at the start. By default that at rest, beta tau/C, so that spikes do not
         depend on how long nothing happened before a touch. [mV]
 
-    Raises
-    ------
-    InputError
-        If a number is not finite, one of the membrane's four is not positive, or a quantity is unknown.
-
     Examples
     --------
     SED rises to 2 kPa in 50 ms and stays: the rate is high in the ramp and low in the hold.
@@ -239,11 +234,6 @@ class Afferent(metaclass=KnownKeywords):
         initial_mv : float, optional
             Potential at the start; default: that at rest. [mV]
 
-        Raises
-        ------
-        InputError
-            If there are not six finite numbers, or one of the membrane's is not positive.
-
         Examples
         --------
         >>> Afferent.from_parameters([0.0, 2e-4, 7e-7, 68.0, 1e-6, 50.0]).time_constant_ms
@@ -304,11 +294,6 @@ class Afferent(metaclass=KnownKeywords):
         quantity : float
             The threshold. [its unit]
 
-        Raises
-        ------
-        InputError
-            If it is negative.
-
         Examples
         --------
         >>> round(Afferent().with_static_threshold(5.0).static_threshold, 9)
@@ -330,11 +315,6 @@ class Afferent(metaclass=KnownKeywords):
         -------
         SpikeTrains
             One train per site.
-
-        Raises
-        ------
-        InputError
-            If the quantities of the two terms are not those of `traces`.
         """
         check_quantities(self, traces)
         if isinstance(traces, Drive):
@@ -376,11 +356,6 @@ class Afferent(metaclass=KnownKeywords):
         -------
         dynamic_hz, static_hz : array (n_sites,)
             Rates; 0 where no interval closes in the window. [spikes/s]
-
-        Raises
-        ------
-        InputError
-            As `spikes`, or if a window is not given and `traces` has no ramp or no hold.
         """
         dynamic, static = rate_windows_ms(
             traces.phases, dynamic_window_ms, static_window_ms, traces.times_ms[-1]

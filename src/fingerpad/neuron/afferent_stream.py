@@ -32,11 +32,6 @@ class AfferentStream(metaclass=KnownKeywords):
     n_sites : int
         Number of them.
 
-    Raises
-    ------
-    InputError
-        If the afferent is none, or the number is not positive.
-
     Examples
     --------
     >>> import fingerpad as fp
@@ -75,11 +70,6 @@ class AfferentStream(metaclass=KnownKeywords):
         -------
         SpikeTrains
             One train per site.
-
-        Raises
-        ------
-        InputError
-            If time does not go on, the number of values is wrong, or one quantity is missing.
         """
         if not finite("time_ms", time_ms, "ms") > self._time_ms:
             raise InputError("time_ms", "must go on", f"{time_ms:g} after {self._time_ms:g} ms")

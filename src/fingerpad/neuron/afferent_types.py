@@ -48,8 +48,7 @@ class RapidlyAdapting(metaclass=KnownKeywords):
 
     threshold: float
     """Band-passed quantity that, if it stayed, would just bring the membrane to its threshold. [kPa, or the
-    unit of the quantity]
-    """
+    unit of the quantity]"""
     corner_hz: float
     """Corner frequency of the band pass. [Hz]"""
     rise: int
@@ -199,11 +198,6 @@ class SAI(Afferent):
     smoothing_ms : float
         Time constant of the low pass, tau_s. [ms]
 
-    Raises
-    ------
-    InputError
-        As `Afferent`, or if the smoothing is not positive.
-
     Examples
     --------
     >>> from fingerpad.neuron.tuning import tuning_curve
@@ -292,11 +286,6 @@ class OwnAfferent(metaclass=KnownKeywords):
         What the traces hold, by the names of `SkinResponse.sample`; SED, unless another one is given.
     rate_measure : {"interval", "count"}
         What its rates are, as of `ResponseMap`: one over the mean interval, unless counts are wanted.
-
-    Raises
-    ------
-    InputError
-        If `respond` cannot be called, or returns something else than it must.
 
     Examples
     --------

@@ -42,8 +42,7 @@ class BandPass:
     rise: int
     fall: int
     """Powers of the frequency by which it increases below the corner and decreases above it. A constant input
-    gives no output, because the rise is at least 1.
-    """
+    gives no output, because the rise is at least 1."""
 
     def __post_init__(self) -> None:
         positive("corner_hz", self.corner_hz, "Hz")

@@ -35,11 +35,6 @@ class EndOrgans(metaclass=KnownKeywords):
     combine : {"sum", "largest"}, optional
         The weighted sum; or the largest of the quantities, each times its weight over the largest weight.
 
-    Raises
-    ------
-    InputError
-        If the positions have another shape, or weights are negative or do not sum to 1.
-
     Examples
     --------
     >>> ends = EndOrgans([[[17.0, 0.0], [18.0, 0.0]]], weights=[0.75, 0.25])
@@ -108,11 +103,6 @@ class EndOrgans(metaclass=KnownKeywords):
             From the plane to points of the skin, as in `Population.of_layout`.
         combine : {"sum", "largest"}, optional
             As in `EndOrgans`.
-
-        Raises
-        ------
-        InputError
-            If there is not at least one end organ, or the reach is not positive.
 
         Examples
         --------

@@ -68,11 +68,6 @@ class EscapeRate:
     escape_ms : float, optional
         tau_e. It can be absorbed in the threshold, docs/decisions.md#escape-rate. [ms]
 
-    Raises
-    ------
-    InputError
-        If a number is not positive.
-
     Examples
     --------
     >>> neuron = LeakyIntegrateAndFire(68.0, 1e-6, 50.0, 1.0)
@@ -107,11 +102,6 @@ class EscapeRate:
         -------
         SpikeTrains
             One per presentation.
-
-        Raises
-        ------
-        InputError
-            If the traces are not of a current, or a presentation names a site that does not exist.
         """
         everyone = presentations or Presentations.of_population(current.n_sites)
         checked_sites(everyone.sites, checked_current(current).n_sites)

@@ -49,11 +49,6 @@ class LeakyIntegrateAndFire:
         Potential at the first time. By default that at rest: the first current is taken to have flowed for
         long, so that the spikes do not depend on how long nothing happened. The paper starts at 0. [mV]
 
-    Raises
-    ------
-    InputError
-        If a value is not positive, or the initial potential not below the threshold.
-
     Examples
     --------
     A constant current of 2 µA charges at 2 mV/ms minus the leak and reaches 50 mV every 32 ms.
@@ -95,11 +90,6 @@ class LeakyIntegrateAndFire:
         -------
         SpikeTrains
             One train per site, up to the last knot.
-
-        Raises
-        ------
-        InputError
-            If the traces hold another quantity than a current.
         """
         checked_current(current)
 

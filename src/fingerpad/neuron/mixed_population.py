@@ -137,11 +137,6 @@ class MixedPopulation(metaclass=KnownKeywords):
     parts : mapping of str to Population
         One per type, by any name.
 
-    Raises
-    ------
-    InputError
-        If there is no part, or one is not a `Population`.
-
     Examples
     --------
     >>> from fingerpad.core.regions import Ellipse
@@ -226,12 +221,6 @@ class MixedPopulation(metaclass=KnownKeywords):
         seed : int, optional
             Seed of positions and sensitivities. Each type has random numbers of its own.
 
-        Raises
-        ------
-        InputError
-            If a type is unknown and has no afferent, a density is not positive, none is given, or the region
-            is none.
-
         Examples
         --------
         >>> from fingerpad.core.regions import Rectangle
@@ -273,11 +262,6 @@ class MixedPopulation(metaclass=KnownKeywords):
         ----------
         skin, dynamic_window_ms, static_window_ms
             As in `Population.respond`.
-
-        Raises
-        ------
-        InputError
-            As `Population.respond`.
         """
         windows = dynamic_window_ms, static_window_ms
         maps: dict[str, ResponseMap] = {}

@@ -59,11 +59,6 @@ def sensitivities(count: int, spread: float, seed: int) -> FloatArray:
     array (count,)
         Factors, above 0. [1]
 
-    Raises
-    ------
-    InputError
-        If the count is below 1, or spread or seed is negative.
-
     Examples
     --------
     >>> sensitivities(3, spread=0.0, seed=7).tolist()
@@ -101,12 +96,6 @@ class Population(metaclass=KnownKeywords):
     centre_mm : (float, float), optional
         Middle of the pad about which the positions lie, if they follow the finger that is touched: `on` moves
         them to the middle of its pad. By default they stay. [mm]
-
-    Raises
-    ------
-    InputError
-        If the positions are not pairs or triples of finite numbers, the pitch is not positive, or there is
-        not one sensitivity above 0 and one place per receptor.
     """
 
     positions_mm: FloatArray
@@ -224,12 +213,6 @@ class Population(metaclass=KnownKeywords):
         Population
             Ordered by x, then by z.
 
-        Raises
-        ------
-        InputError
-            If the density is not positive, there is not at least one row and one column, or centre or finger
-            is none.
-
         Examples
         --------
         >>> population = Population.grid(100.0, rows=1, columns=2, centre_mm=(17.0, 0.0))
@@ -298,12 +281,6 @@ class Population(metaclass=KnownKeywords):
         ResponseMap
             Spikes, rates and first-spike latencies of each receptor.
 
-        Raises
-        ------
-        InputError
-            If the skin does not return one trace per receptor, or lacks what the afferent follows, or a
-            window is not given and the touch has no ramp or no hold.
-
         Warns
         -----
         TissuesWarning
@@ -351,11 +328,6 @@ class Population(metaclass=KnownKeywords):
             Traces of `quantities` at `sites_mm`.
         dynamic_window_ms, static_window_ms : (float, float), optional
             As in `respond`. [ms]
-
-        Raises
-        ------
-        InputError
-            If there is not one trace per site, or a window is missing.
         """
         sites = self.sites_mm
         if traces.n_sites != len(sites):

@@ -51,11 +51,6 @@ def recruited(latency_ms: ArrayLike, times_ms: ArrayLike) -> np.ndarray:
     int array (...)
         Afferents with a latency up to that time.
 
-    Raises
-    ------
-    InputError
-        If the latencies are not a one-dimensional array of numbers.
-
     Examples
     --------
     >>> recruited([12.0, np.nan, 7.0, 30.0], [0.0, 7.0, 20.0, 1000.0]).tolist()
@@ -88,8 +83,7 @@ class OrderChange:
     """Afferents that fire under both stimuli, and under at least one."""
     rank_correlation: float
     """Spearman's coefficient of the two orders, over afferents that fire under both: 1 for the same order, -1
-    for the reverse. NaN for fewer than two of them, or if all tie under one stimulus. [1]
-    """
+    for the reverse. NaN for fewer than two of them, or if all tie under one stimulus. [1]"""
     swapped: float
     """Share of their pairs whose order is reversed; a pair with a tie is not. NaN without a pair. [0-1]"""
 
@@ -107,11 +101,6 @@ def order_change(latency_ms: ArrayLike, other_latency_ms: ArrayLike) -> OrderCha
     ----------
     latency_ms, other_latency_ms : array_like (n_afferents,)
         First-spike latencies of the same afferents; NaN for a silent one. [ms]
-
-    Raises
-    ------
-    InputError
-        If they are not two one-dimensional arrays of the same length.
 
     Examples
     --------
@@ -229,12 +218,6 @@ def population_rate(
     smoothing_ms : float, optional
         Standard deviation of phi; 0 for no smoothing. [ms]
 
-    Raises
-    ------
-    InputError
-        If there is no bin, the edges do not increase, the number of groups is not that of the afferents, or
-        the smoothing is negative.
-
     Examples
     --------
     >>> trains = SpikeTrains.from_lists([[2.0, 4.0, 12.0], [10.0], []])
@@ -313,11 +296,6 @@ def rings(positions_mm: ArrayLike, centre_mm: ArrayLike, radii_mm: ArrayLike) ->
     int array (n_receptors,)
         Ring of each receptor from 0, including its inner radius and excluding its outer one; `NO_GROUP`
         outside of all rings.
-
-    Raises
-    ------
-    InputError
-        If centre and positions differ in dimension, a radius is negative, or the radii do not increase.
 
     Examples
     --------

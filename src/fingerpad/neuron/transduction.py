@@ -50,8 +50,7 @@ class Drive:
     """Quantity of the static term, (n_knots, n_sites). [its unit in `fingerpad.core.units.QUANTITY_UNITS`]"""
     rate_per_ms: FloatArray
     """Absolute rate of change of the quantity of the dynamic term, U' of Eq. 2; 0 at the onset, (n_knots,
-    n_sites). [its unit/ms]
-    """
+    n_sites). [its unit/ms]"""
     dynamic_quantity: str = STORED_ENERGY
     static_quantity: str = STORED_ENERGY
     """What the two terms follow, by the names of `SkinResponse.sample`; "stored" is SED."""
@@ -214,11 +213,6 @@ def drive(
     Drive
         The rate is 0 at the onset and jumps there and at each kink; with `difference_step_ms`, a jump takes
         one step.
-
-    Raises
-    ------
-    InputError
-        If a step or the number of pieces is not positive.
 
     Examples
     --------

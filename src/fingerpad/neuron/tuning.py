@@ -73,11 +73,6 @@ def tuning_curve(
     array (n_frequencies,)
         From the middle to a peak, within 1 %; NaN where 10 mm do not suffice. [µm]
 
-    Raises
-    ------
-    InputError
-        If the afferent follows two quantities, or a number is not positive.
-
     Examples
     --------
     Compressive stress changes by 20 Pa per µm under a punch of 1 mm, about 10 kPa:

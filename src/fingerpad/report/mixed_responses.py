@@ -38,11 +38,6 @@ def draw_mixed_responses(touches: Mapping[str, Mapping[str, ResponseMap]]) -> Fi
     ----------
     touches : mapping of str to mapping of str to ResponseMap
         Responses by the name of the touch and by type, such as `MixedResponse.maps`.
-
-    Raises
-    ------
-    InputError
-        If there is no touch.
     """
     if not touches:
         raise InputError("touches", "must hold at least one response", remedy="it is empty")

@@ -70,8 +70,6 @@ def save_figure(
 
     Raises
     ------
-    InputError
-        If the file does not end in .png, or an argument is of another type.
     StoreError
         If the file cannot be written.
 

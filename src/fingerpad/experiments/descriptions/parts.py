@@ -53,8 +53,7 @@ class PopulationSettings(Part):
 
     layout: Annotated[str, choice_of(LAYOUT_NAMES)] = GRID
     """"grid": the paper's rows and columns; a pattern that fills a region; or "nail rows", along the edge of
-    the nail.
-    """
+    the nail."""
     density_per_cm2: Positive = psychophysics.RECEPTOR_DENSITY.value
     """Afferents per area of skin. [1/cm2]"""
     densities_per_cm2: (

@@ -39,11 +39,6 @@ def ramp_and_hold(
         Instead of a depth, the force of the hold on the whole finger. [mN]
     ramp_ms, hold_ms : float, optional
         Durations. [ms]
-
-    Raises
-    ------
-    InputError
-        If both are given, or a value is not above 0.
     """
     if depth_mm is not None and force_mn is not None:
         raise InputError("depth_mm and force_mn exclude each other: leave one out.")

@@ -84,8 +84,7 @@ class StimulusSet(StimulusBlocks, FingerDescription):
     """As of `FingerDescription`; `resolution` is "standard" by default."""
     reach_mm: Positive | None = None
     """How far to either side of the middle, along the finger and across, the mesh is fine at most; without
-    it, as far as the objects need. [mm]
-    """
+    it, as far as the objects need. [mm]"""
     stimuli: Annotated[
         Annotated[tuple[ListedStimulus, ...], Strict(False), Tag(LISTED)]
         | Annotated[VariedStimuli, Tag(VARIED)],

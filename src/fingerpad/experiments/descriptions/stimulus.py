@@ -51,12 +51,10 @@ class PlaceSettings(Part):
 
     x_mm: FiniteNumber = 0.0
     """Where the object's axis meets the skin, from the middle of the pad: along the finger, distal positive,
-    and across. [mm]
-    """
+    and across. [mm]"""
     z_mm: FiniteNumber = 0.0
     """Where the object's axis meets the skin, from the middle of the pad: along the finger, distal positive,
-    and across. [mm]
-    """
+    and across. [mm]"""
     tilt_deg: FiniteNumber | None = None
     """0 is perpendicular to the long axis of the finger; without it, perpendicular to the skin. [degrees]"""
     spin_deg: FiniteNumber = 0.0
@@ -70,8 +68,7 @@ class FingerDescription(Part):
     """How fine mesh and steps are."""
     finger: FingerPart = Field(default={}, validate_default=True)
     """Whose: a preset such as "child", the sizes of `fingerpad.Fingertip.of`, `kind: outline` with those of
-    `fingerpad.Fingertip`, or `kind: mesh` with the parameters of `fingerpad.read_finger`.
-    """
+    `fingerpad.Fingertip`, or `kind: mesh` with the parameters of `fingerpad.read_finger`."""
     tissues: Annotated[str, choice_of(TISSUES)] = DEFAULT_TISSUES
     """A set of tissues by name, as of `fingerpad.indent`."""
 
@@ -122,12 +119,10 @@ class TactileStimulus:
     """How it is pressed."""
     x_mm: float = 0.0
     """Where its axis meets the skin, from the middle of the pad: along the finger, distal positive, and
-    across. [mm]
-    """
+    across. [mm]"""
     z_mm: float = 0.0
     """Where its axis meets the skin, from the middle of the pad: along the finger, distal positive, and
-    across. [mm]
-    """
+    across. [mm]"""
     tilt_deg: float | None = None
     """As in `fingerpad.Touch`; by default it presses perpendicular to the skin in the middle. [degrees]"""
     spin_deg: float = 0.0

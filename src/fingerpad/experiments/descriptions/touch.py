@@ -60,12 +60,10 @@ class AfferentsSettings(PopulationSettings):
 
     afferent: AfferentChoice = DEFAULT
     """"default", the one that was fitted with the tissues; a type by its name, SAI, RA, PC or SAII; a file of
-    results (`fit.json` of `fingerpad fit`, `results.json` of `fingerpad reproduce`); or numbers.
-    """
+    results (`fit.json` of `fingerpad fit`, `results.json` of `fingerpad reproduce`); or numbers."""
     noise: NotNegative = 0.0
     """Width of a soft threshold over the threshold: spikes are random, drawn with `seed`. 0 is a sharp
-    threshold without randomness.
-    """
+    threshold without randomness."""
     windows_ms: RateWindowSettings = RateWindowSettings()
     """When spikes count."""
 
@@ -185,11 +183,6 @@ def read_touch_description(source: str | Path) -> DescribedTouch:
     ----------
     source : str or Path
         The file; docs/touch.md explains its keys, and `fingerpad init` writes an example.
-
-    Raises
-    ------
-    InputError
-        If it is no YAML, or a key is unknown, missing or has an unfit value; with line and key.
 
     Examples
     --------

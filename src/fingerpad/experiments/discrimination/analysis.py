@@ -89,12 +89,10 @@ class ForcedChoice:
     trials: int  # Trials per comparison behind the intervals, those of the task.
     proportions: Matrix
     """Proportion correct, and the ends of the exact 95 % interval that so many trials leave about it, (3,
-    n_comparisons). [0-1]
-    """
+    n_comparisons). [0-1]"""
     d_primes: Matrix
     """sqrt(2) times the normal quantile of these; NaN where it is infinite, negative below chance, (3,
-    n_comparisons).
-    """
+    n_comparisons)."""
 
 
 def forced_choice_of(d_prime: FloatArray, trials: int) -> ForcedChoice:
@@ -198,12 +196,6 @@ class PreparedTask(metaclass=KnownKeywords):
         From `task_stimuli`, the standard first.
     population : Population or MixedPopulation
         From `task_population`, or one's own.
-
-    Raises
-    ------
-    InputError
-        If the windows do not end with the stimuli, an observed point means none of them, or noise shall be
-        fitted to no point.
     """
 
     task: DiscriminationTask
@@ -305,8 +297,6 @@ def analyse(prepared: PreparedTask, skins: Mapping[str, Skin]) -> TaskResult:
 
     Raises
     ------
-    InputError
-        If the population is silent under a stimulus by every measure.
     ConvergenceError
         If no noise gives the observed hit rates.
     """

@@ -49,8 +49,7 @@ class CurveThreshold:
     bootstrap_interval: tuple[Number, Number] | None
     posterior_interval: tuple[Number, Number]
     """Confidence and credible interval of the difference; the former is absent where no comparison lies on
-    the rise of the curve. [unit of what varies]
-    """
+    the rise of the curve. [unit of what varies]"""
 
 
 @result_class

@@ -45,12 +45,10 @@ class WindowSettings(Part):
     dynamic: Pair | None = None
     static: Pair | None = None
     """Start and end of the windows of the two rates; without them they follow the phases of each stimulus, as
-    in `fingerpad.neuron.rate_windows`. [ms]
-    """
+    in `fingerpad.neuron.rate_windows`. [ms]"""
     latency: Positive | None = None
     """Latest first spike that counts; a later one, or none, counts as this time. Without it, receptors that
-    are silent under one stimulus are left out. [ms]
-    """
+    are silent under one stimulus are left out. [ms]"""
 
 
 class ExperimentSettings(Part):
@@ -73,8 +71,7 @@ class ExperimentSettings(Part):
     """Presentations of each stimulus when the criterion varies."""
     trials: Count = _REPETITIONS
     """Judgements per comparison of an experiment with people: intervals of the psychometric curve are those
-    that such an experiment would have.
-    """
+    that such an experiment would have."""
 
     @property
     def plan(self) -> Experiment:
@@ -129,8 +126,7 @@ class DiscriminationTask(StimulusSet):
     """The afferents."""
     afferent: AfferentChoice = DEFAULT
     """"default", a type by its name (SAI, RA, PC, SAII), a file of results (`fit.json` of `fingerpad fit`,
-    `results.json` of `fingerpad reproduce`), or numbers.
-    """
+    `results.json` of `fingerpad reproduce`), or numbers."""
     code: Annotated[
         tuple[Annotated[str, choice_of(CODES)], ...],
         Strict(False),
@@ -152,8 +148,7 @@ class DiscriminationTask(StimulusSet):
         with_message(f"a number from 0 to {LARGEST_NOISE:g}, or {FITTED}"),
     ]
     """Standard deviation of the multiplicative noise, or "fitted": that which brings the main code and
-    measure closest to the observed hit rates.
-    """
+    measure closest to the observed hit rates."""
     experiment: ExperimentSettings = ExperimentSettings()
     """Repetitions, criterion and seed."""
     curve: CurveSettings = CurveSettings()

@@ -42,12 +42,6 @@ def task_stimuli(task: DiscriminationTask, beside: Path = Path()) -> tuple[Named
     tuple of NamedStimulus
         The standard, then the comparisons in the order of the file.
 
-    Raises
-    ------
-    InputError
-        If there are fewer than two, only some have a level, the standard is not among them, or as of
-        `named_stimuli`.
-
     Examples
     --------
     >>> spheres = task_stimuli(read_task("sphere_curvature"))
@@ -134,12 +128,6 @@ def read_task(source: str | Path, **replacing: Any) -> DiscriminationTask:
     **replacing
         Values that replace those of the file, such as `resolution`; None leaves them.
 
-    Raises
-    ------
-    InputError
-        If there is no such file or name, it is no YAML, or a key is unknown, missing or has an unfit
-        value; with the place in the file.
-
     Examples
     --------
     >>> read_task("sphere_curvature", resolution="quick").resolution
@@ -179,11 +167,6 @@ def parse_task(content: Any, source: str = "task", text: str = "") -> Discrimina
         Where it comes from, for errors.
     text : str, optional
         Content of the file, for the lines of errors.
-
-    Raises
-    ------
-    InputError
-        For the first error, with its place.
 
     Examples
     --------

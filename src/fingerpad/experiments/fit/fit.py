@@ -71,10 +71,6 @@ def fit_recordings(
 
     Raises
     ------
-    InputError
-        If there are fewer rates than free parameters in a training set, a fold has rates of 0 only, sizes
-        disagree, windows are not given where phases differ, a stimulus ends before a window, or a likelihood
-        is asked of rates.
     ConvergenceError
         If a fit does not end.
 

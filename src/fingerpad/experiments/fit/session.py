@@ -87,12 +87,6 @@ class FitRequest(metaclass=KnownKeywords):
         Type of the afferent, such as "RA", for a fit of chosen numbers by `fit_chosen_numbers`.
     free : tuple of str
         Names of these numbers.
-
-    Raises
-    ------
-    InputError
-        If the recordings cannot be fitted or a stimulus cannot be indented; this is checked before
-        anything is solved.
     """
 
     recorded: Recorded

@@ -62,8 +62,7 @@ class Interpretation:
     misfit: Number = np.nan
     own_largest_shift: Number = np.nan
     """Noise that fits people best, root mean square distance to them and largest change by the shift with it;
-    NaN where no noise does. [1], [0-1], [0-1]
-    """
+    NaN where no noise does. [1], [0-1], [0-1]"""
 
 
 @result_class
@@ -75,8 +74,7 @@ class CriterionErrorBars:
     fraction: Vector
     likelihood: Vector
     """Error bar if the decision point varies, the fraction beta that places it, or a likelihood ratio of mean
-    1 between comparison and standard, (n_spreads,). [0-1]
-    """
+    1 between comparison and standard, (n_spreads,). [0-1]"""
 
 
 @result_class

@@ -232,8 +232,7 @@ class Observers:
     spread: dict[str, FloatArray]  # mu_3 and sigma_3, by the name of the observer. [0-1]
     unsteadiness: dict[int, FloatArray]
     """Standard deviation of mu_3 when the judgements of the static Gradient Sum are repeated, by the number
-    of hit rates behind it. [0-1]
-    """
+    of hit rates behind it. [0-1]"""
 
 
 def observe(

@@ -58,14 +58,12 @@ class Reproduction:
     seed: int = 0  # Seed of the observers' noise.
     tissues: str = PAPER
     """Tissues of the column `paper`: a name whose afferent follows strain energy density. "paper" is Trial 3
-    with a Poisson's ratio of 0.40, which is our reading; "trial3" is Trial 3 to the letter, 0.48.
-    """
+    with a Poisson's ratio of 0.40, which is our reading; "trial3" is Trial 3 to the letter, 0.48."""
     finger: Finger = field(default_factory=Fingertip)
     jobs: int | Engine = 1  # Processes or engine that press; the numbers do not depend on it.
     extended: bool | None = None
     """Whether to go beyond the paper: uncertainty of the fit, and curvature thresholds at other standards. By
-    default not at "quick" resolution, where this takes half as long again.
-    """
+    default not at "quick" resolution, where this takes half as long again."""
 
     def __post_init__(self) -> None:
         engine_of(self.jobs)

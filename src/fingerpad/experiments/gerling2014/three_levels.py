@@ -34,8 +34,7 @@ class ThreeLevels:
     x_mm: Matrix
     y_mm: Matrix
     """Nodes of the plane z = 0 at the end of the hold, through from the skin to the bone, (n_outline + 1,
-    n_through + 1). [mm]
-    """
+    n_through + 1). [mm]"""
     pressed: str  # Name of what the afferent follows, as it is known in all elements.
     pressed_kpa: Matrix  # Its values in the elements beside that plane, (n_outline, n_through). [kPa]
     end_ms: float  # End of the hold. [ms]

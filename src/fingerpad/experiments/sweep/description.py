@@ -145,8 +145,7 @@ class SweepDescription(Part):
     """An observer of the responses, with the keys of `ObserverSettings`; what varies need not be given."""
     grid: Block = Field(default={})
     """Values by field, such as "motion.depth_mm": each field is a dimension, and settings are all
-    combinations.
-    """
+    combinations."""
     zip: Block = Field(default={})
     """Fields that vary together, one value of each per setting: one dimension."""
     sample: SampleSettings | None = None
@@ -159,8 +158,7 @@ class SweepDescription(Part):
         BeforeValidator(as_list),
     ] = ()
     """Fields of the skin that the result holds beside force, depth and contact, by the names of
-    `fingerpad.skin.fields.FIELDS`.
-    """
+    `fingerpad.skin.fields.FIELDS`."""
 
 
 @dataclass(frozen=True)

@@ -148,12 +148,6 @@ def read_observations(path: str | Path) -> Observations:
         A CSV file in UTF-8, of at most `LARGEST_FILE_MB`. Its header decides the kind; columns may stand in
         any order, and lines that begin with # are comments.
 
-    Raises
-    ------
-    InputError
-        If the file cannot be read, its columns are those of no kind, or an entry cannot be; with the line,
-        what was expected and what came.
-
     Examples
     --------
     >>> from tempfile import TemporaryDirectory

@@ -93,11 +93,6 @@ class ValidationRequest(metaclass=KnownKeywords):
         Where finished indentations are stored.
     jobs : int or Engine
         Processes, or the engine that solves the indentations; the numbers do not depend on it.
-
-    Raises
-    ------
-    InputError
-        If the tissues are unknown or there is no process; this is checked before anything is solved.
     """
 
     observations: Observations
