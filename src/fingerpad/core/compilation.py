@@ -16,8 +16,7 @@ NOTICE = f"{SUBJECT}, once: about half a minute."
 
 SHORT_NOTICE = "fingerpad compiles what this call needs, once: some seconds."
 
-INTERVAL_S = 5.0
-"""Time between two messages. [s]"""
+INTERVAL_S = 5.0  # Time between two messages. [s]
 
 _announced = False
 _told = False

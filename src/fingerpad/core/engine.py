@@ -31,8 +31,7 @@ Work = Callable[[Any, int | None], Any]
 """Called with an item and the number of threads that it may use; None for all. It must be known by name to
 another process, as functions of a module and their `partial` are."""
 
-Outcome = Callable[[], Any]
-"""Returns what the work returned, or raises what it raised."""
+Outcome = Callable[[], Any]  # Returns what the work returned, or raises what it raised.
 
 Outcomes = Generator[tuple[int, Outcome], None, None]
 """Numbers of finished items with their outcomes; closing it ends the work."""
@@ -58,10 +57,8 @@ class Engine(Protocol):
 class Processes:
     """Engine of this computer: one process per job, or this process alone."""
 
-    jobs: int = 1
-    """Number of processes. With one, or for one item, the work is done here with all threads."""
-    kernels: Sequence[Any] = ()
-    """Those that the work calls: their compilation is announced."""
+    jobs: int = 1  # Number of processes. With one, or for one item, the work is done here with all threads.
+    kernels: Sequence[Any] = ()  # Those that the work calls: their compilation is announced.
 
     def __post_init__(self) -> None:
         whole("jobs", self.jobs, at_least=1)

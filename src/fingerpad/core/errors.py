@@ -9,20 +9,14 @@ from collections.abc import Collection
 from itertools import count
 from typing import Any
 
-Place = tuple[int | str, ...]
-"""Keys and indices from 0 that lead to a value."""
+Place = tuple[int | str, ...]  # Keys and indices from 0 that lead to a value.
 
 LONGEST_MESSAGE = 2000
 """Characters of an error's text; what is between its begin and its end is left out beyond that."""
 
-_CLOSE = 0.6
-"""Similarity of two names from which one is taken for the other, of `difflib`."""
-
-_SHORTEST_STEM = 3
-"""Letters from which the beginning of a name is taken for it."""
-
-_NEW_NAMES = {"materials": "tissues"}
-"""Names that were renamed."""
+_CLOSE = 0.6  # Similarity of two names from which one is taken for the other, of `difflib`.
+_SHORTEST_STEM = 3  # Letters from which the beginning of a name is taken for it.
+_NEW_NAMES = {"materials": "tissues"}  # Names that were renamed.
 
 
 class FingerpadError(Exception):

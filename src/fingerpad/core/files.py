@@ -37,8 +37,7 @@ def write_atomically(path: Path, content: bytes) -> None:
         ) from error
 
 
-LARGEST_TEXT_MB = 200
-"""Largest file of text that is read, such as a mesh or a table. [MB]"""
+LARGEST_TEXT_MB = 200  # Largest file of text that is read, such as a mesh or a table. [MB]
 
 
 def path_of(name: str, value: object) -> Path:

@@ -14,8 +14,7 @@ from fingerpad.core.errors import InputError, did_you_mean
 _Given = ParamSpec("_Given")
 _Made = TypeVar("_Made")
 
-_RECEIVERS = ("cls", "self")
-"""Parameters that no caller gives."""
+_RECEIVERS = ("cls", "self")  # Parameters that no caller gives.
 
 _OF_PYTHON = (TypeError, AttributeError, LookupError, ValueError)
 """Errors in which an argument of a wrong type ends where nothing checks it."""

@@ -25,8 +25,7 @@ PATTERNS = ("rectangular", "hexagonal", "uniform", "jittered", "poisson-disc")
 MM2_PER_CM2 = 100.0
 
 
-MOST_RECEPTORS = 1_000_000
-"""Upper limit, to detect a wrong unit: the whole finger has some thousands."""
+MOST_RECEPTORS = 1_000_000  # Upper limit, to detect a wrong unit: the whole finger has some thousands.
 
 
 @dataclass(frozen=True)
@@ -34,13 +33,10 @@ MOST_RECEPTORS = 1_000_000
 class Layout:
     """Positions of receptors in a plane."""
 
-    places_mm: FloatArray
-    """In the plane of the region, (n_receptors, 2). [mm]"""
-    pitch_mm: float
-    """Distance of neighbours in a lattice; 1/sqrt(density) in a random layout. [mm]"""
+    places_mm: FloatArray  # In the plane of the region, (n_receptors, 2). [mm]
+    pitch_mm: float  # Distance of neighbours in a lattice; 1/sqrt(density) in a random layout. [mm]
     pattern: str
-    seed: int | None = None
-    """Seed of random positions; None for a lattice."""
+    seed: int | None = None  # Seed of random positions; None for a lattice.
 
     def __post_init__(self) -> None:
         places = float_array("places_mm", self.places_mm, 2)

@@ -23,11 +23,8 @@ from numba.core.event import Listener, register
 from numba.extending import intrinsic
 from numba.np.arrayobj import make_array, populate_array
 
-TRIED = ("0.61", "0.65", "0.68")
-"""Versions of Numba with which this file was tried."""
-
-ALIGNMENT = 64
-"""Bytes of the widest vector registers, whose loads are fastest from such addresses."""
+TRIED = ("0.61", "0.65", "0.68")  # Versions of Numba with which this file was tried.
+ALIGNMENT = 64  # Bytes of the widest vector registers, whose loads are fastest from such addresses.
 
 
 def is_compiled(kernel: Any) -> bool:

@@ -23,8 +23,7 @@ SEPARATION = 0.75
 """Least distance in a Poisson-disc layout over 1/sqrt(density). Random placement saturates at 0.83."""
 
 LARGEST_SEPARATION = 0.8
-MOST_APART = 100_000
-"""Upper limit of a Poisson-disc layout, whose receptors are placed one after the other."""
+MOST_APART = 100_000  # Upper limit of a Poisson-disc layout, whose receptors are placed one after the other.
 
 _MOST_ATTEMPTS = 1000
 

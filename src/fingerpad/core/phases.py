@@ -10,8 +10,7 @@ from fingerpad.core.errors import InputError
 from fingerpad.core.keywords import KnownKeywords
 from fingerpad.core.values import converted
 
-RAMP, HOLD = "ramp", "hold"
-"""Names of the phases in which the two rates of the paper are counted."""
+RAMP, HOLD = "ramp", "hold"  # Names of the phases in which the two rates of the paper are counted.
 
 RELEASE, VIBRATION = "release", "vibration"
 """Names of phases in which an indenter goes back, and in which it goes to and fro while it touches."""

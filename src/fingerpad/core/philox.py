@@ -11,8 +11,7 @@ import math
 import numpy as np
 from numba import njit, uint64
 
-WORDS = 4
-"""Numbers of one block."""
+WORDS = 4  # Numbers of one block.
 
 # Constants of Philox 4x64 as published: two multipliers, and the increments of the key per round.
 _MULTIPLIER_0 = np.uint64(0xD2E7470EE14C6C93)

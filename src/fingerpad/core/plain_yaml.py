@@ -19,8 +19,7 @@ from fingerpad.core.keywords import known_keywords
 LARGEST_TEXT = 300_000
 """Characters of a document, which are read in some seconds; longer tables belong in CSV."""
 
-DEEPEST = 20
-"""Mappings and lists inside each other."""
+DEEPEST = 20  # Mappings and lists inside each other.
 
 
 @known_keywords

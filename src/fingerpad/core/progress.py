@@ -16,8 +16,7 @@ if TYPE_CHECKING:
     import rich.progress
     from rich.console import Console
 
-SHORTEST_WAIT_S = 0.5
-"""Shortest time between two looks at a stage in which no part has ended. [s]"""
+SHORTEST_WAIT_S = 0.5  # Shortest time between two looks at a stage in which no part has ended. [s]
 
 
 class Progress(Protocol):

@@ -31,14 +31,12 @@ Numbers = int | Sequence[int] | np.ndarray
 
 LARGEST_SEED = 2**63 - 1
 
-MOST_NUMBERS = 100_000_000
-"""Largest number of random numbers that are drawn at once: 0.8 GB."""
+MOST_NUMBERS = 100_000_000  # Largest number of random numbers that are drawn at once: 0.8 GB.
 
 """Seeds, trials and receptors fit into a signed 64-bit integer, as in NumPy."""
 
 
-Key = int | Sequence[int] | np.random.SeedSequence
-"""A seed, or a seed and numbers."""
+Key = int | Sequence[int] | np.random.SeedSequence  # A seed, or a seed and numbers.
 
 
 def generator(key: Key) -> np.random.Generator:
@@ -72,42 +70,27 @@ class Purpose(IntEnum):
     The values are part of every key: a new purpose takes a new value, and no value is changed.
     """
 
-    CURRENT = 1
-    """Noise of the current through a membrane."""
-    THRESHOLD = 2
-    """Threshold of each interspike interval."""
-    GAIN = 3
-    """Gain of an end organ in a presentation."""
-    ESCAPE = 4
-    """Spikes of a membrane with an escape rate."""
-    RESPONSE = 5
-    """Multiplicative noise of a response, such as a rate."""
-    SENSITIVITY = 6
-    """Constant sensitivity of an end organ."""
-    LAYOUT = 7
-    """Position of an end organ."""
-    PICK = 8
-    """Selection of the distributions or sets that an observer compares."""
-    CRITERION = 9
-    """Variation of an observer's criterion."""
-    JUDGEMENT = 10
-    """Correct or incorrect judgements that follow a psychometric function."""
-    END_ORGAN = 12
-    """Position of one of several end organs of an afferent."""
-    SPIKE_COUNT = 11
-    """Spike counts of a Poisson process in a window."""
+    CURRENT = 1  # Noise of the current through a membrane.
+    THRESHOLD = 2  # Threshold of each interspike interval.
+    GAIN = 3  # Gain of an end organ in a presentation.
+    ESCAPE = 4  # Spikes of a membrane with an escape rate.
+    RESPONSE = 5  # Multiplicative noise of a response, such as a rate.
+    SENSITIVITY = 6  # Constant sensitivity of an end organ.
+    LAYOUT = 7  # Position of an end organ.
+    PICK = 8  # Selection of the distributions or sets that an observer compares.
+    CRITERION = 9  # Variation of an observer's criterion.
+    JUDGEMENT = 10  # Correct or incorrect judgements that follow a psychometric function.
+    END_ORGAN = 12  # Position of one of several end organs of an afferent.
+    SPIKE_COUNT = 11  # Spike counts of a Poisson process in a window.
 
 
 @dataclass(frozen=True)
 class Presentations:
     """Site, trial and receptor of each spike train; trial and receptor are part of its random key."""
 
-    sites: IntArray
-    """Column of the current or drive, (n_trains,)."""
-    trials: IntArray
-    """Number of the presentation; trains of one receptor need different ones, (n_trains,)."""
-    receptors: IntArray
-    """Number of the end organ, (n_trains,)."""
+    sites: IntArray  # Column of the current or drive, (n_trains,).
+    trials: IntArray  # Number of the presentation; trains of one receptor need different ones, (n_trains,).
+    receptors: IntArray  # Number of the end organ, (n_trains,).
 
     def __post_init__(self) -> None:
         for name in ("sites", "trials", "receptors"):

@@ -20,8 +20,7 @@ from fingerpad.core.values import converted
 
 Point = tuple[float, float]
 
-_ROUND_OFF = 1e-9
-"""Tolerance for points on the border of a region, over its size, because of round-off."""
+_ROUND_OFF = 1e-9  # Tolerance for points on the border of a region, over its size, because of round-off.
 
 
 class Region(Protocol):

@@ -32,8 +32,7 @@ from fingerpad.core.checks import FloatArray
 from fingerpad.core.errors import InputError, StoreError
 from fingerpad.core.files import LARGEST_TEXT_MB, check_file, write_atomically
 
-JsonSchema = dict[str, Any]
-"""JSON schema, as `json` reads it."""
+JsonSchema = dict[str, Any]  # JSON schema, as `json` reads it.
 
 _Kind = TypeVar("_Kind")
 
@@ -80,20 +79,13 @@ _NUMBER = {"type": ["number", "null"]}
 _WHOLE = {"type": "integer"}
 _TRUTH = {"type": "boolean"}
 
-Array = Annotated[FloatArray, _array(np.float64, None, _NUMBER)]
-"""Float array of any shape."""
-Vector = Annotated[FloatArray, _array(np.float64, 1, _NUMBER)]
-"""Float array (n,)."""
-Matrix = Annotated[FloatArray, _array(np.float64, 2, _NUMBER)]
-"""Float array (n, m)."""
-Stack = Annotated[FloatArray, _array(np.float64, 3, _NUMBER)]
-"""Float array (n, m, k)."""
-WholeVector = Annotated[NDArray[np.int64], _array(np.int64, 1, _WHOLE)]
-"""Integer array (n,)."""
-TruthVector = Annotated[NDArray[np.bool_], _array(np.bool_, 1, _TRUTH)]
-"""Boolean array (n,)."""
-TruthMatrix = Annotated[NDArray[np.bool_], _array(np.bool_, 2, _TRUTH)]
-"""Boolean array (n, m)."""
+Array = Annotated[FloatArray, _array(np.float64, None, _NUMBER)]  # Float array of any shape.
+Vector = Annotated[FloatArray, _array(np.float64, 1, _NUMBER)]  # Float array (n,).
+Matrix = Annotated[FloatArray, _array(np.float64, 2, _NUMBER)]  # Float array (n, m).
+Stack = Annotated[FloatArray, _array(np.float64, 3, _NUMBER)]  # Float array (n, m, k).
+WholeVector = Annotated[NDArray[np.int64], _array(np.int64, 1, _WHOLE)]  # Integer array (n,).
+TruthVector = Annotated[NDArray[np.bool_], _array(np.bool_, 1, _TRUTH)]  # Boolean array (n,).
+TruthMatrix = Annotated[NDArray[np.bool_], _array(np.bool_, 2, _TRUTH)]  # Boolean array (n, m).
 Number = Annotated[
     float,
     BeforeValidator(lambda value: np.nan if value is None else value),

@@ -21,8 +21,7 @@ from fingerpad.core.phases import Phase, from_onset, ramp_and_hold_phases
 from fingerpad.core.units import MS_PER_S, QUANTITY_UNITS, with_unit
 from fingerpad.core.values import converted
 
-MOST_SHOWN = 8
-"""Numbers of a list that `repr` shows."""
+MOST_SHOWN = 8  # Numbers of a list that `repr` shows.
 
 INTERVAL, COUNT = "interval", "count"
 """What a firing rate is: one over the mean interval, or spikes over the length of the window."""
@@ -33,8 +32,7 @@ STORED_ENERGY = "stored"
 CURRENT, RELATIVE_CURRENT = "current", "relative_current"
 """What charges a membrane: the current, or the current over that which just reaches the threshold."""
 
-CURRENTS = (CURRENT, RELATIVE_CURRENT)
-"""Quantities that may jump and may be negative."""
+CURRENTS = (CURRENT, RELATIVE_CURRENT)  # Quantities that may jump and may be negative.
 
 
 class Skin(Protocol):

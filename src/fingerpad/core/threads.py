@@ -25,14 +25,12 @@ from fingerpad.core.numba_internals import tell_compilations
 
 Result = TypeVar("Result")
 
-Chunk = tuple[int, int]
-"""Consecutive numbers, from the first up to but not including the last."""
+Chunk = tuple[int, int]  # Consecutive numbers, from the first up to but not including the last.
 
 BLOCK = 1024
 """Receptors of a block, by default: a thread is worth starting for so many, and they need little memory."""
 
-MANY_CHUNKS = 128
-"""Most chunks of `even_chunks`: enough for all threads of a computer."""
+MANY_CHUNKS = 128  # Most chunks of `even_chunks`: enough for all threads of a computer.
 FEWEST_IN_CHUNK = 128
 """Fewest numbers in a chunk of `even_chunks`: handing over a smaller chunk takes as long as its work."""
 

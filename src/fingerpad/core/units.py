@@ -54,11 +54,8 @@ UNITS = {
 }
 """Unit by the end of a name, such as that of a field or of a column; longer ends first."""
 
-FREQUENCIES = ("frequency_hz", "frequencies_hz", "corner_hz")
-"""Ends of names in Hz that are no firing rates."""
-
-LENGTHS_MM = {"mm": 1.0, "um": 1e-3, "cm": 10.0, "m": 1000.0, "inch": 25.4}
-"""Units of length of a file. [mm]"""
+FREQUENCIES = ("frequency_hz", "frequencies_hz", "corner_hz")  # Ends of names in Hz that are no firing rates.
+LENGTHS_MM = {"mm": 1.0, "um": 1e-3, "cm": 10.0, "m": 1000.0, "inch": 25.4}  # Units of length of a file. [mm]
 
 
 def name_and_unit(key: str) -> tuple[str, str]:

@@ -22,11 +22,8 @@ from fingerpad.core.units import unit_of
 _Kind = TypeVar("_Kind")
 _Convert = Callable[[str, Any], Any]
 
-_LARGEST_MM = 1e9
-"""Largest length, a thousand kilometres. [mm]"""
-
-_MOST_BITS = 1023
-"""Bits of the largest whole number that a float holds."""
+_LARGEST_MM = 1e9  # Largest length, a thousand kilometres. [mm]
+_MOST_BITS = 1023  # Bits of the largest whole number that a float holds.
 
 
 def converted(cls: type[_Kind]) -> type[_Kind]:

@@ -59,8 +59,7 @@ SAII_STATIC_GAIN = _STRETCH("SAII: static gain, inverse of the strain at thresho
 SAII_DYNAMIC_GAIN = _STRETCH("SAII: dynamic gain", 4000.0, "ms")
 SAII_MEMBRANE = _STRETCH("SAII: time constant of the membrane", 80.0, "ms")
 
-TYPES = ("SAI", "RA", "PC", "SAII")
-"""The four types, in the order of the rows below."""
+TYPES = ("SAI", "RA", "PC", "SAII")  # The four types, in the order of the rows below.
 
 _DENSITY_TOTAL = Source("Johansson & Vallbo 1979, J Physiol 286:283, abstract", "read")
 DENSITY_TOTAL = _DENSITY_TOTAL("density of all tactile afferents in the fingertip", 241.0, "1/cm2")

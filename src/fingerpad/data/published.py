@@ -61,10 +61,8 @@ class Published(Generic[Value]):
 class Source:
     """A publication, and the status of the numbers that were taken from it; called, it makes one of them."""
 
-    text: str
-    """Where the numbers stand."""
-    status: Status
-    """Their reliability, see `STATUSES`."""
+    text: str  # Where the numbers stand.
+    status: Status  # Their reliability, see `STATUSES`.
 
     def __call__(self, name: str, value: Value, unit: str) -> Published[Value]:
         return Published(name, value, unit, self.text, self.status)

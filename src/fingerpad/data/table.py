@@ -15,12 +15,10 @@ from fingerpad.data.published import STATUSES
 class Table:
     """Columns of numbers with content, source and status."""
 
-    columns: dict[str, FloatArray]
-    """Values by column name; the name carries the unit, (n_rows,)."""
+    columns: dict[str, FloatArray]  # Values by column name; the name carries the unit, (n_rows,).
     content: str
     source: str
-    status: str
-    """Observed quantity, publication, and status of the numbers."""
+    status: str  # Observed quantity, publication, and status of the numbers.
 
 
 def packaged_table(name: str) -> Table:

@@ -14,8 +14,7 @@ from fingerpad.mechanics.materials import Tissues
 from fingerpad.neuron.afferent import PARAMETER_NAMES, Afferent, AnyAfferent
 from fingerpad.neuron.mixed_population import types_of_afferents
 
-CHOSEN = "fingerpad fit of chosen numbers"
-"""Format of a fit of some numbers of one type."""
+CHOSEN = "fingerpad fit of chosen numbers"  # Format of a fit of some numbers of one type.
 
 
 def fitted_afferent(path: Path, tissues: str | Tissues = DEFAULT_TISSUES) -> AnyAfferent:

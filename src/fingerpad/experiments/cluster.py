@@ -21,11 +21,8 @@ from fingerpad.core.keywords import KnownKeywords
 from fingerpad.core.logger import LOGGER
 from fingerpad.experiments.manifest import software
 
-WAITING_IN_LINE = 512
-"""Most items that the scheduler knows at a time: a sweep may have a million."""
-
-Versions = dict[str, str]
-"""Versions of all on which the numbers of a press depend, by name."""
+WAITING_IN_LINE = 512  # Most items that the scheduler knows at a time: a sweep may have a million.
+Versions = dict[str, str]  # Versions of all on which the numbers of a press depend, by name.
 
 _CONNECT_S = 10.0
 

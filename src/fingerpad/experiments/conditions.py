@@ -21,8 +21,7 @@ from fingerpad.neuron.afferent import Afferent
 from fingerpad.skin.indentation import CONTACT_POINT_MM, touch_of
 from fingerpad.skin.indentation import Touch as Touch
 
-RECEPTOR_X_MM = CONTACT_POINT_MM[0]
-"""`Conditions.receptor_x_mm` of the paper's finger. [mm]"""
+RECEPTOR_X_MM = CONTACT_POINT_MM[0]  # `Conditions.receptor_x_mm` of the paper's finger. [mm]
 
 BAR_REACH_MM = 2.6
 """Fine zone about the receptor in the bar study: an edge farther away hardly reaches it. [mm]"""

@@ -29,8 +29,7 @@ SPIKES = "spike_times_ms"
 DURATION = "duration_ms"
 FOLD = "fold"
 LARGEST_NWB_MB = 20_000
-_SAME_S = 1e-6
-"""Times that differ by less are the same: they are sums of rounded ones. [s]"""
+_SAME_S = 1e-6  # Times that differ by less are the same: they are sums of rounded ones. [s]
 
 SUFFIXES_OF_NWB = (".nwb", ".h5", ".hdf5")
 
@@ -39,14 +38,10 @@ SUFFIXES_OF_NWB = (".nwb", ".h5", ".hdf5")
 class Recorded:
     """Recordings with the stimuli they belong to."""
 
-    recordings: RateRecordings | SpikeRecordings
-    """What the afferent answered."""
-    stimuli: Mapping[str, NamedStimulus]
-    """What touched it, in the order of their first presentations."""
-    memberships: NDArray[np.int64] | None
-    """Fold of each stimulus, from 0, if the file says so, (n_stimuli,)."""
-    presentations: Mapping[str, int]
-    """How often each was presented."""
+    recordings: RateRecordings | SpikeRecordings  # What the afferent answered.
+    stimuli: Mapping[str, NamedStimulus]  # What touched it, in the order of their first presentations.
+    memberships: NDArray[np.int64] | None  # Fold of each stimulus, from 0, if the file says so, (n_stimuli,).
+    presentations: Mapping[str, int]  # How often each was presented.
     spikes_after_hold: int = 0
     """Spikes that came after the motion had ended and are not used, since the model ends there."""
 

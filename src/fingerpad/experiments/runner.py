@@ -24,8 +24,7 @@ from fingerpad.skin.store import OnFailed, Store, solve_missing
 
 LOGGER = logging.getLogger(__name__)
 
-STORE_FOLDER = "indentations"
-"""Folder of finished indentations within the folder of a run."""
+STORE_FOLDER = "indentations"  # Folder of finished indentations within the folder of a run.
 
 Key = TypeVar("Key")
 

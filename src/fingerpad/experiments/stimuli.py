@@ -41,8 +41,7 @@ COLUMNS = (
 )
 """Usual columns of a table of stimuli; any other key of a block is one as well, such as `motion.file`."""
 
-BLOCKS = ("object.", "motion.", "place.")
-"""How other columns begin."""
+BLOCKS = ("object.", "motion.", "place.")  # How other columns begin.
 
 
 class Stimuli(Protocol):
@@ -76,16 +75,11 @@ class Stimuli(Protocol):
 class ShiftedBar:
     """The paper's stimuli: one bar at several places along the finger."""
 
-    bar: Bar = field(default_factory=Bar)
-    """Width and fillets."""
-    motion: Motion = field(default_factory=RampAndHold)
-    """The same at all shifts."""
-    column: str = "shift_mm"
-    """Column of the recordings with the shifts."""
-    conditions: Conditions = field(default_factory=Conditions)
-    """Finger, tissues and accuracy."""
-    finger_files: tuple[Path, ...] = ()
-    """Those that the finger is read from."""
+    bar: Bar = field(default_factory=Bar)  # Width and fillets.
+    motion: Motion = field(default_factory=RampAndHold)  # The same at all shifts.
+    column: str = "shift_mm"  # Column of the recordings with the shifts.
+    conditions: Conditions = field(default_factory=Conditions)  # Finger, tissues and accuracy.
+    finger_files: tuple[Path, ...] = ()  # Those that the finger is read from.
 
     def named(self, entry: str) -> NamedStimulus:
         """Return the bar at a shift."""
@@ -109,16 +103,11 @@ class ListedStimuli:
     """Stimuli of your own, each with a name."""
 
     stimuli: Mapping[str, NamedStimulus]
-    source: str = "stimuli"
-    """Where they are listed, for errors."""
-    column: str = "stimulus"
-    """Column of the recordings with the names."""
-    conditions: Conditions = field(default_factory=Conditions)
-    """Finger, tissues and accuracy."""
-    reach_mm: float | None = None
-    """As of `StimulusSet`. [mm]"""
-    finger_files: tuple[Path, ...] = ()
-    """Those that the finger is read from."""
+    source: str = "stimuli"  # Where they are listed, for errors.
+    column: str = "stimulus"  # Column of the recordings with the names.
+    conditions: Conditions = field(default_factory=Conditions)  # Finger, tissues and accuracy.
+    reach_mm: float | None = None  # As of `StimulusSet`. [mm]
+    finger_files: tuple[Path, ...] = ()  # Those that the finger is read from.
 
     def named(self, entry: str) -> NamedStimulus:
         """Return the stimulus of that name."""

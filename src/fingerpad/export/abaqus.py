@@ -12,8 +12,7 @@ from fingerpad.mechanics.materials import Material
 
 CONTACT, REFERENCE = "CONTACT", "REFERENCE"
 
-UPPER_FACE = 2
-"""Face of a brick's last four or a wedge's last three nodes, which is the side of the skin."""
+UPPER_FACE = 2  # Face of a brick's last four or a wedge's last three nodes, which is the side of the skin.
 
 
 def abaqus_deck(job: Job) -> str:

@@ -23,8 +23,7 @@ from fingerpad.mechanics.materials import Material
 UPPER_FACE, OUTER_FACE = 2, 1
 """Faces in contact: the side of the skin, and the outer side of the elements of the indenter."""
 
-ELEMENTS = {"C3D8": "C3D6", "C3D8I": "C3D6", "C3D20R": "C3D15"}
-"""Available bricks, each with its wedge."""
+ELEMENTS = {"C3D8": "C3D6", "C3D8I": "C3D6", "C3D20R": "C3D15"}  # Available bricks, each with its wedge.
 
 MODULI = ("long_term", "instantaneous")
 SLOWEST_SHARE = 1.0 / 64

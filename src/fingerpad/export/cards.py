@@ -10,8 +10,7 @@ from fingerpad.export.job import Job
 from fingerpad.mechanics.laws import Hyperfoam, Ogden, Polynomial
 from fingerpad.mechanics.materials import Material
 
-PER_LINE, PER_LINE_OF_ELEMENT = 8, 16
-"""Most values on a data line of both programs."""
+PER_LINE, PER_LINE_OF_ELEMENT = 8, 16  # Most values on a data line of both programs.
 
 NO_TERM = 1e20
 """D of a volumetric term that is absent: CalculiX silently replaces 0 by a stiffness of its own."""

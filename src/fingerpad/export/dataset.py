@@ -45,8 +45,7 @@ if TYPE_CHECKING:
 
 FORMAT, FORMAT_VERSION = "fingerpad touch", 1
 
-FILE_NAMES = ("touch.nc", "touch.zarr")
-"""Names under which a folder of results holds a touch."""
+FILE_NAMES = ("touch.nc", "touch.zarr")  # Names under which a folder of results holds a touch.
 
 SUFFIXES = (".nc", ".zarr")
 
@@ -78,14 +77,11 @@ _OBJECT_REACH_MM, _OBJECT_STEPS = (14.0, 10.0), 240
 class Variable:
     """One variable that is no field of the press."""
 
-    unit: str
-    """Unit, "1" for a pure number; empty for numbers of nodes or elements, which have none."""
+    unit: str  # Unit, "1" for a pure number; empty for numbers of nodes or elements, which have none.
     dims: tuple[str, ...]
     long_name: str
-    points_into: str = ""
-    """Dimension of which it holds numbers, from 0."""
-    holes: bool = False
-    """Whether it may be NaN."""
+    points_into: str = ""  # Dimension of which it holds numbers, from 0.
+    holes: bool = False  # Whether it may be NaN.
 
 
 MESH_PARTS = {
@@ -122,8 +118,7 @@ RESPONSE_PARTS = {
     "spike_count": Variable("1", ("receptor",), "number of spikes of each receptor"),
     "spike_time_ms": Variable("ms", ("spike",), "spike times, receptor by receptor"),
 }
-PARTS = {**MESH_PARTS, **OBJECT_PARTS, **RESPONSE_PARTS}
-"""Variables beside the fields of the press, by name."""
+PARTS = {**MESH_PARTS, **OBJECT_PARTS, **RESPONSE_PARTS}  # Variables beside the fields of the press, by name.
 
 
 @known_keywords

@@ -19,26 +19,19 @@ from fingerpad.export.job import Job
 from fingerpad.mechanics.laws import Ogden, Polynomial
 from fingerpad.mechanics.materials import Material
 
-MOST_PRONY_TERMS = 6
-"""Most Prony terms of FEBio's viscoelastic material."""
-
-ABAQUS_VOLUME = 2
-"""Number of FEBio's volumetric energy K/2 (J-1)²."""
-
-GAP_SHARE = 0.002
-"""Penetration at which FEBio stops augmenting its contact, as a share of the depth."""
+MOST_PRONY_TERMS = 6  # Most Prony terms of FEBio's viscoelastic material.
+ABAQUS_VOLUME = 2  # Number of FEBio's volumetric energy K/2 (J-1)².
+GAP_SHARE = 0.002  # Penetration at which FEBio stops augmenting its contact, as a share of the depth.
 
 NODE_ON_FACET_KPA_PER_MM, MOST_AUGMENTATIONS, SEARCH_TOLERANCE = 15_000.0, 10, 0.01
 """Penalty, augmentations and tolerance of the projection of the contact without friction."""
 
-RUBBING_KPA_PER_MM = 5_000.0
-"""Penalty of the contact with friction, which fails with a stiffer one. [kPa/mm]"""
+RUBBING_KPA_PER_MM = 5_000.0  # Penalty of the contact with friction, which fails with a stiffer one. [kPa/mm]
 
 DISPLACEMENT_TOLERANCE, ENERGY_TOLERANCE = 1e-3, 1e-4
 """FEBio's convergence criteria; its default for energy, 0.01, leaves forces 1 % wrong."""
 
-KINDS = ("hex8", "penta6")
-"""FEBio's names of bricks and wedges."""
+KINDS = ("hex8", "penta6")  # FEBio's names of bricks and wedges.
 
 
 def febio_deck(job: Job) -> str:

@@ -28,24 +28,20 @@ LARGEST_TURN_RAD = np.deg2rad(3.0)
 FACETS_AROUND = 96
 FACETS_ACROSS = 8
 
-FACETS_ACROSS_RELIEF = 16
-"""Facets across the narrowest part of a body without an outline."""
+FACETS_ACROSS_RELIEF = 16  # Facets across the narrowest part of a body without an outline.
 
 SMALLEST_FACET_MM, LARGEST_FACET_MM, MOST_FACETS = 0.025, 0.1, 250_000
 """Bounds of their size, and of their number. [mm]"""
 
-SHELL_MM = 0.1
-"""Thickness of their solid elements. [mm]"""
+SHELL_MM = 0.1  # Thickness of their solid elements. [mm]
 
 
 @dataclass(frozen=True)
 class Outline:
     """Section of a rigid indenter."""
 
-    revolved: bool
-    """Whether it turns about the axis of pressing; else it is swept along z."""
-    corners: tuple[Point, ...]
-    """u and y where segments meet. [mm]"""
+    revolved: bool  # Whether it turns about the axis of pressing; else it is swept along z.
+    corners: tuple[Point, ...]  # u and y where segments meet. [mm]
     centres: tuple[Point | None, ...]
     """For each segment the centre of its arc, or None for a straight line. [mm]"""
     middles: tuple[float, ...] = (0.0,)
@@ -159,10 +155,8 @@ class RigidMesh:
 
     nodes_mm: FloatArray
     """The outer nodes, then as many inner ones, in the indenter's frame, (n_nodes, 3). [mm]"""
-    quads: IntArray
-    """Outer nodes, counter-clockwise seen from the skin, (n_quads, 4)."""
-    triangles: IntArray
-    """The same about the axis of a body of revolution, (n_triangles, 3)."""
+    quads: IntArray  # Outer nodes, counter-clockwise seen from the skin, (n_quads, 4).
+    triangles: IntArray  # The same about the axis of a body of revolution, (n_triangles, 3).
 
     def solids(self, faces: IntArray) -> IntArray:
         """Bricks or wedges behind `faces`, their first nodes those of the outer face.

@@ -150,8 +150,7 @@ def read_response_csv(path: Path) -> ResponseMap | MixedResponse:
     return by_type(response, pitches)
 
 
-_RESOLUTION_S = 1e-9
-"""Spike times are roots of a closed form; those of two processors differ by less. [s]"""
+_RESOLUTION_S = 1e-9  # Spike times are roots of a closed form; those of two processors differ by less. [s]
 
 
 @known_keywords

@@ -29,8 +29,7 @@ if TYPE_CHECKING:
     from fingerpad.reduction.streaming import ReducedSample
     from fingerpad.skin.sampling import SkinResponse, SurfaceProfile
 
-Columns = Mapping[Any, Any]
-"""Columns of a table by name, the index first."""
+Columns = Mapping[Any, Any]  # Columns of a table by name, the index first.
 
 
 def skin_columns(skin: SkinResponse) -> Columns:

@@ -25,8 +25,7 @@ from fingerpad.experiments.sweep.settle import Case, settle, unsettled
 from fingerpad.export.sweep_dataset import DONE, FAILED, LEFT_OUT, PENDING, SweepFile
 from fingerpad.mechanics.kernels import KERNELS
 
-MOST_SETTINGS = 10_000
-"""Larger sweeps need the consent of who runs them."""
+MOST_SETTINGS = 10_000  # Larger sweeps need the consent of who runs them.
 
 _WRITE_EVERY_S, _WRITE_EVERY = 5.0, 256
 """How often what is done is written: after so much time, or so many settings."""
@@ -36,19 +35,16 @@ _WRITE_EVERY_S, _WRITE_EVERY = 5.0, 256
 class SweepOutcome:
     """What a run of a sweep did."""
 
-    path: Path
-    """The data set."""
+    path: Path  # The data set.
     settings: int
     done: int
     failed: int
     left_out: int
     """Number of settings: all, those with a result, those that failed, those that `where` leaves out."""
     pressed: int
-    loaded: int
-    """Presses that this run solved, and those that it read from the store."""
+    loaded: int  # Presses that this run solved, and those that it read from the store.
     press_s: float
-    wall_s: float
-    """Time of all presses, summed over processes, and on the clock. [s]"""
+    wall_s: float  # Time of all presses, summed over processes, and on the clock. [s]
 
     @property
     def lines(self) -> tuple[str, ...]:

@@ -52,8 +52,7 @@ PENDING, DONE, FAILED, LEFT_OUT = range(4)
 
 MEANINGS = "pending done failed left_out"
 
-HIT_RATE = "hit_rate"
-"""Variable of what observers find."""
+HIT_RATE = "hit_rate"  # Variable of what observers find.
 
 _SETTINGS_IN_CHUNK = 64
 _CHUNKS = {"time": 64, "receptor": 512, "spike": 1024}
@@ -65,12 +64,10 @@ _NAMES = {"times_ms": "time_ms"}
 class Variable:
     """One variable of the data set."""
 
-    dims: tuple[str, ...]
-    """Dimensions after those of the sweep."""
+    dims: tuple[str, ...]  # Dimensions after those of the sweep.
     unit: str
     long_name: str
-    of_press: bool = False
-    """Whether it has the dimensions that change the skin alone."""
+    of_press: bool = False  # Whether it has the dimensions that change the skin alone.
     dtype: str = "f8"
 
 

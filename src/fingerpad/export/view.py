@@ -53,14 +53,9 @@ SHORT_NAMES = {
 
 SUFFIXES = (".png", ".gif", ".mp4")
 
-RECENT_MS = 25.0
-"""An afferent is drawn dark if it fired a spike at most so long ago. [ms]"""
-
-THICKNESS_MM = 3.0
-"""How much of the object is drawn behind the foremost point of its face. [mm]"""
-
-ARROW_MM = 5.0
-"""Length of the three arrows that give the scale. [mm]"""
+RECENT_MS = 25.0  # An afferent is drawn dark if it fired a spike at most so long ago. [ms]
+THICKNESS_MM = 3.0  # How much of the object is drawn behind the foremost point of its face. [mm]
+ARROW_MM = 5.0  # Length of the three arrows that give the scale. [mm]
 
 FRAMES_PER_S, MOST_FRAMES = 12, 2000
 PIXELS, VIEW_HEIGHT_MM = (1240, 820), 22.5
@@ -70,8 +65,7 @@ _NAIL_MM = 0.6
 _ON_PLANE_MM = 1e-6
 _FROM_THE_SIDE = (np.array([0.35, -0.5, 1.0]), np.array([0.0, 1.0, 0.0]))
 """Offset of the camera and its upward direction where the plane of symmetry is shown."""
-_FROM_BELOW = (np.array([0.10, -1.0, -0.22]), np.array([0.0, 0.0, 1.0]))
-"""The same where the skin is shown."""
+_FROM_BELOW = (np.array([0.10, -1.0, -0.22]), np.array([0.0, 0.0, 1.0]))  # The same where the skin is shown.
 
 
 @known_keywords

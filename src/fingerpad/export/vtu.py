@@ -27,8 +27,7 @@ from fingerpad.mechanics.press import Deformation
 from fingerpad.skin.fields import FIELDS, Place
 from fingerpad.skin.sampling import SkinResponse
 
-HEXAHEDRON, WEDGE = 12, 13
-"""VTK's numbers of the two cells."""
+HEXAHEDRON, WEDGE = 12, 13  # VTK's numbers of the two cells.
 
 AXES = ("XX", "YY", "ZZ", "XY", "YZ", "XZ")
 """Components of a tensor, in the order of ours and of ParaView's symmetric tensors."""
@@ -69,10 +68,8 @@ def write_vtu_series(path: Path, skin: SkinResponse) -> tuple[Path, ...]:
 class VtuSeries:
     """A deformation as VTU files hold it."""
 
-    times_ms: FloatArray
-    """Times of the files, (n_times,). [ms]"""
-    points_mm: FloatArray
-    """Undeformed nodes, (n_nodes, 3). [mm]"""
+    times_ms: FloatArray  # Times of the files, (n_times,). [ms]
+    points_mm: FloatArray  # Undeformed nodes, (n_nodes, 3). [mm]
     points: Mapping[str, np.ndarray]
     cells: Mapping[str, np.ndarray]
     press: Mapping[str, np.ndarray]

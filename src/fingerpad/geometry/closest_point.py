@@ -16,14 +16,9 @@ from fingerpad.core.checks import FloatArray, IntArray
 from fingerpad.core.threads import run_kernel
 from fingerpad.geometry.creases import HOLLOW, SHARP, kinds_of_edges, moments_in_ball, share_of_edges
 
-_LEAF = 4
-"""Triangles in a box without children."""
-
-_COPY = -1
-"""Kind of the edges of a triangle that fills a slot a second time."""
-
-SHARP_SHARE = 1.5
-"""Distance from sharp edges from which on creases are blunted, over the radius."""
+_LEAF = 4  # Triangles in a box without children.
+_COPY = -1  # Kind of the edges of a triangle that fills a slot a second time.
+SHARP_SHARE = 1.5  # Distance from sharp edges from which on creases are blunted, over the radius.
 
 _ON_SURFACE_MM = 1e-9
 
@@ -38,14 +33,10 @@ class Triangles:
     """Outward normals at the three corners, on the three edges (opposite to each corner) and on the face,
     (n_slots, 7, 3)."""
     low_mm: FloatArray
-    high_mm: FloatArray
-    """Boxes; the first is not used, (n_boxes, 3). [mm]"""
-    kinds: np.ndarray
-    """Kinds of edges (`fingerpad.geometry.creases`), opposite to each corner, (n_slots, 3)."""
-    hollow: np.ndarray
-    """Whether a box has triangles with hollow creases, (n_boxes,)."""
-    radius_mm: float
-    """Distance over which hollow creases are blunted. [mm]"""
+    high_mm: FloatArray  # Boxes; the first is not used, (n_boxes, 3). [mm]
+    kinds: np.ndarray  # Kinds of edges (`fingerpad.geometry.creases`), opposite to each corner, (n_slots, 3).
+    hollow: np.ndarray  # Whether a box has triangles with hollow creases, (n_boxes,).
+    radius_mm: float  # Distance over which hollow creases are blunted. [mm]
     far_mm: float
     """Distance beyond which points above the triangles have this one, along y; it need not be sought. [mm]"""
 

@@ -23,8 +23,7 @@ from fingerpad.geometry.relief import (
     with_rounded_edges,
 )
 
-SAME_MM = 1e-6
-"""Heights that differ by less are equal. [mm]"""
+SAME_MM = 1e-6  # Heights that differ by less are equal. [mm]
 
 LEAST_SLOPE = 0.2
 """Least length of the gradient in a seam by which a gap is divided: parts that face each other have none."""

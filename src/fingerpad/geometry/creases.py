@@ -19,8 +19,7 @@ from numba import njit
 
 from fingerpad.core.checks import FloatArray, IntArray
 
-PLAIN, HOLLOW, SHARP = 0, 1, 2
-"""Kinds of edges: nothing is done, blunted, kept sharp."""
+PLAIN, HOLLOW, SHARP = 0, 1, 2  # Kinds of edges: nothing is done, blunted, kept sharp.
 
 LEAST_RAD = 2e-4
 """Angle between two triangles that counts as a crease; below it the rounding of files decides. [rad]"""

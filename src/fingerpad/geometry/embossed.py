@@ -298,11 +298,8 @@ def _beyond_outline(
             outward[number, 0], outward[number, 2] = normals[piece, 0], normals[piece, 1]
 
 
-_BESIDE = 1e-6
-"""Distance from a piece at which its sides are looked at, over the extent of all."""
-
-_SAME = 1e-9
-"""Distance of places that are one, over the extent of all."""
+_BESIDE = 1e-6  # Distance from a piece at which its sides are looked at, over the extent of all.
+_SAME = 1e-9  # Distance of places that are one, over the extent of all.
 
 
 def joined_outlines(outlines: Sequence[FloatArray]) -> list[FloatArray]:

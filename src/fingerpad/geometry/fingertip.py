@@ -65,8 +65,7 @@ class Profile:
 
     readings_mm: Readings
     """At least five readings, x increasing from 0 or more to less than `length_mm`, values above 0. [mm]"""
-    length_mm: float
-    """x of the tip, L. [mm]"""
+    length_mm: float  # x of the tip, L. [mm]
 
     def __post_init__(self) -> None:
         length = positive("length_mm", self.length_mm, "mm")

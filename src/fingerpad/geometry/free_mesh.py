@@ -18,8 +18,7 @@ from fingerpad.geometry.mesh import Mesh
 FACES = np.array([[0, 3, 2, 1], [4, 5, 6, 7], [0, 1, 5, 4], [1, 2, 6, 5], [2, 3, 7, 6], [3, 0, 4, 7]])
 """Corners of the faces of a brick, counter-clockwise seen from outside."""
 
-_NEAR_TRIANGLES = 32
-"""Triangles nearest to a place that give the size of elements there."""
+_NEAR_TRIANGLES = 32  # Triangles nearest to a place that give the size of elements there.
 
 
 @dataclass(frozen=True)
@@ -32,8 +31,7 @@ class FreeMesh(Mesh):
 
     outer_elements: IntArray
     """Element of each face of the skin; its last four nodes lie on the skin where possible, (n_faces,)."""
-    receptor_depth_mm: float
-    """Depth of the end organs below the skin, along its normal. [mm]"""
+    receptor_depth_mm: float  # Depth of the end organs below the skin, along its normal. [mm]
 
     @property
     def is_grid(self) -> bool:
@@ -205,8 +203,7 @@ class FingerMesh(Finger):
         return Grading(x_mm, extent[0], extent[2], size, size, float(extent.max()), full=self.mesh.full)
 
 
-_NEAREST = 24
-"""Triangles that are looked at: those whose corners or middles are nearest to a point."""
+_NEAREST = 24  # Triangles that are looked at: those whose corners or middles are nearest to a point.
 
 
 def closest_on_triangles(points_mm: FloatArray, corners_mm: FloatArray) -> tuple[IntArray, FloatArray]:

@@ -15,14 +15,9 @@ from fingerpad.core.values import converted
 
 RESOLUTIONS = ("quick", "standard", "paper")
 
-Strip = tuple[float, float, float]
-"""From, to and size of the elements between them. [mm]"""
-
-STEPS_TO_SUM = 4000
-"""Intervals over which the number of elements is summed where their size varies."""
-
-FINGER_MM = 40.0
-"""Length of a finger, beyond which a fine zone has no elements. [mm]"""
+Strip = tuple[float, float, float]  # From, to and size of the elements between them. [mm]
+STEPS_TO_SUM = 4000  # Intervals over which the number of elements is summed where their size varies.
+FINGER_MM = 40.0  # Length of a finger, beyond which a fine zone has no elements. [mm]
 
 MOST_ELEMENTS = 2_000_000
 """Elements of the fine zone beyond which no press ends; that of the paper's mesh has 143,000."""

@@ -14,8 +14,7 @@ from fingerpad.geometry.grading import Grading, Strip, covering, resolution_grad
 from fingerpad.geometry.indenters import Indenter
 from fingerpad.geometry.motion import Pose
 
-THIN_SIZE_MM = 0.025
-"""Size along the finger of elements below a wire: two across the strip in contact. [mm]"""
+THIN_SIZE_MM = 0.025  # Size along the finger of elements below a wire: two across the strip in contact. [mm]
 
 EDGE_SIZE_MM = {"quick": 0.2, "standard": 0.1, "paper": 0.1}
 """Size of elements across edges that are parallel to grid lines, as those of the paper's bar. [mm]"""

@@ -26,8 +26,7 @@ from fingerpad.geometry.probing import mirrored, traced_front
 SIZES_MM = (0.01, 400.0)
 """Smallest and largest width or diameter of a body that is pressed into a fingertip. [mm]"""
 
-BESIDE_EDGE_MM = 0.4
-"""Distance from the wall of an edge within which the skin bends sharply. [mm]"""
+BESIDE_EDGE_MM = 0.4  # Distance from the wall of an edge within which the skin bends sharply. [mm]
 
 
 class Indenter(metaclass=KnownKeywords):

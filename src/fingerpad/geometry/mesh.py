@@ -34,15 +34,12 @@ CORNERS = np.array(  # local coordinates of a brick's nodes, in their order
 class Mesh:
     """Hexahedra in a structured grid, with the sets of nodes that mechanics needs."""
 
-    nodes_mm: FloatArray
-    """x, y and z of the nodes, (n_nodes, 3). [mm]"""
+    nodes_mm: FloatArray  # x, y and z of the nodes, (n_nodes, 3). [mm]
     elements: IntArray
     """Nodes of each brick: lower face (towards the bone) counter-clockwise seen from the skin, then upper.
     Elements are numbered along, around, through (skin to bone), the last running fastest, (n_elements, 8)."""
-    layer: IntArray
-    """Index into `LAYERS`, (n_elements,)."""
-    shape: tuple[int, int, int]
-    """Number of elements along, around and through."""
+    layer: IntArray  # Index into `LAYERS`, (n_elements,).
+    shape: tuple[int, int, int]  # Number of elements along, around and through.
     full: bool
     """Whether both halves are meshed; otherwise only z >= 0, with `symmetry_nodes` on the plane z = 0."""
     skin_grid: IntArray
@@ -52,8 +49,7 @@ class Mesh:
     nail_nodes: IntArray
     symmetry_nodes: IntArray
     """Nodes on the bone (or bottom of a block), under the nail, and on the plane of symmetry."""
-    midline_nodes: IntArray
-    """Nodes of the volar skin at z = 0, x increasing, (n_along + 1,)."""
+    midline_nodes: IntArray  # Nodes of the volar skin at z = 0, x increasing, (n_along + 1,).
     living_epidermis: IntArray
     """The sheet of elements above the epidermal-dermal border; empty without one, (n_along, n_around)."""
 

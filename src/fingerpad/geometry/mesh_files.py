@@ -24,8 +24,7 @@ _REFUSED = (
     "hardly changes its volume, and elements of higher order have no kernel here; mesh with bricks or wedges"
 )
 
-_GMSH = {5: 8, 6: 6}
-"""Nodes of Gmsh's types that are read: brick and wedge."""
+_GMSH = {5: 8, 6: 6}  # Nodes of Gmsh's types that are read: brick and wedge.
 
 _GMSH_FLAT = (2, 3, 9, 10, 16)
 _GMSH_SMALL = (1, 8, 15)
@@ -465,5 +464,4 @@ def _read_vtu(file: Path) -> MeshParts:
 
 
 _READERS: dict[str, Callable[[Path], MeshParts]] = {".inp": _read_inp, ".msh": _read_msh, ".vtu": _read_vtu}
-MESH_FILES = tuple(_READERS)
-"""Ends of the names of files that `read_finger` reads."""
+MESH_FILES = tuple(_READERS)  # Ends of the names of files that `read_finger` reads.

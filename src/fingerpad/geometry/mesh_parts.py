@@ -29,11 +29,8 @@ SKIN, BONE, NAIL, FIXED, SYMMETRY = "skin", "bone", "nail", "fixed", "symmetry"
 SETS = (SKIN, BONE, NAIL, FIXED, SYMMETRY, *LAYERS)
 """Names of sets; a file may write them with other capitals, and with _ or - for a space."""
 
-_SAME_PLACE = 1e-7
-"""Distance of two nodes that lie at the same place, over the size of the mesh."""
-
-_FLAT_SHARE = 0.05
-"""Area of a flat side, over that of the skin, from which on it is a plane of symmetry."""
+_SAME_PLACE = 1e-7  # Distance of two nodes that lie at the same place, over the size of the mesh.
+_FLAT_SHARE = 0.05  # Area of a flat side, over that of the skin, from which on it is a plane of symmetry.
 
 _OF_CONTACT = 8
 """Number of nodes of a border nearest to the middle of the pad whose depth is that of the border."""
@@ -43,17 +40,13 @@ _OF_CONTACT = 8
 class MeshParts:
     """What a file holds: nodes, bricks and wedges, and named sets."""
 
-    source: str
-    """Name of the file, for errors."""
-    nodes: FloatArray
-    """Coordinates, in the file's unit, (n_nodes, 3)."""
+    source: str  # Name of the file, for errors.
+    nodes: FloatArray  # Coordinates, in the file's unit, (n_nodes, 3).
     elements: IntArray
     """Rows of `nodes`; a wedge repeats its third and sixth: 0, 1, 2, 2, 3, 4, 5, 5, (n_elements, 8)."""
-    labels: IntArray
-    """Numbers of the elements in the file, (n_elements,)."""
+    labels: IntArray  # Numbers of the elements in the file, (n_elements,).
     node_sets: Mapping[str, IntArray]
-    element_sets: Mapping[str, IntArray]
-    """Rows of `nodes` and of `elements`."""
+    element_sets: Mapping[str, IntArray]  # Rows of `nodes` and of `elements`.
 
 
 def plain_name(name: str) -> str:

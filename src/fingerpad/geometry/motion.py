@@ -15,8 +15,7 @@ from fingerpad.core.units import unit_of
 from fingerpad.core.values import converted
 from fingerpad.data import protocol
 
-LONGEST_MS = 1e13
-"""Longest ramp or hold; a quasi-static ramp of a validation takes 1e12 ms. [ms]"""
+LONGEST_MS = 1e13  # Longest ramp or hold; a quasi-static ramp of a validation takes 1e12 ms. [ms]
 
 PLAUSIBLE = {"depth_mm": (1e-3, 20.0), "force_mn": (1.0, 1e5), "ramp_ms": (1e-6, LONGEST_MS)}
 PLAUSIBLE["hold_ms"] = PLAUSIBLE["ramp_ms"]
@@ -29,11 +28,9 @@ class Pose:
     """How far an indenter has moved and turned since first touch, beside its advance."""
 
     x_mm: float = 0.0
-    z_mm: float = 0.0
-    """Way of its tip along the finger, distal positive, and across it. [mm]"""
+    z_mm: float = 0.0  # Way of its tip along the finger, distal positive, and across it. [mm]
     tilt_deg: float = 0.0
-    spin_deg: float = 0.0
-    """Rotations about its tip, added to those of the `Touch`. [degrees]"""
+    spin_deg: float = 0.0  # Rotations about its tip, added to those of the `Touch`. [degrees]
 
     @property
     def way(self) -> FloatArray:
@@ -76,8 +73,7 @@ class Cycles(metaclass=KnownKeywords):
 
 STILL = Pose()
 
-TURN_LIKE_MM = 10.0
-"""Rotation that takes as many steps as all of the depth. [degrees]"""
+TURN_LIKE_MM = 10.0  # Rotation that takes as many steps as all of the depth. [degrees]
 
 
 class Motion(metaclass=KnownKeywords):
@@ -86,14 +82,12 @@ class Motion(metaclass=KnownKeywords):
     A motion prescribes the depth of the indenter, or its force. It is linear in time between some times.
     """
 
-    by_force: bool = False
-    """Whether the force is prescribed instead of the depth."""
+    by_force: bool = False  # Whether the force is prescribed instead of the depth.
 
     cycles: Cycles | None = None
     """The part that repeats itself, if there is one: not all of its cycles need be solved."""
 
-    given_samples: bool = False
-    """Whether a user gave the samples, so that errors name them."""
+    given_samples: bool = False  # Whether a user gave the samples, so that errors name them.
 
     @property
     def samples_ms(self) -> tuple[float, ...]:
@@ -264,5 +258,4 @@ def hold_ends_ms(length_ms: float, first_ms: float, steps: int) -> FloatArray:
     return ends
 
 
-Stimulus = Motion
-"""What a touch asks for: a motion by depth or by force."""
+Stimulus = Motion  # What a touch asks for: a motion by depth or by force.

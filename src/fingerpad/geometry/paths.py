@@ -9,14 +9,9 @@ from fingerpad.core.errors import InputError
 from fingerpad.geometry.fingertip import Finger
 from fingerpad.geometry.motion import Motion
 
-CLEARANCE_TO_BONE = 0.8
-"""Share of the way to the bone that an indenter may go."""
-
-STEP_MM = 0.25
-"""Distance between places at which a way along the skin is looked at. [mm]"""
-
-FAR_MM = 1000.0
-"""Way beyond which the samples are looked at first. [mm]"""
+CLEARANCE_TO_BONE = 0.8  # Share of the way to the bone that an indenter may go.
+STEP_MM = 0.25  # Distance between places at which a way along the skin is looked at. [mm]
+FAR_MM = 1000.0  # Way beyond which the samples are looked at first. [mm]
 
 
 def check_path(finger: Finger, motion: Motion, at_mm: tuple[float, float]) -> None:

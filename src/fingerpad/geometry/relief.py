@@ -20,8 +20,7 @@ from fingerpad.core.errors import InputError
 REACH_MM = 6.0
 """Ridges, grooves and dots are looked for within this distance of the axis, along and across. [mm]"""
 
-PIXELS = 480
-"""Heights of the face along each side of that square, or of the body where it is smaller."""
+PIXELS = 480  # Heights of the face along each side of that square, or of the body where it is smaller.
 
 PIXELS_PER_FEATURE = 4
 """Heights across the narrowest ridge, groove or dot that can be found; wider ones are sought with up to four
@@ -30,8 +29,7 @@ times as many."""
 WIDTHS_MM = (0.1, 0.15, 0.2, 0.3, 0.4, 0.5, 0.6, 0.8, 1.0, 1.25, 1.5, 1.75, 2.0)
 """Widths of ridges, grooves and dots that are looked for. [mm]"""
 
-RELIEF_MM = 2.0
-"""Depth below the highest point within which they are looked for. [mm]"""
+RELIEF_MM = 2.0  # Depth below the highest point within which they are looked for. [mm]
 
 RELIEF_SHARE = 0.2
 """A ridge or dot is as high, over its width, or more; a ball's cap of the same width is lower."""
@@ -52,8 +50,7 @@ groove so far above its bottom."""
 CORNER_SHARE = 0.4
 """A ridge, groove or dot covers this share of the disc; the tip of a corner between walls does not."""
 
-CRACK_MM = 0.05
-"""Width of a crack, which skin does not enter. [mm]"""
+CRACK_MM = 0.05  # Width of a crack, which skin does not enter. [mm]
 
 
 def narrowest_relief(height_mm: FloatArray, spacing_mm: float, beside_mm: float) -> float:
@@ -141,11 +138,8 @@ Gap = Callable[[FloatArray], tuple[FloatArray, FloatArray]]
 MOST_PLANES = 10
 """Most planes below which one point must lie: an edge has two, a corner three, rounded ones a few more."""
 
-NEAR_MM = 1.5
-"""Farther points keep the distance to the sharp body, which is less. [mm]"""
-
-_DEEP_ENOUGH = 1e-6
-"""Depth that may be missing to the radius, over the radius."""
+NEAR_MM = 1.5  # Farther points keep the distance to the sharp body, which is less. [mm]
+_DEEP_ENOUGH = 1e-6  # Depth that may be missing to the radius, over the radius.
 
 
 def check_edge_radius(radius_mm: float, narrowest_mm: float) -> None:

@@ -29,14 +29,12 @@ from fingerpad.geometry.relief import (
 )
 from fingerpad.geometry.surface_repair import border_of, is_crack, layers_of, repaired
 
-MOST_HEIGHTS = 2_000_000
-"""Heights of a map that become a body within about 20 s."""
+MOST_HEIGHTS = 2_000_000  # Heights of a map that become a body within about 20 s.
 
 SMALLEST_MM, LARGEST_MM = 0.1, 1000.0
 """Extents beyond which a surface is refused: its unit must be wrong. [mm]"""
 
-SKIRT_MM = 20.0
-"""An open surface goes on downwards from its border as far as this. [mm]"""
+SKIRT_MM = 20.0  # An open surface goes on downwards from its border as far as this. [mm]
 
 SMOOTH_BELOW_DEG = 30.0
 """Angle of creases that are rounded where they are hollow, unless another is given. [degrees]"""

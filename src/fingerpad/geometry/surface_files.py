@@ -31,8 +31,7 @@ _END_OF_PNG = b"IEND\xaeB`\x82"
 _BITS, _PHOTOMETRIC, _SAMPLE_FORMAT = 258, 262, 339
 """Tags of a TIFF image: bits of a sample; 0 for white as zero; 2 for signed numbers."""
 
-LEAST_POINTS = 50
-"""From this length on a table of three columns is taken for points."""
+LEAST_POINTS = 50  # From this length on a table of three columns is taken for points.
 
 _AXES = {
     sign + axis: (number, 1.0 if sign == "+" else -1.0)

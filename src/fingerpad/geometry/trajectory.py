@@ -30,8 +30,7 @@ MOST_JUMP, EVEN_STEPS = 0.6, 4.0
 """A smaller change is a corner too, unless the acceleration is the same at a neighbour within this share, and
 the steps before and after it differ by at most this factor, as along a smooth curve."""
 
-STEPS_ASIDE = 3.0
-"""Steps per mm aside over those of a ramp: skin passes an edge within a few of them."""
+STEPS_ASIDE = 3.0  # Steps per mm aside over those of a ramp: skin passes an edge within a few of them.
 
 ONSET_SHARES = (0.25, 0.5)
 """Where the first of several steps aside is divided, over its length: at 0.025 and 0.05 mm at quick."""

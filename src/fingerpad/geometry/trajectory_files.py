@@ -21,8 +21,7 @@ from fingerpad.geometry.trajectory import POSE_COLUMNS, SAME_VALUE, Trajectory, 
 
 MM_PER_UM = 1e-3
 
-TOLERANCE = 0.005
-"""Largest error of a trajectory with fewer samples, over the extent of each of its columns."""
+TOLERANCE = 0.005  # Largest error of a trajectory with fewer samples, over the extent of each of its columns.
 
 COLUMNS = {
     "time_ms": ("times_ms", 1.0),
@@ -157,14 +156,12 @@ def _without_noise(values: FloatArray, never_negative: bool) -> FloatArray:
     return values
 
 
-Course = Callable[[float], float]
-"""From the time [ms] to a depth, a force, a way or a rotation."""
+Course = Callable[[float], float]  # From the time [ms] to a depth, a force, a way or a rotation.
 
 LOOKS, LOOKS_PER_PIECE = 512, 32
 """Into how many equal parts a function and each of its linear pieces are divided to look at it."""
 
-SHORTEST_SHARE = 1e-9
-"""Duration of a piece over that of the whole motion, below which the function jumps."""
+SHORTEST_SHARE = 1e-9  # Duration of a piece over that of the whole motion, below which the function jumps.
 
 
 @known_keywords

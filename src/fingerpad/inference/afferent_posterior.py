@@ -33,8 +33,7 @@ that of the posteriors seen so far, so that ensembles which still depend on thei
 SMALLEST_MARGIN = 0.01
 """Smallest 1 - u of a start: walkers of a fit that is closer to the threshold at rest start here. [1]"""
 
-N_PREDICTED = 1000
-"""Draws from which the bands of the rates are computed."""
+N_PREDICTED = 1000  # Draws from which the bands of the rates are computed.
 
 _START = identifiable(
     [
@@ -76,8 +75,7 @@ class AfferentPrior:
     fits, the paper's first one with its gains rescaled. See docs/decisions.md#priors.
     """
 
-    resting_share_sd: float = 1.0
-    """Standard deviation of the potential at rest over the threshold. [1]"""
+    resting_share_sd: float = 1.0  # Standard deviation of the potential at rest over the threshold. [1]
     dynamic_gain_per_kpa: float = float(_START[1])
     static_gain_per_kpa_ms: float = float(_START[2])
     time_constant_ms: float = float(_START[3])
@@ -113,10 +111,8 @@ class AfferentPrior:
 class AfferentPosterior:
     """Posterior draws of the four identifiable parameters and of the rates that they predict."""
 
-    chains: Chains
-    """Draws in the coordinates, with their measures of convergence."""
-    four: FloatArray
-    """The same draws as the four identifiable parameters, (n_draws, 4)."""
+    chains: Chains  # Draws in the coordinates, with their measures of convergence.
+    four: FloatArray  # The same draws as the four identifiable parameters, (n_draws, 4).
     rates: dict[str, ResidualDraws]
     """By phase, for some of the draws: predicted rates, new recordings, sigma and length."""
 

@@ -24,11 +24,8 @@ from fingerpad.inference.identifiable import IDENTIFIABLE_NAMES
 from fingerpad.inference.rate_model import AfferentModel, Rates, evaluate_rows
 from fingerpad.neuron.transduction import Drive
 
-BEND = 0.05
-"""Width s over which the rate sets in, relative to the threshold. [1]"""
-
-SAMPLES = 16
-"""Times in each window at which the rate under a constant drive is computed."""
+BEND = 0.05  # Width s over which the rate sets in, relative to the threshold. [1]
+SAMPLES = 16  # Times in each window at which the rate under a constant drive is computed.
 
 
 def constant_drive_rate(
@@ -69,10 +66,8 @@ class ClosedFormModel:
     its derivatives are cheap.
     """
 
-    stimuli: AfferentModel
-    """Drives, windows and refractory period."""
-    bend: float = BEND
-    """Width over which the rate sets in. [1]"""
+    stimuli: AfferentModel  # Drives, windows and refractory period.
+    bend: float = BEND  # Width over which the rate sets in. [1]
 
     @property
     def names(self) -> tuple[str, ...]:

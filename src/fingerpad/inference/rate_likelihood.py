@@ -27,17 +27,13 @@ from fingerpad.core.errors import InputError
 from fingerpad.inference.rate_model import RateModel
 from fingerpad.inference.recordings import PHASES, RateRecordings
 
-INDEPENDENT = 0.0
-"""Length at which residuals are independent. [mm]"""
+INDEPENDENT = 0.0  # Length at which residuals are independent. [mm]
 
 LENGTHS_MM = (INDEPENDENT, 0.2, 0.4, 0.6, 0.9, 1.3, 2.0, 3.0)
 """Correlation lengths of the residuals, from a step of the bar to a receptive field. [mm]"""
 
-DEVIATION_HZ = 10.0
-"""Scale s of the prior of sigma. [spikes/s]"""
-
-PRIOR_OBSERVATIONS = 1.0
-"""Degrees of freedom nu of the prior of sigma."""
+DEVIATION_HZ = 10.0  # Scale s of the prior of sigma. [spikes/s]
+PRIOR_OBSERVATIONS = 1.0  # Degrees of freedom nu of the prior of sigma.
 
 
 @dataclass(frozen=True)
@@ -47,10 +43,8 @@ class CorrelatedResiduals:
     n_residuals: int
     positions_mm: FloatArray | None = None
     """Their places along a line; default: independent residuals, (n_residuals,). [mm]"""
-    lengths_mm: tuple[float, ...] = LENGTHS_MM
-    """Grid of correlation lengths; 0 for independence. [mm]"""
-    deviation: float = DEVIATION_HZ
-    """Scale s of the prior of sigma. [unit of the residuals]"""
+    lengths_mm: tuple[float, ...] = LENGTHS_MM  # Grid of correlation lengths; 0 for independence. [mm]
+    deviation: float = DEVIATION_HZ  # Scale s of the prior of sigma. [unit of the residuals]
     _whitening: FloatArray = field(init=False, repr=False, compare=False)
     _log_weights: FloatArray = field(init=False, repr=False, compare=False)
 
@@ -108,16 +102,12 @@ class CorrelatedResiduals:
 class RateLikelihood:
     """Likelihood of the parameters of a rate model, given the observed rates of one afferent."""
 
-    model: RateModel
-    """Predicts the rates under all stimuli."""
-    recordings: RateRecordings
-    """Observed rates, one row per stimulus."""
+    model: RateModel  # Predicts the rates under all stimuli.
+    recordings: RateRecordings  # Observed rates, one row per stimulus.
     positions_mm: FloatArray | None = None
     """Position of each stimulus along a line; default: independent residuals, (n_stimuli,). [mm]"""
-    lengths_mm: tuple[float, ...] = LENGTHS_MM
-    """Grid of correlation lengths; 0 for independence. [mm]"""
-    deviation_hz: float = DEVIATION_HZ
-    """Scale s of the prior of sigma. [spikes/s]"""
+    lengths_mm: tuple[float, ...] = LENGTHS_MM  # Grid of correlation lengths; 0 for independence. [mm]
+    deviation_hz: float = DEVIATION_HZ  # Scale s of the prior of sigma. [spikes/s]
     _residuals: CorrelatedResiduals = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
@@ -172,10 +162,8 @@ class ResidualDraws:
     predicted_hz: FloatArray
     new_hz: FloatArray
     """Predicted rates, and rates with a random residual, not below 0, (n_points, n_stimuli). [spikes/s]"""
-    deviation_hz: FloatArray
-    """Standard deviation sigma, (n_points,). [spikes/s]"""
-    length_mm: FloatArray
-    """Correlation length of the residuals; 0 if they are independent, (n_points,). [mm]"""
+    deviation_hz: FloatArray  # Standard deviation sigma, (n_points,). [spikes/s]
+    length_mm: FloatArray  # Correlation length of the residuals; 0 if they are independent, (n_points,). [mm]
 
 
 def _whitening(distances_mm: FloatArray, length_mm: float) -> FloatArray:

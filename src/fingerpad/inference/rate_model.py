@@ -27,14 +27,9 @@ from fingerpad.neuron.rate_windows import Windows, check_windows, common_rate_wi
 from fingerpad.neuron.spikes import window_rates_hz
 from fingerpad.neuron.transduction import Drive, drive
 
-Rates = tuple[FloatArray, FloatArray]
-"""Dynamic and static rates, one column per stimulus. [spikes/s]"""
-
-Evaluate = Callable[[FloatArray], Rates]
-"""From one set of parameters (n_parameters,) to rates (n_stimuli,)."""
-
-ROWS_PER_BLOCK = 4
-"""Rows of parameters that a thread evaluates at a time."""
+Rates = tuple[FloatArray, FloatArray]  # Dynamic and static rates, one column per stimulus. [spikes/s]
+Evaluate = Callable[[FloatArray], Rates]  # From one set of parameters (n_parameters,) to rates (n_stimuli,).
+ROWS_PER_BLOCK = 4  # Rows of parameters that a thread evaluates at a time.
 
 
 class RateModel(Protocol):
@@ -232,8 +227,7 @@ class Reparametrised:
 
     model: RateModel
     names: tuple[str, ...]
-    transform: Callable[[FloatArray], FloatArray]
-    """From the new parameters to those of `model`."""
+    transform: Callable[[FloatArray], FloatArray]  # From the new parameters to those of `model`.
 
     @property
     def n_stimuli(self) -> int:

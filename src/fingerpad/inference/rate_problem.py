@@ -22,10 +22,8 @@ class RateProblem:
     Gerling et al. 2014, Eqs. 12-14. The sums run over the chosen stimuli.
     """
 
-    model: RateModel
-    """Predicts the rates under all stimuli, in the order of the recordings."""
-    recordings: RateRecordings
-    """Observed rates. A phase that was not recorded does not enter the score."""
+    model: RateModel  # Predicts the rates under all stimuli, in the order of the recordings.
+    recordings: RateRecordings  # Observed rates. A phase that was not recorded does not enter the score.
     dynamic_weight: float = protocol.DYNAMIC_WEIGHT.value
     static_weight: float = protocol.STATIC_WEIGHT.value
     """Weights of the two phases where both were recorded, Eq. 12. [1]"""

@@ -30,8 +30,7 @@ WEIGHT = 2.0
 FIRST_SPREAD, MOST_EVALUATIONS = 0.3, 600
 """CMA-ES: standard deviation of the first generation in units of the scales, and most evaluations."""
 
-CHANCE = 0.5
-"""Hit rate of an observer of a silent population. [0-1]"""
+CHANCE = 0.5  # Hit rate of an observer of a silent population. [0-1]
 
 
 @dataclass(frozen=True)
@@ -42,14 +41,11 @@ class RatesAndHitRates:
     chosen, so that a cross validation leaves out rates only.
     """
 
-    rates: RateProblem
-    """Recorded rates and the model that predicts them."""
+    rates: RateProblem  # Recorded rates and the model that predicts them.
     hit_rates: Callable[[FloatArray], FloatArray]
     """From the parameters of that model to predicted hit rates (n,). [0-1]"""
-    observed: FloatArray
-    """Hit rates of people, (n,). [0-1]"""
-    weight: float = WEIGHT
-    """Weight w of the squared differences against FSS."""
+    observed: FloatArray  # Hit rates of people, (n,). [0-1]
+    weight: float = WEIGHT  # Weight w of the squared differences against FSS.
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "observed", float_array("observed", self.observed, 1))
@@ -82,13 +78,10 @@ class SphereHitRates:
     model: RateModel
     """Rates, a column per receptor, sphere and position, receptors fastest and positions slowest."""
     n_positions: int
-    n_receptors: int
-    """Sizes; the number of spheres, the standard first, follows."""
-    neighbours: np.ndarray
-    """Pairs of the Gradient Sum, (n_pairs, 2)."""
+    n_receptors: int  # Sizes; the number of spheres, the standard first, follows.
+    neighbours: np.ndarray  # Pairs of the Gradient Sum, (n_pairs, 2).
     noise_sigma: float
-    standard_normals: FloatArray
-    """Common random presentations of the Gradient Sum, (n_draws, n_receptors)."""
+    standard_normals: FloatArray  # Common random presentations of the Gradient Sum, (n_draws, n_receptors).
 
     def __post_init__(self) -> None:
         if self.model.n_stimuli % (self.n_positions * self.n_receptors):
@@ -118,12 +111,9 @@ class ToRatesAndHitRates:
     `RatesAndHitRates`. The scores of the result are FSS of the rates alone.
     """
 
-    hit_rates: SphereHitRates
-    """Predicts hit rates from the paper's six parameters."""
-    observed: FloatArray
-    """Hit rates of people, in the same order, (n,). [0-1]"""
-    seed: int = 0
-    """Of CMA-ES."""
+    hit_rates: SphereHitRates  # Predicts hit rates from the paper's six parameters.
+    observed: FloatArray  # Hit rates of people, in the same order, (n,). [0-1]
+    seed: int = 0  # Of CMA-ES.
     name: str = "rates and hit rates"
 
     def fit(self, problem: Problem, chosen: IntArray) -> Fit:

@@ -19,8 +19,7 @@ from fingerpad.neuron.afferent import PARAMETER_NAMES
 from fingerpad.neuron.rate_windows import Windows
 from fingerpad.neuron.transduction import Drive
 
-OFFSET_NAME = "offset_mm"
-"""Name of the parameter; positive is distal. [mm]"""
+OFFSET_NAME = "offset_mm"  # Name of the parameter; positive is distal. [mm]
 
 
 @dataclass(frozen=True)
@@ -32,8 +31,7 @@ class ReceptorOffset:
 
     offsets_mm: FloatArray
     """Offsets at which the drive is sampled, distal positive, increasing, (n_offsets,). [mm]"""
-    models: Sequence[AfferentModel]
-    """The model at each offset, all with the same stimuli and times."""
+    models: Sequence[AfferentModel]  # The model at each offset, all with the same stimuli and times.
 
     def __post_init__(self) -> None:
         offsets = increasing("offsets_mm", float_array("offsets_mm", self.offsets_mm, 1))

@@ -16,8 +16,7 @@ from fingerpad.core.values import converted
 from fingerpad.neuron.rate_windows import Windows
 from fingerpad.neuron.spikes import RATE_OF
 
-PHASES = ("dynamic", "static")
-"""The ramp and the hold."""
+PHASES = ("dynamic", "static")  # The ramp and the hold.
 
 ROUNDING_MS = 1e-6
 """By how much the duration of a recording may fall short: files count seconds from their start. [ms]"""

@@ -35,11 +35,8 @@ from fingerpad.neuron.rate_windows import Windows
 from fingerpad.neuron.spikes import firing_rate_hz
 from fingerpad.neuron.transduction import Drive
 
-NARROWEST = 1.0e-3
-"""Width below which the threshold is considered hard and log L unbounded."""
-
-SMALLEST_GAIN = 1.0e-6
-"""A fit ends when the predicted gain of log L of a step is at most this."""
+NARROWEST = 1.0e-3  # Width below which the threshold is considered hard and log L unbounded.
+SMALLEST_GAIN = 1.0e-6  # A fit ends when the predicted gain of log L of a step is at most this.
 
 _FIRST_DAMPING, _MOST_DAMPING = 1.0e-3, 1.0e12
 _LONGEST_STEP_OF_LOG_TAU = 1.0
@@ -223,12 +220,9 @@ def soft_spikes(
 class SoftAfferent:
     """Mean rates of an afferent with a soft threshold; a `RateModel` in the five parameters of its spikes."""
 
-    drive: Drive
-    """One column per stimulus."""
-    windows_ms: Windows
-    """Windows of the dynamic and of the static rate. [ms]"""
-    seed: int
-    """Seed of the simulated presentations, the same for all parameters."""
+    drive: Drive  # One column per stimulus.
+    windows_ms: Windows  # Windows of the dynamic and of the static rate. [ms]
+    seed: int  # Seed of the simulated presentations, the same for all parameters.
 
     @property
     def names(self) -> tuple[str, ...]:

@@ -331,8 +331,7 @@ class TimeRescaling:
 
     quantiles: FloatArray
     """1 - exp(-rescaled interval) of each interval, sorted: uniform under the model, (n_spikes,)."""
-    statistic: float
-    """Kolmogorov-Smirnov distance between their distribution and the uniform one."""
+    statistic: float  # Kolmogorov-Smirnov distance between their distribution and the uniform one.
     p_value: float
     """Probability of a larger distance under the true parameters; for fitted ones it is too large."""
 

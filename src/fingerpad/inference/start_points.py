@@ -12,11 +12,8 @@ from fingerpad.inference.identifiable import identifiable, silent_at_rest
 INCREMENT = 0.01
 """Coding increment over the start value; the paper's are "typically two orders of magnitude smaller"."""
 
-LOWEST_SHARE = 0.05
-"""Lower bound of time constant, capacitance and threshold over their start."""
-
-START_WIDTH = 0.5
-"""Width of the threshold over the threshold at the start of fits to spikes. [1]"""
+LOWEST_SHARE = 0.05  # Lower bound of time constant, capacitance and threshold over their start.
+START_WIDTH = 0.5  # Width of the threshold over the threshold at the start of fits to spikes. [1]
 
 
 def printed_starts() -> FloatArray:

@@ -24,11 +24,8 @@ from fingerpad.neuron.afferent import AnyAfferent
 from fingerpad.neuron.rate_windows import Windows, rate_windows_ms
 from fingerpad.neuron.spikes import RATE_OF
 
-LARGEST_FACTOR = 30.0
-"""How far a fitted number may lie from that of the afferent given, as a factor."""
-
-N_STARTS, N_REFINED = 16, 3
-"""Starts that are scored, and starts from which least squares continues."""
+LARGEST_FACTOR = 30.0  # How far a fitted number may lie from that of the afferent given, as a factor.
+N_STARTS, N_REFINED = 16, 3  # Starts that are scored, and starts from which least squares continues.
 
 
 @dataclass(frozen=True)
@@ -70,15 +67,13 @@ class TypedModel:
 class TypedFit:
     """An afferent of any type as it was fitted to recorded rates."""
 
-    afferent: AnyAfferent
-    """With the fitted numbers."""
+    afferent: AnyAfferent  # With the fitted numbers.
     free: tuple[str, ...]
     fss_in_sample: float
     fss_out_of_sample: float
     """Fractional sum of squares of the fit to all stimuli, and its mean over stimuli left out of folds."""
     dynamic_rate_hz: FloatArray
-    static_rate_hz: FloatArray
-    """Rates of the afferent under all stimuli, (n_stimuli,). [spikes/s]"""
+    static_rate_hz: FloatArray  # Rates of the afferent under all stimuli, (n_stimuli,). [spikes/s]
 
 
 def _largest_factor(afferent: AnyAfferent, name: str) -> float:

@@ -26,14 +26,10 @@ from fingerpad.mechanics.materials import has_formulas
 class Sparsity:
     """Block pattern of the tangent, where each element adds to it, and which may add at the same time."""
 
-    row_start: np.ndarray
-    """First block of every block row, (n_nodes + 1,)."""
-    column: np.ndarray
-    """Block column, increasing within a row, (n_blocks,)."""
-    position: np.ndarray
-    """Block to which a pair of element nodes adds, (n_elements, 8, 8)."""
-    diagonal: np.ndarray
-    """Block of each node with itself, (n_nodes,)."""
+    row_start: np.ndarray  # First block of every block row, (n_nodes + 1,).
+    column: np.ndarray  # Block column, increasing within a row, (n_blocks,).
+    position: np.ndarray  # Block to which a pair of element nodes adds, (n_elements, 8, 8).
+    diagonal: np.ndarray  # Block of each node with itself, (n_nodes,).
     colours: list[list[Chunk]]
     """Chunks of elements that threads may add up at the same time, see `coloured_chunks`."""
 

@@ -32,8 +32,7 @@ from fingerpad.mechanics.element import N_NODES, N_POINTS, strain_changes, take_
 from fingerpad.mechanics.materials import MaterialTable
 from fingerpad.mechanics.viscoelastic import N_STRESSES, InstantaneousState, StressHistory, flat
 
-FEW_STEPS = 3
-"""Points of a phase below which a cubic cannot be drawn and straight lines take its place."""
+FEW_STEPS = 3  # Points of a phase below which a cubic cannot be drawn and straight lines take its place.
 
 _SERIES_BELOW = 1e-2
 _GAUSS_POINTS, _GAUSS_WEIGHTS = np.polynomial.legendre.leggauss(3)
@@ -43,16 +42,11 @@ _GAUSS_POINTS, _GAUSS_WEIGHTS = np.polynomial.legendre.leggauss(3)
 class EnergyBalance:
     """Energies over time, of the whole body also when half of it is solved."""
 
-    times_ms: FloatArray
-    """From 0, the unloaded state, (n_times,). [ms]"""
-    external_uj: FloatArray
-    """Work of the indenter since then, (n_times,). [µJ]"""
-    stored_uj: FloatArray
-    """Energy in the springs of the tissue, (n_times,). [µJ]"""
-    dissipated_uj: FloatArray
-    """Energy that relaxation and friction have turned into heat, (n_times,). [µJ]"""
-    contact_uj: FloatArray
-    """Energy in the springs of the contact's penalty, (n_times,). [µJ]"""
+    times_ms: FloatArray  # From 0, the unloaded state, (n_times,). [ms]
+    external_uj: FloatArray  # Work of the indenter since then, (n_times,). [µJ]
+    stored_uj: FloatArray  # Energy in the springs of the tissue, (n_times,). [µJ]
+    dissipated_uj: FloatArray  # Energy that relaxation and friction have turned into heat, (n_times,). [µJ]
+    contact_uj: FloatArray  # Energy in the springs of the contact's penalty, (n_times,). [µJ]
 
     @property
     def imbalance_uj(self) -> FloatArray:
@@ -85,19 +79,15 @@ class Entry(NamedTuple):
     dissipated_uj: float = 0.0
     contact_uj: float = 0.0
     """As in `EnergyBalance`; dissipated and contact are sums over all steps up to here. [µJ]"""
-    lost_uj: float = 0.0
-    """What would be stored if nothing had relaxed, less what is. [µJ]"""
+    lost_uj: float = 0.0  # What would be stored if nothing had relaxed, less what is. [µJ]
 
 
 class TissueEnergies(NamedTuple):
     """Energies of the body as it is meshed at the end of a step."""
 
-    stored_uj: float
-    """Held by its springs. [µJ]"""
-    instantaneous_uj: float
-    """What they would hold if nothing had relaxed, see `instantaneous_energy`. [µJ]"""
-    relaxed_work_uj: float
-    """See `relaxed_work`; of this step. [µJ]"""
+    stored_uj: float  # Held by its springs. [µJ]
+    instantaneous_uj: float  # What they would hold if nothing had relaxed, see `instantaneous_energy`. [µJ]
+    relaxed_work_uj: float  # See `relaxed_work`; of this step. [µJ]
 
 
 def energy_balance(entries: Sequence[Entry], kinks_ms: Sequence[float]) -> EnergyBalance:
@@ -163,8 +153,7 @@ class MeanRelaxed:
 
     new: FloatArray
     old: FloatArray
-    kept: FloatArray
-    """Shares g_i times `new` and `old`, and `kept`, (n_layers, n_terms)."""
+    kept: FloatArray  # Shares g_i times `new` and `old`, and `kept`, (n_layers, n_terms).
 
     @classmethod
     def of(cls, table: MaterialTable, step_ms: float) -> MeanRelaxed:

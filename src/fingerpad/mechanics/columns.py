@@ -35,11 +35,8 @@ from fingerpad.core.numba_internals import small_single_array
 
 SingleArray = NDArray[np.float32]
 
-LARGEST = 32767
-"""The diagonal of Q: the largest number of 16 bits."""
-
-LANES = 8
-"""Depths are padded to a multiple of this: the single-precision numbers of one 256-bit register."""
+LARGEST = 32767  # The diagonal of Q: the largest number of 16 bits.
+LANES = 8  # Depths are padded to a multiple of this: the single-precision numbers of one 256-bit register.
 
 MOST_LANES = 512
 """Padded nodes of the deepest column that kernels take: they keep numbers of one on the stack."""
@@ -49,8 +46,7 @@ MOST_LANES = 512
 class ColumnGraph:
     """Which columns are neighbours."""
 
-    start: np.ndarray
-    """First pair of every column, (n_columns + 1,)."""
+    start: np.ndarray  # First pair of every column, (n_columns + 1,).
     neighbour: np.ndarray
     """The other column, increasing within a column; a column is its own neighbour, (n_pairs,)."""
 

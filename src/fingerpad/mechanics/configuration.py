@@ -19,8 +19,7 @@ from fingerpad.mechanics.materials import MaterialTable
 from fingerpad.mechanics.mixed import Pressures, exchange_pressure
 from fingerpad.mechanics.viscoelastic import StepCoefficients
 
-SMALLEST_FORCE_MN = 1e-6
-"""Below it residuals are no longer taken relative to the force of contact. [mN]"""
+SMALLEST_FORCE_MN = 1e-6  # Below it residuals are no longer taken relative to the force of contact. [mN]
 
 LEAST_SHARE_OF_FORCE = 1e-3
 """Least force that residuals are compared to, over the largest force of the press so far."""
@@ -37,14 +36,11 @@ CURVATURE_BELOW_RESIDUAL = 0.1
 class Body:
     """The discretised tissue with what its equations need."""
 
-    mesh: Mesh
-    """Nodes, bricks and node sets."""
+    mesh: Mesh  # Nodes, bricks and node sets.
     table: MaterialTable
     sparsity: Sparsity
-    free: np.ndarray
-    """Degrees of freedom that move, (n_free,)."""
-    is_mixed: bool = False
-    """Whether Newton's method treats pressure as an unknown of its own (see `mixed`)."""
+    free: np.ndarray  # Degrees of freedom that move, (n_free,).
+    is_mixed: bool = False  # Whether Newton's method treats pressure as an unknown of its own (see `mixed`).
 
 
 @dataclass(frozen=True)
@@ -55,8 +51,7 @@ class Reached:
     more than round-off allows, so these are the least that a tolerance refers to.
     """
 
-    force_mn: float = 0.0
-    """Largest contact force on the body as it is meshed. [mN]"""
+    force_mn: float = 0.0  # Largest contact force on the body as it is meshed. [mN]
     depth_mm: float = 0.0
 
     @property
@@ -83,20 +78,16 @@ class Load:
     contact: Contact
     depth_mm: float
     """How far it has advanced since first touch; under a given force, where its search begins. [mm]"""
-    step: StepCoefficients
-    """Relaxation coefficients of the step."""
-    carried: FloatArray
-    """H, the history that the step starts from, (n_elements, 8, 6). [kPa]"""
+    step: StepCoefficients  # Relaxation coefficients of the step.
+    carried: FloatArray  # H, the history that the step starts from, (n_elements, 8, 6). [kPa]
     force_mn: float | None = None
     """Force along the indenter's axis on the body as it is meshed; the depth is then found. [mN]"""
     anchors: Anchors | None = None
     """Where the skin holds on to the indenter at the start of the step; without friction nothing."""
     pressure_kpa: FloatArray | None = None
     """Pressures at the start of the step, for a mixed method, (n_elements,). [kPa]"""
-    reached: Reached = Reached()
-    """Largest force and depth before the step."""
-    pressed_before: np.ndarray | None = None
-    """Points that were pressed before the step, (n_points,)."""
+    reached: Reached = Reached()  # Largest force and depth before the step.
+    pressed_before: np.ndarray | None = None  # Points that were pressed before the step, (n_points,).
 
     def force_scale_mn(self, force_mn: float) -> float:
         """Force to which a force that is out of balance is compared. [mN]"""
@@ -111,10 +102,8 @@ class Balance:
     is held along x by the indenter; these two count as supports in the direction that they hold.
     """
 
-    reaction_mn: FloatArray
-    """Force of the body on bone and nail, (3,). [mN]"""
-    nail_mn: FloatArray
-    """Its part on the nail, (3,). [mN]"""
+    reaction_mn: FloatArray  # Force of the body on bone and nail, (3,). [mN]
+    nail_mn: FloatArray  # Its part on the nail, (3,). [mN]
     imbalance: float
     """Contact force minus the force on all supports, over the contact force along the indenter's axis."""
 
@@ -123,8 +112,7 @@ class Balance:
 class Lagging:
     """What lags behind Newton's method and is renewed between its runs."""
 
-    multipliers_mn: FloatArray
-    """Normal contact forces of earlier augmentations, (n_points,). [mN]"""
+    multipliers_mn: FloatArray  # Normal contact forces of earlier augmentations, (n_points,). [mN]
     anchors: Anchors | None = None
     """Where the skin holds on to the indenter, and how strongly; without friction nothing."""
 
@@ -134,28 +122,19 @@ class Configuration:
     """A trial configuration; its tangent is in the blocks that `evaluate` was given."""
 
     displacement_mm: FloatArray
-    depth_mm: float
-    """How far the indenter has advanced. [mm]"""
-    positions_mm: FloatArray
-    """Where the points are that may touch, (n_points, 3). [mm]"""
+    depth_mm: float  # How far the indenter has advanced. [mm]
+    positions_mm: FloatArray  # Where the points are that may touch, (n_points, 3). [mm]
     contact: ContactState
-    contact_stiffness: FloatArray
-    """Its part of the tangent, (n_points, 3, 3). [mN/mm]"""
-    potential_uj: float
-    """Incremental potential, NaN if an element is turned inside out. [µJ]"""
+    contact_stiffness: FloatArray  # Its part of the tangent, (n_points, 3, 3). [mN/mm]
+    potential_uj: float  # Incremental potential, NaN if an element is turned inside out. [µJ]
     out_of_balance_mn: FloatArray
     """Contact forces minus internal forces; on held nodes, what supports take, (n_nodes, 3). [mN]"""
-    residual_mn: FloatArray
-    """The same of the free degrees of freedom, (n_free,). [mN]"""
-    residual_norm_mn: float
-    """Norm of the residual, infinite if an element is turned inside out. [mN]"""
-    relative_residual: float
-    """This norm over the contact force."""
+    residual_mn: FloatArray  # The same of the free degrees of freedom, (n_free,). [mN]
+    residual_norm_mn: float  # Norm of the residual, infinite if an element is turned inside out. [mN]
+    relative_residual: float  # This norm over the contact force.
     has_tangent: bool
-    is_curved: bool
-    """Whether the indenter's curvature is part of it."""
-    pressures: Pressures | None = None
-    """Of the elements, for a mixed method."""
+    is_curved: bool  # Whether the indenter's curvature is part of it.
+    pressures: Pressures | None = None  # Of the elements, for a mixed method.
 
     @property
     def whole(self) -> bool:

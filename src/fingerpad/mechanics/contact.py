@@ -43,12 +43,9 @@ class Middles:
 
     corners: IntArray
     """Nodes whose mean a middle is: those of a facet, or both ends of an edge twice, (n, 4)."""
-    blocks: IntArray
-    """Block of the tangent of each pair of these nodes, (n, 4, 4)."""
-    area_mm2: FloatArray
-    """Undeformed area that belongs to each middle, (n,). [mm²]"""
-    sag_mm: float
-    """How deep a middle lies within the indenter before it is pushed out. [mm]"""
+    blocks: IntArray  # Block of the tangent of each pair of these nodes, (n, 4, 4).
+    area_mm2: FloatArray  # Undeformed area that belongs to each middle, (n,). [mm²]
+    sag_mm: float  # How deep a middle lies within the indenter before it is pushed out. [mm]
 
     @classmethod
     def none(cls) -> Middles:
@@ -91,10 +88,8 @@ CURVATURE_STEP_MM = 1e-5
 class Placement:
     """Where an indenter stands and which way it presses."""
 
-    origin_mm: FloatArray
-    """Position of the indenter's tip at first touch, (3,). [mm]"""
-    rotation: FloatArray
-    """Columns are the indenter's x, y and z axes in the finger's frame, (3, 3)."""
+    origin_mm: FloatArray  # Position of the indenter's tip at first touch, (3,). [mm]
+    rotation: FloatArray  # Columns are the indenter's x, y and z axes in the finger's frame, (3, 3).
     pressing: FloatArray | None = None
     """Unit direction of pressing; by default the indenter's y axis, as it is until it tilts, (3,)."""
 
@@ -162,20 +157,14 @@ def check_friction(friction: float, indenter: Indenter) -> float:
 class ContactState:
     """Contact at one configuration."""
 
-    gap_mm: FloatArray
-    """Signed gap of every point; of a middle, with the sag that it may have, (n,). [mm]"""
-    normal: FloatArray
-    """Outward normal of the indenter at every point, (n, 3)."""
-    pressed_mn: FloatArray
-    """lambda, the normal force on each point, (n,). [mN]"""
-    force_mn: FloatArray
-    """Whole force of the indenter on each point: lambda n and friction, (n, 3). [mN]"""
+    gap_mm: FloatArray  # Signed gap of every point; of a middle, with the sag that it may have, (n,). [mm]
+    normal: FloatArray  # Outward normal of the indenter at every point, (n, 3).
+    pressed_mn: FloatArray  # lambda, the normal force on each point, (n,). [mN]
+    force_mn: FloatArray  # Whole force of the indenter on each point: lambda n and friction, (n, 3). [mN]
     stiffness: FloatArray
     """epsilon A n n' in contact and that of friction, without the indenter's curvature, (n, 3, 3). [mN/mm]"""
-    potential: float
-    """Energy of the penalty and of friction. [µJ]"""
-    friction: Friction | None = None
-    """Friction in the indenter's frame, if there is any."""
+    potential: float  # Energy of the penalty and of friction. [µJ]
+    friction: Friction | None = None  # Friction in the indenter's frame, if there is any.
 
     @property
     def friction_mn(self) -> FloatArray:
@@ -200,20 +189,13 @@ class Contact:
     """Skin that may touch one placed indenter."""
 
     indenter: Indenter
-    placement: Placement
-    """Where it stands at first touch."""
-    nodes: np.ndarray
-    """Candidate nodes, the first of the points, (n_nodes,)."""
-    area_mm2: FloatArray
-    """Their tributary areas, (n_nodes,). [mm²]"""
-    penalty: float = PENALTY_KPA_PER_MM
-    """epsilon. [kPa/mm]"""
-    friction: float = 0.0
-    """mu, Coulomb's coefficient."""
-    stick_penalty: float = PENALTY_KPA_PER_MM
-    """Stiffness per area of skin that sticks. [kPa/mm]"""
-    middles: Middles = field(default_factory=Middles.none)
-    """The other points; none by default."""
+    placement: Placement  # Where it stands at first touch.
+    nodes: np.ndarray  # Candidate nodes, the first of the points, (n_nodes,).
+    area_mm2: FloatArray  # Their tributary areas, (n_nodes,). [mm²]
+    penalty: float = PENALTY_KPA_PER_MM  # epsilon. [kPa/mm]
+    friction: float = 0.0  # mu, Coulomb's coefficient.
+    stick_penalty: float = PENALTY_KPA_PER_MM  # Stiffness per area of skin that sticks. [kPa/mm]
+    middles: Middles = field(default_factory=Middles.none)  # The other points; none by default.
 
     @property
     def stiffness(self) -> FloatArray:

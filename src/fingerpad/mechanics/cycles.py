@@ -33,8 +33,7 @@ from fingerpad.mechanics.viscoelastic import StressHistory
 if TYPE_CHECKING:
     from fingerpad.mechanics.press import _Moment as Moment
 
-SOLVED_FIRST = 3
-"""Cycles that are solved before the first gap: contact and shape settle in them."""
+SOLVED_FIRST = 3  # Cycles that are solved before the first gap: contact and shape settle in them.
 
 FIRST_GAP, LENGTHEN_GAP = 5, 4.0
 """Periods from the last of them to the next solved cycle, and the most by which the next gap is longer."""
@@ -53,8 +52,7 @@ NOT_BLENDED = frozenset({
 class PronyCycle:
     """Relaxation over equal cycles, for each branch and element."""
 
-    period_over_tau: FloatArray
-    """Period over relaxation time, (n_terms, n_elements, 1, 1)."""
+    period_over_tau: FloatArray  # Period over relaxation time, (n_terms, n_elements, 1, 1).
 
     @classmethod
     def of(cls, table: MaterialTable, layer: np.ndarray, period_ms: float) -> PronyCycle:
@@ -128,16 +126,12 @@ class CycleJumps:
 
     times_ms: FloatArray
     """Times to solve at in each cycle; its last one is its end, (n_cycles, n_steps). [ms]"""
-    tolerance: float
-    """Largest error of SED by what is not solved, over the largest SED."""
-    where: np.ndarray
-    """Elements that count for it."""
+    tolerance: float  # Largest error of SED by what is not solved, over the largest SED.
+    where: np.ndarray  # Elements that count for it.
     table: MaterialTable
-    layer: np.ndarray
-    """Row of the table of each element, (n_elements,)."""
+    layer: np.ndarray  # Row of the table of each element, (n_elements,).
     step: Step[Moment]
-    stop: Stop[Moment]
-    """Solve a step; make the final error, as in `steps_at`."""
+    stop: Stop[Moment]  # Solve a step; make the final error, as in `steps_at`.
 
     def moments(self, start: Moment) -> Iterator[Moment]:
         count, gap = len(self.times_ms), 1

@@ -47,10 +47,8 @@ from fingerpad.mechanics.tensors import (
 
 N_NODES = 8
 N_POINTS = 8
-N_ROWS = 9
-"""Rows of the product that gives the tangent: the points, and the pressure of the element."""
-N_COLUMNS = 48
-"""Numbers of a row of the packed tangent, six pairs of directions times eight nodes."""
+N_ROWS = 9  # Rows of the product that gives the tangent: the points, and the pressure of the element.
+N_COLUMNS = 48  # Numbers of a row of the packed tangent, six pairs of directions times eight nodes.
 WITH_VOLUME = SECOND[:3, 3].copy()
 
 

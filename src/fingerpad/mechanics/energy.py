@@ -39,11 +39,8 @@ MOST_OPERATIONS = 200
 LONGEST_FORMULA = 4000
 
 VARIABLE, ADD, SUBTRACT, MULTIPLY, DIVIDE, SCALE, SHIFT, POWER, LOG, EXP = range(10)
-OPERATION_SIZE = 4
-"""Numbers per operation: its code, the results it takes (left, right) and a constant."""
-
-CARRIED = 15
-"""A value, its gradient (4) and the upper triangle of its Hessian (10)."""
+OPERATION_SIZE = 4  # Numbers per operation: its code, the results it takes (left, right) and a constant.
+CARRIED = 15  # A value, its gradient (4) and the upper triangle of its Hessian (10).
 
 ROW = np.array([0, 0, 0, 0, 1, 1, 1, 2, 2, 3])
 COLUMN = np.array([0, 1, 2, 3, 1, 2, 3, 2, 3, 3])

@@ -58,8 +58,7 @@ class ElementFields:
     elements: np.ndarray
     gradient: FloatArray
     """Mean deformation gradient, its determinant the dilatation, (n_times, n_elements, 3, 3)."""
-    stress_kpa: FloatArray
-    """Cauchy stress, mean over the present volume, (n_times, n_elements, 6). [kPa]"""
+    stress_kpa: FloatArray  # Cauchy stress, mean over the present volume, (n_times, n_elements, 6). [kPa]
     stored_kpa: FloatArray
     instantaneous_kpa: FloatArray
     work_kpa: FloatArray
@@ -149,8 +148,7 @@ class FieldState:
     convected_kpa: FloatArray
     """S0 - sum S_i, the relaxing stress in the convected frame, (n_elements, 8, 6). [kPa]"""
     pressure_kpa: FloatArray
-    dilatation: FloatArray
-    """U'(Jbar) and Jbar, (n_elements,). [kPa, -]"""
+    dilatation: FloatArray  # U'(Jbar) and Jbar, (n_elements,). [kPa, -]
 
     @classmethod
     def unloaded(cls, n_nodes: int, n_elements: int) -> FieldState:
@@ -173,11 +171,9 @@ class Watched:
     """Elements whose fields are computed during an indentation."""
 
     elements: np.ndarray
-    nodes_mm: FloatArray
-    """Reference nodes of the whole mesh, (n_nodes, 3). [mm]"""
+    nodes_mm: FloatArray  # Reference nodes of the whole mesh, (n_nodes, 3). [mm]
     corners: np.ndarray
-    layer: np.ndarray
-    """Their row of the material table, (n_elements,)."""
+    layer: np.ndarray  # Their row of the material table, (n_elements,).
     table: MaterialTable
 
     def after(
@@ -286,8 +282,7 @@ def _isochoric_work(  # type: ignore[no-untyped-def]
         work[e] = total / volume
 
 
-LARGEST_RATIO = 1e6
-"""Largest s; the contact ends within 1e-12 of the distance there."""
+LARGEST_RATIO = 1e6  # Largest s; the contact ends within 1e-12 of the distance there.
 
 SHARE_BESIDE = 0.5
 """Share of the distance to a node that the indenter cannot touch: half, as in a node's tributary area."""
@@ -299,8 +294,7 @@ class SkinContact:
 
     pressure_kpa: FloatArray
     """Normal force on each of `mesh.skin_nodes` over its present area, (n_times, n_skin_nodes). [kPa]"""
-    shear_kpa: FloatArray
-    """Friction on each node over that area, (n_times, n_skin_nodes, 3). [kPa]"""
+    shear_kpa: FloatArray  # Friction on each node over that area, (n_times, n_skin_nodes, 3). [kPa]
     slip_mm: FloatArray
     """How far each node in contact has slid over the indenter since it came to touch, with friction,
     (n_times, n_skin_nodes). [mm]"""

@@ -26,8 +26,7 @@ import numpy as np
 
 from fingerpad.core.checks import FloatArray
 
-LEAST_SECANT = 1e-6
-"""Size below which a combination of secants counts as none, over that of the largest."""
+LEAST_SECANT = 1e-6  # Size below which a combination of secants counts as none, over that of the largest.
 
 MOST_EXPECTED = 4.0
 """Largest factor by which the last step of free skin is extended to where it is expected next."""
@@ -37,14 +36,11 @@ MOST_EXPECTED = 4.0
 class Approach:
     """Skin and indenter at the end of the step before, and how they moved in it."""
 
-    local_mm: FloatArray
-    """Nodes in the indenter's frame of then, (n, 3). [mm]"""
+    local_mm: FloatArray  # Nodes in the indenter's frame of then, (n, 3). [mm]
     skin_mm: FloatArray
-    skin_step_mm: FloatArray
-    """Nodes in the finger's frame, and their motion in that step, (n, 3). [mm]"""
+    skin_step_mm: FloatArray  # Nodes in the finger's frame, and their motion in that step, (n, 3). [mm]
     tip_mm: FloatArray
-    tip_step_mm: FloatArray
-    """The indenter's tip, and its motion, (3,). [mm]"""
+    tip_step_mm: FloatArray  # The indenter's tip, and its motion, (3,). [mm]
 
     @classmethod
     def at_rest(cls, local_mm: FloatArray, skin_mm: FloatArray, tip_mm: FloatArray) -> Approach:
@@ -70,18 +66,12 @@ class Approach:
 class Anchors:
     """Where each node of skin holds on to the indenter, and how strongly."""
 
-    anchor_mm: FloatArray
-    """a, in the indenter's frame; meaningless where a node is not held, (n, 3). [mm]"""
-    normal: FloatArray
-    """n, in the indenter's frame, (n, 3)."""
-    limit_mn: FloatArray
-    """L, the largest friction, (n,). [mN]"""
-    pull_mn: FloatArray
-    """t, where the search for the pull begins, see `friction`, (n, 3). [mN]"""
-    held: np.ndarray
-    """Nodes that were in contact at the end of the step before, (n,)."""
-    approach: Approach
-    """Motion of skin and indenter in the step before."""
+    anchor_mm: FloatArray  # a, in the indenter's frame; meaningless where a node is not held, (n, 3). [mm]
+    normal: FloatArray  # n, in the indenter's frame, (n, 3).
+    limit_mn: FloatArray  # L, the largest friction, (n,). [mN]
+    pull_mn: FloatArray  # t, where the search for the pull begins, see `friction`, (n, 3). [mN]
+    held: np.ndarray  # Nodes that were in contact at the end of the step before, (n,).
+    approach: Approach  # Motion of skin and indenter in the step before.
 
     @classmethod
     def none_held(cls, approach: Approach) -> Anchors:
@@ -112,14 +102,12 @@ class Anchors:
 class Friction:
     """Friction at one configuration, in the indenter's frame."""
 
-    force_mn: FloatArray
-    """Friction on each node, (n, 3). [mN]"""
+    force_mn: FloatArray  # Friction on each node, (n, 3). [mN]
     stiffness: FloatArray
     """Its tangent, or a stiffer one far from the solution; no negative eigenvalues, (n, 3, 3). [mN/mm]"""
     potential: float
     slip_mm: FloatArray
-    pull_mn: FloatArray
-    """t, the pull towards which the linearised law leads, within the limit, (n, 3). [mN]"""
+    pull_mn: FloatArray  # t, the pull towards which the linearised law leads, within the limit, (n, 3). [mN]
 
 
 def friction(

@@ -32,8 +32,7 @@ from fingerpad.mechanics.materials import Material
 LARGEST_SHARE = 0.1
 """Force that accelerates the tissue over the elastic force, above which a touch warns or has a caveat."""
 
-LEAST_WAY = 1e-3
-"""Way over the largest depth or force of a motion below which it counts as noise."""
+LEAST_WAY = 1e-3  # Way over the largest depth or force of a motion below which it counts as noise.
 
 
 def resonance_hz(materials: Sequence[Material], thickness_mm: ArrayLike) -> float:

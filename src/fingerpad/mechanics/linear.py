@@ -35,8 +35,7 @@ docs/decisions.md#linear-solver)."""
 MULTIGRID_NODES = 4_000
 """Smallest mesh for multigrid; for a smaller mesh a factor takes a fraction of a second."""
 
-DIRECT_NODES = 20_000
-"""Largest mesh for a factor, which then takes about 1 GB and 15 s."""
+DIRECT_NODES = 20_000  # Largest mesh for a factor, which then takes about 1 GB and 15 s.
 
 NO_NODES = np.empty(0, dtype=np.int64)
 
@@ -160,8 +159,7 @@ def choose_preconditioner(
 class LinearSolver:
     """Solve with a tangent on the free degrees of freedom, keeping the preconditioner while it serves."""
 
-    approximate: Preconditioner
-    """The tangent's product and approximate inverse."""
+    approximate: Preconditioner  # The tangent's product and approximate inverse.
     renewals: int = field(default=0, init=False)
     iterations: int = field(default=0, init=False)
     _stale: bool = field(default=True, init=False)

@@ -29,8 +29,7 @@ from fingerpad.mechanics.laws import (
 POLYNOMIAL, SPLIT, COUPLED = 0.0, 1.0, 2.0
 """Kinds of law: own kernel; a formula whose volume changes cost energy of their own; any other formula."""
 
-N_COEFFICIENTS = 11
-"""Columns of `MaterialTable.law` before the operations of a formula."""
+N_COEFFICIENTS = 11  # Columns of `MaterialTable.law` before the operations of a formula.
 
 
 def has_formulas(law: FloatArray) -> bool | None:
@@ -279,8 +278,7 @@ class MaterialTable:
     factor from given to instantaneous coefficients and the number of operations; then the operations of a
     formula, (n_layers, 11 + 4 n_operations)."""
     shares: FloatArray
-    times_ms: FloatArray
-    """Prony series, padded with zero shares, (n_layers, n_terms)."""
+    times_ms: FloatArray  # Prony series, padded with zero shares, (n_layers, n_terms).
 
     @classmethod
     def of(cls, materials: Sequence[Material]) -> MaterialTable:
@@ -310,8 +308,7 @@ def _row(material: Material) -> FloatArray:
     return np.concatenate([row, program.ravel()])
 
 
-STABLE_STRETCHES = (0.5, 2.0)
-"""Range in which a material must be stable, or a warning names the stretch."""
+STABLE_STRETCHES = (0.5, 2.0)  # Range in which a material must be stable, or a warning names the stretch.
 
 
 @lru_cache(maxsize=256)

@@ -43,8 +43,7 @@ steps instead of 17 at this ratio, and 21 instead of 116 at 0.4999."""
 class Pressures:
     """Pressure of every element and how it changes with the displacements."""
 
-    pressure_kpa: FloatArray
-    """U'(Jbar); 0 where shape and volume are coupled, (n_elements,). [kPa]"""
+    pressure_kpa: FloatArray  # U'(Jbar); 0 where shape and volume are coupled, (n_elements,). [kPa]
     slope_kpa_per_mm: FloatArray
     """Its derivative by the displacement of each node, (n_elements, 8, 3). [kPa/mm]"""
 

@@ -46,15 +46,13 @@ from fingerpad.mechanics.factors import SuperLuFactor
 MERGED_OVER_FINEST = 4.0
 """Largest distance of two lines that become one step, over the smallest distance on the grid."""
 
-COARSEST_COLUMNS = 60
-"""A grid with fewer columns is not coarsened: its factor costs less than a level."""
+COARSEST_COLUMNS = 60  # A grid with fewer columns is not coarsened: its factor costs less than a level.
 
 FEWEST_COLUMNS = 200
 """Fewest columns of one colour for a thread: starting it takes as long as the work on some tens of
 columns."""
 
-PIECES_PER_THREAD = 2
-"""Pieces that columns are shared out in, for each thread, if there are enough columns."""
+PIECES_PER_THREAD = 2  # Pieces that columns are shared out in, for each thread, if there are enough columns.
 
 ROUNDED_ASPECT = 50.0
 """Largest ratio of the widest step along or around to the smallest step through up to which sweeps round; it
@@ -62,8 +60,7 @@ is smaller on fingers. The coupling across wide and thin elements is a small par
 lost in rounding: at 80 a nearly incompressible block took twice the iterations, at 300 it did not
 converge."""
 
-WORTHWHILE = 0.8
-"""Largest ratio of columns, coarse over fine, for which a level is added."""
+WORTHWHILE = 0.8  # Largest ratio of columns, coarse over fine, for which a level is added.
 
 
 @dataclass(frozen=True)
@@ -75,14 +72,11 @@ class Transfer:
     """Coarse columns around each fine one, and their weights, which add up to 1, (n_fine, 4)."""
     child_start: np.ndarray
     child: np.ndarray
-    child_weight: SingleArray
-    """The same seen from the coarse columns: their fine columns and weights."""
-    graph: ColumnGraph
-    """Neighbours on the coarse grid."""
+    child_weight: SingleArray  # The same seen from the coarse columns: their fine columns and weights.
+    graph: ColumnGraph  # Neighbours on the coarse grid.
     part_start: np.ndarray
     part: np.ndarray
-    part_weight: SingleArray
-    """For each coarse pair of columns the fine pairs whose weighted sum it is."""
+    part_weight: SingleArray  # For each coarse pair of columns the fine pairs whose weighted sum it is.
 
     @classmethod
     def of(cls, graph: ColumnGraph, parent: np.ndarray, weight: FloatArray) -> Transfer:
@@ -147,8 +141,7 @@ class ColumnGrid:
     columns: np.ndarray
     """Column at each crossing; pole and seam of a finger appear repeatedly, (n_along, n_around)."""
     along_mm: FloatArray
-    around_mm: FloatArray
-    """Distances of successive lines, (n_along - 1,). [mm]"""
+    around_mm: FloatArray  # Distances of successive lines, (n_along - 1,). [mm]
 
     @property
     def n_columns(self) -> int:

@@ -72,8 +72,7 @@ together the negative stiffness is a millionth of it, and with a shift of 1e-4 t
 LARGEST_SHIFTS = {True: 0.05, False: 2.0}
 """Largest shifts of a tangent with and without the curvature of the indenter."""
 
-LONGEST_SHIFTED_STEP = 16.0
-"""Largest multiple of a step with a shifted tangent that is tried."""
+LONGEST_SHIFTED_STEP = 16.0  # Largest multiple of a step with a shifted tangent that is tried.
 
 MOST_FULL_AUGMENTATIONS = 5
 """Augmentations after which multipliers change by half: nodes at a rim may alternate between two places."""
@@ -82,10 +81,8 @@ MOST_PLAIN_RENEWALS, SECANTS = 7, 3
 """Renewals of friction after which its limits and normals follow secants, and the number of these: near the
 limit of jamming a plain renewal changes them by as much as the one before, or more."""
 
-AT_REST = 1e-2
-"""Residual over contact force below which the depth is moved towards the given force."""
-DEPTH_FORCING = 1e-3
-"""Tolerance of the linear solve for the body's response to the indenter's displacement."""
+AT_REST = 1e-2  # Residual over contact force below which the depth is moved towards the given force.
+DEPTH_FORCING = 1e-3  # Tolerance of the linear solve for the body's response to the indenter's displacement.
 FIRST_DEPTH_MM, MOST_ADVANCE = 0.01, 4.0
 """Where the search for the depth of a force begins, and the factor by which one step may change it. [mm]"""
 
@@ -95,12 +92,10 @@ FIRST_DEPTH_MM, MOST_ADVANCE = 0.01, 4.0
 class NewtonSettings:
     """When an equilibrium counts as found."""
 
-    residual_tolerance: float = 1e-5
-    """Norm of the out-of-balance nodal forces over the contact force."""
+    residual_tolerance: float = 1e-5  # Norm of the out-of-balance nodal forces over the contact force.
     penetration_tolerance: float = 5e-3
     """Largest distance of pressed skin to the indenter, over the depth: contact is augmented until then."""
-    most_iterations: int = 40
-    """Newton steps before the attempt is given up."""
+    most_iterations: int = 40  # Newton steps before the attempt is given up.
     balance_tolerance: float = 1e-4
     """Difference between the force of the indenter and the reaction of the supports, over that force. A small
     residual does not imply it: many small nodal forces of one sign add up."""
@@ -122,19 +117,15 @@ class Equilibrium:
     """A converged configuration."""
 
     displacement_mm: FloatArray
-    depth_mm: float
-    """How far the indenter has advanced since first touch. [mm]"""
+    depth_mm: float  # How far the indenter has advanced since first touch. [mm]
     contact: ContactState
-    multipliers_mn: FloatArray
-    """Contact multipliers to start the next step from, (n_points,). [mN]"""
+    multipliers_mn: FloatArray  # Contact multipliers to start the next step from, (n_points,). [mN]
     iterations: int
     balance: Balance
-    anchors: Anchors | None = None
-    """Where the skin holds on to the indenter when the next step starts."""
+    anchors: Anchors | None = None  # Where the skin holds on to the indenter when the next step starts.
     slid_mm: FloatArray | None = None
     """How far each point slid over the indenter in this step, with friction, (n_points,). [mm]"""
-    rubbed_uj: float = 0.0
-    """Energy that friction has turned into heat in this step. [µJ]"""
+    rubbed_uj: float = 0.0  # Energy that friction has turned into heat in this step. [µJ]
     pressure_kpa: FloatArray | None = None
     """Pressures for the next step of a mixed method, (n_elements,). [kPa]"""
     was_shifted: bool = False

@@ -61,11 +61,8 @@ from fingerpad.mechanics.viscoelastic import (
 
 LOGGER = logging.getLogger(__name__)
 
-MOST_CONTINUED = 4.0
-"""Largest factor by which the last step of the skin is extended for the next guess."""
-
-LARGEST_DROP = 0.1
-"""Largest share by which the force may fall in a step that drives the indenter deeper."""
+MOST_CONTINUED = 4.0  # Largest factor by which the last step of the skin is extended for the next guess.
+LARGEST_DROP = 0.1  # Largest share by which the force may fall in a step that drives the indenter deeper.
 
 SAME_DIGITS = 9
 """Decimals of depths [mm], forces [mN] and lengths of steps [ms]: the same touch later has the same bits."""
@@ -73,47 +70,36 @@ SAME_DIGITS = 9
 AIR_TOLERANCE_MM = 1e-6
 """Overlap at first touch from which skin counts as touched; a placement has rounding errors. [mm]"""
 
-LIFT_MM = 100.0
-"""How far an indenter without force is lifted while the skin below it is solved. [mm]"""
+LIFT_MM = 100.0  # How far an indenter without force is lifted while the skin below it is solved. [mm]
 
 
 @dataclass(frozen=True)
 class Deformation:
     """What a press did to a body."""
 
-    times_ms: FloatArray
-    """From 0, the unloaded state, (n_times,). [ms]"""
+    times_ms: FloatArray  # From 0, the unloaded state, (n_times,). [ms]
     force_mn: FloatArray
     """Force of the indenter along its axis on the whole body, also if half is solved, (n_times,). [mN]"""
-    displacement_mm: FloatArray
-    """Displacements, (n_times, n_nodes, 3). [mm]"""
-    sed_kpa: FloatArray
-    """Stored strain energy density, element mean, (n_times, n_elements). [kPa]"""
-    depth_mm: FloatArray
-    """How far the indenter has advanced since first touch, (n_times,). [mm]"""
+    displacement_mm: FloatArray  # Displacements, (n_times, n_nodes, 3). [mm]
+    sed_kpa: FloatArray  # Stored strain energy density, element mean, (n_times, n_elements). [kPa]
+    depth_mm: FloatArray  # How far the indenter has advanced since first touch, (n_times,). [mm]
     contact_force_mn: FloatArray
     """Whole force of the indenter on the skin, with friction, of the whole body also when half of it is
     solved, (n_times, 3). [mN]"""
     reaction_mn: FloatArray
     """Force on bone and nail of the whole body, also if half of it is solved, (n_times, 3). [mN]"""
-    nail_reaction_mn: FloatArray
-    """Its part on the nail, (n_times, 3). [mN]"""
+    nail_reaction_mn: FloatArray  # Its part on the nail, (n_times, 3). [mN]
     force_imbalance: float
     """Largest difference of the indenter's force to the reaction of the supports, over that force."""
     stress_kpa: FloatArray
     """Cauchy stress of all elements at the last time, as in `ElementFields`, (n_elements, 6). [kPa]"""
-    fields: ElementFields
-    """Stress, strain and energies over time of the elements that were watched."""
-    contact: SkinContact
-    """Pressure on the skin and area of contact over time."""
-    energy: EnergyBalance
-    """Where the work of the indenter went."""
-    penetration_mm: float
-    """Deepest penetration at any time. [mm]"""
+    fields: ElementFields  # Stress, strain and energies over time of the elements that were watched.
+    contact: SkinContact  # Pressure on the skin and area of contact over time.
+    energy: EnergyBalance  # Where the work of the indenter went.
+    penetration_mm: float  # Deepest penetration at any time. [mm]
     newton_steps: int
     factorisations: int
-    linear_solver: str
-    """Which one was chosen, and why."""
+    linear_solver: str  # Which one was chosen, and why.
 
 
 @dataclass(frozen=True)

@@ -31,8 +31,7 @@ LONGEST_SLIDE = 1.0 / 6
 """Longest way aside of an edge in one step, over its radius. The force on a node rises and falls as it passes
 the edge, and with longer steps the heat of friction there is not found."""
 
-LEAST_PENETRATION = 0.1
-"""Penetration that is accepted at any depth, over the smallest elements."""
+LEAST_PENETRATION = 0.1  # Penetration that is accepted at any depth, over the smallest elements.
 
 SAGS, SAG_OF_WIDTH = (0.125, 0.5), 1.0 / 60
 """Least and largest sag of a facet that follows the body, over the smallest elements, and the sag over the
@@ -94,15 +93,13 @@ def _steps(way_mm: float, longest_mm: float) -> int:
     return max(1, int(np.ceil(way_mm / longest_mm - 1e-9)))
 
 
-MOST_SOLVED = 10
-"""Equal cycles up to which all are solved."""
+MOST_SOLVED = 10  # Equal cycles up to which all are solved.
 
 PENETRATION_SHARE = 0.1
 """Largest penetration over depth, as a share of the tolerance of SED: SED grows as the square of depth or
 faster, and what augmentation leaves open differs from step to step."""
 
-SAME_TIME = 1e-9
-"""Times closer than this, over the end of the motion, are one."""
+SAME_TIME = 1e-9  # Times closer than this, over the end of the motion, are one.
 
 
 @dataclass(frozen=True)

@@ -26,14 +26,9 @@ from fingerpad.core.errors import ConvergenceError
 
 LOGGER = logging.getLogger(__name__)
 
-SMALLEST_CUT = 1.0 / 32
-"""Shortest step that is tried, over the step asked for."""
-
-LENGTHEN_AFTER = 2
-"""Steps in a row that must converge after a cut before their length is doubled."""
-
-SMALLEST_SHARE = 1.0 / 4096
-"""Shortest adaptive step, over the phase that it belongs to."""
+SMALLEST_CUT = 1.0 / 32  # Shortest step that is tried, over the step asked for.
+LENGTHEN_AFTER = 2  # Steps in a row that must converge after a cut before their length is doubled.
+SMALLEST_SHARE = 1.0 / 4096  # Shortest adaptive step, over the phase that it belongs to.
 
 SMOOTH_SHARE = 0.5
 """Share of the tolerance that the estimated error may take. The rest is for kinks of SED within a step, where
@@ -56,8 +51,7 @@ class Moment(Protocol):
 
 
 Reached = TypeVar("Reached", bound=Moment)
-Step = Callable[[Reached, float], Reached]
-"""Solves from a moment to a time [ms]; raises ConvergenceError."""
+Step = Callable[[Reached, float], Reached]  # Solves from a moment to a time [ms]; raises ConvergenceError.
 
 Stop = Callable[[Reached, tuple[str, ...], str], ConvergenceError]
 """Error for a press that gets no further than a moment, from the history of attempts and the last cause."""
@@ -112,8 +106,7 @@ class Phase:
     """A part of the motion at constant speed, within which SED is smooth in time."""
 
     end_ms: float
-    first_ms: float
-    """Length of the first step to try. [ms]"""
+    first_ms: float  # Length of the first step to try. [ms]
     loading: bool
     """Whether SED grows to the end. Errors then are relative to the largest SED expected there, by growth in
     proportion to time: no step is small beside what it has reached from nothing."""

@@ -18,8 +18,7 @@ COLUMN = np.array([0, 1, 2, 1, 2, 2])
 INDEX = np.array([[0, 3, 5], [3, 1, 4], [5, 4, 2]])
 """Rows and columns of the six stored components, and where the nine of a 3x3 tensor stand among them."""
 
-SWEEPS = 12
-"""Sweeps of Jacobi's method; four or five reach round-off."""
+SWEEPS = 12  # Sweeps of Jacobi's method; four or five reach round-off.
 
 WIDEST_ROOT = 5.0
 """Three steps of `power_minus_two_thirds` reach round-off from 1/5 to this; at 8 they err by 6e-11."""

@@ -25,8 +25,7 @@ from fingerpad.geometry.mesh import Mesh
 from fingerpad.mechanics.element import N_NODES, N_POINTS, element_state, relaxing_norms, take_nodes
 from fingerpad.mechanics.materials import MaterialTable, has_formulas
 
-N_STRESSES = 6 * N_POINTS
-"""Numbers of an element's stresses at its points, which lie side by side in memory."""
+N_STRESSES = 6 * N_POINTS  # Numbers of an element's stresses at its points, which lie side by side in memory.
 
 
 def flat(stresses: FloatArray) -> FloatArray:
@@ -38,12 +37,10 @@ def flat(stresses: FloatArray) -> FloatArray:
 class StepCoefficients:
     """Coefficients of one time step, one row per layer."""
 
-    s: FloatArray
-    """1 - sum_i a_i g_i, the factor on the instantaneous energy, (n_layers,)."""
+    s: FloatArray  # 1 - sum_i a_i g_i, the factor on the instantaneous energy, (n_layers,).
     new: FloatArray
     old: FloatArray
-    decay: FloatArray
-    """a_i g_i, b_i g_i and gamma_i, (n_layers, n_terms)."""
+    decay: FloatArray  # a_i g_i, b_i g_i and gamma_i, (n_layers, n_terms).
 
     @classmethod
     def of(cls, table: MaterialTable, step_ms: float) -> StepCoefficients:
@@ -57,8 +54,7 @@ class StepCoefficients:
 class StressHistory:
     """Stress state that a step starts from, at every Gauss point of every element."""
 
-    instantaneous: FloatArray
-    """S0, the instantaneous deviatoric stress, (n_elements, 8, 6). [kPa]"""
+    instantaneous: FloatArray  # S0, the instantaneous deviatoric stress, (n_elements, 8, 6). [kPa]
     relaxed: FloatArray
     """S_i, the stress that each branch has relaxed away, (n_terms, n_elements, 8, 6). [kPa]"""
 

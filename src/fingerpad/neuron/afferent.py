@@ -35,8 +35,7 @@ PARAMETER_NAMES = (
 _SITES_PER_BLOCK = 256
 """Sites that a thread takes through the whole chain at once: their traces stay in the cache."""
 
-_SURELY_SILENT = 1.0 - 1e-9
-"""Share of the rheobase below which round-off cannot elicit a spike."""
+_SURELY_SILENT = 1.0 - 1e-9  # Share of the rheobase below which round-off cannot elicit a spike.
 
 
 class Follows(Protocol):
@@ -145,8 +144,7 @@ class Afferent(metaclass=KnownKeywords):
     ([217.0], [63.0])
     """
 
-    rate_measure: ClassVar[str] = INTERVAL
-    """What its rates are, as of `ResponseMap`: those of Eqs. 6-10."""
+    rate_measure: ClassVar[str] = INTERVAL  # What its rates are, as of `ResponseMap`: those of Eqs. 6-10.
 
     intercept_ma: float = neuron.HUMAN_INTERCEPT.value
     dynamic_gain: float = neuron.HUMAN_DYNAMIC_GAIN.value

@@ -49,19 +49,13 @@ class RapidlyAdapting(metaclass=KnownKeywords):
     threshold: float
     """Band-passed quantity that, if it stayed, would just bring the membrane to its threshold. [kPa, or the
     unit of the quantity]"""
-    corner_hz: float
-    """Corner frequency of the band pass. [Hz]"""
+    corner_hz: float  # Corner frequency of the band pass. [Hz]
     rise: int
-    fall: int
-    """Its powers of the frequency below and above the corner."""
-    retraction: float
-    """Share of the response to a decreasing quantity, 0 to 1. [1]"""
-    membrane_ms: float
-    """Time constant of the membrane. [ms]"""
-    refractory_ms: float
-    """Refractory period. [ms]"""
-    quantity: str
-    """What is followed, by the names of `SkinResponse.sample`."""
+    fall: int  # Its powers of the frequency below and above the corner.
+    retraction: float  # Share of the response to a decreasing quantity, 0 to 1. [1]
+    membrane_ms: float  # Time constant of the membrane. [ms]
+    refractory_ms: float  # Refractory period. [ms]
+    quantity: str  # What is followed, by the names of `SkinResponse.sample`.
 
     def __post_init__(self) -> None:
         positive("threshold", self.threshold)

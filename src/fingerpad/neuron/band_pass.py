@@ -37,8 +37,7 @@ _MOST_PIECES = 2**20
 class BandPass:
     """A filter that transmits a band of frequencies."""
 
-    corner_hz: float
-    """Corner frequency. [Hz]"""
+    corner_hz: float  # Corner frequency. [Hz]
     rise: int
     fall: int
     """Powers of the frequency by which it increases below the corner and decreases above it. A constant input

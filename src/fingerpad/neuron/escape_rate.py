@@ -31,20 +31,14 @@ from fingerpad.core.values import converted
 from fingerpad.neuron.exact_spikes import potential_at
 from fingerpad.neuron.lif import LeakyIntegrateAndFire, checked_current
 
-ESCAPE_TIME_MS = 1.0
-"""Mean time to a spike at a potential equal to the threshold, tau_e: a convention. [ms]"""
-
-_TRAINS_PER_BLOCK = 32
-"""Trains that one thread simulates at a time."""
+ESCAPE_TIME_MS = 1.0  # Mean time to a spike at a potential equal to the threshold, tau_e: a convention. [ms]
+_TRAINS_PER_BLOCK = 32  # Trains that one thread simulates at a time.
 
 _ESCAPE = int(Purpose.ESCAPE)
 _NODES = tuple(0.5 + 0.5 * np.polynomial.legendre.leggauss(5)[0])
 _WEIGHTS = tuple(0.5 * np.polynomial.legendre.leggauss(5)[1])
-_LONGEST_PANEL = 0.5
-"""Largest length of a panel over tau: the potential is too curved over longer ones."""
-
-_HIGHEST_STEP = 1.0
-"""Largest change of the log hazard over one panel: the quadrature error is then 1e-9."""
+_LONGEST_PANEL = 0.5  # Largest length of a panel over tau: the potential is too curved over longer ones.
+_HIGHEST_STEP = 1.0  # Largest change of the log hazard over one panel: the quadrature error is then 1e-9.
 
 _NEGLIGIBLE = -60.0
 """Log hazard below which a panel is skipped: exp(-60)/tau_e practically never elicits a spike."""

@@ -12,11 +12,8 @@ from fingerpad.core.phases import HOLD, RAMP, Phase, phase_named, ramp_and_hold_
 from fingerpad.core.signals import COUNT, INTERVAL
 from fingerpad.data import protocol
 
-Window = tuple[float, ...]
-"""Start and end. [ms]"""
-
-Windows = tuple[Window, Window]
-"""Windows of the dynamic and of the static rate. [ms]"""
+Window = tuple[float, ...]  # Start and end. [ms]
+Windows = tuple[Window, Window]  # Windows of the dynamic and of the static rate. [ms]
 
 PAPER_WINDOWS_MS: Windows = (protocol.DYNAMIC_WINDOW.value, protocol.STATIC_WINDOW.value)
 """The paper's windows, which belong to its own ramp and hold. [ms]"""

@@ -19,8 +19,7 @@ from fingerpad.core.keywords import known_keywords
 from fingerpad.core.signals import SpikeTrains
 from fingerpad.core.units import MS_PER_S
 
-NO_GROUP = -1
-"""Group number of an afferent that is in no group."""
+NO_GROUP = -1  # Group number of an afferent that is in no group.
 
 _LEAST_SMOOTHING = 1e-6
 _PAIRS_AT_A_TIME = 4_000_000
@@ -79,8 +78,7 @@ class OrderChange:
     """Difference of the order of first spikes between two stimuli."""
 
     both: int
-    either: int
-    """Afferents that fire under both stimuli, and under at least one."""
+    either: int  # Afferents that fire under both stimuli, and under at least one.
     rank_correlation: float
     """Spearman's coefficient of the two orders, over afferents that fire under both: 1 for the same order, -1
     for the reverse. NaN for fewer than two of them, or if all tie under one stimulus. [1]"""
@@ -160,14 +158,10 @@ def _swapped(r: FloatArray, s: FloatArray) -> float:
 class PopulationRate:
     """Spike counts of groups of afferents over time."""
 
-    edges_ms: FloatArray
-    """Edges of the bins, increasing, (n_bins + 1,). [ms]"""
-    spikes: FloatArray
-    """Spikes of each group in each bin; whole numbers unless smoothed, (n_groups, n_bins)."""
-    active: np.ndarray
-    """Afferents of each group with at least one spike in the bin, (n_groups, n_bins)."""
-    n_afferents: np.ndarray
-    """Size of each group, including silent afferents, (n_groups,)."""
+    edges_ms: FloatArray  # Edges of the bins, increasing, (n_bins + 1,). [ms]
+    spikes: FloatArray  # Spikes of each group in each bin; whole numbers unless smoothed, (n_groups, n_bins).
+    active: np.ndarray  # Afferents of each group with at least one spike in the bin, (n_groups, n_bins).
+    n_afferents: np.ndarray  # Size of each group, including silent afferents, (n_groups,).
 
     @property
     def times_ms(self) -> FloatArray:

@@ -28,15 +28,11 @@ from fingerpad.core.phases import Phase
 from fingerpad.core.signals import CURRENT, STORED_ENERGY, Traces
 from fingerpad.core.values import converted
 
-PIECES_PER_INTERVAL = 32
-"""Largest number of linear pieces that replace the cubic between two given times."""
-
-SHORTEST_PIECE_MS = 0.25
-"""Shortest linear piece: shorter intervals are divided into fewer pieces. [ms]"""
+PIECES_PER_INTERVAL = 32  # Largest number of linear pieces that replace the cubic between two given times.
+SHORTEST_PIECE_MS = 0.25  # Shortest linear piece: shorter intervals are divided into fewer pieces. [ms]
 
 
-SAME_COUNT = 1e-6
-"""Share of a piece by which an interval may be too short for one more."""
+SAME_COUNT = 1e-6  # Share of a piece by which an interval may be too short for one more.
 
 
 @dataclass(frozen=True)
@@ -44,8 +40,7 @@ SAME_COUNT = 1e-6
 class Drive:
     """A quantity, and the rate of change of it or of another one, piecewise linear between the same knots."""
 
-    times_ms: FloatArray
-    """Knots; a repeated knot is a jump of the rate, (n_knots,). [ms]"""
+    times_ms: FloatArray  # Knots; a repeated knot is a jump of the rate, (n_knots,). [ms]
     values: FloatArray
     """Quantity of the static term, (n_knots, n_sites). [its unit in `fingerpad.core.units.QUANTITY_UNITS`]"""
     rate_per_ms: FloatArray
@@ -54,8 +49,7 @@ class Drive:
     dynamic_quantity: str = STORED_ENERGY
     static_quantity: str = STORED_ENERGY
     """What the two terms follow, by the names of `SkinResponse.sample`; "stored" is SED."""
-    phases: tuple[Phase, ...] = ()
-    """As of `Traces`."""
+    phases: tuple[Phase, ...] = ()  # As of `Traces`.
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "times_ms", float_array("times_ms", self.times_ms, 1))

@@ -21,8 +21,7 @@ SAMPLES_PER_CYCLE = 40
 CYCLES, COUNTED_CYCLES = 30, 20
 """Cycles of the vibration, and those at its end in which impulses are counted."""
 
-SETTLING_MS = 1000.0
-"""Hold before the vibration. [ms]"""
+SETTLING_MS = 1000.0  # Hold before the vibration. [ms]
 
 _RANGE_UM = (1e-2, 1e4)
 _AMPLITUDES, _ROUNDS = 41, 3

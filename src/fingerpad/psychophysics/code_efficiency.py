@@ -30,11 +30,8 @@ from fingerpad.psychophysics.ideal_observer import (
 from fingerpad.psychophysics.noisy_responses import session_trials
 
 POPULATION_CODES = ("gradient_sum", "euclidean")
-SMALLEST_SPREAD = 1.0
-"""Noise floor s. [spikes/s or ms]"""
-
-EFFICIENCY_TRIALS = 4000
-"""Presentations of either stimulus behind one efficiency."""
+SMALLEST_SPREAD = 1.0  # Noise floor s. [spikes/s or ms]
+EFFICIENCY_TRIALS = 4000  # Presentations of either stimulus behind one efficiency.
 
 LEAST_KNOWN = 10.0
 """Ratio of the ideal observer's d' to its standard error from which on an efficiency is reported."""

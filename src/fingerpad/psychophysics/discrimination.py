@@ -45,8 +45,7 @@ CRITERION_MOVES = ("point", "fraction", "likelihood")
 """Quantity multiplied by a varied criterion: the decision point, the fraction beta, or a likelihood ratio of
 1 between comparison and standard, which then is the criterion in the place of the fraction."""
 
-_NOISES_AT_ONCE = 32
-"""Noises whose sums are held in memory together."""
+_NOISES_AT_ONCE = 32  # Noises whose sums are held in memory together.
 
 MOST_REPETITIONS = 1_000_000
 
@@ -64,8 +63,7 @@ class Experiment:
     of responses from which pairs are sampled (c*)."""
     distributions: int = _REPETITIONS
     """Pairs of mean and standard deviation per sphere, Gradient Sum only (f)."""
-    pairs: int = _REPETITIONS
-    """Distances per sphere behind one hit rate, Euclidean Distance only (f*)."""
+    pairs: int = _REPETITIONS  # Distances per sphere behind one hit rate, Euclidean Distance only (f*).
     hit_rates: int = _REPETITIONS
     """Hit rates per comparison, of which mean and standard deviation are reported (i, h*)."""
     criterion: float = psychophysics.DECISION_CRITERION.value
@@ -74,8 +72,7 @@ class Experiment:
     """Spread of the decision point: for each hit rate it is multiplied by Normal(1, criterion_sigma). Above 0
     this is the paper's derivative of Gradient Sum: one mean and standard deviation per sphere, from
     `presentations_varied` sums; steps (f) and (g) are omitted."""
-    presentations_varied: int = _REPETITIONS_VARIED
-    """Presentations of each sphere when the criterion varies."""
+    presentations_varied: int = _REPETITIONS_VARIED  # Presentations of each sphere when the criterion varies.
     criterion_moves: str = CRITERION_MOVES[0]
     """Quantity multiplied by the varied criterion: the decision point itself, beta, or a likelihood ratio of
     1 that replaces beta."""

@@ -45,10 +45,8 @@ class Sigmoid:
 
     cumulative: Curve
     density: Curve
-    quantile: Curve
-    """S, its derivative and its inverse."""
-    logarithmic: bool = False
-    """Whether the coordinate is ln x instead of x."""
+    quantile: Curve  # S, its derivative and its inverse.
+    logarithmic: bool = False  # Whether the coordinate is ln x instead of x.
 
     def coordinate(self, levels: ArrayLike) -> FloatArray:
         """c(x)."""
@@ -95,8 +93,7 @@ def _gumbel_quantile(share: FloatArray) -> FloatArray:
     return np.log(-np.log1p(-share))
 
 
-_LARGEST_EXPONENT = 50.0
-"""Above it the function is 1 in double precision, and exp would overflow."""
+_LARGEST_EXPONENT = 50.0  # Above it the function is 1 in double precision, and exp would overflow.
 
 SIGMOIDS = {
     "normal": Sigmoid(ndtr, _normal_density, ndtri),
@@ -252,8 +249,7 @@ def checked_levels(levels: ArrayLike, sigmoid: str) -> FloatArray:
 SMALLEST_OVERDISPERSION = 1e-5
 """Below it the beta-binomial formula loses precision and the binomial one is used."""
 
-LARGEST_LEVEL = 1e9
-"""Largest level of a stimulus; the fit loses its digits with far larger numbers."""
+LARGEST_LEVEL = 1e9  # Largest level of a stimulus; the fit loses its digits with far larger numbers.
 
 
 @dataclass(frozen=True)

@@ -27,8 +27,7 @@ PARAMETERS = ("threshold", "width", "guess", "lapse", "overdispersion")
 
 THRESHOLD, WIDTH, GUESS, LAPSE, OVERDISPERSION = range(len(PARAMETERS))
 MOST_STEPS = 200
-LEAST_GAIN = 1e-10
-"""The iteration ends with a predicted gain in the log likelihood below this."""
+LEAST_GAIN = 1e-10  # The iteration ends with a predicted gain in the log likelihood below this.
 
 SMALLEST_DAMPING, LARGEST_DAMPING = 1e-6, 1e12
 _SCALES = (1.0, 1.0, 0.1, 0.01, 1.0)
@@ -50,13 +49,10 @@ class Model:
     """
 
     sigmoid: Sigmoid
-    coordinates: FloatArray
-    """c(x) of the levels, (n_levels,)."""
-    n_trials: FloatArray
-    """Judgements at each, (n_levels,)."""
+    coordinates: FloatArray  # c(x) of the levels, (n_levels,).
+    n_trials: FloatArray  # Judgements at each, (n_levels,).
     lower: FloatArray
-    upper: FloatArray
-    """Bounds in working coordinates; equal where a parameter is given, (5,)."""
+    upper: FloatArray  # Bounds in working coordinates; equal where a parameter is given, (5,).
 
     @property
     def free(self) -> np.ndarray:

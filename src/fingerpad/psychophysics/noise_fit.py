@@ -23,8 +23,7 @@ from fingerpad.psychophysics.discrimination import (
 from fingerpad.psychophysics.encoding import check_neighbours
 from fingerpad.psychophysics.noisy_responses import checked_noise, shared_noise_gradient_sums
 
-NOISE_DRAWS = 4000
-"""Common random presentations in the fit of the noise; its sampling error is one per cent."""
+NOISE_DRAWS = 4000  # Common random presentations in the fit of the noise; its sampling error is one per cent.
 
 _NOISE_SCAN = 33
 
@@ -33,12 +32,9 @@ _NOISE_SCAN = 33
 class NoiseFit:
     """Noise for which predicted hit rates are closest to observed ones."""
 
-    noise_sigma: float
-    """Standard deviation sigma_1 of the multiplicative noise."""
-    hit_rates: FloatArray
-    """Predicted hit rates at that noise, (n_targets,). [0-1]"""
-    root_mean_square_error: float
-    """Of the predicted against the observed hit rates."""
+    noise_sigma: float  # Standard deviation sigma_1 of the multiplicative noise.
+    hit_rates: FloatArray  # Predicted hit rates at that noise, (n_targets,). [0-1]
+    root_mean_square_error: float  # Of the predicted against the observed hit rates.
 
 
 def expected_hit_rates(

@@ -19,8 +19,7 @@ from fingerpad.core.philox import four_normals
 from fingerpad.core.random_streams import LARGEST_SEED, Purpose, normals
 from fingerpad.core.threads import in_blocks
 
-TRIALS_PER_SESSION = 2**32
-"""Trials of one session. Sessions of one seed share no random number."""
+TRIALS_PER_SESSION = 2**32  # Trials of one session. Sessions of one seed share no random number.
 
 LARGEST_SESSION = LARGEST_SEED // TRIALS_PER_SESSION - 1
 

@@ -29,8 +29,7 @@ from fingerpad.psychophysics.maximum_likelihood import (
     maximise_likelihood,
 )
 
-LARGEST_LAPSE = 0.1
-"""Upper bound of a fitted lapse rate."""
+LARGEST_LAPSE = 0.1  # Upper bound of a fitted lapse rate.
 
 LARGEST_GUESS = 0.5
 LARGEST_OVERDISPERSION = 0.5

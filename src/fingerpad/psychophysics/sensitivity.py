@@ -113,8 +113,7 @@ def _rate(of: str, count: int, among: str, total: int, correction: str) -> float
     return k / n
 
 
-LARGEST_D_PRIME = 20.0
-"""Above it the proportion correct is 1 in double precision."""
+LARGEST_D_PRIME = 20.0  # Above it the proportion correct is 1 in double precision.
 
 _REACH, _POINTS = 9.0, 361
 """Of the integral: the error of the trapezium rule on a normal density is below round-off."""

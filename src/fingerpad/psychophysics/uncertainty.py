@@ -51,13 +51,11 @@ COARSE_POINTS = 21
 FINE_POINTS = {1: (401,), 2: (81, 81), 3: (81, 35, 13), 4: (31, 27, 13, 13), 5: (21, 19, 9, 9, 9)}
 """Points of the fine grid along each fitted parameter, by the number of parameters."""
 
-NEGLIGIBLE = 1e-5
-"""Share of its maximum below which a posterior is neglected."""
+NEGLIGIBLE = 1e-5  # Share of its maximum below which a posterior is neglected.
 
 REFINEMENTS = 2
 
-STEEPEST = 0.01
-"""Smallest width of the prior over that of the fit."""
+STEEPEST = 0.01  # Smallest width of the prior over that of the fit.
 
 
 @dataclass(frozen=True)

@@ -30,19 +30,13 @@ from fingerpad.reduction.training import ReducedTraining
 from fingerpad.skin.indentation import Touch
 from fingerpad.skin.sampling import SkinResponse
 
-COVERAGE = 0.95
-"""Part of new touches whose error is to stay within the bound."""
-
-FEWEST_CALIBRATED = 19
-"""Least number of touches from which a bound with this coverage exists."""
-
-CHECKED_SITES = 9
-"""Sites along and across at which errors are measured."""
+COVERAGE = 0.95  # Part of new touches whose error is to stay within the bound.
+FEWEST_CALIBRATED = 19  # Least number of touches from which a bound with this coverage exists.
+CHECKED_SITES = 9  # Sites along and across at which errors are measured.
 
 EXPONENTS = tuple(0.05 * n for n in range(17))
 
-STREAM_MS = 5.0
-"""Longest step of the stream while errors are measured. [ms]"""
+STREAM_MS = 5.0  # Longest step of the stream while errors are measured. [ms]
 
 Solve = Callable[[Sequence[Touch], str], list[SkinResponse]]
 """Solves touches of a named stage, in their order."""

@@ -56,13 +56,10 @@ def weighted(weights: FloatArray, values: FloatArray) -> FloatArray:
 class Axis:
     """One quantity that varies over the range of a reduced touch."""
 
-    name: str
-    """"x_mm", "z_mm", "tilt_deg", or a parameter of the indenter."""
+    name: str  # "x_mm", "z_mm", "tilt_deg", or a parameter of the indenter.
     low: float
-    high: float
-    """Its range; equal if it does not vary."""
-    count: int
-    """Number of Chebyshev's points, 1 if it does not vary."""
+    high: float  # Its range; equal if it does not vary.
+    count: int  # Number of Chebyshev's points, 1 if it does not vary.
 
     def __post_init__(self) -> None:
         finite(f"low of {self.name}", self.low)

@@ -33,20 +33,11 @@ from fingerpad.skin.indentation import Touch
 from fingerpad.skin.sampling import SkinResponse
 from fingerpad.skin.store import value_digest
 
-AT_ONCE, RELAXED = 14, 4
-"""Degree in sqrt(depth) of the response at once and of what relaxes."""
-
-GRID_POINTS = 41
-"""Points of the local fields along and across."""
-
-BEYOND_CONTACT_MM = 3.0
-"""How far the local fields extend beyond the contact. [mm]"""
-
-LOST = 1e-3
-"""Part of the fields that modes may leave out, relative to the largest singular value."""
-
-FINE_PARTS = 20
-"""Parts of a training step in which the filters are integrated."""
+AT_ONCE, RELAXED = 14, 4  # Degree in sqrt(depth) of the response at once and of what relaxes.
+GRID_POINTS = 41  # Points of the local fields along and across.
+BEYOND_CONTACT_MM = 3.0  # How far the local fields extend beyond the contact. [mm]
+LOST = 1e-3  # Part of the fields that modes may leave out, relative to the largest singular value.
+FINE_PARTS = 20  # Parts of a training step in which the filters are integrated.
 
 ERROR_FLOOR = 0.05
 """Part of the largest values of the training that errors are relative to in a touch that is still light."""

@@ -46,8 +46,7 @@ def filter_step(step_ms: float, times_ms: FloatArray) -> tuple[FloatArray, Float
     return 1.0 - average, average - gamma, gamma
 
 
-SHALLOWEST = 0.4
-"""Share of the largest depth up to which what has relaxed counts alike."""
+SHALLOWEST = 0.4  # Share of the largest depth up to which what has relaxed counts alike.
 
 
 def depth_scale(depth_mm: float, deepest_mm: float, exponents: FloatArray) -> FloatArray:
@@ -99,10 +98,8 @@ def slope_changes(levels: FloatArray, deepest_mm: float, values: FloatArray) -> 
 class Springs:
     """Ways of the springs, and what their branches have relaxed."""
 
-    way_mm: FloatArray
-    """u, at most 0 before the first touch of a level, (n_levels,). [mm]"""
-    relaxed_mm: FloatArray
-    """m, (n_branches, n_levels). [mm]"""
+    way_mm: FloatArray  # u, at most 0 before the first touch of a level, (n_levels,). [mm]
+    relaxed_mm: FloatArray  # m, (n_branches, n_levels). [mm]
 
     @classmethod
     def at_rest(cls, n_branches: int) -> Springs:

@@ -24,20 +24,11 @@ from fingerpad.reduction.interpolation import weighted
 from fingerpad.reduction.model import GRID_POINTS, ReducedModel
 from fingerpad.reduction.relaxation import Springs, amplitudes, depth_scale, filter_step, lost
 
-SHEET_MM = 0.8
-"""Distance of the places that tell how far the skin below the contact has relaxed. [mm]"""
-
-FORGETS_MM = 2.0
-"""Way of sliding over which the skin below the contact is replaced. [mm]"""
-
-NEAR_MM = 0.03
-"""How far from the last depth that of a force is looked for first. [mm]"""
-
-CLOSEST_MM = 1e-6
-"""Tolerance of the depth of a force. [mm]"""
-
-MOST_SECANTS = 8
-"""Steps of the secant method before the depth of a force is looked for between two others."""
+SHEET_MM = 0.8  # Distance of the places that tell how far the skin below the contact has relaxed. [mm]
+FORGETS_MM = 2.0  # Way of sliding over which the skin below the contact is replaced. [mm]
+NEAR_MM = 0.03  # How far from the last depth that of a force is looked for first. [mm]
+CLOSEST_MM = 1e-6  # Tolerance of the depth of a force. [mm]
+MOST_SECANTS = 8  # Steps of the secant method before the depth of a force is looked for between two others.
 
 LEAST_APART_MM = 1e-3
 """Distance of the first two depths of the secant method where the last step was shorter. [mm]"""
@@ -240,17 +231,12 @@ class _Press:
     """One step at a pose, to any depth."""
 
     model: ReducedModel
-    totals: FloatArray
-    """Coefficients of force and area at the pose, (n_terms, 2)."""
-    amounts: FloatArray
-    """Those of the modes, (n_terms, n_modes)."""
-    sheet_places: FloatArray
-    """Places of the sheet, in steps of the grid, (n_sheet, 2)."""
+    totals: FloatArray  # Coefficients of force and area at the pose, (n_terms, 2).
+    amounts: FloatArray  # Those of the modes, (n_terms, n_modes).
+    sheet_places: FloatArray  # Places of the sheet, in steps of the grid, (n_sheet, 2).
     springs: Springs
-    sheet: _Filters
-    """State before the step."""
-    kept: float
-    """Part of the skin below the contact that is still there after the way aside."""
+    sheet: _Filters  # State before the step.
+    kept: float  # Part of the skin below the contact that is still there after the way aside.
     step_ms: float
 
     @cached_property

@@ -29,16 +29,14 @@ from fingerpad.mechanics.press_settings import PressSettings
 from fingerpad.reduction.interpolation import Axis
 from fingerpad.skin.indentation import LARGEST_TILT_DEG, Touch, settings_of
 
-DEPTH_SHARES = (0.1, 0.25, 0.45, 0.7, 1.0)
-"""Depths of the presses at one pose, over the largest."""
+DEPTH_SHARES = (0.1, 0.25, 0.45, 0.7, 1.0)  # Depths of the presses at one pose, over the largest.
 
 RAMP_MS = 20.0
 
 RAMP_SHARES = 1.0 - (1.0 - np.arange(1, 13) / 12) ** 1.5
 """Samples of a ramp, as shares of it: denser where no other press at the pose adds to them."""
 
-HOLD_MS = (80.0, 280.0, 980.0, 2000.0)
-"""Times of the samples in the hold, from its start. [ms]"""
+HOLD_MS = (80.0, 280.0, 980.0, 2000.0)  # Times of the samples in the hold, from its start. [ms]
 
 PRESSED_AGAIN_MS = (0.0, 20.0, 1020.0, 1040.0, 1540.0, 1590.0, 1890.0)
 PRESSED_AGAIN = (0.0, 0.45, 0.45, 1.0, 1.0, 0.6, 0.6)
@@ -47,20 +45,14 @@ PRESSED_AGAIN = (0.0, 0.45, 0.45, 1.0, 1.0, 0.6, 0.6)
 MET_MM, MOST_ADVANCES = 1e-9, 1000
 """Gap at which a tilted indenter meets the skin [mm], and steps of the search for it."""
 
-MOVE_MS = 50.0
-"""Time to move aside, and time to approach, both without contact. [ms]"""
-
-CLEARANCE_MM = 0.5
-"""How far above the skin the indenter moves aside. [mm]"""
-
-SPACING = {"x_mm": 1.5, "z_mm": 1.0, "tilt_deg": 10.0}
-"""Largest mean distance of the poses along each axis."""
+MOVE_MS = 50.0  # Time to move aside, and time to approach, both without contact. [ms]
+CLEARANCE_MM = 0.5  # How far above the skin the indenter moves aside. [mm]
+SPACING = {"x_mm": 1.5, "z_mm": 1.0, "tilt_deg": 10.0}  # Largest mean distance of the poses along each axis.
 
 MOST_FIXED_POINTS = 30
 """Steps of the search for the skin on the line of pressing; each gains a digit or more."""
 
-FEWEST_POINTS = 3
-"""Least number of points along an axis that varies."""
+FEWEST_POINTS = 3  # Least number of points along an axis that varies.
 
 
 @dataclass(frozen=True)
@@ -141,14 +133,11 @@ def _pair(name: str, values: tuple[float, float]) -> tuple[float, float]:
 class TrainingPose:
     """One pose, and the presses there."""
 
-    values: tuple[float, ...]
-    """Its place on each axis of the range."""
+    values: tuple[float, ...]  # Its place on each axis of the range.
     first_touch_mm: float
     """Depth at which the indenter meets undeformed skin, from the first touch of the touch. [mm]"""
-    meets_mm: float
-    """The same from the first touch at this place, before the indenter tilts. [mm]"""
-    touches: tuple[Touch, ...]
-    """One per depth."""
+    meets_mm: float  # The same from the first touch at this place, before the indenter tilts. [mm]
+    touches: tuple[Touch, ...]  # One per depth.
 
 
 @dataclass(frozen=True)

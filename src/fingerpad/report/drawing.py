@@ -252,8 +252,7 @@ DRAWINGS: Mapping[str, Mapping[str, Callable[..., None]]] = {
 }
 """Drawings by the name of a result's class, the default first."""
 
-IN_NOTEBOOKS = {"SkinResponse": "section"}
-"""Drawings in notebooks that are not the default."""
+IN_NOTEBOOKS = {"SkinResponse": "section"}  # Drawings in notebooks that are not the default.
 
 
 def plot(result: Displayed, axes: Axes | None = None, what: str | None = None, **options: Any) -> Axes:

@@ -18,8 +18,7 @@ from fingerpad.mechanics.materials import STABLE_STRETCHES
 if TYPE_CHECKING:
     from fingerpad.skin.sampling import SkinResponse
 
-EPIDERMIS = 1
-"""Number of the layer in which receptors are sampled."""
+EPIDERMIS = 1  # Number of the layer in which receptors are sampled.
 
 LARGEST_SED_RATIO = 6.5
 """Largest SED over the shear modulus of the living epidermis that docs/presses.md compares between meshes:
@@ -34,13 +33,10 @@ presses whose meshes docs/presses.md compares. Skin that snaps round an edge wit
 class Caveat:
     """One quantity of a result that lies outside of what was verified."""
 
-    name: str
-    """The quantity, such as "strain"."""
+    name: str  # The quantity, such as "strain".
     value: float
-    limit: float
-    """What it is, and up to where results were verified."""
-    text: str
-    """A sentence with both."""
+    limit: float  # What it is, and up to where results were verified.
+    text: str  # A sentence with both.
 
 
 def strain(skin: SkinResponse) -> Caveat | None:

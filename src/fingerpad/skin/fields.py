@@ -43,24 +43,20 @@ class Times(Enum):
 class Field:
     """One field of an indentation."""
 
-    name: str
-    """Name in `SkinResponse.fields` and in stored files."""
+    name: str  # Name in `SkinResponse.fields` and in stored files.
     unit: str
-    long_name: str
-    """What it is, in words for an axis or a legend."""
+    long_name: str  # What it is, in words for an axis or a legend.
     place: Place
     of: Callable[[Deformation, Mesh], FloatArray]
     """Computes it from a `Deformation` and its mesh: array (n_times, n_places, n_components), without an axis
     of places for `Place.PRESS` and without one of components for a scalar."""
-    components: int = 1
-    """Number of components: 1 of a scalar, 3 of a vector, 6 of a symmetric tensor."""
+    components: int = 1  # Number of components: 1 of a scalar, 3 of a vector, 6 of a symmetric tensor.
     stored: Times = Times.NONE
     """Times at which it is stored. Fields at places are stored in single precision."""
     sampled: str = ""
     """Name under which receptors sample it, see `SkinResponse.sample`; empty if they do not. It needs a
     scalar of elements that is stored at all times and is never negative."""
-    exported: str = ""
-    """Name in VTU files; empty if it is not exported."""
+    exported: str = ""  # Name in VTU files; empty if it is not exported.
 
     def shape(self, mesh: Mesh, n_times: int) -> tuple[int, ...]:
         sizes = {

@@ -18,8 +18,7 @@ from fingerpad.core.errors import InputError
 from fingerpad.geometry.free_mesh import FreeMesh
 
 _NEIGHBOURS = 25
-_OFF_THE_SKIN = 0.25
-"""How far beside the skin a site may lie, over the size of the element there."""
+_OFF_THE_SKIN = 0.25  # How far beside the skin a site may lie, over the size of the element there.
 
 _MOST_STEPS = 20
 _EXACT_MM = 1e-7
@@ -33,10 +32,8 @@ _LARGEST_WEIGHT = 1e3
 class Interpolation:
     """Elements near each site and their weights."""
 
-    elements: IntArray
-    """Rows of the elements around the end organs, (n_sites, n_neighbours)."""
-    weights: FloatArray
-    """Their sum is 1, (n_sites, n_neighbours)."""
+    elements: IntArray  # Rows of the elements around the end organs, (n_sites, n_neighbours).
+    weights: FloatArray  # Their sum is 1, (n_sites, n_neighbours).
 
 
 @dataclass(frozen=True)

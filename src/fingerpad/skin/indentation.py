@@ -46,11 +46,8 @@ STEPS = {"quick": (5, 5), "standard": (8, 8), "paper": (8, 8)}
 
 LARGEST_TILT_DEG = 45.0
 
-LOOKS_FOR_TOUCH = 8
-"""Times per sample of a motion aside at which first touch is looked for."""
-
-FEWEST_ACROSS_BODY = 3
-"""Least number of elements across a body that is narrow along and across the finger."""
+LOOKS_FOR_TOUCH = 8  # Times per sample of a motion aside at which first touch is looked for.
+FEWEST_ACROSS_BODY = 3  # Least number of elements across a body that is narrow along and across the finger.
 
 
 @dataclass(frozen=True)

@@ -27,8 +27,7 @@ from fingerpad.core.regions import Polygon
 from fingerpad.core.values import converted
 from fingerpad.geometry.fingertip import Fingertip
 
-REACH_MM = 4.0
-"""Largest distance from the nail of the unrolled skin. [mm]"""
+REACH_MM = 4.0  # Largest distance from the nail of the unrolled skin. [mm]
 
 _STEP_MM = 0.05
 _FAN_LINES = 48

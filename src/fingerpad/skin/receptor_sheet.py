@@ -154,11 +154,8 @@ def values_and_slopes_at(known: FloatArray, uv: FloatArray, padding: int) -> Flo
 _PADDING = 24
 """Rows and columns beyond the rim. The end of a spline acts 0.27 as strongly one element further on."""
 
-_TIMES_PER_BLOCK = 64
-"""Times that one thread interpolates at once: their padded sheet stays in the cache."""
-
-_SITES_PER_BLOCK = 4096
-"""Sites that one thread locates at once."""
+_TIMES_PER_BLOCK = 64  # Times that one thread interpolates at once: their padded sheet stays in the cache.
+_SITES_PER_BLOCK = 4096  # Sites that one thread locates at once.
 
 _MOST_STEPS = 60
 _LONGEST_STEP = 2.0  # elements
@@ -167,8 +164,7 @@ _BEYOND_RIM = 0.9  # elements past the last middle that are tried; the mesh's bo
 _OFF_THE_SKIN = 0.25
 """How far beside the skin of the mesh a site may lie, over the size of its elements, which cut corners."""
 
-_MIRROR = np.array([1.0, 1.0, -1.0])
-"""What the plane of symmetry, z = 0, does to a point."""
+_MIRROR = np.array([1.0, 1.0, -1.0])  # What the plane of symmetry, z = 0, does to a point.
 
 Equations = Callable[[FloatArray, np.ndarray], tuple[FloatArray, FloatArray]]
 """From (u, v) of some sites (n, 2) and their numbers to the residual (n, 2) and its Jacobian."""

@@ -34,8 +34,7 @@ if TYPE_CHECKING:
     from fingerpad.skin.indentation import Touch
 
 
-_PLACES_KEPT = 4
-"""Sets of sites whose end organs are remembered."""
+_PLACES_KEPT = 4  # Sets of sites whose end organs are remembered.
 
 
 class Receptors(Protocol):

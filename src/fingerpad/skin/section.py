@@ -22,10 +22,8 @@ _ON_PLANE_MM = 1e-9
 class Section:
     """Faces of elements on the plane z = 0, as they lie after the deformation."""
 
-    corners_mm: FloatArray
-    """x and y of the corners, in order around each face, (n_faces, 4, 2). [mm]"""
-    elements: IntArray
-    """The element of each face, (n_faces,)."""
+    corners_mm: FloatArray  # x and y of the corners, in order around each face, (n_faces, 4, 2). [mm]
+    elements: IntArray  # The element of each face, (n_faces,).
     skin_mm: FloatArray
     nail_mm: FloatArray
     bone_mm: FloatArray

@@ -39,8 +39,7 @@ from fingerpad.skin.fields import Place, stored_fields
 from fingerpad.skin.indentation import Touch
 from fingerpad.skin.sampling import SkinResponse
 
-PRESSES = logging.getLogger(__name__)
-"""Tells of each press that is stored."""
+PRESSES = logging.getLogger(__name__)  # Tells of each press that is stored.
 
 _SOLUTION = {
     "force_imbalance": float,
@@ -51,11 +50,8 @@ _SOLUTION = {
 }
 """Content of the stored array "solution", in this order."""
 
-SUFFIX, ASIDE = ".npz", ".damaged"
-"""Ends of the names of stored files, and of those that were set aside."""
-
-KEY, CHECKSUM = "key", "checksum"
-"""Names of the arrays by which a stored file knows itself."""
+SUFFIX, ASIDE = ".npz", ".damaged"  # Ends of the names of stored files, and of those that were set aside.
+KEY, CHECKSUM = "key", "checksum"  # Names of the arrays by which a stored file knows itself.
 
 OnFailed = Callable[[Touch, ConvergenceError | InputError], None]
 """Told of an indentation that cannot be solved, and why."""
@@ -193,11 +189,9 @@ class Store(metaclass=KnownKeywords):
 class StoredFile:
     """A file of a store."""
 
-    path: Path
-    """The file; its name is the key of the indentation."""
+    path: Path  # The file; its name is the key of the indentation.
     size: int
-    written_s: float
-    """When it was written, in seconds since 1970."""
+    written_s: float  # When it was written, in seconds since 1970.
 
     @property
     def fault(self) -> str | None:

@@ -26,8 +26,7 @@ class SurfaceMotion:
     """How the faces of the skin move and deform: arrays (n_times, n_faces), never negative."""
 
     mesh: Mesh
-    displacement_mm: FloatArray
-    """Displacement of `mesh.skin_nodes`, (n_times, n_skin_nodes, 3). [mm]"""
+    displacement_mm: FloatArray  # Displacement of `mesh.skin_nodes`, (n_times, n_skin_nodes, 3). [mm]
 
     @cached_property
     def skin_displacement(self) -> FloatArray:

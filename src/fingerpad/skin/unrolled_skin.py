@@ -31,11 +31,8 @@ from fingerpad.core.values import converted
 from fingerpad.data import fingertip as published
 from fingerpad.geometry.fingertip import Fingertip
 
-PAD_X_MM = (8.0, 26.0)
-"""Proximal and distal end of the paper's pad: where the subcutis is thick. [mm]"""
-
-PAD_FACES_DEG = 45.0
-"""Largest angle between the skin's normal and the volar direction on the pad. [degrees]"""
+PAD_X_MM = (8.0, 26.0)  # Proximal and distal end of the paper's pad: where the subcutis is thick. [mm]
+PAD_FACES_DEG = 45.0  # Largest angle between the skin's normal and the volar direction on the pad. [degrees]
 
 _ARC_POINTS = 2001
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(20)  # exact to 1e-9 mm on a quarter of a section
@@ -50,13 +47,10 @@ class _Quarter:
     """A quarter of each of some sections, volar or dorsal, and its element of area."""
 
     a: FloatArray
-    a_slope: FloatArray
-    """Volar depth or dorsal height and its derivative by s. [mm]"""
+    a_slope: FloatArray  # Volar depth or dorsal height and its derivative by s. [mm]
     c: FloatArray
-    c_slope: FloatArray
-    """Half-width and its derivative by s. [mm]"""
-    x_slope: FloatArray
-    """|dx/ds|. [mm]"""
+    c_slope: FloatArray  # Half-width and its derivative by s. [mm]
+    x_slope: FloatArray  # |dx/ds|. [mm]
 
     def area_element(self, phi: FloatArray) -> FloatArray:
         """|dP/ds x dP/dphi|. [mm²]"""

@@ -54,19 +54,16 @@ class WindowSettings(Part):
 class ExperimentSettings(Part):
     """Repetitions, decision criterion and seed."""
 
-    seed: Seed = 0
-    """Of every random number."""
+    seed: Seed = 0  # Of every random number.
     criterion: Share = psychophysics.DECISION_CRITERION.value
     """Decision point, as a fraction of the way from the standard to the comparison."""
-    criterion_sigma: NotNegative = 0.0
-    """Spread of the criterion from one hit rate to the next."""
+    criterion_sigma: NotNegative = 0.0  # Spread of the criterion from one hit rate to the next.
     criterion_moves: Annotated[str, choice_of(CRITERION_MOVES)] = CRITERION_MOVES[0]
     """What that spread multiplies: the decision point itself, or the fraction."""
     presentations: Several = _REPETITIONS
     distributions: Several = _REPETITIONS
     pairs: Several = _REPETITIONS
-    hit_rates: Several = _REPETITIONS
-    """As of `fingerpad.psychophysics.discrimination.Experiment`."""
+    hit_rates: Several = _REPETITIONS  # As of `fingerpad.psychophysics.discrimination.Experiment`.
     presentations_varied: Several = int(psychophysics.REPETITIONS_VARIED_CRITERION.value)
     """Presentations of each stimulus when the criterion varies."""
     trials: Count = _REPETITIONS
@@ -96,34 +93,25 @@ class CurveSettings(Part):
 class ObservedPoint(Part):
     """How often people discriminated one stimulus from the standard."""
 
-    at: LevelOrName
-    """Level or name of the stimulus; a level may lie between those that are pressed."""
-    hit_rate: Share
-    """Fraction of trials. [0-1]"""
-    trials: Count | None = None
-    """How many there were, for the interval."""
+    at: LevelOrName  # Level or name of the stimulus; a level may lie between those that are pressed.
+    hit_rate: Share  # Fraction of trials. [0-1]
+    trials: Count | None = None  # How many there were, for the interval.
 
 
 class ObservedSettings(Part):
     """Observations in people."""
 
-    points: Annotated[tuple[ObservedPoint, ...], Strict(False), Field(min_length=1)]
-    """One per stimulus."""
-    source: Text = "people"
-    """Who observed it."""
+    points: Annotated[tuple[ObservedPoint, ...], Strict(False), Field(min_length=1)]  # One per stimulus.
+    source: Text = "people"  # Who observed it.
 
 
 class DiscriminationTask(StimulusSet):
     """All that a file of a task holds."""
 
-    question: Text
-    """In words: the title of the page."""
-    axis: Text | None = None
-    """What the levels are, for the axes of figures; by default the key that varies."""
-    standard: LevelOrName
-    """Level or name of the stimulus that all others are compared with."""
-    population: PopulationSettings = PopulationSettings()
-    """The afferents."""
+    question: Text  # In words: the title of the page.
+    axis: Text | None = None  # What the levels are, for the axes of figures; by default the key that varies.
+    standard: LevelOrName  # Level or name of the stimulus that all others are compared with.
+    population: PopulationSettings = PopulationSettings()  # The afferents.
     afferent: AfferentChoice = DEFAULT
     """"default", a type by its name (SAI, RA, PC, SAII), a file of results (`fit.json` of `fingerpad fit`,
     `results.json` of `fingerpad reproduce`), or numbers."""
@@ -141,17 +129,13 @@ class DiscriminationTask(StimulusSet):
         BeforeValidator(as_list),
     ] = ("static",)
     """What is measured of each afferent, by the names of `MEASURES`; the first is the main one."""
-    windows_ms: WindowSettings = WindowSettings()
-    """When spikes count."""
+    windows_ms: WindowSettings = WindowSettings()  # When spikes count.
     noise: Annotated[
         Annotated[NotNegative, Field(le=LARGEST_NOISE)] | Annotated[str, choice_of((FITTED,))],
         with_message(f"a number from 0 to {LARGEST_NOISE:g}, or {FITTED}"),
     ]
     """Standard deviation of the multiplicative noise, or "fitted": that which brings the main code and
     measure closest to the observed hit rates."""
-    experiment: ExperimentSettings = ExperimentSettings()
-    """Repetitions, criterion and seed."""
-    curve: CurveSettings = CurveSettings()
-    """The psychometric curve."""
-    observed: ObservedSettings | None = None
-    """Hit rates of people."""
+    experiment: ExperimentSettings = ExperimentSettings()  # Repetitions, criterion and seed.
+    curve: CurveSettings = CurveSettings()  # The psychometric curve.
+    observed: ObservedSettings | None = None  # Hit rates of people.

@@ -65,10 +65,8 @@ class EvenValues(Part):
     """Evenly spaced values of a field."""
 
     start: FiniteNumber
-    stop: FiniteNumber
-    """First and last value. [unit of the field]"""
-    count: Count
-    """How many."""
+    stop: FiniteNumber  # First and last value. [unit of the field]
+    count: Count  # How many.
     spacing: Annotated[str, choice_of((LINEAR, LOGARITHMIC))] = LINEAR
     """Whether differences or ratios are equal."""
 
@@ -89,12 +87,9 @@ class SampleSettings(Part):
 
     method: Annotated[str, choice_of((SOBOL, LATIN_HYPERCUBE))] = SOBOL
     """How: a scrambled Sobol sequence, or a Latin hypercube."""
-    count: Count
-    """Number of points; powers of two suit Sobol."""
-    seed: Seed = 0
-    """Of the random numbers."""
-    fields: dict[str, Pair]
-    """Lower and upper bound by field. [unit of the field]"""
+    count: Count  # Number of points; powers of two suit Sobol.
+    seed: Seed = 0  # Of the random numbers.
+    fields: dict[str, Pair]  # Lower and upper bound by field. [unit of the field]
 
     @property
     def values(self) -> dict[str, list[float]]:
@@ -118,38 +113,29 @@ class SampleSettings(Part):
 class ObserverSettings(Part):
     """An observer who discriminates the stimuli along one dimension of a sweep from one of them."""
 
-    along: Text
-    """Field of the touch that varies from stimulus to stimulus, such as "object.curvature_per_m"."""
-    standard: LevelOrName
-    """Its value under the standard, that all others are discriminated from."""
+    along: Text  # Field of the touch that varies from stimulus to stimulus, such as "object.curvature_per_m".
+    standard: LevelOrName  # Its value under the standard, that all others are discriminated from.
     code: Annotated[str, choice_of(tuple(code for code in CODES if code != IDEAL))] = CODES[0]
     """How the population is decoded."""
-    measure: Annotated[str, choice_of(MEASURES)] = MEASURES[0]
-    """What is measured of each afferent."""
+    measure: Annotated[str, choice_of(MEASURES)] = MEASURES[0]  # What is measured of each afferent.
     latest_ms: Positive | None = None
     """Latest first spike that counts, as `windows_ms.latency` of a task. [ms]"""
-    noise: Annotated[NotNegative, Field(le=LARGEST_NOISE)]
-    """Standard deviation of the multiplicative noise."""
-    experiment: ExperimentSettings = ExperimentSettings()
-    """Repetitions, criterion and seed."""
+    noise: Annotated[NotNegative, Field(le=LARGEST_NOISE)]  # Standard deviation of the multiplicative noise.
+    experiment: ExperimentSettings = ExperimentSettings()  # Repetitions, criterion and seed.
 
 
 class SweepDescription(Part):
     """All that a file of a sweep holds."""
 
-    title: Text = "A sweep"
-    """What it is, in words."""
-    touch: Block
-    """The touch, with the keys of `TouchDescription`; what varies need not be given."""
+    title: Text = "A sweep"  # What it is, in words.
+    touch: Block  # The touch, with the keys of `TouchDescription`; what varies need not be given.
     observer: Block | None = None
     """An observer of the responses, with the keys of `ObserverSettings`; what varies need not be given."""
     grid: Block = Field(default={})
     """Values by field, such as "motion.depth_mm": each field is a dimension, and settings are all
     combinations."""
-    zip: Block = Field(default={})
-    """Fields that vary together, one value of each per setting: one dimension."""
-    sample: SampleSettings | None = None
-    """Fields that vary together over a box: one dimension."""
+    zip: Block = Field(default={})  # Fields that vary together, one value of each per setting: one dimension.
+    sample: SampleSettings | None = None  # Fields that vary together over a box: one dimension.
     where: Annotated[tuple[Text, ...], Strict(False), BeforeValidator(as_list)] = ()
     """Constraints such as "motion.depth_mm < 0.5 * object.radius_mm": other settings are left out."""
     fields: Annotated[

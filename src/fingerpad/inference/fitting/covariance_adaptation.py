@@ -20,16 +20,12 @@ class CovarianceAdaptation:
     Hansen & Ostermeier 2001.
     """
 
-    start: ArrayLike
-    """Mean of the first generation, (n_parameters,)."""
-    bounds: Bounds
-    """Limits of the parameters, and the scales that set their units in the search."""
-    first_spread: float = 0.5
-    """Standard deviation of the first generation, in units of the scales."""
+    start: ArrayLike  # Mean of the first generation, (n_parameters,).
+    bounds: Bounds  # Limits of the parameters, and the scales that set their units in the search.
+    first_spread: float = 0.5  # Standard deviation of the first generation, in units of the scales.
     most_evaluations: int = 2000
     """The search ends with the generation that reaches this number, or when it has converged."""
-    seed: int = 0
-    """Seed of the random numbers; the same seed gives the same bits."""
+    seed: int = 0  # Seed of the random numbers; the same seed gives the same bits.
     name: str = "CMA-ES"
 
     def __post_init__(self) -> None:

@@ -19,11 +19,9 @@ class FoldFit:
 
     fold: int
     fit: Fit
-    score_test: float
-    """Score of its parameters on the observations left out."""
+    score_test: float  # Score of its parameters on the observations left out.
     training: IntArray
-    testing: IntArray
-    """Observations used for fitting, and those left out, (n_training,)."""
+    testing: IntArray  # Observations used for fitting, and those left out, (n_training,).
 
     @property
     def score_train(self) -> float:
@@ -34,8 +32,7 @@ class FoldFit:
 class CrossValidation:
     """Results of all folds."""
 
-    folds: tuple[FoldFit, ...]
-    """In the order of their numbers."""
+    folds: tuple[FoldFit, ...]  # In the order of their numbers.
 
     @property
     def score_train(self) -> float:

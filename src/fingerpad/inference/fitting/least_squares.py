@@ -30,18 +30,14 @@ class LeastSquares:
     all evaluated points. The method is deterministic.
     """
 
-    starts: ArrayLike
-    """Start points; all are scored, (n_starts, n_parameters)."""
-    bounds: Bounds
-    """Limits of the parameters, and the scales in which steps are taken."""
-    n_refined: int = 4
-    """Number of starts, the best ones, from which a fit is made."""
+    starts: ArrayLike  # Start points; all are scored, (n_starts, n_parameters).
+    bounds: Bounds  # Limits of the parameters, and the scales in which steps are taken.
+    n_refined: int = 4  # Number of starts, the best ones, from which a fit is made.
     difference_steps: tuple[float, ...] = (0.1, 0.03, 0.01)
     """Half widths of the central differences, round by round, in units of the scales."""
     jacobian: Jacobian | None = None
     """`jacobian(parameters, chosen)`: derivatives of the residuals, instead of differences."""
-    most_iterations: int = 50
-    """Iterations of each round."""
+    most_iterations: int = 50  # Iterations of each round.
     name: str = "least squares"
 
     def __post_init__(self) -> None:

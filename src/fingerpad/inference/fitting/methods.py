@@ -91,8 +91,7 @@ class FitStep:
     """One step of a fit."""
 
     parameters: FloatArray
-    score: float
-    """Score of the chosen observations."""
+    score: float  # Score of the chosen observations.
 
 
 @dataclass(frozen=True)
@@ -100,16 +99,11 @@ class Fit:
     """Result of a method: parameters, score, effort and history."""
 
     parameters: FloatArray
-    score: float
-    """Their score over the chosen observations."""
-    n_evaluations: int
-    """Evaluations of the model, over all starts."""
-    seconds: float
-    """Elapsed time, over all starts. [s]"""
-    history: tuple[FitStep, ...]
-    """Steps of the best fit; the first is its start, the last the result."""
-    start: int = 0
-    """Number of its start, from 0; the first one of equals."""
+    score: float  # Their score over the chosen observations.
+    n_evaluations: int  # Evaluations of the model, over all starts.
+    seconds: float  # Elapsed time, over all starts. [s]
+    history: tuple[FitStep, ...]  # Steps of the best fit; the first is its start, the last the result.
+    start: int = 0  # Number of its start, from 0; the first one of equals.
     attempts: tuple[Fit, ...] = ()
     """The fit from each start, in their order; empty for a method with one start."""
 
@@ -143,10 +137,8 @@ def best_of(attempts: tuple[Fit, ...]) -> Fit:
 class Continued:
     """Two methods in sequence: a cheap one for the start of the second."""
 
-    first: Method
-    """Finds the start of the second."""
-    second: Callable[[FloatArray], Method]
-    """`second(parameters)`: the method that starts there."""
+    first: Method  # Finds the start of the second.
+    second: Callable[[FloatArray], Method]  # `second(parameters)`: the method that starts there.
     first_problem: Problem | None = None
     """Problem of the first method, if it is a simpler one with the same observations."""
     name: str = "continued"

@@ -32,8 +32,7 @@ from fingerpad.core.checks import FloatArray, finite, float_array, positive, who
 from fingerpad.core.errors import ConvergenceError, InputError
 from fingerpad.core.random_streams import Key, emcee_state, generator, independent_keys
 
-TAILS = (0.025, 0.975)
-"""Quantiles of the effective sample size of the tails: the ends of a 95 % interval."""
+TAILS = (0.025, 0.975)  # Quantiles of the effective sample size of the tails: the ends of a 95 % interval.
 
 
 def split_r_hat(draws: FloatArray) -> float:
@@ -123,11 +122,8 @@ def _autocorrelations(series: FloatArray) -> tuple[FloatArray, float]:
 LogDensity = Callable[[FloatArray], FloatArray]
 """From points (n_points, n_parameters) to their log densities up to a constant, -inf outside."""
 
-BANDWIDTH = 0.5
-"""Bandwidth of the kernel density estimate, in standard deviations of the walkers. [1]"""
-
-MOST_TRIES = 200
-"""Times that a start at an impossible point is drawn again."""
+BANDWIDTH = 0.5  # Bandwidth of the kernel density estimate, in standard deviations of the walkers. [1]
+MOST_TRIES = 200  # Times that a start at an impossible point is drawn again.
 
 
 @dataclass(frozen=True)
@@ -135,25 +131,17 @@ class Chains:
     """Converged draws from a density, and the measures of convergence."""
 
     names: tuple[str, ...]
-    draws: FloatArray
-    """The second half of all steps, (n_ensembles, n_steps, n_walkers, n_parameters)."""
-    log_densities: FloatArray
-    """Up to a constant, (n_ensembles, n_steps, n_walkers)."""
-    r_hat: FloatArray
-    """Split R-hat over the ensembles, (n_parameters,). [1]"""
+    draws: FloatArray  # The second half of all steps, (n_ensembles, n_steps, n_walkers, n_parameters).
+    log_densities: FloatArray  # Up to a constant, (n_ensembles, n_steps, n_walkers).
+    r_hat: FloatArray  # Split R-hat over the ensembles, (n_parameters,). [1]
     effective_sizes: FloatArray
     tail_effective_sizes: FloatArray
     """Effective sample sizes for the middle and for the ends of a 95 % interval, (n_parameters,). [1]"""
-    autocorrelation_steps: FloatArray
-    """Draws made per effective one, (n_parameters,). [1]"""
-    acceptance: float
-    """Accepted share of the proposals. [0-1]"""
-    n_evaluations: int
-    """Evaluations of the density, those of the discarded first half included."""
-    seed: int
-    """Of the random numbers; the same seed gives the same bits."""
-    history: tuple[str, ...]
-    """One line per check of convergence."""
+    autocorrelation_steps: FloatArray  # Draws made per effective one, (n_parameters,). [1]
+    acceptance: float  # Accepted share of the proposals. [0-1]
+    n_evaluations: int  # Evaluations of the density, those of the discarded first half included.
+    seed: int  # Of the random numbers; the same seed gives the same bits.
+    history: tuple[str, ...]  # One line per check of convergence.
 
     @property
     def flat(self) -> FloatArray:

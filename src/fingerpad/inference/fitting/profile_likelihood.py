@@ -22,14 +22,12 @@ from fingerpad.core.threads import in_blocks
 LogLikelihood = Callable[[FloatArray], FloatArray]
 """From points (n_points, n_parameters) to their log likelihoods, -inf where impossible."""
 
-PROFILE_STEP = 0.5
-"""Step of the fixed parameter over its scale. [1]"""
+PROFILE_STEP = 0.5  # Step of the fixed parameter over its scale. [1]
 
 LIKELIHOOD_TOLERANCE = 0.02
 """Tolerance of the fits of the others, in log likelihood and in parameters over their scales. [1]"""
 
-NEAREST = 20
-"""Number of starts nearest to a fixed value; a fit starts from the best of them."""
+NEAREST = 20  # Number of starts nearest to a fixed value; a fit starts from the best of them.
 
 MOST_EVALUATIONS = 2000
 RESTARTS = 5
@@ -40,27 +38,20 @@ class ProfileLikelihood:
     """Profile likelihood of one parameter."""
 
     name: str
-    values: FloatArray
-    """Its fixed values, increasing, (n_values,)."""
-    losses: FloatArray
-    """Largest log likelihood of all minus the largest one for this value, (n_values,). [1]"""
-    points: FloatArray
-    """The best parameters for each value, (n_values, n_parameters)."""
-    interval: tuple[float, float]
-    """Ends of the confidence interval; infinite where the data set no bound."""
-    level: float
-    """Level of confidence. [0-1]"""
+    values: FloatArray  # Its fixed values, increasing, (n_values,).
+    losses: FloatArray  # Largest log likelihood of all minus the largest one for this value, (n_values,). [1]
+    points: FloatArray  # The best parameters for each value, (n_values, n_parameters).
+    interval: tuple[float, float]  # Ends of the confidence interval; infinite where the data set no bound.
+    level: float  # Level of confidence. [0-1]
 
 
 @dataclass(frozen=True)
 class ProfileLikelihoods:
     """Profile likelihoods of all parameters."""
 
-    best: FloatArray
-    """The most likely parameters found, (n_parameters,)."""
+    best: FloatArray  # The most likely parameters found, (n_parameters,).
     log_likelihood: float
-    profiles: tuple[ProfileLikelihood, ...]
-    """One per parameter."""
+    profiles: tuple[ProfileLikelihood, ...]  # One per parameter.
     n_evaluations: int
 
 

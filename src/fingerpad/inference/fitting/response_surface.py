@@ -110,19 +110,14 @@ class ResponseSurface:
     Gerling et al. 2014, section 2.2.2; see `maximise`. The method is deterministic.
     """
 
-    starts: ArrayLike
-    """Start points, (n_starts, n_parameters)."""
+    starts: ArrayLike  # Start points, (n_starts, n_parameters).
     increments: ArrayLike
     """One coded unit of each parameter, for all start points or for each, (n_parameters,)."""
-    lower_bounds: ArrayLike | None = None
-    """Lower limits of all evaluations; -inf for none, (n_parameters,)."""
-    smallest_gain: float = 1.0e-4
-    """A gain of at most this much ends a fit."""
-    most_iterations: int = 200
-    """Largest number of iterations."""
+    lower_bounds: ArrayLike | None = None  # Lower limits of all evaluations; -inf for none, (n_parameters,).
+    smallest_gain: float = 1.0e-4  # A gain of at most this much ends a fit.
+    most_iterations: int = 200  # Largest number of iterations.
     name: str = "response surface"
-    restrict: Restriction | None = None
-    """As of `maximise`."""
+    restrict: Restriction | None = None  # As of `maximise`.
 
     def __post_init__(self) -> None:
         starts = float_array("starts", self.starts, 2)

@@ -22,8 +22,7 @@ from fingerpad.core.random_streams import generator
 BatchObjective = Callable[[FloatArray], FloatArray]
 """Called with points (n_points, n_parameters); returns one number for each."""
 
-SOBOL_RESAMPLES = 200
-"""Bootstrap resamples behind the confidence intervals of the indices."""
+SOBOL_RESAMPLES = 200  # Bootstrap resamples behind the confidence intervals of the indices.
 
 
 @dataclass(frozen=True)
@@ -32,8 +31,7 @@ class SobolIndices:
 
     names: tuple[str, ...]
     lower: FloatArray
-    upper: FloatArray
-    """Ranges of the parameters, (n_parameters,)."""
+    upper: FloatArray  # Ranges of the parameters, (n_parameters,).
     first: FloatArray
     first_half_width: FloatArray
     """First-order index, the share of the variance that the parameter explains alone, and half the width of
@@ -41,11 +39,9 @@ class SobolIndices:
     total: FloatArray
     total_half_width: FloatArray
     """Total index: the share explained alone and in interaction with others, (n_parameters,). [1]"""
-    level: float
-    """Level of confidence. [0-1]"""
+    level: float  # Level of confidence. [0-1]
     mean: float
-    standard_deviation: float
-    """Of the objective over the ranges."""
+    standard_deviation: float  # Of the objective over the ranges.
     n_evaluations: int
 
 
@@ -139,8 +135,7 @@ class Identifiability:
     """Change of the outputs per unit step along each direction, largest first, (n_parameters,)."""
     directions: FloatArray
     """One unit direction per row, in the scales, singular value 0 last, (n_parameters, n_parameters)."""
-    rank: int
-    """Number of singular values above zero, the number of identifiable combinations."""
+    rank: int  # Number of singular values above zero, the number of identifiable combinations.
 
     @property
     def silent_directions(self) -> FloatArray:
