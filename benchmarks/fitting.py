@@ -15,12 +15,16 @@ from fingerpad.core.signals import Traces
 from fingerpad.experiments.conditions import Conditions
 from fingerpad.experiments.fit.methods import FOUR_NUMBER_METHODS
 from fingerpad.experiments.gerling2014 import single_unit
-from fingerpad.inference.afferent_methods import bounds_of, four_number_problem
+from fingerpad.inference.afferent_methods import (
+    bounds_of,
+    four_number_problem,
+    response_surface,
+    start_points,
+)
 from fingerpad.inference.fitting.cross_validation import cross_validate, interleaved_folds
 from fingerpad.inference.fitting.methods import Method
 from fingerpad.inference.rate_model import AfferentModel
 from fingerpad.inference.rate_problem import RateProblem
-from fingerpad.inference.start_points import response_surface, start_points
 from fingerpad.neuron.transduction import drive
 from fingerpad.skin.store import Store, solve_missing
 

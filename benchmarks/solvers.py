@@ -55,7 +55,7 @@ class Aggregation:
 
 def preconditioner(name: str, sparsity: Any, free: np.ndarray, mesh: Any) -> Any:
     """Make the preconditioner of a name of `RUNS` for a mesh."""
-    from fingerpad.geometry.mesh_quality import rigid_motions
+    from fingerpad.geometry.mesh_checks import rigid_motions
     from fingerpad.mechanics.linear import KeptFactor
     from fingerpad.mechanics.multigrid import Multigrid
 

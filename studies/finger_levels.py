@@ -25,8 +25,7 @@ from fingerpad.geometry.indenters import Cylinder
 from fingerpad.inference.rates_and_hit_rates import CHANCE
 from fingerpad.neuron.exact_spikes import exact_trains
 from fingerpad.neuron.population import Population
-from fingerpad.neuron.rate_windows import PAPER_WINDOWS_MS
-from fingerpad.neuron.spikes import window_rates_hz
+from fingerpad.neuron.spikes import PAPER_WINDOWS_MS, window_rates_hz
 from fingerpad.neuron.transduction import Drive, drive
 from fingerpad.psychophysics.encoding import neighbour_pairs
 from fingerpad.psychophysics.noise_fit import expected_euclidean_hit_rates, expected_hit_rates

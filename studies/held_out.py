@@ -33,7 +33,7 @@ from fingerpad.experiments.validation.predictions import LOADINGS, Condition, Fi
 from fingerpad.experiments.validation.validation import ValidationRequest, validate
 from fingerpad.geometry.edged_indenters import Grating
 from fingerpad.geometry.indenters import FlatPunch, Indenter, Plate
-from fingerpad.geometry.mesh_quality import jacobian_at_gauss
+from fingerpad.geometry.mesh_checks import jacobian_at_gauss
 from fingerpad.geometry.motion import RampAndHold
 from fingerpad.mechanics.press_settings import PressSettings
 from fingerpad.neuron.afferent import Afferent
@@ -42,7 +42,7 @@ from fingerpad.neuron.spikes import firing_rate_hz, modulation_index
 from fingerpad.psychophysics.encoding import neighbour_pairs
 from fingerpad.psychophysics.noise_fit import NOISE_DRAWS, expected_hit_rates, fit_noise_sigma
 from fingerpad.report.formatting import ABSENT, fixed, number
-from fingerpad.report.manifest import edition
+from fingerpad.report.parts import edition
 from fingerpad.skin.indentation import Touch, touch_of
 from fingerpad.skin.sampling import SkinResponse
 from studies import held_out_facts as facts

@@ -8,7 +8,7 @@ from math import isfinite
 
 from fingerpad.experiments.tissue_sets import TissueLayer, tissue_layers
 from fingerpad.report.formatting import fixed, number
-from fingerpad.report.manifest import edition
+from fingerpad.report.parts import edition
 from studies.pages import joined, share, table
 from studies.posterior_calibration import LEVELS as COVERED
 from studies.tissue_candidates import LEVELS

@@ -18,11 +18,11 @@ from fingerpad.experiments import gerling2014
 from fingerpad.experiments.conditions import Conditions
 from fingerpad.experiments.descriptions.stimulus import FingerDescription
 from fingerpad.export import formats
+from fingerpad.geometry.edged_indenters import INDENTERS
 from fingerpad.geometry.fingertip import FINGERS, Fingertip
 from fingerpad.geometry.grading import RESOLUTIONS
 from fingerpad.geometry.indenters import Plate, Sphere
 from fingerpad.geometry.motion import RampAndHold
-from fingerpad.geometry.names import INDENTERS
 from fingerpad.geometry.trajectory import Trajectory
 from fingerpad.mechanics.tissues import TISSUES
 from fingerpad.skin.indentation import touch_of

@@ -5,10 +5,10 @@ import pytest
 
 from fingerpad.core.errors import InputError
 from fingerpad.core.signals import Traces
+from fingerpad.inference.afferent_methods import ReceptorOffset
 from fingerpad.inference.closed_form import ClosedFormModel
 from fingerpad.inference.identifiable import identifiable
 from fingerpad.inference.rate_model import AfferentModel, evaluate_rows, four_number_model
-from fingerpad.inference.receptor_offset import ReceptorOffset
 from sections import SED_DRIVEN, sed_driven
 
 PEAKS = np.array([0.0, 0.3, 0.8, 1.4, 1.9, 2.5])

@@ -9,6 +9,7 @@ from fingerpad.core.errors import InputError
 from fingerpad.core.signals import Traces
 from fingerpad.experiments.gerling2014.single_unit import bar_recordings
 from fingerpad.inference.afferent_methods import (
+    ReceptorOffset,
     along_slopes,
     bounds_of,
     fitted_four,
@@ -16,17 +17,15 @@ from fingerpad.inference.afferent_methods import (
     four_number_problem,
 )
 from fingerpad.inference.closed_form import ClosedFormModel, constant_drive_rate
-from fingerpad.inference.fitting.fractional_sum_of_squares import fractional_sum_of_squares
+from fingerpad.inference.fitting.cross_validation import fractional_sum_of_squares
 from fingerpad.inference.fitting.least_squares import LeastSquares
 from fingerpad.inference.fitting.methods import Bounds
 from fingerpad.inference.identifiable import IDENTIFIABLE_NAMES, identifiable, six_parameters
 from fingerpad.inference.rate_model import AfferentModel, Reparametrised, four_number_model
 from fingerpad.inference.rate_problem import RateProblem
-from fingerpad.inference.receptor_offset import ReceptorOffset
 from fingerpad.inference.recordings import RateRecordings
 from fingerpad.neuron.lif import LeakyIntegrateAndFire
-from fingerpad.neuron.rate_windows import PAPER_WINDOWS_MS
-from fingerpad.neuron.spikes import firing_rate_hz
+from fingerpad.neuron.spikes import PAPER_WINDOWS_MS, firing_rate_hz
 from fingerpad.neuron.transduction import drive
 from sections import SED_DRIVEN, sed_driven
 

@@ -6,7 +6,7 @@ import pytest
 from fingerpad.core.errors import InputError
 from fingerpad.core.signals import SpikeTrains
 from fingerpad.inference.recordings import RateRecordings, SpikeRecordings
-from fingerpad.neuron.rate_windows import PAPER_WINDOWS_MS
+from fingerpad.neuron.spikes import PAPER_WINDOWS_MS
 
 
 def test_chosen_rows_keep_names_rates_and_a_phase_that_was_not_recorded():

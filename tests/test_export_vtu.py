@@ -22,7 +22,7 @@ from fingerpad.geometry.fingertip import Fingertip
 from fingerpad.geometry.grading import Grading
 from fingerpad.geometry.indenters import Sphere
 from fingerpad.geometry.mesh import Mesh, block_mesh
-from fingerpad.geometry.mesh_quality import jacobian_at_gauss
+from fingerpad.geometry.mesh_checks import jacobian_at_gauss
 from fingerpad.geometry.motion import RampAndHold
 from fingerpad.mechanics.press_settings import PressSettings
 from fingerpad.mechanics.tissues import named_tissues

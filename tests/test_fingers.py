@@ -14,8 +14,7 @@ from fingerpad.geometry.grading import resolution_grading
 from fingerpad.geometry.indenter_grading import grading_about
 from fingerpad.geometry.indenters import Sphere
 from fingerpad.geometry.mesh import finger_mesh
-from fingerpad.geometry.mesh_checks import check_mesh
-from fingerpad.geometry.mesh_quality import scaled_jacobian
+from fingerpad.geometry.mesh_checks import check_mesh, scaled_jacobian
 from fingerpad.geometry.motion import RampAndHold
 from fingerpad.mechanics.laws import Energy, Hencky, Hyperfoam, Ogden, Polynomial
 from fingerpad.mechanics.materials import Material, Prony

@@ -7,8 +7,11 @@ import numpy as np
 import pytest
 
 from fingerpad.core.errors import InputError
-from fingerpad.inference.fitting.cross_validation import cross_validate, interleaved_folds
-from fingerpad.inference.fitting.fractional_sum_of_squares import fractional_sum_of_squares
+from fingerpad.inference.fitting.cross_validation import (
+    cross_validate,
+    fractional_sum_of_squares,
+    interleaved_folds,
+)
 from fingerpad.inference.fitting.response_surface import ResponseSurface, coding_increments, maximise
 
 SHIFTS = np.linspace(-3.5, 3.5, 36)

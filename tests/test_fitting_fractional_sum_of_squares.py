@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from fingerpad.core.errors import InputError
-from fingerpad.inference.fitting.fractional_sum_of_squares import fractional_sum_of_squares
+from fingerpad.inference.fitting.cross_validation import fractional_sum_of_squares
 
 RATES = np.array([0.0, 20.0, 135.0, 210.0, 72.0, 5.0])
 

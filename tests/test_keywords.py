@@ -17,7 +17,7 @@ from fingerpad.core.keywords import KnownKeywords, OtherName, other_names
 from fingerpad.core.units import unit_of
 from fingerpad.experiments.indenter_text import indenter_named
 from fingerpad.experiments.stimuli import read_stimuli
-from fingerpad.geometry.names import INDENTERS, sizes_of
+from fingerpad.geometry.edged_indenters import INDENTERS, sizes_of
 from fingerpad.skin.store import touch_key
 
 SAME = [

@@ -6,7 +6,7 @@ from scipy.integrate import quad
 
 from fingerpad.geometry.indenters import FlatPunch, Plate, Sphere
 from fingerpad.geometry.mesh import block_mesh
-from fingerpad.geometry.mesh_quality import jacobian_at_gauss
+from fingerpad.geometry.mesh_checks import jacobian_at_gauss
 from fingerpad.geometry.motion import RampAndHold
 from fingerpad.geometry.trajectory import Trajectory
 from fingerpad.mechanics.balance import (

@@ -11,12 +11,12 @@ from fingerpad.core.errors import ConvergenceError, InputError
 from fingerpad.geometry.mesh import block_mesh
 from fingerpad.mechanics import linear
 from fingerpad.mechanics.assembly import Sparsity, assemble
-from fingerpad.mechanics.factors import SuperLuFactor
 from fingerpad.mechanics.linear import (
     KeptFactor,
     LinearSolver,
     NotPositiveDefiniteError,
     SmoothedAggregation,
+    SuperLuFactor,
     choose_preconditioner,
     free_degrees_of_freedom,
 )

@@ -7,7 +7,7 @@ import pytest
 
 from fingerpad.geometry.indenters import Sphere
 from fingerpad.geometry.mesh import block_mesh
-from fingerpad.geometry.mesh_quality import jacobian_at_gauss
+from fingerpad.geometry.mesh_checks import jacobian_at_gauss
 from fingerpad.geometry.motion import ForceRampAndHold, RampAndHold
 from fingerpad.mechanics import press as press_module
 from fingerpad.mechanics.assembly import Sparsity

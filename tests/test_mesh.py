@@ -9,7 +9,7 @@ from fingerpad.core.errors import InputError
 from fingerpad.geometry.fingertip import Fingertip
 from fingerpad.geometry.grading import Grading, graded_lines, lines_along, lines_of_sizes, resolution_grading
 from fingerpad.geometry.mesh import LAYERS, Mesh, block_mesh, finger_mesh
-from fingerpad.geometry.mesh_quality import jacobian_at_gauss, scaled_jacobian
+from fingerpad.geometry.mesh_checks import jacobian_at_gauss, scaled_jacobian
 
 FACES = np.array([[0, 3, 2, 1], [4, 5, 6, 7], [0, 1, 5, 4], [1, 2, 6, 5], [2, 3, 7, 6], [3, 0, 4, 7]])
 FINGER = Fingertip()

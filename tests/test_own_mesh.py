@@ -20,16 +20,15 @@ from fingerpad.geometry.free_mesh import FACES, FreeMesh, closest_on_triangles
 from fingerpad.geometry.grading import Grading
 from fingerpad.geometry.indenters import Sphere
 from fingerpad.geometry.mesh import LAYERS
+from fingerpad.geometry.mesh_checks import jacobian_at_gauss
 from fingerpad.geometry.mesh_files import _read_inp, _read_msh, read_finger
 from fingerpad.geometry.mesh_parts import MeshParts, finger_from
-from fingerpad.geometry.mesh_quality import jacobian_at_gauss
 from fingerpad.geometry.motion import RampAndHold
 from fingerpad.mechanics.press_settings import PressSettings
 from fingerpad.skin.free_receptors import FreeReceptors
 from fingerpad.skin.indentation import touch_of
-from fingerpad.skin.section import middle_section
+from fingerpad.skin.section import SURFACE_QUANTITIES, middle_section
 from fingerpad.skin.store import touch_key
-from fingerpad.skin.surface_motion import SURFACE_QUANTITIES
 from fingerpad.skin.unrolled_skin import UnrolledSkin
 from tests import gmsh_finger
 

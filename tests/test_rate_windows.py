@@ -14,10 +14,10 @@ from fingerpad.experiments.discrimination.task_stimuli import parse_task, task_p
 from fingerpad.geometry.motion import ForceRampAndHold, RampAndHold
 from fingerpad.geometry.motions import repeated, sine
 from fingerpad.geometry.trajectory import Trajectory
+from fingerpad.inference.afferent_methods import ReceptorOffset
 from fingerpad.inference.rate_model import AfferentModel
-from fingerpad.inference.receptor_offset import ReceptorOffset
 from fingerpad.neuron.population import Population
-from fingerpad.neuron.rate_windows import PAPER_WINDOWS_MS, common_rate_windows_ms, rate_windows_ms
+from fingerpad.neuron.spikes import PAPER_WINDOWS_MS, common_rate_windows_ms, rate_windows_ms
 from fingerpad.neuron.transduction import drive
 from sections import SED_DRIVEN
 

@@ -13,13 +13,13 @@ from fingerpad.experiments.fit.fit import fit_recordings
 from fingerpad.experiments.fit.methods import check_offset, fit_offset
 from fingerpad.experiments.fit.rate_uncertainty import profiled
 from fingerpad.experiments.fit.results import ParameterProfile, RatePosterior
+from fingerpad.inference.afferent_methods import ReceptorOffset
 from fingerpad.inference.identifiable import IDENTIFIABLE_NAMES, identifiable
 from fingerpad.inference.rate_model import AfferentModel, four_number_model
 from fingerpad.inference.rate_problem import RateProblem
-from fingerpad.inference.receptor_offset import ReceptorOffset
 from fingerpad.inference.recordings import RateRecordings
 from fingerpad.report import recording_fit as report
-from fingerpad.report.rate_uncertainty import ALLOWED_LOSS
+from fingerpad.report.single_unit import ALLOWED_LOSS
 from fingerpad.report.style import png
 
 TIMES_MS = np.array([0.0, 10.0, 20.0, 30.0, 40.0, 50.0, 80.0, 200.0, 1000.0])

@@ -34,10 +34,9 @@ from fingerpad.experiments.gerling2014 import single_unit
 from fingerpad.experiments.manifest import sha256
 from fingerpad.experiments.recording_files import read_recordings
 from fingerpad.experiments.stimuli import ListedStimuli, ShiftedBar
-from fingerpad.geometry.edged_indenters import Gap
+from fingerpad.geometry.edged_indenters import INDENTERS, Gap
 from fingerpad.geometry.indenters import Bar, Line, Sphere
 from fingerpad.geometry.motion import ForceRampAndHold, RampAndHold
-from fingerpad.geometry.names import INDENTERS
 from fingerpad.inference.afferent_methods import OFFSETS_MM
 from fingerpad.inference.closed_form import ClosedFormModel
 from fingerpad.inference.identifiable import IDENTIFIABLE_NAMES, identifiable
@@ -46,7 +45,7 @@ from fingerpad.inference.recordings import RateRecordings, SpikeRecordings
 from fingerpad.inference.spike_fit import soft_spikes
 from fingerpad.neuron.afferent import Afferent
 from fingerpad.neuron.afferent_types import RA
-from fingerpad.neuron.rate_windows import PAPER_WINDOWS_MS
+from fingerpad.neuron.spikes import PAPER_WINDOWS_MS
 from fingerpad.neuron.transduction import drive
 from fingerpad.report import recording_fit as report
 from sections import sed_driven

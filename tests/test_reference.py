@@ -5,7 +5,7 @@ import pytest
 
 from fingerpad.core.errors import InputError
 from fingerpad.data import bar_firing_rates, cylinder_deflection, goodwin_hit_rates, protocol, psychophysics
-from fingerpad.data.table import parsed_table
+from fingerpad.data.observations import parsed_table
 
 STORY = "# content: a\n# source: b\n# status: read\n"
 

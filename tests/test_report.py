@@ -29,15 +29,24 @@ from fingerpad.experiments.tissue_sets import tissue_layers
 from fingerpad.geometry.fingertip import Fingertip
 from fingerpad.geometry.grading import resolution_grading
 from fingerpad.geometry.mesh import finger_mesh
-from fingerpad.report import discrimination, nail, reproduction, single_unit, skin_deflection, three_levels
+from fingerpad.report import discrimination, reproduction, single_unit, skin_deflection, three_levels
 from fingerpad.report import formatting as words
 from fingerpad.report import mesh_picture as mesh_picture_figure
-from fingerpad.report import page as page_module
+from fingerpad.report import parts as page_module
 from fingerpad.report import responses as population
 from fingerpad.report.comparison import MEANINGS, SIGNS, TITLES
 from fingerpad.report.discrimination import draw_steps
-from fingerpad.report.page import VERDICTS, write_html
-from fingerpad.report.parts import COLUMNS, Chapter, Drawing, Page, Paragraph, Row, Table
+from fingerpad.report.parts import (
+    COLUMNS,
+    VERDICTS,
+    Chapter,
+    Drawing,
+    Page,
+    Paragraph,
+    Row,
+    Table,
+    write_html,
+)
 from fingerpad.report.reproduction import reproduction_page, write_report
 from fingerpad.report.style import BLUE, GREEN, ORANGE, RESOLUTION_DPI, STYLE, new_figure, png
 from sections import CURVATURE_PER_M, discrimination_section, nail_section, typed
@@ -691,7 +700,7 @@ def test_figure_7_has_the_papers_letters_people_and_our_curves_with_bars_of_one_
 
 def test_figure_9_shows_each_place_from_its_own_side_with_two_scales_and_both_halves():
     section = typed(NailBorder, nail_section())
-    axes = nail.draw_nail(section).axes
+    axes = skin_deflection.draw_nail(section).axes
     below, middle, above, across, profile = axes[:5]
     half = 19 * 15
     assert [axes.collections[0].get_array().size for axes in (below, above)] == [2 * half, 2 * half]

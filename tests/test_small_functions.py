@@ -41,18 +41,18 @@ NUMBERS = [
     ("core.layouts:around_zero", (3,), [-1.0, 0.0, 1.0]),
     ("core.threads:even_chunks", (300,), [(0, 128), (128, 256), (256, 300)]),
     ("core.threads:run_kernel", (lambda size, first, last: size * (last - first), 200, 10), [1280, 720]),
-    ("experiments.gerling2014.goodwin:goodwin_misfit", (np.array([0.58, 0.93]),), 0.0141),
+    ("experiments.gerling2014.discrimination_statistics:goodwin_misfit", (np.array([0.58, 0.93]),), 0.0141),
     ("geometry.grading:lines_across", (Grading(17.0, 0.5, 1.0, 0.2, 0.5, 0.5), 2.0), [0, 0.5, 1, 1.5, 2]),
     ("geometry.trajectory:samples_of_line", (np.arange(4.0), COURSE, 0.2), [True, False, True, True]),
     ("mechanics.fields:largest_compression", (np.array([1.0, -3.0, 0.0, 0.0, 0.0, 0.0]),), 3.0),
     ("mechanics.inertia:share_of_force", (sine(0.5, 0.01, 183.0, cycles=4), SOFT, [5.0]), 0.0189),
     ("mechanics.multigrid:kept_lines", (LINES, 1.0), [0, 1, 3, 5, 7]),
     ("mechanics.press:length_ms", (500.1, 500.4), 0.3),
-    ("mechanics.small_bodies:steps_of_advance", (0.4, 0.05), 8),
-    ("mechanics.small_bodies:steps_of_advance", (0.4, float("inf")), 1),
-    ("mechanics.small_bodies:steps_of_slide", (0.1, Bar(fillet_mm=0.3)), 2),
-    ("mechanics.small_bodies:steps_of_slide", (0.1, Bar(fillet_mm=0.0)), 12),
-    ("mechanics.small_bodies:steps_of_slide", (0.1, Sphere()), 1),
+    ("mechanics.press_settings:steps_of_advance", (0.4, 0.05), 8),
+    ("mechanics.press_settings:steps_of_advance", (0.4, float("inf")), 1),
+    ("mechanics.press_settings:steps_of_slide", (0.1, Bar(fillet_mm=0.3)), 2),
+    ("mechanics.press_settings:steps_of_slide", (0.1, Bar(fillet_mm=0.0)), 12),
+    ("mechanics.press_settings:steps_of_slide", (0.1, Sphere()), 1),
     ("psychophysics.discrimination:checked_responses", (SILENT, 50.0), [[20, 50], [30, 40]]),
     ("reduction.relaxation:filter_step", (100.0, np.array([100.0])), [[0.3679], [0.2642], [0.3679]]),
 ]  # fmt: skip
@@ -68,10 +68,9 @@ WORDS = [
     ("core.units:with_unit", ("0.1", "skin_stretch", " {}"), "0.1"),
     ("experiments.descriptions.reading:merged", ("bar", {"width_mm": 3}), {"kind": "bar", "width_mm": 3}),
     ("experiments.descriptions.reading:merged", ({"kind": "bar"}, {"kind": "sphere"}), {"kind": "sphere"}),
-    ("export.dataset:unit_of_name", ("static_rate_hz",), "s-1"),
-    ("export.dataset:unit_of_name", ("hit_rate",), "1"),
+    ("export.dataset:udunits", ("spikes/s",), "s-1"),
     ("geometry.mesh_parts:plain_name", ("LIVING-EPIDERMIS",), "living epidermis"),
-    ("geometry.mesh_quality:element_place", (block_mesh([0, 1], [0, 1], [0, 1], layers=[2]), 0),
+    ("geometry.mesh_checks:element_place", (block_mesh([0, 1], [0, 1], [0, 1], layers=[2]), 0),
      "element 0 (dermis, about x = 0.5, y = 0.5, z = 0.5 mm)"),
     ("mechanics.tissues:name_of_tissues", (named_tissues("paper"),), "paper"),
     ("mechanics.tissues:name_of_tissues", (named_tissues("paper").scaled(1.1),), ""),
@@ -93,19 +92,19 @@ def test_parts_of_results():
     assert (
         called("mechanics.cycles:blended", Entry(stored_uj=1.0), Entry(stored_uj=3.0), 0.25).stored_uj == 1.5
     )
-    turned = called("geometry.mesh_quality:rigid_motions", PAIR)[:, 1, 3]  # along y, about z
+    turned = called("geometry.mesh_checks:rigid_motions", PAIR)[:, 1, 3]  # along y, about z
     assert turned.tolist() == [-0.5, 0.5]
     block = block_mesh([0.0, 1.0], [0.0, 1.0, 2.0], [0.0, 1.0], layers=[2, 3])
     squeezed = called(
-        "geometry.mesh_quality:squeezed_most", block, -0.1 * block.nodes_mm**2 * [0.0, 1.0, 0.0]
+        "geometry.mesh_checks:squeezed_most", block, -0.1 * block.nodes_mm**2 * [0.0, 1.0, 0.0]
     )
     assert squeezed == (1, pytest.approx(0.7))
 
 
 def test_cubic_interpolation_is_exact_for_a_cubic():
     u, v = np.indices((41, 41)) - 20.0
-    known = called("skin.grid_cubic:coefficients", (u * u * v)[:, :, None])
-    found = called("skin.grid_cubic:values_and_slopes_at", known, np.array([[1.5, 2.0]]), 20)
+    known = called("skin.receptor_sheet:coefficients", (u * u * v)[:, :, None])
+    found = called("skin.receptor_sheet:values_and_slopes_at", known, np.array([[1.5, 2.0]]), 20)
     np.testing.assert_allclose(np.ravel(found), [4.5, 6.0, 2.25], rtol=1e-6)
 
 
@@ -123,4 +122,4 @@ def test_observers_side_by_side_are_those_that_judge_alone():
 
 def test_a_window_beyond_the_end_is_refused():
     with pytest.raises(InputError, match="static_window_ms must be a start from 0 on and a later end"):
-        called("neuron.rate_windows:check_windows", ((30.0, 50.0), (600.0, 9500.0)), RampAndHold().end_ms)
+        called("neuron.spikes:check_windows", ((30.0, 50.0), (600.0, 9500.0)), RampAndHold().end_ms)

@@ -9,7 +9,7 @@ from fingerpad.experiments.recording_files import read_recordings
 from fingerpad.experiments.stimuli import ShiftedBar
 from fingerpad.experiments.validation.observations import read_observations
 from fingerpad.skin.fields import sampled_fields
-from fingerpad.skin.surface_motion import SURFACE_QUANTITIES
+from fingerpad.skin.section import SURFACE_QUANTITIES
 
 
 def traces(quantity):

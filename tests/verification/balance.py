@@ -9,7 +9,7 @@ import numpy as np
 from fingerpad.geometry.edged_indenters import Edge, Gap
 from fingerpad.geometry.indenters import Bar, Cylinder, FlatPunch, Line, Plate, Sphere
 from fingerpad.geometry.mesh import block_mesh
-from fingerpad.geometry.mesh_quality import jacobian_at_gauss
+from fingerpad.geometry.mesh_checks import jacobian_at_gauss
 from fingerpad.geometry.motion import RampAndHold
 from fingerpad.mechanics.contact import place
 from fingerpad.mechanics.materials import Material, Prony

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from fingerpad.geometry.mesh import Mesh, block_mesh
-from fingerpad.geometry.mesh_quality import jacobian_at_gauss
+from fingerpad.geometry.mesh_checks import jacobian_at_gauss
 from fingerpad.mechanics.materials import Material
 
 from .case import Row, at_least, at_most, case

@@ -8,8 +8,8 @@ from functools import lru_cache
 from fingerpad.core.checks import number_in, one_of
 from fingerpad.core.errors import InputError
 from fingerpad.core.units import unit_of
+from fingerpad.geometry.edged_indenters import INDENTERS
 from fingerpad.geometry.indenters import Indenter
-from fingerpad.geometry.names import INDENTERS
 
 
 @lru_cache(maxsize=1024)

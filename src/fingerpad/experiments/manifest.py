@@ -15,7 +15,7 @@ import numpy as np
 from fingerpad import __version__
 from fingerpad.core.results import Number, result_class
 from fingerpad.geometry.mesh import Mesh
-from fingerpad.geometry.mesh_quality import jacobian_at_gauss, scaled_jacobian
+from fingerpad.geometry.mesh_checks import jacobian_at_gauss, scaled_jacobian
 from fingerpad.skin.code_hash import code_hash
 
 PACKAGES = ("numpy", "scipy", "numba", "matplotlib")  # Packages on which the numbers of a run depend.

@@ -26,9 +26,9 @@ from fingerpad.experiments.descriptions.stimuli import (
     touches_of,
 )
 from fingerpad.experiments.descriptions.stimulus import PlaceSettings
+from fingerpad.geometry.edged_indenters import SIZES
 from fingerpad.geometry.indenters import Bar
 from fingerpad.geometry.motion import PLAUSIBLE, Motion, RampAndHold
-from fingerpad.geometry.names import SIZES
 from fingerpad.skin.indentation import Touch
 
 COLUMNS = (

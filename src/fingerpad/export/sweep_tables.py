@@ -24,7 +24,7 @@ from fingerpad.export.sweep_dataset import (
     setting_spikes,
     sweep_settings,
 )
-from fingerpad.neuron.rate_windows import rate_windows_ms
+from fingerpad.neuron.spikes import rate_windows_ms
 
 if TYPE_CHECKING:
     import pandas

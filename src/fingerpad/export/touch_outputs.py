@@ -23,8 +23,7 @@ from fingerpad.export.dataset import write_touch
 from fingerpad.export.formats import DECKS, REQUIRED, RESULTS, write_deck
 from fingerpad.export.job import job_of
 from fingerpad.export.responses import require_pynwb, write_response_csv, write_responses_nwb
-from fingerpad.report.touch import draw
-from fingerpad.report.touch_page import write_touch_page
+from fingerpad.report.touch import draw, write_touch_page
 
 Write = Callable[[PressedTouch, Path], object]
 

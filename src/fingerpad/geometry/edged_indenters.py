@@ -7,21 +7,26 @@ of their gaps. This is exact on both sides of its face if the flat between the t
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from fingerpad.core.checks import FloatArray, not_negative, plausible, positive
 from fingerpad.core.errors import InputError
-from fingerpad.core.keywords import OtherName
+from fingerpad.core.keywords import OtherName, other_names
 from fingerpad.core.values import converted
 from fingerpad.data import protocol
 from fingerpad.geometry.indenters import (
     BESIDE_EDGE_MM,
     SIZES_MM,
     Bar,
+    Cylinder,
+    FlatPunch,
     Indenter,
+    Line,
+    Plate,
+    Sphere,
     fillet_within,
     round_front,
     rounded,
@@ -280,3 +285,30 @@ class Grating(Indenter):
         beside = points_mm.copy()
         beside[:, 0] -= self.period_mm * np.round(points_mm[:, 0] / self.period_mm)
         return beside
+
+
+INDENTERS: dict[str, type[Indenter]] = {
+    "sphere": Sphere,
+    "cylinder": Cylinder,
+    "bar": Bar,
+    "line": Line,
+    "punch": FlatPunch,
+    "plate": Plate,
+    "edge": Edge,
+    "gap": Gap,
+    "grating": Grating,
+}
+
+_FIELDS = {
+    name: [size.name for size in fields(kind)]  # type: ignore[arg-type]
+    for name, kind in INDENTERS.items()
+}
+
+
+def sizes_of(indenter: str) -> tuple[str, ...]:
+    """Sizes that an indenter has: fields of its class, then other names."""
+    return tuple(dict.fromkeys([*_FIELDS[indenter], *other_names(INDENTERS[indenter])]))
+
+
+SIZES = tuple(dict.fromkeys(size for name in INDENTERS for size in sizes_of(name)))
+"""Sizes of all indenters, other names of sizes included."""

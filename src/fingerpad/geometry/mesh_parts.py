@@ -22,8 +22,7 @@ from fingerpad.data import fingertip as published
 from fingerpad.geometry.fingertip import SIZES_MM
 from fingerpad.geometry.free_mesh import FACES, FingerMesh, FreeMesh
 from fingerpad.geometry.mesh import CORNERS, LAYERS
-from fingerpad.geometry.mesh_checks import PLANE_TOLERANCE, check_mesh
-from fingerpad.geometry.mesh_quality import element_place, jacobian_at_gauss
+from fingerpad.geometry.mesh_checks import PLANE_TOLERANCE, check_mesh, element_place, jacobian_at_gauss
 
 SKIN, BONE, NAIL, FIXED, SYMMETRY = "skin", "bone", "nail", "fixed", "symmetry"
 SETS = (SKIN, BONE, NAIL, FIXED, SYMMETRY, *LAYERS)

@@ -1,6 +1,6 @@
 """Methods that fit one afferent to firing rates: bounds, scales, starts and parameters.
 
-All but the paper's method (`fingerpad.inference.start_points.response_surface`) fit four numbers, optionally
+All but the paper's method (`response_surface`) fit four numbers, optionally
 with the offset of the receptor along the finger, within the same bounds. The four are the identifiable ones
 with the potential at rest over the threshold, beta tau/(C v), in the place of beta/(C v): its bound keeps the
 afferent silent at rest (docs/decisions.md#silent-at-rest).
@@ -8,20 +8,168 @@ afferent silent at rest (docs/decisions.md#silent-at-rest).
 
 from __future__ import annotations
 
-from dataclasses import replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from fingerpad.core.checks import FloatArray
+from fingerpad.core.checks import FloatArray, finite, float_array, increasing
+from fingerpad.core.errors import InputError
+from fingerpad.core.signals import Traces
+from fingerpad.data import neuron
 from fingerpad.inference.fitting.covariance_adaptation import CovarianceAdaptation
 from fingerpad.inference.fitting.least_squares import LeastSquares
 from fingerpad.inference.fitting.methods import Bounds
-from fingerpad.inference.identifiable import IDENTIFIABLE_NAMES, LARGEST_RESTING_SHARE, six_parameters
-from fingerpad.inference.rate_model import RateModel, Rates, Reparametrised, SmoothRateModel
+from fingerpad.inference.fitting.response_surface import ResponseSurface, coding_increments
+from fingerpad.inference.identifiable import (
+    IDENTIFIABLE_NAMES,
+    LARGEST_RESTING_SHARE,
+    identifiable,
+    silent_at_rest,
+    six_parameters,
+)
+from fingerpad.inference.rate_model import (
+    AfferentModel,
+    RateModel,
+    Rates,
+    Reparametrised,
+    SmoothRateModel,
+    evaluate_rows,
+)
 from fingerpad.inference.rate_problem import RateProblem
-from fingerpad.inference.receptor_offset import OFFSET_NAME
 from fingerpad.inference.recordings import RateRecordings
+from fingerpad.neuron.afferent import PARAMETER_NAMES
+from fingerpad.neuron.spikes import Windows
 from fingerpad.neuron.transduction import Drive
+
+OFFSET_NAME = "offset_mm"  # Name of the parameter; positive is distal. [mm]
+
+
+@dataclass(frozen=True)
+class ReceptorOffset:
+    """The paper's model with the offset of the receptor as a seventh parameter; a `RateModel`.
+
+    Between two sampled offsets the drive is interpolated linearly.
+    """
+
+    offsets_mm: FloatArray
+    """Offsets at which the drive is sampled, distal positive, increasing, (n_offsets,). [mm]"""
+    models: Sequence[AfferentModel]  # The model at each offset, all with the same stimuli and times.
+
+    def __post_init__(self) -> None:
+        offsets = increasing("offsets_mm", float_array("offsets_mm", self.offsets_mm, 1))
+        kinds = {
+            tuple(
+                (columns.tobytes(), driven.times_ms.tobytes())
+                for columns, driven in zip(model.stimuli, model.drives, strict=True)
+            )
+            for model in self.models
+        }
+        if offsets.size < 2 or offsets.size != len(self.models) or len(kinds) > 1:
+            raise InputError(
+                "ReceptorOffset needs at least two offsets, each with a model of the same stimuli and times: "
+                f"got {offsets.size} offsets and {len(self.models)} models of {len(kinds)} kinds."
+            )
+        object.__setattr__(self, "offsets_mm", offsets)
+
+    @classmethod
+    def of_traces(
+        cls, traces: Mapping[float, Traces | Sequence[Traces]], windows_ms: Windows | None = None
+    ) -> ReceptorOffset:
+        """Make the model from what drives the afferent at each offset."""
+        return cls(
+            np.array(list(traces), dtype=np.float64),
+            [AfferentModel.of_traces(each, windows_ms) for each in traces.values()],
+        )
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        return (*PARAMETER_NAMES, OFFSET_NAME)
+
+    @property
+    def n_stimuli(self) -> int:
+        return self.models[0].n_stimuli
+
+    def at(self, offset_mm: float) -> AfferentModel:
+        offset = finite(OFFSET_NAME, offset_mm, "mm")
+        if not self.offsets_mm[0] <= offset <= self.offsets_mm[-1]:
+            raise InputError(
+                f"{OFFSET_NAME} must lie within {self.offsets_mm[0]:g} ... {self.offsets_mm[-1]:g} mm, "
+                f"where the skin was sampled: got {offset:g}."
+            )
+        before = min(int(np.searchsorted(self.offsets_mm, offset, "right")) - 1, len(self.models) - 2)
+        share = (offset - self.offsets_mm[before]) / (self.offsets_mm[before + 1] - self.offsets_mm[before])
+        near, far = self.models[before], self.models[before + 1]
+        return replace(
+            near, drives=tuple(_between(*pair, share) for pair in zip(near.drives, far.drives, strict=True))
+        )
+
+    def evaluate(self, parameters: FloatArray) -> Rates:
+        return self.at(parameters[-1]).evaluate(parameters[:-1])
+
+    def evaluate_batch(self, points: FloatArray) -> Rates:
+        """Rates (n_points, n_stimuli) for rows of seven parameters, bit-equal to `evaluate`. [spikes/s]"""
+        return evaluate_rows(self, points)
+
+
+def _between(near: Drive, far: Drive, share: float) -> Drive:
+    """Drive interpolated linearly: `near` for a share of 0, `far` for 1."""
+    return replace(
+        near,
+        values=(1.0 - share) * near.values + share * far.values,
+        rate_per_ms=(1.0 - share) * near.rate_per_ms + share * far.rate_per_ms,
+    )
+
+
+INCREMENT = 0.01
+"""Coding increment over the start value; the paper's are "typically two orders of magnitude smaller"."""
+
+LOWEST_SHARE = 0.05  # Lower bound of time constant, capacitance and threshold over their start.
+START_WIDTH = 0.5  # Width of the threshold over the threshold at the start of fits to spikes. [1]
+
+
+def printed_starts() -> FloatArray:
+    """Both start points of the paper as printed, (2, 6), with energy density in kPa."""
+    shared = (neuron.TIME_CONSTANT.value, neuron.CAPACITANCE.value, neuron.THRESHOLD.value)
+    return np.array(
+        [
+            [neuron.INTERCEPT_START.value, dynamic.value, static.value, *shared]
+            for dynamic, static in (
+                (neuron.DYNAMIC_GAIN_START_1, neuron.STATIC_GAIN_START_1),
+                (neuron.DYNAMIC_GAIN_START_2, neuron.STATIC_GAIN_START_2),
+            )
+        ]
+    )
+
+
+def start_points() -> FloatArray:
+    """Both start points of the paper, (2, 6), with rescaled gains.
+
+    One factor of k_d and one of k_s hold for both, see docs/decisions.md#dynamic-gain-rescaled.
+    """
+    scales = [1.0, neuron.DYNAMIC_GAIN_SCALE.value, neuron.STATIC_GAIN_SCALE.value, 1.0, 1.0, 1.0]
+    return printed_starts() * scales
+
+
+def spike_start() -> FloatArray:
+    """Start of every fit to spikes: the paper's first start point with a soft threshold."""
+    return np.array([*identifiable(start_points()[0]), START_WIDTH])
+
+
+def increments(starts: FloatArray) -> FloatArray:
+    """Coding increments of both start points (2, 6); that of the intercept is a share of the rheobase."""
+    time_constant, capacitance, threshold = starts[0, 3:]
+    rheobase = capacitance * threshold / time_constant
+    where_zero = np.full(6, INCREMENT * rheobase)
+    return np.array([coding_increments(start, INCREMENT, where_zero) for start in starts])
+
+
+def response_surface(starts: FloatArray | None = None) -> ResponseSurface:
+    """Return the paper's method, silent at rest, with gains and parameters of the membrane bounded below."""
+    starts = start_points() if starts is None else starts
+    bounds = np.array([-np.inf, 0.0, 0.0, *(LOWEST_SHARE * starts[0, 3:])])
+    return ResponseSurface(starts, increments(starts), bounds, restrict=silent_at_rest)
+
 
 OFFSETS_MM = (-0.3, -0.2, -0.1, 0.0, 0.1, 0.2, 0.3)
 """Offsets from the receptor at which the drive is sampled. The paper's bar moves in steps of 0.2 mm. [mm]"""

@@ -2,7 +2,7 @@
 
 All rate models follow one contract, `RateModel`. `AfferentModel` is the paper's model with six parameters.
 `Reparametrised` is the same model in other parameters. `fingerpad.inference.closed_form` has an approximation
-with derivatives, `fingerpad.inference.receptor_offset` a model whose receptor position is a parameter.
+with derivatives, `fingerpad.inference.afferent_methods` a model whose receptor position is a parameter.
 """
 
 from __future__ import annotations
@@ -23,8 +23,7 @@ from fingerpad.data import neuron
 from fingerpad.inference.identifiable import IDENTIFIABLE_NAMES, six_parameters
 from fingerpad.neuron.afferent import PARAMETER_NAMES, Afferent
 from fingerpad.neuron.exact_spikes import exact_trains
-from fingerpad.neuron.rate_windows import Windows, check_windows, common_rate_windows_ms
-from fingerpad.neuron.spikes import window_rates_hz
+from fingerpad.neuron.spikes import Windows, check_windows, common_rate_windows_ms, window_rates_hz
 from fingerpad.neuron.transduction import Drive, drive
 
 Rates = tuple[FloatArray, FloatArray]  # Dynamic and static rates, one column per stimulus. [spikes/s]

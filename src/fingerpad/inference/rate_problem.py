@@ -10,7 +10,7 @@ import numpy as np
 from fingerpad.core.checks import FloatArray, IntArray, not_negative
 from fingerpad.core.errors import InputError
 from fingerpad.data import protocol
-from fingerpad.inference.fitting.fractional_sum_of_squares import fractional_sum_of_squares
+from fingerpad.inference.fitting.cross_validation import fractional_sum_of_squares
 from fingerpad.inference.rate_model import RateModel, Rates
 from fingerpad.inference.recordings import RateRecordings
 

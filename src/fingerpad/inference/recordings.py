@@ -13,8 +13,7 @@ from fingerpad.core.errors import InputError
 from fingerpad.core.keywords import KnownKeywords
 from fingerpad.core.signals import INTERVAL, SpikeTrains
 from fingerpad.core.values import converted
-from fingerpad.neuron.rate_windows import Windows
-from fingerpad.neuron.spikes import RATE_OF
+from fingerpad.neuron.spikes import RATE_OF, Windows
 
 PHASES = ("dynamic", "static")  # The ramp and the hold.
 

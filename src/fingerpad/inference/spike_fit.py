@@ -31,8 +31,7 @@ from fingerpad.inference.rate_model import Rates, evaluate_rows
 from fingerpad.inference.spike_likelihood import SpikeLikelihood
 from fingerpad.neuron.afferent import Afferent
 from fingerpad.neuron.escape_rate import EscapeRate
-from fingerpad.neuron.rate_windows import Windows
-from fingerpad.neuron.spikes import firing_rate_hz
+from fingerpad.neuron.spikes import Windows, firing_rate_hz
 from fingerpad.neuron.transduction import Drive
 
 NARROWEST = 1.0e-3  # Width below which the threshold is considered hard and log L unbounded.

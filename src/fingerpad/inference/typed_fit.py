@@ -21,8 +21,7 @@ from fingerpad.inference.rate_model import Rates, evaluate_rows
 from fingerpad.inference.rate_problem import RateProblem
 from fingerpad.inference.recordings import RateRecordings
 from fingerpad.neuron.afferent import AnyAfferent
-from fingerpad.neuron.rate_windows import Windows, rate_windows_ms
-from fingerpad.neuron.spikes import RATE_OF
+from fingerpad.neuron.spikes import RATE_OF, Windows, rate_windows_ms
 
 LARGEST_FACTOR = 30.0  # How far a fitted number may lie from that of the afferent given, as a factor.
 N_STARTS, N_REFINED = 16, 3  # Starts that are scored, and starts from which least squares continues.

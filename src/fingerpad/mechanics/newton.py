@@ -24,12 +24,11 @@ import numpy as np
 from fingerpad.core.checks import FloatArray, positive, whole
 from fingerpad.core.errors import ConvergenceError
 from fingerpad.core.values import converted
-from fingerpad.geometry.mesh_quality import element_place, squeezed_most
+from fingerpad.geometry.mesh_checks import element_place, squeezed_most
 from fingerpad.mechanics.configuration import Balance, Body, Configuration, Lagging, Load, evaluate
 from fingerpad.mechanics.contact import ContactState
-from fingerpad.mechanics.factors import NotPositiveDefiniteError
 from fingerpad.mechanics.friction import Anchors, by_secants, slid_mm
-from fingerpad.mechanics.linear import LinearSolver
+from fingerpad.mechanics.linear import LinearSolver, NotPositiveDefiniteError
 
 SUFFICIENT_DECREASE = 1e-4
 SHORTEST_STEP, SHORTEST_NEAR_REST = 1.0 / 64, 2.0**-15

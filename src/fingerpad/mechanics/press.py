@@ -14,8 +14,7 @@ from fingerpad.core.errors import ConvergenceError, InputError
 from fingerpad.core.progress import share_done
 from fingerpad.geometry.indenters import Indenter
 from fingerpad.geometry.mesh import Mesh
-from fingerpad.geometry.mesh_checks import check_mesh
-from fingerpad.geometry.mesh_quality import element_place, squeezed_most
+from fingerpad.geometry.mesh_checks import check_mesh, element_place, squeezed_most
 from fingerpad.geometry.motion import STILL, Stimulus
 from fingerpad.mechanics.assembly import Sparsity
 from fingerpad.mechanics.balance import (

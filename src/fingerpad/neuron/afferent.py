@@ -18,8 +18,7 @@ from fingerpad.core.units import SKIN_QUANTITY_UNITS, gain_unit, units_of
 from fingerpad.core.values import converted
 from fingerpad.data import neuron
 from fingerpad.neuron.lif import LeakyIntegrateAndFire
-from fingerpad.neuron.rate_windows import Window, rate_windows_ms
-from fingerpad.neuron.spikes import firing_rate_hz
+from fingerpad.neuron.spikes import Window, firing_rate_hz, rate_windows_ms
 from fingerpad.neuron.transduction import Drive, Transduction, drive
 
 PARAMETER_NAMES = (

@@ -22,7 +22,7 @@ from fingerpad.data.tissues import DEFAULT_TISSUES
 from fingerpad.neuron.afferent import AnyAfferent, checked_afferent
 from fingerpad.neuron.afferent_types import PC, RA, SAI, SAII
 from fingerpad.neuron.population import Population, sensitivities
-from fingerpad.neuron.rate_windows import Window
+from fingerpad.neuron.spikes import Window
 
 if TYPE_CHECKING:
     from fingerpad.core.regions import Region

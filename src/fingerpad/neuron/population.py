@@ -21,8 +21,7 @@ from fingerpad.data import fingertip, psychophysics
 from fingerpad.data.tissues import DEFAULT_TISSUES
 from fingerpad.neuron.afferent import Afferent, AnyAfferent, checked_afferent
 from fingerpad.neuron.end_organs import EndOrgans
-from fingerpad.neuron.rate_windows import Window, rate_windows_ms
-from fingerpad.neuron.spikes import RATE_OF, first_spike_latency_ms
+from fingerpad.neuron.spikes import RATE_OF, Window, first_spike_latency_ms, rate_windows_ms
 
 MM_PER_CM = 10.0
 LARGEST_SPREAD = 9.0

@@ -2,16 +2,91 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from types import MappingProxyType
 
 import numpy as np
 from numba import njit
 from numpy.typing import ArrayLike
 
-from fingerpad.core.checks import FloatArray
+from fingerpad.core.checks import FloatArray, float_array
+from fingerpad.core.errors import InputError
+from fingerpad.core.phases import HOLD, RAMP, Phase, phase_named, ramp_and_hold_phases
 from fingerpad.core.signals import COUNT, INTERVAL, SpikeTrains, window_bounds
 from fingerpad.core.units import MS_PER_S
+from fingerpad.data import protocol
+
+Window = tuple[float, ...]  # Start and end. [ms]
+Windows = tuple[Window, Window]  # Windows of the dynamic and of the static rate. [ms]
+
+PAPER_WINDOWS_MS: Windows = (protocol.DYNAMIC_WINDOW.value, protocol.STATIC_WINDOW.value)
+"""The paper's windows, which belong to its own ramp and hold. [ms]"""
+
+_NAMES = "dynamic_window_ms", "static_window_ms"
+_PAPER_PHASES = ramp_and_hold_phases(protocol.RAMP.value, protocol.RAMP.value + protocol.HOLD.value)
+
+
+def rate_windows_ms(
+    phases: Sequence[Phase],
+    dynamic_ms: Window | None = None,
+    static_ms: Window | None = None,
+    end_ms: float | None = None,
+    measure: str = INTERVAL,
+) -> Windows:
+    """Return the windows of the dynamic and of the static rate of a touch.
+
+    A window that is not given has the place of the paper's window in its phase: the last 40 % of the ramp,
+    and 550 to 900 ms from the start of the hold, or 58 to 95 % of a hold shorter than the paper's 950 ms
+    (docs/decisions/rate-windows.md). Afferents that fire once or twice in a ramp are counted in all of it.
+    """
+    dynamic, static = (
+        given if given is not None else _within(phase_named(phases, paper.name, asks), paper, window)
+        for given, paper, window, asks in zip(
+            (dynamic_ms, static_ms), _PAPER_PHASES, PAPER_WINDOWS_MS, _NAMES, strict=True
+        )
+    )
+    if measure == COUNT and dynamic_ms is None:
+        dynamic = phase_named(phases, RAMP, _NAMES[0]).window_ms
+    if end_ms is not None:
+        return check_windows((dynamic, static), float(end_ms))
+    return dynamic, static
+
+
+def check_windows(windows_ms: Windows, end_ms: float) -> Windows:
+    """Return two windows if both lie in what was recorded, else raise `InputError`."""
+    checked = []
+    for name, window in zip(_NAMES, windows_ms, strict=True):
+        bounds = float_array(name, window, 1)
+        if bounds.size != 2 or not 0.0 <= bounds[0] < bounds[1] <= end_ms:
+            until = f", at most {end_ms:g} ms, where the touch ends" if np.isfinite(end_ms) else ""
+            came = ", ".join(f"{bound:g}" for bound in bounds[:4])
+            raise InputError(name, f"must be a start from 0 on and a later end{until}", str(came))
+        checked.append((float(bounds[0]), float(bounds[1])))
+    return checked[0], checked[1]
+
+
+def common_rate_windows_ms(
+    touches: Sequence[Sequence[Phase]],
+    dynamic_ms: Window | None = None,
+    static_ms: Window | None = None,
+    measure: str = INTERVAL,
+) -> Windows:
+    """Return the windows that several touches share, each given by its phases, as `rate_windows_ms`."""
+    asked = (rate_windows_ms(phases, dynamic_ms, static_ms, measure=measure) for phases in touches)
+    found = list(dict.fromkeys(asked))
+    if len(found) != 1:
+        shown = " or ".join(", ".join(f"{start:g}-{end:g} ms" for start, end in windows) for windows in found)
+        raise InputError(f"Windows of the rates must be given where the phases differ: got {shown}.")
+    return found[0]
+
+
+def _within(phase: Phase, paper: Phase, window_ms: Window) -> tuple[float, float]:
+    """Window of `phase` at the place of `window_ms` in `paper`; its bits where the phases are equal."""
+    length, whole = phase.end_ms - phase.start_ms, paper.end_ms - paper.start_ms
+    # A response adapts with the time since the ramp, so a longer hold is read at the same time.
+    length = min(length, whole) if phase.name == HOLD else length
+    start, end = (phase.start_ms + (bound - paper.start_ms) * length / whole for bound in window_ms)
+    return start, end
 
 
 def firing_rate_hz(spikes: SpikeTrains, window_ms: tuple[float, ...]) -> FloatArray:

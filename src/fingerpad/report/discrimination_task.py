@@ -16,10 +16,18 @@ from fingerpad.experiments.discrimination.analysis import Decoding, ForcedChoice
 from fingerpad.experiments.discrimination.decoding import SideCurve
 from fingerpad.experiments.discrimination.run import DiscriminationFile
 from fingerpad.report.formatting import ABSENT, fixed, joined, number, whole_percent
-from fingerpad.report.manifest import edition, manifest_chapter
-from fingerpad.report.mixed_responses import MAP_AXES
-from fingerpad.report.page import write_html
-from fingerpad.report.parts import Chapter, Page, Row, Table, illustrated, listed
+from fingerpad.report.parts import (
+    Chapter,
+    Page,
+    Row,
+    Table,
+    edition,
+    illustrated,
+    listed,
+    manifest_chapter,
+    write_html,
+)
+from fingerpad.report.responses import MAP_AXES
 from fingerpad.report.style import (
     BLACK,
     BLUE,

@@ -21,9 +21,14 @@ from fingerpad.core.units import with_unit
 from fingerpad.experiments.discrimination.analysis import TaskResult
 from fingerpad.experiments.fit.results import FitResult
 from fingerpad.report.discrimination_task import draw_curves_of_measure, main_decoding
-from fingerpad.report.mixed_responses import MAP_AXES, draw_map_by_type, draw_raster_by_type, draw_trains
 from fingerpad.report.recording_fit import draw_phase, recorded_phases
-from fingerpad.report.responses import QUANTITIES
+from fingerpad.report.responses import (
+    MAP_AXES,
+    QUANTITIES,
+    draw_map_by_type,
+    draw_raster_by_type,
+    draw_trains,
+)
 from fingerpad.report.style import BLACK, BLUE, GREEN, GREY, ORANGE, new_figure, png, say_nothing_to_draw
 from fingerpad.report.three_levels import NANOAMPERE_PER_MA
 from fingerpad.report.touch import BONE, BONE_INSIDE, draw_section

@@ -2,12 +2,22 @@
 
 from __future__ import annotations
 
+import base64
+import html
+import re
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from functools import partial
+from pathlib import Path
 from typing import Literal, TypeVar
 
+from jinja2 import Environment, PackageLoader, StrictUndefined
 from matplotlib.figure import Figure
+
+from fingerpad.core.files import write_atomically
+from fingerpad.experiments.manifest import Manifest
+from fingerpad.report.formatting import plain, spelled
+from fingerpad.report.style import png
 
 Kind = Literal["", "assumed", "final"]  # An assumed input, or the row that is the result.
 COLUMNS = ("paper", "human")  # Sets of tissues of a reproduction, in the order of their columns.
@@ -133,3 +143,72 @@ class Page:
     @property
     def drawings(self) -> list[Drawing]:
         return [*self.opening, *(drawing for chapter in self.chapters for drawing in chapter.drawings)]
+
+
+def manifest_chapter(manifest: Manifest) -> Chapter:
+    """Return the chapter: facts about the run, its stages, and versions of packages."""
+    facts = asdict(manifest)
+    stages, packages = facts.pop("stages"), facts.pop("packages")
+    tables = [facts_table("The run", facts)]
+    if stages:
+        names = [name for name in stages[0] if any(stage[name] for stage in stages)]
+        rows = [Row([plain(stage[name]) for name in names]) for stage in stages]
+        tables.append(Table("Stages", [spelled(name) for name in names], rows))
+    return Chapter("Provenance", [*tables, facts_table("Packages", packages)])
+
+
+def edition(manifest: Manifest) -> str:
+    """Return the version, resolution and seed of a run, and its caveats: what was not verified."""
+    made = f"fingerpad {manifest.version}, {manifest.resolution} resolution, seed {manifest.seed}"
+    return made if not manifest.caveats else f"{made}. Not verified: {' '.join(manifest.caveats)}"
+
+
+def facts_table(title: str, facts: Mapping[str, object]) -> Table:
+    """Return names and values as a table; what is None or empty is left out."""
+    given = {name: value for name, value in facts.items() if value is not None and value not in ({}, ())}
+    return Table(title, ("", ""), [Row.of(spelled(name), plain(value)) for name, value in given.items()])
+
+
+VERDICTS = {"✓": "met", "✗": "missed", "?": "open"}  # How a cell is marked by the sign that it begins with.
+
+
+def write_html(page: Page, path: Path) -> Path:
+    """Write a page as one HTML file that holds its figures; they are also written beside it in `figures/`."""
+    images = images_of(page)
+    environment = Environment(
+        loader=PackageLoader("fingerpad.report", "."),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    environment.filters["base64"] = lambda content: base64.b64encode(content).decode("ascii")
+    environment.filters |= {"inline": _inline, "code": _code}
+    environment.filters["verdict"] = lambda cell: VERDICTS.get(cell.partition(" ")[0], "")
+    environment.tests |= {"table": lambda part: isinstance(part, Table)}
+    environment.tests |= {"drawing": lambda part: isinstance(part, Drawing)}
+    content = environment.get_template("template.html").render(page=page, images=images, columns=COLUMNS)
+    return write_beside(path, content, images, "figures")
+
+
+def images_of(page: Page) -> dict[str, bytes]:
+    return {name: png(draw) for drawing in page.drawings for name, draw in drawing.images.items()}
+
+
+def write_beside(path: Path, content: str, images: Mapping[str, bytes], folder: str) -> Path:
+    """Write a page, and before it its images into a folder beside it; each file whole or not at all."""
+    path = Path(path)
+    for name, image in images.items():
+        write_atomically(path.parent / folder / f"{name}.png", image)
+    write_atomically(path, content.encode())
+    return path
+
+
+def _inline(text: str) -> str:
+    """Return a paragraph as HTML: escaped, with its links and code."""
+    return re.sub(r"\[([^\]]+)\]\(([^)\s]+)\)", r'<a href="\2">\1</a>', _code(text))
+
+
+def _code(text: str) -> str:
+    """Return a text as HTML: escaped, with its code."""
+    return re.sub(r"`([^`]+)`", r"<code>\1</code>", html.escape(text))

@@ -24,10 +24,18 @@ from fingerpad.report.formatting import (
     number,
     plain,
 )
-from fingerpad.report.manifest import edition, manifest_chapter
-from fingerpad.report.page import write_html
-from fingerpad.report.parts import Chapter, Page, Row, Table, illustrated, listed
-from fingerpad.report.rate_uncertainty import draw_indices, draw_profile, profile_ends, sensitivity_table
+from fingerpad.report.parts import (
+    Chapter,
+    Page,
+    Row,
+    Table,
+    edition,
+    illustrated,
+    listed,
+    manifest_chapter,
+    write_html,
+)
+from fingerpad.report.single_unit import draw_indices, draw_profile, profile_ends, sensitivity_table
 from fingerpad.report.style import BLACK, BLUE, GREY, ORANGE, draw_rates, new_figure
 
 IDENTIFIABLE = IDENTIFIABLE_SYMBOLS | {"time_constant_ms": "time constant τ"}

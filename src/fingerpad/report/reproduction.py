@@ -19,7 +19,6 @@ from fingerpad.report import (
     curvature_thresholds,
     discrimination,
     mesh_picture,
-    nail,
     responses,
     single_unit,
     skin_deflection,
@@ -27,9 +26,19 @@ from fingerpad.report import (
 )
 from fingerpad.report.comparison import comparison_tables, notes_table, statement_table, verdict_table
 from fingerpad.report.formatting import ABSENT, fixed, joined, number, plain
-from fingerpad.report.manifest import edition, manifest_chapter
-from fingerpad.report.page import write_html
-from fingerpad.report.parts import COLUMNS, Chapter, Drawing, Page, Paragraph, Part, Row, Table
+from fingerpad.report.parts import (
+    COLUMNS,
+    Chapter,
+    Drawing,
+    Page,
+    Paragraph,
+    Part,
+    Row,
+    Table,
+    edition,
+    manifest_chapter,
+    write_html,
+)
 from fingerpad.report.style import BLUE, ORANGE, LineStyle, draw_observed_rates, new_figure
 
 # Inputs are the record of what was used: nothing of them is rounded or left out.
@@ -113,7 +122,14 @@ def reproduction_page(result: ReproductionResult) -> Page:
         8, "varied_criterion", "The same with a varied criterion", "discrimination",
         discrimination.draw_criterion, discrimination.caption_criterion,
     )  # fmt: skip
-    border = pair(9, "nail", "Stress at the border of the nail", "nail", nail.draw_nail, nail.caption_nail)
+    border = pair(
+        9,
+        "nail",
+        "Stress at the border of the nail",
+        "nail",
+        skin_deflection.draw_nail,
+        skin_deflection.caption_nail,
+    )
     more: list[Part] = []
     beyond: list[Part] = [
         pair(

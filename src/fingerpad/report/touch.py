@@ -18,13 +18,53 @@ from fingerpad.core.files import path_of
 from fingerpad.core.keywords import known_keywords
 from fingerpad.core.signals import STORED_ENERGY, ResponseMap
 from fingerpad.core.units import cosine_and_sine
-from fingerpad.report.mixed_responses import draw_raster_by_type, draw_trains
+from fingerpad.report.responses import draw_raster_by_type, draw_trains
 from fingerpad.report.style import BLACK, BLUE, ORANGE, new_figure, say_nothing_to_draw, write_png
 
 if TYPE_CHECKING:
     from fingerpad.geometry.indenters import Indenter
     from fingerpad.skin.sampling import SkinResponse
     from fingerpad.skin.section import Section
+from collections.abc import Callable
+from dataclasses import asdict
+
+from fingerpad.experiments.descriptions.pressed import TouchFile
+from fingerpad.report.formatting import number
+from fingerpad.report.parts import Chapter, Drawing, Page, edition, facts_table, manifest_chapter, write_html
+
+PAGE = "touch.html"
+
+
+def write_touch_page(result: TouchFile, draw: Callable[[], Figure], folder: Path) -> Path:
+    caption = (
+        "Left: the middle plane of the finger at the end of the touch. Right: depth "
+        "over time, and the spikes of the afferents that fire."
+    )
+    numbers = asdict(result.summary).items()
+    facts = {"number of times" if name == "times" else name: value for name, value in numbers}
+    page = Page(
+        result.touch.title,
+        f"A finite-element fingertip and a population of afferents. {edition(result.manifest)}",
+        touch_summary(result),
+        [
+            Chapter(
+                "Results", [Drawing("touch", "The touch", draw, caption, 1), facts_table("In numbers", facts)]
+            ),
+            manifest_chapter(result.manifest),
+        ],
+    )
+    return write_html(page, Path(folder) / PAGE)
+
+
+def touch_summary(result: TouchFile) -> list[str]:
+    found = result.summary
+    return [
+        f"The largest force is {number(found.largest_force_mn)} mN, the largest depth "
+        f"{number(found.largest_depth_mm)} mm, the largest contact {number(found.largest_contact_mm2)} mm².",
+        f"{found.firing} of {found.afferents} afferents fire, at up to {number(found.dynamic_rate_hz)} "
+        f"spikes/s in the dynamic window and {number(found.static_rate_hz)} spikes/s in the static window.",
+    ]
+
 
 SKIN = LinearSegmentedColormap.from_list(
     "skin", ["#f7ece1", "#f3c9a5", "#e58a5e", "#b8405e", "#5c1a63", "#1d0b33"]

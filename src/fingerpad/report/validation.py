@@ -10,9 +10,18 @@ from matplotlib.figure import Figure
 from fingerpad.experiments.validation.observations import COLUMNS, KINDS
 from fingerpad.experiments.validation.validation import Prediction, ValidationFile
 from fingerpad.report.formatting import ABSENT, fixed, number, plain, spelled
-from fingerpad.report.manifest import edition, facts_table, manifest_chapter
-from fingerpad.report.page import write_html
-from fingerpad.report.parts import Chapter, Page, Row, Table, illustrated, listed
+from fingerpad.report.parts import (
+    Chapter,
+    Page,
+    Row,
+    Table,
+    edition,
+    facts_table,
+    illustrated,
+    listed,
+    manifest_chapter,
+    write_html,
+)
 from fingerpad.report.style import BLACK, BLUE, GREY, ORANGE, new_figure, say_nothing_to_draw
 
 LONGEST_TABLE = 200  # Conditions that the page lists; validate.json has all rows.

@@ -23,8 +23,7 @@ from fingerpad.mechanics.tissues import name_of_tissues
 from fingerpad.skin.caveats import Caveat, caveats_of
 from fingerpad.skin.fields import Place, sampled_fields, stored_fields
 from fingerpad.skin.receptor_sheet import ReceptorSheet
-from fingerpad.skin.section import Section, middle_section
-from fingerpad.skin.surface_motion import SURFACE_QUANTITIES, SurfaceMotion
+from fingerpad.skin.section import SURFACE_QUANTITIES, Section, SurfaceMotion, middle_section
 
 if TYPE_CHECKING:
     import xarray

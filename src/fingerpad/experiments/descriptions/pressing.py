@@ -12,11 +12,11 @@ from fingerpad.data import protocol
 from fingerpad.experiments.descriptions.signatures import one_of_kinds
 from fingerpad.experiments.descriptions.values import Text
 from fingerpad.experiments.indenter_text import indenter_named
+from fingerpad.geometry.edged_indenters import INDENTERS
 from fingerpad.geometry.fingertip import Finger, Fingertip
 from fingerpad.geometry.indenters import Indenter
 from fingerpad.geometry.mesh_files import MESH_FILES, read_finger
 from fingerpad.geometry.motion import ForceRampAndHold, Motion, RampAndHold
-from fingerpad.geometry.names import INDENTERS
 from fingerpad.geometry.trajectory_files import recorded
 
 RAMP_AND_HOLD = "ramp_and_hold"

@@ -33,11 +33,11 @@ from fingerpad.experiments.descriptions.values import (
     Text,
     choice_of,
 )
+from fingerpad.geometry.edged_indenters import SIZES
 from fingerpad.geometry.grading import RESOLUTIONS, Grading, covering
 from fingerpad.geometry.indenter_grading import grading_along
 from fingerpad.geometry.indenters import Sphere
 from fingerpad.geometry.motion import PLAUSIBLE
-from fingerpad.geometry.names import SIZES
 from fingerpad.skin.indentation import Touch
 
 _NEAR_MM = max(protocol.SPHERE_POSITIONS.value)

@@ -39,7 +39,7 @@ from fingerpad.mechanics.tissues import named_tissues
 from fingerpad.neuron.afferent import Afferent
 from fingerpad.neuron.mixed_population import MixedPopulation
 from fingerpad.neuron.population import Population
-from fingerpad.neuron.rate_windows import rate_windows_ms
+from fingerpad.neuron.spikes import rate_windows_ms
 from fingerpad.skin.indentation import Touch
 
 OUTPUTS = ("figures", "csv", "spikes", "npz", "netcdf", "zarr", "nwb", "vtu", "abaqus", "calculix", "febio")

@@ -33,7 +33,7 @@ from fingerpad.experiments.discrimination.task import FITTED, IDEAL, Discriminat
 from fingerpad.experiments.discrimination.task_stimuli import stimulus_index
 from fingerpad.neuron.mixed_population import MixedPopulation, one_map
 from fingerpad.neuron.population import Population
-from fingerpad.neuron.rate_windows import Windows, rate_windows_ms
+from fingerpad.neuron.spikes import Windows, rate_windows_ms
 from fingerpad.psychophysics.code_efficiency import (
     EFFICIENCY_TRIALS,
     SMALLEST_SPREAD,

@@ -45,7 +45,7 @@ class WindowSettings(Part):
     dynamic: Pair | None = None
     static: Pair | None = None
     """Start and end of the windows of the two rates; without them they follow the phases of each stimulus, as
-    in `fingerpad.neuron.rate_windows`. [ms]"""
+    in `fingerpad.neuron.spikes`. [ms]"""
     latency: Positive | None = None
     """Latest first spike that counts; a later one, or none, counts as this time. Without it, receptors that
     are silent under one stimulus are left out. [ms]"""

@@ -15,14 +15,18 @@ from fingerpad.core.units import units_of
 from fingerpad.data import protocol
 from fingerpad.experiments.fit.methods import Beside, Prepared, check_beside, fit_offset, prepare
 from fingerpad.experiments.fit.results import FitResult, FittedFold, PhaseRates
-from fingerpad.inference.fitting.cross_validation import CrossValidation, cross_validate, interleaved_folds
-from fingerpad.inference.fitting.fractional_sum_of_squares import fractional_sum_of_squares
+from fingerpad.inference.fitting.cross_validation import (
+    CrossValidation,
+    cross_validate,
+    fractional_sum_of_squares,
+    interleaved_folds,
+)
 from fingerpad.inference.identifiable import IDENTIFIABLE_NAMES, identifiable
 from fingerpad.inference.rate_model import AfferentModel, four_number_model
 from fingerpad.inference.rate_problem import RateProblem
 from fingerpad.inference.recordings import PHASES, RateRecordings, SpikeRecordings
 from fingerpad.neuron.afferent import PARAMETER_NAMES, parameter_units
-from fingerpad.neuron.rate_windows import Windows
+from fingerpad.neuron.spikes import Windows
 
 
 @known_keywords

@@ -13,6 +13,7 @@ from fingerpad.core.signals import Traces
 from fingerpad.data import neuron
 from fingerpad.experiments.fit.results import HeldOffset, OffsetFit, SpikeFitSummary
 from fingerpad.inference.afferent_methods import (
+    ReceptorOffset,
     along_slopes,
     and_offset,
     bounds_of,
@@ -21,6 +22,7 @@ from fingerpad.inference.afferent_methods import (
     fitted_six,
     five_number_problem,
     four_number_problem,
+    response_surface,
     search_from,
 )
 from fingerpad.inference.closed_form import ClosedFormModel
@@ -30,10 +32,8 @@ from fingerpad.inference.fitting.methods import Bounds, Continued, Fit, Method
 from fingerpad.inference.identifiable import IDENTIFIABLE_NAMES, SPIKE_PARAMETER_NAMES, identifiable
 from fingerpad.inference.rate_model import AfferentModel
 from fingerpad.inference.rate_problem import RateProblem
-from fingerpad.inference.receptor_offset import ReceptorOffset
 from fingerpad.inference.recordings import RateRecordings, SpikeRecordings
-from fingerpad.inference.start_points import response_surface
-from fingerpad.neuron.rate_windows import Windows
+from fingerpad.neuron.spikes import Windows
 
 Recordings = RateRecordings | SpikeRecordings
 MethodOf = Callable[[AfferentModel, RateProblem, Bounds, int], Method]

@@ -16,6 +16,7 @@ from fingerpad.experiments.fit.results import (
     RateBand,
     RatePosterior,
 )
+from fingerpad.inference.afferent_methods import start_points
 from fingerpad.inference.afferent_posterior import afferent_posterior, from_coordinates, to_coordinates
 from fingerpad.inference.fitting.methods import halton
 from fingerpad.inference.fitting.posterior import credible_band
@@ -26,7 +27,6 @@ from fingerpad.inference.rate_likelihood import RateLikelihood
 from fingerpad.inference.rate_model import AfferentModel, four_number_model
 from fingerpad.inference.rate_problem import RateProblem
 from fingerpad.inference.recordings import RateRecordings
-from fingerpad.inference.start_points import start_points
 
 LEVEL = 0.95  # Probability within every interval and band.
 SEEDS_OF_PROFILES = 300  # Draws from the posterior that profiles start from.

@@ -34,7 +34,7 @@ from fingerpad.inference.recordings import RateRecordings
 from fingerpad.inference.typed_fit import fit_afferent
 from fingerpad.neuron.afferent import AnyAfferent
 from fingerpad.neuron.mixed_population import types_of_afferents
-from fingerpad.neuron.rate_windows import Window, Windows, common_rate_windows_ms
+from fingerpad.neuron.spikes import Window, Windows, common_rate_windows_ms
 from fingerpad.skin.fields import sampled_fields
 from fingerpad.skin.indentation import Touch
 

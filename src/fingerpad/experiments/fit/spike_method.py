@@ -12,6 +12,7 @@ from fingerpad.core.errors import ConvergenceError
 from fingerpad.core.signals import SpikeTrains
 from fingerpad.experiments.fit.methods import Prepared, Recordings, check_spikes
 from fingerpad.experiments.fit.results import SpikeFitSummary
+from fingerpad.inference.afferent_methods import spike_start
 from fingerpad.inference.fitting.cross_validation import CrossValidation
 from fingerpad.inference.fitting.methods import Fit, Problem
 from fingerpad.inference.identifiable import six_parameters
@@ -20,7 +21,6 @@ from fingerpad.inference.rate_problem import RateProblem
 from fingerpad.inference.recordings import RateRecordings, SpikeRecordings
 from fingerpad.inference.spike_fit import SoftAfferent, fit_spikes
 from fingerpad.inference.spike_likelihood import SpikeLikelihood, time_rescaling
-from fingerpad.inference.start_points import spike_start
 from fingerpad.neuron.transduction import Drive
 
 

@@ -16,6 +16,7 @@ from fingerpad.data import bar_firing_rates, protocol
 from fingerpad.experiments.conditions import RECEPTOR_X_MM, Conditions, Touch
 from fingerpad.experiments.gerling2014.skin_deflection import PLATE_DEPTHS_MM, plate
 from fingerpad.geometry.indenters import Bar
+from fingerpad.inference.afferent_methods import response_surface, start_points
 from fingerpad.inference.fitting.cross_validation import (
     CrossValidation,
     FoldFit,
@@ -26,11 +27,9 @@ from fingerpad.inference.fitting.methods import Fit, FitStep, Method
 from fingerpad.inference.rate_model import AfferentModel
 from fingerpad.inference.rate_problem import RateProblem
 from fingerpad.inference.recordings import RateRecordings
-from fingerpad.inference.start_points import response_surface, start_points
 from fingerpad.neuron.afferent import PARAMETER_NAMES, Afferent, parameter_units
 from fingerpad.neuron.population import Population
-from fingerpad.neuron.rate_windows import PAPER_WINDOWS_MS
-from fingerpad.neuron.spikes import modulation_difference, modulation_index
+from fingerpad.neuron.spikes import PAPER_WINDOWS_MS, modulation_difference, modulation_index
 from fingerpad.skin.sampling import SkinResponse
 
 RECEPTOR = ((RECEPTOR_X_MM, 0.0),)  # Position of the end organ: x and z on the skin. [mm]

@@ -14,8 +14,7 @@ from fingerpad.geometry.mesh import LAYERS, Mesh
 from fingerpad.neuron.afferent import Afferent
 from fingerpad.neuron.lif import LeakyIntegrateAndFire
 from fingerpad.neuron.population import Population
-from fingerpad.neuron.rate_windows import PAPER_WINDOWS_MS
-from fingerpad.neuron.spikes import first_spike_latency_ms
+from fingerpad.neuron.spikes import PAPER_WINDOWS_MS, first_spike_latency_ms
 from fingerpad.skin.sampling import SkinResponse
 
 OFFSETS_MM = (0.0, 1.0, 2.0)  # Distances of the three afferents from the axis of the sphere, distal. [mm]
