@@ -59,13 +59,7 @@ LENGTHS_MM = {"mm": 1.0, "um": 1e-3, "cm": 10.0, "m": 1000.0, "inch": 25.4}  # U
 
 
 def name_and_unit(key: str) -> tuple[str, str]:
-    """Split a key into what it names and the unit that it ends with, which is empty where there is none.
-
-    Examples
-    --------
-    >>> name_and_unit("ramp_ms"), name_and_unit("frequency_hz"), name_and_unit("duty")
-    (('ramp', 'ms'), ('frequency', 'Hz'), ('duty', ''))
-    """
+    """Split a key into what it names and the unit that it ends with, which is empty where there is none."""
     end = next((end for end in UNITS if key.endswith(end)), "")
     return key.removesuffix(end), "Hz" if key.endswith(FREQUENCIES) else UNITS.get(end, "")
 
@@ -81,13 +75,7 @@ def units_of(keys: Iterable[str]) -> dict[str, str]:
 
 
 def gain_unit(gain: str, quantity: str) -> str:
-    """Return the unit of a gain of an afferent, "dynamic_gain" or "static_gain", on a quantity.
-
-    Examples
-    --------
-    >>> gain_unit("dynamic_gain", "stored"), gain_unit("static_gain", "skin_stretch")
-    ('mA ms/kPa', 'mA')
-    """
+    """Return the unit of a gain of an afferent, "dynamic_gain" or "static_gain", on a quantity."""
     current, unit = {"dynamic_gain": "mA ms", "static_gain": "mA"}[gain], QUANTITY_UNITS[quantity]
     return f"{current}/{unit}" if unit else current
 
