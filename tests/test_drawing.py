@@ -157,6 +157,9 @@ def test_few_sites_have_a_key_and_many_have_none(results):
     assert len(styles) == 6
     assert few.get_ylabel() == "current [nA]"
     assert few.lines[0].get_ydata().tolist() == pytest.approx([0.0, 20.0])
+    one = fp.Traces([0.0, 50.0, 50.0, 90.0], [[0.0], [2e-3], [1e-3], [1e-3]], quantity="current")
+    assert one.plot(Figure().add_subplot()).get_legend() is None
+    assert one.to_xarray().current.units == "mA"
     axes = fp.SpikeTrains.from_lists([[], []]).plot(Figure().add_subplot())
     assert "no afferent fires" in axes.texts[0].get_text()
     axes = Figure().add_subplot()

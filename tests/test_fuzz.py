@@ -23,7 +23,6 @@ from fingerpad.core.errors import FingerpadError
 from fingerpad.core.layouts import Layout
 from fingerpad.core.plain_yaml import read_yaml
 from fingerpad.core.regions import Ellipse, Polygon, Rectangle
-from fingerpad.core.signals import Traces
 from fingerpad.experiments.afferent_files import fitted_afferent
 from fingerpad.experiments.conditions import Conditions
 from fingerpad.experiments.descriptions.example import EXAMPLE
@@ -106,8 +105,7 @@ VALUES = {
     BandPass: {"corner_hz": 30.0, "rise": 2, "fall": 2},
     fp.Population: {"positions_mm": [[17.0, 0.0], [18.0, 0.0]], "pitch_mm": 1.0, "sensitivity": [1.0, 2.0]},
     fp.EndOrgans: {"positions_mm": [[[17.0, 0.0], [18.0, 0.0]]], "weights": [0.5, 0.5], "combine": "sum"},
-    fp.Traces: {"times_ms": [0.0, 50.0, 100.0], "sed_kpa": [[0.0], [1.0], [1.0]], "kinks_ms": [50.0]},
-    Traces: {"times_ms": [0.0, 50.0], "current_ma": [[0.0, 1.0], [1.0, 1.0]]},
+    fp.Traces: {"times_ms": [0.0, 50.0, 100.0], "values": [[0.0], [1.0], [1.0]], "kinks_ms": [50.0]},
     fp.SpikeTrains: {"times_ms": [1.0, 2.0, 1.5], "offsets": [0, 2, 3]},
     fp.HitRates: {"hit_rate": [0.5, 0.7], "hit_rate_sd": [0.1, 0.1], "seed": 3, "session": 0},
     Layout: {"places_mm": [[0.0, 0.0], [1.0, 0.0]], "pitch_mm": 1.0, "pattern": "uniform", "seed": 1},

@@ -333,7 +333,7 @@ def swapped_layers(parts):
          "set stratum corneum, .* of elements is missing: the file has none"),
         (lambda p: without(p, "symmetry"), {}, "is flat, so half a finger seems to be meant"),
         (lambda p: p, {"unit": "um"}, "with unit 'um'; give the unit of the file"),
-        (lambda p: p, {"unit": "inch"}, "unit must be one of mm, cm, m, um"),
+        (lambda p: p, {"unit": "furlong"}, "unit must be one of mm, um, cm, m, inch"),
         (lambda p: p, {"axes": "x y"}, "axes must name the axes"),
         (lambda p: p, {"axes": "x y -z"}, "must not mirror it"),
         (lambda p: p, {"names": {"hide": "skin"}}, "names must be one of skin, bone"),

@@ -95,9 +95,7 @@ def test_parts_of_results():
     turned = called("geometry.mesh_checks:rigid_motions", PAIR)[:, 1, 3]  # along y, about z
     assert turned.tolist() == [-0.5, 0.5]
     block = block_mesh([0.0, 1.0], [0.0, 1.0, 2.0], [0.0, 1.0], layers=[2, 3])
-    squeezed = called(
-        "geometry.mesh_checks:squeezed_most", block, -0.1 * block.nodes_mm**2 * [0.0, 1.0, 0.0]
-    )
+    squeezed = called("geometry.mesh_checks:squeezed_most", block, -0.1 * block.nodes_mm**2 * [0.0, 1.0, 0.0])
     assert squeezed == (1, pytest.approx(0.7))
 
 

@@ -129,7 +129,7 @@ ONE = Traces([0.0, 1.0], [[0.0], [1.0]])
     [
         (lambda: Traces([0.0, 1.0], [[0.0], [1.0]], kinks_ms=[0.5]), "kinks_ms must be among times_ms"),
         (lambda: Traces([0.0, 1.0], [[0.0], [1.0]], kinks_ms=[1.0, 0.0]), "kinks_ms must increase"),
-        (lambda: replace(ONE, dynamic=ONE), "dynamic must follow another quantity"),
+        (lambda: replace(ONE, dynamic=ONE), "dynamic must hold another quantity"),
         (lambda: replace(ONE, dynamic=Traces([0.0, 1.0], np.ones((2, 2)), quantity="work")), "dynamic must"),
         (lambda: Traces([0.0, 1.0], [[0.0], [-1.0]], quantity="work"), "must not be negative"),
         (lambda: Traces([0.0, 50.0], [[np.inf, 1.0], [-np.inf, 1.0]]),

@@ -4,10 +4,18 @@ import numpy as np
 import pytest
 
 import fingerpad as fp
-from fingerpad.core.units import QUANTITY_UNITS
+from fingerpad.core.units import (
+    QUANTITY_UNITS,
+    SKIN_QUANTITY_UNITS,
+    UNITS,
+    gain_unit,
+    name_and_unit,
+    units_of,
+)
 from fingerpad.experiments.recording_files import read_recordings
 from fingerpad.experiments.stimuli import ShiftedBar
 from fingerpad.experiments.validation.observations import read_observations
+from fingerpad.inference.identifiable import SPIKE_PARAMETER_NAMES
 from fingerpad.skin.fields import sampled_fields
 from fingerpad.skin.section import SURFACE_QUANTITIES
 
@@ -19,9 +27,21 @@ def traces(quantity):
 
 def test_every_quantity_that_skin_has_is_in_the_table_with_its_unit():
     fields = {name: field.unit for name, field in sampled_fields().items()}
-    assert QUANTITY_UNITS.keys() == fields.keys() | set(SURFACE_QUANTITIES)
+    assert SKIN_QUANTITY_UNITS.keys() == fields.keys() | set(SURFACE_QUANTITIES)
     assert {name: QUANTITY_UNITS[name] for name in fields} == fields
     assert [QUANTITY_UNITS[name] for name in SURFACE_QUANTITIES] == ["mm", "mm", ""]
+
+
+def test_units_follow_from_names_and_quantities():
+    assert name_and_unit("ramp_ms") == ("ramp", "ms")
+    assert name_and_unit("static_rate_hz") == ("static_rate", "spikes/s")
+    assert name_and_unit("frequency_hz") == ("frequency", "Hz")
+    assert name_and_unit("duty") == ("duty", "")
+    ends = list(UNITS)
+    assert not [(a, b) for n, a in enumerate(ends) for b in ends[n + 1 :] if b.endswith(a)]
+    assert list(units_of(SPIKE_PARAMETER_NAMES).values()) == ["1/ms", "1/kPa", "1/(kPa ms)", "ms", "1"]
+    assert gain_unit("dynamic_gain", "stored") == "mA ms/kPa"
+    assert gain_unit("static_gain", "skin_stretch") == "mA"
 
 
 @pytest.mark.parametrize(
