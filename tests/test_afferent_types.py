@@ -318,7 +318,7 @@ BAD = [
     (lambda: fp.RA(retraction=1.5), "retraction must lie within 0 ... 1: got 1.5"),
     (lambda: fp.RA(rise=0), "rise must be a whole number of at least 1"),
     (lambda: fp.RA().spikes(ENERGY), "needs 'compressive_stress': got traces of 'stored'"),
-    (lambda: fp.RA(treshold=0.1), "RA has no treshold: did you mean threshold"),
+    (lambda: fp.RA(treshold=0.1), "treshold is no argument of RA: did you mean threshold"),
     (lambda: fp.OwnAfferent("sum"), "respond must be a function of Traces: got 'sum'"),
     (lambda: own(lambda sed: sed), "respond must return .* got Traces"),
     (lambda: own(lambda sed: fp.SpikeTrains.from_lists([])), "respond must return .* 1 in all: got 0 trains"),

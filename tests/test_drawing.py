@@ -174,7 +174,6 @@ def test_few_sites_have_a_key_and_many_have_none(results):
     pyplot.close(axes.figure)
     many = fp.Traces(times_ms, np.ones((2, 7)), quantity="current").plot(Figure().add_subplot())
     assert many.get_legend() is None
-    assert results["Traces"].plot(Figure().add_subplot()).get_legend() is None
 
 
 @pytest.mark.parametrize("kind", DRAWINGS)

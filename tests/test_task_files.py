@@ -268,7 +268,7 @@ stimuli: {vary: object.curvature_per_m, values: [287, 287]} => '287' is repeated
 stimuli: {vary: object.curvature_per_m, values: [287, x]} =>
     stimuli.values[2], object.curvature_per_m must be a finite number: got 'x'.
 stimuli: {vary: object.curvature_per_m, values: [287, 0]} =>
-    stimuli.values[2], object: curvature_per_m must be greater than 0
+    stimuli.values[2], object.curvature_per_m must be greater than 0
 stimuli: {vary: object.curvature_per_m, values: 287} => stimuli.values must be a list: got 287.
 stimuli: {vary: colour, values: [1, 2]} =>
     stimuli.vary must be friction, or a key of object, motion or place such as object.radius_mm: got 'colour'.
@@ -277,7 +277,7 @@ stimuli: {vary: curvature_per_m, values: [1, 2]} =>
 stimuli: {vary: object.width_mm, values: [1, 2]} =>
     stimuli.values[1], object.width_mm is unknown: object has kind, curvature_per_m
 {stimuli: {vary: motion.depth_mm, values: [1, 15]}, standard: 1} =>
-    stimuli.values[2], motion: depth_mm must stay below
+    stimuli.values[2], motion.depth_mm must stay below
 stimuli: {vary: object.curvature_per_m} => stimuli.values must be given
 stimuli: [{object: {curvature_per_m: 300}}] => stimuli[1].name must be given
 stimuli: [{name: a}, {name: a}] => 'a' is repeated
@@ -295,8 +295,8 @@ object: {kind: sphere, curvature_per_m: 3} => object.curvature_per_m must not be
 motion: {kind: recorded, file: none.csv} => motion: none.csv must be a file that can be read
 motion: {kind: stroke, depth_mm: 0.5, speed_mm_per_s: 20, x_mm: 40} =>
     motion: The indenter must not leave the finger
-place: {x_mm: 90} => place: A position must lie on the finger
-finger: giant => finger:
+place: {x_mm: 90} => place must lie on the finger
+finger: giant => finger.like must
 reach_mm: 0 => reach_mm must be a number greater than 0: got 0.
 skin: {materials: human} => skin is unknown
 population: {density_per_cm2: 0} => population.density_per_cm2 must be a number greater than 0: got 0.
