@@ -37,7 +37,8 @@ def draw_nail(section: NailBorder) -> Figure:
     profile = figure.add_subplot(grid[2, :])
     middle, across, nail = section.middle, section.across, section.nail_mm
     stress = section.von_mises_kpa.ravel()
-    peak = float(np.nanmax([*stress, *middle.von_mises_kpa], initial=0.0)) or 1.0
+    shown = np.concatenate([stress, middle.von_mises_kpa])
+    peak = float(shown[np.isfinite(shown)].max(initial=0.0)) or 1.0
     # Values below these decades have the darkest colour.
     wide = LogNorm(vmin=peak / 10.0**DECADES, vmax=peak, clip=True)
     near = Normalize(0.0, section.border_kpa or 1.0)
