@@ -262,6 +262,18 @@ def test_predictions_put_in_as_observations_score_1(folder):
     assert sphere > rest
 
 
+def test_a_receptor_beside_the_contact_fires_less_and_0_is_the_middle(folder):
+    middle = result_of(folder, RATES).predictions[0].predicted
+    header = "force_n,curvature_per_m,position_mm,rate_hz\n"
+    found = result_of(folder, header + "0.1,287,0,30\n0.1,287,3,1\n0.1,287,-3,2\n0.1,287,40,2\n")
+    centre, proximal, distal, beyond = found.predictions
+    assert centre.predicted == middle > max(proximal.predicted, distal.predicted)
+    assert np.isnan(beyond.predicted)
+    # With the axis reversed, 3 and -3 mm change places.
+    observed, mirrored = np.array([30.0, 1.0, 2.0]), [middle, distal.predicted, proximal.predicted]
+    assert found.r2_mirrored == pytest.approx(scores.coefficient_of_determination(observed, mirrored))
+
+
 @pytest.fixture
 def pressed(monkeypatch):
     """What is pressed and where the receptors are, without pressing."""
