@@ -80,7 +80,7 @@ def test_fields_are_the_papers_and_units_cover_every_name():
         (lambda: fp.Gap(edge_radius_mm=-0.1), "edge_radius_mm must not be negative [mm]: got -0.1."),
         (lambda: fp.Grating(period_mm=2.0, duty=1.0), "duty must be below 1"),
         (lambda: fp.indent(fp.Fingertip(), fp.Sphere(), resolutoin="quick"), "did you mean resolution?"),
-        (lambda: fp.indent(fp.Fingertip(), fp.Sphere(), materials=""), "argument of indent: did you mean tissues?"),
+        (lambda: fp.indent(fp.Fingertip(), fp.Sphere(), materials=""), "of indent: did you mean tissues?"),
         (lambda: fp.Population.grid(dens=3), "dens is no argument of Population.grid: did you mean dens"),
         (lambda: fp.Trajectory([0, 1], depths_mm=[0, 1]), "did you mean depth_mm?"),
         (lambda: indenter_named("sphere:raduis_mm=4"), "raduis_mm is no argument of Sphere: did you"),

@@ -11,7 +11,6 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from enum import Enum
 from operator import attrgetter
-from pkgutil import resolve_name
 from typing import TYPE_CHECKING
 
 # Only for types: the command line reads the names of the quantities here, without compiling anything.
@@ -84,7 +83,9 @@ def _at_last_time(function: str) -> Callable[[Deformation, Mesh], FloatArray]:
     """Values of a function of `mechanics.fields` of the stress at the last time."""
 
     def of(deformation: Deformation, _: Mesh) -> FloatArray:
-        values: FloatArray = resolve_name(f"fingerpad.mechanics.fields:{function}")(deformation.stress_kpa)
+        from fingerpad.mechanics import fields as computed  # only who samples them loads its kernels
+
+        values: FloatArray = getattr(computed, function)(deformation.stress_kpa)
         return values[None]
 
     return of
