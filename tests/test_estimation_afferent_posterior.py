@@ -149,7 +149,7 @@ def test_ranks_of_truths_are_uniform_and_intervals_have_their_nominal_coverage(p
 
 @pytest.mark.parametrize(("width", "noise"), [(2.0, 1.0), (0.4, 1.0), (1.0, 1.5), (1.0, 1.0 / 1.5)])
 def test_calibration_detects_intervals_that_are_too_narrow_or_too_wide(places, width, noise):
-    assert calibrated(ranks(places, 100, width, noise)) == (False, False)
+    assert calibrated(ranks(places, 150, width, noise)) == (False, False)
 
 
 def test_rates_that_end_at_zero_make_intervals_somewhat_too_narrow(places) -> None:

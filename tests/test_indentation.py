@@ -170,7 +170,7 @@ def refused(said, **changes):
         refused("tissues must be one of", tissues=None),
         refused("resolution must be one of quick, standard, paper: got 'fine'", resolution="fine"),
         refused("depth_mm must stay below", stimulus=RampAndHold(depth_mm=6.0)),
-        refused("at_mm must be a finite number", at_mm=(np.nan, 0.0)),
+        refused(r"at_mm\[0\] must be a finite number", at_mm=(np.nan, 0.0)),
         refused("at_mm must be a pair", at_mm=17.37),
         refused("x = 50", at_mm=(50.0, 0.0)),
         refused("z = 12", at_mm=(17.37, 12.0)),

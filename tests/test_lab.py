@@ -61,8 +61,9 @@ def until(is_done):
 
 def waited(laboratory, state, exact=False):
     """View of a state once its presses are done."""
-    until(lambda: not isinstance(view_of(laboratory, state, exact), Making))
-    return view_of(laboratory, state, exact)
+    views = []
+    until(lambda: views.append(view_of(laboratory, state, exact)) or not isinstance(views[-1], Making))
+    return views[-1]
 
 
 @pytest.mark.parametrize(

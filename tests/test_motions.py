@@ -287,7 +287,7 @@ def test_the_fastest_ramp_force_and_vibration_are_allowed():
     ("motion", "said"),
     [
         (Trajectory((0, 50, 500), (0, 0.5, 0.5), x_mm=(0, 0, 20)),
-         r"must not leave the finger at \d+(\.\d+)? ms, sample 3: A position must lie on the finger"),
+         r"must not leave the finger at \d+(\.\d+)? ms, sample 3: position must lie on the finger"),
         (Trajectory((0, 50, 500), force_mn=(0, 50, 50), z_mm=(0, 0, -12)),
          "The indenter must not leave the finger at .* ms, sample 3"),
         (Trajectory((0, 50, 100, 500), (0, 0.5, 4.6, 0.5)),

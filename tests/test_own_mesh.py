@@ -342,7 +342,7 @@ def swapped_layers(parts):
         (lambda p: p, {"receptor_depth_mm": -1.0}, "receptor_depth_mm must be greater than 0"),
         (lambda p: p, {"contact_mm": 10.0}, r"contact_mm must be a pair, x and z \[mm\]: got 10.0"),
         (lambda p: p, {"names": ["skin"]}, r"names must be of type Mapping: got \['skin'\]"),
-        (lambda p: p, {"contact_mm": (90.0, 0.0)}, "A position must lie on the finger"),
+        (lambda p: p, {"contact_mm": (90.0, 0.0)}, "position must lie on the finger"),
         (lambda p: moved(p, 5, np.nan), {}, "nodes must have finite coordinates"),
         (lambda p: replace(p, element_sets=p.element_sets | {"dermis": p.element_sets["stratum corneum"]}),
          {}, "an element must be in one layer: element .* is in stratum corneum and in dermis"),

@@ -35,6 +35,7 @@ FURTHER = {
     "core.regions": ("Rectangle",),
     "core.progress": ("Lines", "NoProgress", "Progress", "share_done"),
     "experiments.discrimination.analysis": ("TaskResult",),
+    "experiments.fit.fit": ("fit_recordings",),
     "experiments.fit.results": ("FitResult",),
     "experiments.descriptions.pressing": ("ramp_and_hold",),
     "geometry.trajectory_files": ("recorded",),

@@ -91,8 +91,8 @@ SED_DRIVEN = replace(HUMAN, reading=Reading())
 
 def test_a_quantity_is_read_and_raised_to_its_exponent():
     rooted = replace(HUMAN, reading=Reading(exponent=0.5))
-    assert driven(Skin(), rooted, SITES).sed_kpa[-1].tolist() == [2.0, 3.0]
-    assert driven(Skin(), replace(HUMAN, reading=STRESS), SITES).sed_kpa[-1].tolist() == [8.0, 18.0]
+    assert driven(Skin(), rooted, SITES).values[-1].tolist() == [2.0, 3.0]
+    assert driven(Skin(), replace(HUMAN, reading=STRESS), SITES).values[-1].tolist() == [8.0, 18.0]
 
 
 def test_one_bar_is_read_where_a_shifted_bar_would_have_the_receptor():

@@ -143,7 +143,7 @@ def _value(
             raise failed[plan.touch]
         return plan.of(skins[plan.touch] if plan.touch else None), None
     except (ConvergenceError, InputError) as error:
-        return np.nan, error.args[0]
+        return np.nan, str(error)
 
 
 def _number(value: Value) -> float:
