@@ -14,6 +14,7 @@ BAD_TOUCH = {
     "object: sphere\nplace: {x_mm: 40}": ("place",),
     "object: sphere\nplace: {tilt_deg: 100}": ("place", "tilt_deg"),
     "object: sphere\nresolutoin: quick": ("resolutoin",),
+    "object: sphere\nplace: {colour: 1}": ("place", "colour"),
 }
 
 
@@ -41,6 +42,7 @@ def test_an_error_in_a_file_has_the_keys_that_lead_to_it(tmp_path, text, path):
         fp.read_touch_description(file).touch()
     assert caught.value.path == path
     assert str(caught.value).startswith(f"{file}, line ")
+    assert not str(caught.value).endswith("..")
 
 
 def test_an_error_comes_whole_from_another_process():

@@ -117,7 +117,7 @@ class InputError(FingerpadError, ValueError):
             self.where = spelled(self.path) if isinstance(path, tuple) else str(path)
             self.said = f"{expected}: got {got}" if got else expected
             self.said += f"{'; ' if got else ': '}{remedy}" if remedy else ""
-            self.said += "" if self.said.endswith("?") else "."
+            self.said += "" if self.said.endswith(("?", ".")) else "."
 
     def _said(self) -> str:
         between = " " if self.expected else ": "

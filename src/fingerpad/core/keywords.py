@@ -67,7 +67,7 @@ def _refuse_unknown(
         if name not in known:
             other = (elsewhere or {}).get(name)
             hint = f"take {other}." if other else did_you_mean(name, known, owner)
-            raise InputError(name, f"is no argument of {owner}", remedy=hint.removesuffix("."))
+            raise InputError(name, f"is no argument of {owner}", remedy=hint)
 
 
 def _refuse_misfit(
