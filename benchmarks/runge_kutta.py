@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from fingerpad.core.checks import FloatArray, positive
 from fingerpad.core.signals import SpikeTrains, Traces
+from fingerpad.core.values import FloatArray, positive
 from fingerpad.neuron.lif import LeakyIntegrateAndFire
 
 

@@ -22,9 +22,9 @@ from matplotlib.ticker import LogLocator
 from scipy.interpolate import interp1d
 
 import fingerpad as fp
-from fingerpad.core.checks import FloatArray
 from fingerpad.core.errors import InertiaWarning
 from fingerpad.core.regions import Ellipse
+from fingerpad.core.values import FloatArray
 from fingerpad.data import afferents as published
 from fingerpad.neuron.afferent import AnyAfferent
 from fingerpad.neuron.mixed_population import types_of_afferents

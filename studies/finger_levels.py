@@ -12,10 +12,10 @@ from functools import cached_property
 
 import numpy as np
 
-from fingerpad.core.checks import FloatArray
 from fingerpad.core.errors import InputError
 from fingerpad.core.random_streams import Purpose, normals
 from fingerpad.core.units import MN_PER_N
+from fingerpad.core.values import FloatArray
 from fingerpad.data import cylinder_deflection, neuron, protocol
 from fingerpad.experiments.conditions import RECEPTOR_X_MM, Conditions
 from fingerpad.experiments.gerling2014.single_unit_uncertainty import PIECES

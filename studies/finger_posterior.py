@@ -17,8 +17,8 @@ from scipy.linalg import solve_triangular
 from scipy.special import logsumexp, ndtr, ndtri, xlog1py, xlogy
 from scipy.stats import norm
 
-from fingerpad.core.checks import FloatArray
 from fingerpad.core.errors import ConvergenceError
+from fingerpad.core.values import FloatArray
 from fingerpad.data import bar_firing_rates, cylinder_deflection, psychophysics
 from fingerpad.data import tissues as published
 from fingerpad.experiments.gerling2014.skin_deflection import PLATE_DEPTHS_MM

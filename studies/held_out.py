@@ -12,11 +12,11 @@ from pathlib import Path
 
 import numpy as np
 
-from fingerpad.core.checks import FloatArray
+from fingerpad.core.checked import result_class
 from fingerpad.core.errors import ConvergenceError
 from fingerpad.core.random_streams import Purpose, normals
-from fingerpad.core.results import Number, result_class
 from fingerpad.core.units import MS_PER_S
+from fingerpad.core.values import FloatArray, Number
 from fingerpad.data import paper, protocol, psychophysics
 from fingerpad.data.published import Published
 from fingerpad.experiments.conditions import RECEPTOR_X_MM, Conditions

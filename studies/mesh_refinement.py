@@ -14,9 +14,9 @@ from typing import Any
 import numpy as np
 from scipy.optimize import brentq
 
-from fingerpad.core.checks import FloatArray, float_array, positive
+from fingerpad.core.checked import result_class
 from fingerpad.core.errors import InputError
-from fingerpad.core.results import Number, Vector, result_class
+from fingerpad.core.values import FloatArray, Number, Vector, float_array, positive
 from fingerpad.data import bar_firing_rates, protocol, psychophysics
 from fingerpad.experiments.conditions import RECEPTOR_X_MM, Conditions
 from fingerpad.experiments.gerling2014 import single_unit, sphere_discrimination

@@ -12,9 +12,9 @@ from collections.abc import Iterable
 import numpy as np
 from scipy.stats import binomtest
 
-from fingerpad.core.checks import FloatArray
+from fingerpad.core.checked import result_class
 from fingerpad.core.errors import InputError
-from fingerpad.core.results import Matrix, result_class
+from fingerpad.core.values import FloatArray, Matrix
 
 LEVELS = (0.5, 0.95)
 """Intervals whose coverage is given. [0-1]"""

@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from fingerpad.core.files import write_atomically
-from fingerpad.core.results import from_json, to_json
+from fingerpad.core.result_files import from_json, to_json
 from fingerpad.report.style import write_png
 from studies import chain_picture, results_page, tissue_page
 from studies.command_line_page import command_line_page

@@ -8,7 +8,9 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from fingerpad.core.results import Number, Vector, read_results, result_class
+from fingerpad.core.checked import result_class
+from fingerpad.core.result_files import read_results
+from fingerpad.core.values import Number, Vector
 from fingerpad.experiments.gerling2014.claim_row import ClaimRow, Group, Statement
 from fingerpad.experiments.gerling2014.discrepancy import CriterionErrorBars
 from fingerpad.experiments.gerling2014.reproduction import ReproductionResult, Summaries

@@ -12,7 +12,7 @@ import typer
 from fingerpad.cli.options import Jobs, Resolution, Tissues, to_whole
 from fingerpad.cli.running import interruptible, make_writable, processes, progress
 from fingerpad.core.files import write_atomically
-from fingerpad.core.results import to_json
+from fingerpad.core.result_files import to_json
 from fingerpad.experiments.conditions import Conditions
 from fingerpad.experiments.runner import Runner
 from studies.pages import DOCS, joined, write_blocks

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-from fingerpad.core.checks import one_of, positive
 from fingerpad.core.signals import STORED_ENERGY
+from fingerpad.core.values import one_of, positive
 from fingerpad.data import tissues as published
 from fingerpad.mechanics.materials import Material, Prony, Tissues
 from fingerpad.mechanics.tissues import LONG_TERM, named_tissues, skin_prony

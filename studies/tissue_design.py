@@ -13,8 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import qmc
 
-from fingerpad.core.checks import FloatArray, float_array
 from fingerpad.core.errors import InputError
+from fingerpad.core.values import FloatArray, float_array
 from fingerpad.mechanics.materials import Prony, Tissues
 from fingerpad.mechanics.tissues import skin_prony
 from studies.tissue_candidates import STRESS, Candidate, neo_hookean

@@ -21,8 +21,8 @@ from numpy.typing import ArrayLike
 from scipy.linalg import cho_solve, solve_triangular
 from scipy.optimize import minimize
 
-from fingerpad.core.checks import FloatArray, IntArray, float_array, whole
 from fingerpad.core.errors import InputError
+from fingerpad.core.values import FloatArray, IntArray, float_array, whole
 
 KEPT = 0.99999
 """Share of the variance of an output over the design that its components keep."""

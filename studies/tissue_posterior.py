@@ -9,9 +9,9 @@ from multiprocessing import get_context
 
 import numpy as np
 
-from fingerpad.core.checks import FloatArray, IntArray
+from fingerpad.core.checked import result_class
 from fingerpad.core.errors import ConvergenceError, InputError
-from fingerpad.core.results import Number, result_class
+from fingerpad.core.values import FloatArray, IntArray, Number
 from fingerpad.data import protocol
 from fingerpad.experiments.conditions import Conditions
 from fingerpad.experiments.gerling2014.curvature_thresholds import (

@@ -14,12 +14,12 @@ from pathlib import Path
 
 import numpy as np
 
-from fingerpad.core.checks import FloatArray
+from fingerpad.core.checked import result_class
 from fingerpad.core.errors import ConvergenceError
 from fingerpad.core.random_streams import Purpose, normals
-from fingerpad.core.results import Matrix, Number, Vector, result_class
 from fingerpad.core.signals import Traces
 from fingerpad.core.units import MN_PER_N
+from fingerpad.core.values import FloatArray, Matrix, Number, Vector
 from fingerpad.data import protocol, psychophysics
 from fingerpad.experiments.conditions import RECEPTOR_X_MM, Conditions, Touch
 from fingerpad.experiments.gerling2014 import single_unit

@@ -6,7 +6,7 @@ from typing import TypeVar
 
 import numpy as np
 
-from fingerpad.core.results import from_json
+from fingerpad.core.result_files import from_json
 from fingerpad.core.signals import STORED_ENERGY, Traces
 from fingerpad.geometry.mesh import block_mesh
 from fingerpad.neuron.afferent import Afferent

@@ -14,7 +14,7 @@ from scipy.stats import binom
 
 from fingerpad import cli
 from fingerpad.core.errors import InputError
-from fingerpad.core.results import to_json
+from fingerpad.core.result_files import to_json
 from fingerpad.core.signals import Traces
 from fingerpad.experiments import runner
 from fingerpad.experiments.conditions import RECEPTOR_X_MM

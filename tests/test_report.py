@@ -12,7 +12,7 @@ import pytest
 from matplotlib.collections import PolyCollection
 from matplotlib.patches import Circle
 
-from fingerpad.core.results import schema_of, to_json
+from fingerpad.core.result_files import schema_of, to_json
 from fingerpad.data import all_published
 from fingerpad.experiments.gerling2014.claim_row import Group, Verdict, paired
 from fingerpad.experiments.gerling2014.nail_border import NailBorder

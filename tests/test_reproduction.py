@@ -18,7 +18,7 @@ import pytest
 
 from fingerpad import __version__
 from fingerpad.core.compilation import SHORT_NOTICE, SUBJECT
-from fingerpad.core.results import read_results, to_json
+from fingerpad.core.result_files import read_results, to_json
 from fingerpad.data import all_published
 from fingerpad.experiments.discrimination.task_stimuli import read_task, task_touches
 from fingerpad.experiments.gerling2014.claim_row import Group, Verdict

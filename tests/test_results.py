@@ -10,19 +10,10 @@ import numpy as np
 import pytest
 from pydantic import ValidationError
 
+from fingerpad.core.checked import result_class
 from fingerpad.core.errors import InputError, StoreError
-from fingerpad.core.results import (
-    Matrix,
-    Number,
-    Vector,
-    WholeVector,
-    from_json,
-    read_results,
-    result_class,
-    schema_of,
-    to_json,
-    write_results,
-)
+from fingerpad.core.result_files import from_json, read_results, schema_of, to_json, write_results
+from fingerpad.core.values import Matrix, Number, Vector, WholeVector
 
 
 @result_class

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from fingerpad.core.errors import InputError, StoreError
-from fingerpad.core.results import from_json
+from fingerpad.core.result_files import from_json
 from studies.command_line_page import command_line_page
 from studies.pages import with_blocks
 from studies.results_page import (

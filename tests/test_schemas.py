@@ -5,7 +5,7 @@ import json
 import fastjsonschema
 import pytest
 
-from fingerpad.core.results import file_format
+from fingerpad.core.result_files import file_format
 from fingerpad.experiments.schemas import TOUCH_SCHEMA, file_name, schema, touch_schema
 from fingerpad.experiments.schemas.__main__ import RESULT_FILES, write_schemas
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from fingerpad.core.errors import InputError
-from fingerpad.core.results import from_json, to_json
+from fingerpad.core.result_files import from_json, to_json
 from fingerpad.core.signals import Traces
 from fingerpad.data import bar_firing_rates, cylinder_deflection, neuron
 from fingerpad.experiments.conditions import RECEPTOR_X_MM, Conditions

@@ -8,7 +8,7 @@ import pytest
 import typer
 
 import studies
-from fingerpad.core.results import result_class
+from fingerpad.core.checked import result_class
 from fingerpad.experiments import runner
 from studies import __main__ as command
 from studies.pages import DOCS

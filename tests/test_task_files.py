@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from fingerpad.core.errors import InputError
 from fingerpad.core.plain_yaml import read_yaml
-from fingerpad.core.results import file_format
+from fingerpad.core.result_files import file_format
 from fingerpad.experiments import schemas
 from fingerpad.experiments.conditions import RECEPTOR_X_MM, Conditions
 from fingerpad.experiments.descriptions.reading import parts_in

@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 import fingerpad as fp
 from fingerpad import cli
 from fingerpad.core.plain_yaml import read_yaml
-from fingerpad.core.results import from_json, to_json
+from fingerpad.core.result_files import from_json, to_json
 from fingerpad.experiments import schemas
 from fingerpad.experiments.conditions import RECEPTOR_X_MM, Conditions
 from fingerpad.experiments.descriptions.estimate import (

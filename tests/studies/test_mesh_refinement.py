@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from fingerpad.core.results import from_json, to_json
+from fingerpad.core.result_files import from_json, to_json
 from fingerpad.data import bar_firing_rates
 from fingerpad.experiments import runner
 from fingerpad.experiments.conditions import RECEPTOR_X_MM, Conditions

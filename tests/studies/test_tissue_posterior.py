@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from fingerpad.core.errors import InputError
-from fingerpad.core.results import from_json, to_json
+from fingerpad.core.result_files import from_json, to_json
 from fingerpad.core.signals import Traces
 from fingerpad.experiments.conditions import RECEPTOR_X_MM, Conditions
 from fingerpad.experiments.gerling2014.single_unit_uncertainty import PIECES

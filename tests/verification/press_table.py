@@ -24,9 +24,9 @@ from typing import Any
 
 import numpy as np
 
-from fingerpad.core.checks import FloatArray
 from fingerpad.core.errors import FingerpadError
 from fingerpad.core.files import write_atomically
+from fingerpad.core.values import FloatArray
 from fingerpad.data.tissues import DEFAULT_TISSUES
 from fingerpad.geometry.edged_indenters import Edge, Gap, Grating
 from fingerpad.geometry.fingertip import Fingertip

@@ -31,7 +31,7 @@ def discriminate_command(
     example: Annotated[str | None, option("Print the YAML file of an example task, and exit.")] = None,
 ) -> None:
     """Predict hit rates, psychometric curves and thresholds of a discrimination task."""
-    from fingerpad.core.checks import one_of
+    from fingerpad.core.values import one_of
     from fingerpad.experiments import schemas
     from fingerpad.experiments.discrimination.run import DiscriminationRun, discriminate
     from fingerpad.experiments.discrimination.task_stimuli import (

@@ -62,7 +62,7 @@ def export_command(
     ] = None,
 ) -> None:
     """Press an indenter into the finger and write the touch as a table, for ParaView or another solver."""
-    from fingerpad.core.checks import one_of
+    from fingerpad.core.values import one_of
     from fingerpad.experiments.descriptions.touch import described_touch, read_touch_description
     from fingerpad.export.formats import check_format, export_touch
 

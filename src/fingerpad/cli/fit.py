@@ -127,7 +127,7 @@ def fit_command(
     example: Annotated[Path | None, option("Write example recordings into this folder, and exit.")] = None,
 ) -> None:
     """Fit an afferent to your own recordings: firing rates or spike times under known stimuli."""
-    from fingerpad.core.checks import one_of
+    from fingerpad.core.values import one_of
     from fingerpad.experiments import schemas
     from fingerpad.experiments.descriptions.pressing import finger_of, named_files
     from fingerpad.experiments.descriptions.reading import at

@@ -72,7 +72,7 @@ def prune_command(
     yes: Annotated[bool, option("Delete; without it, only say what would be.", "--yes")] = False,
 ) -> None:
     """Delete stored indentations by age and by size; they are computed again when they are needed."""
-    from fingerpad.core.checks import not_negative
+    from fingerpad.core.values import not_negative
     from fingerpad.skin.store import pruned
 
     if days is None and size is None:

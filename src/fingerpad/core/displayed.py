@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from fingerpad.core.keywords import check_methods
+from fingerpad.core.checked import checked_class
 
 if TYPE_CHECKING:
     import pandas
@@ -21,7 +21,7 @@ class Displayed:
 
     def __init_subclass__(cls, **options: Any) -> None:
         super().__init_subclass__(**options)
-        check_methods(cls)
+        checked_class(cls)
 
     def plot(self, axes: Axes | None = None, what: str | None = None, **options: Any) -> Axes:
         """Draw this result.

@@ -19,13 +19,13 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import partial
 from multiprocessing import get_context
-from typing import Any, Protocol, cast
+from typing import Any, Protocol, cast, runtime_checkable
 
-from fingerpad.core.checks import whole
 from fingerpad.core.compilation import announce_compilation
 from fingerpad.core.errors import StoreError
 from fingerpad.core.logger import LOGGER
 from fingerpad.core.threads import available_threads
+from fingerpad.core.values import whole
 
 Work = Callable[[Any, int | None], Any]
 """Called with an item and the number of threads that it may use; None for all. It must be known by name to
@@ -40,6 +40,7 @@ _ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"), "1")
 _LOOK_FOR_PARENT_S = 0.1
 
 
+@runtime_checkable
 class Engine(Protocol):
     """Something that does work on items, in any order."""
 

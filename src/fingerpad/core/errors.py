@@ -124,10 +124,10 @@ class InputError(FingerpadError, ValueError):
         said = f"{self.where}{between}{self.said}" if self.where else self.said
         return f"{self.source}, {said}" if self.source else said
 
-    def at(self, place: Place, words: str | None = None) -> "InputError":
-        """Return the same error at a place of a file, which `words` spell."""
+    def at(self, place: Place, words: str | None = None, in_file: bool = True) -> "InputError":
+        """Return the same error at a place, of a file or of an argument, which `words` spell."""
         other = copy.copy(self)
-        other.path, other.where, other.in_file = place, spelled(place) if words is None else words, True
+        other.path, other.where, other.in_file = place, spelled(place) if words is None else words, in_file
         return other
 
     def from_source(self, source: str) -> "InputError":
@@ -141,6 +141,11 @@ def spelled(path: Place) -> str:
     """Spell a place in a file, such as stimuli[2].width_mm, entries counted from 1."""
     text = "".join(f"[{part + 1}]" if isinstance(part, int) else f".{part}" for part in path)
     return text.lstrip(".") or "the file"
+
+
+def named(path: Place) -> str:
+    """Spell a part of an argument, such as corners_mm[0], entries counted from 0."""
+    return "".join(f"[{part}]" if isinstance(part, int) else f".{part}" for part in path).lstrip(".")
 
 
 def _parts(path: str) -> Place:

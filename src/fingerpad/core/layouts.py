@@ -8,13 +8,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 
-from fingerpad.core.checks import FloatArray, float_array, one_of, positive, whole
+from fingerpad.core.checked import value_class
 from fingerpad.core.errors import InputError
-from fingerpad.core.values import converted
+from fingerpad.core.values import FiniteMatrix, FloatArray, NotNegativeWhole, Positive, choice
 
 Place = Callable[[FloatArray], FloatArray]
 """From positions in the plane (n, 2) to points of the skin (n, 3), both in mm."""
@@ -28,25 +28,18 @@ MM2_PER_CM2 = 100.0
 MOST_RECEPTORS = 1_000_000  # Upper limit, to detect a wrong unit: the whole finger has some thousands.
 
 
-@dataclass(frozen=True)
-@converted
+@value_class
 class Layout:
     """Positions of receptors in a plane."""
 
-    places_mm: FloatArray  # In the plane of the region, (n_receptors, 2). [mm]
-    pitch_mm: float  # Distance of neighbours in a lattice; 1/sqrt(density) in a random layout. [mm]
-    pattern: str
-    seed: int | None = None  # Seed of random positions; None for a lattice.
+    places_mm: FiniteMatrix  # In the plane of the region, (n_receptors, 2). [mm]
+    pitch_mm: Positive  # Distance of neighbours in a lattice; 1/sqrt(density) in a random layout. [mm]
+    pattern: Annotated[str, choice(PATTERNS)]
+    seed: NotNegativeWhole | None = None  # Seed of random positions; None for a lattice.
 
     def __post_init__(self) -> None:
-        places = float_array("places_mm", self.places_mm, 2)
-        if places.shape[1] != 2 or len(places) == 0:
-            raise InputError("places_mm", "must have rows of two numbers", f"shape {places.shape}")
-        positive("pitch_mm", self.pitch_mm, "mm")
-        one_of("pattern", self.pattern, PATTERNS)
-        if self.seed is not None:
-            whole("seed", self.seed, at_least=0)
-        object.__setattr__(self, "places_mm", places)
+        if self.places_mm.shape[1] != 2 or len(self.places_mm) == 0:
+            raise InputError("places_mm", "must have rows of two numbers", f"shape {self.places_mm.shape}")
 
     def __len__(self) -> int:
         return len(self.places_mm)

@@ -12,12 +12,12 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from scipy.spatial import cKDTree
 
-from fingerpad.core.checks import FloatArray, not_negative, positive
+from fingerpad.core.checked import checked
 from fingerpad.core.errors import ConvergenceError, InputError
-from fingerpad.core.keywords import known_keywords
 from fingerpad.core.layouts import MM2_PER_CM2, MOST_RECEPTORS, Layout, Place, around_zero, mean_spacing_mm
 from fingerpad.core.random_streams import Purpose, normals, uniforms
 from fingerpad.core.regions import Region
+from fingerpad.core.values import Finite, FloatArray, Whole, not_negative, positive
 
 SEPARATION = 0.75
 """Least distance in a Poisson-disc layout over 1/sqrt(density). Random placement saturates at 0.83."""
@@ -28,8 +28,8 @@ MOST_APART = 100_000  # Upper limit of a Poisson-disc layout, whose receptors ar
 _MOST_ATTEMPTS = 1000
 
 
-@known_keywords
-def rectangular(region: Region, density_per_cm2: float) -> Layout:
+@checked
+def rectangular(region: Region, density_per_cm2: Finite) -> Layout:
     """Square lattice, the pitch being 1/sqrt(density)."""
     _expected(region, density_per_cm2)
     pitch = mean_spacing_mm(density_per_cm2)
@@ -40,8 +40,8 @@ def rectangular(region: Region, density_per_cm2: float) -> Layout:
     return _lattice(region, np.stack(np.meshgrid(*columns, indexing="ij"), axis=-1), pitch, "rectangular")
 
 
-@known_keywords
-def hexagonal(region: Region, density_per_cm2: float) -> Layout:
+@checked
+def hexagonal(region: Region, density_per_cm2: Finite) -> Layout:
     """Triangular lattice with six neighbours per receptor: pitch^2 = 2/(sqrt(3) density).
 
     Parameters
@@ -73,16 +73,16 @@ def hexagonal(region: Region, density_per_cm2: float) -> Layout:
     return _lattice(region, np.stack([step * row, across], axis=-1) + middle, pitch, "hexagonal")
 
 
-@known_keywords
-def uniform(region: Region, density_per_cm2: float, seed: int) -> Layout:
+@checked
+def uniform(region: Region, density_per_cm2: Finite, seed: Whole) -> Layout:
     """Independent positions with uniform probability."""
     count = _expected(region, density_per_cm2)
     places = _inside(region, count, lambda who, attempt: _anywhere(region, seed, attempt, who))
     return Layout(places, mean_spacing_mm(density_per_cm2), "uniform", seed)
 
 
-@known_keywords
-def jittered(region: Region, density_per_cm2: float, seed: int, jitter: float = 0.2) -> Layout:
+@checked
+def jittered(region: Region, density_per_cm2: Finite, seed: Whole, jitter: Finite = 0.2) -> Layout:
     """Square lattice with random displacements: each coordinate by Normal(0, jitter times the pitch)."""
     lattice = rectangular(region, density_per_cm2)
     spread = not_negative("jitter", jitter) * lattice.pitch_mm
@@ -96,12 +96,12 @@ def jittered(region: Region, density_per_cm2: float, seed: int, jitter: float = 
     return Layout(places, lattice.pitch_mm, "jittered", seed)
 
 
-@known_keywords
+@checked
 def poisson_disc(
     region: Region,
-    density_per_cm2: float,
-    seed: int,
-    separation: float = SEPARATION,
+    density_per_cm2: Finite,
+    seed: Whole,
+    separation: Finite = SEPARATION,
     place: Place | None = None,
 ) -> Layout:
     """Random positions with a least distance from each other.

@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
-from fingerpad.core.checks import finite
+from fingerpad.core.checked import value_class
 from fingerpad.core.errors import InputError
-from fingerpad.core.keywords import KnownKeywords
-from fingerpad.core.values import converted
+from fingerpad.core.values import Finite, finite
 
 RAMP, HOLD = "ramp", "hold"  # Names of the phases in which the two rates of the paper are counted.
 
@@ -16,9 +14,8 @@ RELEASE, VIBRATION = "release", "vibration"
 """Names of phases in which an indenter goes back, and in which it goes to and fro while it touches."""
 
 
-@dataclass(frozen=True)
-@converted
-class Phase(metaclass=KnownKeywords):
+@value_class
+class Phase:
     """A named part of a touch.
 
     Parameters
@@ -30,8 +27,8 @@ class Phase(metaclass=KnownKeywords):
     """
 
     name: str
-    start_ms: float
-    end_ms: float
+    start_ms: Finite
+    end_ms: Finite
 
     def __post_init__(self) -> None:
         start, end = (finite(f"{at} of phase {self.name!r}", getattr(self, at), "ms")

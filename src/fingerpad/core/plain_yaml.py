@@ -13,8 +13,8 @@ from typing import Any
 
 import yaml
 
+from fingerpad.core.checked import checked
 from fingerpad.core.errors import InputError
-from fingerpad.core.keywords import known_keywords
 
 LARGEST_TEXT = 300_000
 """Characters of a document, which are read in some seconds; longer tables belong in CSV."""
@@ -22,7 +22,7 @@ LARGEST_TEXT = 300_000
 DEEPEST = 20  # Mappings and lists inside each other.
 
 
-@known_keywords
+@checked
 def read_yaml(text: str, source: str) -> Any:
     """Plain values of a text in YAML.
 

@@ -7,10 +7,10 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager
 from contextvars import ContextVar
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING, Protocol, runtime_checkable
 
+from fingerpad.core.checked import checked
 from fingerpad.core.errors import InputError
-from fingerpad.core.keywords import known_keywords
 
 if TYPE_CHECKING:
     import rich.progress
@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 SHORTEST_WAIT_S = 0.5  # Shortest time between two looks at a stage in which no part has ended. [s]
 
 
+@runtime_checkable
 class Progress(Protocol):
     """Reports the progress of a run."""
 
@@ -231,7 +232,7 @@ def _bars(name: str, console: Console | None = None) -> rich.progress.Progress:
     )  # fmt: skip
 
 
-@known_keywords
+@checked
 def notebook_progress() -> Progress:
     """Progress in a notebook: a bar below the cell, as on a terminal.
 

@@ -22,9 +22,9 @@ from typing import Any
 import numpy as np
 from numba import njit
 
-from fingerpad.core.checks import FloatArray, IntArray, instance, whole
 from fingerpad.core.errors import InputError
 from fingerpad.core.philox import WORDS, four_normals, four_uniforms
+from fingerpad.core.values import FloatArray, IntArray, instance, whole
 
 Numbers = int | Sequence[int] | np.ndarray
 """Trials or receptors: their numbers, or their count, numbered from 0."""

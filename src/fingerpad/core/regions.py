@@ -7,22 +7,21 @@ The plane is the skin seen from its volar side (x and z), or the unrolled skin o
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from fingerpad.core.checks import FloatArray, float_array, positive
+from fingerpad.core.checked import value_class
 from fingerpad.core.errors import InputError
-from fingerpad.core.keywords import KnownKeywords
-from fingerpad.core.values import converted
+from fingerpad.core.values import FloatArray, Pairs, Positive, float_array
 
 Point = tuple[float, float]
 
 _ROUND_OFF = 1e-9  # Tolerance for points on the border of a region, over its size, because of round-off.
 
 
+@runtime_checkable
 class Region(Protocol):
     """A part of the plane with an area and a test for points."""
 
@@ -39,9 +38,8 @@ class Region(Protocol):
         ...
 
 
-@dataclass(frozen=True)
-@converted
-class Rectangle(metaclass=KnownKeywords):
+@value_class
+class Rectangle:
     """Rectangle with sides parallel to the axes.
 
     Parameters
@@ -58,13 +56,9 @@ class Rectangle(metaclass=KnownKeywords):
     (18.0, [True, False])
     """
 
-    length_mm: float
-    width_mm: float
+    length_mm: Positive
+    width_mm: Positive
     centre_mm: Point = (0.0, 0.0)
-
-    def __post_init__(self) -> None:
-        positive("length_mm", self.length_mm, "mm")
-        positive("width_mm", self.width_mm, "mm")
 
     @property
     def area_mm2(self) -> float:
@@ -82,9 +76,8 @@ class Rectangle(metaclass=KnownKeywords):
         return away.max(axis=1) <= 1.0 + _ROUND_OFF
 
 
-@dataclass(frozen=True)
-@converted
-class Ellipse(metaclass=KnownKeywords):
+@value_class
+class Ellipse:
     """Ellipse with axes parallel to the coordinate axes; a disc if both semi-axes are equal.
 
     Parameters
@@ -101,13 +94,9 @@ class Ellipse(metaclass=KnownKeywords):
     (12.566, [True, False])
     """
 
-    semi_length_mm: float
-    semi_width_mm: float
+    semi_length_mm: Positive
+    semi_width_mm: Positive
     centre_mm: Point = (0.0, 0.0)
-
-    def __post_init__(self) -> None:
-        positive("semi_length_mm", self.semi_length_mm, "mm")
-        positive("semi_width_mm", self.semi_width_mm, "mm")
 
     @property
     def area_mm2(self) -> float:
@@ -125,9 +114,8 @@ class Ellipse(metaclass=KnownKeywords):
         return np.square(away).sum(axis=1) <= 1.0 + _ROUND_OFF
 
 
-@dataclass(frozen=True)
-@converted
-class Polygon(metaclass=KnownKeywords):
+@value_class
+class Polygon:
     """Region inside a closed line of straight edges that does not cross itself.
 
     Parameters
@@ -142,13 +130,12 @@ class Polygon(metaclass=KnownKeywords):
     (4.0, [True, False])
     """
 
-    corners_mm: tuple[Point, ...]
+    corners_mm: Pairs
 
     def __post_init__(self) -> None:
-        corners = float_array("corners_mm", self.corners_mm, 2)
-        if corners.shape[1] != 2 or len(corners) < 3:
-            raise InputError("corners_mm", "needs three pairs or more", f"shape {corners.shape}")
-        object.__setattr__(self, "corners_mm", tuple((float(x), float(z)) for x, z in corners))
+        corners = np.array(self.corners_mm)
+        if len(corners) < 3:
+            raise InputError("corners_mm", "needs three pairs or more", str(len(corners)))
         extent = float(np.prod(np.ptp(corners, axis=0)))
         if self.area_mm2 <= _ROUND_OFF * extent:
             raise InputError("corners_mm", "must enclose an area", "corners on one line")

@@ -7,19 +7,38 @@ Skin -> `Traces` -> `Traces` of a current -> `SpikeTrains` -> `ResponseMap` -> `
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import field, fields, replace
+from functools import partial
 from inspect import signature
-from typing import Any, Protocol
+from typing import Annotated, Any, Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from fingerpad.core.checks import FloatArray, finite, float_array, increasing, int_array, one_of, positive
+from fingerpad.core.checked import value_class
 from fingerpad.core.displayed import Result
 from fingerpad.core.errors import InputError
 from fingerpad.core.phases import Phase, from_onset, ramp_and_hold_phases
 from fingerpad.core.units import MS_PER_S, QUANTITY_UNITS, with_unit
-from fingerpad.core.values import converted
+from fingerpad.core.values import (
+    Check,
+    Finite,
+    FiniteMatrix,
+    FiniteVector,
+    FloatArray,
+    IntArray,
+    Many,
+    Numbers,
+    Positive,
+    TimesMs,
+    Vector,
+    Whole,
+    choice,
+    finite,
+    float_array,
+    increasing,
+    int_array,
+)
 
 MOST_SHOWN = 8  # Numbers of a list that `repr` shows.
 
@@ -35,6 +54,7 @@ CURRENT, RELATIVE_CURRENT = "current", "relative_current"
 CURRENTS = (CURRENT, RELATIVE_CURRENT)  # Quantities that may jump and may be negative.
 
 
+@runtime_checkable
 class Skin(Protocol):
     """Any object that returns the strain energy density below points of its surface."""
 
@@ -50,13 +70,7 @@ class Skin(Protocol):
         ...
 
 
-def _freeze(signal: object, **arrays: np.ndarray) -> None:
-    for name, array in arrays.items():
-        object.__setattr__(signal, name, array)
-
-
-@dataclass(frozen=True)
-@converted
+@value_class
 class Traces(Result):
     """One quantity at receptor sites over time: of the skin, or the current that it drives.
 
@@ -95,17 +109,16 @@ class Traces(Result):
     'mA'
     """
 
-    times_ms: FloatArray
-    values: FloatArray
-    kinks_ms: FloatArray = field(default_factory=lambda: np.empty(0))
-    quantity: str = STORED_ENERGY
+    times_ms: FiniteVector
+    values: FiniteMatrix
+    kinks_ms: TimesMs = field(default_factory=lambda: np.empty(0))
+    quantity: Annotated[str, choice(QUANTITY_UNITS)] = STORED_ENERGY
     dynamic: Traces | None = None
-    phases: tuple[Phase, ...] = ()
-    onset_ms: float = None  # type: ignore[assignment]  # a number after initialisation
+    phases: Many[Phase] = ()
+    onset_ms: Finite = None  # type: ignore[assignment]  # a number after initialisation
 
     def __post_init__(self) -> None:
-        one_of("quantity", self.quantity, tuple(QUANTITY_UNITS))
-        times, values = float_array("times_ms", self.times_ms, 1), float_array("values", self.values, 2)
+        times, values, kinks = self.times_ms, self.values, self.kinks_ms
         if values.shape[0] != times.size or times.size < 2:
             raise InputError(
                 "Traces needs one row of values per time and at least two times: "
@@ -121,13 +134,11 @@ class Traces(Result):
             if values.min(initial=0.0) < 0.0:
                 smallest = with_unit(f"{values.min():.3g}", self.quantity, " {}")
                 raise InputError("values", "must not be negative", remedy=f"the smallest is {smallest}")
-        kinks = increasing("kinks_ms", float_array("kinks_ms", self.kinks_ms, 1))
         if not np.isin(kinks, times).all():
             raise InputError("kinks_ms", "must be among times_ms", str(kinks[~np.isin(kinks, times)]))
-        _freeze(self, times_ms=times, values=values, kinks_ms=kinks)
         if self.dynamic is not None:
             self._check_dynamic(self.dynamic)
-        onset = self._first_touch_ms() if self.onset_ms is None else float(self.onset_ms)
+        onset = self._first_touch_ms() if self.onset_ms is None else self.onset_ms
         object.__setattr__(self, "onset_ms", onset)
         phases, later = self.phases, kinks[kinks > onset]
         if not phases and later.size == 1 and onset >= 0.0 and later[0] < times[-1]:
@@ -179,7 +190,7 @@ class Traces(Result):
 
     @classmethod
     def at_rest(
-        cls, end_ms: float, dynamic_quantity: str = STORED_ENERGY, static_quantity: str = STORED_ENERGY
+        cls, end_ms: Finite, dynamic_quantity: str = STORED_ENERGY, static_quantity: str = STORED_ENERGY
     ) -> Traces:
         """Traces of one site that is not touched: 0 from the start to `end_ms`.
 
@@ -296,8 +307,7 @@ def window_bounds(window_ms: Sequence[float]) -> tuple[float, float]:
     return bounds[0], bounds[1]
 
 
-@dataclass(frozen=True)
-@converted
+@value_class
 class SpikeTrains(Result):
     """Spike times of several afferents, one after the other in one array.
 
@@ -315,20 +325,17 @@ class SpikeTrains(Result):
     [[1.0, 2.5], [], [4.0]]
     """
 
-    times_ms: FloatArray
-    offsets: np.ndarray
+    times_ms: FiniteVector
+    offsets: Annotated[IntArray, Check(partial(int_array, ndim=1), {})]
 
     def __post_init__(self) -> None:
-        times = float_array("times_ms", self.times_ms, 1)
-        offsets = int_array("offsets", self.offsets, 1)
-        if offsets.ndim != 1 or offsets.size == 0 or offsets[0] != 0 or offsets[-1] != times.size:
+        times, offsets = self.times_ms, self.offsets
+        if offsets.size == 0 or offsets[0] != 0 or offsets[-1] != times.size:
             raise InputError(
                 "offsets", f"must run from 0 to the number of spikes, {times.size}", str(offsets)
             )
         if (np.diff(offsets) < 0).any():
             raise InputError("offsets", "must not decrease", str(offsets))
-        offsets.setflags(write=False)
-        _freeze(self, times_ms=times, offsets=offsets)
         falls = np.diff(times) <= 0.0
         falls[offsets[(offsets > 0) & (offsets < times.size)] - 1] = False  # from one train to the next
         if falls.any():
@@ -361,7 +368,7 @@ class SpikeTrains(Result):
         if len(parts) == 1:
             return parts[0]
         counts = [np.diff(part.offsets) for part in parts]
-        offsets = np.concatenate([[0], np.cumsum(np.concatenate(counts))]) if parts else np.zeros(1)
+        offsets = np.concatenate([[0], np.cumsum(np.concatenate(counts))]) if parts else np.zeros(1, int)
         return cls(np.concatenate([part.times_ms for part in parts]) if parts else np.empty(0), offsets)
 
     @property
@@ -408,8 +415,7 @@ class SpikeTrains(Result):
         return self.times_ms[self.offsets[afferent] : self.offsets[afferent + 1]]
 
 
-@dataclass(frozen=True)
-@converted
+@value_class
 class ResponseMap(Result):
     """Response of a population of afferents to one touch.
 
@@ -440,18 +446,18 @@ class ResponseMap(Result):
         Type of each receptor, in a mixed population; empty where all have one.
     """
 
-    positions_mm: FloatArray
-    pitch_mm: float
+    positions_mm: FiniteMatrix
+    pitch_mm: Positive
     spikes: SpikeTrains
-    dynamic_rate_hz: FloatArray
-    static_rate_hz: FloatArray
-    first_spike_latency_ms: FloatArray
-    duration_ms: float | None = None
-    phases: tuple[Phase, ...] = ()
-    windows_ms: tuple[tuple[float, ...], tuple[float, ...]] | None = None
-    rate_measure: str = INTERVAL
+    dynamic_rate_hz: FiniteVector
+    static_rate_hz: FiniteVector
+    first_spike_latency_ms: Vector
+    duration_ms: Positive | None = None
+    phases: Many[Phase] = ()
+    windows_ms: tuple[Numbers, Numbers] | None = None
+    rate_measure: Annotated[str, choice((INTERVAL, COUNT))] = INTERVAL
     quantity: str = STORED_ENERGY
-    types: tuple[str, ...] = ()
+    types: Many[str] = ()
 
     @property
     def by_type(self) -> dict[str, ResponseMap]:
@@ -506,42 +512,25 @@ class ResponseMap(Result):
         return self.spikes.counted_hz(self.windows_ms[number])
 
     def __post_init__(self) -> None:
-        one_of("rate_measure", self.rate_measure, (INTERVAL, COUNT))
-        if self.duration_ms is not None:
-            positive("duration_ms", self.duration_ms, "ms")
         for window in self.windows_ms or ():
             window_bounds(window)
-        positions = float_array("positions_mm", self.positions_mm, 2)
-        if positions.shape[1] not in (2, 3):
+        n, columns = self.positions_mm.shape
+        if columns not in (2, 3):
             raise InputError(
-                "positions_mm", "needs columns x and z, or x, y and z", f"shape {positions.shape}"
+                "positions_mm", "needs columns x and z, or x, y and z", f"shape {self.positions_mm.shape}"
             )
-        positive("pitch_mm", self.pitch_mm, "mm")
-        dynamic = float_array("dynamic_rate_hz", self.dynamic_rate_hz, 1)
-        static = float_array("static_rate_hz", self.static_rate_hz, 1)
-        latency = np.array(self.first_spike_latency_ms, dtype=np.float64)
-        latency.setflags(write=False)
-        n = positions.shape[0]
         for name, size in (
             ("spikes", len(self.spikes)),
-            ("dynamic_rate_hz", dynamic.size),
-            ("static_rate_hz", static.size),
-            ("first_spike_latency_ms", latency.size),
+            ("dynamic_rate_hz", self.dynamic_rate_hz.size),
+            ("static_rate_hz", self.static_rate_hz.size),
+            ("first_spike_latency_ms", self.first_spike_latency_ms.size),
             ("types", len(self.types) or n),
         ):
             if size != n:
                 raise InputError(f"ResponseMap needs one entry of {name} per receptor: got {size} for {n}.")
-        _freeze(
-            self,
-            positions_mm=positions,
-            dynamic_rate_hz=dynamic,
-            static_rate_hz=static,
-            first_spike_latency_ms=latency,
-        )
 
 
-@dataclass(frozen=True)
-@converted
+@value_class
 class HitRates(Result):
     """Hit rate of each comparison with the standard.
 
@@ -555,19 +544,17 @@ class HitRates(Result):
         Key of the random numbers of the noise and the observer.
     """
 
-    hit_rate: FloatArray
-    hit_rate_sd: FloatArray
-    seed: int | None = None
-    session: int = 0
+    hit_rate: FiniteVector
+    hit_rate_sd: FiniteVector
+    seed: Whole | None = None
+    session: Whole = 0
 
     def __post_init__(self) -> None:
-        mean = float_array("hit_rate", self.hit_rate, 1)
-        spread = float_array("hit_rate_sd", self.hit_rate_sd, 1)
+        mean, spread = self.hit_rate, self.hit_rate_sd
         if mean.shape != spread.shape:
             raise InputError(f"hit_rate and hit_rate_sd must match: got {mean.shape} and {spread.shape}.")
         if ((mean < 0) | (mean > 1)).any() or (spread < 0).any():
             raise InputError("hit_rate", "must lie within 0 ... 1 and hit_rate_sd must not be negative")
-        _freeze(self, hit_rate=mean, hit_rate_sd=spread)
 
     def __repr__(self) -> str:
         rates = ", ".join(f"{rate:.2f}" for rate in self.hit_rate[:MOST_SHOWN])

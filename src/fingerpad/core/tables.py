@@ -13,9 +13,9 @@ from typing import Any
 
 import numpy as np
 
-from fingerpad.core.checks import FloatArray, finite, number_in, numbers_in
 from fingerpad.core.errors import InputError, did_you_mean
 from fingerpad.core.files import read_text
+from fingerpad.core.values import FloatArray, finite, number_in, numbers_in
 
 Check = Callable[[str, Any, str], float]
 

@@ -18,10 +18,10 @@ from typing import Any, TypeVar
 
 import numba
 
-from fingerpad.core.checks import whole
 from fingerpad.core.compilation import tell_once
 from fingerpad.core.errors import InputError
 from fingerpad.core.numba_internals import tell_compilations
+from fingerpad.core.values import whole
 
 Result = TypeVar("Result")
 

@@ -9,8 +9,8 @@ from importlib.resources import files
 import numpy as np
 from numpy.typing import NDArray
 
-from fingerpad.core.checks import FloatArray, float_array, number_in, one_of
 from fingerpad.core.errors import InputError
+from fingerpad.core.values import FloatArray, float_array, number_in, one_of
 from fingerpad.data.published import STATUSES
 
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Generic, Literal, TypeVar
 
-from fingerpad.core.checks import finite, one_of
 from fingerpad.core.errors import InputError
+from fingerpad.core.values import finite, one_of
 
 Status = Literal["paper", "read", "recalled", "assumed"]
 STATUSES: dict[str, str] = {

@@ -10,15 +10,15 @@ import time
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import CancelledError
 from contextlib import contextmanager
-from dataclasses import dataclass
 from functools import cache, partial
 from importlib import import_module
 from typing import Any
 
+from fingerpad.core.checked import value_class
 from fingerpad.core.engine import Outcomes, Work
 from fingerpad.core.errors import InputError, StoreError
-from fingerpad.core.keywords import KnownKeywords
 from fingerpad.core.logger import LOGGER
+from fingerpad.core.values import Finite
 from fingerpad.experiments.manifest import software
 
 WAITING_IN_LINE = 512  # Most items that the scheduler knows at a time: a sweep may have a million.
@@ -27,8 +27,8 @@ Versions = dict[str, str]  # Versions of all on which the numbers of a press dep
 _CONNECT_S = 10.0
 
 
-@dataclass(frozen=True)
-class Cluster(metaclass=KnownKeywords):
+@value_class
+class Cluster:
     """Engine whose work is done by the workers of a Dask scheduler.
 
     Each task uses one thread, so that a worker shall have one process per core and one thread per process.
@@ -45,7 +45,7 @@ class Cluster(metaclass=KnownKeywords):
     """
 
     address: str
-    patience_s: float = 300.0
+    patience_s: Finite = 300.0
 
     def check(self) -> None:
         """Raise `InputError` unless the scheduler answers and its workers have this version of fingerpad."""

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
+from typing import Annotated
 
 import numpy as np
 
-from fingerpad.core.checks import instance, one_of, whole
-from fingerpad.core.keywords import KnownKeywords
-from fingerpad.core.random_streams import LARGEST_SEED
-from fingerpad.core.values import converted
+from fingerpad.core.checked import value_class
+from fingerpad.core.values import Finite, Seed, choice, instance, one_of
 from fingerpad.data.tissues import DEFAULT_TISSUES
 from fingerpad.geometry.fingertip import Finger, Fingertip
 from fingerpad.geometry.grading import RESOLUTIONS, Grading, resolution_grading
@@ -45,9 +44,8 @@ def straight_tilt_deg(finger: Finger, indenter: Indenter) -> float:
     return 0.0 if indenter.grips else skin_tilt_deg(finger)
 
 
-@dataclass(frozen=True)
-@converted
-class Conditions(metaclass=KnownKeywords):
+@value_class
+class Conditions:
     """Finger, tissues and accuracy of a reproduction.
 
     Parameters
@@ -62,14 +60,12 @@ class Conditions(metaclass=KnownKeywords):
         The finger.
     """
 
-    resolution: str = "standard"
-    seed: int = 0
+    resolution: Annotated[str, choice(RESOLUTIONS)] = "standard"
+    seed: Seed = 0
     tissues: str | Tissues = DEFAULT_TISSUES
     finger: Finger = field(default_factory=Fingertip)
 
     def __post_init__(self) -> None:
-        one_of("resolution", self.resolution, RESOLUTIONS)
-        whole("seed", self.seed, 0, LARGEST_SEED)
         if isinstance(self.tissues, str):
             one_of("tissues", self.tissues, tuple(TISSUES))
         else:
@@ -98,10 +94,10 @@ class Conditions(metaclass=KnownKeywords):
     def touch(
         self,
         indenter: Indenter,
-        x_mm: float,
+        x_mm: Finite,
         grading: Grading,
         tissues: str | Tissues | None = None,
-        tilt_deg: float = 0.0,
+        tilt_deg: Finite = 0.0,
     ) -> Touch:
         """One touch of the paper's protocol, 1.0 mm in 50 ms, held for 950 ms, on the midline at x."""
         return touch_of(
@@ -115,7 +111,7 @@ class Conditions(metaclass=KnownKeywords):
         )
 
     def sphere_touch(
-        self, curvature_per_m: float, position_mm: float = 0.0, grading: Grading | None = None
+        self, curvature_per_m: Finite, position_mm: Finite = 0.0, grading: Grading | None = None
     ) -> Touch:
         """One touch of the population study: a sphere along the skin's normal, centred on the receptors.
 

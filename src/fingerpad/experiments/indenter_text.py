@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import fields
 from functools import lru_cache
 
-from fingerpad.core.checks import number_in, one_of
 from fingerpad.core.errors import InputError
 from fingerpad.core.units import unit_of
+from fingerpad.core.values import number_in, one_of
 from fingerpad.geometry.edged_indenters import INDENTERS
 from fingerpad.geometry.indenters import Indenter
 

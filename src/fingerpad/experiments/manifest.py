@@ -13,7 +13,8 @@ from typing import TypedDict
 import numpy as np
 
 from fingerpad import __version__
-from fingerpad.core.results import Number, result_class
+from fingerpad.core.checked import result_class
+from fingerpad.core.values import Number
 from fingerpad.geometry.mesh import Mesh
 from fingerpad.geometry.mesh_checks import jacobian_at_gauss, scaled_jacobian
 from fingerpad.skin.code_hash import code_hash

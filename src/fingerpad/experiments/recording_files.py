@@ -12,14 +12,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from fingerpad.core.checks import FloatArray, not_negative, numbers_in, positive
+from fingerpad.core.checked import checked
 from fingerpad.core.errors import InputError
 from fingerpad.core.files import check_file
-from fingerpad.core.keywords import known_keywords
 from fingerpad.core.logger import LOGGER
 from fingerpad.core.signals import SpikeTrains
 from fingerpad.core.tables import TableRow, column_of, read_csv
 from fingerpad.core.units import MS_PER_S
+from fingerpad.core.values import FloatArray, Whole, not_negative, numbers_in, positive
 from fingerpad.experiments.descriptions.stimuli import NamedStimulus
 from fingerpad.experiments.stimuli import Stimuli
 from fingerpad.inference.recordings import PHASES, RateRecordings, SpikeRecordings
@@ -46,8 +46,8 @@ class Recorded:
     """Spikes that came after the motion had ended and are not used, since the model ends there."""
 
 
-@known_keywords
-def read_recordings(path: str | Path, stimuli: Stimuli, unit: int | None = None) -> Recorded:
+@checked
+def read_recordings(path: str | Path, stimuli: Stimuli, unit: Whole | None = None) -> Recorded:
     r"""Read what an afferent answered to known stimuli.
 
     Parameters

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from fingerpad.core.checks import FloatArray, float_array
+from fingerpad.core.values import FloatArray, float_array
 
 
 def coefficient_of_determination(observed: ArrayLike, predicted: ArrayLike) -> float:

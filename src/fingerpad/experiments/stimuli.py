@@ -5,16 +5,16 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 
-from fingerpad.core.checks import number_in
+from fingerpad.core.checked import checked
 from fingerpad.core.errors import InputError, Place, spelled
 from fingerpad.core.files import read_text
-from fingerpad.core.keywords import known_keywords
 from fingerpad.core.plain_yaml import read_yaml
 from fingerpad.core.tables import TableRow, read_csv
+from fingerpad.core.values import number_in
 from fingerpad.experiments.conditions import Conditions
 from fingerpad.experiments.descriptions.pressing import named_files
 from fingerpad.experiments.descriptions.reading import Origin, at, merged, part_from
@@ -44,6 +44,7 @@ COLUMNS = (
 BLOCKS = ("object.", "motion.", "place.")  # How other columns begin.
 
 
+@runtime_checkable
 class Stimuli(Protocol):
     """Tells which stimulus the entry of a table of recordings means, and how it is pressed."""
 
@@ -134,7 +135,7 @@ def along_skin(conditions: Conditions) -> float:
     return float(np.cos(np.deg2rad(conditions.skin_tilt_deg)))
 
 
-@known_keywords
+@checked
 def read_stimuli(path: str | Path, **replacing: str | None) -> ListedStimuli:
     r"""Read a list of stimuli, CSV or YAML.
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TypeAlias
 
-from fingerpad.core.results import result_class
+from fingerpad.core.checked import result_class
 from fingerpad.data import tissues as published
 from fingerpad.data.published import Published
 from fingerpad.geometry.mesh import LAYERS

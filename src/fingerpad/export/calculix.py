@@ -12,8 +12,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from fingerpad.core.checks import FloatArray, IntArray, one_of
 from fingerpad.core.errors import InputError
+from fingerpad.core.values import FloatArray, IntArray, one_of
 from fingerpad.export import cards
 from fingerpad.export.cards import INDENTER, SKIN
 from fingerpad.export.job import CONTACT_KPA_PER_MM, Job, Phase

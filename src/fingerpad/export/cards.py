@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 
-from fingerpad.core.checks import FloatArray, IntArray
 from fingerpad.core.errors import InputError
+from fingerpad.core.values import FloatArray, IntArray
 from fingerpad.export.job import Job
 from fingerpad.mechanics.laws import Hyperfoam, Ogden, Polynomial
 from fingerpad.mechanics.materials import Material

@@ -28,11 +28,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from fingerpad.core.checks import instance, one_of
+from fingerpad.core.checked import checked
 from fingerpad.core.errors import InputError, StoreError
 from fingerpad.core.files import path_of, write_atomically
-from fingerpad.core.keywords import known_keywords
 from fingerpad.core.signals import ResponseMap, SpikeTrains
+from fingerpad.core.values import Whole, instance, one_of
 from fingerpad.geometry.mesh import LAYERS, Mesh
 from fingerpad.skin.fields import FIELDS, Field, Place, Times, stored_fields
 from fingerpad.skin.sampling import SkinResponse
@@ -121,13 +121,13 @@ RESPONSE_PARTS = {
 PARTS = {**MESH_PARTS, **OBJECT_PARTS, **RESPONSE_PARTS}  # Variables beside the fields of the press, by name.
 
 
-@known_keywords
+@checked
 def touch_dataset(
     skin: SkinResponse,
     response: ResponseMap | None = None,
     *,
     quantities: Sequence[str] = (),
-    seed: int | None = None,
+    seed: Whole | None = None,
 ) -> xarray.Dataset:
     """Put the result of a touch into one labelled data set.
 
@@ -159,7 +159,6 @@ def touch_dataset(
     '0.3 mm'
     """
     xarray = library("xarray")
-    instance("skin", skin, SkinResponse)
     for name in quantities:
         one_of("quantity", name, tuple(FIELDS))
         if skin.deformation is None and name not in skin.fields:
@@ -184,14 +183,14 @@ def touch_dataset(
     return xarray.Dataset(variables, coordinates, _attributes(skin, response, seed))
 
 
-@known_keywords
+@checked
 def write_touch(
     path: str | Path,
     skin: SkinResponse,
     response: ResponseMap | None = None,
     *,
     quantities: Sequence[str] = (),
-    seed: int | None = None,
+    seed: Whole | None = None,
 ) -> tuple[Path, ...]:
     """Write the result of a touch as NetCDF (.nc) or Zarr (.zarr).
 
@@ -234,7 +233,7 @@ def write_touch(
     return (path,)
 
 
-@known_keywords
+@checked
 def read_touch(path: str | Path) -> xarray.Dataset:
     """Read the result of a touch into memory, and check it.
 

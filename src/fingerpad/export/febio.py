@@ -12,8 +12,8 @@ from xml.etree import ElementTree as xml
 
 import numpy as np
 
-from fingerpad.core.checks import FloatArray, IntArray
 from fingerpad.core.errors import InputError
+from fingerpad.core.values import FloatArray, IntArray
 from fingerpad.export.cards import INDENTER, SKIN, digits
 from fingerpad.export.job import Job
 from fingerpad.mechanics.laws import Ogden, Polynomial

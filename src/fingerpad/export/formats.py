@@ -11,10 +11,10 @@ from typing import Any
 
 import numpy as np
 
-from fingerpad.core.checks import one_of
+from fingerpad.core.checked import checked
 from fingerpad.core.errors import InputError
 from fingerpad.core.files import path_of, write_atomically
-from fingerpad.core.keywords import known_keywords
+from fingerpad.core.values import one_of
 from fingerpad.export.abaqus import abaqus_deck
 from fingerpad.export.calculix import calculix_deck
 from fingerpad.export.dataset import require_netcdf, write_touch
@@ -85,7 +85,7 @@ REQUIRED = {"vtu": require_vtk, "netcdf": require_netcdf, "zarr": require_netcdf
 FORMATS = (*RESULTS, *DECKS)
 
 
-@known_keywords
+@checked
 def export_touch(
     folder: Path, touch: Touch, format_name: str, elastic_moduli: str | None = None
 ) -> tuple[Path, ...]:

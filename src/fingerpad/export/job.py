@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from fingerpad import __version__
-from fingerpad.core.checks import FloatArray, IntArray, float_array, increasing, instance
 from fingerpad.core.errors import InputError
+from fingerpad.core.values import FloatArray, IntArray, float_array, increasing, instance
 from fingerpad.export.outline import Outline, RigidMesh, face_mesh, outline_of, rigid_mesh
 from fingerpad.geometry.indenters import Indenter
 from fingerpad.geometry.mesh import LAYERS, Mesh

@@ -12,8 +12,8 @@ from itertools import pairwise
 
 import numpy as np
 
-from fingerpad.core.checks import FloatArray, IntArray, positive
 from fingerpad.core.errors import InputError
+from fingerpad.core.values import FloatArray, IntArray, positive
 from fingerpad.geometry.edged_indenters import Edge, Gap, Grating
 from fingerpad.geometry.indenters import Bar, Cylinder, FlatPunch, Indenter, Line, Plate, Sphere
 

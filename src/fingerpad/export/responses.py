@@ -15,13 +15,13 @@ from typing import Any
 
 import numpy as np
 
-from fingerpad.core.checks import FloatArray, instance, not_negative, positive
+from fingerpad.core.checked import checked
 from fingerpad.core.errors import InputError
 from fingerpad.core.files import path_of, read_text, write_atomically
-from fingerpad.core.keywords import known_keywords
 from fingerpad.core.phases import Phase
 from fingerpad.core.signals import ResponseMap, SpikeTrains
 from fingerpad.core.units import MS_PER_S
+from fingerpad.core.values import Finite, FloatArray, NotNegative, instance, positive
 from fingerpad.experiments.recording_files import SUFFIXES_OF_NWB
 from fingerpad.export.dataset import library
 from fingerpad.neuron.mixed_population import MixedResponse, one_map
@@ -43,7 +43,7 @@ MEASURED = ("dynamic_rate_hz", "static_rate_hz", "first_spike_latency_ms")
 """Columns from which a response is read back, beside its places and spikes."""
 
 
-@known_keywords
+@checked
 def write_response_csv(path: Path, response: ResponseMap | MixedResponse) -> Path:
     """Write one row per receptor: position, rates, latency of the first spike, and all spike times.
 
@@ -115,7 +115,7 @@ def _rows(response: ResponseMap, pitches: FloatArray) -> Iterator[list[object]]:
         yield [receptor, *kind, *("" if np.isnan(number) else number for number in (*place, *row)), times]
 
 
-@known_keywords
+@checked
 def read_response_csv(path: Path) -> ResponseMap | MixedResponse:
     """Read what `write_response_csv` wrote."""
     rows = list(csv.DictReader(io.StringIO(read_text(path_of("path", path)))))
@@ -153,12 +153,12 @@ def read_response_csv(path: Path) -> ResponseMap | MixedResponse:
 _RESOLUTION_S = 1e-9  # Spike times are roots of a closed form; those of two processors differ by less. [s]
 
 
-@known_keywords
+@checked
 def write_responses_nwb(
     path: Path,
     responses: Mapping[str, ResponseMap | MixedResponse],
-    duration_ms: float | None = None,
-    pause_ms: float = 1000.0,
+    duration_ms: Finite | None = None,
+    pause_ms: NotNegative = 1000.0,
     started: datetime | None = None,
 ) -> Path:
     """Write a session: one trial per touch, one epoch per phase of its motion, one unit per receptor.
@@ -198,7 +198,6 @@ def write_responses_nwb(
     file = path_of("path", path)
     if file.suffix not in SUFFIXES_OF_NWB:
         raise InputError(f"A session is written as {', '.join(SUFFIXES_OF_NWB)}: got {file.name}.")
-    not_negative("pause_ms", pause_ms, "ms")
     instance("responses", responses, Mapping)
     began = started or datetime.now(UTC)
     if began.tzinfo is None:
@@ -268,7 +267,7 @@ def write_responses_nwb(
     return file
 
 
-@known_keywords
+@checked
 def read_responses_nwb(path: Path) -> dict[str, ResponseMap | MixedResponse]:
     """Read what `write_responses_nwb` wrote."""
     pynwb = require_pynwb()

@@ -12,10 +12,11 @@ from pathlib import Path
 
 import numpy as np
 
+from fingerpad.core.checked import checked
 from fingerpad.core.engine import Engine, engine_of
 from fingerpad.core.errors import InputError
-from fingerpad.core.keywords import known_keywords
 from fingerpad.core.progress import NoProgress, Progress
+from fingerpad.core.values import Flag, Whole
 from fingerpad.experiments.descriptions.values import Content
 from fingerpad.experiments.manifest import software
 from fingerpad.experiments.runner import STORE_FOLDER
@@ -78,14 +79,14 @@ def check_sweep(sweep: Sweep, out: Path, any_size: bool = False) -> None:
     sweep.check()
 
 
-@known_keywords
+@checked
 def run_sweep(
     sweep: str | Path | Content | SweepDescription | Sweep,
     out: str | Path,
-    jobs: int | Engine = 1,
+    jobs: Whole | Engine = 1,
     *,
-    retry_failed: bool = False,
-    any_size: bool = False,
+    retry_failed: Flag = False,
+    any_size: Flag = False,
     store: str | Path | None = None,
     progress: Progress | None = None,
     command: str = "",

@@ -24,9 +24,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from fingerpad.core.checked import checked
 from fingerpad.core.errors import InputError, StoreError, shown
 from fingerpad.core.files import path_of
-from fingerpad.core.keywords import known_keywords
 from fingerpad.core.signals import SpikeTrains
 from fingerpad.core.units import unit_of
 from fingerpad.experiments.descriptions.values import Content
@@ -277,7 +277,7 @@ class SweepFile:
         return tuple(int(index) for index in np.unravel_index(number, shape)) if shape else ()
 
 
-@known_keywords
+@checked
 def open_sweep(path: str | Path) -> xarray.Dataset:
     """Open the data set that `run_sweep` wrote; numbers are read when they are used.
 
@@ -297,7 +297,7 @@ def check_sweep_data(data: xarray.Dataset) -> None:
         raise InputError("data", "must be a data set from open_sweep", shown(data))
 
 
-@known_keywords
+@checked
 def observe_sweep(data: xarray.Dataset, observer: Content, grid: Content | None = None) -> xarray.DataArray:
     """Hit rates of other observers than those of the sweep; nothing is pressed and no afferent responds.
 
@@ -338,7 +338,7 @@ def sweep_settings(data: xarray.Dataset) -> Sweep:
     return sweep_of(json.loads(data.attrs["sweep"]), data.attrs.get("source", "sweep"))
 
 
-@known_keywords
+@checked
 def setting_touch(data: xarray.Dataset, **where: int) -> Content:
     """Touch of one setting, by its index along each dimension, in the words of a file for `run_touch`."""
     sweep = sweep_settings(data)
@@ -357,7 +357,7 @@ def setting_number(sweep: Sweep, where: Mapping[str, int]) -> int:
     return int(np.ravel_multi_index(index, sweep.shape))
 
 
-@known_keywords
+@checked
 def setting_spikes(data: xarray.Dataset) -> SpikeTrains:
     """Spike trains of the receptors of one setting.
 

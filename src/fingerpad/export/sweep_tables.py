@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from fingerpad import __version__
+from fingerpad.core.checked import checked
 from fingerpad.core.errors import InputError
 from fingerpad.core.files import path_of, write_atomically
-from fingerpad.core.keywords import known_keywords
 from fingerpad.core.signals import ResponseMap
 from fingerpad.export.dataset import first_line, library
 from fingerpad.export.responses import PLACES, require_pynwb, write_responses_nwb
@@ -39,7 +39,7 @@ _RATES = (
 )  # fmt: skip
 
 
-@known_keywords
+@checked
 def write_sweep_table(data: xarray.Dataset, path: str | Path) -> Path:
     """Write rates, latencies and numbers of spikes as a table, one row per setting and receptor.
 
@@ -78,7 +78,7 @@ def write_sweep_table(data: xarray.Dataset, path: str | Path) -> Path:
     return path
 
 
-@known_keywords
+@checked
 def read_sweep_table(path: str | Path) -> pandas.DataFrame:
     """Read a table that `write_sweep_table` wrote.
 
@@ -117,7 +117,7 @@ def read_sweep_table(path: str | Path) -> pandas.DataFrame:
     return table
 
 
-@known_keywords
+@checked
 def setting_response(data: xarray.Dataset, **where: int) -> ResponseMap:
     """Responses of the receptors in one setting, as `Population.respond` returned them.
 
@@ -150,7 +150,7 @@ def setting_response(data: xarray.Dataset, **where: int) -> ResponseMap:
     )
 
 
-@known_keywords
+@checked
 def write_sweep_spikes(data: xarray.Dataset, path: str | Path, **where: int) -> Path:
     """Write the spikes of a sweep as one session of NWB: a trial per setting, a unit per receptor.
 

@@ -6,8 +6,8 @@ from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 
+from fingerpad.core.checked import checked
 from fingerpad.core.errors import InputError
-from fingerpad.core.keywords import known_keywords
 from fingerpad.core.progress import Progress
 from fingerpad.experiments import schemas
 from fingerpad.experiments.descriptions.pressed import PressedTouch, press_described
@@ -84,7 +84,7 @@ def check_described(described: DescribedTouch) -> None:
                 )
 
 
-@known_keywords
+@checked
 def run_touch(
     touch: str | Path | Content | TouchDescription | DescribedTouch,
     out: str | Path,

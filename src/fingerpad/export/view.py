@@ -29,11 +29,11 @@ from matplotlib.lines import Line2D
 from PIL import Image
 from scipy.spatial import cKDTree
 
-from fingerpad.core.checks import FloatArray, finite, instance, one_of, whole
+from fingerpad.core.checked import checked
 from fingerpad.core.errors import InputError
 from fingerpad.core.files import path_of, write_atomically
-from fingerpad.core.keywords import known_keywords
 from fingerpad.core.progress import NoProgress, Progress
+from fingerpad.core.values import Finite, FloatArray, Whole, finite, instance, one_of, whole
 from fingerpad.export.dataset import check_touch, library, read_touch, spike_trains, touch_dataset
 from fingerpad.report.style import BLACK, BLUE, STYLE, new_figure, say_nothing_to_draw
 from fingerpad.report.touch import BONE, DECADES, SKIN
@@ -68,14 +68,14 @@ _FROM_THE_SIDE = (np.array([0.35, -0.5, 1.0]), np.array([0.0, 1.0, 0.0]))
 _FROM_BELOW = (np.array([0.10, -1.0, -0.22]), np.array([0.0, 0.0, 1.0]))  # The same where the skin is shown.
 
 
-@known_keywords
+@checked
 def save_view(
     path: str | Path,
     touch: xarray.Dataset | SkinResponse | str | Path,
     *,
     field: str = "sed",
-    time_ms: float | None = None,
-    frames: int = 40,
+    time_ms: Finite | None = None,
+    frames: Whole = 40,
     progress: Progress | None = None,
 ) -> tuple[Path, ...]:
     """Draw a touch in three dimensions: a picture at one time, or a film.

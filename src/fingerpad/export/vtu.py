@@ -16,10 +16,10 @@ from xml.sax.saxutils import quoteattr
 
 import numpy as np
 
-from fingerpad.core.checks import FloatArray
+from fingerpad.core.checked import checked
 from fingerpad.core.errors import InputError
 from fingerpad.core.files import path_of, read_text, write_atomically
-from fingerpad.core.keywords import known_keywords
+from fingerpad.core.values import FloatArray
 from fingerpad.export.dataset import library
 from fingerpad.export.job import wedge_nodes
 from fingerpad.geometry.mesh import Mesh
@@ -76,7 +76,7 @@ class VtuSeries:
     """Values at nodes, in elements, and of the whole press, by ParaView's names, (n_times, ...)."""
 
 
-@known_keywords
+@checked
 def read_vtu_series(path: str | Path) -> VtuSeries:
     """Read the files that `write_vtu_series` wrote, by their PVD file."""
     require_vtk()

@@ -12,8 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 from numba import njit
 
-from fingerpad.core.checks import FloatArray, IntArray
 from fingerpad.core.threads import run_kernel
+from fingerpad.core.values import FloatArray, IntArray, PointsMm
 from fingerpad.geometry.creases import HOLLOW, SHARP, kinds_of_edges, moments_in_ball, share_of_edges
 
 _LEAF = 4  # Triangles in a box without children.
@@ -88,7 +88,7 @@ class Triangles:
         run_kernel(_heights, len(points_mm), points_mm, self.corners_mm, self.low_mm, self.high_mm, height)
         return height
 
-    def gap(self, points_mm: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def gap(self, points_mm: PointsMm) -> tuple[FloatArray, FloatArray]:
         """Signed distance (n,) and its gradient (n, 3) at points (n, 3). [mm]
 
         On the surface the gradient is the normal of a face, or the mean normal of an edge or a corner.

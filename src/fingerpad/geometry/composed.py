@@ -3,15 +3,27 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from functools import cached_property
+from dataclasses import replace
+from functools import cached_property, partial
+from typing import Annotated
 
 import numpy as np
 
-from fingerpad.core.checks import FloatArray, float_array, instance, not_negative, positive
+from fingerpad.core.checked import checked, value_class
 from fingerpad.core.errors import InputError
-from fingerpad.core.keywords import known_keywords
-from fingerpad.core.values import converted
+from fingerpad.core.values import (
+    Check,
+    Finite,
+    FloatArray,
+    Many,
+    NotNegative,
+    PointsMm,
+    Positive,
+    entries,
+    finite,
+    float_array,
+    tuple_of,
+)
 from fingerpad.geometry.indenters import Bar, Indenter, Plate
 from fingerpad.geometry.relief import (
     PIXELS,
@@ -29,8 +41,7 @@ LEAST_SLOPE = 0.2
 """Least length of the gradient in a seam by which a gap is divided: parts that face each other have none."""
 
 
-@dataclass(frozen=True)
-@converted
+@value_class
 class Union(Indenter):
     """Several bodies as one, each moved, with rounded seams and edges.
 
@@ -54,23 +65,20 @@ class Union(Indenter):
     [0.0, -0.4]
     """
 
-    parts: tuple[Indenter, ...]
-    at_mm: tuple[tuple[float, float, float], ...]
-    seam_mm: float = 0.0
-    edge_radius_mm: float = 0.0
+    parts: Many[Indenter]
+    at_mm: Annotated[
+        tuple[tuple[float, float, float], ...], entries(Check(partial(tuple_of, each=finite, length=3), {}))
+    ]
+    seam_mm: NotNegative = 0.0
+    edge_radius_mm: NotNegative = 0.0
 
     def __post_init__(self) -> None:
-        parts = tuple(instance("a part", part, Indenter) for part in self.parts)
-        at = float_array("at_mm", self.at_mm, 2)
-        if not parts or at.shape != (len(parts), 3):
+        if not self.parts or len(self.at_mm) != len(self.parts):
             raise InputError(
-                f"A union needs one (x, y, z) of at_mm for each of its parts: got {len(parts)} parts and "
-                f"shape {at.shape}."
+                f"A union needs one (x, y, z) of at_mm for each of its parts: got {len(self.at_mm)} for "
+                f"{len(self.parts)} parts."
             )
-        not_negative("seam_mm", self.seam_mm, "mm")
-        object.__setattr__(self, "parts", parts)
-        object.__setattr__(self, "at_mm", tuple(map(tuple, at.tolist())))
-        if not_negative("edge_radius_mm", self.edge_radius_mm, "mm"):
+        if self.edge_radius_mm:
             check_edge_radius(self.edge_radius_mm, replace(self, edge_radius_mm=0.0).narrowest_mm)
 
     @property
@@ -116,7 +124,7 @@ class Union(Indenter):
         height = self.front(np.column_stack([x.ravel(), np.zeros(x.size), z.ravel()])).reshape(x.shape)
         return np.maximum(height, height.max() - RELIEF_MM)
 
-    def gap(self, points_mm: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def gap(self, points_mm: PointsMm) -> tuple[FloatArray, FloatArray]:
         if self.edge_radius_mm == 0.0:
             return self._sharp(points_mm)
         return with_rounded_edges(self._sharp, points_mm, self.edge_radius_mm)
@@ -141,9 +149,12 @@ class Union(Indenter):
         return both / length, slope / np.linalg.norm(slope, axis=1)[:, None]
 
 
-@known_keywords
+@checked
 def ridges(
-    centres_mm: Sequence[float], widths_mm: Sequence[float], fillet_mm: float = 0.1, height_mm: float = 1.0
+    centres_mm: Sequence[float],
+    widths_mm: Sequence[float],
+    fillet_mm: Finite = 0.1,
+    height_mm: Positive = 1.0,
 ) -> Union:
     """Grating of any ridges across the finger on a flat plate, periodic or not.
 
@@ -167,7 +178,6 @@ def ridges(
         raise InputError(
             "ridges", "needs one of widths_mm for each of centres_mm", f"{widths.size} and {centres.size}"
         )
-    positive("height_mm", height_mm, "mm")
     bars = [Bar(width, fillet_mm) for width in widths.tolist()]
     at = [(centre, 0.0, 0.0) for centre in centres.tolist()]
     return Union((*bars, Plate()), (*at, (0.0, -height_mm, 0.0)))

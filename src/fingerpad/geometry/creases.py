@@ -17,7 +17,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from fingerpad.core.checks import FloatArray, IntArray
+from fingerpad.core.values import FloatArray, IntArray
 
 PLAIN, HOLLOW, SHARP = 0, 1, 2  # Kinds of edges: nothing is done, blunted, kept sharp.
 

@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
-from fingerpad.core.checks import FloatArray, float_array, instance, plausible, positive
+from fingerpad.core.checked import checked, value_class
 from fingerpad.core.errors import InputError
-from fingerpad.core.keywords import known_keywords
-from fingerpad.core.values import converted
-from fingerpad.geometry.indenters import SIZES_MM, Indenter
+from fingerpad.core.values import Finite, Flag, FloatArray, Pairs, PointsMm, SizeMm, float_array, positive
+from fingerpad.geometry.indenters import Indenter
 
 BRAILLE_DOT_MM, BRAILLE_HEIGHT_MM, BRAILLE_PITCH_MM, BRAILLE_CELL_MM = 1.44, 0.48, 2.34, 6.2
 """Base diameter and height of a dot, distance of dots in a cell, distance of cells: US Library of Congress,
@@ -24,8 +21,7 @@ _LETTERS = {cell[0]: cell[1:] for cell in _CELLS.split()}
 """Numbers of the raised dots: 1 to 3 down the left column of a cell, 4 to 6 down the right one."""
 
 
-@dataclass(frozen=True)
-@converted
+@value_class
 class Dots(Indenter):
     """Raised dots on a flat plate: caps of balls with their tops in one plane.
 
@@ -45,15 +41,14 @@ class Dots(Indenter):
     [0.0, -0.48]
     """
 
-    at_mm: tuple[tuple[float, float], ...]
-    diameter_mm: float = BRAILLE_DOT_MM
-    height_mm: float = BRAILLE_HEIGHT_MM
+    at_mm: Pairs
+    diameter_mm: SizeMm = BRAILLE_DOT_MM
+    height_mm: Finite = BRAILLE_HEIGHT_MM
 
     def __post_init__(self) -> None:
         at = float_array("at_mm", self.at_mm, 2)
         if not len(at) or at.shape[1] != 2:
             raise InputError("at_mm", "must hold a pair x, z for each dot", f"shape {at.shape}")
-        plausible("diameter_mm", self.diameter_mm, "mm", SIZES_MM)
         if positive("height_mm", self.height_mm, "mm") > self.diameter_mm / 2:
             raise InputError(
                 "height_mm",
@@ -78,7 +73,7 @@ class Dots(Indenter):
     def narrowest_mm(self) -> float:
         return self.relief_mm
 
-    def gap(self, points_mm: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def gap(self, points_mm: PointsMm) -> tuple[FloatArray, FloatArray]:
         at, radius = np.array(self.at_mm), self.radius_mm
         beside = np.linalg.norm(points_mm[:, None, [0, 2]] - at, axis=2)
         nearest = at[beside.argmin(axis=1)]
@@ -90,8 +85,8 @@ class Dots(Indenter):
         return np.minimum(ball, plate), np.where((ball < plate)[:, None], direction, [0.0, 1.0, 0.0])
 
 
-@known_keywords
-def braille(text: str, along_finger: bool = True) -> Dots:
+@checked
+def braille(text: str, along_finger: Flag = True) -> Dots:
     """Braille of some lower-case letters, dots 0.48 mm high, its middle on the indenter's axis.
 
     Parameters
@@ -107,7 +102,6 @@ def braille(text: str, along_finger: bool = True) -> Dots:
     >>> braille("l").at_mm
     ((2.34, 0.0), (0.0, 0.0), (-2.34, 0.0))
     """
-    instance("text", text, str)
     unknown = sorted(set(text) - set(_LETTERS) - {" "})
     if unknown or not text.strip():
         low = text.lower()

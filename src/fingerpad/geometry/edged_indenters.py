@@ -7,19 +7,17 @@ of their gaps. This is exact on both sides of its face if the flat between the t
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields, replace
+from dataclasses import fields, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from fingerpad.core.checks import FloatArray, not_negative, plausible, positive
+from fingerpad.core.checked import OtherName, other_names, value_class
 from fingerpad.core.errors import InputError
-from fingerpad.core.keywords import OtherName, other_names
-from fingerpad.core.values import converted
+from fingerpad.core.values import Finite, FloatArray, NotNegative, PointsMm, SizeMm, not_negative, positive
 from fingerpad.data import protocol
 from fingerpad.geometry.indenters import (
     BESIDE_EDGE_MM,
-    SIZES_MM,
     Bar,
     Cylinder,
     FlatPunch,
@@ -45,8 +43,7 @@ def _along_x(signs: FloatArray) -> FloatArray:
     return np.where(signs < 0.0, -1.0, 1.0)[:, None] * [1.0, 0.0, 0.0]
 
 
-@dataclass(frozen=True)
-@converted
+@value_class
 class Edge(Indenter):
     """Flat body over the proximal half of the finger that ends in one rounded edge at x = 0, long in z.
 
@@ -63,36 +60,32 @@ class Edge(Indenter):
     """
 
     symmetry_deg = 180.0
-    fillet_mm: float = protocol.BAR_FILLET.value
+    fillet_mm: NotNegative = protocol.BAR_FILLET.value
     edge_radius_mm = OtherName("fillet_mm")
 
     if TYPE_CHECKING:
 
         def __init__(self, fillet_mm: float = ..., *, edge_radius_mm: float = ...) -> None: ...
 
-    def __post_init__(self) -> None:
-        not_negative("fillet_mm", self.fillet_mm, "mm")
-
     @property
     def edge_reach_mm(self) -> float:
         return self.fillet_mm + BESIDE_EDGE_MM
 
-    def edges_mm(self, reach_mm: float) -> tuple[tuple[float, float], ...]:
+    def edges_mm(self, reach_mm: Finite) -> tuple[tuple[float, float], ...]:
         return ((0.0, self.fillet_mm),)
 
-    def rounded_to(self, radius_mm: float) -> Edge:
+    def rounded_to(self, radius_mm: Finite) -> Edge:
         return replace(self, fillet_mm=max(self.fillet_mm, radius_mm))
 
-    def front(self, points_mm: FloatArray) -> FloatArray:
+    def front(self, points_mm: PointsMm) -> FloatArray:
         return round_front(points_mm[:, 0] + self.fillet_mm, self.fillet_mm)
 
-    def gap(self, points_mm: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def gap(self, points_mm: PointsMm) -> tuple[FloatArray, FloatArray]:
         x, y = points_mm[:, 0], points_mm[:, 1]
         return _corner(x, y, self.fillet_mm, _along_x(np.ones_like(x)))
 
 
-@dataclass(frozen=True)
-@converted
+@value_class
 class Gap(Indenter):
     """Flat bar across the finger with a gap along its middle: two ridges of one rigid body.
 
@@ -123,10 +116,10 @@ class Gap(Indenter):
     """
 
     symmetry_deg = 90.0
-    gap_mm: float = protocol.GAP_WIDTH.value
-    width_mm: float = protocol.GAPPED_BAR_WIDTH.value
-    fillet_mm: float = protocol.BAR_FILLET.value
-    lip_mm: float = protocol.LIP_RADIUS.value
+    gap_mm: NotNegative = protocol.GAP_WIDTH.value
+    width_mm: SizeMm = protocol.GAPPED_BAR_WIDTH.value
+    fillet_mm: Finite = protocol.BAR_FILLET.value
+    lip_mm: NotNegative = protocol.LIP_RADIUS.value
     edge_radius_mm = OtherName("fillet_mm")
     lip_radius_mm = OtherName("lip_mm", lambda body: min(body.lip_mm, body.gap_mm / 2))
 
@@ -144,10 +137,7 @@ class Gap(Indenter):
         ) -> None: ...
 
     def __post_init__(self) -> None:
-        not_negative("gap_mm", self.gap_mm, "mm")
-        plausible("width_mm", self.width_mm, "mm", SIZES_MM)
         fillet_within(self.fillet_mm, self.width_mm, "width_mm")
-        not_negative("lip_mm", self.lip_mm, "mm")
         widest = self.width_mm - 2 * self.fillet_mm - 2 * self.lip_radius_mm
         if self.gap_mm > 0.0 and self.gap_mm >= widest:
             raise InputError(
@@ -168,19 +158,19 @@ class Gap(Indenter):
     def narrowest_mm(self) -> float:
         return self.gap_mm if self.gap_mm > 0.0 else np.inf
 
-    def edges_mm(self, reach_mm: float) -> tuple[tuple[float, float], ...]:
+    def edges_mm(self, reach_mm: Finite) -> tuple[tuple[float, float], ...]:
         half, lip = self.width_mm / 2, self.gap_mm / 2
         lips = ((-lip, self.lip_radius_mm), (lip, self.lip_radius_mm)) if self.gap_mm > 0.0 else ()
         return ((-half, self.fillet_mm), *lips, (half, self.fillet_mm))
 
-    def front(self, points_mm: FloatArray) -> FloatArray:
+    def front(self, points_mm: PointsMm) -> FloatArray:
         u = np.abs(points_mm[:, 0])
         face = round_front(u - self.width_mm / 2 + self.fillet_mm, self.fillet_mm)
         if self.gap_mm == 0.0:
             return face
         return np.minimum(face, round_front(self.gap_mm / 2 - u + self.lip_radius_mm, self.lip_radius_mm))
 
-    def gap(self, points_mm: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def gap(self, points_mm: PointsMm) -> tuple[FloatArray, FloatArray]:
         if self.gap_mm == 0.0:
             return Bar(self.width_mm, self.fillet_mm).gap(points_mm)
         x, y = points_mm[:, 0], points_mm[:, 1]
@@ -198,8 +188,7 @@ def _of_period(period_mm: float = 2 * protocol.RIDGE_WIDTH.value, duty: float = 
     return {"ridge_mm": ridge, "groove_mm": period_mm - ridge}
 
 
-@dataclass(frozen=True)
-@converted
+@value_class
 class Grating(Indenter):
     """Grating larger than the finger: flat ridges across it with grooves between them, one ridge at x = 0.
 
@@ -224,9 +213,9 @@ class Grating(Indenter):
     """
 
     symmetry_deg = 90.0
-    ridge_mm: float = protocol.RIDGE_WIDTH.value
-    groove_mm: float = protocol.RIDGE_WIDTH.value
-    lip_mm: float = protocol.LIP_RADIUS.value
+    ridge_mm: SizeMm = protocol.RIDGE_WIDTH.value
+    groove_mm: SizeMm = protocol.RIDGE_WIDTH.value
+    lip_mm: Finite = protocol.LIP_RADIUS.value
     edge_radius_mm = OtherName("lip_mm")
     period_mm = OtherName(_of_period, lambda body: body.ridge_mm + body.groove_mm)
     duty = OtherName(_of_period, lambda body: body.ridge_mm / body.period_mm)
@@ -245,8 +234,6 @@ class Grating(Indenter):
         ) -> None: ...
 
     def __post_init__(self) -> None:
-        plausible("ridge_mm", self.ridge_mm, "mm", SIZES_MM)
-        plausible("groove_mm", self.groove_mm, "mm", SIZES_MM)
         if not_negative("lip_mm", self.lip_mm, "mm") > self.ridge_mm / 2:
             raise InputError(
                 "lip_mm", f"must not exceed half of ridge_mm, {self.ridge_mm / 2:g} mm", f"{self.lip_mm:g} mm"
@@ -260,7 +247,7 @@ class Grating(Indenter):
     def narrowest_mm(self) -> float:
         return min(self.ridge_mm, self.groove_mm)
 
-    def edges_mm(self, reach_mm: float) -> tuple[tuple[float, float], ...]:
+    def edges_mm(self, reach_mm: Finite) -> tuple[tuple[float, float], ...]:
         last = int(reach_mm / self.period_mm) + 1
         return tuple(
             (ridge * self.period_mm + side * self.ridge_mm / 2, self.lip_mm)
@@ -268,13 +255,13 @@ class Grating(Indenter):
             for side in (-1, 1)
         )
 
-    def rounded_to(self, radius_mm: float) -> Grating:
+    def rounded_to(self, radius_mm: Finite) -> Grating:
         return replace(self, lip_mm=max(self.lip_mm, min(radius_mm, self.ridge_mm / 2)))
 
-    def front(self, points_mm: FloatArray) -> FloatArray:
+    def front(self, points_mm: PointsMm) -> FloatArray:
         return self._ridge.front(self._beside_ridge(points_mm))
 
-    def gap(self, points_mm: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def gap(self, points_mm: PointsMm) -> tuple[FloatArray, FloatArray]:
         return self._ridge.gap(self._beside_ridge(points_mm))
 
     @property

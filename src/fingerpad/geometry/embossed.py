@@ -3,17 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
 from numba import njit
 
-from fingerpad.core.checks import FloatArray, float_array, one_of, positive
+from fingerpad.core.checked import checked, value_class
 from fingerpad.core.errors import InputError
-from fingerpad.core.keywords import known_keywords
-from fingerpad.core.values import converted
+from fingerpad.core.values import Finite, Flag, FloatArray, Outlines, PointsMm, Positive, float_array, one_of
 from fingerpad.geometry.indenters import Indenter, rounded
 
 OPPOSITE = -0.985
@@ -27,8 +25,7 @@ DRAWN_EM = 1000.0
 """Size at which matplotlib draws letters before they are scaled; it keeps curves within a fraction of 1."""
 
 
-@dataclass(frozen=True)
-@converted
+@value_class
 class Embossed(Indenter):
     """Shapes raised from a flat plate, with walls at right angles to it and rounded edges.
 
@@ -52,9 +49,9 @@ class Embossed(Indenter):
     2.0
     """
 
-    outlines_mm: tuple[tuple[tuple[float, float], ...], ...]
-    height_mm: float = 0.5
-    edge_radius_mm: float = 0.1
+    outlines_mm: Outlines
+    height_mm: Positive = 0.5
+    edge_radius_mm: Positive = 0.1
 
     def __post_init__(self) -> None:
         outlines = [_closed(f"outlines_mm[{number}]", line) for number, line in enumerate(self.outlines_mm)]
@@ -69,8 +66,6 @@ class Embossed(Indenter):
                 "take fewer letters or coarser outlines",
             )
         object.__setattr__(self, "outlines_mm", tuple(tuple(map(tuple, line.tolist())) for line in outlines))
-        positive("height_mm", self.height_mm, "mm")
-        positive("edge_radius_mm", self.edge_radius_mm, "mm")
         if _cross(self._pieces):
             raise InputError("Outlines must not touch or cross, each other or themselves: they do.")
         sizes = {"height_mm": self.height_mm, "half of the narrowest stroke": self.stroke_mm / 2}
@@ -98,7 +93,7 @@ class Embossed(Indenter):
         """Width of the narrowest stroke. [mm]"""
         return float(self._widths_mm[0])
 
-    def gap(self, points_mm: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def gap(self, points_mm: PointsMm) -> tuple[FloatArray, FloatArray]:
         points_mm = np.ascontiguousarray(points_mm, dtype=np.float64)
         beyond, outward = np.empty(len(points_mm)), np.zeros((len(points_mm), 3))
         _beyond_outline(points_mm, self._pieces, self._normals, beyond, outward)
@@ -145,13 +140,13 @@ class Embossed(Indenter):
         return widths
 
 
-@known_keywords
+@checked
 def embossed_text(
     text: str,
-    capital_mm: float = 6.0,
-    height_mm: float = 0.5,
-    edge_radius_mm: float = 0.1,
-    along_finger: bool = False,
+    capital_mm: Positive = 6.0,
+    height_mm: Finite = 0.5,
+    edge_radius_mm: Finite = 0.1,
+    along_finger: Flag = False,
     weight: str = "bold",
 ) -> Embossed:
     """Emboss letters of DejaVu Sans, their middle on the indenter's axis.
@@ -184,7 +179,6 @@ def embossed_text(
     from matplotlib.path import Path
     from matplotlib.textpath import text_to_path
 
-    positive("capital_mm", capital_mm, "mm")
     if not isinstance(text, str) or not text.strip():
         raise InputError("text", "must have at least one letter", repr(text))
     font = FontProperties(family="DejaVu Sans", weight=one_of("weight", weight, ("normal", "bold")))

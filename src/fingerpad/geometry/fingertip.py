@@ -8,9 +8,9 @@ function of s; the level function below is written without the factor s, so it s
 
 from __future__ import annotations
 
-from abc import abstractmethod
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cache, cached_property
 from types import MappingProxyType
 from typing import TYPE_CHECKING
@@ -19,11 +19,20 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.interpolate import BSpline, make_smoothing_spline
 
-from fingerpad.core.checks import FloatArray, finite, float_array, increasing, not_negative, one_of, positive
+from fingerpad.core.checked import checked, checked_class, value_class
 from fingerpad.core.displayed import Displayed
 from fingerpad.core.errors import InputError
-from fingerpad.core.keywords import KnownKeywords, known_keywords
-from fingerpad.core.values import converted
+from fingerpad.core.values import (
+    Finite,
+    FloatArray,
+    Numbers,
+    finite,
+    float_array,
+    increasing,
+    not_negative,
+    one_of,
+    positive,
+)
 from fingerpad.data import fingers
 from fingerpad.data import fingertip as published
 
@@ -54,8 +63,7 @@ DORSAL_READINGS = _readings(published.STATIONS_X.value, published.DORSAL_Y.value
 HALF_WIDTH_READINGS = _readings(published.HALF_WIDTH_X.value, published.HALF_WIDTH_Z.value)
 
 
-@dataclass(frozen=True)
-@converted
+@value_class
 class Profile:
     """One dimension of the finger's sections, a smooth function of x that closes at the tip.
 
@@ -65,7 +73,7 @@ class Profile:
 
     readings_mm: Readings
     """At least five readings, x increasing from 0 or more to less than `length_mm`, values above 0. [mm]"""
-    length_mm: float  # x of the tip, L. [mm]
+    length_mm: Finite  # x of the tip, L. [mm]
 
     def __post_init__(self) -> None:
         length = positive("length_mm", self.length_mm, "mm")
@@ -102,7 +110,8 @@ class Profile:
         return s * self.over_s(s)[0]
 
 
-class Finger(metaclass=KnownKeywords):
+@checked_class
+class Finger(ABC):
     """What can be pressed: a `Fingertip` by its outline, or a `FingerMesh` by its mesh."""
 
     @property
@@ -137,13 +146,12 @@ class Finger(metaclass=KnownKeywords):
         """Mesh that a finger has already; None for a finger that is meshed."""
         return None
 
-    def own_grading(self, x_mm: float, z_mm: float) -> Grading | None:
+    def own_grading(self, x_mm: Finite, z_mm: Finite) -> Grading | None:
         """Sizes of the elements that a finger has already, about a place of its skin."""
         return None
 
 
-@dataclass(frozen=True)
-@converted
+@value_class
 class Fingertip(Displayed, Finger):
     """Outline, layers, bone and nail of a fingertip.
 
@@ -172,20 +180,20 @@ class Fingertip(Displayed, Finger):
     9.85 9.75
     """
 
-    length_mm: float = published.LENGTH.value
+    length_mm: Finite = published.LENGTH.value
     volar_readings_mm: Readings = VOLAR_READINGS
     dorsal_readings_mm: Readings = DORSAL_READINGS
     half_width_readings_mm: Readings = HALF_WIDTH_READINGS
-    stratum_corneum_mm: float = published.STRATUM_CORNEUM.value
-    living_epidermis_mm: float = published.LIVING_EPIDERMIS.value
-    dermis_mm: float = published.DERMIS.value
-    spine_y_mm: float = published.SPINE_Y.value
-    spine_end_x_mm: float = published.SPINE_END_X.value
-    bone_height_mm: float = published.BONE_HEIGHT.value
-    bone_width_mm: float = published.BONE_WIDTH.value
-    bone_tip_x_mm: float = published.BONE_TIP_X.value
-    nail_x_mm: tuple[float, ...] = published.NAIL_X.value
-    nail_half_width_mm: float = published.NAIL_HALF_WIDTH.value
+    stratum_corneum_mm: Finite = published.STRATUM_CORNEUM.value
+    living_epidermis_mm: Finite = published.LIVING_EPIDERMIS.value
+    dermis_mm: Finite = published.DERMIS.value
+    spine_y_mm: Finite = published.SPINE_Y.value
+    spine_end_x_mm: Finite = published.SPINE_END_X.value
+    bone_height_mm: Finite = published.BONE_HEIGHT.value
+    bone_width_mm: Finite = published.BONE_WIDTH.value
+    bone_tip_x_mm: Finite = published.BONE_TIP_X.value
+    nail_x_mm: Numbers = published.NAIL_X.value
+    nail_half_width_mm: Finite = published.NAIL_HALF_WIDTH.value
 
     def __new__(cls, *given: object, **_: object) -> Fingertip:
         """Refuse the name of a preset, which is that of `of`."""
@@ -241,16 +249,16 @@ class Fingertip(Displayed, Finger):
             )
 
     @classmethod
-    @known_keywords
+    @checked
     def of(
         cls,
         like: str = "adult",
-        length_mm: float | None = None,
-        width_mm: float | None = None,
-        height_mm: float | None = None,
-        stratum_corneum_mm: float | None = None,
-        living_epidermis_mm: float | None = None,
-        dermis_mm: float | None = None,
+        length_mm: Finite | None = None,
+        width_mm: Finite | None = None,
+        height_mm: Finite | None = None,
+        stratum_corneum_mm: Finite | None = None,
+        living_epidermis_mm: Finite | None = None,
+        dermis_mm: Finite | None = None,
     ) -> Fingertip:
         """Fingertip by what a ruler and a calliper measure.
 
@@ -295,7 +303,7 @@ class Fingertip(Displayed, Finger):
             **{name: size for name, size in layers.items() if size is not None},
         )
 
-    def scaled(self, factor: float) -> Fingertip:
+    def scaled(self, factor: Finite) -> Fingertip:
         """Return the same finger in another size: outline, layers, bone and nail times a factor.
 
         Examples
@@ -428,7 +436,7 @@ class Fingertip(Displayed, Finger):
         share = z / np.where(half_width > 0.0, half_width, 1.0)
         return np.stack([x, -volar * np.sqrt(1.0 - share**2), z], axis=-1)
 
-    def subsurface(self, skin_points_mm: ArrayLike, depth_mm: float) -> FloatArray:
+    def subsurface(self, skin_points_mm: ArrayLike, depth_mm: Finite) -> FloatArray:
         """Points `depth_mm` below points of the skin, along the inward normal, (..., 3) [mm]."""
         points = np.asarray(skin_points_mm, dtype=np.float64)
         return points - not_negative("depth_mm", depth_mm, "mm") * self.skin_normal(points)

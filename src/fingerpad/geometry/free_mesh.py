@@ -9,8 +9,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.spatial import cKDTree
 
-from fingerpad.core.checks import FloatArray, IntArray
+from fingerpad.core.checked import value_class
 from fingerpad.core.errors import InputError
+from fingerpad.core.values import FloatArray, IntArray
 from fingerpad.geometry.fingertip import Finger
 from fingerpad.geometry.grading import Grading
 from fingerpad.geometry.mesh import Mesh
@@ -75,7 +76,7 @@ class FreeMesh(Mesh):
         return feet, normals / np.linalg.norm(normals, axis=1, keepdims=True), sides.max(axis=1)
 
 
-@dataclass(frozen=True, eq=False)
+@value_class(eq=False)
 class FingerMesh(Finger):
     """A finger that is a mesh of one's own, from `read_finger` or `finger_from`.
 

@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from scipy.optimize import brentq
 
-from fingerpad.core.checks import FloatArray, finite, one_of, positive, whole
+from fingerpad.core.checked import value_class
 from fingerpad.core.errors import InputError
-from fingerpad.core.keywords import KnownKeywords
-from fingerpad.core.values import converted
+from fingerpad.core.values import Count, Finite, Flag, FloatArray, Many, Positive, one_of, positive
 
 RESOLUTIONS = ("quick", "standard", "paper")
 
@@ -23,9 +22,8 @@ MOST_ELEMENTS = 2_000_000
 """Elements of the fine zone beyond which no press ends; that of the paper's mesh has 143,000."""
 
 
-@dataclass(frozen=True)
-@converted
-class Grading(metaclass=KnownKeywords):
+@value_class
+class Grading:
     """Fine zone of the mesh of a finger and sizes of its elements.
 
     Parameters
@@ -52,31 +50,26 @@ class Grading(metaclass=KnownKeywords):
         two sides or, across, z; and the largest size in it. Sizes grow from there by `growth`. [mm]
     """
 
-    centre_mm: float
-    half_length_mm: float
-    half_width_mm: float
-    size_x_mm: float
-    size_z_mm: float
-    largest_mm: float = 3.0
-    growth: float = 1.3
-    stratum_corneum: int = 4
-    living_epidermis: int = 1
-    dermis: int = 4
-    subcutis: int = 4
-    full: bool = False
-    core_half_length_mm: float = 0.0
-    core_size_mm: float = 0.0
-    finer_along: tuple[Strip, ...] = ()
-    finer_across: tuple[Strip, ...] = ()
+    centre_mm: Finite
+    half_length_mm: Positive
+    half_width_mm: Positive
+    size_x_mm: Positive
+    size_z_mm: Positive
+    largest_mm: Positive = 3.0
+    growth: Finite = 1.3
+    stratum_corneum: Count = 4
+    living_epidermis: Count = 1
+    dermis: Count = 4
+    subcutis: Count = 4
+    full: Flag = False
+    core_half_length_mm: Finite = 0.0
+    core_size_mm: Finite = 0.0
+    finer_along: Many[Strip] = ()
+    finer_across: Many[Strip] = ()
 
     def __post_init__(self) -> None:
-        finite("centre_mm", self.centre_mm, "mm")
-        for name in ("half_length_mm", "half_width_mm", "size_x_mm", "size_z_mm", "largest_mm"):
-            positive(name, getattr(self, name), "mm")
-        if not 1.0 < finite("growth", self.growth) <= 1.3:
+        if not 1.0 < self.growth <= 1.3:
             raise InputError("growth", "must be above 1 and at most 1.3", repr(self.growth))
-        for name in ("stratum_corneum", "living_epidermis", "dermis", "subcutis"):
-            whole(name, getattr(self, name), 1)
         core = self.core_half_length_mm, self.core_size_mm
         if core != (0.0, 0.0) and not (
             0.0 < core[0] < self.half_length_mm and 0.0 < core[1] < self.size_x_mm

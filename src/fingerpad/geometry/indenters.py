@@ -9,17 +9,16 @@ direction of the contact force without friction. Edge, bar with a gap and gratin
 
 from __future__ import annotations
 
-from abc import abstractmethod
-from dataclasses import dataclass, field, fields, is_dataclass, replace
+from abc import ABC, abstractmethod
+from dataclasses import field, fields, is_dataclass, replace
 from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
-from fingerpad.core.checks import FloatArray, not_negative, plausible, positive
+from fingerpad.core.checked import OtherName, checked_class, value_class
 from fingerpad.core.errors import InputError
-from fingerpad.core.keywords import KnownKeywords, OtherName
 from fingerpad.core.units import curvature_per_m, radius_mm
-from fingerpad.core.values import converted
+from fingerpad.core.values import Finite, FloatArray, PointsMm, SizeMm, not_negative, positive
 from fingerpad.data import protocol
 from fingerpad.geometry.probing import mirrored, traced_front
 
@@ -29,7 +28,8 @@ SIZES_MM = (0.01, 400.0)
 BESIDE_EDGE_MM = 0.4  # Distance from the wall of an edge within which the skin bends sharply. [mm]
 
 
-class Indenter(metaclass=KnownKeywords):
+@checked_class
+class Indenter(ABC):
     """A rigid body with a signed gap; derive from it to define a body of your own.
 
     Only `gap` has to be written. Make the class a frozen dataclass, so that its sizes are fields: they are
@@ -72,14 +72,14 @@ class Indenter(metaclass=KnownKeywords):
         return hash((type(self), _content(self)))
 
     @abstractmethod
-    def gap(self, points_mm: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def gap(self, points_mm: PointsMm) -> tuple[FloatArray, FloatArray]:
         """Signed gap (n,) and outward unit normal (n, 3) at points (n, 3) of the indenter's frame. [mm]
 
         The gap is positive outside the body and negative inside. Near the face it is the distance; the
         normal is its gradient. Far away it may be less than the distance, with the same sign.
         """
 
-    def front(self, points_mm: FloatArray) -> FloatArray:
+    def front(self, points_mm: PointsMm) -> FloatArray:
         """Y of the body's face towards the skin above the x and z of points (n, 3), -inf beside it. [mm]
 
         By default it is found from `gap`.
@@ -94,7 +94,7 @@ class Indenter(metaclass=KnownKeywords):
         """
         return np.inf
 
-    def may_touch(self, undeformed_mm: FloatArray) -> np.ndarray:
+    def may_touch(self, undeformed_mm: PointsMm) -> np.ndarray:
         """Whether each undeformed point (n, 3) can come into contact; bool (n,)."""
         return np.ones(len(undeformed_mm), dtype=bool)
 
@@ -103,7 +103,7 @@ class Indenter(metaclass=KnownKeywords):
         """Whether skin in contact cannot slide along the finger; False for most bodies."""
         return False
 
-    def mirrors(self, spin_deg: float) -> bool:
+    def mirrors(self, spin_deg: Finite) -> bool:
         """Whether the body, turned by `spin_deg` about y, is its own mirror image across z = 0.
 
         Half a finger can be solved only then. It follows from `symmetry_deg` where the class that defines
@@ -135,7 +135,7 @@ class Indenter(metaclass=KnownKeywords):
         """Radius of a round tip, which a mesh must resolve; infinite without one. [mm]"""
         return np.inf
 
-    def edges_mm(self, reach_mm: float) -> tuple[tuple[float, float], ...]:
+    def edges_mm(self, reach_mm: Finite) -> tuple[tuple[float, float], ...]:
         """Place along x and radius of each edge across the finger within reach of the axis. [mm]"""
         return ()
 
@@ -150,7 +150,7 @@ class Indenter(metaclass=KnownKeywords):
         rim = () if self.rim_mm is None else (self.rim_mm[1],)
         return min([*rim, *(radius for _, radius in self.edges_mm(0.0))], default=np.inf)
 
-    def rounded_to(self, radius_mm: float) -> Indenter:
+    def rounded_to(self, radius_mm: Finite) -> Indenter:
         """Return the body with edges or a rim of at least this radius [mm], where it has any."""
         return self
 
@@ -209,8 +209,7 @@ def _of_diameter(radius_mm: float) -> dict[str, float]:
     return {"diameter_mm": 2 * positive("radius_mm", radius_mm, "mm")}
 
 
-@dataclass(frozen=True)
-@converted
+@value_class
 class Cylinder(Indenter):
     """Cylinder that lies across the finger, its axis along z.
 
@@ -229,15 +228,12 @@ class Cylinder(Indenter):
     """
 
     symmetry_deg = 90.0
-    diameter_mm: float = protocol.CYLINDER_DIAMETER.value
+    diameter_mm: SizeMm = protocol.CYLINDER_DIAMETER.value
     radius_mm = OtherName(_of_diameter, lambda body: body.diameter_mm / 2)
 
     if TYPE_CHECKING:
 
         def __init__(self, diameter_mm: float = ..., *, radius_mm: float = ...) -> None: ...
-
-    def __post_init__(self) -> None:
-        plausible("diameter_mm", self.diameter_mm, "mm", SIZES_MM)
 
     @property
     def half_width_mm(self) -> float:
@@ -247,17 +243,16 @@ class Cylinder(Indenter):
     def tip_radius_mm(self) -> float:
         return self.diameter_mm / 2
 
-    def front(self, points_mm: FloatArray) -> FloatArray:
+    def front(self, points_mm: PointsMm) -> FloatArray:
         return round_front(np.abs(points_mm[:, 0]), self.diameter_mm / 2)
 
-    def gap(self, points_mm: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def gap(self, points_mm: PointsMm) -> tuple[FloatArray, FloatArray]:
         radius = self.diameter_mm / 2
         centred = (points_mm + np.array([0.0, radius, 0.0])) * [1.0, 1.0, 0.0]
         return _rod_end(centred, centred * [1.0, 0.0, 0.0], radius)
 
 
-@dataclass(frozen=True)
-@converted
+@value_class
 class Line(Indenter):
     """Line load across the finger: a wire thinner than the elements of the skin, modelled as a blade.
 
@@ -277,10 +272,7 @@ class Line(Indenter):
     """
 
     symmetry_deg = 180.0
-    diameter_mm: float = protocol.LINE_DIAMETER.value
-
-    def __post_init__(self) -> None:
-        plausible("diameter_mm", self.diameter_mm, "mm", SIZES_MM)
+    diameter_mm: SizeMm = protocol.LINE_DIAMETER.value
 
     @property
     def grips(self) -> bool:
@@ -290,20 +282,19 @@ class Line(Indenter):
     def half_width_mm(self) -> float:
         return self.diameter_mm / 2
 
-    def front(self, points_mm: FloatArray) -> FloatArray:
+    def front(self, points_mm: PointsMm) -> FloatArray:
         return np.where(np.abs(points_mm[:, 0]) <= self.diameter_mm / 2, 0.0, -np.inf)
 
-    def may_touch(self, undeformed_mm: FloatArray) -> np.ndarray:
+    def may_touch(self, undeformed_mm: PointsMm) -> np.ndarray:
         """Only the points below the undeformed wire; bool (n,)."""
         return np.abs(undeformed_mm[:, 0]) <= self.diameter_mm / 2 * (1 + 1e-6)
 
-    def gap(self, points_mm: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def gap(self, points_mm: PointsMm) -> tuple[FloatArray, FloatArray]:
         """Gap along y (n,) and that direction (n, 3) at points (n, 3) of the indenter's frame. [mm]"""
         return Plate().gap(points_mm)
 
 
-@dataclass(frozen=True)
-@converted
+@value_class
 class Sphere(Indenter):
     """Sphere given by its curvature, as in the psychophysics literature, or by its radius; by name only.
 
@@ -322,7 +313,7 @@ class Sphere(Indenter):
 
     symmetry_deg = None
     # A bare number could be either: 3.5 mm of radius is 286 1/m.
-    curvature_per_m: float = field(default=protocol.STANDARD_CURVATURE.value, kw_only=True)
+    curvature_per_m: Finite = field(default=protocol.STANDARD_CURVATURE.value, kw_only=True)
     radius_mm = OtherName(
         lambda radius_mm: {"curvature_per_m": curvature_per_m(positive("radius_mm", radius_mm, "mm"))},
         lambda body: radius_mm(body.curvature_per_m),
@@ -361,16 +352,15 @@ class Sphere(Indenter):
     def tip_radius_mm(self) -> float:
         return self.radius_mm
 
-    def front(self, points_mm: FloatArray) -> FloatArray:
+    def front(self, points_mm: PointsMm) -> FloatArray:
         return round_front(np.hypot(points_mm[:, 0], points_mm[:, 2]), self.radius_mm)
 
-    def gap(self, points_mm: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def gap(self, points_mm: PointsMm) -> tuple[FloatArray, FloatArray]:
         centred = points_mm + np.array([0.0, self.radius_mm, 0.0])
         return _rod_end(centred, centred * [1.0, 0.0, 1.0], self.radius_mm)
 
 
-@dataclass(frozen=True)
-@converted
+@value_class
 class Bar(Indenter):
     """Flat bar across the finger, long in z, its two edges rounded.
 
@@ -389,8 +379,8 @@ class Bar(Indenter):
     """
 
     symmetry_deg = 90.0
-    width_mm: float = protocol.BAR_WIDTH.value
-    fillet_mm: float = protocol.BAR_FILLET.value
+    width_mm: SizeMm = protocol.BAR_WIDTH.value
+    fillet_mm: Finite = protocol.BAR_FILLET.value
     edge_radius_mm = OtherName("fillet_mm")
 
     if TYPE_CHECKING:
@@ -400,7 +390,6 @@ class Bar(Indenter):
         ) -> None: ...
 
     def __post_init__(self) -> None:
-        plausible("width_mm", self.width_mm, "mm", SIZES_MM)
         fillet_within(self.fillet_mm, self.width_mm, "width_mm")
 
     @property
@@ -411,16 +400,16 @@ class Bar(Indenter):
     def edge_reach_mm(self) -> float:
         return self.width_mm / 2 + BESIDE_EDGE_MM
 
-    def edges_mm(self, reach_mm: float) -> tuple[tuple[float, float], ...]:
+    def edges_mm(self, reach_mm: Finite) -> tuple[tuple[float, float], ...]:
         return ((-self.width_mm / 2, self.fillet_mm), (self.width_mm / 2, self.fillet_mm))
 
-    def rounded_to(self, radius_mm: float) -> Bar:
+    def rounded_to(self, radius_mm: Finite) -> Bar:
         return replace(self, fillet_mm=max(self.fillet_mm, min(radius_mm, self.width_mm / 2)))
 
-    def front(self, points_mm: FloatArray) -> FloatArray:
+    def front(self, points_mm: PointsMm) -> FloatArray:
         return round_front(np.abs(points_mm[:, 0]) - self.width_mm / 2 + self.fillet_mm, self.fillet_mm)
 
-    def gap(self, points_mm: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def gap(self, points_mm: PointsMm) -> tuple[FloatArray, FloatArray]:
         x, y = points_mm[:, 0], points_mm[:, 1]
         outward = np.zeros_like(points_mm)
         outward[:, 0] = np.where(x < 0.0, -1.0, 1.0)
@@ -428,8 +417,7 @@ class Bar(Indenter):
         return rounded(inside, y + self.fillet_mm, outward, self.fillet_mm)
 
 
-@dataclass(frozen=True)
-@converted
+@value_class
 class FlatPunch(Indenter):
     """Flat-ended round probe with a rounded rim.
 
@@ -449,8 +437,8 @@ class FlatPunch(Indenter):
     """
 
     symmetry_deg = None
-    diameter_mm: float = protocol.PUNCH_DIAMETER.value
-    fillet_mm: float = protocol.BAR_FILLET.value
+    diameter_mm: SizeMm = protocol.PUNCH_DIAMETER.value
+    fillet_mm: Finite = protocol.BAR_FILLET.value
     edge_radius_mm = OtherName("fillet_mm")
     radius_mm = OtherName(_of_diameter, lambda body: body.diameter_mm / 2)
 
@@ -466,7 +454,6 @@ class FlatPunch(Indenter):
         ) -> None: ...
 
     def __post_init__(self) -> None:
-        plausible("diameter_mm", self.diameter_mm, "mm", SIZES_MM)
         fillet_within(self.fillet_mm, self.diameter_mm, "diameter_mm")
 
     @property
@@ -477,15 +464,15 @@ class FlatPunch(Indenter):
     def rim_mm(self) -> tuple[float, float]:
         return self.diameter_mm / 2, self.fillet_mm
 
-    def rounded_to(self, radius_mm: float) -> FlatPunch:
+    def rounded_to(self, radius_mm: Finite) -> FlatPunch:
         return replace(self, fillet_mm=max(self.fillet_mm, min(radius_mm, self.diameter_mm / 2)))
 
-    def front(self, points_mm: FloatArray) -> FloatArray:
+    def front(self, points_mm: PointsMm) -> FloatArray:
         return round_front(
             np.hypot(points_mm[:, 0], points_mm[:, 2]) - self.diameter_mm / 2 + self.fillet_mm, self.fillet_mm
         )
 
-    def gap(self, points_mm: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def gap(self, points_mm: PointsMm) -> tuple[FloatArray, FloatArray]:
         radial, outward = _norm_and_direction(points_mm * [1.0, 0.0, 1.0])
         # On the axis any radial direction serves; x is taken, since y would not be radial.
         outward = np.where(radial[:, None] > 0.0, outward, [1.0, 0.0, 0.0])
@@ -493,16 +480,16 @@ class FlatPunch(Indenter):
         return rounded(inside, points_mm[:, 1] + self.fillet_mm, outward, self.fillet_mm)
 
 
-@dataclass(frozen=True)
+@value_class
 class Plate(Indenter):
     """Flat plate without edges, larger than the finger."""
 
     symmetry_deg = None
 
-    def front(self, points_mm: FloatArray) -> FloatArray:
+    def front(self, points_mm: PointsMm) -> FloatArray:
         return np.zeros(len(points_mm))
 
-    def gap(self, points_mm: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def gap(self, points_mm: PointsMm) -> tuple[FloatArray, FloatArray]:
         return points_mm[:, 1].copy(), np.broadcast_to([0.0, 1.0, 0.0], points_mm.shape).copy()
 
 

@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.optimize import brentq
 
-from fingerpad.core.checks import FloatArray, IntArray, float_array, increasing, whole
 from fingerpad.core.errors import InputError
+from fingerpad.core.values import FloatArray, IntArray, float_array, increasing, whole
 from fingerpad.geometry.fingertip import Fingertip
 from fingerpad.geometry.grading import Grading, Strip, lines_across, lines_along
 

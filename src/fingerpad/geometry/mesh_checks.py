@@ -12,8 +12,8 @@ import numpy as np
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
-from fingerpad.core.checks import FloatArray, IntArray
 from fingerpad.core.errors import InputError
+from fingerpad.core.values import FloatArray, IntArray
 from fingerpad.geometry.mesh import CORNERS, LAYERS, Mesh
 
 

@@ -10,10 +10,10 @@ from typing import NoReturn
 
 import numpy as np
 
-from fingerpad.core.checks import IntArray
+from fingerpad.core.checked import checked
 from fingerpad.core.errors import InputError
 from fingerpad.core.files import path_of, read_text
-from fingerpad.core.keywords import known_keywords
+from fingerpad.core.values import Finite, IntArray, Pair
 from fingerpad.geometry.free_mesh import FingerMesh
 from fingerpad.geometry.mesh import LAYERS
 from fingerpad.geometry.mesh_parts import MeshParts, finger_from, plain_name
@@ -34,14 +34,14 @@ _INP_BRICK_FACES = ([0, 1, 2, 3], [4, 5, 6, 7], [0, 1, 5, 4], [1, 2, 6, 5], [2, 
 """Nodes of the faces S1, S2, ... of Abaqus."""
 
 
-@known_keywords
+@checked
 def read_finger(
     path: Path | str,
     unit: str = "mm",
     axes: str = "x y z",
     names: Mapping[str, str] | None = None,
-    contact_mm: tuple[float, float] | None = None,
-    receptor_depth_mm: float | None = None,
+    contact_mm: Pair | None = None,
+    receptor_depth_mm: Finite | None = None,
 ) -> FingerMesh:
     """Read a finger from a file of a mesh; it takes the place of a `Fingertip`.
 

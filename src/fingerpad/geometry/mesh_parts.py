@@ -15,9 +15,9 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
-from fingerpad.core.checks import FloatArray, IntArray, instance, one_of, pair, positive
 from fingerpad.core.errors import InputError
 from fingerpad.core.units import LENGTHS_MM
+from fingerpad.core.values import FloatArray, IntArray, instance, one_of, pair, positive
 from fingerpad.data import fingertip as published
 from fingerpad.geometry.fingertip import SIZES_MM
 from fingerpad.geometry.free_mesh import FACES, FingerMesh, FreeMesh

@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-from abc import abstractmethod
-from dataclasses import dataclass
+from abc import ABC, abstractmethod
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from fingerpad.core.checks import FloatArray, not_negative, plausible, positive, whole
-from fingerpad.core.keywords import KnownKeywords
+from fingerpad.core.checked import checked_class, value_class
 from fingerpad.core.phases import Phase, ramp_and_hold_phases
-from fingerpad.core.units import unit_of
-from fingerpad.core.values import converted
+from fingerpad.core.values import Count, Finite, FloatArray, NotNegative, Positive, Whole, plausible
 from fingerpad.data import protocol
 
 LONGEST_MS = 1e13  # Longest ramp or hold; a quasi-static ramp of a validation takes 1e12 ms. [ms]
@@ -22,15 +19,14 @@ PLAUSIBLE["hold_ms"] = PLAUSIBLE["ramp_ms"]
 """Smallest and largest peaks and times of a touch: an afferent answers to 1 mN, and pads are 10 mm thick."""
 
 
-@dataclass(frozen=True)
-@converted
+@value_class
 class Pose:
     """How far an indenter has moved and turned since first touch, beside its advance."""
 
-    x_mm: float = 0.0
-    z_mm: float = 0.0  # Way of its tip along the finger, distal positive, and across it. [mm]
-    tilt_deg: float = 0.0
-    spin_deg: float = 0.0  # Rotations about its tip, added to those of the `Touch`. [degrees]
+    x_mm: Finite = 0.0
+    z_mm: Finite = 0.0  # Way of its tip along the finger, distal positive, and across it. [mm]
+    tilt_deg: Finite = 0.0
+    spin_deg: Finite = 0.0  # Rotations about its tip, added to those of the `Touch`. [degrees]
 
     @property
     def way(self) -> FloatArray:
@@ -38,9 +34,8 @@ class Pose:
         return np.array([self.x_mm, self.z_mm, self.tilt_deg / TURN_LIKE_MM, self.spin_deg / TURN_LIKE_MM])
 
 
-@dataclass(frozen=True)
-@converted
-class Cycles(metaclass=KnownKeywords):
+@value_class
+class Cycles:
     """A part of a motion that repeats itself.
 
     Parameters
@@ -56,14 +51,9 @@ class Cycles(metaclass=KnownKeywords):
     600.0
     """
 
-    start_ms: float
-    period_ms: float
-    count: int
-
-    def __post_init__(self) -> None:
-        not_negative("start_ms", self.start_ms, "ms")
-        positive("period_ms", self.period_ms, "ms")
-        whole("count", self.count, at_least=1)
+    start_ms: NotNegative
+    period_ms: Positive
+    count: Count
 
     @property
     def end_ms(self) -> float:
@@ -76,7 +66,8 @@ STILL = Pose()
 TURN_LIKE_MM = 10.0  # Rotation that takes as many steps as all of the depth. [degrees]
 
 
-class Motion(metaclass=KnownKeywords):
+@checked_class
+class Motion(ABC):
     """What an indenter does over time: common part of all motions.
 
     A motion prescribes the depth of the indenter, or its force. It is linear in time between some times.
@@ -104,11 +95,11 @@ class Motion(metaclass=KnownKeywords):
         """Poses between which the indenter moves, in order; one if it only goes up and down."""
         return (STILL,)
 
-    def pose_at(self, time_ms: float) -> Pose:
+    def pose_at(self, time_ms: Finite) -> Pose:
         """Pose of the indenter at a time [ms]."""
         return STILL
 
-    def course_at(self, time_ms: float) -> FloatArray:
+    def course_at(self, time_ms: Finite) -> FloatArray:
         """Where the motion is at a time [ms]: depth or force over the largest, and `Pose.way`, (5,)."""
         return np.array([float(self.prescribed_at(time_ms)) / self.largest, *self.pose_at(time_ms).way])
 
@@ -147,7 +138,7 @@ class Motion(metaclass=KnownKeywords):
         """Depth [mm] or force [mN] at `times_ms`, any shape."""
 
     @abstractmethod
-    def step_times_ms(self, ramp_steps: int, hold_steps: int) -> FloatArray:
+    def step_times_ms(self, ramp_steps: Whole, hold_steps: Whole) -> FloatArray:
         """List the times to solve at, from 0. [ms]"""
 
 
@@ -162,7 +153,7 @@ class _OneRamp(Motion):
     def __post_init__(self) -> None:
         for name, between in PLAUSIBLE.items():
             if hasattr(self, name):
-                plausible(name, getattr(self, name), unit_of(name), between)
+                plausible(name, getattr(self, name), between)
 
     @property
     def end_ms(self) -> float:
@@ -189,8 +180,7 @@ class _OneRamp(Motion):
         )
 
 
-@dataclass(frozen=True)
-@converted
+@value_class
 class RampAndHold(_OneRamp):
     """Indent at constant speed to a depth, then hold it.
 
@@ -210,17 +200,16 @@ class RampAndHold(_OneRamp):
     [0.0, 0.5, 1.0, 1.0]
     """
 
-    depth_mm: float = protocol.DEPTH.value
-    ramp_ms: float = protocol.RAMP.value
-    hold_ms: float = protocol.HOLD.value
+    depth_mm: Finite = protocol.DEPTH.value
+    ramp_ms: Finite = protocol.RAMP.value
+    hold_ms: Finite = protocol.HOLD.value
 
     @property
     def largest(self) -> float:
         return self.depth_mm
 
 
-@dataclass(frozen=True)
-@converted
+@value_class
 class ForceRampAndHold(_OneRamp):
     """Press with a force that grows at a constant rate, then hold it: the skin creeps.
 
@@ -240,9 +229,9 @@ class ForceRampAndHold(_OneRamp):
     [0.0, 50.0, 100.0]
     """
 
-    force_mn: float
-    ramp_ms: float = protocol.RAMP.value
-    hold_ms: float = protocol.HOLD.value
+    force_mn: Finite
+    ramp_ms: Finite = protocol.RAMP.value
+    hold_ms: Finite = protocol.HOLD.value
 
     by_force = True
 

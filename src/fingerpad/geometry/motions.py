@@ -8,11 +8,21 @@ from itertools import pairwise
 
 import numpy as np
 
-from fingerpad.core.checks import FloatArray, finite, float_array, not_negative, positive, whole
+from fingerpad.core.checked import checked
 from fingerpad.core.errors import InputError
-from fingerpad.core.keywords import known_keywords
 from fingerpad.core.phases import HOLD, RAMP, Phase
 from fingerpad.core.units import MS_PER_S
+from fingerpad.core.values import (
+    Finite,
+    FloatArray,
+    Positive,
+    Whole,
+    finite,
+    float_array,
+    not_negative,
+    positive,
+    whole,
+)
 from fingerpad.data import protocol
 from fingerpad.geometry.motion import Cycles
 from fingerpad.geometry.trajectory import Trajectory
@@ -21,17 +31,17 @@ SAMPLES_PER_CYCLE = 20
 """Samples of a sine per cycle; a line between two of them misses it by up to 1.2 % of the amplitude."""
 
 
-@known_keywords
+@checked
 def sine(
-    depth_mm: float | None = None,
-    amplitude_mm: float | None = None,
-    frequency_hz: float | None = None,
-    cycles: int | None = None,
-    ramp_ms: float = protocol.RAMP.value,
-    hold_ms: float = protocol.HOLD.value,
+    depth_mm: Finite | None = None,
+    amplitude_mm: Finite | None = None,
+    frequency_hz: Finite | None = None,
+    cycles: Whole | None = None,
+    ramp_ms: Finite = protocol.RAMP.value,
+    hold_ms: Finite = protocol.HOLD.value,
     *,
-    force_mn: float | None = None,
-    amplitude_mn: float | None = None,
+    force_mn: Finite | None = None,
+    amplitude_mn: Finite | None = None,
 ) -> Trajectory:
     """Press to a depth or a force, hold it, then vibrate about it.
 
@@ -64,24 +74,24 @@ def sine(
     """
     _check_given("sine", frequency_hz=frequency_hz, cycles=cycles)
     hold = _hold(depth_mm, amplitude_mm, force_mn, amplitude_mn)
-    period_ms = MS_PER_S / positive("frequency_hz", frequency_hz, "Hz")  # type: ignore[arg-type]
-    count = whole("cycles", cycles, at_least=1)  # type: ignore[arg-type]
+    period_ms = MS_PER_S / positive("frequency_hz", frequency_hz, "Hz")
+    count = whole("cycles", cycles, at_least=1)
     turns = np.arange(1, SAMPLES_PER_CYCLE * count + 1) / SAMPLES_PER_CYCLE
     motion = _on_a_hold(hold, period_ms * turns, turns, ramp_ms, hold_ms, "vibration")
     return replace(motion, cycles=Cycles(ramp_ms + hold_ms, period_ms, count))
 
 
-@known_keywords
+@checked
 def chirp(
-    depth_mm: float | None = None,
-    amplitude_mm: float | None = None,
+    depth_mm: Finite | None = None,
+    amplitude_mm: Finite | None = None,
     frequencies_hz: Sequence[float] | None = None,
-    sweep_ms: float | None = None,
-    ramp_ms: float = protocol.RAMP.value,
-    hold_ms: float = protocol.HOLD.value,
+    sweep_ms: Finite | None = None,
+    ramp_ms: Finite = protocol.RAMP.value,
+    hold_ms: Finite = protocol.HOLD.value,
     *,
-    force_mn: float | None = None,
-    amplitude_mn: float | None = None,
+    force_mn: Finite | None = None,
+    amplitude_mn: Finite | None = None,
 ) -> Trajectory:
     """Press to a depth or a force, hold it, then vibrate with a frequency that changes at a constant rate.
 
@@ -111,7 +121,7 @@ def chirp(
     if pair.size != 2:
         raise InputError("frequencies_hz", "must be a pair, first and last", str(pair.size))
     first, last = (positive("frequencies_hz", each, "Hz") for each in pair.tolist())
-    duration_ms = positive("sweep_ms", sweep_ms, "ms")  # type: ignore[arg-type]
+    duration_ms = positive("sweep_ms", sweep_ms, "ms")
     seconds = duration_ms / MS_PER_S
     cycles = int((first + last) / 2.0 * seconds)
     if cycles < 1:
@@ -126,8 +136,10 @@ def chirp(
     return _on_a_hold(hold, times_ms, turns, ramp_ms, hold_ms, "sweep")
 
 
-@known_keywords
-def repeated(depth_mm: float, touches: int, ramp_ms: float, hold_ms: float, pause_ms: float) -> Trajectory:
+@checked
+def repeated(
+    depth_mm: Positive, touches: Whole, ramp_ms: Finite, hold_ms: Finite, pause_ms: Finite
+) -> Trajectory:
     """Press several times to the same depth, with pauses at first touch of the undeformed skin.
 
     Parameters
@@ -149,7 +161,6 @@ def repeated(depth_mm: float, touches: int, ramp_ms: float, hold_ms: float, paus
     >>> repeated(1.0, 2, ramp_ms=50.0, hold_ms=200.0, pause_ms=300.0).end_ms
     1200.0
     """
-    positive("depth_mm", depth_mm, "mm")
     lengths_ms = [
         positive(name, value, "ms")
         for name, value in (
@@ -163,13 +174,13 @@ def repeated(depth_mm: float, touches: int, ramp_ms: float, hold_ms: float, paus
     return Trajectory((0.0, *np.cumsum(n * lengths_ms)), (0.0, *n * (depth_mm, depth_mm, 0.0, 0.0)))
 
 
-@known_keywords
+@checked
 def staircase(
     depths_mm: Sequence[float] | None = None,
     forces_mn: Sequence[float] | None = None,
     *,
-    ramp_ms: float = protocol.RAMP.value,
-    hold_ms: float = protocol.HOLD.value,
+    ramp_ms: Finite = protocol.RAMP.value,
+    hold_ms: Finite = protocol.HOLD.value,
 ) -> Trajectory:
     """Press to several depths or forces, one after the other, and hold each.
 
@@ -204,17 +215,17 @@ def staircase(
     return Trajectory((0.0, *np.cumsum(lengths_ms).tolist()), depths, forces)
 
 
-@known_keywords
+@checked
 def stroke(
-    depth_mm: float | None = None,
-    force_mn: float | None = None,
+    depth_mm: Finite | None = None,
+    force_mn: Finite | None = None,
     *,
-    speed_mm_per_s: float,
-    x_mm: float = 0.0,
-    z_mm: float = 0.0,
-    strokes: int = 1,
-    ramp_ms: float = protocol.RAMP.value,
-    hold_ms: float = protocol.HOLD.value,
+    speed_mm_per_s: Finite,
+    x_mm: Finite = 0.0,
+    z_mm: Finite = 0.0,
+    strokes: Whole = 1,
+    ramp_ms: Finite = protocol.RAMP.value,
+    hold_ms: Finite = protocol.HOLD.value,
 ) -> Trajectory:
     """Press, hold, then slide along the skin at a constant speed, once or to and fro.
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from fingerpad.core.checks import FloatArray
 from fingerpad.core.errors import InputError
+from fingerpad.core.values import FloatArray
 from fingerpad.geometry.fingertip import Finger
 from fingerpad.geometry.motion import Motion
 

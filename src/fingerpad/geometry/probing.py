@@ -6,9 +6,9 @@ from collections.abc import Callable
 
 import numpy as np
 
-from fingerpad.core.checks import FloatArray
 from fingerpad.core.errors import InputError
 from fingerpad.core.units import cosine_and_sine
+from fingerpad.core.values import FloatArray
 
 Gap = Callable[[FloatArray], tuple[FloatArray, FloatArray]]
 

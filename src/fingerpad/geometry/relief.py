@@ -14,8 +14,8 @@ import numpy as np
 from numba import njit
 from scipy.ndimage import grey_closing, grey_dilation, grey_erosion, grey_opening, label, map_coordinates
 
-from fingerpad.core.checks import FloatArray
 from fingerpad.core.errors import InputError
+from fingerpad.core.values import FloatArray
 
 REACH_MM = 6.0
 """Ridges, grooves and dots are looked for within this distance of the axis, along and across. [mm]"""

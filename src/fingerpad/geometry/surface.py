@@ -6,17 +6,29 @@ distance is exact and not interpolated: docs/decisions/surfaces.md.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
-from functools import cached_property
+from dataclasses import fields
+from functools import cached_property, partial
+from typing import Annotated
 
 import numpy as np
 from numba import njit
 
-from fingerpad.core.checks import FloatArray, IntArray, finite, float_array, int_array, not_negative, positive
+from fingerpad.core.checked import checked, value_class
 from fingerpad.core.errors import InputError
-from fingerpad.core.keywords import known_keywords
 from fingerpad.core.logger import LOGGER
-from fingerpad.core.values import converted
+from fingerpad.core.values import (
+    Check,
+    Finite,
+    FiniteMatrix,
+    FloatArray,
+    IntArray,
+    NotNegative,
+    PointsMm,
+    Positive,
+    float_array,
+    int_array,
+    limits,
+)
 from fingerpad.geometry.closest_point import Triangles
 from fingerpad.geometry.indenters import Indenter
 from fingerpad.geometry.probing import traced_front
@@ -48,8 +60,7 @@ FAR_MM = 2.0
 """Beyond this distance above a surface its gap is this number: in a hollow all triangles are as far. [mm]"""
 
 
-@dataclass(frozen=True, eq=False, repr=False)
-@converted
+@value_class(eq=False)
 class Surface(Indenter):
     """A rigid body bounded by triangles, watertight or open, in the frame of indenters.
 
@@ -86,15 +97,14 @@ class Surface(Indenter):
     [0.25, 0.5]
     """
 
-    vertices_mm: FloatArray
-    faces: IntArray
-    smooth_below_deg: float = SMOOTH_BELOW_DEG
-    edge_radius_mm: float = 0.0
+    vertices_mm: FiniteMatrix
+    faces: Annotated[IntArray, Check(partial(int_array, ndim=2), {})]
+    smooth_below_deg: Annotated[float, limits(0.0, LARGEST_SMOOTH_DEG)] = SMOOTH_BELOW_DEG
+    edge_radius_mm: NotNegative = 0.0
 
     def __post_init__(self) -> None:
-        vertices = float_array("vertices_mm", self.vertices_mm, 2)
-        faces = int_array("faces", self.faces, 2)
-        if vertices.shape[1] != 3 or faces.ndim != 2 or faces.shape[1] != 3 or not len(faces):
+        vertices, faces = self.vertices_mm, self.faces
+        if vertices.shape[1] != 3 or faces.shape[1] != 3 or not len(faces):
             raise InputError(
                 f"A surface needs vertices (n, 3) and at least one triangle (m, 3): got {vertices.shape} and "
                 f"{faces.shape}."
@@ -120,12 +130,6 @@ class Surface(Indenter):
         vertices, faces, told = repaired(vertices, faces[area > 1e-12 * extent**2])
         vertices = vertices - [0.0, vertices[faces, 1].max(), 0.0]
         self.__dict__["repairs"] = told
-        if not 0.0 <= finite("smooth_below_deg", self.smooth_below_deg, "degrees") <= LARGEST_SMOOTH_DEG:
-            raise InputError(
-                "smooth_below_deg",
-                f"must be from 0 to {LARGEST_SMOOTH_DEG:g} degrees",
-                f"{self.smooth_below_deg:g}",
-            )
         for name, value in (("vertices_mm", vertices), ("faces", faces)):
             value.setflags(write=False)
             object.__setattr__(self, name, value)
@@ -136,7 +140,7 @@ class Surface(Indenter):
             )
         if told:
             LOGGER.warning("%r was repaired: %s.", self, "; ".join(told))
-        if not_negative("edge_radius_mm", self.edge_radius_mm, "mm"):
+        if self.edge_radius_mm:
             check_edge_radius(self.edge_radius_mm, self.relief_mm)
 
     def __repr__(self) -> str:
@@ -158,7 +162,7 @@ class Surface(Indenter):
         reach = float(np.abs(self.vertices_mm[self.faces, 0]).max())
         return reach if reach < 2 * REACH_MM else np.inf
 
-    def mirrors(self, spin_deg: float) -> bool:
+    def mirrors(self, spin_deg: Finite) -> bool:
         found: dict[float, bool] = self.__dict__.setdefault("_mirrors", {})
         if spin_deg not in found:
             found[spin_deg] = super().mirrors(spin_deg)
@@ -238,11 +242,11 @@ class Surface(Indenter):
         _raise_to_triangles(triangles, low, spacing, height)
         return height, spacing
 
-    def front(self, points_mm: FloatArray) -> FloatArray:
+    def front(self, points_mm: PointsMm) -> FloatArray:
         height = np.max([layer.heights(points_mm) for layer in self._layers], axis=0)
         return traced_front(self.gap, points_mm, np.where(np.isfinite(height), height + HOLLOW_MM, -np.inf))
 
-    def gap(self, points_mm: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def gap(self, points_mm: PointsMm) -> tuple[FloatArray, FloatArray]:
         if self.edge_radius_mm == 0.0:
             return self._sharp_gap(points_mm)
         return with_rounded_edges(self._sharp_gap, points_mm, self.edge_radius_mm)
@@ -291,12 +295,12 @@ def check_heights(name: str, heights: int) -> None:
         )
 
 
-@known_keywords
+@checked
 def height_surface(
     heights_mm: FloatArray,
-    pitch_mm: float,
-    smooth_below_deg: float = SMOOTH_BELOW_DEG,
-    edge_radius_mm: float = 0.0,
+    pitch_mm: Positive,
+    smooth_below_deg: Finite = SMOOTH_BELOW_DEG,
+    edge_radius_mm: Finite = 0.0,
 ) -> Surface:
     """Surface through heights on a regular grid, centred on the indenter's axis.
 
@@ -317,7 +321,6 @@ def height_surface(
     [0.0, -0.4]
     """
     heights = float_array("heights_mm", heights_mm, 2)
-    positive("pitch_mm", pitch_mm, "mm")
     rows, columns = heights.shape
     if min(rows, columns) < 2:
         raise InputError("heights_mm", "must have at least 2 rows and 2 columns", f"{rows} and {columns}")

@@ -7,11 +7,11 @@ from pathlib import Path
 
 import numpy as np
 
-from fingerpad.core.checks import FloatArray, IntArray, float_array, one_of, positive
+from fingerpad.core.checked import checked
 from fingerpad.core.errors import InputError
 from fingerpad.core.files import LARGEST_TEXT_MB, check_file, path_of
-from fingerpad.core.keywords import known_keywords
 from fingerpad.core.units import LENGTHS_MM
+from fingerpad.core.values import Finite, FloatArray, IntArray, Pair, Positive, float_array, one_of, positive
 from fingerpad.geometry.surface import (
     LARGEST_MM,
     MOST_HEIGHTS,
@@ -40,15 +40,15 @@ _AXES = {
 }
 
 
-@known_keywords
+@checked
 def read_surface(
     path: str | Path,
     unit: str = "mm",
-    scale: float = 1.0,
+    scale: Finite = 1.0,
     up: str = "+z",
-    at_mm: tuple[float, float] = (0, 0),
-    smooth_below_deg: float = SMOOTH_BELOW_DEG,
-    edge_radius_mm: float = 0.0,
+    at_mm: Pair = (0, 0),
+    smooth_below_deg: Finite = SMOOTH_BELOW_DEG,
+    edge_radius_mm: Finite = 0.0,
 ) -> Surface:
     """Read a rigid body of triangles, watertight or open.
 
@@ -112,13 +112,13 @@ def _welded(vertices: FloatArray, faces: IntArray) -> tuple[FloatArray, IntArray
     return ahead[is_new], number[faces]
 
 
-@known_keywords
+@checked
 def read_height_map(
     path: str | Path,
-    pitch_mm: float,
-    height_mm: float = 1.0,
-    smooth_below_deg: float = SMOOTH_BELOW_DEG,
-    edge_radius_mm: float = 0.0,
+    pitch_mm: Positive,
+    height_mm: Positive = 1.0,
+    smooth_below_deg: Finite = SMOOTH_BELOW_DEG,
+    edge_radius_mm: Finite = 0.0,
 ) -> Surface:
     """Read a map of heights towards the skin, without sides or back, centred on the indenter's axis.
 
@@ -137,8 +137,6 @@ def read_height_map(
         Hollow creases between triangles of a smaller angle are rounded; see `Surface`. [degrees]
     """
     file = path_of("path", path)
-    positive("pitch_mm", pitch_mm, "mm")
-    positive("height_mm", height_mm, "mm")
     _check_file(file, MAPS)
     try:
         with warnings.catch_warnings():

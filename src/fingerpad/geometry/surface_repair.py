@@ -10,8 +10,8 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
-from fingerpad.core.checks import FloatArray, IntArray
 from fingerpad.core.errors import InputError
+from fingerpad.core.values import FloatArray, IntArray
 from fingerpad.geometry.closest_point import Triangles
 
 JOIN_MM = 0.01

@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from itertools import groupby, pairwise
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from fingerpad.core.checks import FloatArray, float_array, increasing, plausible
+from fingerpad.core.checked import value_class
 from fingerpad.core.errors import InputError
 from fingerpad.core.phases import HOLD, RAMP, RELEASE, VIBRATION, Phase
 from fingerpad.core.units import unit_of
-from fingerpad.core.values import converted
+from fingerpad.core.values import Finite, FloatArray, Many, Numbers, Whole, increasing, plausible
 from fingerpad.data import protocol
 from fingerpad.geometry.motion import PLAUSIBLE, STILL, Cycles, Motion, Pose, hold_ends_ms
 
@@ -65,8 +65,7 @@ def _with_vibrations(runs: Sequence[Phase], lifted_ms: FloatArray) -> list[Phase
     return found
 
 
-@dataclass(frozen=True)
-@converted
+@value_class
 class Trajectory(Motion):
     """Move the indenter along any course of depth or of force, back as well as forth, aside and turning.
 
@@ -117,21 +116,21 @@ class Trajectory(Motion):
     ['ramp', 'hold', 'release', 'pause']
     """
 
-    times_ms: tuple[float, ...]
-    depth_mm: tuple[float, ...] | None = None
-    force_mn: tuple[float, ...] | None = None
-    x_mm: tuple[float, ...] | None = None
-    z_mm: tuple[float, ...] | None = None
-    tilt_deg: tuple[float, ...] | None = None
-    spin_deg: tuple[float, ...] | None = None
+    times_ms: Numbers
+    depth_mm: Numbers | None = None
+    force_mn: Numbers | None = None
+    x_mm: Numbers | None = None
+    z_mm: Numbers | None = None
+    tilt_deg: Numbers | None = None
+    spin_deg: Numbers | None = None
     # Names do not change what is pressed, and a stored press is found by what is compared.
-    phases: tuple[Phase, ...] = field(default=(), compare=False)
+    phases: Many[Phase] = field(default=(), compare=False)
     cycles: Cycles | None = None
 
     given_samples = True
 
     def __post_init__(self) -> None:
-        times = increasing("times_ms", float_array("times_ms", self.times_ms, 1))
+        times = increasing("times_ms", self.times_ms)
         if times.size < 2 or times[0] != 0.0:
             raise InputError("times_ms", "must hold at least two times, the first of them 0", str(times))
         if (self.depth_mm is None) == (self.force_mn is None):
@@ -140,7 +139,7 @@ class Trajectory(Motion):
         for column in (name, *POSE_COLUMNS):
             if getattr(self, column) is None:
                 continue
-            values = float_array(column, getattr(self, column), 1)
+            values = np.array(getattr(self, column))
             if values.size != times.size:
                 raise InputError(column, f"must have one value per time, {times.size}", str(values.size))
             if column in POSE_COLUMNS and values[0] != 0.0:
@@ -149,7 +148,6 @@ class Trajectory(Motion):
                 )
             if column.endswith("_mm"):
                 check_speed(column, times, values)
-            object.__setattr__(self, column, tuple(values.tolist()))
         values = np.array(getattr(self, name))
         if values[0] > 0.0:
             raise InputError(
@@ -167,9 +165,8 @@ class Trajectory(Motion):
         if values.max() <= 0.0 and not aside:
             raise InputError(name, "must be above 0 at some time", remedy="the indenter would never press")
         if values.max() > 0.0 and not aside:
-            plausible(f"the largest {name}", values.max(), unit_of(name), PLAUSIBLE[name])
-        object.__setattr__(self, "times_ms", tuple(times.tolist()))
-        object.__setattr__(self, "phases", tuple(self.phases) or self._phases_of_course())
+            plausible(f"the largest {name}", values.max(), PLAUSIBLE[name])
+        object.__setattr__(self, "phases", self.phases or self._phases_of_course())
         for phase in self.phases:
             if phase.end_ms > self.end_ms:
                 raise InputError(
@@ -261,7 +258,7 @@ class Trajectory(Motion):
         times = np.union1d(given, further)
         return times, np.column_stack([np.interp(times, given, column) for column in self._course.T])
 
-    def pose_at(self, time_ms: float) -> Pose:
+    def pose_at(self, time_ms: Finite) -> Pose:
         columns = (getattr(self, name) for name in POSE_COLUMNS)
         return Pose(
             *(0.0 if each is None else float(np.interp(time_ms, self.times_ms, each)) for each in columns)
@@ -355,7 +352,7 @@ class Trajectory(Motion):
     def prescribed_at(self, times_ms: ArrayLike) -> FloatArray:
         return np.interp(np.asarray(times_ms, dtype=float), self.times_ms, self.prescribed)
 
-    def step_times_ms(self, ramp_steps: int, hold_steps: int) -> FloatArray:
+    def step_times_ms(self, ramp_steps: Whole, hold_steps: Whole) -> FloatArray:
         """List the times to solve at: all samples, and times between them where they are far apart. [ms]
 
         First touch is one of them, and the way straight through the air before it is one step. A part of the

@@ -10,13 +10,13 @@ from typing import Any
 import numpy as np
 from scipy.optimize import minimize_scalar
 
-from fingerpad.core.checks import FloatArray, finite, instance, positive, whole
+from fingerpad.core.checked import checked
 from fingerpad.core.errors import InputError, shown
 from fingerpad.core.files import path_of
-from fingerpad.core.keywords import known_keywords
 from fingerpad.core.phases import Phase
 from fingerpad.core.tables import TableRow, column_of, read_csv
 from fingerpad.core.units import MN_PER_N, MS_PER_S
+from fingerpad.core.values import Count, Finite, FloatArray, Positive, finite, positive
 from fingerpad.geometry.trajectory import POSE_COLUMNS, SAME_VALUE, Trajectory, check_speed, samples_of_line
 
 MM_PER_UM = 1e-3
@@ -42,9 +42,9 @@ GAP, SAME_STEP, REGULAR_SHARE = 5.0, 0.01, 0.9
 the median within 1 %: the file is a recording at a fixed rate. A line replaces a few lost samples."""
 
 
-@known_keywords
+@checked
 def read_trajectory(
-    path: Path | str, *, first_touch_mm: float = 0.0, phases: Sequence[Phase] = ()
+    path: Path | str, *, first_touch_mm: Finite = 0.0, phases: Sequence[Phase] = ()
 ) -> Trajectory:
     r"""Read a motion from a CSV file.
 
@@ -164,9 +164,9 @@ LOOKS, LOOKS_PER_PIECE = 512, 32
 SHORTEST_SHARE = 1e-9  # Duration of a piece over that of the whole motion, below which the function jumps.
 
 
-@known_keywords
+@checked
 def sampled(
-    end_ms: float,
+    end_ms: Finite,
     depth_mm: Course | None = None,
     force_mn: Course | None = None,
     *,
@@ -174,8 +174,8 @@ def sampled(
     z_mm: Course | None = None,
     tilt_deg: Course | None = None,
     spin_deg: Course | None = None,
-    tolerance: float = TOLERANCE,
-    looks: int = LOOKS,
+    tolerance: Positive = TOLERANCE,
+    looks: Count = LOOKS,
     phases: Sequence[Phase] = (),
 ) -> Trajectory:
     """Make a trajectory from functions of time, linear between as few times as an error bound allows.
@@ -203,8 +203,6 @@ def sampled(
     [0.0, 80.0, 1000.0]
     """
     end = positive("end_ms", end_ms, "ms")
-    positive("tolerance", tolerance)
-    whole("looks", looks, at_least=1)
     given = (("depth_mm", depth_mm), ("force_mn", force_mn), ("x_mm", x_mm), ("z_mm", z_mm),
              ("tilt_deg", tilt_deg), ("spin_deg", spin_deg))  # fmt: skip
     courses = {name: course for name, course in given if course is not None}
@@ -257,8 +255,8 @@ def sampled(
     return Trajectory(tuple(times), **columns, phases=tuple(phases))
 
 
-@known_keywords
-def reduced(motion: Trajectory, tolerance: float = TOLERANCE) -> Trajectory:
+@checked
+def reduced(motion: Trajectory, tolerance: Positive = TOLERANCE) -> Trajectory:
     """Leave out samples of a recording that lie close to a line between others; each is a step to solve at.
 
     Samples are kept where the course deviates most from a line (`samples_of_line`), so that corners stay
@@ -283,8 +281,6 @@ def reduced(motion: Trajectory, tolerance: float = TOLERANCE) -> Trajectory:
     >>> reduced(recorded).times_ms
     (0.0, 50.0, 1000.0)
     """
-    positive("tolerance", tolerance)
-    instance("motion", motion, Trajectory)
     names = ["force_mn" if motion.by_force else "depth_mm"]
     names += [name for name in POSE_COLUMNS if getattr(motion, name) is not None]
     times, table = np.array(motion.times_ms), np.array([getattr(motion, name) for name in names]).T

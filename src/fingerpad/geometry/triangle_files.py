@@ -15,8 +15,8 @@ from typing import Any
 
 import numpy as np
 
-from fingerpad.core.checks import FloatArray, IntArray
 from fingerpad.core.errors import InputError, shown
+from fingerpad.core.values import FloatArray, IntArray
 
 Mesh = tuple[FloatArray, IntArray]
 

@@ -13,9 +13,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from fingerpad.core.checks import FloatArray, finite, float_array, increasing
 from fingerpad.core.errors import InputError
 from fingerpad.core.signals import Traces
+from fingerpad.core.values import FloatArray, finite, float_array, increasing
 from fingerpad.data import neuron
 from fingerpad.inference.fitting.covariance_adaptation import CovarianceAdaptation
 from fingerpad.inference.fitting.least_squares import LeastSquares

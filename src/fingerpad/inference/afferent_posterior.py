@@ -14,10 +14,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from fingerpad.core.checks import FloatArray, finite, positive
+from fingerpad.core.checked import value_class
 from fingerpad.core.errors import InputError
 from fingerpad.core.random_streams import generator
-from fingerpad.core.values import converted
+from fingerpad.core.values import Finite, FloatArray, finite, positive
 from fingerpad.data import neuron
 from fingerpad.inference.fitting.posterior import Chains, LogDensity, sample
 from fingerpad.inference.identifiable import IDENTIFIABLE_NAMES, identifiable, six_parameters
@@ -65,8 +65,7 @@ def from_coordinates(points: ArrayLike) -> FloatArray:
     return np.concatenate([coordinates[..., :1] / positive_three[..., 2:], positive_three], axis=-1)
 
 
-@dataclass(frozen=True)
-@converted
+@value_class
 class AfferentPrior:
     """Weakly informative prior of an afferent's parameters.
 
@@ -75,13 +74,13 @@ class AfferentPrior:
     fits, the paper's first one with its gains rescaled. See docs/decisions.md#priors.
     """
 
-    resting_share_sd: float = 1.0  # Standard deviation of the potential at rest over the threshold. [1]
-    dynamic_gain_per_kpa: float = float(_START[1])
-    static_gain_per_kpa_ms: float = float(_START[2])
-    time_constant_ms: float = float(_START[3])
+    resting_share_sd: Finite = 1.0  # Standard deviation of the potential at rest over the threshold. [1]
+    dynamic_gain_per_kpa: Finite = float(_START[1])
+    static_gain_per_kpa_ms: Finite = float(_START[2])
+    time_constant_ms: Finite = float(_START[3])
     """Medians of k_d/(C v), k_s/(C v) and tau. [1/kPa, 1/(kPa ms), ms]"""
-    gain_factor: float = 10.0
-    time_constant_factor: float = 2.0
+    gain_factor: Finite = 10.0
+    time_constant_factor: Finite = 2.0
     """Two thirds of the prior lie between the median divided and multiplied by this factor. [1]"""
 
     def __post_init__(self) -> None:

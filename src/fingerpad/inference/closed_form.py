@@ -17,8 +17,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from fingerpad.core.checks import FloatArray, not_negative, positive
 from fingerpad.core.units import MS_PER_S
+from fingerpad.core.values import FloatArray, not_negative, positive
 from fingerpad.data import neuron
 from fingerpad.inference.identifiable import IDENTIFIABLE_NAMES
 from fingerpad.inference.rate_model import AfferentModel, Rates, evaluate_rows

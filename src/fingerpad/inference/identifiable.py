@@ -23,8 +23,8 @@ import math
 import numpy as np
 from numpy.typing import ArrayLike
 
-from fingerpad.core.checks import FloatArray, float_array, positive
 from fingerpad.core.errors import InputError
+from fingerpad.core.values import FloatArray, float_array, positive
 from fingerpad.data import neuron
 from fingerpad.neuron.afferent import PARAMETER_NAMES
 

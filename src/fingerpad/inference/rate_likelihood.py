@@ -22,8 +22,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from scipy.special import logsumexp
 
-from fingerpad.core.checks import FloatArray, float_array, positive
 from fingerpad.core.errors import InputError
+from fingerpad.core.values import FloatArray, float_array, positive
 from fingerpad.inference.rate_model import RateModel
 from fingerpad.inference.recordings import PHASES, RateRecordings
 

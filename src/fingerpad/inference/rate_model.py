@@ -10,15 +10,15 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 
-from fingerpad.core.checks import FloatArray, IntArray, not_negative
+from fingerpad.core.checked import value_class
 from fingerpad.core.errors import InputError
-from fingerpad.core.keywords import KnownKeywords
 from fingerpad.core.signals import Traces
 from fingerpad.core.threads import in_blocks
+from fingerpad.core.values import Finite, FloatArray, IntArray, Many, NotNegative
 from fingerpad.data import neuron
 from fingerpad.inference.identifiable import IDENTIFIABLE_NAMES, six_parameters
 from fingerpad.neuron.afferent import PARAMETER_NAMES, Afferent
@@ -31,6 +31,7 @@ Evaluate = Callable[[FloatArray], Rates]  # From one set of parameters (n_parame
 ROWS_PER_BLOCK = 4  # Rows of parameters that a thread evaluates at a time.
 
 
+@runtime_checkable
 class RateModel(Protocol):
     """Contract of a model that predicts the dynamic and the static rate under every stimulus."""
 
@@ -83,8 +84,8 @@ def checked_rows(model: RateModel, points: FloatArray) -> FloatArray:
     return rows
 
 
-@dataclass(frozen=True)
-class AfferentModel(metaclass=KnownKeywords):
+@value_class
+class AfferentModel:
     """The paper's model of one afferent in its six parameters.
 
     Parameters
@@ -111,14 +112,13 @@ class AfferentModel(metaclass=KnownKeywords):
     [63.0, 63.0, 63.0]
     """
 
-    drives: tuple[Drive, ...]
-    stimuli: tuple[IntArray, ...]
+    drives: Many[Drive]
+    stimuli: Many[IntArray]
     windows_ms: Windows | None = None
-    refractory_ms: float = neuron.REFRACTORY.value
-    initial_mv: float | None = None
+    refractory_ms: NotNegative = neuron.REFRACTORY.value
+    initial_mv: Finite | None = None
 
     def __post_init__(self) -> None:
-        not_negative("refractory_ms", self.refractory_ms, "ms")
         if self.windows_ms is not None:
             object.__setattr__(self, "windows_ms", check_windows(self.windows_ms, np.inf))
         end = max(bound for window in self.used_windows_ms for bound in window)
@@ -135,8 +135,8 @@ class AfferentModel(metaclass=KnownKeywords):
         cls,
         driven: Drive,
         windows_ms: Windows | None = None,
-        refractory_ms: float = neuron.REFRACTORY.value,
-        initial_mv: float | None = None,
+        refractory_ms: Finite = neuron.REFRACTORY.value,
+        initial_mv: Finite | None = None,
     ) -> AfferentModel:
         """Make the model for stimuli that share their times, one per column of a drive."""
         return cls((driven,), (np.arange(driven.n_sites),), windows_ms, refractory_ms, initial_mv)
@@ -146,8 +146,8 @@ class AfferentModel(metaclass=KnownKeywords):
         cls,
         traces: Traces | Sequence[Traces],
         windows_ms: Windows | None = None,
-        refractory_ms: float = neuron.REFRACTORY.value,
-        initial_mv: float | None = None,
+        refractory_ms: Finite = neuron.REFRACTORY.value,
+        initial_mv: Finite | None = None,
     ) -> AfferentModel:
         """Make the model for what drives the afferent, stimuli grouped by their times.
 

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fingerpad.core.checks import FloatArray, IntArray, not_negative
 from fingerpad.core.errors import InputError
+from fingerpad.core.values import FloatArray, IntArray, not_negative
 from fingerpad.data import protocol
 from fingerpad.inference.fitting.cross_validation import fractional_sum_of_squares
 from fingerpad.inference.rate_model import RateModel, Rates

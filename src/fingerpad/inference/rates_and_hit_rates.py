@@ -15,8 +15,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from fingerpad.core.checks import FloatArray, IntArray, float_array, positive
 from fingerpad.core.errors import InputError
+from fingerpad.core.values import FloatArray, IntArray, float_array, positive
 from fingerpad.inference.afferent_methods import bounds_of, by_differences, fitted_six, four_number_problem
 from fingerpad.inference.fitting.covariance_adaptation import CovarianceAdaptation
 from fingerpad.inference.fitting.methods import Continued, Fit, FitStep, Problem

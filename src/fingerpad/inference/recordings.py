@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 from collections import Counter
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from fingerpad.core.checks import FloatArray, float_array, instance
+from fingerpad.core.checked import value_class
 from fingerpad.core.errors import InputError
-from fingerpad.core.keywords import KnownKeywords
 from fingerpad.core.signals import INTERVAL, SpikeTrains
-from fingerpad.core.values import converted
+from fingerpad.core.values import FiniteArray, FiniteVector, Many, float_array
 from fingerpad.neuron.spikes import RATE_OF, Windows
 
 PHASES = ("dynamic", "static")  # The ramp and the hold.
@@ -21,9 +19,8 @@ ROUNDING_MS = 1e-6
 """By how much the duration of a recording may fall short: files count seconds from their start. [ms]"""
 
 
-@dataclass(frozen=True)
-@converted
-class RateRecordings(metaclass=KnownKeywords):
+@value_class
+class RateRecordings:
     """Firing rates of one afferent, one row per stimulus.
 
     Parameters
@@ -42,13 +39,12 @@ class RateRecordings(metaclass=KnownKeywords):
     [212.0]
     """
 
-    stimuli: tuple[str, ...]
-    dynamic_rate_hz: FloatArray | None
-    static_rate_hz: FloatArray | None
+    stimuli: Many[str]
+    dynamic_rate_hz: FiniteVector | None
+    static_rate_hz: FiniteVector | None
     source: str = ""
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "stimuli", tuple(self.stimuli))
         twice = sorted(name for name, count in Counter(self.stimuli).items() if count > 1)
         if twice:
             raise InputError(
@@ -60,14 +56,13 @@ class RateRecordings(metaclass=KnownKeywords):
             raise InputError("RateRecordings needs dynamic_rate_hz, static_rate_hz or both: got neither.")
         for phase in self.phases:
             name = f"{phase}_rate_hz"
-            rates = float_array(name, getattr(self, name), 1)
+            rates = getattr(self, name)
             if rates.size != len(self.stimuli):
                 raise InputError(name, "needs one rate per stimulus", f"{rates.size} for {len(self.stimuli)}")
             if (rates < 0.0).any():
                 raise InputError(
                     name, "must not be negative", remedy=f"the smallest is {rates.min():g} spikes/s"
                 )
-            object.__setattr__(self, name, rates)
 
     @property
     def phases(self) -> tuple[str, ...]:
@@ -90,9 +85,8 @@ class RateRecordings(metaclass=KnownKeywords):
         )
 
 
-@dataclass(frozen=True)
-@converted
-class SpikeRecordings(metaclass=KnownKeywords):
+@value_class
+class SpikeRecordings:
     """Spike trains of one afferent, one per presentation of a stimulus.
 
     Parameters
@@ -115,20 +109,18 @@ class SpikeRecordings(metaclass=KnownKeywords):
     (('edge', 'flat'), [61.9, 0.0])
     """
 
-    stimuli: tuple[str, ...]
+    stimuli: Many[str]
     trains: SpikeTrains
-    duration_ms: FloatArray
+    duration_ms: FiniteArray
     source: str = ""
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "stimuli", tuple(self.stimuli))
-        instance("trains", self.trains, SpikeTrains)
         if len(self.trains) != len(self.stimuli):
             raise InputError(
                 "trains", "needs one train per presentation", f"{len(self.trains)} for {len(self.stimuli)}"
             )
-        duration = float_array("duration_ms", np.atleast_1d(self.duration_ms), 1)
-        if duration.size not in (1, len(self.stimuli)) or (duration <= 0.0).any():
+        duration = np.atleast_1d(self.duration_ms)
+        if duration.ndim > 1 or duration.size not in (1, len(self.stimuli)) or (duration <= 0.0).any():
             raise InputError(
                 "duration_ms",
                 f"must be above 0, one for all or for each of {len(self.stimuli)} presentations",

@@ -12,12 +12,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from fingerpad.core.checks import FloatArray, whole
+from fingerpad.core.checked import checked, value_class
 from fingerpad.core.displayed import Result
 from fingerpad.core.errors import ConvergenceError, InputError
-from fingerpad.core.keywords import known_keywords
 from fingerpad.core.random_streams import Presentations
 from fingerpad.core.signals import SpikeTrains, Traces
+from fingerpad.core.values import Count, Finite, FloatArray, Numbers, Whole
 from fingerpad.inference.identifiable import (
     N_PARAMETERS,
     SPIKE_PARAMETER_NAMES,
@@ -41,7 +41,7 @@ _FIRST_DAMPING, _MOST_DAMPING = 1.0e-3, 1.0e12
 _LONGEST_STEP_OF_LOG_TAU = 1.0
 
 
-@dataclass(frozen=True)
+@value_class
 class SpikeFit(Result):
     """Maximum-likelihood parameters and their covariance.
 
@@ -61,9 +61,9 @@ class SpikeFit(Result):
 
     parameters: FloatArray
     covariance: FloatArray
-    log_likelihood: float
-    n_spikes: int
-    history: tuple[float, ...]
+    log_likelihood: Finite
+    n_spikes: Whole
+    history: Numbers
 
     def __repr__(self) -> str:
         (memory_ms, width), (memory_error, width_error) = self.parameters[3:], self.standard_errors[3:]
@@ -83,8 +83,8 @@ class SpikeFit(Result):
         return np.sqrt(np.diag(self.covariance))
 
 
-@known_keywords
-def fit_spikes(recorded: SpikeLikelihood, start: ArrayLike, most_steps: int = 100) -> SpikeFit:
+@checked
+def fit_spikes(recorded: SpikeLikelihood, start: ArrayLike, most_steps: Count = 100) -> SpikeFit:
     """Fit parameters to recorded spikes by maximum likelihood.
 
     Parameters
@@ -106,7 +106,6 @@ def fit_spikes(recorded: SpikeLikelihood, start: ArrayLike, most_steps: int = 10
     --------
     `tests/test_estimation_spikes.py` recovers an afferent from its own spikes.
     """
-    whole("most_steps", most_steps, 1)
     if recorded.n_spikes < N_PARAMETERS:
         raise InputError(
             f"a fit of {N_PARAMETERS} parameters needs at least as many spikes: got {recorded.n_spikes}."

@@ -28,11 +28,11 @@ from numba import njit
 from numpy.typing import ArrayLike
 from scipy.stats import kstest
 
-from fingerpad.core.checks import FloatArray, float_array, instance, positive
+from fingerpad.core.checked import checked
 from fingerpad.core.errors import InputError
-from fingerpad.core.keywords import known_keywords
 from fingerpad.core.signals import SpikeTrains
 from fingerpad.core.threads import in_blocks
+from fingerpad.core.values import FloatArray, float_array, instance, positive
 from fingerpad.data import neuron
 from fingerpad.inference.identifiable import (
     N_PARAMETERS,
@@ -336,7 +336,7 @@ class TimeRescaling:
     """Probability of a larger distance under the true parameters; for fitted ones it is too large."""
 
 
-@known_keywords
+@checked
 def time_rescaling(recorded: SpikeLikelihood, parameters: ArrayLike) -> TimeRescaling:
     """Test a model on spike trains.
 

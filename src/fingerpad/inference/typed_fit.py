@@ -9,10 +9,10 @@ from typing import Any, cast
 import numpy as np
 from numpy.typing import ArrayLike
 
-from fingerpad.core.checks import FloatArray, one_of, positive
+from fingerpad.core.checked import checked
 from fingerpad.core.errors import InputError
-from fingerpad.core.keywords import known_keywords
 from fingerpad.core.signals import INTERVAL, Traces
+from fingerpad.core.values import FloatArray, one_of, positive
 from fingerpad.data import protocol
 from fingerpad.inference.fitting.cross_validation import cross_validate, interleaved_folds
 from fingerpad.inference.fitting.least_squares import LeastSquares
@@ -84,7 +84,7 @@ def _largest_factor(afferent: AnyAfferent, name: str) -> float:
     return LARGEST_FACTOR
 
 
-@known_keywords
+@checked
 def fit_afferent(
     afferent: AnyAfferent,
     free: Sequence[str],

@@ -10,10 +10,10 @@ from typing import cast
 import numpy as np
 from threadpoolctl import ThreadpoolController
 
-from fingerpad.core.checks import FloatArray
+from fingerpad.core.checked import checked
 from fingerpad.core.errors import InputError
-from fingerpad.core.keywords import known_keywords
 from fingerpad.core.signals import STORED_ENERGY, ResponseMap, Traces
+from fingerpad.core.values import FloatArray, Whole
 from fingerpad.data import psychophysics
 from fingerpad.experiments.descriptions.reduction import DescribedReduction
 from fingerpad.geometry.fingertip import Fingertip
@@ -238,8 +238,8 @@ class Comparison:
     spikes. [0-1]"""
 
 
-@known_keywords
-def compared(one: Answer, other: Answer, seed: int = 1) -> Comparison:
+@checked
+def compared(one: Answer, other: Answer, seed: Whole = 1) -> Comparison:
     """Compare two touches by the spikes that each afferent fires.
 
     Numbers of spikes have the multiplicative noise of the paper and a further spread of one spike.

@@ -17,12 +17,13 @@ from typing import Any
 
 import numpy as np
 
+from fingerpad.core.checked import checked_class
 from fingerpad.core.engine import Engine
 from fingerpad.core.errors import InputError
 from fingerpad.core.files import path_of, read_text
-from fingerpad.core.keywords import KnownKeywords
 from fingerpad.core.plain_yaml import read_yaml
 from fingerpad.core.progress import Progress
+from fingerpad.core.values import Flag, Whole
 from fingerpad.experiments.descriptions.reduction import (
     DescribedReduction,
     described_reduction,
@@ -48,7 +49,8 @@ class Making:
     total: int = 0  # Finished presses, and all of them; 0 before that is known.
 
 
-class Laboratory(metaclass=KnownKeywords):
+@checked_class
+class Laboratory:
     """Objects to press, and what was made of them so far.
 
     Parameters
@@ -61,7 +63,7 @@ class Laboratory(metaclass=KnownKeywords):
         Processes that press.
     """
 
-    def __init__(self, folder: str | Path, ranges: Sequence[Path] = (), jobs: int | Engine = 1):
+    def __init__(self, folder: str | Path, ranges: Sequence[Path] = (), jobs: Whole | Engine = 1):
         self.folder, self._engine = path_of("folder", folder), jobs
         self._contents = {path.stem: read_yaml(read_text(path), str(path)) for path in ranges or shipped()}
         self._files = {path.stem: path for path in ranges or shipped()}
@@ -125,7 +127,7 @@ class Laboratory(metaclass=KnownKeywords):
                 self._models[path] = read_reduced(path, self.described(state).training.touch)
             return self._models.get(path)
 
-    def make(self, state: LabState, with_error: bool = False, told: Progress | None = None) -> ReducedModel:
+    def make(self, state: LabState, with_error: Flag = False, told: Progress | None = None) -> ReducedModel:
         """Make the reduced touch of a state, without its error or with it.
 
         Raises
@@ -150,7 +152,7 @@ class Laboratory(metaclass=KnownKeywords):
         wanted = self.described(state).description.calibration > 0
         return not wanted or (model is not None and bool(np.isfinite(model.error).all()))
 
-    def answer(self, state: LabState, exact: bool = False, told: Progress | None = None) -> Answer:
+    def answer(self, state: LabState, exact: Flag = False, told: Progress | None = None) -> Answer:
         """Answer a state, and make its reduced touch before that if there is none.
 
         Parameters
@@ -186,7 +188,7 @@ class Laboratory(metaclass=KnownKeywords):
                 self._answers.popitem(last=False)
         return answer
 
-    def poll(self, state: LabState, exact: bool = False) -> Answer | Making:
+    def poll(self, state: LabState, exact: Flag = False) -> Answer | Making:
         """Answer at once: what needs a press goes on in the background, and the answer is how far it is.
 
         Until there is a reduced touch, the full solution of the same touch is the answer.

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from fingerpad.core.checks import FloatArray
+from fingerpad.core.values import FloatArray
 from fingerpad.lab.answer import (
     COLUMNS,
     ROWS,

@@ -14,9 +14,9 @@ import numpy as np
 from numba import njit
 from scipy import sparse
 
-from fingerpad.core.checks import FloatArray
 from fingerpad.core.numba_internals import small_array
 from fingerpad.core.threads import Chunk, even_chunks, in_chunks
+from fingerpad.core.values import FloatArray
 from fingerpad.geometry.mesh import Mesh
 from fingerpad.mechanics.element import N_COLUMNS, N_NODES, add_tangent, element_system, take_nodes
 from fingerpad.mechanics.materials import has_formulas

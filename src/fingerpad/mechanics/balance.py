@@ -24,9 +24,9 @@ import numpy as np
 from numba import njit
 from scipy.interpolate import CubicSpline
 
-from fingerpad.core.checks import FloatArray
 from fingerpad.core.numba_internals import small_array
 from fingerpad.core.threads import run_kernel
+from fingerpad.core.values import FloatArray
 from fingerpad.geometry.mesh import Mesh
 from fingerpad.mechanics.element import N_NODES, N_POINTS, strain_changes, take_nodes
 from fingerpad.mechanics.materials import MaterialTable

@@ -30,8 +30,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from fingerpad.core.checks import FloatArray
 from fingerpad.core.numba_internals import small_single_array
+from fingerpad.core.values import FloatArray
 
 SingleArray = NDArray[np.float32]
 

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fingerpad.core.checks import FloatArray
+from fingerpad.core.values import FloatArray
 from fingerpad.geometry.mesh import Mesh
 from fingerpad.mechanics.assembly import Sparsity, assemble
 from fingerpad.mechanics.contact import Contact, ContactState

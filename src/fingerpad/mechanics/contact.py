@@ -25,9 +25,9 @@ from functools import cached_property
 
 import numpy as np
 
-from fingerpad.core.checks import FloatArray, IntArray, not_negative
 from fingerpad.core.errors import InputError
 from fingerpad.core.units import cosine_and_sine
+from fingerpad.core.values import FloatArray, IntArray, not_negative
 from fingerpad.geometry.indenters import Indenter
 from fingerpad.geometry.mesh import Mesh
 from fingerpad.geometry.motion import STILL, Pose

@@ -24,8 +24,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from fingerpad.core.checks import FloatArray
 from fingerpad.core.errors import ConvergenceError
+from fingerpad.core.values import FloatArray
 from fingerpad.mechanics.materials import MaterialTable
 from fingerpad.mechanics.steps import Step, Stop, change_of_length, interpolation_error, steps_at
 from fingerpad.mechanics.viscoelastic import StressHistory

@@ -27,8 +27,8 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from fingerpad.core.checks import FloatArray
 from fingerpad.core.numba_internals import small_array
+from fingerpad.core.values import FloatArray
 from fingerpad.mechanics.energy import CARRIED, SECOND, differentiate
 from fingerpad.mechanics.materials import COUPLED, N_COEFFICIENTS, POLYNOMIAL
 from fingerpad.mechanics.tensors import (

@@ -28,8 +28,8 @@ from collections.abc import Callable, Mapping
 import numpy as np
 from numba import njit
 
-from fingerpad.core.checks import FloatArray, finite
 from fingerpad.core.errors import InputError, shown
+from fingerpad.core.values import FloatArray, finite
 
 VARIABLES = (
     "lambdabar1", "lambdabar2", "lambdabar3", "lambda1", "lambda2", "lambda3", "J", "I1", "I2",

@@ -11,8 +11,8 @@ import numpy as np
 from scipy import sparse
 from scipy.sparse.linalg import splu
 
-from fingerpad.core.checks import FloatArray
 from fingerpad.core.errors import ConvergenceError
+from fingerpad.core.values import FloatArray
 
 
 class NotPositiveDefiniteError(ConvergenceError):

@@ -24,7 +24,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from fingerpad.core.checks import FloatArray
+from fingerpad.core.values import FloatArray
 
 LEAST_SECANT = 1e-6  # Size below which a combination of secants counts as none, over that of the largest.
 

@@ -22,9 +22,9 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike
 
-from fingerpad.core.checks import FloatArray, float_array
 from fingerpad.core.errors import InertiaWarning, level_of_caller
 from fingerpad.core.units import MS_PER_S
+from fingerpad.core.values import FloatArray, float_array
 from fingerpad.data.tissues import DENSITY
 from fingerpad.geometry.motion import Motion
 from fingerpad.mechanics.materials import Material

@@ -17,19 +17,19 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import fields, replace
 from functools import cached_property
-from typing import Protocol, Self
+from typing import Protocol, Self, runtime_checkable
 
 import numpy as np
 
-from fingerpad.core.checks import FloatArray, finite, not_negative, positive
+from fingerpad.core.checked import value_class
 from fingerpad.core.errors import InputError, shown
-from fingerpad.core.keywords import KnownKeywords
-from fingerpad.core.values import converted
+from fingerpad.core.values import Finite, FloatArray, Numbers, Positive, finite, not_negative, positive
 from fingerpad.mechanics.energy import CARRIED, SECOND, differentiate, translate
 
 
+@runtime_checkable
 class Law(Protocol):
     """An isotropic strain energy."""
 
@@ -51,9 +51,8 @@ class Law(Protocol):
     def scaled(self, factor: float) -> Law: ...
 
 
-@dataclass(frozen=True)
-@converted
-class Energy(metaclass=KnownKeywords):
+@value_class
+class Energy:
     """A law of your own: its energy as a formula in the principal stretches or invariants.
 
     A formula without a term that mixes J with a change of shape keeps its pressure while it relaxes; of any
@@ -118,7 +117,7 @@ class Energy(metaclass=KnownKeywords):
         """The law itself."""
         return self
 
-    def scaled(self, factor: float) -> Energy:
+    def scaled(self, factor: Finite) -> Energy:
         """Return the same law with its energy times a factor."""
         return Energy(f"{factor!r} * ({self.formula})", self.coefficients)
 
@@ -159,11 +158,11 @@ _PROBES = np.array([[0.3, -0.1, -0.2, 0.1], [-0.4, 0.25, 0.15, -0.2], [0.05, 0.1
 """Deformations at which a formula is looked at: ln lambdabar_1 ... 3 and ln J."""
 
 
-@dataclass(frozen=True)
-class _OfModuli(metaclass=KnownKeywords):
+@value_class
+class _OfModuli:
     """Common part of laws whose energy is proportional to their coefficients in kPa."""
 
-    def scaled(self, factor: float) -> Self:
+    def scaled(self, factor: Finite) -> Self:
         """Return the same law with its energy times a factor."""
         moduli = {
             item.name: getattr(self, item.name)
@@ -179,8 +178,7 @@ class _OfModuli(metaclass=KnownKeywords):
         )
 
 
-@dataclass(frozen=True)
-@converted
+@value_class
 class Polynomial(_OfModuli):
     """Polynomial N = 2 in the isochoric invariants; neo-Hooke and Mooney-Rivlin among them.
 
@@ -197,13 +195,13 @@ class Polynomial(_OfModuli):
     10.0
     """
 
-    c10: float
-    c01: float = 0.0
-    c20: float = 0.0
-    c11: float = 0.0
-    c02: float = 0.0
-    bulk_linear: float = 0.0
-    bulk_cubic: float = 0.0
+    c10: Finite
+    c01: Finite = 0.0
+    c20: Finite = 0.0
+    c11: Finite = 0.0
+    c02: Finite = 0.0
+    bulk_linear: Finite = 0.0
+    bulk_cubic: Finite = 0.0
 
     def __post_init__(self) -> None:
         for name in ("c10", "c01", "c20", "c11", "c02"):
@@ -233,13 +231,12 @@ class Polynomial(_OfModuli):
         )
 
 
-@dataclass(frozen=True)
-@converted
+@value_class
 class _Powers(_OfModuli):
     """Common part of laws that are a sum of up to three powers of stretches."""
 
-    moduli_kpa: tuple[float, ...]
-    exponents: tuple[float, ...]
+    moduli_kpa: Numbers
+    exponents: Numbers
 
     def __post_init__(self) -> None:
         name, moduli, exponents = type(self).__name__, tuple(self.moduli_kpa), tuple(self.exponents)
@@ -271,8 +268,7 @@ class _Powers(_OfModuli):
         return Energy(" + ".join((*terms, *others)), (*named, *coefficients.items()))
 
 
-@dataclass(frozen=True)
-@converted
+@value_class
 class Ogden(_Powers):
     """Sum of up to three powers of the isochoric stretches.
 
@@ -291,11 +287,10 @@ class Ogden(_Powers):
     10.0
     """
 
-    bulk_kpa: float
+    bulk_kpa: Positive
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        positive("bulk_kpa", self.bulk_kpa, "kPa")
 
     @property
     def bulk_modulus_kpa(self) -> float:
@@ -309,8 +304,7 @@ class Ogden(_Powers):
         return self._sum_of(term, "bulk / 2 * (J - 1)**2", bulk=float(self.bulk_kpa))
 
 
-@dataclass(frozen=True)
-@converted
+@value_class
 class Hyperfoam(_Powers):
     """Storakers' compressible foam (1986), with one Poisson's ratio for all terms: the form of Wu's tissues.
 
@@ -330,7 +324,7 @@ class Hyperfoam(_Powers):
     14.0
     """
 
-    poisson: float
+    poisson: Finite
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -350,8 +344,7 @@ class Hyperfoam(_Powers):
         )
 
 
-@dataclass(frozen=True)
-@converted
+@value_class
 class Hencky(_OfModuli):
     """Quadratic in the logarithmic strain: Hooke's law between Kirchhoff stress and logarithmic strain.
 
@@ -366,12 +359,8 @@ class Hencky(_OfModuli):
     False
     """
 
-    shear_kpa: float
-    bulk_kpa: float
-
-    def __post_init__(self) -> None:
-        positive("shear_kpa", self.shear_kpa, "kPa")
-        positive("bulk_kpa", self.bulk_kpa, "kPa")
+    shear_kpa: Positive
+    bulk_kpa: Positive
 
     @property
     def shear_modulus_kpa(self) -> float:

@@ -13,14 +13,14 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Any, Protocol
+from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 from scipy import sparse
 from scipy.sparse.linalg import LinearOperator, cg
 
-from fingerpad.core.checks import FloatArray
 from fingerpad.core.errors import ConvergenceError, InputError
+from fingerpad.core.values import FloatArray
 from fingerpad.geometry.mesh import Mesh
 from fingerpad.mechanics.assembly import Sparsity
 from fingerpad.mechanics.columns import MOST_LANES
@@ -40,6 +40,7 @@ DIRECT_NODES = 20_000  # Largest mesh for a factor, which then takes about 1 GB 
 NO_NODES = np.empty(0, dtype=np.int64)
 
 
+@runtime_checkable
 class Preconditioner(Protocol):
     """The tangent on the free degrees of freedom, and an approximate inverse of it."""
 

@@ -6,14 +6,24 @@ import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, fields, replace
 from functools import lru_cache
+from typing import Annotated
 
 import numpy as np
 from scipy.optimize import brentq
 
-from fingerpad.core.checks import FloatArray, finite, float_array, instance, not_negative, one_of, positive
+from fingerpad.core.checked import value_class
 from fingerpad.core.errors import InputError, MaterialWarning, shown
-from fingerpad.core.keywords import KnownKeywords
-from fingerpad.core.values import converted
+from fingerpad.core.values import (
+    Finite,
+    FloatArray,
+    Numbers,
+    choice,
+    finite,
+    float_array,
+    not_negative,
+    one_of,
+    positive,
+)
 from fingerpad.mechanics.energy import SECOND
 from fingerpad.mechanics.laws import (
     Energy,
@@ -41,9 +51,8 @@ def has_formulas(law: FloatArray) -> bool | None:
     return True if law.shape[1] > N_COEFFICIENTS else None
 
 
-@dataclass(frozen=True)
-@converted
-class Prony(metaclass=KnownKeywords):
+@value_class
+class Prony:
     """Relaxation of the deviatoric stress: g(t) = 1 - sum g_i (1 - exp(-t / tau_i)).
 
     Parameters
@@ -59,8 +68,8 @@ class Prony(metaclass=KnownKeywords):
     0.6
     """
 
-    shares: tuple[float, ...] = ()
-    times_ms: tuple[float, ...] = ()
+    shares: Numbers = ()
+    times_ms: Numbers = ()
 
     def __post_init__(self) -> None:
         if len(self.shares) != len(self.times_ms):
@@ -80,9 +89,8 @@ class Prony(metaclass=KnownKeywords):
         return 1.0 - sum(self.shares)
 
 
-@dataclass(frozen=True)
-@converted
-class Material(metaclass=KnownKeywords):
+@value_class
+class Material:
     """A tissue: a strain energy and how its stress relaxes.
 
     Parameters
@@ -111,20 +119,18 @@ class Material(metaclass=KnownKeywords):
 
     law: Law
     prony: Prony = field(default_factory=Prony)
-    moduli: str = "long_term"
+    moduli: Annotated[str, choice(("long_term", "instantaneous"))] = "long_term"
 
     def __post_init__(self) -> None:
         if not isinstance(self.law, Polynomial | Ogden | Hyperfoam | Hencky | Energy):
             raise InputError("law", "must be Polynomial, Ogden, Hyperfoam, Hencky or Energy", shown(self.law))
-        instance("prony", self.prony, Prony)
-        one_of("moduli", self.moduli, ("long_term", "instantaneous"))
         unstable = instability(self.law)
         if unstable:
             warnings.warn(MaterialWarning(f"{self.law} is unstable {unstable}."), stacklevel=3)
 
     @classmethod
     def neo_hooke(
-        cls, shear_kpa: float, poisson: float, prony: Prony = Prony(), moduli: str = "long_term"
+        cls, shear_kpa: Finite, poisson: Finite, prony: Prony = Prony(), moduli: str = "long_term"
     ) -> Material:
         """Neo-Hooke from shear modulus and Poisson's ratio. [kPa]"""
         shear = positive("shear_kpa", shear_kpa, "kPa")
@@ -134,8 +140,8 @@ class Material(metaclass=KnownKeywords):
     @classmethod
     def linear_elastic(
         cls,
-        young_kpa: float,
-        poisson: float,
+        young_kpa: Finite,
+        poisson: Finite,
         prony: Prony = Prony(),
         moduli: str = "long_term",
         law: str = "neo_hooke",
@@ -149,12 +155,12 @@ class Material(metaclass=KnownKeywords):
     @classmethod
     def polynomial(
         cls,
-        c10: float,
-        c01: float,
-        c20: float,
-        c11: float,
-        c02: float,
-        poisson: float,
+        c10: Finite,
+        c01: Finite,
+        c20: Finite,
+        c11: Finite,
+        c02: Finite,
+        poisson: Finite,
         prony: Prony = Prony(),
         moduli: str = "long_term",
     ) -> Material:
@@ -168,7 +174,7 @@ class Material(metaclass=KnownKeywords):
         cls,
         moduli_kpa: Sequence[float],
         exponents: Sequence[float],
-        poisson: float,
+        poisson: Finite,
         prony: Prony = Prony(),
         moduli: str = "long_term",
     ) -> Material:
@@ -182,7 +188,7 @@ class Material(metaclass=KnownKeywords):
         cls,
         moduli_kpa: Sequence[float],
         exponents: Sequence[float],
-        poisson: float,
+        poisson: Finite,
         prony: Prony = Prony(),
         moduli: str = "long_term",
     ) -> Material:
@@ -222,7 +228,7 @@ class Material(metaclass=KnownKeywords):
         """Factor from the given coefficients to the instantaneous ones."""
         return 1.0 / self.prony.long_term_share if self.moduli == "long_term" else 1.0
 
-    def scaled(self, factor: float) -> Material:
+    def scaled(self, factor: Finite) -> Material:
         """Return the same tissue with all moduli times a factor."""
         return replace(self, law=self.law.scaled(positive("factor", factor)))
 
@@ -231,9 +237,8 @@ class Material(metaclass=KnownKeywords):
         return replace(self, prony=prony)
 
 
-@dataclass(frozen=True)
-@converted
-class Tissues(metaclass=KnownKeywords):
+@value_class
+class Tissues:
     """The four layers of the fingertip from the outside in.
 
     Parameters
@@ -252,7 +257,7 @@ class Tissues(metaclass=KnownKeywords):
         """Materials in the order of `mesh.LAYERS`."""
         return tuple(getattr(self, field.name) for field in fields(self))
 
-    def scaled(self, factor: float) -> Tissues:
+    def scaled(self, factor: Finite) -> Tissues:
         """Return the same tissues, stiffer or softer: all moduli times a factor.
 
         Parameters

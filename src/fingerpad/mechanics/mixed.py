@@ -24,9 +24,9 @@ from dataclasses import dataclass
 import numpy as np
 from numba import njit
 
-from fingerpad.core.checks import FloatArray
 from fingerpad.core.numba_internals import small_array
 from fingerpad.core.threads import in_chunks, run_kernel
+from fingerpad.core.values import FloatArray
 from fingerpad.geometry.mesh import Mesh
 from fingerpad.mechanics.assembly import Sparsity
 from fingerpad.mechanics.element import BY_NODE, N_NODES, N_POINTS, deformation_at_points, summed, take_nodes

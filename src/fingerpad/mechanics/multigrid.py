@@ -22,8 +22,8 @@ from typing import Any
 import numpy as np
 from numba import njit
 
-from fingerpad.core.checks import FloatArray
 from fingerpad.core.threads import Chunk, current_threads, in_chunks
+from fingerpad.core.values import FloatArray
 from fingerpad.mechanics.assembly import Sparsity
 from fingerpad.mechanics.columns import (
     ColumnGraph,

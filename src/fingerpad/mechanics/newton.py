@@ -21,9 +21,9 @@ from functools import partial
 
 import numpy as np
 
-from fingerpad.core.checks import FloatArray, positive, whole
+from fingerpad.core.checked import value_class
 from fingerpad.core.errors import ConvergenceError
-from fingerpad.core.values import converted
+from fingerpad.core.values import Count, Finite, Flag, FloatArray, Positive
 from fingerpad.geometry.mesh_checks import element_place, squeezed_most
 from fingerpad.mechanics.configuration import Balance, Body, Configuration, Lagging, Load, evaluate
 from fingerpad.mechanics.contact import ContactState
@@ -86,29 +86,22 @@ FIRST_DEPTH_MM, MOST_ADVANCE = 0.01, 4.0
 """Where the search for the depth of a force begins, and the factor by which one step may change it. [mm]"""
 
 
-@dataclass(frozen=True)
-@converted
+@value_class
 class NewtonSettings:
     """When an equilibrium counts as found."""
 
-    residual_tolerance: float = 1e-5  # Norm of the out-of-balance nodal forces over the contact force.
-    penetration_tolerance: float = 5e-3
+    residual_tolerance: Positive = 1e-5  # Norm of the out-of-balance nodal forces over the contact force.
+    penetration_tolerance: Positive = 5e-3
     """Largest distance of pressed skin to the indenter, over the depth: contact is augmented until then."""
-    most_iterations: int = 40  # Newton steps before the attempt is given up.
-    balance_tolerance: float = 1e-4
+    most_iterations: Count = 40  # Newton steps before the attempt is given up.
+    balance_tolerance: Positive = 1e-4
     """Difference between the force of the indenter and the reaction of the supports, over that force. A small
     residual does not imply it: many small nodal forces of one sign add up."""
-    persistent: bool = False
+    persistent: Flag = False
     """Whether the search goes on through an indefinite tangent and insists on a falling potential, as skin
     about a small body or a sharp edge needs. Elsewhere a shorter step in time is the faster remedy."""
-    least_penetration_mm: float = 0.0
+    least_penetration_mm: Finite = 0.0
     """Penetration accepted at any depth after two augmentations: about a small body. [mm]"""
-
-    def __post_init__(self) -> None:
-        positive("residual_tolerance", self.residual_tolerance)
-        positive("balance_tolerance", self.balance_tolerance)
-        positive("penetration_tolerance", self.penetration_tolerance)
-        whole("most_iterations", self.most_iterations, at_least=1)
 
 
 @dataclass(frozen=True)

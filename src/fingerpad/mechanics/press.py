@@ -9,9 +9,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.optimize import brentq
 
-from fingerpad.core.checks import FloatArray
 from fingerpad.core.errors import ConvergenceError, InputError
 from fingerpad.core.progress import share_done
+from fingerpad.core.values import FloatArray
 from fingerpad.geometry.indenters import Indenter
 from fingerpad.geometry.mesh import Mesh
 from fingerpad.geometry.mesh_checks import check_mesh, element_place, squeezed_most

@@ -7,14 +7,13 @@ good for is measured in docs/decisions/small-bodies.md.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 
 import numpy as np
 
-from fingerpad.core.checks import FloatArray, float_array, increasing, positive, whole
+from fingerpad.core.checked import value_class
 from fingerpad.core.errors import InputError
-from fingerpad.core.keywords import KnownKeywords
-from fingerpad.core.values import converted
+from fingerpad.core.values import Count, Finite, FloatArray, Numbers, float_array, increasing, positive
 from fingerpad.geometry.indenter_grading import SHARPEST_MM
 from fingerpad.geometry.indenters import Indenter
 from fingerpad.geometry.mesh import Mesh
@@ -102,9 +101,8 @@ faster, and what augmentation leaves open differs from step to step."""
 SAME_TIME = 1e-9  # Times closer than this, over the end of the motion, are one.
 
 
-@dataclass(frozen=True)
-@converted
-class PressSettings(metaclass=KnownKeywords):
+@value_class
+class PressSettings:
     """Steps in time and tolerances of a press.
 
     Parameters
@@ -125,20 +123,18 @@ class PressSettings(metaclass=KnownKeywords):
         SED, at the same places. None solves all of them, as do friction and `sed_tolerance`.
     """
 
-    ramp_steps: int = 8
-    hold_steps: int = 8
+    ramp_steps: Count = 8
+    hold_steps: Count = 8
     newton: NewtonSettings = field(default_factory=NewtonSettings)
-    sed_tolerance: float | None = None
-    times_ms: tuple[float, ...] = ()
-    cycle_tolerance: float | None = 0.01
+    sed_tolerance: Finite | None = None
+    times_ms: Numbers = ()
+    cycle_tolerance: Finite | None = 0.01
 
     def __post_init__(self) -> None:
         wanted = increasing("times_ms", float_array("times_ms", self.times_ms, 1))
         if wanted.size and wanted[0] <= 0.0:
             raise InputError("times_ms", "must lie above 0, which is solved anyway", f"{wanted[0]:g}")
         object.__setattr__(self, "times_ms", tuple(wanted.tolist()))
-        whole("ramp_steps", self.ramp_steps, at_least=1)
-        whole("hold_steps", self.hold_steps, at_least=1)
         for name in ("sed_tolerance", "cycle_tolerance"):
             tolerance = getattr(self, name)
             if tolerance is not None and positive(name, tolerance) >= 1.0:
@@ -164,7 +160,7 @@ class PressSettings(metaclass=KnownKeywords):
         apart = np.abs(wanted[:, None] - times_ms).min(axis=1) > SAME_TIME * motion.end_ms
         return np.union1d(times_ms, wanted[apart])
 
-    def newton_about(self, finest_mm: float) -> NewtonSettings:
+    def newton_about(self, finest_mm: Finite) -> NewtonSettings:
         """Tolerances of each step, tight enough for the bound on SED, and those of a small body about one.
 
         Parameters

@@ -17,12 +17,12 @@ from __future__ import annotations
 import logging
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from typing import Protocol, TypeVar
+from typing import Protocol, TypeVar, runtime_checkable
 
 import numpy as np
 
-from fingerpad.core.checks import FloatArray
 from fingerpad.core.errors import ConvergenceError
+from fingerpad.core.values import FloatArray
 
 LOGGER = logging.getLogger(__name__)
 
@@ -38,6 +38,7 @@ SAFETY, SHORTEN, LENGTHEN = 0.85, 0.25, 2.0
 """Aim below the tolerance, and bounds on how much one step's length may differ from the last one's."""
 
 
+@runtime_checkable
 class Moment(Protocol):
     """A solved time; the next step starts from it and leaves it as it is."""
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from fingerpad.core.checks import one_of
-from fingerpad.core.keywords import known_keywords
+from fingerpad.core.checked import checked
 from fingerpad.core.units import MS_PER_S
+from fingerpad.core.values import one_of
 from fingerpad.data import tissues as published
 from fingerpad.data.published import Published
 from fingerpad.mechanics.materials import Material, Prony, Tissues
@@ -129,7 +129,7 @@ TISSUES: dict[str, Callable[[], Tissues]] = {
 }
 
 
-@known_keywords
+@checked
 def named_tissues(name: str) -> Tissues:
     """Tissues by name.
 

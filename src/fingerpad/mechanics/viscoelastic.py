@@ -18,9 +18,9 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-from fingerpad.core.checks import FloatArray
 from fingerpad.core.numba_internals import small_array
 from fingerpad.core.threads import run_kernel
+from fingerpad.core.values import FloatArray
 from fingerpad.geometry.mesh import Mesh
 from fingerpad.mechanics.element import N_NODES, N_POINTS, element_state, relaxing_norms, take_nodes
 from fingerpad.mechanics.materials import MaterialTable, has_formulas

@@ -3,19 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
-from typing import ClassVar, Protocol
+from dataclasses import replace
+from typing import ClassVar, Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from fingerpad.core.checks import FloatArray, float_array, not_negative, one_of
+from fingerpad.core.checked import value_class
 from fingerpad.core.errors import InputError, shown
-from fingerpad.core.keywords import KnownKeywords
 from fingerpad.core.signals import INTERVAL, STORED_ENERGY, SpikeTrains, Traces
 from fingerpad.core.threads import in_blocks
 from fingerpad.core.units import SKIN_QUANTITY_UNITS, gain_unit, units_of
-from fingerpad.core.values import converted
+from fingerpad.core.values import Finite, FloatArray, float_array, not_negative, one_of
 from fingerpad.data import neuron
 from fingerpad.neuron.lif import LeakyIntegrateAndFire
 from fingerpad.neuron.spikes import Window, firing_rate_hz, rate_windows_ms
@@ -37,6 +36,7 @@ _SITES_PER_BLOCK = 256
 _SURELY_SILENT = 1.0 - 1e-9  # Share of the rheobase below which round-off cannot elicit a spike.
 
 
+@runtime_checkable
 class Follows(Protocol):
     """Anything that has two terms, each with the quantity of the skin that it follows or holds."""
 
@@ -100,9 +100,8 @@ def check_known_quantities(afferent: Follows) -> None:
 _NEEDED = ("dynamic_quantity", "static_quantity", "spikes")
 
 
-@dataclass(frozen=True)
-@converted
-class Afferent(metaclass=KnownKeywords):
+@value_class
+class Afferent:
     """A slowly adapting type I (SAI) afferent.
 
     The defaults are the fit with the default tissues, `human`, to the recordings under the shifted bar and to
@@ -145,16 +144,16 @@ class Afferent(metaclass=KnownKeywords):
 
     rate_measure: ClassVar[str] = INTERVAL  # What its rates are, as of `ResponseMap`: those of Eqs. 6-10.
 
-    intercept_ma: float = neuron.HUMAN_INTERCEPT.value
-    dynamic_gain: float = neuron.HUMAN_DYNAMIC_GAIN.value
-    static_gain: float = neuron.HUMAN_STATIC_GAIN.value
-    time_constant_ms: float = neuron.HUMAN_TIME_CONSTANT.value
-    capacitance_mf: float = neuron.CAPACITANCE.value
-    threshold_mv: float = neuron.THRESHOLD.value
-    refractory_ms: float = neuron.REFRACTORY.value
+    intercept_ma: Finite = neuron.HUMAN_INTERCEPT.value
+    dynamic_gain: Finite = neuron.HUMAN_DYNAMIC_GAIN.value
+    static_gain: Finite = neuron.HUMAN_STATIC_GAIN.value
+    time_constant_ms: Finite = neuron.HUMAN_TIME_CONSTANT.value
+    capacitance_mf: Finite = neuron.CAPACITANCE.value
+    threshold_mv: Finite = neuron.THRESHOLD.value
+    refractory_ms: Finite = neuron.REFRACTORY.value
     dynamic_quantity: str = neuron.HUMAN_QUANTITY
     static_quantity: str = neuron.HUMAN_QUANTITY
-    initial_mv: float | None = None
+    initial_mv: Finite | None = None
 
     def __post_init__(self) -> None:
         check_known_quantities(self)
@@ -212,10 +211,10 @@ class Afferent(metaclass=KnownKeywords):
     def from_parameters(
         cls,
         parameters: ArrayLike,
-        refractory_ms: float = neuron.REFRACTORY.value,
+        refractory_ms: Finite = neuron.REFRACTORY.value,
         dynamic_quantity: str = neuron.HUMAN_QUANTITY,
         static_quantity: str = neuron.HUMAN_QUANTITY,
-        initial_mv: float | None = None,
+        initial_mv: Finite | None = None,
     ) -> Afferent:
         """Make an afferent from the six fitted numbers.
 
@@ -283,7 +282,7 @@ class Afferent(metaclass=KnownKeywords):
         """Constant current that just reaches the threshold, C v / tau; less never elicits a spike. [mA]"""
         return self.capacitance_mf * self.threshold_mv / self.time_constant_ms
 
-    def with_static_threshold(self, quantity: float) -> Afferent:
+    def with_static_threshold(self, quantity: Finite) -> Afferent:
         """Return the same afferent with another intercept, so that it fires above a constant quantity.
 
         Parameters

@@ -12,17 +12,18 @@ import math
 import numpy as np
 from numpy.typing import ArrayLike
 
-from fingerpad.core.checks import FloatArray, finite, float_array, whole
+from fingerpad.core.checked import checked_class
 from fingerpad.core.errors import InputError
-from fingerpad.core.keywords import KnownKeywords
 from fingerpad.core.signals import SpikeTrains, Traces
+from fingerpad.core.values import Finite, FloatArray, Whole, finite, float_array, whole
 from fingerpad.neuron.afferent import Afferent, AnyAfferent, checked_afferent
 from fingerpad.neuron.afferent_types import SAI, RapidlyAdapting
 from fingerpad.neuron.band_pass import continued_stage, knots_between
 from fingerpad.neuron.exact_spikes import continued_trains
 
 
-class AfferentStream(metaclass=KnownKeywords):
+@checked_class
+class AfferentStream:
     """Afferents of one type that respond as the samples come.
 
     Parameters
@@ -41,7 +42,7 @@ class AfferentStream(metaclass=KnownKeywords):
     True
     """
 
-    def __init__(self, afferent: AnyAfferent, n_sites: int):
+    def __init__(self, afferent: AnyAfferent, n_sites: Whole):
         self._afferent = checked_afferent(afferent)
         count = whole("n_sites", n_sites, at_least=1)
         self._time_ms, self._ready = 0.0, np.zeros(count)
@@ -54,7 +55,7 @@ class AfferentStream(metaclass=KnownKeywords):
         stages = afferent.rise + afferent.fall if isinstance(afferent, RapidlyAdapting) else 1
         self._filtered = np.zeros((stages, count))
 
-    def step(self, time_ms: float, static: ArrayLike, dynamic: ArrayLike | None = None) -> SpikeTrains:
+    def step(self, time_ms: Finite, static: ArrayLike, dynamic: ArrayLike | None = None) -> SpikeTrains:
         """Go to a later time, and return the spikes since the last one.
 
         Parameters

@@ -13,14 +13,13 @@ transmits no constant. SAII has the chain of SAI (Eqs. 1-5), but follows the str
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
-from typing import ClassVar
+from dataclasses import replace
+from typing import Annotated, ClassVar
 
 import numpy as np
 
-from fingerpad.core.checks import FloatArray, instance, not_negative, one_of, positive
+from fingerpad.core.checked import value_class
 from fingerpad.core.errors import InputError, shown
-from fingerpad.core.keywords import KnownKeywords
 from fingerpad.core.signals import (
     COUNT,
     CURRENTS,
@@ -30,7 +29,7 @@ from fingerpad.core.signals import (
     SpikeTrains,
     Traces,
 )
-from fingerpad.core.values import converted
+from fingerpad.core.values import Finite, FloatArray, Positive, Whole, choice, not_negative
 from fingerpad.data import afferents
 from fingerpad.neuron.afferent import Afferent, check_known_quantities, check_quantities, spikes_where
 from fingerpad.neuron.band_pass import BandPass, resampled, smoothed_rate
@@ -38,27 +37,25 @@ from fingerpad.neuron.lif import LeakyIntegrateAndFire
 from fingerpad.neuron.transduction import Drive
 
 
-@dataclass(frozen=True)
-@converted
-class RapidlyAdapting(metaclass=KnownKeywords):
+@value_class
+class RapidlyAdapting:
     """Afferent that follows the band-passed and rectified course of one quantity: the chain of RA and PC."""
 
     rate_measure: ClassVar[str] = COUNT
     """Many of these afferents fire once or twice in a ramp, without an interval to measure."""
 
-    threshold: float
+    threshold: Positive
     """Band-passed quantity that, if it stayed, would just bring the membrane to its threshold. [kPa, or the
     unit of the quantity]"""
-    corner_hz: float  # Corner frequency of the band pass. [Hz]
-    rise: int
-    fall: int  # Its powers of the frequency below and above the corner.
-    retraction: float  # Share of the response to a decreasing quantity, 0 to 1. [1]
-    membrane_ms: float  # Time constant of the membrane. [ms]
-    refractory_ms: float  # Refractory period. [ms]
+    corner_hz: Finite  # Corner frequency of the band pass. [Hz]
+    rise: Whole
+    fall: Whole  # Its powers of the frequency below and above the corner.
+    retraction: Finite  # Share of the response to a decreasing quantity, 0 to 1. [1]
+    membrane_ms: Finite  # Time constant of the membrane. [ms]
+    refractory_ms: Finite  # Refractory period. [ms]
     quantity: str  # What is followed, by the names of `SkinResponse.sample`.
 
     def __post_init__(self) -> None:
-        positive("threshold", self.threshold)
         if not_negative("retraction", self.retraction) > 1.0:
             raise InputError("retraction", "must lie within 0 ... 1", f"{self.retraction:g}")
         # Both stages check their parameters when they are made.
@@ -101,8 +98,7 @@ class RapidlyAdapting(metaclass=KnownKeywords):
         return spikes_where(may_fire, traces, lambda some: self.membrane.spikes(self.current(some)))
 
 
-@dataclass(frozen=True)
-@converted
+@value_class
 class RA(RapidlyAdapting):
     """A rapidly adapting afferent (RA, FA-I), which ends in Meissner corpuscles.
 
@@ -125,18 +121,17 @@ class RA(RapidlyAdapting):
     (True, True)
     """
 
-    threshold: float = afferents.RA_THRESHOLD.value
-    corner_hz: float = afferents.RA_CORNER.value
-    rise: int = int(afferents.RA_RISE.value)
-    fall: int = int(afferents.RA_FALL.value)
-    retraction: float = afferents.RA_RETRACTION.value
-    membrane_ms: float = afferents.RA_MEMBRANE.value
-    refractory_ms: float = afferents.RA_REFRACTORY.value
+    threshold: Finite = afferents.RA_THRESHOLD.value
+    corner_hz: Finite = afferents.RA_CORNER.value
+    rise: Whole = int(afferents.RA_RISE.value)
+    fall: Whole = int(afferents.RA_FALL.value)
+    retraction: Finite = afferents.RA_RETRACTION.value
+    membrane_ms: Finite = afferents.RA_MEMBRANE.value
+    refractory_ms: Finite = afferents.RA_REFRACTORY.value
     quantity: str = afferents.RA_QUANTITY
 
 
-@dataclass(frozen=True)
-@converted
+@value_class
 class PC(RapidlyAdapting):
     """A Pacinian afferent (PC, FA-II).
 
@@ -161,18 +156,17 @@ class PC(RapidlyAdapting):
     (True, 0)
     """
 
-    threshold: float = afferents.PC_THRESHOLD.value
-    corner_hz: float = afferents.PC_CORNER.value
-    rise: int = int(afferents.PC_RISE.value)
-    fall: int = int(afferents.PC_FALL.value)
-    retraction: float = afferents.PC_RETRACTION.value
-    membrane_ms: float = afferents.PC_MEMBRANE.value
-    refractory_ms: float = afferents.PC_REFRACTORY.value
+    threshold: Finite = afferents.PC_THRESHOLD.value
+    corner_hz: Finite = afferents.PC_CORNER.value
+    rise: Whole = int(afferents.PC_RISE.value)
+    fall: Whole = int(afferents.PC_FALL.value)
+    retraction: Finite = afferents.PC_RETRACTION.value
+    membrane_ms: Finite = afferents.PC_MEMBRANE.value
+    refractory_ms: Finite = afferents.PC_REFRACTORY.value
     quantity: str = afferents.PC_QUANTITY
 
 
-@dataclass(frozen=True)
-@converted
+@value_class
 class SAI(Afferent):
     """A slowly adapting type I (SAI) afferent that is also right under vibration.
 
@@ -201,10 +195,9 @@ class SAI(Afferent):
     [50.0, 30.0]
     """
 
-    smoothing_ms: float = afferents.SAI_SMOOTHING.value
+    smoothing_ms: Positive = afferents.SAI_SMOOTHING.value
 
     def __post_init__(self) -> None:
-        positive("smoothing_ms", self.smoothing_ms, "ms")
         super().__post_init__()
 
     def spikes(self, traces: Traces | Drive) -> SpikeTrains:
@@ -229,8 +222,7 @@ class SAI(Afferent):
         )
 
 
-@dataclass(frozen=True)
-@converted
+@value_class
 class SAII(SAI):
     """A slowly adapting type II (SAII) afferent, which follows the stretch of the skin.
 
@@ -255,19 +247,18 @@ class SAII(SAI):
     True
     """
 
-    intercept_ma: float = 0.0
-    dynamic_gain: float = afferents.SAII_DYNAMIC_GAIN.value
-    static_gain: float = afferents.SAII_STATIC_GAIN.value
-    time_constant_ms: float = afferents.SAII_MEMBRANE.value
-    capacitance_mf: float = afferents.SAII_MEMBRANE.value
-    threshold_mv: float = 1.0
+    intercept_ma: Finite = 0.0
+    dynamic_gain: Finite = afferents.SAII_DYNAMIC_GAIN.value
+    static_gain: Finite = afferents.SAII_STATIC_GAIN.value
+    time_constant_ms: Finite = afferents.SAII_MEMBRANE.value
+    capacitance_mf: Finite = afferents.SAII_MEMBRANE.value
+    threshold_mv: Finite = 1.0
     dynamic_quantity: str = afferents.SAII_QUANTITY
     static_quantity: str = afferents.SAII_QUANTITY
 
 
-@dataclass(frozen=True)
-@converted
-class OwnAfferent(metaclass=KnownKeywords):
+@value_class
+class OwnAfferent:
     """An afferent of one's own: a function of the traces of the skin that returns current or spikes.
 
     Parameters
@@ -306,16 +297,13 @@ class OwnAfferent(metaclass=KnownKeywords):
     membrane: LeakyIntegrateAndFire | None = None
     dynamic_quantity: str = STORED_ENERGY
     static_quantity: str = STORED_ENERGY
-    rate_measure: str = INTERVAL
+    rate_measure: Annotated[str, choice((INTERVAL, COUNT))] = INTERVAL
 
     MUST_RETURN: ClassVar[str] = "respond must return Traces of a current, or SpikeTrains, an entry per site"
 
     def __post_init__(self) -> None:
         if not callable(self.respond):
             raise InputError("respond", "must be a function of Traces", shown(self.respond))
-        if self.membrane is not None:
-            instance("membrane", self.membrane, LeakyIntegrateAndFire)
-        one_of("rate_measure", self.rate_measure, (INTERVAL, COUNT))
         check_known_quantities(self)
 
     def spikes(self, traces: Traces) -> SpikeTrains:

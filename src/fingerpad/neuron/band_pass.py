@@ -12,17 +12,16 @@ which increases as the frequency to the power `rise` below the corner and decrea
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
 from numba import njit
 
-from fingerpad.core.checks import FloatArray, positive, whole
+from fingerpad.core.checked import value_class
 from fingerpad.core.signals import Traces
 from fingerpad.core.threads import in_blocks
 from fingerpad.core.units import MS_PER_S
-from fingerpad.core.values import converted
+from fingerpad.core.values import Count, FloatArray, Positive
 from fingerpad.neuron.transduction import Drive, drive, knots_of
 
 _KNOTS_PER_TIME_CONSTANT = 4.0
@@ -32,21 +31,15 @@ _KNOTS_PER_TIME_CONSTANT = 4.0
 _MOST_PIECES = 2**20
 
 
-@dataclass(frozen=True)
-@converted
+@value_class
 class BandPass:
     """A filter that transmits a band of frequencies."""
 
-    corner_hz: float  # Corner frequency. [Hz]
-    rise: int
-    fall: int
+    corner_hz: Positive  # Corner frequency. [Hz]
+    rise: Count
+    fall: Count
     """Powers of the frequency by which it increases below the corner and decreases above it. A constant input
     gives no output, because the rise is at least 1."""
-
-    def __post_init__(self) -> None:
-        positive("corner_hz", self.corner_hz, "Hz")
-        whole("rise", self.rise, 1)
-        whole("fall", self.fall, 1)
 
     @property
     def time_constant_ms(self) -> float:

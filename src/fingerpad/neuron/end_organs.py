@@ -2,25 +2,34 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from functools import partial
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from fingerpad.core.checks import FloatArray, float_array, one_of, positive, whole
+from fingerpad.core.checked import value_class
 from fingerpad.core.errors import InputError
-from fingerpad.core.keywords import KnownKeywords
 from fingerpad.core.layouts import Place
 from fingerpad.core.random_streams import Purpose, uniforms
 from fingerpad.core.signals import Traces
-from fingerpad.core.values import converted
+from fingerpad.core.values import (
+    Check,
+    Count,
+    Finite,
+    FiniteArray,
+    FloatArray,
+    Whole,
+    choice,
+    float_array,
+    positive,
+)
 
 _SUM_TOLERANCE = 1e-6
 
 
-@dataclass(frozen=True)
-@converted
-class EndOrgans(metaclass=KnownKeywords):
+@value_class
+class EndOrgans:
     """Positions and weights of the end organs of every afferent.
 
     What the afferent follows is the weighted sum of what its end organs follow, or what the strongest of them
@@ -42,21 +51,19 @@ class EndOrgans(metaclass=KnownKeywords):
     [[0.0], [2.5]]
     """
 
-    positions_mm: FloatArray
-    weights: FloatArray | None = None
-    combine: str = "sum"
+    positions_mm: Annotated[FloatArray, Check(partial(float_array, ndim=3), {})]
+    weights: FiniteArray | None = None
+    combine: Annotated[str, choice(("sum", "largest"))] = "sum"
 
     def __post_init__(self) -> None:
-        positions = float_array("positions_mm", self.positions_mm, 3)
-        n_afferents, n_ends, columns = positions.shape
-        one_of("combine", self.combine, ("sum", "largest"))
-        if columns not in (2, 3) or positions.size == 0:
+        n_afferents, n_ends, columns = self.positions_mm.shape
+        if columns not in (2, 3) or self.positions_mm.size == 0:
             raise InputError(
                 "positions_mm of EndOrgans must be afferents by end organs by x, z, or x, y, z: got shape "
-                f"{positions.shape}."
+                f"{self.positions_mm.shape}."
             )
         shares = np.full(n_ends, 1.0 / n_ends) if self.weights is None else self.weights
-        weights = float_array("weights", np.atleast_2d(float_array("weights", shares, None)), 2)
+        weights = float_array("weights", np.atleast_2d(shares), 2)
         if weights.shape not in ((1, n_ends), (n_afferents, n_ends)):
             raise InputError(
                 "weights",
@@ -71,7 +78,6 @@ class EndOrgans(metaclass=KnownKeywords):
             raise InputError(
                 f"weights of an afferent must sum to 1: got {worst:g}; divide them by their sum."
             )
-        object.__setattr__(self, "positions_mm", positions)
         object.__setattr__(self, "weights", np.broadcast_to(weights, (n_afferents, n_ends)))
 
     def __len__(self) -> int:
@@ -81,9 +87,9 @@ class EndOrgans(metaclass=KnownKeywords):
     def scattered(
         cls,
         places_mm: ArrayLike,
-        count: int,
-        reach_mm: float,
-        seed: int,
+        count: Count,
+        reach_mm: Finite,
+        seed: Whole,
         place: Place | None = None,
         combine: str = "sum",
     ) -> EndOrgans:
@@ -110,7 +116,6 @@ class EndOrgans(metaclass=KnownKeywords):
         (2, 5, 2)
         """
         centres = float_array("places_mm", places_mm, 2)
-        whole("count", count, 1)
         radius_mm = positive("reach_mm", reach_mm, "mm")
         drawn = uniforms(seed, 1, len(centres), Purpose.END_ORGAN, 2 * count)[0]
         distance, angle = radius_mm * np.sqrt(drawn[:, :count]), 2.0 * np.pi * drawn[:, count:]

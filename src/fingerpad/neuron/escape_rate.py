@@ -17,17 +17,16 @@ spike are exponentially distributed with mean 1.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
 import numpy as np
 from numba import njit
 
-from fingerpad.core.checks import FloatArray, positive
+from fingerpad.core.checked import value_class
 from fingerpad.core.philox import four_uniforms
 from fingerpad.core.random_streams import Presentations, Purpose, checked_sites
 from fingerpad.core.signals import SpikeTrains, Traces
 from fingerpad.core.threads import in_blocks
-from fingerpad.core.values import converted
+from fingerpad.core.values import FloatArray, Positive, Whole
 from fingerpad.neuron.exact_spikes import potential_at
 from fingerpad.neuron.lif import LeakyIntegrateAndFire, checked_current
 
@@ -48,8 +47,7 @@ _ROUND_OFF = 1.0e-14
 _MOST_REFINEMENTS = 100
 
 
-@dataclass(frozen=True)
-@converted
+@value_class
 class EscapeRate:
     """A leaky integrate-and-fire neuron with a soft threshold.
 
@@ -73,14 +71,10 @@ class EscapeRate:
     """
 
     membrane: LeakyIntegrateAndFire
-    width: float
-    escape_ms: float = ESCAPE_TIME_MS
+    width: Positive
+    escape_ms: Positive = ESCAPE_TIME_MS
 
-    def __post_init__(self) -> None:
-        positive("width", self.width)
-        positive("escape_ms", self.escape_ms, "ms")
-
-    def spikes(self, current: Traces, seed: int, presentations: Presentations | None = None) -> SpikeTrains:
+    def spikes(self, current: Traces, seed: Whole, presentations: Presentations | None = None) -> SpikeTrains:
         """Simulate spike times by time rescaling.
 
         Parameters

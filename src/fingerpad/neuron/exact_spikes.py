@@ -16,7 +16,7 @@ import math
 import numpy as np
 from numba import njit
 
-from fingerpad.core.checks import FloatArray
+from fingerpad.core.values import FloatArray
 
 _MOST_REFINEMENTS = 200
 _ROUND_OFF = 4.0 * float(np.finfo(np.float64).eps)

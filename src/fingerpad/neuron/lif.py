@@ -7,13 +7,12 @@ threshold is bracketed and refined to round-off (`fingerpad.neuron.exact_spikes`
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
-from fingerpad.core.checks import FloatArray, finite, positive
+from fingerpad.core.checked import value_class
 from fingerpad.core.errors import InputError
 from fingerpad.core.signals import CURRENTS, SpikeTrains, Traces
 from fingerpad.core.threads import in_blocks
-from fingerpad.core.values import converted
+from fingerpad.core.values import Finite, FloatArray, Positive, finite
 from fingerpad.neuron.exact_spikes import exact_trains, initial_potentials
 
 
@@ -27,8 +26,7 @@ def checked_current(traces: Traces) -> Traces:
     return traces
 
 
-@dataclass(frozen=True)
-@converted
+@value_class
 class LeakyIntegrateAndFire:
     """A leaky integrate-and-fire membrane with a refractory period.
 
@@ -59,17 +57,13 @@ class LeakyIntegrateAndFire:
     [31.165, 63.33, 95.495]
     """
 
-    time_constant_ms: float
-    capacitance_mf: float
-    threshold_mv: float
-    refractory_ms: float
-    initial_mv: float | None = None
+    time_constant_ms: Positive
+    capacitance_mf: Positive
+    threshold_mv: Positive
+    refractory_ms: Positive
+    initial_mv: Finite | None = None
 
     def __post_init__(self) -> None:
-        positive("time_constant_ms", self.time_constant_ms, "ms")
-        positive("capacitance_mf", self.capacitance_mf, "mF")
-        positive("threshold_mv", self.threshold_mv, "mV")
-        positive("refractory_ms", self.refractory_ms, "ms")
         if self.initial_mv is not None and finite("initial_mv", self.initial_mv, "mV") >= self.threshold_mv:
             raise InputError(
                 "initial_mv",

@@ -3,20 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from fingerpad.core.checks import FloatArray, instance, positive, whole
+from fingerpad.core.checked import value_class
 from fingerpad.core.displayed import Result
 from fingerpad.core.errors import InputError
-from fingerpad.core.keywords import KnownKeywords
 from fingerpad.core.layouts import Place
 from fingerpad.core.random_streams import seed_of
 from fingerpad.core.signals import ResponseMap, Skin, SpikeTrains, traces_below
-from fingerpad.core.values import converted
+from fingerpad.core.values import Finite, FloatArray, NotNegativeWhole, instance, positive
 from fingerpad.data import afferents as published
 from fingerpad.data.tissues import DEFAULT_TISSUES
 from fingerpad.neuron.afferent import AnyAfferent, checked_afferent
@@ -47,7 +46,7 @@ def one_map(response: ResponseMap | MixedResponse) -> ResponseMap:
     )
 
 
-@dataclass(frozen=True)
+@value_class
 class MixedResponse(Result):
     """Responses of a mixed population to one touch.
 
@@ -127,9 +126,8 @@ class MixedResponse(Result):
         return cls(MappingProxyType(parts))
 
 
-@dataclass(frozen=True)
-@converted
-class MixedPopulation(metaclass=KnownKeywords):
+@value_class
+class MixedPopulation:
     """Populations of several types in the same skin.
 
     Parameters
@@ -149,13 +147,8 @@ class MixedPopulation(metaclass=KnownKeywords):
     parts: Mapping[str, Population]
 
     def __post_init__(self) -> None:
-        if not isinstance(self.parts, Mapping):
-            raise InputError("parts", "must be a mapping from types to Population", type(self.parts).__name__)
         if not self.parts:
             raise InputError("MixedPopulation needs at least one Population: got none.")
-        for name, part in self.parts.items():
-            if not isinstance(part, Population):
-                raise InputError(f"parts[{name!r}] must be a Population: got {part!r}.")
         object.__setattr__(self, "parts", MappingProxyType(dict(self.parts)))
 
     def __repr__(self) -> str:
@@ -200,8 +193,8 @@ class MixedPopulation(metaclass=KnownKeywords):
         densities_per_cm2: Mapping[str, float] = PUBLISHED_DENSITIES,
         afferents: Mapping[str, AnyAfferent] | None = None,
         place: Place | None = None,
-        spread: float = 0.0,
-        seed: int = 0,
+        spread: Finite = 0.0,
+        seed: NotNegativeWhole = 0,
     ) -> MixedPopulation:
         """Place afferents of each type at random, evenly, at a density each.
 
@@ -238,7 +231,6 @@ class MixedPopulation(metaclass=KnownKeywords):
                 "region", "must be one of fingerpad.core.regions or UnrolledSkin(finger).pad()", repr(region)
             )
         known = types_of_afferents() | dict(afferents or {})
-        whole("seed", seed, 0)
         parts = {}
         for number, (name, density) in enumerate(densities_per_cm2.items()):
             if name not in known:

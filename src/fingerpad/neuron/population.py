@@ -4,19 +4,31 @@ from __future__ import annotations
 
 import math
 import warnings
-from dataclasses import dataclass, field, replace
-from typing import Protocol
+from dataclasses import field, replace
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from fingerpad.core.checks import FloatArray, float_array, not_negative, pair, positive, whole
+from fingerpad.core.checked import checked, value_class
 from fingerpad.core.errors import InputError, TissuesWarning, level_of_caller, shown
-from fingerpad.core.keywords import KnownKeywords, known_keywords
 from fingerpad.core.layouts import MOST_RECEPTORS, Layout, Place, around_zero
 from fingerpad.core.random_streams import Purpose, normals
 from fingerpad.core.signals import INTERVAL, ResponseMap, Skin, Traces, traces_below
-from fingerpad.core.values import converted
+from fingerpad.core.values import (
+    Finite,
+    FiniteMatrix,
+    FiniteVector,
+    FloatArray,
+    Pair,
+    Positive,
+    Whole,
+    float_array,
+    not_negative,
+    pair,
+    positive,
+    whole,
+)
 from fingerpad.data import fingertip, psychophysics
 from fingerpad.data.tissues import DEFAULT_TISSUES
 from fingerpad.neuron.afferent import Afferent, AnyAfferent, checked_afferent
@@ -29,6 +41,7 @@ CENTRE_MM = (fingertip.CONTACT_POINT.value[0], 0.0)
 """Centre of the default layout: the contact point of the paper's finger, on the midline. [mm]"""
 
 
+@runtime_checkable
 class HasContact(Protocol):
     """A finger with a place of contact."""
 
@@ -72,9 +85,8 @@ def sensitivities(count: int, spread: float, seed: int) -> FloatArray:
     return np.exp(sigma * drawn - 0.5 * sigma**2)
 
 
-@dataclass(frozen=True)
-@converted
-class Population(metaclass=KnownKeywords):
+@value_class
+class Population:
     """Afferents of one type at different positions of the skin, with their sensitivities and end organs.
 
     Parameters
@@ -97,40 +109,33 @@ class Population(metaclass=KnownKeywords):
         them to the middle of its pad. By default they stay. [mm]
     """
 
-    positions_mm: FloatArray
-    pitch_mm: float
+    positions_mm: FiniteMatrix
+    pitch_mm: Positive
     afferent: AnyAfferent = field(default_factory=Afferent)
-    sensitivity: FloatArray | None = None
-    places_mm: FloatArray | None = None
+    sensitivity: FiniteVector | None = None
+    places_mm: FiniteMatrix | None = None
     ends: EndOrgans | None = None
-    centre_mm: tuple[float, float] | None = None
+    centre_mm: Pair | None = None
 
     def __post_init__(self) -> None:
-        positions = float_array("positions_mm", self.positions_mm, 2)
+        positions, factors = self.positions_mm, self.sensitivity
         if positions.shape[1] not in (2, 3) or len(positions) == 0:
             raise InputError(
                 "positions_mm", "must have rows of x and z, or of x, y and z", f"shape {positions.shape}"
             )
-        positive("pitch_mm", self.pitch_mm, "mm")
         checked_afferent(self.afferent)
         if self.ends is not None and len(self.ends) != len(positions):
             raise InputError("ends", f"needs one row per afferent, {len(positions)}", str(len(self.ends)))
-        if self.sensitivity is not None:
-            factors = float_array("sensitivity", self.sensitivity, 1)
-            if factors.size != len(positions) or (factors <= 0.0).any():
-                raise InputError(
-                    "sensitivity",
-                    f"needs one factor above 0 per receptor, {len(positions)}",
-                    f"{factors.size}, the smallest {factors.min(initial=math.inf):g}",
-                )
-            object.__setattr__(self, "sensitivity", factors)
-        places = float_array(
-            "places_mm", positions[:, [0, -1]] if self.places_mm is None else self.places_mm, 2
-        )
+        if factors is not None and (factors.size != len(positions) or (factors <= 0.0).any()):
+            raise InputError(
+                "sensitivity",
+                f"needs one factor above 0 per receptor, {len(positions)}",
+                f"{factors.size}, the smallest {factors.min(initial=math.inf):g}",
+            )
+        places = positions[:, [0, -1]] if self.places_mm is None else self.places_mm
         if places.shape != (len(positions), 2):
             raise InputError("places_mm", f"needs a pair per receptor, {len(positions)}", str(places.shape))
-        object.__setattr__(self, "positions_mm", positions)
-        object.__setattr__(self, "places_mm", places)
+        object.__setattr__(self, "places_mm", float_array("places_mm", places, 2))
 
     def __repr__(self) -> str:
         unequal = "" if self.sensitivity is None else ", each with its sensitivity"
@@ -141,7 +146,7 @@ class Population(metaclass=KnownKeywords):
         return len(self.positions_mm)
 
     @classmethod
-    @known_keywords
+    @checked
     def of_layout(
         cls,
         layout: Layout,
@@ -179,13 +184,13 @@ class Population(metaclass=KnownKeywords):
         return cls(positions, layout.pitch_mm, afferent or Afferent(), factors, layout.places_mm, ends)
 
     @classmethod
-    @known_keywords
+    @checked
     def grid(
         cls,
-        density_per_cm2: float = psychophysics.RECEPTOR_DENSITY.value,
-        rows: int = 3,
-        columns: int = 6,
-        centre_mm: tuple[float, float] | None = None,
+        density_per_cm2: Finite = psychophysics.RECEPTOR_DENSITY.value,
+        rows: Whole = 3,
+        columns: Whole = 6,
+        centre_mm: Pair | None = None,
         afferent: AnyAfferent | None = None,
         finger: HasContact | None = None,
     ) -> Population:

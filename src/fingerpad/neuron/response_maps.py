@@ -13,11 +13,11 @@ from numpy.typing import ArrayLike
 from scipy.special import ndtr
 from scipy.stats import rankdata
 
-from fingerpad.core.checks import FloatArray, float_array, increasing, not_negative, positive
+from fingerpad.core.checked import checked
 from fingerpad.core.errors import InputError
-from fingerpad.core.keywords import known_keywords
 from fingerpad.core.signals import SpikeTrains
 from fingerpad.core.units import MS_PER_S
+from fingerpad.core.values import FloatArray, NotNegative, float_array, increasing, positive
 
 NO_GROUP = -1  # Group number of an afferent that is in no group.
 
@@ -34,7 +34,7 @@ def recruitment_rank(latency_ms: ArrayLike) -> FloatArray:
     return rank
 
 
-@known_keywords
+@checked
 def recruited(latency_ms: ArrayLike, times_ms: ArrayLike) -> np.ndarray:
     """Count the afferents that have fired their first spike by each time.
 
@@ -86,7 +86,7 @@ class OrderChange:
     """Share of their pairs whose order is reversed; a pair with a tie is not. NaN without a pair. [0-1]"""
 
 
-@known_keywords
+@checked
 def order_change(latency_ms: ArrayLike, other_latency_ms: ArrayLike) -> OrderChange:
     """Compare the order of recruitment under two stimuli.
 
@@ -187,9 +187,9 @@ class PopulationRate:
         return counts / sizes[:, np.newaxis]
 
 
-@known_keywords
+@checked
 def population_rate(
-    spikes: SpikeTrains, edges_ms: ArrayLike, groups: ArrayLike | None = None, smoothing_ms: float = 0.0
+    spikes: SpikeTrains, edges_ms: ArrayLike, groups: ArrayLike | None = None, smoothing_ms: NotNegative = 0.0
 ) -> PopulationRate:
     """Compute the peristimulus histogram of a population.
 
@@ -222,7 +222,6 @@ def population_rate(
     edges = increasing("edges_ms", float_array("edges_ms", edges_ms, 1))
     if edges.size < 2:
         raise InputError("edges_ms", "must hold the two edges of at least one bin", f"{edges.size} numbers")
-    not_negative("smoothing_ms", smoothing_ms, "ms")
     group = _groups(groups, len(spikes))
     n_groups, n_bins = int(group.max(initial=0)) + 1, edges.size - 1
 

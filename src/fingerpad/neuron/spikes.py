@@ -9,11 +9,11 @@ import numpy as np
 from numba import njit
 from numpy.typing import ArrayLike
 
-from fingerpad.core.checks import FloatArray, float_array
 from fingerpad.core.errors import InputError
 from fingerpad.core.phases import HOLD, RAMP, Phase, phase_named, ramp_and_hold_phases
 from fingerpad.core.signals import COUNT, INTERVAL, SpikeTrains, window_bounds
 from fingerpad.core.units import MS_PER_S
+from fingerpad.core.values import FloatArray, float_array
 from fingerpad.data import protocol
 
 Window = tuple[float, ...]  # Start and end. [ms]

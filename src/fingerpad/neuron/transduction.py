@@ -14,19 +14,27 @@ I = beta + k_d |Q'| + k_s P (docs/decisions.md#dynamic-term-quantity).
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
 from numba import njit
 from scipy.interpolate import PchipInterpolator, PPoly
 
-from fingerpad.core.checks import FloatArray, finite, float_array, positive, whole
+from fingerpad.core.checked import checked, value_class
 from fingerpad.core.errors import InputError
-from fingerpad.core.keywords import known_keywords
 from fingerpad.core.phases import Phase
 from fingerpad.core.signals import CURRENT, STORED_ENERGY, Traces
-from fingerpad.core.values import converted
+from fingerpad.core.values import (
+    Count,
+    Finite,
+    FiniteMatrix,
+    FiniteVector,
+    FloatArray,
+    Many,
+    Positive,
+    positive,
+)
 
 PIECES_PER_INTERVAL = 32  # Largest number of linear pieces that replace the cubic between two given times.
 SHORTEST_PIECE_MS = 0.25  # Shortest linear piece: shorter intervals are divided into fewer pieces. [ms]
@@ -35,26 +43,22 @@ SHORTEST_PIECE_MS = 0.25  # Shortest linear piece: shorter intervals are divided
 SAME_COUNT = 1e-6  # Share of a piece by which an interval may be too short for one more.
 
 
-@dataclass(frozen=True)
-@converted
+@value_class
 class Drive:
     """A quantity, and the rate of change of it or of another one, piecewise linear between the same knots."""
 
-    times_ms: FloatArray  # Knots; a repeated knot is a jump of the rate, (n_knots,). [ms]
-    values: FloatArray
+    times_ms: FiniteVector  # Knots; a repeated knot is a jump of the rate, (n_knots,). [ms]
+    values: FiniteMatrix
     """Quantity of the static term, (n_knots, n_sites). [its unit in `fingerpad.core.units.QUANTITY_UNITS`]"""
-    rate_per_ms: FloatArray
+    rate_per_ms: FiniteMatrix
     """Absolute rate of change of the quantity of the dynamic term, U' of Eq. 2; 0 at the onset, (n_knots,
     n_sites). [its unit/ms]"""
     dynamic_quantity: str = STORED_ENERGY
     static_quantity: str = STORED_ENERGY
     """What the two terms follow, by the names of `SkinResponse.sample`; "stored" is SED."""
-    phases: tuple[Phase, ...] = ()  # As of `Traces`.
+    phases: Many[Phase] = ()  # As of `Traces`.
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "times_ms", float_array("times_ms", self.times_ms, 1))
-        for name in ("values", "rate_per_ms"):
-            object.__setattr__(self, name, float_array(name, getattr(self, name), 2))
         if not self.times_ms.size == len(self.values) or self.values.shape != self.rate_per_ms.shape:
             raise InputError(
                 "Drive needs one row of values and of rate_per_ms per knot: "
@@ -73,8 +77,7 @@ class Drive:
         return replace(self, values=self.values[:, sites], rate_per_ms=self.rate_per_ms[:, sites])
 
 
-@dataclass(frozen=True)
-@converted
+@value_class
 class Transduction:
     """Gains that transform strain energy density (SED) to membrane current.
 
@@ -97,14 +100,9 @@ class Transduction:
     ['0.0e+00', '4.0e-06', '6.0e-06', '2.0e-06', '2.0e-06']
     """
 
-    intercept_ma: float
-    dynamic_gain: float
-    static_gain: float
-
-    def __post_init__(self) -> None:
-        finite("intercept_ma", self.intercept_ma, "mA")
-        finite("dynamic_gain", self.dynamic_gain, "mA ms/kPa")
-        finite("static_gain", self.static_gain, "mA/kPa")
+    intercept_ma: Finite
+    dynamic_gain: Finite
+    static_gain: Finite
 
     def current(self, traces: Traces | Drive) -> Traces:
         """Compute the current through the membrane at every site, Eq. 1: I = beta + k_d U' + k_s U.
@@ -172,13 +170,13 @@ def _largest_sum(lengths, dynamic, static, of_slope, of_value):  # type: ignore[
     return found
 
 
-@known_keywords
+@checked
 def drive(
     traces: Traces,
     *,
-    difference_step_ms: float | None = None,
-    pieces: int = PIECES_PER_INTERVAL,
-    shortest_piece_ms: float = SHORTEST_PIECE_MS,
+    difference_step_ms: Finite | None = None,
+    pieces: Count = PIECES_PER_INTERVAL,
+    shortest_piece_ms: Positive = SHORTEST_PIECE_MS,
 ) -> Drive:
     """Resample what drives the current and compute the rate of change of its dynamic term, Eq. 2.
 
@@ -217,8 +215,6 @@ def drive(
     >>> resampled.rate_per_ms[:, 0].round(6).tolist()
     [0.0, 0.04, 0.04, 0.04]
     """
-    whole("pieces", pieces, 1)
-    positive("shortest_piece_ms", shortest_piece_ms, "ms")
     if traces.dynamic is not None:
         static, dynamic = (
             drive(

@@ -10,11 +10,11 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from fingerpad.core.checks import FloatArray, float_array, not_negative, positive
+from fingerpad.core.checked import checked
 from fingerpad.core.errors import InputError
-from fingerpad.core.keywords import known_keywords
 from fingerpad.core.signals import Traces
 from fingerpad.core.units import MS_PER_S
+from fingerpad.core.values import Finite, FloatArray, Positive, float_array, not_negative, positive
 from fingerpad.neuron.afferent import AnyAfferent, checked_afferent
 
 SAMPLES_PER_CYCLE = 40
@@ -48,9 +48,13 @@ def impulses_per_cycle(afferent: AnyAfferent, traces: Traces) -> FloatArray:
     return np.array(counts) / COUNTED_CYCLES
 
 
-@known_keywords
+@checked
 def tuning_curve(
-    afferent: AnyAfferent, frequencies_hz: ArrayLike, per_um: float, hold: float = 0.0, impulses: float = 1.0
+    afferent: AnyAfferent,
+    frequencies_hz: ArrayLike,
+    per_um: Positive,
+    hold: Finite = 0.0,
+    impulses: Positive = 1.0,
 ) -> FloatArray:
     """Smallest amplitude at which an afferent fires a given number of impulses per cycle.
 
@@ -87,8 +91,6 @@ def tuning_curve(
             "needs an afferent that follows one quantity",
             f"{afferent.dynamic_quantity!r} and {afferent.static_quantity!r}",
         )
-    positive("per_um", per_um)
-    positive("impulses", impulses)
 
     def threshold_um(frequency_hz: float) -> float:
         low, high = _RANGE_UM

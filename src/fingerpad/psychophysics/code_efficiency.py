@@ -15,8 +15,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fingerpad.core.checks import FloatArray, one_of
-from fingerpad.core.keywords import known_keywords
+from fingerpad.core.checked import checked
+from fingerpad.core.values import Finite, FloatArray, Whole, one_of
 from fingerpad.psychophysics.encoding import distance, gradient_sum
 from fingerpad.psychophysics.ideal_observer import (
     Discriminability,
@@ -56,9 +56,9 @@ class CodeEfficiency:
     efficiency_error: float
 
 
-@known_keywords
+@checked
 def noisy_presentations(
-    table: FloatArray, noise_sigma: float, seed: int, session: int = 0
+    table: FloatArray, noise_sigma: Finite, seed: Whole, session: Whole = 0
 ) -> list[Presentation]:
     """Draw responses to the standard and to each comparison.
 
@@ -97,7 +97,7 @@ def code_statistic(
     return lambda responses: distance(responses, memory)
 
 
-@known_keywords
+@checked
 def code_efficiency(shown: Presentation, statistic: Statistic) -> CodeEfficiency:
     """Compare a code, by `code_statistic`, with the ideal observer of the same presentations.
 

@@ -21,19 +21,29 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
 from operator import attrgetter
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy.special import ndtr
 
-from fingerpad.core.checks import FloatArray, IntArray, finite, float_array, not_negative, one_of, whole
+from fingerpad.core.checked import checked, value_class
 from fingerpad.core.errors import InputError
-from fingerpad.core.keywords import known_keywords
 from fingerpad.core.random_streams import Purpose, normals, uniforms
 from fingerpad.core.signals import HitRates
-from fingerpad.core.values import converted
+from fingerpad.core.values import (
+    Finite,
+    FloatArray,
+    IntArray,
+    NotNegative,
+    Whole,
+    choice,
+    finite,
+    float_array,
+    one_of,
+    whole,
+)
 from fingerpad.data import protocol, psychophysics
 from fingerpad.psychophysics.encoding import NORMS, check_neighbours, distance
 from fingerpad.psychophysics.noisy_responses import checked_noise, noisy_gradient_sums, session_trials
@@ -53,27 +63,28 @@ _REPETITIONS = int(psychophysics.REPETITIONS.value)
 _REPETITIONS_VARIED = int(psychophysics.REPETITIONS_VARIED_CRITERION.value)
 
 
-@dataclass(frozen=True)
-@converted
+@value_class
 class Experiment:
     """Numbers of repetitions, and decision criterion."""
 
-    presentations: int = _REPETITIONS
+    presentations: Whole = _REPETITIONS
     """Noisy presentations of each sphere: gradient sums behind one mean and standard deviation (d), or sets
     of responses from which pairs are sampled (c*)."""
-    distributions: int = _REPETITIONS
+    distributions: Whole = _REPETITIONS
     """Pairs of mean and standard deviation per sphere, Gradient Sum only (f)."""
-    pairs: int = _REPETITIONS  # Distances per sphere behind one hit rate, Euclidean Distance only (f*).
-    hit_rates: int = _REPETITIONS
+    pairs: Whole = _REPETITIONS  # Distances per sphere behind one hit rate, Euclidean Distance only (f*).
+    hit_rates: Whole = _REPETITIONS
     """Hit rates per comparison, of which mean and standard deviation are reported (i, h*)."""
-    criterion: float = psychophysics.DECISION_CRITERION.value
+    criterion: Finite = psychophysics.DECISION_CRITERION.value
     """Decision point beta, as a fraction of the distance from the standard's mean to the comparison's."""
-    criterion_sigma: float = 0.0
+    criterion_sigma: NotNegative = 0.0
     """Spread of the decision point: for each hit rate it is multiplied by Normal(1, criterion_sigma). Above 0
     this is the paper's derivative of Gradient Sum: one mean and standard deviation per sphere, from
     `presentations_varied` sums; steps (f) and (g) are omitted."""
-    presentations_varied: int = _REPETITIONS_VARIED  # Presentations of each sphere when the criterion varies.
-    criterion_moves: str = CRITERION_MOVES[0]
+    presentations_varied: Whole = (
+        _REPETITIONS_VARIED  # Presentations of each sphere when the criterion varies.
+    )
+    criterion_moves: Annotated[str, choice(CRITERION_MOVES)] = CRITERION_MOVES[0]
     """Quantity multiplied by the varied criterion: the decision point itself, beta, or a likelihood ratio of
     1 that replaces beta."""
 
@@ -85,9 +96,6 @@ class Experiment:
                 f"distributions times presentations must be at most {MOST_REPETITIONS:,}: got "
                 f"{self.distributions} by {self.presentations}."
             )
-        finite("criterion", self.criterion)
-        not_negative("criterion_sigma", self.criterion_sigma)
-        one_of("criterion_moves", self.criterion_moves, CRITERION_MOVES)
 
     @property
     def sums_per_sphere(self) -> tuple[int, int]:
@@ -96,15 +104,15 @@ class Experiment:
         return self.distributions, self.presentations
 
 
-@known_keywords
+@checked
 def discriminate_gradient_sum(
     responses: ArrayLike,
     neighbours: np.ndarray,
-    noise_sigma: float,
-    seed: int,
+    noise_sigma: Finite,
+    seed: Whole,
     experiment: Experiment | None = None,
-    silent_value: float | None = None,
-    session: int = 0,
+    silent_value: Finite | None = None,
+    session: Whole = 0,
 ) -> HitRates:
     """Discriminate spheres by their Gradient Sum, steps (a) to (k).
 

@@ -13,11 +13,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.spatial import Delaunay, QhullError, cKDTree
 
-from fingerpad.core.checks import FloatArray, float_array, one_of, positive
+from fingerpad.core.checked import checked
 from fingerpad.core.errors import InputError
-from fingerpad.core.keywords import known_keywords
 from fingerpad.core.layouts import PATTERNS
 from fingerpad.core.signals import ResponseMap
+from fingerpad.core.values import Finite, FloatArray, Whole, float_array, one_of, positive
 
 RESPONSE_MEASURES: dict[str, Callable[[ResponseMap], FloatArray]] = {
     "static": lambda response: response.static_rate_hz,
@@ -33,8 +33,8 @@ _LONGEST_PITCHES = 3.0
 _LATTICE_NEIGHBOURS = {"rectangular": 8, "hexagonal": 6}
 
 
-@known_keywords
-def neighbour_pairs(positions_mm: ArrayLike, pitch_mm: float, count: int = 8) -> np.ndarray:
+@checked
+def neighbour_pairs(positions_mm: ArrayLike, pitch_mm: Finite, count: Whole = 8) -> np.ndarray:
     """Find the pairs (n_pairs, 2) of neighbours in a lattice, each once, the lower index first.
 
     Receptors are neighbours when they lie less than 1.5 pitches apart: in x and z each (8 neighbours,
@@ -118,7 +118,7 @@ def taking_part(responses: ArrayLike, neighbours: np.ndarray) -> tuple[FloatArra
     return np.where(silent, 0.0, table), pairs[~silent[pairs].any(axis=1)]
 
 
-@known_keywords
+@checked
 def gradient_sum(values: ArrayLike, neighbours: np.ndarray) -> FloatArray:
     """Gradient Sum: sum of the differences between neighbours, steps (b) and (c) of Figure 3.
 

@@ -23,15 +23,25 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy.special import betaln, expit, gammaln, logit, ndtr, ndtri, xlog1py, xlogy
 from scipy.stats import binomtest
 
-from fingerpad.core.checks import FloatArray, finite, float_array, one_of, positive
+from fingerpad.core.checked import value_class
 from fingerpad.core.errors import InputError
-from fingerpad.core.values import converted
+from fingerpad.core.values import (
+    Finite,
+    FiniteVector,
+    FloatArray,
+    Positive,
+    choice,
+    finite,
+    float_array,
+    positive,
+)
 
 LOWER, HALF, UPPER = 0.05, 0.5, 0.95
 """Shares of F at the start of its width, at its threshold and at the end of its width."""
@@ -138,8 +148,7 @@ def level_at(
     return sigmoid.level(sigmoid.coordinate(m) + w * beyond_half / sigmoid.stretch)
 
 
-@dataclass(frozen=True)
-@converted
+@value_class
 class PsychometricFunction:
     """One psychometric function.
 
@@ -165,17 +174,15 @@ class PsychometricFunction:
     320.3
     """
 
-    threshold: float
-    width: float
-    guess: float = 0.5
-    lapse: float = 0.0
-    sigmoid: str = "normal"
+    threshold: Finite
+    width: Positive
+    guess: Finite = 0.5
+    lapse: Finite = 0.0
+    sigmoid: Annotated[str, choice(SIGMOIDS)] = "normal"
 
     def __post_init__(self) -> None:
-        one_of("sigmoid", self.sigmoid, SIGMOIDS)
         check = positive if self.shape.logarithmic else finite
         object.__setattr__(self, "threshold", check("threshold", self.threshold))
-        object.__setattr__(self, "width", positive("width", self.width))
         guess, lapse = finite("guess", self.guess), finite("lapse", self.lapse)
         if guess < 0.0 or lapse < 0.0 or guess + lapse >= 1.0:
             raise InputError(
@@ -199,7 +206,7 @@ class PsychometricFunction:
             self.lapse,
         )
 
-    def level_at(self, proportion_correct: float | None = None) -> float:
+    def level_at(self, proportion_correct: Finite | None = None) -> float:
         """Level at which psi has a value. [unit of the levels]
 
         Parameters
@@ -218,7 +225,7 @@ class PsychometricFunction:
             )
         return float(level_at(self.shape, wanted, self.threshold, self.width, self.guess, self.lapse))
 
-    def slope(self, proportion_correct: float | None = None) -> float:
+    def slope(self, proportion_correct: Finite | None = None) -> float:
         """Slope of psi, its derivative by the level, as in `level_at`. [1/unit of the levels]
 
         Examples
@@ -252,8 +259,7 @@ SMALLEST_OVERDISPERSION = 1e-5
 LARGEST_LEVEL = 1e9  # Largest level of a stimulus; the fit loses its digits with far larger numbers.
 
 
-@dataclass(frozen=True)
-@converted
+@value_class
 class JudgementCounts:
     """Numbers of judgements at each level that were correct, or "yes".
 
@@ -270,14 +276,12 @@ class JudgementCounts:
     [0.58, 0.95]
     """
 
-    levels: FloatArray
-    n_correct: FloatArray
-    n_trials: FloatArray
+    levels: FiniteVector
+    n_correct: FiniteVector
+    n_trials: FiniteVector
 
     def __post_init__(self) -> None:
-        levels = float_array("levels", self.levels, 1)
-        correct = float_array("n_correct", self.n_correct, 1)
-        trials = float_array("n_trials", self.n_trials, 1)
+        levels, correct, trials = self.levels, self.n_correct, self.n_trials
         if not levels.size == correct.size == trials.size or levels.size == 0:
             raise InputError(
                 "levels, n_correct and n_trials must have one entry per level: "
@@ -297,8 +301,6 @@ class JudgementCounts:
                 "must be at least 1 and n_correct within 0 ... n_trials",
                 f"{correct.tolist()} of {trials.tolist()}",
             )
-        for name, values in (("levels", levels), ("n_correct", correct), ("n_trials", trials)):
-            object.__setattr__(self, name, values)
 
     @property
     def proportion(self) -> FloatArray:

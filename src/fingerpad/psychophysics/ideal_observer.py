@@ -25,21 +25,30 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy.special import ndtri
 from scipy.stats import rankdata
 
-from fingerpad.core.checks import FloatArray, IntArray, float_array, not_negative, whole
+from fingerpad.core.checked import checked, value_class
 from fingerpad.core.errors import InputError
-from fingerpad.core.keywords import known_keywords
 from fingerpad.core.random_streams import Purpose, normals
-from fingerpad.core.values import converted
+from fingerpad.core.values import (
+    FiniteMatrix,
+    FiniteVector,
+    FloatArray,
+    IntArray,
+    Whole,
+    float_array,
+    not_negative,
+    whole,
+)
 from fingerpad.psychophysics.noisy_responses import checked_noise, session_trials
 
 
+@runtime_checkable
 class ResponseModel(Protocol):
     """Distribution of the responses of a population to one stimulus."""
 
@@ -57,8 +66,7 @@ class ResponseModel(Protocol):
         ...
 
 
-@dataclass(frozen=True)
-@converted
+@value_class
 class GaussianResponses:
     """Normally distributed responses.
 
@@ -76,11 +84,11 @@ class GaussianResponses:
     -0.9189
     """
 
-    mean: FloatArray
-    covariance: FloatArray
+    mean: FiniteVector
+    covariance: FiniteMatrix
 
     def __post_init__(self) -> None:
-        mean, covariance = float_array("mean", self.mean, 1), float_array("covariance", self.covariance, 2)
+        mean, covariance = self.mean, self.covariance
         if covariance.shape != (mean.size, mean.size):
             raise InputError(
                 "covariance",
@@ -89,8 +97,6 @@ class GaussianResponses:
             )
         if np.abs(covariance - covariance.T).max(initial=0.0) > 1e-9 * np.abs(covariance).max(initial=0.0):
             raise InputError("covariance", "must be symmetric", remedy="the two halves differ")
-        object.__setattr__(self, "mean", mean)
-        object.__setattr__(self, "covariance", covariance)
         self.factor  # noqa: B018
 
     @cached_property
@@ -116,7 +122,7 @@ class GaussianResponses:
         volume = np.log(np.diagonal(self.factor)).sum() + 0.5 * self.n_receptors * np.log(2.0 * np.pi)
         return -0.5 * distance - volume
 
-    def draw(self, seed: int, trials: IntArray) -> FloatArray:
+    def draw(self, seed: Whole, trials: IntArray) -> FloatArray:
         """Sample responses (n_trials, n_receptors) with the random numbers of these trials."""
         draws = normals(seed, trials, self.n_receptors, Purpose.RESPONSE, 1)[..., 0]
         return self.mean + draws @ self.factor.T
@@ -185,7 +191,7 @@ class Discriminability:
     d_prime_error: float
 
 
-@known_keywords
+@checked
 def discriminability(standard: ArrayLike, comparison: ArrayLike) -> Discriminability:
     """Compare the values of an observer's statistic for two stimuli, all pairs.
 
@@ -257,9 +263,13 @@ class Presentation:
         return discriminability(sign * first, sign * second)
 
 
-@known_keywords
+@checked
 def present(
-    standard: ResponseModel, comparison: ResponseModel, seed: int, n_trials: int = 4000, session: int = 0
+    standard: ResponseModel,
+    comparison: ResponseModel,
+    seed: Whole,
+    n_trials: Whole = 4000,
+    session: Whole = 0,
 ) -> Presentation:
     """Simulate responses to two stimuli, with the log likelihood ratio of the ideal observer.
 
@@ -294,7 +304,7 @@ def present(
     return Presentation(first, second, ratios[0], ratios[1], seed)
 
 
-@known_keywords
+@checked
 def efficiency(code: Discriminability, ideal: Discriminability) -> tuple[float, float]:
     """Return (d'_code / d'_ideal)^2 and its standard error.
 

@@ -18,8 +18,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import digamma
 
-from fingerpad.core.checks import FloatArray
 from fingerpad.core.errors import ConvergenceError
+from fingerpad.core.values import FloatArray
 from fingerpad.psychophysics.functions import SMALLEST_OVERDISPERSION, Sigmoid, log_probability
 
 PARAMETERS = ("threshold", "width", "guess", "lapse", "overdispersion")

@@ -10,8 +10,8 @@ from numpy.typing import ArrayLike
 from scipy.optimize import minimize_scalar
 from scipy.special import ndtr
 
-from fingerpad.core.checks import FloatArray, finite, float_array, positive
 from fingerpad.core.errors import ConvergenceError, InputError
+from fingerpad.core.values import FloatArray, finite, float_array, positive
 from fingerpad.data import psychophysics
 from fingerpad.psychophysics.discrimination import (
     checked_responses,

@@ -13,11 +13,11 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from fingerpad.core.checks import FloatArray, IntArray, not_negative, positive, whole
 from fingerpad.core.errors import InputError
 from fingerpad.core.philox import four_normals
 from fingerpad.core.random_streams import LARGEST_SEED, Purpose, normals
 from fingerpad.core.threads import in_blocks
+from fingerpad.core.values import FloatArray, IntArray, not_negative, positive, whole
 
 TRIALS_PER_SESSION = 2**32  # Trials of one session. Sessions of one seed share no random number.
 

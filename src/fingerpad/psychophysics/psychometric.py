@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from fingerpad.core.checks import FloatArray, finite, one_of
+from fingerpad.core.checked import checked, value_class
 from fingerpad.core.displayed import Result
 from fingerpad.core.errors import ConvergenceError, InputError
-from fingerpad.core.keywords import known_keywords
+from fingerpad.core.values import Finite, FloatArray, choice, finite
 from fingerpad.psychophysics.functions import (
     SIGMOIDS,
     SMALLEST_OVERDISPERSION,
@@ -37,7 +37,7 @@ NARROWEST, WIDEST = 0.5, 5.0
 """Bounds of the width: times the smallest distance between levels, and times their span."""
 
 
-@dataclass(frozen=True, repr=False)
+@value_class
 class PsychometricFit(Result):
     """A psychometric function fitted to counts.
 
@@ -57,8 +57,8 @@ class PsychometricFit(Result):
 
     counts: JudgementCounts
     function: PsychometricFunction
-    overdispersion: float
-    log_likelihood: float
+    overdispersion: Finite
+    log_likelihood: Finite
     model: Model
 
     def __repr__(self) -> str:
@@ -114,27 +114,27 @@ class PsychometricFit(Result):
         """Proportion correct (n_levels,) at any levels; see `PsychometricFunction.predict`."""
         return self.function.predict(levels)
 
-    def threshold(self, proportion_correct: float | None = None) -> float:
+    def threshold(self, proportion_correct: Finite | None = None) -> float:
         """Level at which a proportion of judgements is correct; see `PsychometricFunction.level_at`."""
         return self.function.level_at(proportion_correct)
 
-    def slope(self, proportion_correct: float | None = None) -> float:
+    def slope(self, proportion_correct: Finite | None = None) -> float:
         """Slope of the proportion there, per unit of the level; see `PsychometricFunction.slope`."""
         return self.function.slope(proportion_correct)
 
 
-@known_keywords
+@checked
 def fit_psychometric(
     levels: ArrayLike,
     n_correct: ArrayLike,
     n_trials: ArrayLike,
     *,
-    sigmoid: str = "normal",
-    guess: float | None = 0.5,
-    lapse: float | None = None,
-    threshold: float | None = None,
-    width: float | None = None,
-    overdispersion: float | None = 0.0,
+    sigmoid: Annotated[str, choice(SIGMOIDS)] = "normal",
+    guess: Finite | None = 0.5,
+    lapse: Finite | None = None,
+    threshold: Finite | None = None,
+    width: Finite | None = None,
+    overdispersion: Finite | None = 0.0,
 ) -> PsychometricFit:
     """Fit a psychometric function to counted judgements by maximum likelihood.
 
@@ -176,7 +176,6 @@ def fit_psychometric(
     >>> round(more_curved.threshold(0.5)), more_curved.free
     (287, ('threshold', 'width'))
     """
-    one_of("sigmoid", sigmoid, SIGMOIDS)
     counts = JudgementCounts(checked_levels(levels, sigmoid), n_correct, n_trials)  # type: ignore[arg-type]
     given = _given(sigmoid, threshold, width, guess, lapse, overdispersion)
     model = _model(counts, sigmoid, given)

@@ -29,9 +29,9 @@ import numpy as np
 from scipy.optimize import brentq
 from scipy.special import ndtr, ndtri
 
-from fingerpad.core.checks import finite, not_negative, one_of, positive, whole
+from fingerpad.core.checked import checked
 from fingerpad.core.errors import InputError
-from fingerpad.core.keywords import known_keywords
+from fingerpad.core.values import Finite, finite, not_negative, one_of, positive, whole
 
 CORRECTIONS = ("log-linear", "half", "none")
 
@@ -212,8 +212,10 @@ TASKS: dict[str, Callable[[float], float]] = {
 """Proportion correct of d', by the name of the task."""
 
 
-@known_keywords
-def d_prime_of_proportion(proportion_correct: float, task: Callable[[float], float] = forced_choice) -> float:
+@checked
+def d_prime_of_proportion(
+    proportion_correct: Finite, task: Callable[[float], float] = forced_choice
+) -> float:
     """Return the d' for which a task has a proportion correct. [standard deviations]
 
     Parameters

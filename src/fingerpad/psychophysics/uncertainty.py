@@ -24,9 +24,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from fingerpad.core.checks import FloatArray, finite, float_array, instance, one_of, whole
 from fingerpad.core.errors import ConvergenceError, InputError
 from fingerpad.core.random_streams import Purpose, uniforms
+from fingerpad.core.values import FloatArray, finite, float_array, instance, one_of, whole
 from fingerpad.psychophysics.functions import (
     SIGMOIDS,
     Sigmoid,

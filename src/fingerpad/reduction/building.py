@@ -17,11 +17,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from fingerpad.core.checks import FloatArray, instance, whole
+from fingerpad.core.checked import checked
 from fingerpad.core.errors import InputError
-from fingerpad.core.keywords import known_keywords
 from fingerpad.core.random_streams import published_generator
 from fingerpad.core.signals import STORED_ENERGY
+from fingerpad.core.values import FloatArray, NotNegativeWhole, Whole, whole
 from fingerpad.data.neuron import HUMAN_QUANTITY
 from fingerpad.geometry.trajectory import Trajectory
 from fingerpad.reduction.model import ReducedModel, fitted_model
@@ -42,13 +42,13 @@ Solve = Callable[[Sequence[Touch], str], list[SkinResponse]]
 """Solves touches of a named stage, in their order."""
 
 
-@known_keywords
+@checked
 def reduce_touch(
     training: ReducedTraining,
     solve: Solve | None = None,
     quantities: Sequence[str] = (HUMAN_QUANTITY, STORED_ENERGY),
-    calibration: int = 20,
-    seed: int = 1,
+    calibration: Whole = 20,
+    seed: NotNegativeWhole = 1,
 ) -> ReducedModel:
     """Make a reduced touch from full presses.
 
@@ -82,8 +82,6 @@ def reduce_touch(
     >>> print(f"{sample.force_mn:.0f} mN")
     22 mN
     """
-    instance("training", training, ReducedTraining)
-    whole("seed", seed, at_least=0)
     if not quantities:
         raise InputError("quantities", "must name at least one quantity", "none")
     if whole("calibration", calibration, at_least=0) and calibration < FEWEST_CALIBRATED:

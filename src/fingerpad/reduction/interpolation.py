@@ -8,16 +8,15 @@ s_j = (1 - cos(pi j / n)) / 2 (Trefethen, Approximation Theory and Approximation
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import cache, cached_property
 
 import numpy as np
 from numba import njit
 from numpy.typing import ArrayLike
 
-from fingerpad.core.checks import FloatArray, finite, whole
+from fingerpad.core.checked import value_class
 from fingerpad.core.errors import InputError
-from fingerpad.core.values import converted
+from fingerpad.core.values import Finite, FloatArray, Whole, finite, whole
 
 
 @cache
@@ -51,15 +50,14 @@ def weighted(weights: FloatArray, values: FloatArray) -> FloatArray:
     return np.asarray((weights @ values.reshape(weights.size, -1)).reshape(values.shape[1:]))
 
 
-@dataclass(frozen=True)
-@converted
+@value_class
 class Axis:
     """One quantity that varies over the range of a reduced touch."""
 
     name: str  # "x_mm", "z_mm", "tilt_deg", or a parameter of the indenter.
-    low: float
-    high: float  # Its range; equal if it does not vary.
-    count: int  # Number of Chebyshev's points, 1 if it does not vary.
+    low: Finite
+    high: Finite  # Its range; equal if it does not vary.
+    count: Whole  # Number of Chebyshev's points, 1 if it does not vary.
 
     def __post_init__(self) -> None:
         finite(f"low of {self.name}", self.low)
@@ -82,7 +80,7 @@ class Axis:
         """Values at Chebyshev's points."""
         return self.low + (self.high - self.low) * self.points
 
-    def weights(self, value: float) -> FloatArray:
+    def weights(self, value: Finite) -> FloatArray:
         """Weights of the points at a value, (count,)."""
         # Sums of positions differ in the last digits.
         slack = 1e-9 * max(1.0, abs(self.low), abs(self.high))

@@ -13,18 +13,18 @@ import hashlib
 import io
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from functools import cached_property
 from pathlib import Path
 from typing import cast
 
 import numpy as np
 
-from fingerpad.core.checks import FloatArray, instance
+from fingerpad.core.checked import checked, value_class
 from fingerpad.core.errors import InputError
 from fingerpad.core.files import check_file, path_of, write_atomically
-from fingerpad.core.keywords import KnownKeywords, known_keywords
 from fingerpad.core.signals import STORED_ENERGY
+from fingerpad.core.values import Finite, FloatArray, Many, Pair
 from fingerpad.geometry.fingertip import Fingertip
 from fingerpad.reduction.interpolation import Axis, chebyshev_points, lagrange
 from fingerpad.reduction.relaxation import LEVELS, filtered, levels_mm, slope_changes
@@ -52,8 +52,8 @@ def depth_basis(depth_mm: FloatArray, deepest_mm: float, degree: int) -> FloatAr
     return lagrange(chebyshev_points(degree + 1), share)[..., 1:] * (np.asarray(depth_mm) > 0.0)[..., None]
 
 
-@dataclass(frozen=True, repr=False)
-class ReducedModel(metaclass=KnownKeywords):
+@value_class
+class ReducedModel:
     """What a reduced touch is evaluated from.
 
     Parameters
@@ -92,11 +92,11 @@ class ReducedModel(metaclass=KnownKeywords):
         What was pressed: for people, and to refuse another finger.
     """
 
-    axes: tuple[Axis, ...]
-    depth_mm: float
-    at_mm: tuple[float, float]
+    axes: Many[Axis]
+    depth_mm: Finite
+    at_mm: Pair
     times_ms: FloatArray
-    quantities: tuple[str, ...]
+    quantities: Many[str]
     first_touch_mm: FloatArray
     middle_mm: FloatArray
     totals: FloatArray
@@ -160,7 +160,7 @@ class ReducedModel(metaclass=KnownKeywords):
         )
         return once, relaxed
 
-    def terms(self, depth_mm: float, behind_mm: FloatArray) -> FloatArray:
+    def terms(self, depth_mm: Finite, behind_mm: FloatArray) -> FloatArray:
         """Factors of the terms of the response at once and of each branch.
 
         Parameters
@@ -330,7 +330,7 @@ ARRAYS = (
 )
 
 
-@known_keywords
+@checked
 def write_reduced(model: ReducedModel, path: str | Path) -> None:
     """Write a reduced touch, as a whole or not at all.
 
@@ -339,7 +339,6 @@ def write_reduced(model: ReducedModel, path: str | Path) -> None:
     StoreError
         If the file cannot be written.
     """
-    instance("model", model, ReducedModel)
     head = {
         "format": FORMAT,
         "version": VERSION,
@@ -361,7 +360,7 @@ def write_reduced(model: ReducedModel, path: str | Path) -> None:
     write_atomically(path_of("path", path), buffer.getvalue())
 
 
-@known_keywords
+@checked
 def read_reduced(path: str | Path, touch: Touch | None = None) -> ReducedModel:
     """Read a reduced touch.
 
@@ -372,8 +371,6 @@ def read_reduced(path: str | Path, touch: Touch | None = None) -> ReducedModel:
     touch : Touch, optional
         If given, its finger and tissues must be those of the file.
     """
-    if touch is not None:
-        instance("touch", touch, Touch)
     source = check_file(path_of("path", path), LARGEST_MB)
     try:
         with source.open("rb") as opened, np.load(opened, allow_pickle=False) as file:

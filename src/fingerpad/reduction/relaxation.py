@@ -34,7 +34,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fingerpad.core.checks import FloatArray
+from fingerpad.core.values import FloatArray
 
 
 def filter_step(step_ms: float, times_ms: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:

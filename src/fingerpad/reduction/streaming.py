@@ -15,11 +15,11 @@ from numba import njit
 from numpy.typing import ArrayLike
 from scipy.optimize import brentq
 
-from fingerpad.core.checks import FloatArray, finite, float_array, instance, not_negative
+from fingerpad.core.checked import checked_class, value_class
 from fingerpad.core.displayed import Result
 from fingerpad.core.errors import InputError
-from fingerpad.core.keywords import KnownKeywords
 from fingerpad.core.units import with_unit
+from fingerpad.core.values import Finite, FloatArray, finite, float_array, not_negative
 from fingerpad.reduction.interpolation import weighted
 from fingerpad.reduction.model import GRID_POINTS, ReducedModel
 from fingerpad.reduction.relaxation import Springs, amplitudes, depth_scale, filter_step, lost
@@ -34,7 +34,7 @@ LEAST_APART_MM = 1e-3
 """Distance of the first two depths of the secant method where the last step was shorter. [mm]"""
 
 
-@dataclass(frozen=True)
+@value_class
 class ReducedSample(Result):
     """A touch at one time.
 
@@ -56,12 +56,12 @@ class ReducedSample(Result):
         The same of each quantity, at all receptors. [its unit]
     """
 
-    time_ms: float
-    depth_mm: float
-    force_mn: float
-    contact_area_mm2: float
+    time_ms: Finite
+    depth_mm: Finite
+    force_mn: Finite
+    contact_area_mm2: Finite
     fields: dict[str, FloatArray]
-    force_error_mn: float
+    force_error_mn: Finite
     field_errors: dict[str, float]
 
     def __repr__(self) -> str:
@@ -75,7 +75,8 @@ class ReducedSample(Result):
         )
 
 
-class ReducedTouch(metaclass=KnownKeywords):
+@checked_class
+class ReducedTouch:
     """State of a touch that is evaluated sample by sample.
 
     Parameters
@@ -88,8 +89,7 @@ class ReducedTouch(metaclass=KnownKeywords):
         The parameter of the indenter, if the model has one.
     """
 
-    def __init__(self, model: ReducedModel, receptors_mm: ArrayLike, parameter: float | None = None):
-        instance("model", model, ReducedModel)
+    def __init__(self, model: ReducedModel, receptors_mm: ArrayLike, parameter: Finite | None = None):
         receptors = float_array("receptors_mm", receptors_mm, 2)
         if receptors.shape[1] != 2:
             raise InputError("receptors_mm", "needs columns x and z in mm", f"shape {receptors.shape}")
@@ -116,12 +116,12 @@ class ReducedTouch(metaclass=KnownKeywords):
 
     def step(
         self,
-        time_ms: float,
-        depth_mm: float | None = None,
-        force_mn: float | None = None,
-        x_mm: float = 0.0,
-        z_mm: float = 0.0,
-        tilt_deg: float = 0.0,
+        time_ms: Finite,
+        depth_mm: Finite | None = None,
+        force_mn: Finite | None = None,
+        x_mm: Finite = 0.0,
+        z_mm: Finite = 0.0,
+        tilt_deg: Finite = 0.0,
     ) -> ReducedSample:
         """Go to a later time and pose, along a straight way, and return what is at the receptors then.
 
@@ -163,7 +163,7 @@ class ReducedTouch(metaclass=KnownKeywords):
             step_ms=step_ms,
         )
         if force_mn is None:
-            below_mm = finite("depth_mm", depth_mm, "mm") - first_mm  # type: ignore[arg-type]
+            below_mm = finite("depth_mm", depth_mm, "mm") - first_mm
         else:
             wanted_mn = not_negative("force_mn", force_mn, "mN")
             below_mm = press.depth_of(wanted_mn, self._below_mm, self._further_mm)

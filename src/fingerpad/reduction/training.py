@@ -11,15 +11,14 @@ import itertools
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, cast
+from typing import Annotated, Any, cast
 
 import numpy as np
 from scipy.optimize import brentq
 
-from fingerpad.core.checks import finite, instance, one_of, positive
+from fingerpad.core.checked import value_class
 from fingerpad.core.errors import InputError
-from fingerpad.core.keywords import KnownKeywords
-from fingerpad.core.values import converted
+from fingerpad.core.values import Pair, Positive, choice, finite, instance
 from fingerpad.geometry.fingertip import Fingertip
 from fingerpad.geometry.grading import RESOLUTIONS
 from fingerpad.geometry.indenter_grading import grading_along
@@ -55,9 +54,8 @@ MOST_FIXED_POINTS = 30
 FEWEST_POINTS = 3  # Least number of points along an axis that varies.
 
 
-@dataclass(frozen=True)
-@converted
-class ReducedRange(metaclass=KnownKeywords):
+@value_class
+class ReducedRange:
     """Poses that a reduced touch serves.
 
     Parameters
@@ -79,15 +77,14 @@ class ReducedRange(metaclass=KnownKeywords):
     ['x_mm']
     """
 
-    depth_mm: float
-    x_mm: tuple[float, float] = (0.0, 0.0)
-    z_mm: tuple[float, float] = (0.0, 0.0)
-    tilt_deg: tuple[float, float] = (0.0, 0.0)
+    depth_mm: Positive
+    x_mm: Pair = (0.0, 0.0)
+    z_mm: Pair = (0.0, 0.0)
+    tilt_deg: Pair = (0.0, 0.0)
     parameter: str | None = None
-    values: tuple[float, float] | None = None
+    values: Pair | None = None
 
     def __post_init__(self) -> None:
-        positive("depth_mm", self.depth_mm, "mm")
         for name in SPACING:
             low, high = _pair(name, getattr(self, name))
             if not low <= 0.0 <= high:
@@ -140,9 +137,8 @@ class TrainingPose:
     touches: tuple[Touch, ...]  # One per depth.
 
 
-@dataclass(frozen=True)
-@converted
-class ReducedTraining(metaclass=KnownKeywords):
+@value_class
+class ReducedTraining:
     """All presses behind a reduced touch.
 
     Parameters
@@ -157,12 +153,10 @@ class ReducedTraining(metaclass=KnownKeywords):
 
     touch: Touch
     range: ReducedRange
-    resolution: str = "quick"
+    resolution: Annotated[str, choice(RESOLUTIONS)] = "quick"
 
     def __post_init__(self) -> None:
         touch = instance("touch", self.touch, Touch)
-        instance("range", self.range, ReducedRange)
-        one_of("resolution", self.resolution, RESOLUTIONS)
         if not isinstance(touch.finger, Fingertip):
             raise InputError(
                 "finger", "must be a Fingertip to be reduced", f"a {type(touch.finger).__name__}"

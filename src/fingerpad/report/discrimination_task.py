@@ -11,7 +11,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from fingerpad.core.checks import FloatArray
+from fingerpad.core.values import FloatArray
 from fingerpad.experiments.discrimination.analysis import Decoding, ForcedChoice, TaskResult
 from fingerpad.experiments.discrimination.decoding import SideCurve
 from fingerpad.experiments.discrimination.run import DiscriminationFile

@@ -13,11 +13,11 @@ from matplotlib.axes import Axes
 from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 
-from fingerpad.core.checks import FloatArray, one_of
 from fingerpad.core.displayed import Displayed
 from fingerpad.core.errors import InputError
 from fingerpad.core.signals import COUNT, CURRENT, HitRates, ResponseMap, SpikeTrains, Traces
 from fingerpad.core.units import with_unit
+from fingerpad.core.values import FloatArray, one_of
 from fingerpad.experiments.discrimination.analysis import TaskResult
 from fingerpad.experiments.fit.results import FitResult
 from fingerpad.report.discrimination_task import draw_curves_of_measure, main_decoding

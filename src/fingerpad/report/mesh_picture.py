@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 
-from fingerpad.core.checks import FloatArray
+from fingerpad.core.values import FloatArray
 from fingerpad.experiments.gerling2014.three_levels import MeshPicture, MeshPlane
 from fingerpad.report.formatting import number
 from fingerpad.report.style import BLACK, new_figure

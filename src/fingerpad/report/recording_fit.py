@@ -10,9 +10,9 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from fingerpad.core.checks import FloatArray
-from fingerpad.core.keywords import known_keywords
+from fingerpad.core.checked import checked
 from fingerpad.core.signals import STORED_ENERGY
+from fingerpad.core.values import FloatArray
 from fingerpad.experiments.fit.results import FitResult, OffsetFit, PhaseRates, SpikeFitSummary
 from fingerpad.experiments.fit.session import FitFile
 from fingerpad.report.formatting import (
@@ -143,7 +143,7 @@ def _chapters(found: FitResult) -> list[Chapter]:
     return chapters
 
 
-@known_keywords
+@checked
 def write_fit_page(results: FitFile, folder: Path) -> Path:
     """Write the page of a fit from `run_fit`, `fit.html`, and its figures; return its path."""
     page = Page(

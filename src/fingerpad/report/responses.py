@@ -14,10 +14,10 @@ from matplotlib.colors import LogNorm, Normalize
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 
-from fingerpad.core.checks import FloatArray
+from fingerpad.core.checked import checked
 from fingerpad.core.errors import InputError
-from fingerpad.core.keywords import known_keywords
 from fingerpad.core.signals import ResponseMap
+from fingerpad.core.values import FloatArray
 from fingerpad.data import protocol
 from fingerpad.experiments.gerling2014.three_levels import PopulationMaps
 from fingerpad.report.formatting import number
@@ -44,7 +44,7 @@ LARGEST_MARK, SILENT_MARK = 60.0, 4.0  # Areas: most active afferent of a type, 
 ROW_DRAWN = 0.85  # Length of the mark of a spike, over the height of the row of its afferent.
 
 
-@known_keywords
+@checked
 def draw_mixed_responses(touches: Mapping[str, Mapping[str, ResponseMap]]) -> Figure:
     """Draw the responses to touches, one per row: all spikes over time, and where the afferents lie.
 

@@ -11,7 +11,7 @@ from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.colors import LogNorm, Normalize
 from matplotlib.figure import Figure
 
-from fingerpad.core.checks import FloatArray
+from fingerpad.core.values import FloatArray
 from fingerpad.data import protocol
 from fingerpad.experiments.gerling2014.nail_border import NailBorder, StressProfile
 from fingerpad.experiments.gerling2014.skin_deflection import (

@@ -15,9 +15,9 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.text import Text
 
-from fingerpad.core.checks import FloatArray
+from fingerpad.core.checked import checked
 from fingerpad.core.files import path_of, write_atomically
-from fingerpad.core.keywords import known_keywords
+from fingerpad.core.values import FloatArray
 
 RESOLUTION_DPI = 150
 COLUMN_IN = 6.4  # Width of a figure of one set of tissues; two of them stand side by side. [in]
@@ -91,7 +91,7 @@ def png(draw: Callable[..., Figure], *parts: Any) -> bytes:
     return buffer.getvalue()
 
 
-@known_keywords
+@checked
 def write_png(draw: Callable[[Any], Figure], section: Any, path: Path) -> Path:
     """Write what `draw` makes of a section of the results, or of results of your own, as PNG.
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 from textwrap import fill
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any, Protocol, runtime_checkable
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -12,12 +12,12 @@ from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.colors import LinearSegmentedColormap, LogNorm
 from matplotlib.figure import Figure
 
-from fingerpad.core.checks import FloatArray, instance
+from fingerpad.core.checked import checked
 from fingerpad.core.errors import InputError
 from fingerpad.core.files import path_of
-from fingerpad.core.keywords import known_keywords
 from fingerpad.core.signals import STORED_ENERGY, ResponseMap
 from fingerpad.core.units import cosine_and_sine
+from fingerpad.core.values import FloatArray, instance
 from fingerpad.report.responses import draw_raster_by_type, draw_trains
 from fingerpad.report.style import BLACK, BLUE, ORANGE, new_figure, say_nothing_to_draw, write_png
 
@@ -82,6 +82,7 @@ BONE, BONE_INSIDE = "#9a9488", "#d9dde0"
 """Colours of the outline of bone and nail, and of the bone itself, unlike any of `SKIN` and the paper."""
 
 
+@runtime_checkable
 class Joinable(Protocol):
     """A response of several types of afferents, such as a `MixedResponse`."""
 
@@ -91,7 +92,7 @@ class Joinable(Protocol):
         ...
 
 
-@known_keywords
+@checked
 def save_figure(
     path: str | Path, skin: SkinResponse, response: ResponseMap | Joinable, indenter: Indenter | None = None
 ) -> Path:
@@ -124,16 +125,10 @@ def save_figure(
     >>> fp.save_figure(Path(mkdtemp()) / "touch.png", skin, response, sphere).name
     'touch.png'
     """
-    from fingerpad.geometry.indenters import Indenter
-    from fingerpad.skin.sampling import SkinResponse
-
     file = path_of("path", path)
     if file.suffix.lower() != ".png":
         raise InputError(f"A figure is written as .png: got {file.name}.")
-    instance("skin", skin, SkinResponse)
     answer = instance("response", getattr(response, "joined", response), ResponseMap)
-    if indenter is not None:
-        instance("indenter", indenter, Indenter)
     return write_png(lambda parts: draw(*parts), (skin, answer, indenter), file)
 
 

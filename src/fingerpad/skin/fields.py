@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 
 # Only for types: the command line reads the names of the quantities here, without compiling anything.
 if TYPE_CHECKING:
-    from fingerpad.core.checks import FloatArray
+    from fingerpad.core.values import FloatArray
     from fingerpad.geometry.mesh import Mesh
     from fingerpad.mechanics.press import Deformation
 

@@ -13,8 +13,8 @@ from functools import cached_property
 import numpy as np
 from scipy.spatial import cKDTree
 
-from fingerpad.core.checks import FloatArray, IntArray
 from fingerpad.core.errors import InputError
+from fingerpad.core.values import FloatArray, IntArray
 from fingerpad.geometry.free_mesh import FreeMesh
 
 _NEIGHBOURS = 25

@@ -3,24 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import field, replace
 from functools import cached_property, lru_cache
 from itertools import pairwise
-from typing import Any, cast
+from typing import Annotated, Any, cast
 
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy.optimize import brentq
 from threadpoolctl import threadpool_limits
 
-from fingerpad.core.checks import FloatArray, finite, instance, one_of, pair
+from fingerpad.core.checked import checked, value_class
 from fingerpad.core.compilation import announce_compilation
 from fingerpad.core.errors import InputError, shown
-from fingerpad.core.keywords import KnownKeywords, known_keywords
 from fingerpad.core.phases import from_onset
 from fingerpad.core.progress import NoProgress, Progress
 from fingerpad.core.threads import compiled_threads
-from fingerpad.core.values import converted
+from fingerpad.core.values import Finite, Flag, FloatArray, Pair, Whole, choice, finite, instance, pair
 from fingerpad.data import fingertip as published
 from fingerpad.data.tissues import DEFAULT_TISSUES
 from fingerpad.geometry.fingertip import Finger, Fingertip
@@ -50,9 +49,8 @@ LOOKS_FOR_TOUCH = 8  # Times per sample of a motion aside at which first touch i
 FEWEST_ACROSS_BODY = 3  # Least number of elements across a body that is narrow along and across the finger.
 
 
-@dataclass(frozen=True)
-@converted
-class Touch(metaclass=KnownKeywords):
+@value_class
+class Touch:
     """Everything that determines one indentation; its value is the key of the stored result.
 
     Parameters
@@ -104,11 +102,11 @@ class Touch(metaclass=KnownKeywords):
     tissues: Tissues
     grading: Grading
     settings: PressSettings = field(default_factory=PressSettings)
-    at_mm: tuple[float, float] = None  # type: ignore[assignment]  # a pair after initialisation
-    tilt_deg: float = 0.0
-    friction: float = 0.0
-    spin_deg: float = 0.0
-    whole: bool = field(default=False, compare=False, repr=False)
+    at_mm: Pair = None  # type: ignore[assignment]  # a pair after initialisation
+    tilt_deg: Finite = 0.0
+    friction: Finite = 0.0
+    spin_deg: Finite = 0.0
+    whole: Flag = field(default=False, compare=False, repr=False)
     progress: Progress | None = field(default=None, compare=False, repr=False)
 
     def __post_init__(self) -> None:
@@ -198,7 +196,7 @@ class Touch(metaclass=KnownKeywords):
                 "leave grading out or take grading_about(...)",
             )
 
-    def solve(self, threads: int | None = None, whole: bool | None = None) -> SkinResponse:
+    def solve(self, threads: Whole | None = None, whole: Flag | None = None) -> SkinResponse:
         """Solve the indentation and return the response of the skin.
 
         Parameters
@@ -309,32 +307,29 @@ def _mesh(finger: Finger, grading: Grading) -> Mesh:
     return finger_mesh(cast(Fingertip, finger), grading)
 
 
-@known_keywords
+@checked
 def touch_of(
     finger: Finger,
     indenter: Indenter,
     stimulus: Stimulus | None = None,
     tissues: str | Tissues = DEFAULT_TISSUES,
-    resolution: str = "quick",
+    resolution: Annotated[str, choice(RESOLUTIONS)] = "quick",
     at_mm: Sequence[float] | None = None,
     *,
-    tilt_deg: float = 0.0,
-    spin_deg: float = 0.0,
-    friction: float = 0.0,
+    tilt_deg: Finite = 0.0,
+    spin_deg: Finite = 0.0,
+    friction: Finite = 0.0,
     grading: Grading | None = None,
     settings: PressSettings | None = None,
     times_ms: Sequence[float] = (),
-    whole: bool = False,
+    whole: Flag = False,
     progress: Progress | None = None,
 ) -> Touch:
     """Describe a touch without solving it: `indent` takes the same arguments and solves it."""
-    one_of("resolution", resolution, RESOLUTIONS)
     x, z = _position(at_mm, instance("finger", finger, Finger))
     stimulus = instance("stimulus", stimulus or RampAndHold(), Motion)
     # The grading depends on this point, so finger, indenter and point are checked first.
     check_path(finger, stimulus, (x, z))
-    instance("indenter", indenter, Indenter)
-    finite("spin_deg", spin_deg, "degrees")
     settings = settings or settings_of(resolution)
     return Touch(
         finger=finger,
@@ -354,7 +349,7 @@ def touch_of(
     )
 
 
-@known_keywords
+@checked
 def indent(
     finger: Finger,
     indenter: Indenter,
@@ -363,13 +358,13 @@ def indent(
     resolution: str = "quick",
     at_mm: Sequence[float] | None = None,
     *,
-    tilt_deg: float = 0.0,
-    spin_deg: float = 0.0,
-    friction: float = 0.0,
+    tilt_deg: Finite = 0.0,
+    spin_deg: Finite = 0.0,
+    friction: Finite = 0.0,
     grading: Grading | None = None,
     settings: PressSettings | None = None,
     times_ms: Sequence[float] = (),
-    whole: bool = False,
+    whole: Flag = False,
     progress: Progress | None = None,
 ) -> SkinResponse:
     """Press an indenter into a finger and return the response of the skin.

@@ -13,18 +13,17 @@ Rows of receptors along the edge are rows of the plane.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import field
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from fingerpad.core.checks import FloatArray, float_array, instance, positive, whole
+from fingerpad.core.checked import value_class
 from fingerpad.core.errors import InputError
-from fingerpad.core.keywords import KnownKeywords
 from fingerpad.core.layouts import Layout, mean_spacing_mm
 from fingerpad.core.regions import Polygon
-from fingerpad.core.values import converted
+from fingerpad.core.values import Finite, FloatArray, Positive, Whole, float_array, positive, whole
 from fingerpad.geometry.fingertip import Fingertip
 
 REACH_MM = 4.0  # Largest distance from the nail of the unrolled skin. [mm]
@@ -34,9 +33,8 @@ _FAN_LINES = 48
 _ROUND_OFF_MM = 1e-6
 
 
-@dataclass(frozen=True)
-@converted
-class NailEdge(metaclass=KnownKeywords):
+@value_class
+class NailEdge:
     """The plane of the skin around a finger's nail.
 
     Parameters
@@ -57,11 +55,9 @@ class NailEdge(metaclass=KnownKeywords):
     """
 
     finger: Fingertip = field(default_factory=Fingertip)
-    reach_mm: float = REACH_MM
+    reach_mm: Positive = REACH_MM
 
     def __post_init__(self) -> None:
-        instance("finger", self.finger, Fingertip)
-        positive("reach_mm", self.reach_mm, "mm")
         narrowest = float(np.min(self.finger.section(np.array(self.finger.nail_x_mm))[2]))
         if self.finger.nail_half_width_mm >= narrowest:
             raise InputError(
@@ -113,7 +109,7 @@ class NailEdge(metaclass=KnownKeywords):
         found[:, 2] = np.copysign(found[:, 2], places[:, 0])
         return found
 
-    def region(self, width_mm: float) -> Polygon:
+    def region(self, width_mm: Finite) -> Polygon:
         """Return a strip along the whole edge as a region of the plane.
 
         Parameters
@@ -125,7 +121,7 @@ class NailEdge(metaclass=KnownKeywords):
         side = np.stack([self.half_length_mm(distances), distances], axis=1)
         return Polygon(tuple(map(tuple, np.concatenate([side, side[::-1] * [-1.0, 1.0]]))))
 
-    def rows(self, count: int, density_per_cm2: float) -> Layout:
+    def rows(self, count: Whole, density_per_cm2: Finite) -> Layout:
         """Place receptors in rows along the edge, the first at half a pitch from it.
 
         Parameters

@@ -39,9 +39,9 @@ import numpy as np
 from numba import njit
 from scipy.spatial import cKDTree
 
-from fingerpad.core.checks import FloatArray, IntArray
 from fingerpad.core.errors import InputError
 from fingerpad.core.threads import current_threads, in_blocks
+from fingerpad.core.values import FloatArray, IntArray
 from fingerpad.geometry.mesh import Mesh
 
 Four = tuple[float, float, float, float]

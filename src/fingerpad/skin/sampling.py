@@ -4,19 +4,31 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property, lru_cache
-from typing import TYPE_CHECKING, Any, Protocol, cast
+from typing import TYPE_CHECKING, Annotated, Any, Protocol, cast, runtime_checkable
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 import fingerpad
-from fingerpad.core.checks import FloatArray, float_array, increasing, instance, one_of
+from fingerpad.core.checked import value_class
 from fingerpad.core.displayed import Result
 from fingerpad.core.errors import InputError
 from fingerpad.core.phases import Phase
 from fingerpad.core.signals import STORED_ENERGY, ResponseMap, Traces
+from fingerpad.core.values import (
+    Check,
+    Finite,
+    FiniteVector,
+    FloatArray,
+    Many,
+    Numbers,
+    Whole,
+    float_array,
+    increasing,
+    one_of,
+)
 from fingerpad.geometry.mesh import Mesh
 from fingerpad.geometry.motion import STILL, Pose
 from fingerpad.mechanics.tissues import name_of_tissues
@@ -31,11 +43,14 @@ if TYPE_CHECKING:
     from fingerpad.geometry.free_mesh import FreeMesh
     from fingerpad.mechanics.press import Deformation
     from fingerpad.skin.indentation import Touch
+else:  # both are set by a press alone, whose modules a stored touch does not need
+    Deformation = Touch = Any
 
 
 _PLACES_KEPT = 4  # Sets of sites whose end organs are remembered.
 
 
+@runtime_checkable
 class Receptors(Protocol):
     """Places of end organs in a mesh, and values there."""
 
@@ -57,7 +72,7 @@ class Receptors(Protocol):
         ...
 
 
-@dataclass(frozen=True)
+@value_class
 class SurfaceProfile(Result):
     """Deflection of the skin along the midline of the finger.
 
@@ -69,19 +84,16 @@ class SurfaceProfile(Result):
         Displacement along the direction of pressing, towards the bone positive. [mm]
     """
 
-    distance_mm: FloatArray
-    deflection_mm: FloatArray
+    distance_mm: Annotated[FloatArray, Check(increasing, {})]
+    deflection_mm: FiniteVector
 
     def __post_init__(self) -> None:
-        distance = increasing("distance_mm", float_array("distance_mm", self.distance_mm, 1))
-        deflection = float_array("deflection_mm", self.deflection_mm, 1)
+        distance, deflection = self.distance_mm, self.deflection_mm
         if not distance.size or distance.shape != deflection.shape:
             raise InputError(
                 "SurfaceProfile needs one deflection per distance: got "
                 f"{deflection.size} for {distance.size} distances."
             )
-        object.__setattr__(self, "distance_mm", distance)
-        object.__setattr__(self, "deflection_mm", deflection)
 
     def __repr__(self) -> str:
         return (
@@ -94,7 +106,7 @@ class SurfaceProfile(Result):
         return np.interp(np.asarray(distance_mm, dtype=float), self.distance_mm, self.deflection_mm)
 
 
-@dataclass(frozen=True, repr=False)
+@value_class
 class SkinResponse(Result):
     """Response of the skin to one indentation; the end of the mechanical half of the chain.
 
@@ -134,24 +146,23 @@ class SkinResponse(Result):
     """
 
     mesh: Mesh
-    kinks_ms: tuple[float, ...]
-    axis_x_mm: float
+    kinks_ms: Numbers
+    axis_x_mm: Finite
     direction: FloatArray
     fields: Mapping[str, FloatArray]
-    force_imbalance: float
-    energy_imbalance: float
-    penetration_mm: float
-    newton_steps: int
-    factorisations: int
+    force_imbalance: Finite
+    energy_imbalance: Finite
+    penetration_mm: Finite
+    newton_steps: Whole
+    factorisations: Whole
     linear_solver: str
     deformation: Deformation | None = None
-    phases: tuple[Phase, ...] = ()
+    phases: Many[Phase] = ()
     pose: Pose = STILL
     touch: Touch | None = None
-    onset_ms: float = 0.0
+    onset_ms: Finite = 0.0
 
     def __post_init__(self) -> None:
-        instance("fields", self.fields, Mapping)
         declared = {field.name: field for field in stored_fields()}
         for name, values in self.fields.items():
             shape = declared[one_of("field", name, tuple(declared))].shape(self.mesh, self.times_ms.size)
@@ -274,7 +285,7 @@ class SkinResponse(Result):
             return quantity.replace("_", " ").replace("mises", "Mises stress"), self.fields[last]
         return "strain energy density", self.sed_kpa[-1]
 
-    def surface_profile(self, time_index: int = -1) -> SurfaceProfile:
+    def surface_profile(self, time_index: Whole = -1) -> SurfaceProfile:
         """Deflection along the midline of the volar skin at one of `times_ms` (paper, section 2.2.1)."""
         row = np.searchsorted(self.mesh.skin_nodes, self.mesh.midline_nodes)
         distance = self.mesh.nodes_mm[self.mesh.midline_nodes, 0] - self.axis_x_mm

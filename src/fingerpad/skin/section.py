@@ -9,8 +9,8 @@ import numpy as np
 from scipy.sparse import csr_matrix
 from scipy.spatial import cKDTree
 
-from fingerpad.core.checks import FloatArray, IntArray
 from fingerpad.core.errors import InputError
+from fingerpad.core.values import FloatArray, IntArray
 from fingerpad.data.afferents import PC_REACH
 from fingerpad.geometry.mesh import Mesh
 

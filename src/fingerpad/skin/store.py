@@ -27,12 +27,12 @@ from uuid import uuid4
 
 import numpy as np
 
-from fingerpad.core.checks import instance
+from fingerpad.core.checked import checked, checked_class
 from fingerpad.core.engine import Engine, engine_of
 from fingerpad.core.errors import ConvergenceError, InputError, StoreError
 from fingerpad.core.files import check_file, path_of, write_atomically
-from fingerpad.core.keywords import KnownKeywords, known_keywords
 from fingerpad.core.logger import LOGGER
+from fingerpad.core.values import Whole, instance
 from fingerpad.mechanics.kernels import KERNELS
 from fingerpad.skin.code_hash import PACKAGE, code_hash
 from fingerpad.skin.fields import Place, stored_fields
@@ -108,7 +108,8 @@ def _plain(value: Any, name_of: Callable[[type], str], is_float: bool = False) -
     )
 
 
-class Store(metaclass=KnownKeywords):
+@checked_class
+class Store:
     """Folder of stored indentations.
 
     Parameters
@@ -299,10 +300,10 @@ def _compute(item: tuple[Path, Touch], threads: int | None = None) -> float:
     return time.perf_counter() - started
 
 
-@known_keywords
+@checked
 def solve_missing(
     missing: Mapping[Path, Touch],
-    jobs: int | Engine,
+    jobs: Whole | Engine,
     on_finished: Callable[[float], None] | None = None,
     on_failed: OnFailed | None = None,
 ) -> None:

@@ -23,11 +23,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.interpolate import CubicSpline
 
-from fingerpad.core.checks import FloatArray, finite, float_array, increasing, instance
+from fingerpad.core.checked import value_class
 from fingerpad.core.errors import InputError
-from fingerpad.core.keywords import KnownKeywords
 from fingerpad.core.regions import Polygon
-from fingerpad.core.values import converted
+from fingerpad.core.values import Finite, FloatArray, Pair, finite, float_array, increasing
 from fingerpad.data import fingertip as published
 from fingerpad.geometry.fingertip import Fingertip
 
@@ -84,9 +83,8 @@ class _Quarter:
         return phi
 
 
-@dataclass(frozen=True)
-@converted
-class UnrolledSkin(metaclass=KnownKeywords):
+@value_class
+class UnrolledSkin:
     """The plane of a finger's skin.
 
     Parameters
@@ -107,10 +105,9 @@ class UnrolledSkin(metaclass=KnownKeywords):
     """
 
     finger: Fingertip = field(default_factory=Fingertip)
-    origin_x_mm: float = None  # type: ignore[assignment]  # a number after initialisation
+    origin_x_mm: Finite = None  # type: ignore[assignment]  # a number after initialisation
 
     def __post_init__(self) -> None:
-        instance("finger", self.finger, Fingertip)
         if self.origin_x_mm is None:
             object.__setattr__(self, "origin_x_mm", self.finger.contact_mm[0])
         if not 0.0 < finite("origin_x_mm", self.origin_x_mm, "mm") < self.finger.length_mm:
@@ -175,7 +172,7 @@ class UnrolledSkin(metaclass=KnownKeywords):
         phi = np.arctan2(z / half_width, -y / np.where(y < 0.0, volar, dorsal))
         return np.stack([self._along(s), np.copysign(self._around(s, np.abs(phi)), phi)], axis=1)
 
-    def pad(self, x_mm: tuple[float, float] | None = None, faces_deg: float = PAD_FACES_DEG) -> Polygon:
+    def pad(self, x_mm: Pair | None = None, faces_deg: Finite = PAD_FACES_DEG) -> Polygon:
         """Return the pad as a region of the plane.
 
         Parameters

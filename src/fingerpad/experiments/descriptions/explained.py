@@ -8,12 +8,15 @@ import textwrap
 from itertools import pairwise
 from typing import Any
 
+from docstring_parser import DocstringStyle, parse
 from pydantic import BaseModel
 
-from fingerpad.core.results import JsonSchema
+from fingerpad.core.checked import other_names
+from fingerpad.core.units import unit_of
+from fingerpad.core.values import JsonSchema
 from fingerpad.experiments.descriptions.pressing import MEASURED, RAMP_AND_HOLD
 from fingerpad.experiments.descriptions.reading import parts_in
-from fingerpad.experiments.descriptions.signatures import UNKNOWN_MODEL, described
+from fingerpad.experiments.descriptions.signatures import UNKNOWN_MODEL, Made
 from fingerpad.experiments.descriptions.values import Part
 
 
@@ -28,7 +31,10 @@ def explained_schema(kind: type[Part]) -> JsonSchema:
         told: dict[str, str] = {}
         for home in reversed(part.__mro__):
             if issubclass(home, Part):
-                told |= described(home.__doc__ or "") | _written_beside(home)
+                told |= _of_parameters(home) | _written_beside(home)
+        if issubclass(part, Made) and part is not Made:
+            told |= _of_other_names(part.makes) | _of_parameters(part.makes)
+            told["kind"] = (part.makes.__doc__ or "").strip().partition("\n")[0]
         properties = (schema or {}).get("properties", {})
         for name, value in properties.items():
             if name in told:
@@ -36,6 +42,21 @@ def explained_schema(kind: type[Part]) -> JsonSchema:
         if properties.get("kind", {}).get("const", MEASURED) not in (MEASURED, RAMP_AND_HOLD):
             schema["required"] = [*schema.get("required", ()), "kind"]
     return _tidied(made)
+
+
+def _of_parameters(kind: Any) -> dict[str, str]:
+    """Explanation of each parameter in a docstring."""
+    told = parse(kind.__doc__ or "", DocstringStyle.NUMPYDOC).params
+    return {
+        name.strip(): " ".join((each.description or "").split())
+        for each in told
+        for name in each.arg_name.split(",")
+    }
+
+
+def _of_other_names(kind: Any) -> dict[str, str]:
+    others = other_names(kind) if isinstance(kind, type) else {}
+    return {name: f"Another name of {other.meaning}. [{unit_of(name)}]" for name, other in others.items()}
 
 
 def _written_beside(part: type[Part]) -> dict[str, str]:

@@ -7,22 +7,10 @@ from typing import Annotated
 from pydantic import Discriminator, Field, Strict, Tag
 
 from fingerpad.core.layouts import PATTERNS
+from fingerpad.core.values import Count, Finite, NotNegative, Pair, Positive, Seed, Text, choice
 from fingerpad.data import psychophysics
 from fingerpad.data.afferents import TYPES
-from fingerpad.experiments.descriptions.values import (
-    NAMED,
-    SPELLED,
-    Count,
-    FiniteNumber,
-    NotNegative,
-    Pair,
-    Part,
-    Positive,
-    Seed,
-    Text,
-    choice_of,
-    with_message,
-)
+from fingerpad.experiments.descriptions.values import NAMED, SPELLED, Part, with_message
 from fingerpad.skin.fields import sampled_fields
 
 DEFAULT = "default"
@@ -38,7 +26,7 @@ SHAPES = ("rectangle", "ellipse", "polygon", PAD)
 class RegionSettings(Part):
     """Part of the skin that afferents lie in, unrolled; an area there is the same area of skin."""
 
-    shape: Annotated[str, choice_of(SHAPES)]
+    shape: Annotated[str, choice(SHAPES)]
     """Kind of shape."""
     length_mm: Positive | None = None
     """Extent of a rectangle or an ellipse along the finger and across. [mm]"""
@@ -51,14 +39,14 @@ class RegionSettings(Part):
 class PopulationSettings(Part):
     """The afferents."""
 
-    layout: Annotated[str, choice_of(LAYOUT_NAMES)] = GRID
+    layout: Annotated[str, choice(LAYOUT_NAMES)] = GRID
     """"grid": the paper's rows and columns; a pattern that fills a region; or "nail rows", along the edge of
     the nail."""
     density_per_cm2: Positive = psychophysics.RECEPTOR_DENSITY.value
     """Afferents per area of skin. [1/cm2]"""
     densities_per_cm2: (
         Annotated[
-            dict[Annotated[str, choice_of(TYPES)], Positive],
+            dict[Annotated[str, choice(TYPES)], Positive],
             Field(min_length=1),
             with_message(f"a density above 0 of each type, {', '.join(TYPES)}"),
         ]
@@ -86,11 +74,11 @@ class PopulationSettings(Part):
 class AfferentSettings(Part):
     """The afferent by its numbers; what is absent is as in the afferent of the tissues."""
 
-    intercept_ma: FiniteNumber | None = None
+    intercept_ma: Finite | None = None
     """As of `fingerpad.Afferent`."""
-    dynamic_gain: FiniteNumber | None = None
+    dynamic_gain: Finite | None = None
     """As of `fingerpad.Afferent`."""
-    static_gain: FiniteNumber | None = None
+    static_gain: Finite | None = None
     """As of `fingerpad.Afferent`."""
     time_constant_ms: Positive | None = None
     """As of `fingerpad.Afferent`."""
@@ -100,9 +88,9 @@ class AfferentSettings(Part):
     """As of `fingerpad.Afferent`."""
     refractory_ms: NotNegative | None = None
     """Rest after each spike. [ms]"""
-    dynamic_quantity: Annotated[str, choice_of(sampled_fields())] | None = None
+    dynamic_quantity: Annotated[str, choice(sampled_fields())] | None = None
     """What the two terms follow."""
-    static_quantity: Annotated[str, choice_of(sampled_fields())] | None = None
+    static_quantity: Annotated[str, choice(sampled_fields())] | None = None
     """What the two terms follow."""
 
 

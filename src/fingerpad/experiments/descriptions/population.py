@@ -7,10 +7,10 @@ from pathlib import Path
 
 import numpy as np
 
-from fingerpad.core.checks import IntArray
 from fingerpad.core.errors import InputError
 from fingerpad.core.layouts import PATTERNS
 from fingerpad.core.random_streams import seed_of
+from fingerpad.core.values import IntArray
 from fingerpad.data.afferents import TYPES
 from fingerpad.experiments.afferent_files import fitted_afferent
 from fingerpad.experiments.descriptions.parts import (

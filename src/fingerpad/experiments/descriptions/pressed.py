@@ -8,9 +8,10 @@ from typing import Literal
 
 import numpy as np
 
+from fingerpad.core.checked import result_class
 from fingerpad.core.progress import Progress
-from fingerpad.core.results import Number, result_class
 from fingerpad.core.signals import ResponseMap
+from fingerpad.core.values import Number
 from fingerpad.experiments.conditions import Conditions
 from fingerpad.experiments.descriptions.touch import DescribedTouch, TouchDescription
 from fingerpad.experiments.manifest import Manifest

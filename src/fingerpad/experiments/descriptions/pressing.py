@@ -6,11 +6,10 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeAlias
 
-from fingerpad.core.checks import number_in
 from fingerpad.core.errors import InputError
+from fingerpad.core.values import Finite, Text, number_in
 from fingerpad.data import protocol
 from fingerpad.experiments.descriptions.signatures import one_of_kinds
-from fingerpad.experiments.descriptions.values import Text
 from fingerpad.experiments.indenter_text import indenter_named
 from fingerpad.geometry.edged_indenters import INDENTERS
 from fingerpad.geometry.fingertip import Finger, Fingertip
@@ -24,10 +23,10 @@ MEASURED = "measured"
 
 
 def ramp_and_hold(
-    depth_mm: float | None = None,
-    force_mn: float | None = None,
-    ramp_ms: float = protocol.RAMP.value,
-    hold_ms: float = protocol.HOLD.value,
+    depth_mm: Finite | None = None,
+    force_mn: Finite | None = None,
+    ramp_ms: Finite = protocol.RAMP.value,
+    hold_ms: Finite = protocol.HOLD.value,
 ) -> Motion:
     """Indent at a constant rate to a depth or a force, then hold it.
 

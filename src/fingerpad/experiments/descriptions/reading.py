@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import reprlib
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -11,23 +10,13 @@ from typing import Any, TypeVar, get_args
 
 from pydantic import BaseModel, ValidationError
 
-from fingerpad.core.errors import InputError, Place, did_you_mean, got, spelled
+from fingerpad.core.checked import first_of, in_words
+from fingerpad.core.errors import InputError, Place, did_you_mean, spelled
 from fingerpad.core.plain_yaml import line_at
 from fingerpad.experiments.descriptions.signatures import LateKind
 from fingerpad.experiments.descriptions.values import Part, kind_of
 
 _Kind = TypeVar("_Kind", bound=Part)
-
-_EXPECTED = {
-    "model_type": "must be a mapping of keys to values",
-    "tuple_type": "must be a list",
-    "too_short": "must have at least one entry",
-    "invalid_key": "must have texts as keys",
-    "bool_type": "must be true or false",
-}
-_KEYS = ("extra_forbidden", "invalid_key")
-_SHOWN = reprlib.Repr()
-_SHOWN.maxstring, _SHOWN.maxother, _SHOWN.maxlevel = 60, 60, 2
 
 
 @dataclass(frozen=True)
@@ -113,38 +102,20 @@ def merged(common: Any, own: Any, default_kind: str | None = None) -> Any:
     return {**common, **own} if own.get("kind", kind) == kind else own
 
 
-def place_of(error: ValidationError) -> Place:
-    """Keys and indices that lead to the first error."""
-    return tuple(part for part in first_of(error)["loc"] if kind_of(part) is None)
-
-
-def first_of(error: ValidationError) -> Any:
-    """First error that matters: the kind, an unknown key, a wrong value, a missing key."""
-    found = error.errors(include_url=False)
-
-    def order(each: Any) -> int:
-        if each["loc"][-1:] == ("kind",):
-            return 0
-        return 1 if each["type"] in _KEYS else 3 if each["type"] == "missing" else 2
-
-    return min(found, key=order)
-
-
 def input_error(error: ValidationError, kind: type[Part]) -> InputError:
     """Make the first error that pydantic found one of the package."""
-    first, path = first_of(error), place_of(error)
-    expected = _EXPECTED.get(first["type"], first["msg"])
-    value, allowed = first.get("input"), first.get("ctx", {}).get("allowed", ())
+    first = first_of(error.errors(include_url=False))
+    path = tuple(part for part in first["loc"] if kind_of(part) is None)
     if first["type"] == "missing":
         found = InputError(path, "must be given", remedy="it is missing")
     elif first["type"] == "extra_forbidden":
         known = _keys_at(first["loc"][:-1], kind)
         found = InputError(path, "is unknown", remedy=did_you_mean(str(path[-1]), known, spelled(path[:-1])))
-    elif value is None and not path:
-        found = InputError(path, expected, remedy="it is empty")
+    elif first["input"] is None and not path:
+        found = InputError(path, "must be a mapping of keys to values", remedy="it is empty")
     else:
-        found = InputError(path, expected, got(value, allowed, _SHOWN.repr(value)))
-    return found.at(path)
+        found = in_words(first, path, spelled(path))
+    return found.at(found.path)
 
 
 def _keys_at(path: Sequence[int | str], kind: type[Part]) -> list[str]:

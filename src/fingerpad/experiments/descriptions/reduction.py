@@ -12,10 +12,11 @@ from pydantic import Field
 from fingerpad.core.errors import InputError
 from fingerpad.core.files import path_of, read_text
 from fingerpad.core.plain_yaml import read_yaml
+from fingerpad.core.values import Pair, Positive, Seed, Text
 from fingerpad.experiments.descriptions.pressing import finger_of
 from fingerpad.experiments.descriptions.reading import Origin, at, part_from
 from fingerpad.experiments.descriptions.stimulus import FingerDescription, StimulusDescription
-from fingerpad.experiments.descriptions.values import Content, Pair, Part, Positive, Seed, Text
+from fingerpad.experiments.descriptions.values import Content, Part
 from fingerpad.experiments.runner import Runner
 from fingerpad.reduction.building import reduce_touch
 from fingerpad.reduction.model import ReducedModel

@@ -1,50 +1,31 @@
-"""Parts whose keys are the parameters of a function or a class: objects and motions.
+"""Parts whose keys are the parameters of a function or the fields of a value: objects, fingers and motions.
 
-A part has the same names, defaults and explanations in a file as its function has in Python. The values of
-its keys are checked by type here, and by the function itself.
+A part has the same names, types, defaults and explanations in a file as its function has in Python.
 """
 
 from __future__ import annotations
 
 import inspect
-import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from importlib import import_module
 from pathlib import Path
 from types import MappingProxyType
-from typing import Annotated, Any, ClassVar, Literal, Union, get_args, get_origin, get_type_hints
+from typing import Annotated, Any, ClassVar, Literal, Union, get_args
 
-from pydantic import Discriminator, Field, GetJsonSchemaHandler, Tag, create_model
+from pydantic import Discriminator, GetJsonSchemaHandler, Tag, create_model
 from pydantic_core import CoreSchema, core_schema
 
-from fingerpad.core.keywords import other_names
-from fingerpad.core.results import JsonSchema
-from fingerpad.core.units import unit_of
-from fingerpad.experiments.descriptions.values import (
-    NAMED,
-    UNKNOWN,
-    FiniteNumber,
-    Numbers,
-    Outlines,
-    Pairs,
-    Part,
-    Text,
-    Truth,
-    Whole,
-    choice_of,
-    form_of,
-)
+from fingerpad.core.checked import hints_of
+from fingerpad.core.values import JsonSchema, Text, choice
+from fingerpad.experiments.descriptions.values import NAMED, UNKNOWN, Part, form_of
 
 UNKNOWN_MODEL = "Unknown_"
 """Beginning of the name of a part that only serves the error of an unknown kind."""
 
 File = Annotated[Text, "file"]
 """Name of a file, from the folder of the description."""
-
-_VALUES: dict[Any, Any] = {float: FiniteNumber, int: Whole, bool: Truth, str: Text, Path: File}
-_LISTS: dict[Any, Any] = {float: Numbers, tuple[float, float]: Pairs}
 
 
 class Made(Part):
@@ -63,59 +44,21 @@ class Made(Part):
 
 def made_by(kind: str, makes: Callable[..., Any], without: Sequence[str] = ()) -> type[Made]:
     """Make the part whose keys are `kind` and the parameters of a function."""
-    hints = get_type_hints(getattr(makes, "__init__") if isinstance(makes, type) else makes)  # noqa: B009
-    told = _of_other_names(makes) | described(makes.__doc__ or "")
-    fields: dict[str, Any] = {}
-    if kind:
-        fields["kind"] = (Annotated[Literal[kind], Field(description=_first_sentence(makes))], kind)
-    files = set()
+    fields: dict[str, Any] = {"kind": (Literal[kind], kind)} if kind else {}
+    files, hints = set(), hints_of(makes)
     for name, parameter in inspect.signature(makes).parameters.items():
         if name in without:
             continue
-        value = _value_of(hints.get(name, float | None))
-        if value is File:
+        hint = hints[name]
+        if hint is Path or Path in get_args(hint):  # a file names what may be a path
             files.add(name)
-        required = parameter.default is parameter.empty
-        kept: Any = Annotated[value, Field(description=told.get(name))]
-        fields[name] = (kept, ...) if required else (kept | None, None)
+            hint = File
+        needed = parameter.default is parameter.empty
+        fields[name] = (hint, ...) if needed else (hint | None, None)
     name = "".join(word.capitalize() for word in (kind or getattr(makes, "__name__", "part")).split("_"))
     made: type[Made] = create_model(name, __base__=Made, **fields)
     made.makes, made.files = staticmethod(makes), frozenset(files)
     return made
-
-
-def _of_other_names(makes: Callable[..., Any]) -> dict[str, str]:
-    """Explanation of each parameter that is another name of a field."""
-    others = other_names(makes) if isinstance(makes, type) else {}
-    return {name: f"Another name of {other.meaning}. [{unit_of(name)}]" for name, other in others.items()}
-
-
-def _value_of(hint: Any) -> Any:
-    """Type of the value in a file, for the type of a parameter."""
-    options = [option for option in get_args(hint) if option is not type(None)]
-    if any(get_origin(option) is Mapping for option in (hint, *options)):
-        return dict[str, Text]
-    if get_origin(hint) in (tuple, Sequence, list) or get_origin(hint) is Sequence:
-        inner = options[0]
-        return Outlines if get_origin(inner) and get_origin(get_args(inner)[0]) else _LISTS[inner]
-    if options:  # a union: a file names what may be a path
-        return File if Path in options else _value_of(options[0])
-    return _VALUES[hint]
-
-
-def described(docstring: str) -> dict[str, str]:
-    """Explanation of each parameter in a docstring of NumPy's style."""
-    section = re.search(r"\n *Parameters\n *-+\n(.*?)(\n\n|\Z)", inspect.cleandoc(docstring) + "\n\n", re.S)
-    found: dict[str, str] = {}
-    for entry in re.split(r"\n(?=\S)", section[1] if section else ""):
-        names, _, text = entry.partition("\n")
-        for name in names.partition(" :")[0].split(","):
-            found[name.strip()] = " ".join(text.split())
-    return found
-
-
-def _first_sentence(makes: Callable[..., Any]) -> str:
-    return (makes.__doc__ or "").strip().partition("\n")[0]
 
 
 @dataclass(frozen=True)
@@ -162,9 +105,7 @@ def one_of_kinds(
 
     # Named after its kinds: two models of one name would get longer names in a schema.
     unknown = create_model(
-        f"{UNKNOWN_MODEL}{'_'.join(makers)}",
-        __base__=Part,
-        kind=(Annotated[str, choice_of(tuple(makers))], ...),
+        f"{UNKNOWN_MODEL}{'_'.join(makers)}", __base__=Part, kind=(Annotated[str, choice(makers)], ...)
     )
     tagged: list[Any] = [
         Annotated[Any, LateKind(kind, makes, without.get(kind, ())), Tag(form_of(kind))]

@@ -10,6 +10,7 @@ from typing import Annotated
 from pydantic import Discriminator, Strict, Tag
 
 from fingerpad.core.errors import InputError, Place, closest, spelled
+from fingerpad.core.values import Finite, Positive, Text, choice
 from fingerpad.data import protocol
 from fingerpad.experiments.conditions import Conditions
 from fingerpad.experiments.descriptions.pressing import RAMP_AND_HOLD
@@ -22,17 +23,7 @@ from fingerpad.experiments.descriptions.stimulus import (
     TactileStimulus,
     about,
 )
-from fingerpad.experiments.descriptions.values import (
-    LISTED,
-    VARIED,
-    Block,
-    FiniteNumber,
-    LevelOrName,
-    Part,
-    Positive,
-    Text,
-    choice_of,
-)
+from fingerpad.experiments.descriptions.values import LISTED, VARIED, Block, LevelOrName, Part
 from fingerpad.geometry.edged_indenters import SIZES
 from fingerpad.geometry.grading import RESOLUTIONS, Grading, covering
 from fingerpad.geometry.indenter_grading import grading_along
@@ -55,7 +46,7 @@ class StimulusBlocks(Part):
     """As in the file of a touch. A stimulus has the keys of its own block, then those that all have."""
     place: Block | None = None
     """As in the file of a touch. A stimulus has the keys of its own block, then those that all have."""
-    friction: FiniteNumber | None = None
+    friction: Finite | None = None
     """Coulomb's coefficient."""
 
 
@@ -64,7 +55,7 @@ class ListedStimulus(StimulusBlocks):
 
     name: Text
     """How it is called."""
-    level: FiniteNumber | None = None
+    level: Finite | None = None
     """Where it stands on the axis of the psychometric curve."""
 
 
@@ -80,7 +71,7 @@ class VariedStimuli(Part):
 class StimulusSet(StimulusBlocks, FingerDescription):
     """Stimuli and the finger that they are pressed into."""
 
-    resolution: Annotated[str, choice_of(RESOLUTIONS)] = "standard"
+    resolution: Annotated[str, choice(RESOLUTIONS)] = "standard"
     """As of `FingerDescription`; `resolution` is "standard" by default."""
     reach_mm: Positive | None = None
     """How far to either side of the middle, along the finger and across, the mesh is fine at most; without

@@ -4,14 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import field
 from pathlib import Path
 from typing import Annotated
 
 from pydantic import Field
 
+from fingerpad.core.checked import value_class
 from fingerpad.core.errors import InputError, Place
-from fingerpad.core.values import converted
+from fingerpad.core.values import Finite, NotNegative, choice
 from fingerpad.data.tissues import DEFAULT_TISSUES
 from fingerpad.experiments.conditions import Conditions, straight_tilt_deg
 from fingerpad.experiments.descriptions.pressing import (
@@ -23,7 +24,7 @@ from fingerpad.experiments.descriptions.pressing import (
     object_of,
 )
 from fingerpad.experiments.descriptions.reading import at
-from fingerpad.experiments.descriptions.values import FiniteNumber, NotNegative, Part, choice_of
+from fingerpad.experiments.descriptions.values import Part
 from fingerpad.geometry.fingertip import Finger
 from fingerpad.geometry.grading import RESOLUTIONS, Grading
 from fingerpad.geometry.indenters import Indenter
@@ -49,27 +50,27 @@ MadeObjects = list[tuple[object, Indenter]]
 class PlaceSettings(Part):
     """Where and in which direction the object is pressed."""
 
-    x_mm: FiniteNumber = 0.0
+    x_mm: Finite = 0.0
     """Where the object's axis meets the skin, from the middle of the pad: along the finger, distal positive,
     and across. [mm]"""
-    z_mm: FiniteNumber = 0.0
+    z_mm: Finite = 0.0
     """Where the object's axis meets the skin, from the middle of the pad: along the finger, distal positive,
     and across. [mm]"""
-    tilt_deg: FiniteNumber | None = None
+    tilt_deg: Finite | None = None
     """0 is perpendicular to the long axis of the finger; without it, perpendicular to the skin. [degrees]"""
-    spin_deg: FiniteNumber = 0.0
+    spin_deg: Finite = 0.0
     """Turn about the direction of pressing. [degrees]"""
 
 
 class FingerDescription(Part):
     """The finger that is pressed."""
 
-    resolution: Annotated[str, choice_of(RESOLUTIONS)] = "quick"
+    resolution: Annotated[str, choice(RESOLUTIONS)] = "quick"
     """How fine mesh and steps are."""
     finger: FingerPart = Field(default={}, validate_default=True)
     """Whose: a preset such as "child", the sizes of `fingerpad.Fingertip.of`, `kind: outline` with those of
     `fingerpad.Fingertip`, or `kind: mesh` with the parameters of `fingerpad.read_finger`."""
-    tissues: Annotated[str, choice_of(TISSUES)] = DEFAULT_TISSUES
+    tissues: Annotated[str, choice(TISSUES)] = DEFAULT_TISSUES
     """A set of tissues by name, as of `fingerpad.indent`."""
 
     def conditions(self, seed: int = 0, beside: Path = Path()) -> Conditions:
@@ -108,8 +109,7 @@ class StimulusDescription(Part):
         return [*named_files(self.object, beside), *named_files(self.motion, beside)]
 
 
-@dataclass(frozen=True)
-@converted
+@value_class
 class TactileStimulus:
     """An indenter, its motion, its place from the middle of the pad, and friction."""
 
@@ -117,17 +117,17 @@ class TactileStimulus:
     """The rigid body."""
     motion: Motion = field(default_factory=RampAndHold)
     """How it is pressed."""
-    x_mm: float = 0.0
+    x_mm: Finite = 0.0
     """Where its axis meets the skin, from the middle of the pad: along the finger, distal positive, and
     across. [mm]"""
-    z_mm: float = 0.0
+    z_mm: Finite = 0.0
     """Where its axis meets the skin, from the middle of the pad: along the finger, distal positive, and
     across. [mm]"""
-    tilt_deg: float | None = None
+    tilt_deg: Finite | None = None
     """As in `fingerpad.Touch`; by default it presses perpendicular to the skin in the middle. [degrees]"""
-    spin_deg: float = 0.0
+    spin_deg: Finite = 0.0
     """As in `fingerpad.Touch`: the orientation of a bar, an edge, a gap or a grating. [degrees]"""
-    friction: float = 0.0
+    friction: Finite = 0.0
     """Coulomb's coefficient."""
 
     def tilt_on(self, finger: Finger) -> float:

@@ -11,29 +11,18 @@ from functools import cached_property
 from pathlib import Path
 from typing import Annotated, Any
 
-from pydantic import BeforeValidator, Field, Strict
-
+from fingerpad.core.checked import checked
 from fingerpad.core.errors import InputError
 from fingerpad.core.files import path_of, read_text
-from fingerpad.core.keywords import known_keywords
 from fingerpad.core.plain_yaml import read_yaml
 from fingerpad.core.signals import window_bounds
+from fingerpad.core.values import NotNegative, Numbers, Pair, Positive, Text, some_of
 from fingerpad.experiments.descriptions.parts import DEFAULT, AfferentChoice, PopulationSettings, file_of
 from fingerpad.experiments.descriptions.population import population_of
 from fingerpad.experiments.descriptions.pressing import finger_of, named_files
 from fingerpad.experiments.descriptions.reading import Origin, at, part_from
 from fingerpad.experiments.descriptions.stimulus import FingerDescription, StimulusDescription
-from fingerpad.experiments.descriptions.values import (
-    Content,
-    NotNegative,
-    Numbers,
-    Pair,
-    Part,
-    Positive,
-    Text,
-    as_list,
-    choice_of,
-)
+from fingerpad.experiments.descriptions.values import Content, Part
 from fingerpad.geometry.fingertip import Finger
 from fingerpad.mechanics.tissues import named_tissues
 from fingerpad.neuron.afferent import Afferent
@@ -99,12 +88,7 @@ class TouchDescription(StimulusDescription, FingerDescription):
     stiffness: Positive = 1.0
     times_ms: Numbers = ()
     afferents: AfferentsSettings = AfferentsSettings()
-    outputs: Annotated[
-        tuple[Annotated[str, choice_of(OUTPUTS)], ...],
-        Strict(False),
-        Field(min_length=1),
-        BeforeValidator(as_list),
-    ] = ("figures", "csv", "spikes")
+    outputs: Annotated[tuple[str, ...], some_of(OUTPUTS)] = ("figures", "csv", "spikes")
 
 
 @dataclass(frozen=True)
@@ -175,7 +159,7 @@ class DescribedTouch:
         return {name: hashlib.sha256(content).hexdigest() for name, content in contents.items()}
 
 
-@known_keywords
+@checked
 def read_touch_description(source: str | Path) -> DescribedTouch:
     r"""Read the description of a touch from a YAML file.
 

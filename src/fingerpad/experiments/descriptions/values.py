@@ -1,26 +1,22 @@
-"""Types of the values of a description, each with the words of its error."""
+"""What all parts of files share: forms of a value, values that have one message, and the base of parts."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
 from typing import Annotated, Any
 
 from pydantic import (
-    AfterValidator,
     BaseModel,
     ConfigDict,
     Field,
-    GetJsonSchemaHandler,
     SerializerFunctionWrapHandler,
-    Strict,
     ValidationError,
+    ValidationInfo,
     WrapValidator,
     model_serializer,
 )
-from pydantic_core import CoreSchema, PydanticCustomError
 
-from fingerpad.core.results import JsonSchema
+from fingerpad.core.errors import InputError, shown
 
 _FORM = "form "
 LISTED, VARIED, NAMED, SPELLED, UNKNOWN = (
@@ -39,71 +35,18 @@ def kind_of(form: int | str) -> str | None:
     return form.removeprefix(_FORM) if isinstance(form, str) and form.startswith(_FORM) else None
 
 
-def with_message(words: str, allowed: Collection[Any] | None = None) -> WrapValidator:
-    """Give a value one message for any error: what it must be."""
+def with_message(words: str) -> WrapValidator:
+    """Give a value of several types one message for any error: what it must be."""
 
-    def checked(value: Any, handler: Callable[[Any], Any]) -> Any:
-        refusal = PydanticCustomError(
-            "expected", "must be {words}", {"words": words, "allowed": allowed or ()}
-        )
+    def validated(value: Any, handler: Callable[[Any], Any], info: ValidationInfo) -> Any:
         try:
-            found = handler(value)
+            return handler(value)
         except ValidationError as error:
-            raise refusal from error
-        if allowed is not None and found not in allowed:
-            raise refusal
-        return found
+            raise InputError(info.field_name or "value", f"must be {words}", shown(value)) from error
 
-    return WrapValidator(checked)
+    return WrapValidator(validated)
 
 
-def choice_of(allowed: Collection[str]) -> WrapValidator:
-    """Restrict a value to one of several names."""
-    return _Choice(with_message(f"one of {', '.join(allowed)}", allowed).func, names=tuple(allowed))
-
-
-@dataclass(frozen=True)
-class _Choice(WrapValidator):
-    """Check of a name, which a JSON schema lists."""
-
-    names: tuple[str, ...] = ()
-
-    def __get_pydantic_json_schema__(self, core: CoreSchema, handler: GetJsonSchemaHandler) -> JsonSchema:
-        return handler(core) | {"enum": list(self.names)}
-
-
-def _at_most(most: int) -> AfterValidator:
-    """Refuse a number above `most`, at which memory or a type of numbers ends."""
-
-    def checked(value: int) -> int:
-        if value > most:
-            raise PydanticCustomError(
-                "expected", "must be {words}", {"words": f"at most {most:,}", "allowed": ()}
-            )
-        return value
-
-    return AfterValidator(checked)
-
-
-Text = Annotated[str, Field(min_length=1), with_message("a text")]
-FiniteNumber = Annotated[float, Field(allow_inf_nan=False), with_message("a finite number")]
-Positive = Annotated[float, Field(gt=0, allow_inf_nan=False), with_message("a number greater than 0")]
-NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False), with_message("a number not below 0")]
-Share = Annotated[float, Field(ge=0, le=1), with_message("a number within 0 ... 1")]
-Seed = Annotated[int, Field(ge=0), with_message("a whole number of at least 0"), _at_most(2**63 - 1)]
-Count = Annotated[int, Field(ge=1), with_message("a whole number of at least 1"), _at_most(1_000_000)]
-Several = Annotated[int, Field(ge=2), with_message("a whole number of at least 2"), _at_most(1_000_000)]
-Pair = Annotated[
-    tuple[FiniteNumber, ...],
-    Strict(False),
-    Field(min_length=2, max_length=2),
-    with_message("a pair of numbers"),
-]
-Whole = Annotated[int, with_message("a whole number")]
-Truth = Annotated[bool, with_message("true or false")]
-Numbers = Annotated[tuple[FiniteNumber, ...], Strict(False), with_message("a list of finite numbers")]
-Pairs = Annotated[tuple[Pair, ...], Strict(False), with_message("a list of pairs of numbers")]
-Outlines = Annotated[tuple[Pairs, ...], Strict(False), with_message("a list of lists of pairs of numbers")]
 Content = Mapping[str, Any]
 """Keys and values of a description, as its file holds them."""
 Block = Annotated[dict[str, Any], with_message("a mapping of keys to values")]
@@ -117,7 +60,7 @@ def as_list(value: Any) -> Any:
 
 
 class Part(BaseModel):
-    """Base of all parts: unknown keys are refused, nothing is converted, values are frozen."""
+    """Base of all parts: unknown keys are refused, values are frozen."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
 

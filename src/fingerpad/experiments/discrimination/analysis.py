@@ -4,19 +4,18 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
 
 import numpy as np
 from scipy.special import ndtr, ndtri
 
-from fingerpad.core.checks import FloatArray, IntArray
+from fingerpad.core.checked import checked, result_class, value_class
 from fingerpad.core.displayed import Result
 from fingerpad.core.errors import InputError
-from fingerpad.core.keywords import KnownKeywords, known_keywords
-from fingerpad.core.results import Matrix, Vector, result_class
 from fingerpad.core.signals import ResponseMap, Skin
 from fingerpad.core.units import name_and_unit
+from fingerpad.core.values import FloatArray, IntArray, Many, Matrix, Vector
 from fingerpad.experiments.descriptions.population import population_neighbours
 from fingerpad.experiments.descriptions.stimuli import NamedStimulus, VariedStimuli
 from fingerpad.experiments.discrimination.decoding import (
@@ -184,8 +183,8 @@ class TaskResult(Result):
         )
 
 
-@dataclass(frozen=True)
-class PreparedTask(metaclass=KnownKeywords):
+@value_class
+class PreparedTask:
     """A task with its stimuli and its population.
 
     Parameters
@@ -199,7 +198,7 @@ class PreparedTask(metaclass=KnownKeywords):
     """
 
     task: DiscriminationTask
-    stimuli: tuple[NamedStimulus, ...]
+    stimuli: Many[NamedStimulus]
     population: Population | MixedPopulation
 
     def __post_init__(self) -> None:
@@ -284,7 +283,7 @@ class PreparedTask(metaclass=KnownKeywords):
         ]
 
 
-@known_keywords
+@checked
 def analyse(prepared: PreparedTask, skins: Mapping[str, Skin]) -> TaskResult:
     """Compute the responses to indented stimuli, and decode them by every code and measure.
 

@@ -7,11 +7,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from fingerpad.core.checks import FloatArray, IntArray
+from fingerpad.core.checked import result_class
 from fingerpad.core.errors import ConvergenceError, InputError
 from fingerpad.core.random_streams import Purpose, normals
-from fingerpad.core.results import Number, Vector, result_class
 from fingerpad.core.signals import HitRates, ResponseMap
+from fingerpad.core.values import FloatArray, IntArray, Number, Vector
 from fingerpad.experiments.discrimination.task import CurveSettings
 from fingerpad.psychophysics.discrimination import (
     Experiment,

@@ -8,9 +8,9 @@ from functools import cached_property
 from pathlib import Path
 from typing import Literal
 
+from fingerpad.core.checked import result_class
 from fingerpad.core.engine import Engine, engine_of
 from fingerpad.core.progress import Progress
-from fingerpad.core.results import result_class
 from fingerpad.experiments.conditions import Conditions
 from fingerpad.experiments.descriptions.reading import Origin, at
 from fingerpad.experiments.descriptions.stimuli import touches_of

@@ -7,26 +7,25 @@ from __future__ import annotations
 
 from typing import Annotated
 
-from pydantic import BeforeValidator, Field, Strict
+from pydantic import Field, Strict
 
-from fingerpad.data import psychophysics
-from fingerpad.experiments.descriptions.parts import DEFAULT, AfferentChoice, PopulationSettings
-from fingerpad.experiments.descriptions.stimuli import StimulusSet
-from fingerpad.experiments.descriptions.values import (
+from fingerpad.core.values import (
     Count,
-    LevelOrName,
     NotNegative,
     Pair,
-    Part,
     Positive,
     Seed,
     Several,
     Share,
     Text,
-    as_list,
-    choice_of,
-    with_message,
+    choice,
+    limits,
+    some_of,
 )
+from fingerpad.data import psychophysics
+from fingerpad.experiments.descriptions.parts import DEFAULT, AfferentChoice, PopulationSettings
+from fingerpad.experiments.descriptions.stimuli import StimulusSet
+from fingerpad.experiments.descriptions.values import LevelOrName, Part, with_message
 from fingerpad.psychophysics.discrimination import CRITERION_MOVES, Experiment
 from fingerpad.psychophysics.functions import SIGMOIDS
 from fingerpad.psychophysics.noisy_responses import LARGEST_NOISE
@@ -58,7 +57,7 @@ class ExperimentSettings(Part):
     criterion: Share = psychophysics.DECISION_CRITERION.value
     """Decision point, as a fraction of the way from the standard to the comparison."""
     criterion_sigma: NotNegative = 0.0  # Spread of the criterion from one hit rate to the next.
-    criterion_moves: Annotated[str, choice_of(CRITERION_MOVES)] = CRITERION_MOVES[0]
+    criterion_moves: Annotated[str, choice(CRITERION_MOVES)] = CRITERION_MOVES[0]
     """What that spread multiplies: the decision point itself, or the fraction."""
     presentations: Several = _REPETITIONS
     distributions: Several = _REPETITIONS
@@ -79,10 +78,10 @@ class ExperimentSettings(Part):
 class CurveSettings(Part):
     """The psychometric curve through the hit rates."""
 
-    sigmoid: Annotated[str, choice_of(SIGMOIDS)] = "weibull"
+    sigmoid: Annotated[str, choice(SIGMOIDS)] = "weibull"
     """Its shape over the distance from the standard, by the names of `fingerpad.psychophysics`."""
     lapse: Annotated[
-        Annotated[float, Field(ge=0, lt=0.5)] | Annotated[str, choice_of((FREE,))],
+        Annotated[float, Field(ge=0, lt=0.5)] | Annotated[str, choice((FREE,))],
         with_message(f"a number within 0 ... 0.5, or {FREE}"),
     ] = 0.0
     """What is missing to 1 far above threshold, or that it shall be fitted. [0-1]"""
@@ -115,23 +114,13 @@ class DiscriminationTask(StimulusSet):
     afferent: AfferentChoice = DEFAULT
     """"default", a type by its name (SAI, RA, PC, SAII), a file of results (`fit.json` of `fingerpad fit`,
     `results.json` of `fingerpad reproduce`), or numbers."""
-    code: Annotated[
-        tuple[Annotated[str, choice_of(CODES)], ...],
-        Strict(False),
-        Field(min_length=1),
-        BeforeValidator(as_list),
-    ] = ("gradient_sum",)
+    code: Annotated[tuple[str, ...], some_of(CODES)] = ("gradient_sum",)
     """How the population is decoded, by the names of `CODES`; the first is the main one."""
-    measure: Annotated[
-        tuple[Annotated[str, choice_of(MEASURES)], ...],
-        Strict(False),
-        Field(min_length=1),
-        BeforeValidator(as_list),
-    ] = ("static",)
+    measure: Annotated[tuple[str, ...], some_of(MEASURES)] = ("static",)
     """What is measured of each afferent, by the names of `MEASURES`; the first is the main one."""
     windows_ms: WindowSettings = WindowSettings()  # When spikes count.
     noise: Annotated[
-        Annotated[NotNegative, Field(le=LARGEST_NOISE)] | Annotated[str, choice_of((FITTED,))],
+        Annotated[float, limits(0.0, LARGEST_NOISE)] | Annotated[str, choice((FITTED,))],
         with_message(f"a number from 0 to {LARGEST_NOISE:g}, or {FITTED}"),
     ]
     """Standard deviation of the multiplicative noise, or "fitted": that which brings the main code and

@@ -8,9 +8,9 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
+from fingerpad.core.checked import checked
 from fingerpad.core.errors import InputError, closest
 from fingerpad.core.files import path_of, read_text
-from fingerpad.core.keywords import known_keywords
 from fingerpad.core.plain_yaml import read_yaml
 from fingerpad.experiments.conditions import Conditions
 from fingerpad.experiments.descriptions.parts import file_of
@@ -26,7 +26,7 @@ from fingerpad.neuron.population import Population
 from fingerpad.skin.indentation import Touch
 
 
-@known_keywords
+@checked
 def task_stimuli(task: DiscriminationTask, beside: Path = Path()) -> tuple[NamedStimulus, ...]:
     """List the stimuli of a task, the standard first.
 
@@ -71,7 +71,7 @@ def stimulus_index(stimuli: Sequence[NamedStimulus], place: float | str, key: st
     raise InputError(key, f"must be one of the stimuli, {names}", repr(place))
 
 
-@known_keywords
+@checked
 def task_population(
     task: DiscriminationTask, beside: Path = Path(), finger: Finger | None = None
 ) -> Population | MixedPopulation:
@@ -117,7 +117,7 @@ def input_hashes(
     return hashes | {str(path): sha256(path) for path in named}
 
 
-@known_keywords
+@checked
 def read_task(source: str | Path, **replacing: Any) -> DiscriminationTask:
     """Read a task from a file, or one that comes with the package.
 
@@ -155,7 +155,7 @@ def task_text(source: str | Path) -> str:
     )
 
 
-@known_keywords
+@checked
 def parse_task(content: Any, source: str = "task", text: str = "") -> DiscriminationTask:
     """Build a task from plain values.
 

@@ -7,11 +7,11 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike
 
-from fingerpad.core.checks import FloatArray, IntArray, whole
+from fingerpad.core.checked import checked
 from fingerpad.core.errors import InputError
-from fingerpad.core.keywords import known_keywords
 from fingerpad.core.signals import Traces
 from fingerpad.core.units import units_of
+from fingerpad.core.values import Flag, FloatArray, IntArray, Whole, whole
 from fingerpad.data import protocol
 from fingerpad.experiments.fit.methods import Beside, Prepared, check_beside, fit_offset, prepare
 from fingerpad.experiments.fit.results import FitResult, FittedFold, PhaseRates
@@ -29,7 +29,7 @@ from fingerpad.neuron.afferent import PARAMETER_NAMES, parameter_units
 from fingerpad.neuron.spikes import Windows
 
 
-@known_keywords
+@checked
 def fit_recordings(
     traces: Traces | Sequence[Traces],
     recordings: RateRecordings | SpikeRecordings,
@@ -37,10 +37,10 @@ def fit_recordings(
     *,
     method: str = "least_squares",
     windows_ms: Windows | None = None,
-    seed: int = 0,
-    with_posterior: bool = False,
-    with_profiles: bool = False,
-    with_sensitivity: bool = False,
+    seed: Whole = 0,
+    with_posterior: Flag = False,
+    with_profiles: Flag = False,
+    with_sensitivity: Flag = False,
     beside: Beside | None = None,
     positions_mm: ArrayLike | None = None,
 ) -> FitResult:

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fingerpad.core.checks import FloatArray, IntArray, one_of
 from fingerpad.core.errors import InputError
 from fingerpad.core.signals import Traces
+from fingerpad.core.values import FloatArray, IntArray, one_of
 from fingerpad.data import neuron
 from fingerpad.experiments.fit.results import HeldOffset, OffsetFit, SpikeFitSummary
 from fingerpad.inference.afferent_methods import (

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.stats import norm
 
-from fingerpad.core.checks import FloatArray
+from fingerpad.core.values import FloatArray
 from fingerpad.experiments.fit.results import (
     FssSensitivity,
     ParameterProfile,

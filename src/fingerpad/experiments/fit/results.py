@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from fingerpad.core.checked import result_class
 from fingerpad.core.displayed import Result
-from fingerpad.core.results import Matrix, Number, Vector, WholeVector, result_class
+from fingerpad.core.values import Matrix, Number, Vector, WholeVector
 
 
 @result_class

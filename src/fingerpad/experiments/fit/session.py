@@ -3,20 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
-from typing import Literal
+from typing import Annotated, Literal
 
 import numpy as np
 
-from fingerpad.core.checks import IntArray, one_of, positive
+from fingerpad.core.checked import checked, result_class, value_class
 from fingerpad.core.engine import Engine, engine_of
 from fingerpad.core.errors import InputError
-from fingerpad.core.keywords import KnownKeywords, known_keywords
 from fingerpad.core.progress import Progress
-from fingerpad.core.results import Vector, result_class
 from fingerpad.core.signals import INTERVAL
+from fingerpad.core.values import Flag, IntArray, Many, Vector, Whole, choice, one_of, positive
 from fingerpad.data.afferents import TYPES
 from fingerpad.data.observations import bar_firing_rates
 from fingerpad.experiments.conditions import Conditions
@@ -54,8 +53,8 @@ class FitFile:
     manifest: Manifest
 
 
-@dataclass(frozen=True)
-class FitRequest(metaclass=KnownKeywords):
+@value_class
+class FitRequest:
     """A fit to recordings with all that it takes to run it.
 
     Parameters
@@ -92,22 +91,21 @@ class FitRequest(metaclass=KnownKeywords):
     recorded: Recorded
     stimuli: Stimuli
     folder: Path
-    method: str = "least_squares"
-    n_folds: int | None = None
+    method: Annotated[str, choice(METHODS)] = "least_squares"
+    n_folds: Whole | None = None
     windows_ms: tuple[Window | None, Window | None] = (None, None)
-    jobs: int | Engine = 1
-    seed: int = 0
+    jobs: Whole | Engine = 1
+    seed: Whole = 0
     dynamic_quantity: str | None = None
     static_quantity: str | None = None
-    with_posterior: bool = False
-    with_profiles: bool = False
-    with_sensitivity: bool = False
-    with_offset: bool = False
+    with_posterior: Flag = False
+    with_profiles: Flag = False
+    with_sensitivity: Flag = False
+    with_offset: Flag = False
     afferent_type: str | None = None
-    free: tuple[str, ...] = ()
+    free: Many[str] = ()
 
     def __post_init__(self) -> None:
-        one_of("method", self.method, METHODS)
         if self.afferent_type is not None or self.free:
             self._check_chosen()
         for name, quantity in zip(("dynamic_quantity", "static_quantity"), self.quantities, strict=True):
@@ -210,7 +208,7 @@ class FitRequest(metaclass=KnownKeywords):
         return self.dynamic_quantity or default, self.static_quantity or default
 
 
-@known_keywords
+@checked
 def run_fit(
     request: FitRequest,
     progress: Progress | None = None,

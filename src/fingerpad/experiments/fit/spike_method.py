@@ -7,9 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fingerpad.core.checks import FloatArray, IntArray
 from fingerpad.core.errors import ConvergenceError
 from fingerpad.core.signals import SpikeTrains
+from fingerpad.core.values import FloatArray, IntArray
 from fingerpad.experiments.fit.methods import Prepared, Recordings, check_spikes
 from fingerpad.experiments.fit.results import SpikeFitSummary
 from fingerpad.inference.afferent_methods import spike_start

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from enum import StrEnum
 
-from fingerpad.core.results import result_class
+from fingerpad.core.checked import result_class
 from fingerpad.data.published import Published
 
 CLOSE = 0.2  # A number of the paper counts as met within this share of it, unless more is better.

@@ -16,10 +16,10 @@ import numpy as np
 from scipy.interpolate import PchipInterpolator
 from scipy.optimize import brentq
 
-from fingerpad.core.checks import FloatArray
+from fingerpad.core.checked import result_class
 from fingerpad.core.errors import ConvergenceError
 from fingerpad.core.random_streams import Purpose, normals
-from fingerpad.core.results import Number, Vector, result_class
+from fingerpad.core.values import FloatArray, Number, Vector
 from fingerpad.data import psychophysics
 from fingerpad.experiments.conditions import RECEPTOR_X_MM, Conditions, Touch
 from fingerpad.neuron.afferent import Afferent

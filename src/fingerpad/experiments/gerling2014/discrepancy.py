@@ -14,9 +14,9 @@ from functools import partial
 import numpy as np
 from scipy.optimize import brentq
 
-from fingerpad.core.checks import FloatArray
+from fingerpad.core.checked import result_class
 from fingerpad.core.errors import ConvergenceError
-from fingerpad.core.results import Matrix, Number, Vector, WholeVector, result_class
+from fingerpad.core.values import FloatArray, Matrix, Number, Vector, WholeVector
 from fingerpad.data import protocol, psychophysics
 from fingerpad.experiments.gerling2014.discrimination_statistics import (
     CRITERION_SIGMAS,

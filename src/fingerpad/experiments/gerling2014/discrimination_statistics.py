@@ -17,10 +17,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.special import ndtr, ndtri
 
-from fingerpad.core.checks import FloatArray, whole
+from fingerpad.core.checked import result_class
 from fingerpad.core.errors import InputError
-from fingerpad.core.results import Number, Vector, WholeVector, result_class
 from fingerpad.core.signals import HitRates
+from fingerpad.core.values import FloatArray, Number, Vector, WholeVector, whole
 from fingerpad.data import psychophysics
 from fingerpad.psychophysics.discrimination import (
     Experiment,

@@ -14,9 +14,9 @@ from itertools import pairwise
 
 import numpy as np
 
-from fingerpad.core.checks import FloatArray
+from fingerpad.core.checked import result_class
 from fingerpad.core.errors import InputError
-from fingerpad.core.results import Matrix, Number, Stack, Vector, result_class
+from fingerpad.core.values import FloatArray, Matrix, Number, Stack, Vector
 from fingerpad.data import protocol
 from fingerpad.experiments.conditions import RECEPTOR_X_MM, Conditions, Touch
 from fingerpad.geometry.grading import resolution_grading

@@ -8,11 +8,11 @@ from functools import partial
 from pathlib import Path
 from typing import Any, Literal
 
-from fingerpad.core.checks import one_of
+from fingerpad.core.checked import result_class
 from fingerpad.core.engine import Engine, Processes, engine_of
 from fingerpad.core.progress import Progress
-from fingerpad.core.results import Number, result_class
 from fingerpad.core.signals import STORED_ENERGY
+from fingerpad.core.values import Number, one_of
 from fingerpad.data import all_published
 from fingerpad.data.neuron import PAPER_INITIAL
 from fingerpad.experiments.conditions import RECEPTOR_X_MM, Conditions, Touch

@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.interpolate import interp1d
 
-from fingerpad.core.checks import FloatArray
-from fingerpad.core.results import Number, Vector, result_class
+from fingerpad.core.checked import result_class
 from fingerpad.core.signals import STORED_ENERGY, Traces, traces_below
+from fingerpad.core.values import FloatArray, Number, Vector
 from fingerpad.data import bar_firing_rates, protocol
 from fingerpad.experiments.conditions import RECEPTOR_X_MM, Conditions, Touch
 from fingerpad.experiments.gerling2014.skin_deflection import PLATE_DEPTHS_MM, plate

@@ -7,10 +7,10 @@ from functools import partial
 import numpy as np
 from numpy.typing import ArrayLike
 
-from fingerpad.core.checks import FloatArray
-from fingerpad.core.results import Number, Vector, result_class
+from fingerpad.core.checked import result_class
 from fingerpad.core.signals import Traces
 from fingerpad.core.units import units_of
+from fingerpad.core.values import FloatArray, Number, Vector
 from fingerpad.data import bar_firing_rates
 from fingerpad.experiments.fit.rate_uncertainty import LEVEL, SEEDS_OF_PROFILES, fss_sensitivity, profiles
 from fingerpad.experiments.fit.results import FssSensitivity, ParameterProfile

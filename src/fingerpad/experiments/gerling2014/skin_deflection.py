@@ -6,8 +6,9 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from fingerpad.core.results import Number, TruthVector, Vector, result_class
+from fingerpad.core.checked import result_class
 from fingerpad.core.units import MN_PER_N
+from fingerpad.core.values import Number, TruthVector, Vector
 from fingerpad.data import cylinder_deflection, protocol
 from fingerpad.experiments.conditions import Conditions, Touch
 from fingerpad.experiments.scores import coefficient_of_determination

@@ -6,9 +6,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from fingerpad.core.checked import result_class
 from fingerpad.core.random_streams import Purpose, normals
-from fingerpad.core.results import Matrix, Vector, result_class
 from fingerpad.core.signals import Traces
+from fingerpad.core.values import Matrix, Vector
 from fingerpad.data import protocol, psychophysics
 from fingerpad.experiments.conditions import RECEPTOR_X_MM, Conditions, Touch
 from fingerpad.experiments.gerling2014.discrepancy import (

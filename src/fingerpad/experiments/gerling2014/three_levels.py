@@ -4,10 +4,19 @@ from __future__ import annotations
 
 import numpy as np
 
-from fingerpad.core.checks import FloatArray, IntArray
-from fingerpad.core.results import Matrix, Number, TruthMatrix, TruthVector, Vector, WholeVector, result_class
+from fingerpad.core.checked import result_class
 from fingerpad.core.signals import ResponseMap, Traces
 from fingerpad.core.units import MM_PER_M
+from fingerpad.core.values import (
+    FloatArray,
+    IntArray,
+    Matrix,
+    Number,
+    TruthMatrix,
+    TruthVector,
+    Vector,
+    WholeVector,
+)
 from fingerpad.data import fingertip, protocol
 from fingerpad.experiments.conditions import RECEPTOR_X_MM
 from fingerpad.geometry.mesh import LAYERS, Mesh

@@ -11,7 +11,8 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
-from fingerpad.core.results import JsonSchema, ResultFile, check_schema, read_format, write_results
+from fingerpad.core.result_files import ResultFile, check_schema, read_format, write_results
+from fingerpad.core.values import JsonSchema
 
 TOUCH_SCHEMA = "fingerpad-touch.schema.json"
 """Schema of the description of a touch, from which editors complete."""

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from fingerpad.core.files import write_atomically
-from fingerpad.core.results import file_format, schema_of
+from fingerpad.core.result_files import file_format, schema_of
 from fingerpad.experiments.descriptions.explained import explained_schema
 from fingerpad.experiments.descriptions.pressed import TouchFile
 from fingerpad.experiments.descriptions.touch import TouchDescription

@@ -21,23 +21,10 @@ from pydantic import BeforeValidator, Field, Strict
 from fingerpad.core.errors import InputError
 from fingerpad.core.files import path_of, read_text
 from fingerpad.core.plain_yaml import read_yaml
+from fingerpad.core.values import Count, Finite, NotNegative, Pair, Positive, Seed, Text, choice
 from fingerpad.experiments.descriptions.reading import Origin, at, part_from
 from fingerpad.experiments.descriptions.touch import DescribedTouch, described_touch
-from fingerpad.experiments.descriptions.values import (
-    Block,
-    Content,
-    Count,
-    FiniteNumber,
-    LevelOrName,
-    NotNegative,
-    Pair,
-    Part,
-    Positive,
-    Seed,
-    Text,
-    as_list,
-    choice_of,
-)
+from fingerpad.experiments.descriptions.values import Block, Content, LevelOrName, Part, as_list
 from fingerpad.experiments.discrimination.task import CODES, IDEAL, MEASURES, ExperimentSettings
 from fingerpad.psychophysics.noisy_responses import LARGEST_NOISE
 from fingerpad.skin.fields import stored_fields
@@ -64,10 +51,10 @@ _OPERATORS = (*_COMPARISONS, *_OPERATIONS, ast.And, ast.Or, ast.USub)
 class EvenValues(Part):
     """Evenly spaced values of a field."""
 
-    start: FiniteNumber
-    stop: FiniteNumber  # First and last value. [unit of the field]
+    start: Finite
+    stop: Finite  # First and last value. [unit of the field]
     count: Count  # How many.
-    spacing: Annotated[str, choice_of((LINEAR, LOGARITHMIC))] = LINEAR
+    spacing: Annotated[str, choice((LINEAR, LOGARITHMIC))] = LINEAR
     """Whether differences or ratios are equal."""
 
     @property
@@ -85,7 +72,7 @@ class EvenValues(Part):
 class SampleSettings(Part):
     """Points that fill a box of several fields."""
 
-    method: Annotated[str, choice_of((SOBOL, LATIN_HYPERCUBE))] = SOBOL
+    method: Annotated[str, choice((SOBOL, LATIN_HYPERCUBE))] = SOBOL
     """How: a scrambled Sobol sequence, or a Latin hypercube."""
     count: Count  # Number of points; powers of two suit Sobol.
     seed: Seed = 0  # Of the random numbers.
@@ -115,9 +102,9 @@ class ObserverSettings(Part):
 
     along: Text  # Field of the touch that varies from stimulus to stimulus, such as "object.curvature_per_m".
     standard: LevelOrName  # Its value under the standard, that all others are discriminated from.
-    code: Annotated[str, choice_of(tuple(code for code in CODES if code != IDEAL))] = CODES[0]
+    code: Annotated[str, choice(tuple(code for code in CODES if code != IDEAL))] = CODES[0]
     """How the population is decoded."""
-    measure: Annotated[str, choice_of(MEASURES)] = MEASURES[0]  # What is measured of each afferent.
+    measure: Annotated[str, choice(MEASURES)] = MEASURES[0]  # What is measured of each afferent.
     latest_ms: Positive | None = None
     """Latest first spike that counts, as `windows_ms.latency` of a task. [ms]"""
     noise: Annotated[NotNegative, Field(le=LARGEST_NOISE)]  # Standard deviation of the multiplicative noise.
@@ -139,7 +126,7 @@ class SweepDescription(Part):
     where: Annotated[tuple[Text, ...], Strict(False), BeforeValidator(as_list)] = ()
     """Constraints such as "motion.depth_mm < 0.5 * object.radius_mm": other settings are left out."""
     fields: Annotated[
-        tuple[Annotated[str, choice_of([field.name for field in stored_fields()])], ...],
+        tuple[Annotated[str, choice([field.name for field in stored_fields()])], ...],
         Strict(False),
         BeforeValidator(as_list),
     ] = ()

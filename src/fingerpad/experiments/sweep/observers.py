@@ -6,8 +6,8 @@ from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
-from fingerpad.core.checks import FloatArray, IntArray
 from fingerpad.core.signals import HitRates
+from fingerpad.core.values import FloatArray, IntArray
 from fingerpad.experiments.descriptions.population import population_neighbours
 from fingerpad.experiments.discrimination.decoding import SESSION, silent_stimuli
 from fingerpad.experiments.sweep.description import ObserverSettings, Sweep

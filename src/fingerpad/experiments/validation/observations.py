@@ -9,11 +9,11 @@ from pathlib import Path
 
 import numpy as np
 
-from fingerpad.core.checks import FloatArray, finite, float_array, not_negative, one_of, positive
+from fingerpad.core.checked import checked
 from fingerpad.core.errors import InputError
-from fingerpad.core.keywords import known_keywords
 from fingerpad.core.tables import TableRow, read_csv
 from fingerpad.core.units import unit_of
+from fingerpad.core.values import FloatArray, finite, float_array, not_negative, one_of, positive
 from fingerpad.experiments.indenter_text import indenter_named
 
 LARGEST_FILE_MB = 1.0  # Larger files are refused: they hold no published table. [MB]
@@ -138,7 +138,7 @@ class Observations:
         ]
 
 
-@known_keywords
+@checked
 def read_observations(path: str | Path) -> Observations:
     r"""Read a file of observations.
 

@@ -4,14 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+from typing import Annotated
 
 import numpy as np
 
-from fingerpad.core.checks import FloatArray, one_of
+from fingerpad.core.checked import value_class
 from fingerpad.core.errors import ConvergenceError, InputError
-from fingerpad.core.keywords import KnownKeywords
 from fingerpad.core.signals import Traces
 from fingerpad.core.units import MN_PER_N
+from fingerpad.core.values import FloatArray, Numbers, choice
 from fingerpad.data import protocol
 from fingerpad.experiments.conditions import Conditions
 from fingerpad.experiments.indenter_text import indenter_named
@@ -32,8 +33,8 @@ LOADINGS = (RAMP_AND_HOLD, QUASI_STATIC)  # Read at the end of the paper's hold,
 QUASI_STATIC_MS = 1e12  # After such a ramp all Prony terms have relaxed to 1 in 10⁶. [ms]
 
 
-@dataclass(frozen=True)
-class FingertipModel(metaclass=KnownKeywords):
+@value_class
+class FingertipModel:
     """The fingertip, its afferent and the loading whose predictions are scored.
 
     Parameters
@@ -50,11 +51,10 @@ class FingertipModel(metaclass=KnownKeywords):
 
     conditions: Conditions
     afferent: Afferent | None = None
-    loading: str = RAMP_AND_HOLD
-    static_window_ms: tuple[float, ...] = protocol.STATIC_WINDOW.value
+    loading: Annotated[str, choice(LOADINGS)] = RAMP_AND_HOLD
+    static_window_ms: Numbers = protocol.STATIC_WINDOW.value
 
     def __post_init__(self) -> None:
-        one_of("loading", self.loading, LOADINGS)
         start, end = self.static_window_ms
         end_ms = RampAndHold().end_ms
         if not 0.0 <= start < end <= end_ms:

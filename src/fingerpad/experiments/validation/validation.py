@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from pathlib import Path
 from typing import Literal
 
 import numpy as np
 
+from fingerpad.core.checked import checked, result_class, value_class
 from fingerpad.core.engine import Engine, engine_of
-from fingerpad.core.keywords import KnownKeywords, known_keywords
 from fingerpad.core.progress import Progress
-from fingerpad.core.results import Number, result_class
+from fingerpad.core.values import Number, Whole
 from fingerpad.data import fingertip
 from fingerpad.experiments.manifest import Manifest
 from fingerpad.experiments.runner import Runner
@@ -79,8 +79,8 @@ class ValidationFile:
     manifest: Manifest
 
 
-@dataclass(frozen=True)
-class ValidationRequest(metaclass=KnownKeywords):
+@value_class
+class ValidationRequest:
     """Observations with all that it takes to score them.
 
     Parameters
@@ -98,7 +98,7 @@ class ValidationRequest(metaclass=KnownKeywords):
     observations: Observations
     model: FingertipModel
     folder: Path
-    jobs: int | Engine = 1
+    jobs: Whole | Engine = 1
 
     def __post_init__(self) -> None:
         engine_of(self.jobs)
@@ -106,7 +106,7 @@ class ValidationRequest(metaclass=KnownKeywords):
             named_tissues(self.model.conditions.tissues)
 
 
-@known_keywords
+@checked
 def validate(
     request: ValidationRequest,
     progress: Progress | None = None,

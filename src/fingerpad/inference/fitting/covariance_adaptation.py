@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from fingerpad.core.checks import IntArray, positive, whole
 from fingerpad.core.random_streams import published_generator
+from fingerpad.core.values import IntArray, positive, whole
 from fingerpad.inference.fitting.methods import Bounds, Fit, FitStep, Problem
 
 

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from fingerpad.core.checks import FloatArray, IntArray, float_array, whole
 from fingerpad.core.errors import InputError
+from fingerpad.core.values import FloatArray, IntArray, float_array, whole
 from fingerpad.data import protocol
 from fingerpad.inference.fitting.methods import Fit, Method, Problem
 

@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.optimize import least_squares
 
-from fingerpad.core.checks import FloatArray, IntArray, positive, whole
 from fingerpad.core.errors import InputError
+from fingerpad.core.values import FloatArray, IntArray, positive, whole
 from fingerpad.inference.fitting.methods import Bounds, Fit, FitStep, Problem, best_of
 
 Jacobian = Callable[[FloatArray, IntArray], FloatArray]

@@ -7,14 +7,14 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy.stats import qmc
 
-from fingerpad.core.checks import FloatArray, IntArray, float_array
 from fingerpad.core.errors import InputError
+from fingerpad.core.values import FloatArray, IntArray, float_array
 
 
 @dataclass(frozen=True)
@@ -60,6 +60,7 @@ def halton(number: int, dimensions: int) -> FloatArray:
     return points[1:]  # the first is a corner
 
 
+@runtime_checkable
 class Problem(Protocol):
     """A model and the observations to which it is fitted.
 
@@ -108,6 +109,7 @@ class Fit:
     """The fit from each start, in their order; empty for a method with one start."""
 
 
+@runtime_checkable
 class Method(Protocol):
     """Contract of a method that fits any problem."""
 

@@ -28,9 +28,9 @@ from scipy.special import ndtri
 from scipy.stats import rankdata
 from threadpoolctl import threadpool_limits
 
-from fingerpad.core.checks import FloatArray, finite, float_array, positive, whole
 from fingerpad.core.errors import ConvergenceError, InputError
 from fingerpad.core.random_streams import Key, emcee_state, generator, independent_keys
+from fingerpad.core.values import FloatArray, finite, float_array, positive, whole
 
 TAILS = (0.025, 0.975)  # Quantiles of the effective sample size of the tails: the ends of a 95 % interval.
 

@@ -15,9 +15,9 @@ from numpy.typing import ArrayLike
 from scipy.optimize import minimize
 from scipy.stats import chi2
 
-from fingerpad.core.checks import FloatArray, finite, float_array, whole
 from fingerpad.core.errors import ConvergenceError, InputError
 from fingerpad.core.threads import in_blocks
+from fingerpad.core.values import FloatArray, finite, float_array, whole
 
 LogLikelihood = Callable[[FloatArray], FloatArray]
 """From points (n_points, n_parameters) to their log likelihoods, -inf where impossible."""

@@ -15,8 +15,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from fingerpad.core.checks import FloatArray, IntArray, finite, float_array, not_negative, whole
 from fingerpad.core.errors import ConvergenceError, InputError
+from fingerpad.core.values import FloatArray, IntArray, finite, float_array, not_negative, whole
 from fingerpad.inference.fitting.methods import Fit, FitStep, Problem, best_of
 
 Objective = Callable[[FloatArray], float]

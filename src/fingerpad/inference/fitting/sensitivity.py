@@ -15,9 +15,9 @@ from numpy.typing import ArrayLike
 from scipy import stats
 from scipy.special import ndtri
 
-from fingerpad.core.checks import FloatArray, IntArray, finite, float_array, positive, whole
 from fingerpad.core.errors import InputError
 from fingerpad.core.random_streams import generator
+from fingerpad.core.values import FloatArray, IntArray, finite, float_array, positive, whole
 
 BatchObjective = Callable[[FloatArray], FloatArray]
 """Called with points (n_points, n_parameters); returns one number for each."""

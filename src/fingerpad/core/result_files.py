@@ -1,0 +1,115 @@
+"""Files of results: JSON of a class that `result_class` makes, NaN as null, and the schema of it."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, Protocol, TypeVar, runtime_checkable
+
+import fastjsonschema
+from pydantic import TypeAdapter, ValidationError
+
+from fingerpad.core.errors import InputError, StoreError
+from fingerpad.core.files import LARGEST_TEXT_MB, check_file, write_atomically
+from fingerpad.core.values import JsonSchema
+
+_Kind = TypeVar("_Kind")
+
+
+@runtime_checkable
+class ResultFile(Protocol):
+    """Results that are a file of their own: both fields are literals with a default."""
+
+    @property
+    def format(self) -> str:
+        """Name of the format; the schema of that name lies in the package."""
+        ...
+
+    @property
+    def format_version(self) -> int:
+        """Raised when a reader of the version before would not understand the file."""
+        ...
+
+
+def to_json(result: Any, indent: int | None = 1) -> bytes:
+    """JSON of a result, null for NaN."""
+    return TypeAdapter(type(result)).dump_json(result, indent=indent)
+
+
+def from_json(cls: type[_Kind], content: bytes) -> _Kind:
+    """Read a result from its JSON."""
+    try:
+        return TypeAdapter(cls).validate_json(content)
+    except ValidationError as error:
+        first = error.errors(include_url=False)[0]
+        place = ".".join(str(part) for part in first["loc"]) or "the file"
+        raise InputError(f"{place} is not as {cls.__name__} needs it: {first['msg']}.") from error
+
+
+def schema_of(cls: type) -> JsonSchema:
+    """JSON schema of a class of results, as a file holds it."""
+    return {"$schema": "https://json-schema.org/draft/2020-12/schema"} | TypeAdapter(cls).json_schema(
+        mode="serialization"
+    )
+
+
+def write_results(path: Path, results: ResultFile, schema: JsonSchema) -> None:
+    """Write a file of results atomically."""
+    content = to_json(results)
+    check_schema(path, json.loads(content), schema)
+    write_atomically(path, content + b"\n")
+
+
+def check_schema(path: Path, values: dict[str, Any], schema: JsonSchema) -> None:
+    """Raise `StoreError` if the values of a file do not meet a JSON schema."""
+    try:
+        fastjsonschema.compile(schema)(values)
+    except fastjsonschema.JsonSchemaValueException as error:
+        raise StoreError(
+            f"{path} must meet the schema of its format: {error.message}; run the command again, or, after a "
+            "change of a type, `python -m fingerpad.experiments.schemas`."
+        ) from error
+
+
+def read_results(path: Path, cls: type[_Kind]) -> _Kind:
+    """Read a file of results."""
+    content, _ = _json_of_format(path, dict([file_format(cls)]))
+    try:
+        return from_json(cls, content)
+    except InputError as error:
+        raise StoreError(f"{path} is damaged: {error} Run the command again.") from error
+
+
+def read_format(path: Path, versions: Mapping[str, int]) -> dict[str, Any]:
+    """Read the JSON values of a file whose format and version are known."""
+    return _json_of_format(path, versions)[1]
+
+
+def _json_of_format(path: Path, versions: Mapping[str, int]) -> tuple[bytes, dict[str, Any]]:
+    """Content of a file and its JSON values: the classes of some fields accept texts only from JSON."""
+    try:
+        content = check_file(path, LARGEST_TEXT_MB).read_bytes()
+        values = json.loads(content)
+    except RecursionError as error:
+        raise StoreError(
+            f"{path} cannot be read as JSON (nested too deep): run the command again."
+        ) from error
+    except InputError as error:
+        raise StoreError(str(error)) from error
+    except (OSError, ValueError) as error:
+        raise StoreError(f"{path} cannot be read as JSON ({error}): run the command again.") from error
+    found = (values.get("format"), values.get("format_version")) if isinstance(values, dict) else (None, None)
+    if found not in versions.items():
+        wanted = " or ".join(f"{name}, version {version}" for name, version in versions.items())
+        came = "no format" if found[0] is None else f"{found[0]}, version {found[1]}"
+        raise StoreError(
+            f"{path} must have the format {wanted}: got {came}; run the command again to write it anew."
+        )
+    return content, values
+
+
+def file_format(cls: Any) -> tuple[str, int]:
+    """Format and version that a class of result files declares."""
+    declared = cls.__dataclass_fields__
+    return declared["format"].default, declared["format_version"].default
