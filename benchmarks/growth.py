@@ -67,7 +67,6 @@ def measure(sizes: Sequence[tuple[float, tuple[int, int, int, int]]] = SIZES) ->
         notes=[
             "The exponent of memory, and kB per node, are of the memory that an indentation adds to a "
             "process that has imported fingerpad. The memory of Python itself would reduce the exponent.",
-            *dict.fromkeys(run.answer["linear_solver"] for run in runs),
         ],
     )
 
