@@ -124,6 +124,6 @@ def measure() -> Report:
         notes=[
             f"The {paper} method is the paper's, from its two starts, with six parameters; "
             "the others fit four.",
-            f"The SED is from {RESOLUTION} resolution; the FSS at standard is in docs/single-unit.md.",
+            f"The SED is from {RESOLUTION} resolution; the FSS at standard is in docs/results.md.",
         ],
     )

@@ -66,8 +66,7 @@ def measure(sizes: Sequence[tuple[float, tuple[int, int, int, int]]] = SIZES) ->
         measured={"growth_time_exponent": time_exponent, "growth_memory_exponent": memory_exponent},
         notes=[
             "The exponent of memory, and kB per node, are of the memory that an indentation adds to a "
-            "process that has imported fingerpad. The memory of Python itself would reduce the exponent.",
-            *dict.fromkeys(run.answer["linear_solver"] for run in runs),
+            "process that has imported fingerpad. The memory of Python itself would reduce the exponent."
         ],
     )
 

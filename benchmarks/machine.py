@@ -48,23 +48,32 @@ def describe() -> dict[str, Any]:
     }
 
 
-def sentence(machine: dict[str, Any]) -> str:
-    """Say on one line what a measurement ran on.
+def hardware(machine: dict[str, Any]) -> str:
+    """Say on one line on which machine and with which packages a measurement ran.
 
     Examples
     --------
     >>> abacus = {"processor": "Abacus", "cores": 2, "memory_gb": 4, "system": "Linux", "python": "3.11"}
-    >>> code = {"packages": {"numpy": "2.4"}, "commit": "abc", "uncommitted": True}
-    >>> print(sentence(abacus | code | {"load_before": 0.1, "date": "now"}))
-    Abacus, 2 cores, 4 GB; Linux; Python 3.11, numpy 2.4; commit abc with changes; load before it 0.1; now.
+    >>> print(hardware(abacus | {"packages": {"numpy": "2.4"}}))
+    Abacus, 2 cores, 4 GB; Linux; Python 3.11, numpy 2.4
     """
     versions = ", ".join(f"{name} {found}" for name, found in machine["packages"].items())
-    changes = " with changes" if machine["uncommitted"] else ""
     return (
         f"{machine['processor']}, {machine['cores']} cores, {machine['memory_gb']} GB; {machine['system']}; "
-        f"Python {machine['python']}, {versions}; commit {machine['commit']}{changes}; "
-        f"load before it {machine['load_before']}; {machine['date']}."
+        f"Python {machine['python']}, {versions}"
     )
+
+
+def occasion(machine: dict[str, Any]) -> str:
+    """Say on one line which code ran, under which load, and when.
+
+    Examples
+    --------
+    >>> print(occasion({"commit": "abc", "uncommitted": True, "load_before": 0.1, "date": "now"}))
+    commit abc with changes; load before it 0.1; now.
+    """
+    changes = " with changes" if machine["uncommitted"] else ""
+    return f"commit {machine['commit']}{changes}; load before it {machine['load_before']}; {machine['date']}."
 
 
 def _processor() -> str:

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from benchmarks.machine import sentence
+from benchmarks.machine import hardware, occasion
 from benchmarks.results import Report, cell
 from benchmarks.targets import TARGETS
 
@@ -59,6 +59,8 @@ def rewritten(text: str, reports: Mapping[str, Report]) -> str:
         name = found[1]
         if name == "targets":
             return marked(name, targets_table(reports))
+        if name == "machines":
+            return marked(name, machines_table(reports))
         return marked(name, report_text(reports[name]) if name in reports else "*Not measured yet.*")
 
     return re.sub(r"<!-- begin (\w+) -->\n.*?<!-- end \1 -->", section, text, flags=re.DOTALL)
@@ -76,14 +78,24 @@ def targets_table(reports: Mapping[str, Report]) -> str:
     return grid(["job, on 2 cores", "target", "measured", "met", "script"], rows)
 
 
+def machines_table(reports: Mapping[str, Report]) -> str:
+    """Every machine, with the scripts that ran on it."""
+    scripts: dict[str, list[str]] = {}
+    for name, report in reports.items():
+        scripts.setdefault(hardware(report.machine), []).append(f"`{name}`")
+    return grid(
+        ["machine and packages", "scripts"], [[text, ", ".join(names)] for text, names in scripts.items()]
+    )
+
+
 def report_text(report: Report) -> str:
-    """Words, tables and machine of one report."""
+    """Words, tables, code and date of one report."""
     parts = [report.about]
     for table in report.tables:
         parts += [table.caption, grid(table.columns, table.rows)]
     parts += ["\n".join(f"- {note}" for note in report.notes)] if report.notes else []
     command = f'`make benchmarks ARGS="{report.name}"`'
-    parts.append(f"*{command}: {sentence(report.machine)}*")
+    parts.append(f"*{command}: {occasion(report.machine)}*")
     return "\n\n".join(parts)
 
 

@@ -92,7 +92,6 @@ def summary(skin: SkinResponse) -> dict[str, Any]:
         "steps": skin.times_ms.size - 1,
         "newton_steps": skin.newton_steps,
         "factorisations": skin.factorisations,
-        "linear_solver": skin.linear_solver,
         "force_mn": float(skin.force_mn[-1]),
         "sed_kpa": float(skin.sed_kpa.max()),
     }

@@ -1,4 +1,4 @@
-"""Tables and pictures of docs/afferents.md and docs/afferents.md.
+"""Tables and pictures of docs/afferents.md and docs/vibration.md.
 
 `python -m studies.afferents_page` presses a probe, balls, a stroke and vibrations, and writes them anew (half
 an hour); with the names of parts only those.

@@ -406,7 +406,7 @@ def test_what_the_guide_shows_can_be_asked(block):
     assert asked(part if "question" in part else changed(SPHERES, **part))
 
 
-def test_the_guide_names_every_key():
+def test_the_guide_and_the_page_of_populations_name_every_key():
     def keys(part):
         for name, field in part.model_fields.items():
             yield name
@@ -415,7 +415,8 @@ def test_the_guide_names_every_key():
             for inner in parts_in(field.annotation):
                 yield from keys(inner)
 
-    guide = (ROOT / "docs" / "discriminate.md").read_text(encoding="utf-8")
+    pages = ("discriminate.md", "populations.md")
+    guide = "".join((ROOT / "docs" / page).read_text(encoding="utf-8") for page in pages)
     assert [key for key in dict.fromkeys(keys(DiscriminationTask)) if f"`{key}`" not in guide] == []
 
 

@@ -181,6 +181,8 @@ class Traces(Result):
         >>> Traces.joined(halves).values.tolist()
         [[0.0, 0.0], [1.0, 2.0]]
         """
+        if not traces:
+            raise InputError("traces", "must have at least one entry", "none")
         dynamic = [trace.dynamic for trace in traces if trace.dynamic is not None]
         return replace(
             traces[0],
@@ -351,7 +353,7 @@ class SpikeTrains(Result):
     @classmethod
     def from_lists(cls, trains: Sequence[ArrayLike]) -> SpikeTrains:
         """Spike trains from one sequence of spike times per afferent. [ms]"""
-        arrays = [np.asarray(train, dtype=np.float64) for train in trains]
+        arrays = [float_array(f"trains[{number}]", train, 1) for number, train in enumerate(trains)]
         offsets = np.concatenate([[0], np.cumsum([array.size for array in arrays])])
         return cls(np.concatenate(arrays) if arrays else np.empty(0), offsets)
 

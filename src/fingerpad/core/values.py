@@ -201,6 +201,14 @@ def float_array(name: str, values: ArrayLike, ndim: int | None) -> FloatArray:
     return array
 
 
+def vector(name: str, values: ArrayLike) -> FloatArray:
+    """Return an array (n,) of numbers, of which some may be NaN or infinite."""
+    array = values if isinstance(values, np.ndarray) and values.dtype == np.float64 else _numbers(name, values)
+    if array.ndim != 1:
+        raise InputError(name, "must have 1 dimension(s)", f"shape {array.shape}")
+    return array
+
+
 def int_array(name: str, values: ArrayLike, ndim: int) -> IntArray:
     """Return `values` as an array of whole numbers if it has `ndim` dimensions."""
     if isinstance(values, np.ndarray) and values.dtype.kind in "iu" and values.ndim == ndim:

@@ -168,7 +168,7 @@ class _OneRamp(Motion):
         return ramp_and_hold_phases(self.ramp_ms, self.end_ms)
 
     def prescribed_at(self, times_ms: ArrayLike) -> FloatArray:
-        return self.largest * np.clip(np.asarray(times_ms, dtype=float) / self.ramp_ms, 0.0, 1.0)
+        return self.largest * np.clip(float_array("times_ms", times_ms, None) / self.ramp_ms, 0.0, 1.0)
 
     def step_times_ms(self, ramp_steps: int, hold_steps: int) -> FloatArray:
         """List the times to solve at: 0, equal ramp steps, hold steps that grow geometrically. [ms]"""

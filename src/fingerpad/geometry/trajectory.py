@@ -350,7 +350,7 @@ class Trajectory(Motion):
         return HOLD if max(start[0], end[0]) > SAME_VALUE else "pause"
 
     def prescribed_at(self, times_ms: ArrayLike) -> FloatArray:
-        return np.interp(np.asarray(times_ms, dtype=float), self.times_ms, self.prescribed)
+        return np.interp(float_array("times_ms", times_ms, None), self.times_ms, self.prescribed)
 
     def step_times_ms(self, ramp_steps: Whole, hold_steps: Whole) -> FloatArray:
         """List the times to solve at: all samples, and times between them where they are far apart. [ms]

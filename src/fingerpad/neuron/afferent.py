@@ -179,7 +179,7 @@ class Afferent:
         >>> Afferent.for_tissues("human") == Afferent()
         True
         """
-        if tissues == "human":
+        if isinstance(tissues, str) and tissues == "human":
             return cls()
         fitted = (
             (
@@ -190,7 +190,7 @@ class Afferent:
                 neuron.PAPER_CAPACITANCE,
                 neuron.PAPER_THRESHOLD,
             )
-            if tissues == "paper"
+            if isinstance(tissues, str) and tissues == "paper"
             else (
                 neuron.TRIAL_3_INTERCEPT,
                 neuron.TRIAL_3_DYNAMIC_GAIN,

@@ -123,13 +123,9 @@ def order_change(latency_ms: ArrayLike, other_latency_ms: ArrayLike) -> OrderCha
 
 
 def _latencies(name: str, values: ArrayLike) -> FloatArray:
-    latency = np.asarray(values, dtype=np.float64)
-    if latency.ndim != 1 or np.isinf(latency).any():
-        raise InputError(
-            name,
-            "must be a one-dimensional array of times, NaN if silent",
-            f"shape {latency.shape}{' with infinite times' if latency.ndim == 1 else ''}",
-        )
+    latency = vector(name, values)
+    if np.isinf(latency).any():
+        raise InputError(name, "must be times, NaN if silent", "infinite times")
     return latency
 
 

@@ -210,7 +210,7 @@ def discriminability(standard: ArrayLike, comparison: ArrayLike) -> Discriminabi
     >>> discriminability([1.0, 2.0, 3.0, 4.0], [2.5, 3.5, 4.5, 5.5]).proportion_correct
     0.8125
     """
-    first, second = np.asarray(standard, dtype=np.float64), np.asarray(comparison, dtype=np.float64)
+    first, second = vector("standard", standard), vector("comparison", comparison)
     n, m = first.size, second.size
     if min(n, m) < 2 or np.isnan(first).any() or np.isnan(second).any():
         raise InputError(f"Two numbers or more are needed for each stimulus, none NaN: got {n} and {m}.")

@@ -355,7 +355,7 @@ def indent(
     indenter: Indenter,
     stimulus: Stimulus | None = None,
     tissues: str | Tissues = DEFAULT_TISSUES,
-    resolution: str = "quick",
+    resolution: Annotated[str, choice(RESOLUTIONS)] = "quick",
     at_mm: Sequence[float] | None = None,
     *,
     tilt_deg: Finite = 0.0,
