@@ -144,9 +144,8 @@ PUBLIC = {
     name: found
     for names in public_names().values()
     for name, found in names.items()
-    if not isinstance(found, type) or (
-        hasattr(found.__init__, "__wrapped__") and not issubclass(found, Result | Exception)
-    )
+    if not isinstance(found, type)
+    or (hasattr(found.__init__, "__wrapped__") and not issubclass(found, Result | Exception))
 }
 """Functions and classes of the reference, without results, which users do not make."""
 

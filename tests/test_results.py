@@ -8,7 +8,6 @@ from typing import Literal
 
 import numpy as np
 import pytest
-from pydantic import ValidationError
 
 from fingerpad.core.checked import result_class
 from fingerpad.core.errors import InputError, StoreError

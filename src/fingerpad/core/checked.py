@@ -215,20 +215,23 @@ def _validated(function: Callable[..., _Made]) -> Callable[..., _Made]:
 
 def hints_of(makes: Callable[..., Any]) -> dict[str, Any]:
     """Return the evaluated annotation of each parameter of a value or a function."""
-    if isinstance(makes, type):
-        from fingerpad.core.values import Finite
+    from fingerpad.core.values import AnyArray, Finite
 
+    if isinstance(makes, type):
         given: Any = makes.__pydantic_fields__  # type: ignore[attr-defined]
         found = {name: part.rebuild_annotation() for name, part in given.items()}
         return dict.fromkeys(other_names(makes), Finite) | found
     function = inspect.unwrap(makes)
-    return {name: _hint(text, function.__globals__) for name, text in function.__annotations__.items()}
+    unchecked = {"FloatArray": AnyArray, "ArrayLike": Any, "Iterable": _Unchecked, "Iterator": _Unchecked}
+    return {
+        name: _hint(text, function.__globals__, unchecked) for name, text in function.__annotations__.items()
+    }
 
 
-def _hint(text: Any, known: dict[str, Any]) -> Any:
+def _hint(text: Any, known: dict[str, Any], unchecked: dict[str, Any]) -> Any:
     """Annotation as pydantic can check it; `Any` for what the function itself converts or consumes."""
     try:
-        return eval(text, known, _UNCHECKED) if isinstance(text, str) else text
+        return eval(text, known, unchecked) if isinstance(text, str) else text
     except NameError:  # a type that only type checkers import
         return Any
 
@@ -238,9 +241,6 @@ class _Unchecked:
 
     def __class_getitem__(cls, _: Any) -> Any:
         return Any
-
-
-_UNCHECKED = {"ArrayLike": Any, "Iterable": _Unchecked, "Iterator": _Unchecked}
 
 
 def _in_one_sentence(

@@ -189,7 +189,7 @@ class TissuesWarning(UserWarning):
 
 def level_of_caller() -> int:
     """`stacklevel` of `warnings.warn` with which a warning names the line that called the package."""
-    inside = __name__.partition(".")[0], "functools", "contextlib"
+    inside = __name__.partition(".")[0], "functools", "contextlib", "pydantic"
     for level in count(1):
         home = str(sys._getframe(level).f_globals.get("__name__", ""))
         if home.partition(".")[0] not in inside or sys._getframe(level).f_back is None:

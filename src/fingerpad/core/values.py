@@ -201,9 +201,16 @@ def float_array(name: str, values: ArrayLike, ndim: int | None) -> FloatArray:
     return array
 
 
+def array(name: str, values: ArrayLike) -> FloatArray:
+    """Return an array of any shape, or anything that becomes one, which may hold NaN."""
+    return values if isinstance(values, np.ndarray) and values.ndim else _numbers(name, values)
+
+
 def vector(name: str, values: ArrayLike) -> FloatArray:
     """Return an array (n,) of numbers, of which some may be NaN or infinite."""
-    array = values if isinstance(values, np.ndarray) and values.dtype == np.float64 else _numbers(name, values)
+    array = (
+        values if isinstance(values, np.ndarray) and values.dtype == np.float64 else _numbers(name, values)
+    )
     if array.ndim != 1:
         raise InputError(name, "must have 1 dimension(s)", f"shape {array.shape}")
     return array
@@ -354,7 +361,7 @@ def count_from(at_least: int, at_most: int | None = None) -> Check:
 
 _NUMBER = Check(finite, {"type": "number"})
 _PAIR = Check(pair, {"type": "array", "items": {"type": "number"}, "minItems": 2, "maxItems": 2})
-_MOST = 1_000_000
+_MOST = 10_000_000
 
 Finite = Annotated[float, _NUMBER]
 Positive = Annotated[float, Check(positive, {"type": "number", "exclusiveMinimum": 0})]
@@ -380,6 +387,7 @@ DepthMm = Annotated[float, between(0.001, 20.0)]
 ForceMn = Annotated[float, between(1.0, 1e5)]
 PointsMm = Annotated[FloatArray, Check(points, {"type": "array"})]
 TimesMs = Annotated[FloatArray, Check(increasing, {"type": "array", "items": {"type": "number"}})]
+AnyArray = Annotated[FloatArray, Check(array, {})]
 FiniteArray = Annotated[FloatArray, Check(partial(float_array, ndim=None), {"type": "array"})]
 FiniteVector = Annotated[FloatArray, Check(partial(float_array, ndim=1), {"type": "array"})]
 FiniteMatrix = Annotated[FloatArray, Check(partial(float_array, ndim=2), {"type": "array"})]

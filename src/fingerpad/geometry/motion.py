@@ -9,7 +9,16 @@ from numpy.typing import ArrayLike
 
 from fingerpad.core.checked import checked_class, value_class
 from fingerpad.core.phases import Phase, ramp_and_hold_phases
-from fingerpad.core.values import Count, Finite, FloatArray, NotNegative, Positive, Whole, plausible
+from fingerpad.core.values import (
+    Count,
+    Finite,
+    FloatArray,
+    NotNegative,
+    Positive,
+    Whole,
+    float_array,
+    plausible,
+)
 from fingerpad.data import protocol
 
 LONGEST_MS = 1e13  # Longest ramp or hold; a quasi-static ramp of a validation takes 1e12 ms. [ms]

@@ -13,7 +13,7 @@ from fingerpad.core.checked import value_class
 from fingerpad.core.errors import InputError
 from fingerpad.core.phases import HOLD, RAMP, RELEASE, VIBRATION, Phase
 from fingerpad.core.units import unit_of
-from fingerpad.core.values import Finite, FloatArray, Many, Numbers, Whole, increasing, plausible
+from fingerpad.core.values import Finite, FloatArray, Many, Numbers, Whole, float_array, increasing, plausible
 from fingerpad.data import protocol
 from fingerpad.geometry.motion import PLAUSIBLE, STILL, Cycles, Motion, Pose, hold_ends_ms
 

@@ -17,7 +17,7 @@ from fingerpad.core.checked import checked
 from fingerpad.core.errors import InputError
 from fingerpad.core.signals import SpikeTrains
 from fingerpad.core.units import MS_PER_S
-from fingerpad.core.values import FloatArray, NotNegative, float_array, increasing, positive
+from fingerpad.core.values import FloatArray, NotNegative, float_array, increasing, positive, vector
 
 NO_GROUP = -1  # Group number of an afferent that is in no group.
 

@@ -107,7 +107,7 @@ class Experiment:
 @checked
 def discriminate_gradient_sum(
     responses: ArrayLike,
-    neighbours: np.ndarray,
+    neighbours: ArrayLike,
     noise_sigma: Finite,
     seed: Whole,
     experiment: Experiment | None = None,
@@ -153,7 +153,7 @@ def discriminate_gradient_sum(
 
 def compare_gradient_sum_observers(
     responses: ArrayLike,
-    neighbours: np.ndarray,
+    neighbours: ArrayLike,
     observers: Sequence[tuple[float, Experiment]],
     seed: int,
     silent_value: float | None = None,

@@ -106,7 +106,7 @@ def _plane(positions_mm: ArrayLike) -> FloatArray:
     return positions
 
 
-def taking_part(responses: ArrayLike, neighbours: np.ndarray) -> tuple[FloatArray, np.ndarray]:
+def taking_part(responses: ArrayLike, neighbours: ArrayLike) -> tuple[FloatArray, np.ndarray]:
     """Leave out the receptors that are silent under one stimulus (docs/decisions/silent-receptors.md).
 
     A receptor that is silent under one stimulus has no latency to compare with its neighbours'. It is left
@@ -119,7 +119,7 @@ def taking_part(responses: ArrayLike, neighbours: np.ndarray) -> tuple[FloatArra
 
 
 @checked
-def gradient_sum(values: ArrayLike, neighbours: np.ndarray) -> FloatArray:
+def gradient_sum(values: ArrayLike, neighbours: ArrayLike) -> FloatArray:
     """Gradient Sum: sum of the differences between neighbours, steps (b) and (c) of Figure 3.
 
     Each element's gradient is the sum of absolute differences to its neighbours (b); the gradients of all
@@ -164,7 +164,7 @@ def distance(values_a: ArrayLike, values_b: ArrayLike, norm: str = "city-block")
     return np.abs(differences).sum(axis=-1)
 
 
-def check_neighbours(neighbours: np.ndarray, n_receptors: int) -> np.ndarray:
+def check_neighbours(neighbours: ArrayLike, n_receptors: int) -> np.ndarray:
     """Return `neighbours` as integers if they are pairs of receptors, else raise `InputError`."""
     pairs = np.asarray(neighbours)
     if pairs.ndim != 2 or pairs.shape[1] != 2 or not np.issubdtype(pairs.dtype, np.integer):

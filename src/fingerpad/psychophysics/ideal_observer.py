@@ -43,6 +43,7 @@ from fingerpad.core.values import (
     Whole,
     float_array,
     not_negative,
+    vector,
     whole,
 )
 from fingerpad.psychophysics.noisy_responses import checked_noise, session_trials
