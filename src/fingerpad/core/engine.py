@@ -16,16 +16,16 @@ from collections.abc import Callable, Generator, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
-from dataclasses import dataclass
 from functools import partial
 from multiprocessing import get_context
 from typing import Any, Protocol, cast, runtime_checkable
 
+from fingerpad.core.checked import value_class
 from fingerpad.core.compilation import announce_compilation
 from fingerpad.core.errors import StoreError
 from fingerpad.core.logger import LOGGER
 from fingerpad.core.threads import available_threads
-from fingerpad.core.values import whole
+from fingerpad.core.values import Count
 
 Work = Callable[[Any, int | None], Any]
 """Called with an item and the number of threads that it may use; None for all. It must be known by name to
@@ -54,15 +54,12 @@ class Engine(Protocol):
         ...
 
 
-@dataclass(frozen=True)
+@value_class
 class Processes:
     """Engine of this computer: one process per job, or this process alone."""
 
-    jobs: int = 1  # Number of processes. With one, or for one item, the work is done here with all threads.
+    jobs: Count = 1  # Number of processes. With one, or for one item, the work is done here with all threads.
     kernels: Sequence[Any] = ()  # Those that the work calls: their compilation is announced.
-
-    def __post_init__(self) -> None:
-        whole("jobs", self.jobs, at_least=1)
 
     @property
     def width(self) -> int:

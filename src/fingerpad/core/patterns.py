@@ -17,7 +17,7 @@ from fingerpad.core.errors import ConvergenceError, InputError
 from fingerpad.core.layouts import MM2_PER_CM2, MOST_RECEPTORS, Layout, Place, around_zero, mean_spacing_mm
 from fingerpad.core.random_streams import Purpose, normals, uniforms
 from fingerpad.core.regions import Region
-from fingerpad.core.values import Finite, FloatArray, Whole, not_negative, positive
+from fingerpad.core.values import Finite, FloatArray, NotNegative, Whole, positive
 
 SEPARATION = 0.75
 """Least distance in a Poisson-disc layout over 1/sqrt(density). Random placement saturates at 0.83."""
@@ -82,10 +82,10 @@ def uniform(region: Region, density_per_cm2: Finite, seed: Whole) -> Layout:
 
 
 @checked
-def jittered(region: Region, density_per_cm2: Finite, seed: Whole, jitter: Finite = 0.2) -> Layout:
+def jittered(region: Region, density_per_cm2: Finite, seed: Whole, jitter: NotNegative = 0.2) -> Layout:
     """Square lattice with random displacements: each coordinate by Normal(0, jitter times the pitch)."""
     lattice = rectangular(region, density_per_cm2)
-    spread = not_negative("jitter", jitter) * lattice.pitch_mm
+    spread = jitter * lattice.pitch_mm
     places = _inside(
         region,
         len(lattice),
@@ -101,7 +101,7 @@ def poisson_disc(
     region: Region,
     density_per_cm2: Finite,
     seed: Whole,
-    separation: Finite = SEPARATION,
+    separation: NotNegative = SEPARATION,
     place: Place | None = None,
 ) -> Layout:
     """Random positions with a least distance from each other.
@@ -140,7 +140,7 @@ def poisson_disc(
     (64, True)
     """
     count = _expected(region, density_per_cm2)
-    if not_negative("separation", separation) > LARGEST_SEPARATION:
+    if separation > LARGEST_SEPARATION:
         raise InputError(
             "separation",
             f"must not exceed {LARGEST_SEPARATION:g} of 1/sqrt(density), the limit of random placement",

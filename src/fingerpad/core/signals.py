@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import field, fields, replace
-from functools import partial
 from inspect import signature
 from typing import Annotated, Any, Protocol, runtime_checkable
 
@@ -21,12 +20,11 @@ from fingerpad.core.errors import InputError
 from fingerpad.core.phases import Phase, from_onset, ramp_and_hold_phases
 from fingerpad.core.units import MS_PER_S, QUANTITY_UNITS, with_unit
 from fingerpad.core.values import (
-    Check,
     Finite,
     FiniteMatrix,
     FiniteVector,
     FloatArray,
-    IntArray,
+    Indices,
     Many,
     Numbers,
     Positive,
@@ -37,7 +35,6 @@ from fingerpad.core.values import (
     finite,
     float_array,
     increasing,
-    int_array,
 )
 
 MOST_SHOWN = 8  # Numbers of a list that `repr` shows.
@@ -328,7 +325,7 @@ class SpikeTrains(Result):
     """
 
     times_ms: FiniteVector
-    offsets: Annotated[IntArray, Check(partial(int_array, ndim=1), {})]
+    offsets: Indices
 
     def __post_init__(self) -> None:
         times, offsets = self.times_ms, self.offsets

@@ -390,6 +390,7 @@ TimesMs = Annotated[FloatArray, Check(increasing, {"type": "array", "items": {"t
 AnyArray = Annotated[FloatArray, Check(array, {})]
 FiniteArray = Annotated[FloatArray, Check(partial(float_array, ndim=None), {"type": "array"})]
 FiniteVector = Annotated[FloatArray, Check(partial(float_array, ndim=1), {"type": "array"})]
+Indices = Annotated[IntArray, Check(partial(int_array, ndim=1), {"type": "array"})]
 FiniteMatrix = Annotated[FloatArray, Check(partial(float_array, ndim=2), {"type": "array"})]
 
 

@@ -32,7 +32,7 @@ from fingerpad.core.checked import checked
 from fingerpad.core.errors import InputError, StoreError
 from fingerpad.core.files import path_of, write_atomically
 from fingerpad.core.signals import ResponseMap, SpikeTrains
-from fingerpad.core.values import Whole, instance, one_of
+from fingerpad.core.values import Whole, one_of
 from fingerpad.geometry.mesh import LAYERS, Mesh
 from fingerpad.skin.fields import FIELDS, Field, Place, Times, stored_fields
 from fingerpad.skin.sampling import SkinResponse
@@ -171,7 +171,7 @@ def touch_dataset(
     if skin.touch is not None:
         values |= _object_values(skin.touch, skin)
     if response is not None:
-        values |= response_values(instance("response", response, ResponseMap))
+        values |= response_values(response)
     for name, value in values.items():
         (coordinates if PARTS[name].dims == (name,) else variables)[name] = part_variable(name, value)
     variables["layer"][2].update(

@@ -10,8 +10,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from fingerpad import __version__
+from fingerpad.core.checked import checked, value_class
 from fingerpad.core.errors import InputError
-from fingerpad.core.values import FloatArray, IntArray, float_array, increasing, instance
+from fingerpad.core.values import Finite, FloatArray, IntArray, Whole, float_array, increasing
 from fingerpad.export.outline import Outline, RigidMesh, face_mesh, outline_of, rigid_mesh
 from fingerpad.geometry.indenters import Indenter
 from fingerpad.geometry.mesh import LAYERS, Mesh
@@ -49,7 +50,7 @@ class Support:
     axes: tuple[int, int]  # First and last axis along which they are held, 1 for x to 3 for z.
 
 
-@dataclass(frozen=True)
+@value_class
 class Job:
     """One indentation, described for another solver."""
 
@@ -59,11 +60,9 @@ class Job:
     placement: Placement  # Its position at first touch.
     times_ms: FloatArray  # Steps, from 0, (n_times,). [ms]
     depths_mm: FloatArray  # How far the indenter has advanced at each, from 0, (n_times,). [mm]
-    friction: float = 0.0  # Coulomb's coefficient between skin and indenter.
+    friction: Finite = 0.0  # Coulomb's coefficient between skin and indenter.
 
     def __post_init__(self) -> None:
-        instance("mesh", self.mesh, Mesh)
-        instance("indenter", self.indenter, Indenter)
         times = increasing("times_ms", float_array("times_ms", self.times_ms, 1))
         depths = float_array("depths_mm", self.depths_mm, 1)
         if times.size < 2 or times[0] != 0.0 or depths.shape != times.shape or depths[0] != 0.0:
@@ -209,7 +208,7 @@ class Job:
         )
         return tuple(each for each in sets if each.nodes.size)
 
-    def parts(self, layer: int) -> Iterator[tuple[bool, IntArray]]:
+    def parts(self, layer: Whole) -> Iterator[tuple[bool, IntArray]]:
         """Elements of a layer by shape: whether they are wedges, and their numbers."""
         for wedges in (False, True):
             numbers = np.flatnonzero((self.is_wedge == wedges) & (self.mesh.layer == layer))
@@ -253,9 +252,9 @@ def wedge_nodes(mesh: Mesh) -> IntArray:
     return wedges
 
 
+@checked
 def job_of(touch: Touch, times_ms: ArrayLike | None = None, depths_mm: ArrayLike | None = None) -> Job:
     """Describe an indentation for other solvers."""
-    instance("touch", touch, Touch)
     stimulus, settings = touch.stimulus, touch.settings
     if not stimulus.stays:
         raise InputError(

@@ -12,8 +12,9 @@ from itertools import pairwise
 
 import numpy as np
 
+from fingerpad.core.checked import checked
 from fingerpad.core.errors import InputError
-from fingerpad.core.values import FloatArray, IntArray, positive
+from fingerpad.core.values import FloatArray, IntArray, Positive
 from fingerpad.geometry.edged_indenters import Edge, Gap, Grating
 from fingerpad.geometry.indenters import Bar, Cylinder, FlatPunch, Indenter, Line, Plate, Sphere
 
@@ -71,8 +72,8 @@ def _arc(start: Point, end: Point, centre: Point) -> FloatArray:
     return middle + radius * np.column_stack([np.cos(angles), np.sin(angles)])
 
 
-def outline_of(indenter: Indenter, reach_mm: float) -> Outline | None:
-    positive("reach_mm", reach_mm, "mm")
+@checked
+def outline_of(indenter: Indenter, reach_mm: Positive) -> Outline | None:
     if isinstance(indenter, Sphere):
         radius = indenter.radius_mm
         return Outline(True, ((0.0, 0.0), (radius, -radius)), ((0.0, -radius),))

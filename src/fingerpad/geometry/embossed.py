@@ -5,13 +5,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 from functools import cached_property
 from itertools import pairwise
+from typing import Annotated
 
 import numpy as np
 from numba import njit
 
 from fingerpad.core.checked import checked, value_class
 from fingerpad.core.errors import InputError
-from fingerpad.core.values import Finite, Flag, FloatArray, Outlines, PointsMm, Positive, float_array, one_of
+from fingerpad.core.values import Finite, Flag, FloatArray, Outlines, PointsMm, Positive, choice, float_array
 from fingerpad.geometry.indenters import Indenter, rounded
 
 OPPOSITE = -0.985
@@ -147,7 +148,7 @@ def embossed_text(
     height_mm: Finite = 0.5,
     edge_radius_mm: Finite = 0.1,
     along_finger: Flag = False,
-    weight: str = "bold",
+    weight: Annotated[str, choice(("normal", "bold"))] = "bold",
 ) -> Embossed:
     """Emboss letters of DejaVu Sans, their middle on the indenter's axis.
 
@@ -181,7 +182,7 @@ def embossed_text(
 
     if not isinstance(text, str) or not text.strip():
         raise InputError("text", "must have at least one letter", repr(text))
-    font = FontProperties(family="DejaVu Sans", weight=one_of("weight", weight, ("normal", "bold")))
+    font = FontProperties(family="DejaVu Sans", weight=weight)
     known = get_font(findfont(font)).get_charmap()
     unknown = sorted(character for character in set(text) if ord(character) not in known)
     if unknown:

@@ -13,7 +13,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import cache, cached_property
 from types import MappingProxyType
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -25,12 +25,13 @@ from fingerpad.core.errors import InputError
 from fingerpad.core.values import (
     Finite,
     FloatArray,
+    NotNegative,
     Numbers,
+    Positive,
+    choice,
     finite,
     float_array,
     increasing,
-    not_negative,
-    one_of,
     positive,
 )
 from fingerpad.data import fingers
@@ -252,7 +253,7 @@ class Fingertip(Displayed, Finger):
     @checked
     def of(
         cls,
-        like: str = "adult",
+        like: Annotated[str, choice(FINGERS)] = "adult",
         length_mm: Finite | None = None,
         width_mm: Finite | None = None,
         height_mm: Finite | None = None,
@@ -285,7 +286,7 @@ class Fingertip(Displayed, Finger):
         >>> Fingertip.of() == Fingertip()
         True
         """
-        preset = FINGERS[one_of("like", like, tuple(FINGERS))]()
+        preset = FINGERS[like]()
         given = {"length_mm": length_mm, "width_mm": width_mm, "height_mm": height_mm}
         factors = {
             name: _size(name, size) / own
@@ -303,7 +304,7 @@ class Fingertip(Displayed, Finger):
             **{name: size for name, size in layers.items() if size is not None},
         )
 
-    def scaled(self, factor: Finite) -> Fingertip:
+    def scaled(self, factor: Positive) -> Fingertip:
         """Return the same finger in another size: outline, layers, bone and nail times a factor.
 
         Examples
@@ -311,7 +312,7 @@ class Fingertip(Displayed, Finger):
         >>> Fingertip().scaled(0.5).dermis_mm
         0.5765
         """
-        k = positive("factor", factor)
+        k = factor
         layers = ("stratum_corneum_mm", "living_epidermis_mm", "dermis_mm")
         return self._stretched(k, k, k, **{name: k * getattr(self, name) for name in layers})
 
@@ -436,10 +437,10 @@ class Fingertip(Displayed, Finger):
         share = z / np.where(half_width > 0.0, half_width, 1.0)
         return np.stack([x, -volar * np.sqrt(1.0 - share**2), z], axis=-1)
 
-    def subsurface(self, skin_points_mm: ArrayLike, depth_mm: Finite) -> FloatArray:
+    def subsurface(self, skin_points_mm: ArrayLike, depth_mm: NotNegative) -> FloatArray:
         """Points `depth_mm` below points of the skin, along the inward normal, (..., 3) [mm]."""
         points = np.asarray(skin_points_mm, dtype=np.float64)
-        return points - not_negative("depth_mm", depth_mm, "mm") * self.skin_normal(points)
+        return points - depth_mm * self.skin_normal(points)
 
     def depth_available_mm(self, x_mm: ArrayLike, z_mm: ArrayLike) -> FloatArray:
         """Distance along y from the volar skin at (x, z) to the bone or, beside it, the dorsal skin [mm].

@@ -11,7 +11,7 @@ from scipy.spatial import cKDTree
 
 from fingerpad.core.checked import value_class
 from fingerpad.core.errors import InputError
-from fingerpad.core.values import FloatArray, IntArray
+from fingerpad.core.values import Finite, FloatArray, IntArray
 from fingerpad.geometry.fingertip import Finger
 from fingerpad.geometry.grading import Grading
 from fingerpad.geometry.mesh import Mesh
@@ -192,7 +192,7 @@ class FingerMesh(Finger):
         reach = float(np.ptp(self.mesh.nodes_mm[:, 1]))
         return np.where(depth > 0.0, depth, reach).reshape(below.shape[:-1])
 
-    def own_grading(self, x_mm: float, z_mm: float) -> Grading:
+    def own_grading(self, x_mm: Finite, z_mm: Finite) -> Grading:
         sides = self.mesh.nodes_mm[self.mesh.skin_triangles]
         away = np.linalg.norm(sides.mean(axis=1) - self.skin_point(x_mm, z_mm), axis=1)
         near = sides[np.argsort(away)[:_NEAR_TRIANGLES]]

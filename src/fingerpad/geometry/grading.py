@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
+from typing import Annotated
 
 import numpy as np
 from scipy.optimize import brentq
 
-from fingerpad.core.checked import value_class
+from fingerpad.core.checked import checked, value_class
 from fingerpad.core.errors import InputError
-from fingerpad.core.values import Count, Finite, Flag, FloatArray, Many, Positive, one_of, positive
+from fingerpad.core.values import Count, Finite, Flag, FloatArray, Many, Positive, choice
 
 RESOLUTIONS = ("quick", "standard", "paper")
 
@@ -125,15 +126,15 @@ class Grading:
         return self.stratum_corneum, self.living_epidermis, self.dermis, self.subcutis
 
 
+@checked
 def resolution_grading(
-    resolution: str,
-    centre_mm: float,
-    half_length_mm: float = 5.0,
-    half_width_mm: float = 1.0,
-    finger_size: float = 1.0,
+    resolution: Annotated[str, choice(RESOLUTIONS)],
+    centre_mm: Finite,
+    half_length_mm: Finite = 5.0,
+    half_width_mm: Finite = 1.0,
+    finger_size: Positive = 1.0,
 ) -> Grading:
-    one_of("resolution", resolution, RESOLUTIONS)
-    k = min(positive("finger_size", finger_size), 1.0)
+    k = min(finger_size, 1.0)
     zone = Grading(centre_mm, half_length_mm, half_width_mm, 0.25 * k, 0.25 * k, largest_mm=3.0 * k)
     if resolution == "quick":
         return replace(zone, size_x_mm=0.45 * k, size_z_mm=0.45 * k, stratum_corneum=2, dermis=3, subcutis=3)

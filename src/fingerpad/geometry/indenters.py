@@ -15,10 +15,10 @@ from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
-from fingerpad.core.checked import OtherName, checked_class, value_class
+from fingerpad.core.checked import OtherName, checked, checked_class, value_class
 from fingerpad.core.errors import InputError
 from fingerpad.core.units import curvature_per_m, radius_mm
-from fingerpad.core.values import Finite, FloatArray, PointsMm, SizeMm, not_negative, positive
+from fingerpad.core.values import Finite, FloatArray, NotNegative, PointsMm, SizeMm, positive
 from fingerpad.data import protocol
 from fingerpad.geometry.probing import mirrored, traced_front
 
@@ -493,9 +493,9 @@ class Plate(Indenter):
         return points_mm[:, 1].copy(), np.broadcast_to([0.0, 1.0, 0.0], points_mm.shape).copy()
 
 
-def fillet_within(fillet_mm: float, width_mm: float, width_name: str) -> None:
+@checked
+def fillet_within(fillet_mm: NotNegative, width_mm: Finite, width_name: str) -> None:
     """Raise an error if a fillet is negative or larger than half of a width. [mm]"""
-    not_negative("fillet_mm", fillet_mm, "mm")
     if fillet_mm > width_mm / 2:
         raise InputError(
             "fillet_mm", f"must not exceed half of {width_name}, {width_mm / 2:g} mm", f"{fillet_mm:g} mm"

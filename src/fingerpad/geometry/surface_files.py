@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import warnings
 from pathlib import Path
+from typing import Annotated
 
 import numpy as np
 
@@ -11,7 +12,7 @@ from fingerpad.core.checked import checked
 from fingerpad.core.errors import InputError
 from fingerpad.core.files import LARGEST_TEXT_MB, check_file, path_of
 from fingerpad.core.units import LENGTHS_MM
-from fingerpad.core.values import Finite, FloatArray, IntArray, Pair, Positive, float_array, one_of, positive
+from fingerpad.core.values import Finite, FloatArray, IntArray, Pair, Positive, choice, float_array
 from fingerpad.geometry.surface import (
     LARGEST_MM,
     MOST_HEIGHTS,
@@ -43,9 +44,9 @@ _AXES = {
 @checked
 def read_surface(
     path: str | Path,
-    unit: str = "mm",
-    scale: Finite = 1.0,
-    up: str = "+z",
+    unit: Annotated[str, choice(LENGTHS_MM)] = "mm",
+    scale: Positive = 1.0,
+    up: Annotated[str, choice(_AXES)] = "+z",
     at_mm: Pair = (0, 0),
     smooth_below_deg: Finite = SMOOTH_BELOW_DEG,
     edge_radius_mm: Finite = 0.0,
@@ -71,8 +72,8 @@ def read_surface(
         Hollow creases between triangles of a smaller angle are rounded; see `Surface`. [degrees]
     """
     file = path_of("path", path)
-    factor = LENGTHS_MM[one_of("unit", unit, tuple(LENGTHS_MM))] * positive("scale", scale)
-    number, sign = _AXES[one_of("up", up, tuple(_AXES))]
+    factor = LENGTHS_MM[unit] * scale
+    number, sign = _AXES[up]
     at = float_array("at_mm", at_mm, 1)
     if at.shape != (2,):
         raise InputError("at_mm", "must be two numbers, along and across the finger in mm", repr(at_mm))

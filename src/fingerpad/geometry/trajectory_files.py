@@ -16,7 +16,7 @@ from fingerpad.core.files import path_of
 from fingerpad.core.phases import Phase
 from fingerpad.core.tables import TableRow, column_of, read_csv
 from fingerpad.core.units import MN_PER_N, MS_PER_S
-from fingerpad.core.values import Count, Finite, FloatArray, Positive, finite, positive
+from fingerpad.core.values import Count, Finite, FloatArray, Positive, finite
 from fingerpad.geometry.trajectory import POSE_COLUMNS, SAME_VALUE, Trajectory, check_speed, samples_of_line
 
 MM_PER_UM = 1e-3
@@ -166,7 +166,7 @@ SHORTEST_SHARE = 1e-9  # Duration of a piece over that of the whole motion, belo
 
 @checked
 def sampled(
-    end_ms: Finite,
+    end_ms: Positive,
     depth_mm: Course | None = None,
     force_mn: Course | None = None,
     *,
@@ -202,7 +202,7 @@ def sampled(
     >>> [round(time, 3) for time in motion.times_ms]
     [0.0, 80.0, 1000.0]
     """
-    end = positive("end_ms", end_ms, "ms")
+    end = end_ms
     given = (("depth_mm", depth_mm), ("force_mn", force_mn), ("x_mm", x_mm), ("z_mm", z_mm),
              ("tilt_deg", tilt_deg), ("spin_deg", spin_deg))  # fmt: skip
     courses = {name: course for name, course in given if course is not None}

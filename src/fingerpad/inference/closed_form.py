@@ -17,8 +17,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
+from fingerpad.core.checked import checked
 from fingerpad.core.units import MS_PER_S
-from fingerpad.core.values import FloatArray, not_negative, positive
+from fingerpad.core.values import FloatArray, NotNegative, Positive
 from fingerpad.data import neuron
 from fingerpad.inference.identifiable import IDENTIFIABLE_NAMES
 from fingerpad.inference.rate_model import AfferentModel, Rates, evaluate_rows
@@ -28,17 +29,18 @@ BEND = 0.05  # Width s over which the rate sets in, relative to the threshold. [
 SAMPLES = 16  # Times in each window at which the rate under a constant drive is computed.
 
 
+@checked
 def constant_drive_rate(
     drive_per_ms: ArrayLike,
-    time_constant_ms: float,
-    refractory_ms: float = neuron.REFRACTORY.value,
-    bend: float = 0.0,
+    time_constant_ms: Positive,
+    refractory_ms: NotNegative = neuron.REFRACTORY.value,
+    bend: NotNegative = 0.0,
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Rate under a constant drive, and its derivatives along the drive and the time constant."""
-    tau = positive("time_constant_ms", time_constant_ms, "ms")
-    rest = not_negative("refractory_ms", refractory_ms, "ms")
+    tau = time_constant_ms
+    rest = refractory_ms
     g = np.asarray(drive_per_ms, dtype=np.float64)
-    above, slope = _bent(tau * g - 1.0, not_negative("bend", bend))
+    above, slope = _bent(tau * g - 1.0, bend)
     fires = above > 0.0
     above = np.where(fires, above, 1.0)
     x = above + 1.0

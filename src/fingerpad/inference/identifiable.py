@@ -23,8 +23,9 @@ import math
 import numpy as np
 from numpy.typing import ArrayLike
 
+from fingerpad.core.checked import checked
 from fingerpad.core.errors import InputError
-from fingerpad.core.values import FloatArray, float_array, positive
+from fingerpad.core.values import FloatArray, Positive, float_array, positive
 from fingerpad.data import neuron
 from fingerpad.neuron.afferent import PARAMETER_NAMES
 
@@ -50,15 +51,16 @@ def identifiable(parameters: ArrayLike) -> FloatArray:
     return np.concatenate([six[..., :3] / scale, six[..., 3:4]], axis=-1)
 
 
+@checked
 def six_parameters(
     four: ArrayLike,
-    capacitance_mf: float = neuron.CAPACITANCE.value,
-    threshold_mv: float = neuron.THRESHOLD.value,
+    capacitance_mf: Positive = neuron.CAPACITANCE.value,
+    threshold_mv: Positive = neuron.THRESHOLD.value,
 ) -> FloatArray:
     """Return the six parameters with given C and v that are equivalent to four identifiable ones."""
     numbers = _rows("four", four, IDENTIFIABLE_NAMES)
-    capacitance = positive("capacitance_mf", capacitance_mf, "mF")
-    threshold = positive("threshold_mv", threshold_mv, "mV")
+    capacitance = capacitance_mf
+    threshold = threshold_mv
     kept = np.broadcast_to([capacitance, threshold], (*numbers.shape[:-1], 2))
     return np.concatenate([numbers[..., :3] * (capacitance * threshold), numbers[..., 3:], kept], axis=-1)
 

@@ -22,8 +22,9 @@ from dataclasses import dataclass, field
 import numpy as np
 from scipy.special import logsumexp
 
+from fingerpad.core.checked import value_class
 from fingerpad.core.errors import InputError
-from fingerpad.core.values import FloatArray, float_array, positive
+from fingerpad.core.values import FloatArray, Numbers, Positive, Whole, float_array
 from fingerpad.inference.rate_model import RateModel
 from fingerpad.inference.recordings import PHASES, RateRecordings
 
@@ -36,21 +37,20 @@ DEVIATION_HZ = 10.0  # Scale s of the prior of sigma. [spikes/s]
 PRIOR_OBSERVATIONS = 1.0  # Degrees of freedom nu of the prior of sigma.
 
 
-@dataclass(frozen=True)
+@value_class
 class CorrelatedResiduals:
     """Distribution of residuals along a line, whose deviation and correlation length are integrated out."""
 
-    n_residuals: int
+    n_residuals: Whole
     positions_mm: FloatArray | None = None
     """Their places along a line; default: independent residuals, (n_residuals,). [mm]"""
-    lengths_mm: tuple[float, ...] = LENGTHS_MM  # Grid of correlation lengths; 0 for independence. [mm]
-    deviation: float = DEVIATION_HZ  # Scale s of the prior of sigma. [unit of the residuals]
+    lengths_mm: Numbers = LENGTHS_MM  # Grid of correlation lengths; 0 for independence. [mm]
+    deviation: Positive = DEVIATION_HZ  # Scale s of the prior of sigma. [unit of the residuals]
     _whitening: FloatArray = field(init=False, repr=False, compare=False)
     _log_weights: FloatArray = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
         n = self.n_residuals
-        positive("deviation", self.deviation)
         lengths = float_array("lengths_mm", self.lengths_mm, 1)
         if not lengths.size or (lengths < 0.0).any():
             raise InputError("lengths_mm", "must hold lengths of at least 0", str(self.lengths_mm))
@@ -98,7 +98,7 @@ class CorrelatedResiduals:
         return self._log_weights - exponent * np.log(PRIOR_OBSERVATIONS * self.deviation**2 + squares)
 
 
-@dataclass(frozen=True)
+@value_class
 class RateLikelihood:
     """Likelihood of the parameters of a rate model, given the observed rates of one afferent."""
 
@@ -106,8 +106,8 @@ class RateLikelihood:
     recordings: RateRecordings  # Observed rates, one row per stimulus.
     positions_mm: FloatArray | None = None
     """Position of each stimulus along a line; default: independent residuals, (n_stimuli,). [mm]"""
-    lengths_mm: tuple[float, ...] = LENGTHS_MM  # Grid of correlation lengths; 0 for independence. [mm]
-    deviation_hz: float = DEVIATION_HZ  # Scale s of the prior of sigma. [spikes/s]
+    lengths_mm: Numbers = LENGTHS_MM  # Grid of correlation lengths; 0 for independence. [mm]
+    deviation_hz: Positive = DEVIATION_HZ  # Scale s of the prior of sigma. [spikes/s]
     _residuals: CorrelatedResiduals = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
@@ -118,7 +118,6 @@ class RateLikelihood:
                 "needs one stimulus per column of the model's drive",
                 f"{len(self.recordings.stimuli)} for {n}",
             )
-        positive("deviation_hz", self.deviation_hz, "spikes/s")
         residuals = CorrelatedResiduals(n, self.positions_mm, self.lengths_mm, self.deviation_hz)
         object.__setattr__(self, "_residuals", residuals)
         object.__setattr__(self, "lengths_mm", residuals.lengths_mm)

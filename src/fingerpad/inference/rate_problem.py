@@ -3,19 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
 
 import numpy as np
 
+from fingerpad.core.checked import value_class
 from fingerpad.core.errors import InputError
-from fingerpad.core.values import FloatArray, IntArray, not_negative
+from fingerpad.core.values import FloatArray, IntArray, NotNegative
 from fingerpad.data import protocol
 from fingerpad.inference.fitting.cross_validation import fractional_sum_of_squares
 from fingerpad.inference.rate_model import RateModel, Rates
 from fingerpad.inference.recordings import RateRecordings
 
 
-@dataclass(frozen=True)
+@value_class
 class RateProblem:
     """Recorded rates and the model that is fitted to them.
 
@@ -24,8 +24,8 @@ class RateProblem:
 
     model: RateModel  # Predicts the rates under all stimuli, in the order of the recordings.
     recordings: RateRecordings  # Observed rates. A phase that was not recorded does not enter the score.
-    dynamic_weight: float = protocol.DYNAMIC_WEIGHT.value
-    static_weight: float = protocol.STATIC_WEIGHT.value
+    dynamic_weight: NotNegative = protocol.DYNAMIC_WEIGHT.value
+    static_weight: NotNegative = protocol.STATIC_WEIGHT.value
     """Weights of the two phases where both were recorded, Eq. 12. [1]"""
 
     def __post_init__(self) -> None:
@@ -36,8 +36,6 @@ class RateProblem:
                 "needs one stimulus per column of the model's drive",
                 f"{observed} for {self.model.n_stimuli}",
             )
-        not_negative("dynamic_weight", self.dynamic_weight)
-        not_negative("static_weight", self.static_weight)
 
     @property
     def names(self) -> tuple[str, ...]:

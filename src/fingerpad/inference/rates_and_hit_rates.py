@@ -15,8 +15,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from fingerpad.core.checked import value_class
 from fingerpad.core.errors import InputError
-from fingerpad.core.values import FloatArray, IntArray, float_array, positive
+from fingerpad.core.values import FiniteVector, FloatArray, IntArray, Positive
 from fingerpad.inference.afferent_methods import bounds_of, by_differences, fitted_six, four_number_problem
 from fingerpad.inference.fitting.covariance_adaptation import CovarianceAdaptation
 from fingerpad.inference.fitting.methods import Continued, Fit, FitStep, Problem
@@ -33,7 +34,7 @@ FIRST_SPREAD, MOST_EVALUATIONS = 0.3, 600
 CHANCE = 0.5  # Hit rate of an observer of a silent population. [0-1]
 
 
-@dataclass(frozen=True)
+@value_class
 class RatesAndHitRates:
     """Recorded rates and hit rates of people, to which one afferent is fitted.
 
@@ -44,12 +45,8 @@ class RatesAndHitRates:
     rates: RateProblem  # Recorded rates and the model that predicts them.
     hit_rates: Callable[[FloatArray], FloatArray]
     """From the parameters of that model to predicted hit rates (n,). [0-1]"""
-    observed: FloatArray  # Hit rates of people, (n,). [0-1]
-    weight: float = WEIGHT  # Weight w of the squared differences against FSS.
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "observed", float_array("observed", self.observed, 1))
-        positive("weight", self.weight)
+    observed: FiniteVector  # Hit rates of people, (n,). [0-1]
+    weight: Positive = WEIGHT  # Weight w of the squared differences against FSS.
 
     @property
     def names(self) -> tuple[str, ...]:

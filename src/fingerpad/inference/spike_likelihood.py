@@ -28,11 +28,11 @@ from numba import njit
 from numpy.typing import ArrayLike
 from scipy.stats import kstest
 
-from fingerpad.core.checked import checked
+from fingerpad.core.checked import checked, value_class
 from fingerpad.core.errors import InputError
 from fingerpad.core.signals import SpikeTrains
 from fingerpad.core.threads import in_blocks
-from fingerpad.core.values import FloatArray, float_array, instance, positive
+from fingerpad.core.values import Finite, FloatArray, Indices, Positive, float_array
 from fingerpad.data import neuron
 from fingerpad.inference.identifiable import (
     N_PARAMETERS,
@@ -191,7 +191,7 @@ _TRAINS_PER_BLOCK = 8
 """Trains that one thread evaluates at a time; sums are taken block by block on any number of threads."""
 
 
-@dataclass(frozen=True)
+@value_class
 class SpikeLikelihood:
     """Likelihood of parameters, given spike trains of one afferent under known drives.
 
@@ -222,19 +222,15 @@ class SpikeLikelihood:
 
     drive: Drive
     trains: SpikeTrains
-    sites: np.ndarray | None = None
-    duration_ms: float | FloatArray | None = None
-    refractory_ms: float = neuron.REFRACTORY.value
-    escape_ms: float = ESCAPE_TIME_MS
+    sites: Indices | None = None
+    duration_ms: Finite | FloatArray | None = None
+    refractory_ms: Positive = neuron.REFRACTORY.value
+    escape_ms: Positive = ESCAPE_TIME_MS
     _intervals: tuple[FloatArray, np.ndarray, np.ndarray] = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
-        instance("drive", self.drive, Drive)
-        instance("trains", self.trains, SpikeTrains)
-        positive("refractory_ms", self.refractory_ms, "ms")
-        positive("escape_ms", self.escape_ms, "ms")
         n_trains, times = len(self.trains), self.drive.times_ms
-        sites = np.arange(n_trains) if self.sites is None else np.array(self.sites, dtype=np.int64)
+        sites = np.arange(n_trains) if self.sites is None else self.sites
         if sites.shape != (n_trains,) or (
             n_trains and not 0 <= sites.min() <= sites.max() < self.drive.n_sites
         ):

@@ -25,9 +25,10 @@ from functools import cached_property
 
 import numpy as np
 
+from fingerpad.core.checked import checked
 from fingerpad.core.errors import InputError
 from fingerpad.core.units import cosine_and_sine
-from fingerpad.core.values import FloatArray, IntArray, not_negative
+from fingerpad.core.values import FloatArray, IntArray, NotNegative
 from fingerpad.geometry.indenters import Indenter
 from fingerpad.geometry.mesh import Mesh
 from fingerpad.geometry.motion import STILL, Pose
@@ -141,9 +142,10 @@ def place(indenter: Indenter, skin_mm: FloatArray, at_mm: FloatArray, rotation: 
     return Placement(at_mm + advance * rotation[:, 1], rotation)
 
 
-def check_friction(friction: float, indenter: Indenter) -> float:
+@checked
+def check_friction(friction: NotNegative, indenter: Indenter) -> float:
     """Return the coefficient if it is not negative, and 0 for an indenter that grips the skin anyway."""
-    if not_negative("friction", friction) > 0.0 and indenter.grips:
+    if friction > 0.0 and indenter.grips:
         raise InputError(
             "friction",
             f"must be 0 for {type(indenter).__name__}, under which skin does not slide along the "

@@ -23,7 +23,7 @@ from typing import Protocol, Self, runtime_checkable
 
 import numpy as np
 
-from fingerpad.core.checked import value_class
+from fingerpad.core.checked import checked, value_class
 from fingerpad.core.errors import InputError, shown
 from fingerpad.core.values import Finite, FloatArray, Numbers, Positive, finite, not_negative, positive
 from fingerpad.mechanics.energy import CARRIED, SECOND, differentiate, translate
@@ -381,9 +381,10 @@ class Hencky(_OfModuli):
         )
 
 
-def check_poisson(poisson: float) -> float:
+@checked
+def check_poisson(poisson: Finite) -> float:
     """Return Poisson's ratio as float if it lies between 0 and 0.5, else raise `InputError`."""
-    ratio = finite("poisson", poisson)
+    ratio = poisson
     if not 0.0 < ratio < 0.5:
         raise InputError(
             "poisson",

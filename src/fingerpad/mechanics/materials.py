@@ -17,11 +17,10 @@ from fingerpad.core.values import (
     Finite,
     FloatArray,
     Numbers,
+    Positive,
     choice,
-    finite,
     float_array,
     not_negative,
-    one_of,
     positive,
 )
 from fingerpad.mechanics.energy import SECOND
@@ -130,25 +129,25 @@ class Material:
 
     @classmethod
     def neo_hooke(
-        cls, shear_kpa: Finite, poisson: Finite, prony: Prony = Prony(), moduli: str = "long_term"
+        cls, shear_kpa: Positive, poisson: Finite, prony: Prony = Prony(), moduli: str = "long_term"
     ) -> Material:
         """Neo-Hooke from shear modulus and Poisson's ratio. [kPa]"""
-        shear = positive("shear_kpa", shear_kpa, "kPa")
+        shear = shear_kpa
         bulk = bulk_modulus(shear, poisson)
         return cls(Polynomial(c10=shear / 2, bulk_linear=bulk / 2), prony, moduli)
 
     @classmethod
     def linear_elastic(
         cls,
-        young_kpa: Finite,
+        young_kpa: Positive,
         poisson: Finite,
         prony: Prony = Prony(),
         moduli: str = "long_term",
-        law: str = "neo_hooke",
+        law: Annotated[str, choice(("neo_hooke", "hencky"))] = "neo_hooke",
     ) -> Material:
         """Hooke's law at small strain; at large strain "neo_hooke" or "hencky" with the same moduli. [kPa]"""
-        shear = positive("young_kpa", young_kpa, "kPa") / (2 * (1 + check_poisson(poisson)))
-        if one_of("law", law, ("neo_hooke", "hencky")) == "neo_hooke":
+        shear = young_kpa / (2 * (1 + check_poisson(poisson)))
+        if law == "neo_hooke":
             return cls.neo_hooke(shear, poisson, prony, moduli)
         return cls(Hencky(shear, bulk_modulus(shear, poisson)), prony, moduli)
 
@@ -165,7 +164,7 @@ class Material:
         moduli: str = "long_term",
     ) -> Material:
         """Polynomial N = 2 (Mooney-Rivlin if c20 = c11 = c02 = 0) of a given Poisson's ratio. [kPa]"""
-        half = finite("c10", c10, "kPa") + finite("c01", c01, "kPa")
+        half = c10 + c01
         bulk = bulk_modulus(positive("2 (c10 + c01)", 2 * half, "kPa"), poisson)
         return cls(Polynomial(c10, c01, c20, c11, c02, bulk_linear=bulk / 2), prony, moduli)
 
@@ -228,9 +227,9 @@ class Material:
         """Factor from the given coefficients to the instantaneous ones."""
         return 1.0 / self.prony.long_term_share if self.moduli == "long_term" else 1.0
 
-    def scaled(self, factor: Finite) -> Material:
+    def scaled(self, factor: Positive) -> Material:
         """Return the same tissue with all moduli times a factor."""
-        return replace(self, law=self.law.scaled(positive("factor", factor)))
+        return replace(self, law=self.law.scaled(factor))
 
     def with_prony(self, prony: Prony) -> Material:
         """Return the same tissue with another relaxation."""

@@ -160,7 +160,7 @@ class PressSettings:
         apart = np.abs(wanted[:, None] - times_ms).min(axis=1) > SAME_TIME * motion.end_ms
         return np.union1d(times_ms, wanted[apart])
 
-    def newton_about(self, finest_mm: Finite) -> NewtonSettings:
+    def newton_about(self, finest_mm: float) -> NewtonSettings:
         """Tolerances of each step, tight enough for the bound on SED, and those of a small body about one.
 
         Parameters

@@ -14,7 +14,7 @@ from fingerpad.core.errors import InputError, shown
 from fingerpad.core.signals import INTERVAL, STORED_ENERGY, SpikeTrains, Traces
 from fingerpad.core.threads import in_blocks
 from fingerpad.core.units import SKIN_QUANTITY_UNITS, gain_unit, units_of
-from fingerpad.core.values import Finite, FloatArray, float_array, not_negative, one_of
+from fingerpad.core.values import Finite, FloatArray, NotNegative, float_array, one_of
 from fingerpad.data import neuron
 from fingerpad.neuron.lif import LeakyIntegrateAndFire
 from fingerpad.neuron.spikes import Window, firing_rate_hz, rate_windows_ms
@@ -282,7 +282,7 @@ class Afferent:
         """Constant current that just reaches the threshold, C v / tau; less never elicits a spike. [mA]"""
         return self.capacitance_mf * self.threshold_mv / self.time_constant_ms
 
-    def with_static_threshold(self, quantity: Finite) -> Afferent:
+    def with_static_threshold(self, quantity: NotNegative) -> Afferent:
         """Return the same afferent with another intercept, so that it fires above a constant quantity.
 
         Parameters
@@ -295,7 +295,7 @@ class Afferent:
         >>> round(Afferent().with_static_threshold(5.0).static_threshold, 9)
         5.0
         """
-        raised = not_negative("quantity", quantity) - self.static_threshold
+        raised = quantity - self.static_threshold
         return replace(self, intercept_ma=self.intercept_ma - self.static_gain * raised)
 
     def spikes(self, traces: Traces | Drive) -> SpikeTrains:

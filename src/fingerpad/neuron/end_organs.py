@@ -13,17 +13,7 @@ from fingerpad.core.errors import InputError
 from fingerpad.core.layouts import Place
 from fingerpad.core.random_streams import Purpose, uniforms
 from fingerpad.core.signals import Traces
-from fingerpad.core.values import (
-    Check,
-    Count,
-    Finite,
-    FiniteArray,
-    FloatArray,
-    Whole,
-    choice,
-    float_array,
-    positive,
-)
+from fingerpad.core.values import Check, Count, FiniteArray, FloatArray, Positive, Whole, choice, float_array
 
 _SUM_TOLERANCE = 1e-6
 
@@ -88,7 +78,7 @@ class EndOrgans:
         cls,
         places_mm: ArrayLike,
         count: Count,
-        reach_mm: Finite,
+        reach_mm: Positive,
         seed: Whole,
         place: Place | None = None,
         combine: str = "sum",
@@ -116,7 +106,7 @@ class EndOrgans:
         (2, 5, 2)
         """
         centres = float_array("places_mm", places_mm, 2)
-        radius_mm = positive("reach_mm", reach_mm, "mm")
+        radius_mm = reach_mm
         drawn = uniforms(seed, 1, len(centres), Purpose.END_ORGAN, 2 * count)[0]
         distance, angle = radius_mm * np.sqrt(drawn[:, :count]), 2.0 * np.pi * drawn[:, count:]
         offsets = np.stack([distance * np.cos(angle), distance * np.sin(angle)], axis=-1)

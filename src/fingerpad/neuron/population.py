@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import warnings
 from dataclasses import field, replace
-from typing import Protocol, runtime_checkable
+from typing import Annotated, Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -16,18 +16,17 @@ from fingerpad.core.layouts import MOST_RECEPTORS, Layout, Place, around_zero
 from fingerpad.core.random_streams import Purpose, normals
 from fingerpad.core.signals import INTERVAL, ResponseMap, Skin, Traces, traces_below
 from fingerpad.core.values import (
-    Finite,
+    Count,
     FiniteMatrix,
     FiniteVector,
     FloatArray,
+    NotNegative,
     Pair,
     Positive,
     Whole,
+    count_from,
     float_array,
-    not_negative,
     pair,
-    positive,
-    whole,
 )
 from fingerpad.data import fingertip, psychophysics
 from fingerpad.data.tissues import DEFAULT_TISSUES
@@ -51,7 +50,10 @@ class HasContact(Protocol):
         ...
 
 
-def sensitivities(count: int, spread: float, seed: int) -> FloatArray:
+@checked
+def sensitivities(
+    count: Annotated[int, count_from(1, MOST_RECEPTORS)], spread: NotNegative, seed: Whole
+) -> FloatArray:
     """Draw the relative sensitivity of each afferent, a factor of both gains.
 
     They are log-normal with mean 1: exp(spread n - spread^2/2), n from Normal(0, 1).
@@ -78,10 +80,10 @@ def sensitivities(count: int, spread: float, seed: int) -> FloatArray:
     >>> bool((sensitivities(5, 0.4, seed=7)[:3] == sensitivities(3, 0.4, seed=7)).all())
     True
     """
-    sigma = not_negative("spread", spread)
+    sigma = spread
     if sigma > LARGEST_SPREAD:
         raise InputError("spread", f"must be at most {LARGEST_SPREAD:g}, a factor of 10^4", f"{sigma:g}")
-    drawn = normals(seed, 1, whole("count", count, 1, MOST_RECEPTORS), Purpose.SENSITIVITY, 1)[0, :, 0]
+    drawn = normals(seed, 1, count, Purpose.SENSITIVITY, 1)[0, :, 0]
     return np.exp(sigma * drawn - 0.5 * sigma**2)
 
 
@@ -187,9 +189,9 @@ class Population:
     @checked
     def grid(
         cls,
-        density_per_cm2: Finite = psychophysics.RECEPTOR_DENSITY.value,
-        rows: Whole = 3,
-        columns: Whole = 6,
+        density_per_cm2: Positive = psychophysics.RECEPTOR_DENSITY.value,
+        rows: Count = 3,
+        columns: Count = 6,
         centre_mm: Pair | None = None,
         afferent: AnyAfferent | None = None,
         finger: HasContact | None = None,
@@ -223,7 +225,7 @@ class Population:
         >>> population.pitch_mm, population.positions_mm.tolist()
         (1.0, [[17.0, -0.5], [17.0, 0.5]])
         """
-        pitch_mm = MM_PER_CM / math.sqrt(positive("density_per_cm2", density_per_cm2, "1/cm2"))
+        pitch_mm = MM_PER_CM / math.sqrt(density_per_cm2)
         follows = centre_mm is None and finger is None
         if finger is not None and not hasattr(finger, "contact_mm"):
             raise InputError(
@@ -231,7 +233,7 @@ class Population:
             )
         centre = centre_mm or (CENTRE_MM if finger is None else finger.contact_mm)
         centre_x, centre_z = pair("centre_mm", centre)
-        counts = whole("rows", rows, 1), whole("columns", columns, 1)
+        counts = rows, columns
         if math.prod(counts) > MOST_RECEPTORS:
             raise InputError(
                 f"rows times columns must be at most {MOST_RECEPTORS:,} receptors: got {rows} by {columns}."

@@ -25,16 +25,7 @@ from fingerpad.core.checked import checked, value_class
 from fingerpad.core.errors import InputError
 from fingerpad.core.phases import Phase
 from fingerpad.core.signals import CURRENT, STORED_ENERGY, Traces
-from fingerpad.core.values import (
-    Count,
-    Finite,
-    FiniteMatrix,
-    FiniteVector,
-    FloatArray,
-    Many,
-    Positive,
-    positive,
-)
+from fingerpad.core.values import Count, Finite, FiniteMatrix, FiniteVector, FloatArray, Many, Positive
 
 PIECES_PER_INTERVAL = 32  # Largest number of linear pieces that replace the cubic between two given times.
 SHORTEST_PIECE_MS = 0.25  # Shortest linear piece: shorter intervals are divided into fewer pieces. [ms]
@@ -174,7 +165,7 @@ def _largest_sum(lengths, dynamic, static, of_slope, of_value):  # type: ignore[
 def drive(
     traces: Traces,
     *,
-    difference_step_ms: Finite | None = None,
+    difference_step_ms: Positive | None = None,
     pieces: Count = PIECES_PER_INTERVAL,
     shortest_piece_ms: Positive = SHORTEST_PIECE_MS,
 ) -> Drive:
@@ -229,7 +220,7 @@ def drive(
     spans = _between_kinks(traces)
     knots = [knots_of(traces.times_ms[first : last + 1], pieces, shortest_piece_ms) for first, last in spans]
     if difference_step_ms is not None:
-        return _difference(traces, spans, knots, positive("difference_step_ms", difference_step_ms, "ms"))
+        return _difference(traces, spans, knots, difference_step_ms)
     times = np.concatenate([traces.times_ms[:1], *knots])
     values, rates = np.empty((2, times.size, traces.n_sites))
     values[0], rates[0] = traces.values[0], 0.0

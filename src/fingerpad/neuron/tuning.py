@@ -14,7 +14,7 @@ from fingerpad.core.checked import checked
 from fingerpad.core.errors import InputError
 from fingerpad.core.signals import Traces
 from fingerpad.core.units import MS_PER_S
-from fingerpad.core.values import Finite, FloatArray, Positive, float_array, not_negative, positive
+from fingerpad.core.values import Finite, FloatArray, NotNegative, Positive, float_array
 from fingerpad.neuron.afferent import AnyAfferent, checked_afferent
 
 SAMPLES_PER_CYCLE = 40
@@ -27,15 +27,16 @@ _RANGE_UM = (1e-2, 1e4)
 _AMPLITUDES, _ROUNDS = 41, 3
 
 
+@checked
 def vibration(
-    frequency_hz: float, amplitudes_um: ArrayLike, per_um: float, hold: float, quantity: str
+    frequency_hz: Positive, amplitudes_um: ArrayLike, per_um: Finite, hold: NotNegative, quantity: str
 ) -> Traces:
     """Traces of one quantity under a vibration on a hold, a column per amplitude; none falls below 0."""
-    period_ms = MS_PER_S / positive("frequency_hz", frequency_hz, "Hz")
+    period_ms = MS_PER_S / frequency_hz
     phase = np.arange(CYCLES * SAMPLES_PER_CYCLE + 1) / SAMPLES_PER_CYCLE
     wave = np.outer(np.sin(2.0 * np.pi * phase), per_um * float_array("amplitudes_um", amplitudes_um, 1))
     times_ms = np.append(0.0, SETTLING_MS + period_ms * phase)
-    values = np.maximum(not_negative("hold", hold) + np.vstack([0.0 * wave[:1], wave]), 0.0)
+    values = np.maximum(hold + np.vstack([0.0 * wave[:1], wave]), 0.0)
     return Traces(times_ms, values, kinks_ms=np.array([SETTLING_MS]), quantity=quantity)
 
 

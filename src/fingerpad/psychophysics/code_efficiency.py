@@ -12,11 +12,12 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 
 from fingerpad.core.checked import checked
-from fingerpad.core.values import Finite, FloatArray, Whole, one_of
+from fingerpad.core.values import Finite, FloatArray, Whole, choice
 from fingerpad.psychophysics.encoding import distance, gradient_sum
 from fingerpad.psychophysics.ideal_observer import (
     Discriminability,
@@ -75,8 +76,13 @@ def noisy_presentations(
     return [present(standard, comparison, seed, EFFICIENCY_TRIALS, session) for comparison in comparisons]
 
 
+@checked
 def code_statistic(
-    code: str, standard: ResponseModel, neighbours: np.ndarray, seed: int, session: int = 0
+    code: Annotated[str, choice(POPULATION_CODES)],
+    standard: ResponseModel,
+    neighbours: np.ndarray,
+    seed: Whole,
+    session: Whole = 0,
 ) -> Statistic:
     """Return what a code computes from the responses of one trial.
 
@@ -91,7 +97,7 @@ def code_statistic(
     seed, session : int
         As in `noisy_presentations`.
     """
-    if one_of("code", code, POPULATION_CODES) == "gradient_sum":
+    if code == "gradient_sum":
         return lambda responses: gradient_sum(responses, neighbours)
     memory = standard.draw(seed, session_trials(session, 3, EFFICIENCY_TRIALS)[2])
     return lambda responses: distance(responses, memory)

@@ -37,11 +37,10 @@ from fingerpad.core.values import (
     FloatArray,
     IntArray,
     NotNegative,
+    NotNegativeWhole,
     Whole,
     choice,
-    finite,
     float_array,
-    one_of,
     whole,
 )
 from fingerpad.data import protocol, psychophysics
@@ -151,13 +150,14 @@ def discriminate_gradient_sum(
     return compare_gradient_sum_observers(responses, neighbours, [observer], seed, silent_value, session)[0]
 
 
+@checked
 def compare_gradient_sum_observers(
     responses: ArrayLike,
     neighbours: ArrayLike,
     observers: Sequence[tuple[float, Experiment]],
-    seed: int,
-    silent_value: float | None = None,
-    session: int = 0,
+    seed: NotNegativeWhole,
+    silent_value: Finite | None = None,
+    session: Whole = 0,
 ) -> list[HitRates]:
     """Discriminate spheres by their Gradient Sum under several noises and criteria.
 
@@ -168,7 +168,6 @@ def compare_gradient_sum_observers(
     pairs = check_neighbours(neighbours, values.shape[1])
     if not len(pairs):
         raise InputError("neighbours", "must hold at least one pair of receptors", "none")
-    whole("seed", seed, 0)
     found: dict[int, HitRates] = {}
     for (distributions, presentations), sigmas, owners in _alike(observers, attrgetter("sums_per_sphere")):
         trials = session_trials(session, len(values), distributions)
@@ -225,20 +224,20 @@ def discriminate_euclidean(
     return compare_euclidean_observers(responses, [observer], seed, silent_value, norm, session)[0]
 
 
+@checked
 def compare_euclidean_observers(
     responses: ArrayLike,
     observers: Sequence[tuple[float, Experiment]],
-    seed: int,
-    silent_value: float | None = None,
-    norm: str = "city-block",
-    session: int = 0,
+    seed: Whole,
+    silent_value: Finite | None = None,
+    norm: Annotated[str, choice(NORMS)] = "city-block",
+    session: Whole = 0,
 ) -> list[HitRates]:
     """Discriminate spheres by their Euclidean Distance under several noises and criteria.
 
     All observers meet the same random numbers, which are drawn once: each has the hit rates that
     `discriminate_euclidean` gives it.
     """
-    one_of("norm", norm, NORMS)
     values = checked_responses(responses, silent_value)
     for _, plan in observers:
         if plan.criterion_sigma > 0.0:
@@ -261,15 +260,14 @@ def compare_euclidean_observers(
     return [found[number] for number in range(len(observers))]
 
 
-def checked_responses(responses: ArrayLike, silent_value: float | None = None) -> FloatArray:
+@checked
+def checked_responses(responses: ArrayLike, silent_value: Finite | None = None) -> FloatArray:
     """Return responses as a table if they are valid for a discrimination, else raise `InputError`."""
     try:
         table = np.array(responses, dtype=np.float64)
     except (TypeError, ValueError) as error:
         raise InputError("responses", "must be numbers", type(responses).__name__) from error
     silent = np.isnan(table)
-    if silent_value is not None:
-        finite("silent_value", silent_value)
     if table.size and (silent | (table == 0.0)).all():
         raise InputError(
             "responses",

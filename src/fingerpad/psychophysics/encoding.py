@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -17,7 +18,7 @@ from fingerpad.core.checked import checked
 from fingerpad.core.errors import InputError
 from fingerpad.core.layouts import PATTERNS
 from fingerpad.core.signals import ResponseMap
-from fingerpad.core.values import Finite, FloatArray, Whole, float_array, one_of, positive
+from fingerpad.core.values import Finite, FloatArray, Positive, Whole, choice, float_array
 
 RESPONSE_MEASURES: dict[str, Callable[[ResponseMap], FloatArray]] = {
     "static": lambda response: response.static_rate_hz,
@@ -34,7 +35,7 @@ _LATTICE_NEIGHBOURS = {"rectangular": 8, "hexagonal": 6}
 
 
 @checked
-def neighbour_pairs(positions_mm: ArrayLike, pitch_mm: Finite, count: Whole = 8) -> np.ndarray:
+def neighbour_pairs(positions_mm: ArrayLike, pitch_mm: Positive, count: Whole = 8) -> np.ndarray:
     """Find the pairs (n_pairs, 2) of neighbours in a lattice, each once, the lower index first.
 
     Receptors are neighbours when they lie less than 1.5 pitches apart: in x and z each (8 neighbours,
@@ -62,21 +63,22 @@ def neighbour_pairs(positions_mm: ArrayLike, pitch_mm: Finite, count: Whole = 8)
     positions = _plane(positions_mm)
     if count not in _METRIC:
         raise InputError("count", "must be 8, 4 or 6 neighbours", repr(count))
-    reach = _BETWEEN_FIRST_AND_SECOND_NEIGHBOUR[count] * positive("pitch_mm", pitch_mm, "mm")
+    reach = _BETWEEN_FIRST_AND_SECOND_NEIGHBOUR[count] * pitch_mm
     # The tree's reach includes its end.
     found = cKDTree(positions).query_pairs(np.nextafter(reach, 0.0), p=_METRIC[count], output_type="ndarray")
     ordered = np.sort(found.astype(np.int64), axis=1)
     return ordered[np.lexsort((ordered[:, 1], ordered[:, 0]))]
 
 
-def delaunay_pairs(positions_mm: ArrayLike, pitch_mm: float) -> np.ndarray:
+@checked
+def delaunay_pairs(positions_mm: ArrayLike, pitch_mm: Positive) -> np.ndarray:
     """Find the pairs of neighbours in a random layout.
 
     Neighbours are joined by an edge of the Delaunay triangulation: their Voronoi cells are adjacent. Edges
     longer than 3 pitches are left out, because they cross a hole or a concave border of the region.
     """
     positions = _plane(positions_mm)
-    longest = _LONGEST_PITCHES * positive("pitch_mm", pitch_mm, "mm")
+    longest = _LONGEST_PITCHES * pitch_mm
     try:
         corners = Delaunay(positions).simplices
     except (QhullError, ValueError) as error:
@@ -89,9 +91,11 @@ def delaunay_pairs(positions_mm: ArrayLike, pitch_mm: float) -> np.ndarray:
     return pairs[lengths <= longest].astype(np.int64)
 
 
-def neighbours_of(places_mm: ArrayLike, pitch_mm: float, pattern: str) -> np.ndarray:
+@checked
+def neighbours_of(
+    places_mm: ArrayLike, pitch_mm: Finite, pattern: Annotated[str, choice(PATTERNS)]
+) -> np.ndarray:
     """Find the pairs of neighbours in a layout of any pattern of `fingerpad.core.layouts`."""
-    one_of("pattern", pattern, PATTERNS)
     if pattern in _LATTICE_NEIGHBOURS:
         return neighbour_pairs(places_mm, pitch_mm, _LATTICE_NEIGHBOURS[pattern])
     return delaunay_pairs(places_mm, pitch_mm)
@@ -149,12 +153,14 @@ def gradient_sum(values: ArrayLike, neighbours: ArrayLike) -> FloatArray:
     return sums
 
 
-def distance(values_a: ArrayLike, values_b: ArrayLike, norm: str = "city-block") -> FloatArray:
+@checked
+def distance(
+    values_a: ArrayLike, values_b: ArrayLike, norm: Annotated[str, choice(NORMS)] = "city-block"
+) -> FloatArray:
     """Euclidean Distance: difference between two populations, receptor by receptor, step (e*) of Figure 3.
 
     The paper uses this name for a sum of absolute differences, which is the city-block distance.
     """
-    one_of("norm", norm, NORMS)
     first, second = np.asarray(values_a, dtype=np.float64), np.asarray(values_b, dtype=np.float64)
     if first.ndim == 0 or second.ndim == 0 or first.shape[-1] != second.shape[-1]:
         raise InputError("distance", "needs the same receptors twice", f"{first.shape} and {second.shape}")

@@ -216,7 +216,7 @@ class PsychometricFunction:
         """
         if proportion_correct is None:
             return self.threshold
-        wanted = finite("proportion_correct", proportion_correct)
+        wanted = proportion_correct
         if not self.guess < wanted < 1.0 - self.lapse:
             raise InputError(
                 "proportion_correct",

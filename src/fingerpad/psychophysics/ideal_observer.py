@@ -36,15 +36,16 @@ from fingerpad.core.checked import checked, value_class
 from fingerpad.core.errors import InputError
 from fingerpad.core.random_streams import Purpose, normals
 from fingerpad.core.values import (
+    Finite,
     FiniteMatrix,
     FiniteVector,
     FloatArray,
     IntArray,
+    NotNegative,
+    Several,
     Whole,
     float_array,
-    not_negative,
     vector,
-    whole,
 )
 from fingerpad.psychophysics.noisy_responses import checked_noise, session_trials
 
@@ -129,8 +130,9 @@ class GaussianResponses:
         return self.mean + draws @ self.factor.T
 
 
+@checked
 def multiplied_responses(
-    responses: ArrayLike, noise_sigma: float, smallest_spread: float = 0.0
+    responses: ArrayLike, noise_sigma: Finite, smallest_spread: NotNegative = 0.0
 ) -> GaussianResponses:
     """Return responses under the paper's noise: each multiplied by its own Normal(1, sigma_1).
 
@@ -156,7 +158,7 @@ def multiplied_responses(
     """
     values = float_array("responses", responses, 1)
     sigma = checked_noise(noise_sigma, above_zero=True)
-    floor = not_negative("smallest_spread", smallest_spread)
+    floor = smallest_spread
     if floor == 0.0 and (values == 0.0).any():
         raise InputError(
             f"{np.count_nonzero(values == 0.0)} of {values.size} receptors are silent, so multiplicative "
@@ -269,7 +271,7 @@ def present(
     standard: ResponseModel,
     comparison: ResponseModel,
     seed: Whole,
-    n_trials: Whole = 4000,
+    n_trials: Several = 4000,
     session: Whole = 0,
 ) -> Presentation:
     """Simulate responses to two stimuli, with the log likelihood ratio of the ideal observer.
@@ -298,7 +300,7 @@ def present(
             "standard and comparison must have the same receptors: "
             f"got {standard.n_receptors} and {comparison.n_receptors}."
         )
-    trials = session_trials(session, 2, whole("n_trials", n_trials, 2))
+    trials = session_trials(session, 2, n_trials)
     first, second = standard.draw(seed, trials[0]), comparison.draw(seed, trials[1])
     # One likelihood may be -inf, but not both: the responses come from one of the models.
     ratios = [comparison.log_likelihood(each) - standard.log_likelihood(each) for each in (first, second)]
@@ -342,8 +344,9 @@ def efficiency(code: Discriminability, ideal: Discriminability) -> tuple[float, 
     return share, 2.0 * share * relative
 
 
+@checked
 def gaussian_information(
-    responses: ArrayLike, slopes: ArrayLike, noise_sigma: float, smallest_spread: float = 0.0
+    responses: ArrayLike, slopes: ArrayLike, noise_sigma: Finite, smallest_spread: NotNegative = 0.0
 ) -> float:
     """Fisher information J with the paper's noise, the limit of the ideal observer. [1/unit of x squared]
 
@@ -373,7 +376,7 @@ def gaussian_information(
     """
     values, rises = float_array("responses", responses, 1), float_array("slopes", slopes, 1)
     sigma = checked_noise(noise_sigma, above_zero=True)
-    floor = not_negative("smallest_spread", smallest_spread)
+    floor = smallest_spread
     zeros = np.count_nonzero(values == 0.0) if floor == 0.0 else 0
     if values.size != rises.size or zeros:
         raise InputError(

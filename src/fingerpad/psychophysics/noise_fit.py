@@ -10,8 +10,9 @@ from numpy.typing import ArrayLike
 from scipy.optimize import minimize_scalar
 from scipy.special import ndtr
 
+from fingerpad.core.checked import checked
 from fingerpad.core.errors import ConvergenceError, InputError
-from fingerpad.core.values import FloatArray, finite, float_array, positive
+from fingerpad.core.values import Finite, FloatArray, float_array, positive
 from fingerpad.data import psychophysics
 from fingerpad.psychophysics.discrimination import (
     checked_responses,
@@ -37,13 +38,14 @@ class NoiseFit:
     root_mean_square_error: float  # Of the predicted against the observed hit rates.
 
 
+@checked
 def expected_hit_rates(
     responses: ArrayLike,
     neighbours: np.ndarray,
-    noise_sigma: float,
+    noise_sigma: Finite,
     standard_normals: ArrayLike,
-    criterion: float = psychophysics.DECISION_CRITERION.value,
-    silent_value: float | None = None,
+    criterion: Finite = psychophysics.DECISION_CRITERION.value,
+    silent_value: Finite | None = None,
 ) -> FloatArray:
     """Predict the mean hit rates of `discriminate_gradient_sum` without repeating the experiment.
 
@@ -61,15 +63,16 @@ def expected_hit_rates(
     pairs = check_neighbours(neighbours, values.shape[1])
     sums = shared_noise_gradient_sums(values, pairs, checked_noise(noise_sigma), draws)
     means, spreads = moments(sums)
-    point = decision_point(means[0], means[1:], finite("criterion", criterion))
+    point = decision_point(means[0], means[1:], criterion)
     return hit_probability(point, means[1:], spreads[1:], side(means[np.newaxis]))
 
 
+@checked
 def expected_euclidean_hit_rates(
     responses: ArrayLike,
-    noise_sigma: float,
-    criterion: float = psychophysics.DECISION_CRITERION.value,
-    silent_value: float | None = None,
+    noise_sigma: Finite,
+    criterion: Finite = psychophysics.DECISION_CRITERION.value,
+    silent_value: Finite | None = None,
 ) -> FloatArray:
     """Predict the mean hit rates of `discriminate_euclidean`, city-block, in closed form.
 
@@ -97,7 +100,7 @@ def expected_euclidean_hit_rates(
     third = s**3 * ((2.0 + x**2) * tail + (3.0 * x + x**3) * centre) - 3.0 * m * second + 2.0 * m**3
     means, spreads = m.sum(axis=1), np.sqrt((second - np.square(m)).sum(axis=1))
     larger = side(means[np.newaxis])
-    point = decision_point(means[0], means[1:], finite("criterion", criterion))
+    point = decision_point(means[0], means[1:], criterion)
     normal = hit_probability(point, means[1:], spreads[1:], larger)
     z = (means[1:] - point) / np.maximum(spreads[1:], np.finfo(float).tiny)
     skewness = third.sum(axis=1)[1:] / np.maximum(spreads[1:] ** 3, np.finfo(float).tiny)

@@ -13,11 +13,21 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
+from fingerpad.core.checked import checked
 from fingerpad.core.errors import InputError
 from fingerpad.core.philox import four_normals
 from fingerpad.core.random_streams import LARGEST_SEED, Purpose, normals
 from fingerpad.core.threads import in_blocks
-from fingerpad.core.values import FloatArray, IntArray, not_negative, positive, whole
+from fingerpad.core.values import (
+    Count,
+    Finite,
+    FloatArray,
+    IntArray,
+    NotNegativeWhole,
+    Whole,
+    not_negative,
+    positive,
+)
 
 TRIALS_PER_SESSION = 2**32  # Trials of one session. Sessions of one seed share no random number.
 
@@ -29,8 +39,9 @@ _PRESENTATIONS_AT_ONCE = 128
 """A multiple of 4, the numbers of a block of the random generator; with 18 receptors they fit into 18 KB."""
 
 
-def session_trials(session: int, *shape: int) -> IntArray:
-    if whole("session", session, 0) > LARGEST_SESSION:
+@checked
+def session_trials(session: NotNegativeWhole, *shape: int) -> IntArray:
+    if session > LARGEST_SESSION:
         raise InputError("session", f"must not exceed {LARGEST_SESSION}", str(session))
     return session * TRIALS_PER_SESSION + np.arange(int(np.prod(shape)), dtype=np.int64).reshape(shape)
 
@@ -42,13 +53,14 @@ def noisy_responses(
     return responses[:, np.newaxis] * (1.0 + noise_sigma * draws.transpose(0, 2, 1))
 
 
+@checked
 def noisy_gradient_sums(
     responses: FloatArray,
     neighbours: np.ndarray,
-    noise_sigma: float | FloatArray,
-    seed: int,
+    noise_sigma: Finite | FloatArray,
+    seed: Whole,
     trials: IntArray,
-    presentations: int,
+    presentations: Count,
 ) -> FloatArray:
     """Sum the gradients of noisy presentations of every stimulus, steps (a) to (d).
 
@@ -62,7 +74,7 @@ def noisy_gradient_sums(
     pairs = np.ascontiguousarray(neighbours, dtype=np.int64)
     numbers = np.ascontiguousarray(trials, dtype=np.int64).ravel()
     stimuli = np.repeat(np.arange(trials.shape[0]), trials.shape[1])
-    sums = np.zeros((len(measures), numbers.size, whole("presentations", presentations, 1)))
+    sums = np.zeros((len(measures), numbers.size, presentations))
 
     def fill(some: slice) -> None:
         _fill_sums(measures, stimuli[some], pairs, sigmas, seed, numbers[some], sums[:, some])

@@ -24,6 +24,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 from scipy.optimize import brentq
@@ -31,7 +32,7 @@ from scipy.special import ndtr, ndtri
 
 from fingerpad.core.checked import checked
 from fingerpad.core.errors import InputError
-from fingerpad.core.values import Finite, finite, not_negative, one_of, positive, whole
+from fingerpad.core.values import Finite, NotNegative, Positive, Several, Whole, choice, whole
 
 CORRECTIONS = ("log-linear", "half", "none")
 
@@ -56,14 +57,15 @@ class Sensitivity:
     false_alarm_rate: float
 
 
+@checked
 def sensitivity(
-    n_hits: int,
-    n_signals: int,
-    n_false_alarms: int,
-    n_others: int,
+    n_hits: Whole,
+    n_signals: Whole,
+    n_false_alarms: Whole,
+    n_others: Whole,
     *,
-    correction: str = "log-linear",
-    spread_ratio: float = 1.0,
+    correction: Annotated[str, choice(CORRECTIONS)] = "log-linear",
+    spread_ratio: Positive = 1.0,
 ) -> Sensitivity:
     """Return d' from hits and false alarms of a detection task.
 
@@ -85,8 +87,7 @@ def sensitivity(
     >>> round(found.d_prime, 2), abs(round(found.criterion, 2))
     (1.99, 0.0)
     """
-    one_of("correction", correction, CORRECTIONS)
-    s = positive("spread_ratio", spread_ratio)
+    s = spread_ratio
     hits = _rate("n_hits", n_hits, "n_signals", n_signals, correction)
     false_alarms = _rate("n_false_alarms", n_false_alarms, "n_others", n_others, correction)
     z_hits, z_false_alarms = float(ndtri(hits)), float(ndtri(false_alarms))
@@ -119,7 +120,8 @@ _REACH, _POINTS = 9.0, 361
 """Of the integral: the error of the trapezium rule on a normal density is below round-off."""
 
 
-def yes_no(d_prime: float) -> float:
+@checked
+def yes_no(d_prime: NotNegative) -> float:
     """Proportion correct in yes-no: one look is judged "standard" or "comparison". [0.5-1]
 
     Examples
@@ -127,10 +129,11 @@ def yes_no(d_prime: float) -> float:
     >>> round(yes_no(2.0), 4)
     0.8413
     """
-    return float(ndtr(0.5 * not_negative("d_prime", d_prime)))
+    return float(ndtr(0.5 * d_prime))
 
 
-def forced_choice(d_prime: float, alternatives: int = 2) -> float:
+@checked
+def forced_choice(d_prime: NotNegative, alternatives: Several = 2) -> float:
     """Proportion correct in forced choice: one of m alternatives is the comparison. [1/m-1]
 
     Examples
@@ -138,7 +141,7 @@ def forced_choice(d_prime: float, alternatives: int = 2) -> float:
     >>> round(forced_choice(1.0), 4), round(forced_choice(0.0, 4), 4)
     (0.7602, 0.25)
     """
-    d, m = not_negative("d_prime", d_prime), whole("alternatives", alternatives, 2)
+    d, m = d_prime, alternatives
     if m == 2:
         return float(ndtr(d / math.sqrt(2.0)))
     around = np.linspace(-_REACH, _REACH, _POINTS)
@@ -146,7 +149,8 @@ def forced_choice(d_prime: float, alternatives: int = 2) -> float:
     return float(np.trapezoid(density * ndtr(around + d) ** (m - 1), around))
 
 
-def same_different_by_difference(d_prime: float, criterion: float | None = None) -> float:
+@checked
+def same_different_by_difference(d_prime: NotNegative, criterion: NotNegative | None = None) -> float:
     """Proportion correct in "same or different?" by the difference of the two looks. [0.5-1 at the best k]
 
     The observer says "different" if the looks differ by more than k, either way.
@@ -163,8 +167,8 @@ def same_different_by_difference(d_prime: float, criterion: float | None = None)
     >>> round(same_different_by_difference(2.0), 3)
     0.68
     """
-    d = not_negative("d_prime", d_prime)
-    k = best_difference(d) if criterion is None else not_negative("criterion", criterion)
+    d = d_prime
+    k = best_difference(d) if criterion is None else criterion
     if math.isinf(k):
         return 0.5
     root = math.sqrt(2.0)
@@ -173,12 +177,13 @@ def same_different_by_difference(d_prime: float, criterion: float | None = None)
     return float(0.5 * (hits + correct_rejections))
 
 
-def best_difference(d_prime: float) -> float:
+@checked
+def best_difference(d_prime: NotNegative) -> float:
     """Return the difference k above which "different" is more likely.
 
     exp(-d'^2 / 4) cosh(d' k / 2) = 1,    k = (2 / d') arcosh(exp(d'^2 / 4))
     """
-    d = not_negative("d_prime", d_prime)
+    d = d_prime
     exponent = 0.25 * d * d
     if exponent < _SMALL:
         return math.sqrt(2.0)
@@ -230,7 +235,7 @@ def d_prime_of_proportion(
     >>> round(d_prime_of_proportion(0.75), 4), round(d_prime_of_proportion(0.75, yes_no), 4)
     (0.9539, 1.349)
     """
-    wanted = finite("proportion_correct", proportion_correct)
+    wanted = proportion_correct
     guessing, never_failed = task(0.0), task(LARGEST_D_PRIME)
     if not guessing - _SMALL <= wanted < never_failed:
         raise InputError(

@@ -24,9 +24,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
+from fingerpad.core.checked import checked
 from fingerpad.core.errors import ConvergenceError, InputError
 from fingerpad.core.random_streams import Purpose, uniforms
-from fingerpad.core.values import FloatArray, finite, float_array, instance, one_of, whole
+from fingerpad.core.values import Count, FloatArray, Whole, finite, float_array, one_of
 from fingerpad.psychophysics.functions import (
     SIGMOIDS,
     Sigmoid,
@@ -159,7 +160,8 @@ def weighted_quantiles(values: ArrayLike, weights: ArrayLike, shares: ArrayLike)
     return np.where((wanted > above) & (quantity[-1] == np.inf), np.inf, inside)
 
 
-def bootstrap(fit: PsychometricFit, seed: int, n_replicates: int = 1000) -> FunctionCloud:
+@checked
+def bootstrap(fit: PsychometricFit, seed: Whole, n_replicates: Whole = 1000) -> FunctionCloud:
     """Sample counts from a fit and fit them again, `n_replicates` times: functions of equal weight.
 
     Raises
@@ -175,7 +177,7 @@ def bootstrap(fit: PsychometricFit, seed: int, n_replicates: int = 1000) -> Func
     >>> bool(lower < fit.threshold(0.75) < upper)
     True
     """
-    if instance("fit", fit, PsychometricFit).is_step:
+    if fit.is_step:
         levels = fit.counts.levels
         above = int(np.clip(np.searchsorted(levels, fit.threshold()), 1, levels.size - 1))
         raise ConvergenceError(
@@ -186,9 +188,8 @@ def bootstrap(fit: PsychometricFit, seed: int, n_replicates: int = 1000) -> Func
     return _cloud(fit, points, np.full(len(points), 1.0 / len(points)))
 
 
-def drawn_counts(fit: PsychometricFit, seed: int, n_replicates: int) -> FloatArray:
-    instance("fit", fit, PsychometricFit)
-    whole("n_replicates", n_replicates, at_least=1)
+@checked
+def drawn_counts(fit: PsychometricFit, seed: Whole, n_replicates: Count) -> FloatArray:
     expected = fit.predict(fit.counts.levels)
     shares = uniforms(seed, n_replicates, expected.size, Purpose.JUDGEMENT, 1)[..., 0]
     counts = np.empty(shares.shape)
@@ -199,6 +200,7 @@ def drawn_counts(fit: PsychometricFit, seed: int, n_replicates: int) -> FloatArr
     return counts
 
 
+@checked
 def posterior(fit: PsychometricFit) -> FunctionCloud:
     """Posterior of the fitted parameters, by Bayes' rule on a grid: functions with weights.
 
@@ -209,7 +211,7 @@ def posterior(fit: PsychometricFit) -> FunctionCloud:
     >>> [round(end) for end in posterior(fit).threshold_interval(0.75)]
     [315, 328]
     """
-    model = instance("fit", fit, PsychometricFit).model
+    model = fit.model
     n_free = int(model.free.sum())
     if n_free == 0:
         return _cloud(fit, fit.point[np.newaxis], np.ones(1))

@@ -21,7 +21,7 @@ from fingerpad.core.checked import checked
 from fingerpad.core.errors import InputError
 from fingerpad.core.random_streams import published_generator
 from fingerpad.core.signals import STORED_ENERGY
-from fingerpad.core.values import FloatArray, NotNegativeWhole, Whole, whole
+from fingerpad.core.values import FloatArray, NotNegativeWhole
 from fingerpad.data.neuron import HUMAN_QUANTITY
 from fingerpad.geometry.trajectory import Trajectory
 from fingerpad.reduction.model import ReducedModel, fitted_model
@@ -47,7 +47,7 @@ def reduce_touch(
     training: ReducedTraining,
     solve: Solve | None = None,
     quantities: Sequence[str] = (HUMAN_QUANTITY, STORED_ENERGY),
-    calibration: Whole = 20,
+    calibration: NotNegativeWhole = 20,
     seed: NotNegativeWhole = 1,
 ) -> ReducedModel:
     """Make a reduced touch from full presses.
@@ -84,7 +84,7 @@ def reduce_touch(
     """
     if not quantities:
         raise InputError("quantities", "must name at least one quantity", "none")
-    if whole("calibration", calibration, at_least=0) and calibration < FEWEST_CALIBRATED:
+    if calibration and calibration < FEWEST_CALIBRATED:
         raise InputError(
             "calibration",
             f"must be 0 or at least {FEWEST_CALIBRATED} touches, fewer have no bound for "

@@ -326,7 +326,7 @@ def touch_of(
     progress: Progress | None = None,
 ) -> Touch:
     """Describe a touch without solving it: `indent` takes the same arguments and solves it."""
-    x, z = _position(at_mm, instance("finger", finger, Finger))
+    x, z = _position(at_mm, finger)
     stimulus = instance("stimulus", stimulus or RampAndHold(), Motion)
     # The grading depends on this point, so finger, indenter and point are checked first.
     check_path(finger, stimulus, (x, z))

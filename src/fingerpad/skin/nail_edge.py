@@ -23,7 +23,7 @@ from fingerpad.core.checked import value_class
 from fingerpad.core.errors import InputError
 from fingerpad.core.layouts import Layout, mean_spacing_mm
 from fingerpad.core.regions import Polygon
-from fingerpad.core.values import Finite, FloatArray, Positive, Whole, float_array, positive, whole
+from fingerpad.core.values import Count, Finite, FloatArray, Positive, float_array, positive
 from fingerpad.geometry.fingertip import Fingertip
 
 REACH_MM = 4.0  # Largest distance from the nail of the unrolled skin. [mm]
@@ -121,7 +121,7 @@ class NailEdge:
         side = np.stack([self.half_length_mm(distances), distances], axis=1)
         return Polygon(tuple(map(tuple, np.concatenate([side, side[::-1] * [-1.0, 1.0]]))))
 
-    def rows(self, count: Whole, density_per_cm2: Finite) -> Layout:
+    def rows(self, count: Count, density_per_cm2: Positive) -> Layout:
         """Place receptors in rows along the edge, the first at half a pitch from it.
 
         Parameters
@@ -137,8 +137,8 @@ class NailEdge:
         >>> len(NailEdge().rows(1, density_per_cm2=25.0))
         21
         """
-        pitch = mean_spacing_mm(positive("density_per_cm2", density_per_cm2, "1/cm²"))
-        distances = pitch * (np.arange(whole("count", count, 1)) + 0.5)
+        pitch = mean_spacing_mm(density_per_cm2)
+        distances = pitch * (np.arange(count) + 0.5)
         self._within_reach("The distance of the last row", distances[-1])
         rows = []
         for distance, half_length in zip(distances, self.half_length_mm(distances), strict=True):

@@ -193,7 +193,7 @@ class UnrolledSkin:
         ends = increasing("x_mm", float_array("x_mm", x_mm, 1))
         if ends.size != 2 or ends[0] < 0.0 or ends[1] > self.finger.length_mm:
             raise InputError("x_mm", f"must be two ends within 0 ... {self.finger.length_mm} mm", str(x_mm))
-        if not 0.0 < finite("faces_deg", faces_deg, "degrees") <= 90.0:
+        if not 0.0 < faces_deg <= 90.0:
             raise InputError("faces_deg", "must be above 0 and at most 90 degrees", repr(faces_deg))
         s = np.sqrt(1.0 - np.linspace(ends[0], ends[1], 61) / self.finger.length_mm)
         low, high = np.zeros_like(s), np.full_like(s, _HALF)

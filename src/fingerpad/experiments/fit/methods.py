@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 
+from fingerpad.core.checked import checked
 from fingerpad.core.errors import InputError
 from fingerpad.core.signals import Traces
-from fingerpad.core.values import FloatArray, IntArray, one_of
+from fingerpad.core.values import FloatArray, IntArray, Whole, choice
 from fingerpad.data import neuron
 from fingerpad.experiments.fit.results import HeldOffset, OffsetFit, SpikeFitSummary
 from fingerpad.inference.afferent_methods import (
@@ -106,10 +108,14 @@ METHODS = ("least_squares", "response_surface", "closed_form", "cma_es", "likeli
 """Methods that fit recordings, by the names that the command line gives."""
 
 
+@checked
 def prepare(
-    method: str, model: AfferentModel, recordings: Recordings, rates: RateRecordings, seed: int
+    method: Annotated[str, choice(METHODS)],
+    model: AfferentModel,
+    recordings: Recordings,
+    rates: RateRecordings,
+    seed: Whole,
 ) -> Prepared:
-    one_of("method", method, METHODS)
     if method == "likelihood":
         # Only this method loads the module and its kernels.
         from fingerpad.experiments.fit.spike_method import prepare_spikes
@@ -150,18 +156,19 @@ def check_beside(beside: Beside) -> FloatArray:
     return beside_mm
 
 
+@checked
 def fit_offset(
     beside: Beside,
     rates: RateRecordings,
     memberships: IntArray,
-    method: str,
+    method: Annotated[str, choice(OFFSET_METHODS)],
     windows_ms: Windows | None,
-    seed: int = 0,
+    seed: Whole = 0,
 ) -> OffsetFit:
     beside_mm = check_beside(beside)
     roving = ReceptorOffset.of_traces({offset: beside[offset] for offset in beside_mm}, windows_ms)
     problem, everything = five_number_problem(roving, rates), np.arange(roving.n_stimuli)
-    searching = _continued(roving, rates, one_of("method", method, tuple(OFFSET_METHODS)), seed)
+    searching = _continued(roving, rates, method, seed)
     best = searching.fit(problem, everything)
     crossed = cross_validate(problem, searching, memberships)
     four, offset_mm = fitted_four(best.parameters[:4]).tolist(), float(best.parameters[-1])

@@ -17,10 +17,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.special import ndtr, ndtri
 
-from fingerpad.core.checked import result_class
+from fingerpad.core.checked import checked, result_class
 from fingerpad.core.errors import InputError
 from fingerpad.core.signals import HitRates
-from fingerpad.core.values import FloatArray, Number, Vector, WholeVector, whole
+from fingerpad.core.values import Finite, FloatArray, Number, Several, Vector, Whole, WholeVector
 from fingerpad.data import psychophysics
 from fingerpad.psychophysics.discrimination import (
     Experiment,
@@ -235,11 +235,11 @@ class Observers:
     of hit rates behind it. [0-1]"""
 
 
+@checked
 def observe(
-    measures: Mapping[str, Sequence[Measured]], noise_sigma: float, seed: int, sessions: int = SESSIONS
+    measures: Mapping[str, Sequence[Measured]], noise_sigma: Finite, seed: Whole, sessions: Several = SESSIONS
 ) -> Observers:
     """Simulate the judgements of every observer at every position in several sessions."""
-    whole("sessions", sessions, 2)
     n_positions = len(measures["static"])
     judged = [
         _judge(

@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import asdict, field, replace
 from functools import partial
 from pathlib import Path
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
-from fingerpad.core.checked import result_class
+from fingerpad.core.checked import result_class, value_class
 from fingerpad.core.engine import Engine, Processes, engine_of
 from fingerpad.core.progress import Progress
 from fingerpad.core.signals import STORED_ENERGY
-from fingerpad.core.values import Number, one_of
+from fingerpad.core.values import Flag, Number, Whole, choice
 from fingerpad.data import all_published
 from fingerpad.data.neuron import PAPER_INITIAL
 from fingerpad.experiments.conditions import RECEPTOR_X_MM, Conditions, Touch
@@ -49,25 +49,24 @@ STANDARD_SPHERE = (sphere_discrimination.POSITIONS_MM[0], sphere_discrimination.
 PAPER, HUMAN = "paper", "human"  # The paper's own system; the set that serves all three levels.
 
 
-@dataclass(frozen=True)
+@value_class
 class Reproduction:
     """A run of all parts of the paper with two sets of tissues."""
 
     folder: Path
     resolution: str = "standard"  # How fine meshes and steps are.
-    seed: int = 0  # Seed of the observers' noise.
-    tissues: str = PAPER
+    seed: Whole = 0  # Seed of the observers' noise.
+    tissues: Annotated[str, choice(tuple(name for name in TISSUES if name != HUMAN))] = PAPER
     """Tissues of the column `paper`: a name whose afferent follows strain energy density. "paper" is Trial 3
     with a Poisson's ratio of 0.40, which is our reading; "trial3" is Trial 3 to the letter, 0.48."""
     finger: Finger = field(default_factory=Fingertip)
-    jobs: int | Engine = 1  # Processes or engine that press; the numbers do not depend on it.
-    extended: bool | None = None
+    jobs: Whole | Engine = 1  # Processes or engine that press; the numbers do not depend on it.
+    extended: Flag | None = None
     """Whether to go beyond the paper: uncertainty of the fit, and curvature thresholds at other standards. By
     default not at "quick" resolution, where this takes half as long again."""
 
     def __post_init__(self) -> None:
         engine_of(self.jobs)
-        one_of("tissues", self.tissues, tuple(name for name in TISSUES if name != HUMAN))
         _ = self.conditions  # checks resolution and seed
 
     @property
@@ -109,6 +108,40 @@ class SetResult:
     single_unit_uncertainty: UncertaintyResult | None = None
     curvature_thresholds: CurvatureThresholds | None = None  # Beyond the paper, where asked for.
     comparison: tuple[ClaimRow, ...]  # The paper's numbers beside ours.
+
+
+@result_class
+class Summary:
+    """One number per quantity, at the tissues, the afferent and the noise of the run."""
+
+    deflection_r2: Number  # R² of the deflection under the cylinder at 1.0 mm.
+    force_plate_1mm_n: Number
+    force_plate_2mm_n: Number
+    force_disc_1mm_n: Number  # Force of a flat plate and of a disc of 6.35 mm, end of the hold. [N]
+    fss_out_of_sample: Number
+    fss_in_sample: Number  # Fractional sum of squares under the bar: mean of folds, and all shifts.
+    dynamic_flat_hz: Number
+    dynamic_max_hz: Number  # Smallest dynamic rate under the flat face, and the largest. [spikes/s]
+    static_difference_hz: Number  # Largest static rate less the smallest under the flat face. [spikes/s]
+    resting_rate_hz: Number  # Rate without a touch. [spikes/s]
+    noise_sigma: Number  # Noise that fits people's two points best.
+    euclidean_rms_same_noise: Number  # Euclidean Distance: rms distance to these points. [0-1]
+    hit_rate_296: tuple[Number, Number]
+    hit_rate_365: tuple[Number, Number]  # Static Gradient Sum, spheres at 0.0 and 0.2 mm. [0-1]
+    weber_144: Number
+    weber_287: Number  # Curvature threshold at 75 % over the standard; NaN where there is none.
+    wall_s: float = 0.0
+    peak_memory_mb: float = 0.0  # Of the whole run, both sets. [s, MB]
+
+
+@result_class
+class Summaries:
+    """Numbers of both sets, and time and memory of the whole run."""
+
+    paper: Summary
+    human: Summary
+    wall_s: float
+    peak_memory_mb: float
 
 
 @result_class
@@ -260,40 +293,6 @@ def _method(conditions: Conditions, spheres: dict[tuple[float, float], SkinRespo
     if conditions.quantity == STORED_ENERGY:
         return response_surface()
     return sphere_discrimination.to_rates_and_hit_rates(spheres, conditions.quantity)
-
-
-@result_class
-class Summary:
-    """One number per quantity, at the tissues, the afferent and the noise of the run."""
-
-    deflection_r2: Number  # R² of the deflection under the cylinder at 1.0 mm.
-    force_plate_1mm_n: Number
-    force_plate_2mm_n: Number
-    force_disc_1mm_n: Number  # Force of a flat plate and of a disc of 6.35 mm, end of the hold. [N]
-    fss_out_of_sample: Number
-    fss_in_sample: Number  # Fractional sum of squares under the bar: mean of folds, and all shifts.
-    dynamic_flat_hz: Number
-    dynamic_max_hz: Number  # Smallest dynamic rate under the flat face, and the largest. [spikes/s]
-    static_difference_hz: Number  # Largest static rate less the smallest under the flat face. [spikes/s]
-    resting_rate_hz: Number  # Rate without a touch. [spikes/s]
-    noise_sigma: Number  # Noise that fits people's two points best.
-    euclidean_rms_same_noise: Number  # Euclidean Distance: rms distance to these points. [0-1]
-    hit_rate_296: tuple[Number, Number]
-    hit_rate_365: tuple[Number, Number]  # Static Gradient Sum, spheres at 0.0 and 0.2 mm. [0-1]
-    weber_144: Number
-    weber_287: Number  # Curvature threshold at 75 % over the standard; NaN where there is none.
-    wall_s: float = 0.0
-    peak_memory_mb: float = 0.0  # Of the whole run, both sets. [s, MB]
-
-
-@result_class
-class Summaries:
-    """Numbers of both sets, and time and memory of the whole run."""
-
-    paper: Summary
-    human: Summary
-    wall_s: float
-    peak_memory_mb: float
 
 
 def summary(found: SetResult, afferent: Afferent) -> Summary:

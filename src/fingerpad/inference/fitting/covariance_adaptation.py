@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from fingerpad.core.checked import value_class
 from fingerpad.core.random_streams import published_generator
-from fingerpad.core.values import IntArray, positive, whole
+from fingerpad.core.values import Count, IntArray, NotNegativeWhole, Positive
 from fingerpad.inference.fitting.methods import Bounds, Fit, FitStep, Problem
 
 
-@dataclass(frozen=True)
+@value_class
 class CovarianceAdaptation:
     """CMA-ES from one start, with the package `cma`.
 
@@ -22,17 +22,14 @@ class CovarianceAdaptation:
 
     start: ArrayLike  # Mean of the first generation, (n_parameters,).
     bounds: Bounds  # Limits of the parameters, and the scales that set their units in the search.
-    first_spread: float = 0.5  # Standard deviation of the first generation, in units of the scales.
-    most_evaluations: int = 2000
+    first_spread: Positive = 0.5  # Standard deviation of the first generation, in units of the scales.
+    most_evaluations: Count = 2000
     """The search ends with the generation that reaches this number, or when it has converged."""
-    seed: int = 0  # Seed of the random numbers; the same seed gives the same bits.
+    seed: NotNegativeWhole = 0  # Seed of the random numbers; the same seed gives the same bits.
     name: str = "CMA-ES"
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "start", self.bounds.rows("start", np.atleast_2d(self.start))[0])
-        positive("first_spread", self.first_spread)
-        whole("most_evaluations", self.most_evaluations, at_least=1)
-        whole("seed", self.seed, at_least=0)
 
     def fit(self, problem: Problem, chosen: IntArray) -> Fit:
         """Search until convergence; the result is the best of all evaluated points."""

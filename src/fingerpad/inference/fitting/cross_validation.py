@@ -7,8 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
+from fingerpad.core.checked import checked
 from fingerpad.core.errors import InputError
-from fingerpad.core.values import FloatArray, IntArray, float_array, whole
+from fingerpad.core.values import FloatArray, IntArray, Several, float_array
 from fingerpad.data import protocol
 from fingerpad.inference.fitting.methods import Fit, Method, Problem
 
@@ -66,9 +67,10 @@ class CrossValidation:
         return float(np.mean([fold.score_test for fold in self.folds]))
 
 
-def interleaved_folds(n_observations: int, n_folds: int = int(protocol.FOLDS.value)) -> IntArray:
+@checked
+def interleaved_folds(n_observations: Several, n_folds: Several = int(protocol.FOLDS.value)) -> IntArray:
     """Assign observations to folds in turn: index modulo the number of folds."""
-    if whole("n_folds", n_folds, at_least=2) > whole("n_observations", n_observations, at_least=2):
+    if n_folds > n_observations:
         raise InputError("n_folds", f"must be at most the number of stimuli, {n_observations}", str(n_folds))
     return np.arange(n_observations, dtype=np.int64) % n_folds
 

@@ -9,20 +9,20 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy.optimize import least_squares
 
+from fingerpad.core.checked import value_class
 from fingerpad.core.errors import InputError
-from fingerpad.core.values import FloatArray, IntArray, positive, whole
+from fingerpad.core.values import Count, FloatArray, IntArray, Numbers, positive
 from fingerpad.inference.fitting.methods import Bounds, Fit, FitStep, Problem, best_of
 
 Jacobian = Callable[[FloatArray, IntArray], FloatArray]
 
 
-@dataclass(frozen=True)
+@value_class
 class LeastSquares:
     """Trust-region least squares from the most promising of several starts.
 
@@ -32,12 +32,12 @@ class LeastSquares:
 
     starts: ArrayLike  # Start points; all are scored, (n_starts, n_parameters).
     bounds: Bounds  # Limits of the parameters, and the scales in which steps are taken.
-    n_refined: int = 4  # Number of starts, the best ones, from which a fit is made.
-    difference_steps: tuple[float, ...] = (0.1, 0.03, 0.01)
+    n_refined: Count = 4  # Number of starts, the best ones, from which a fit is made.
+    difference_steps: Numbers = (0.1, 0.03, 0.01)
     """Half widths of the central differences, round by round, in units of the scales."""
     jacobian: Jacobian | None = None
     """`jacobian(parameters, chosen)`: derivatives of the residuals, instead of differences."""
-    most_iterations: int = 50  # Iterations of each round.
+    most_iterations: Count = 50  # Iterations of each round.
     name: str = "least squares"
 
     def __post_init__(self) -> None:
@@ -51,8 +51,6 @@ class LeastSquares:
         object.__setattr__(self, "starts", starts)
         for step in self.difference_steps:
             positive("difference_steps", step)
-        whole("n_refined", self.n_refined, at_least=1)
-        whole("most_iterations", self.most_iterations, at_least=1)
 
     def fit(self, problem: Problem, chosen: IntArray) -> Fit:
         """Score all starts, fit from the best of them, and keep the best fit."""

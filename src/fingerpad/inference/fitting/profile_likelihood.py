@@ -15,9 +15,10 @@ from numpy.typing import ArrayLike
 from scipy.optimize import minimize
 from scipy.stats import chi2
 
+from fingerpad.core.checked import checked
 from fingerpad.core.errors import ConvergenceError, InputError
 from fingerpad.core.threads import in_blocks
-from fingerpad.core.values import FloatArray, finite, float_array, whole
+from fingerpad.core.values import Finite, FloatArray, Several, float_array
 
 LogLikelihood = Callable[[FloatArray], FloatArray]
 """From points (n_points, n_parameters) to their log likelihoods, -inf where impossible."""
@@ -55,14 +56,15 @@ class ProfileLikelihoods:
     n_evaluations: int
 
 
+@checked
 def profile_likelihoods(
     log_likelihood: LogLikelihood,
     starts: ArrayLike,
     scales: ArrayLike,
     names: Sequence[str],
     *,
-    level: float = 0.95,
-    most_steps: int = 12,
+    level: Finite = 0.95,
+    most_steps: Several = 12,
 ) -> ProfileLikelihoods:
     """Profile the likelihood of every parameter.
 
@@ -77,9 +79,8 @@ def profile_likelihoods(
             "starts, scales and names must have one entry for each of at least two parameters, scales "
             f"greater than 0: got {origins.shape[1]}, {units.tolist()} and {len(labels)}."
         )
-    if not 0.0 < finite("level", level) < 1.0:
+    if not 0.0 < level < 1.0:
         raise InputError("level", "must lie between 0 and 1", repr(level))
-    whole("most_steps", most_steps, at_least=2)
     search = _Search(log_likelihood, units, origins)
     best, highest = search.best_of(origins)
     if not np.isfinite(highest):

@@ -15,8 +15,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
+from fingerpad.core.checked import checked
 from fingerpad.core.errors import ConvergenceError, InputError
-from fingerpad.core.values import FloatArray, IntArray, finite, float_array, not_negative, whole
+from fingerpad.core.values import Count, Finite, FloatArray, IntArray, NotNegative, finite, float_array
 from fingerpad.inference.fitting.methods import Fit, FitStep, Problem, best_of
 
 Objective = Callable[[FloatArray], float]
@@ -26,9 +27,9 @@ _MOST_PARAMETERS = 12
 _MOST_STEPS = 200
 
 
-def factorial_design(n_parameters: int) -> FloatArray:
+@checked
+def factorial_design(n_parameters: Count) -> FloatArray:
     """Two-level full factorial design with centre point, in coded units."""
-    whole("n_parameters", n_parameters, at_least=1)
     if n_parameters > _MOST_PARAMETERS:
         raise InputError(
             "n_parameters", f"must be at most {_MOST_PARAMETERS}", f"{n_parameters}, too many corners"
@@ -45,22 +46,24 @@ def regression_slopes(design: FloatArray, values: FloatArray) -> FloatArray:
     return (design.T @ values) / (design**2).sum(axis=0)
 
 
-def coding_increments(base: ArrayLike, share: float, where_zero: ArrayLike | None = None) -> FloatArray:
+@checked
+def coding_increments(base: ArrayLike, share: Finite, where_zero: ArrayLike | None = None) -> FloatArray:
     """Increments as a share of the base; a parameter whose base is zero needs an increment of its own."""
     start = float_array("base", base, 1)
-    increments = finite("share", share) * np.abs(start)
+    increments = share * np.abs(start)
     if where_zero is not None:
         increments = np.where(start == 0.0, float_array("where_zero", where_zero, 1), increments)
     return _checked_increments(increments, start)
 
 
+@checked
 def maximise(
     objective: Objective,
     start: ArrayLike,
     increments: ArrayLike,
     lower_bounds: ArrayLike | None = None,
-    smallest_gain: float = 1.0e-4,
-    most_iterations: int = 200,
+    smallest_gain: NotNegative = 1.0e-4,
+    most_iterations: Count = 200,
     restrict: Restriction | None = None,
 ) -> Fit:
     """Maximise `objective` from `start` by the response surface method.
@@ -72,8 +75,6 @@ def maximise(
     base = float_array("start", start, 1)
     units = _checked_increments(increments, base)
     floor = _floor(lower_bounds, base, units)
-    not_negative("smallest_gain", smallest_gain)
-    whole("most_iterations", most_iterations, at_least=1)
 
     def allowed(point: FloatArray) -> FloatArray:
         above = np.maximum(point, floor)

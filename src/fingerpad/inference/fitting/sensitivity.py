@@ -15,9 +15,18 @@ from numpy.typing import ArrayLike
 from scipy import stats
 from scipy.special import ndtri
 
+from fingerpad.core.checked import checked
 from fingerpad.core.errors import InputError
 from fingerpad.core.random_streams import generator
-from fingerpad.core.values import FloatArray, IntArray, finite, float_array, positive, whole
+from fingerpad.core.values import (
+    Finite,
+    FloatArray,
+    IntArray,
+    NotNegativeWhole,
+    Positive,
+    Several,
+    float_array,
+)
 
 BatchObjective = Callable[[FloatArray], FloatArray]
 """Called with points (n_points, n_parameters); returns one number for each."""
@@ -45,15 +54,16 @@ class SobolIndices:
     n_evaluations: int
 
 
+@checked
 def sobol_indices(
     objective: BatchObjective,
     lower: ArrayLike,
     upper: ArrayLike,
     names: Sequence[str],
     *,
-    seed: int,
-    n_base: int = 512,
-    level: float = 0.95,
+    seed: NotNegativeWhole,
+    n_base: Several = 512,
+    level: Finite = 0.95,
 ) -> SobolIndices:
     """Estimate first-order and total Sobol indices with `scipy.stats.sobol_indices`.
 
@@ -67,11 +77,11 @@ def sobol_indices(
             "lower and upper must have one entry per name, and lower be below upper: "
             f"got {low.tolist()}, {high.tolist()} for {len(labels)} names."
         )
-    if whole("n_base", n_base, at_least=2) & (n_base - 1):
+    if n_base & (n_base - 1):
         raise InputError("n_base", "must be a power of two", str(n_base))
-    if not 0.0 < finite("level", level) < 1.0:
+    if not 0.0 < level < 1.0:
         raise InputError("level", "must lie between 0 and 1", repr(level))
-    random = generator(whole("seed", seed, at_least=0))
+    random = generator(seed)
     values: list[FloatArray] = []  # at A, at B, and at A with each column of B: parts of Saltelli's design
 
     def evaluate(points: FloatArray) -> FloatArray:
@@ -143,8 +153,9 @@ class Identifiability:
         return self.directions[self.rank :]
 
 
+@checked
 def jacobian(
-    answer: Answer, parameters: ArrayLike, scales: ArrayLike, step: float = JACOBIAN_STEP
+    answer: Answer, parameters: ArrayLike, scales: ArrayLike, step: Positive = JACOBIAN_STEP
 ) -> FloatArray:
     """Change of every output per scale of every parameter, by central differences."""
     centre, units = float_array("parameters", parameters, 1), float_array("scales", scales, 1)
@@ -152,7 +163,7 @@ def jacobian(
         raise InputError(
             "scales", f"must be greater than 0, one for each of {centre.size} parameters", str(units.tolist())
         )
-    width = positive("step", step)
+    width = step
     columns = [
         (float_array("answer", answer(centre + move), 1) - float_array("answer", answer(centre - move), 1))
         / (2.0 * width)
