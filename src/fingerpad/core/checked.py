@@ -78,34 +78,12 @@ def value_class(kind: Any = None, *, eq: bool = True) -> Any:
 @dataclass_transform(frozen_default=True, kw_only_default=True, field_specifiers=(field,))
 def result_class(kind: type[_Kind]) -> type[_Kind]:
     """Make a class a frozen dataclass with named fields, which `core/result_files` writes and reads."""
-    from pydantic import ConfigDict, model_validator
+    from pydantic import ConfigDict
     from pydantic.dataclasses import dataclass
 
-    kind._plain_scalars = model_validator(mode="before")(_plain_scalars)  # type: ignore[attr-defined]
     config = ConfigDict(arbitrary_types_allowed=True, extra="forbid")
     made: Any = dataclass(frozen=True, kw_only=True, config=config)(kind)
     return checked_class(made)
-
-
-def _plain_scalars(values: Any) -> Any:
-    """Python's numbers in the place of NumPy's scalars, in fields and in what they nest."""
-    from pydantic_core import ArgsKwargs
-
-    if isinstance(values, ArgsKwargs):
-        return ArgsKwargs(values.args, _plain(values.kwargs or {}))
-    return _plain(values) if isinstance(values, Mapping) else values
-
-
-def _plain(value: Any) -> Any:
-    from numpy import generic
-
-    if isinstance(value, generic):
-        return value.item()
-    if isinstance(value, Mapping):
-        return {_plain(key): _plain(item) for key, item in value.items()}
-    if isinstance(value, list | tuple):
-        return type(value)(_plain(item) for item in value) if type(value) in (list, tuple) else value
-    return value
 
 
 def checked(function: Callable[_Given, _Made]) -> Callable[_Given, _Made]:

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from fingerpad.core.checked import value_class
 from fingerpad.core.errors import InputError
-from fingerpad.core.values import Finite, finite
+from fingerpad.core.values import Finite
 
 RAMP, HOLD = "ramp", "hold"  # Names of the phases in which the two rates of the paper are counted.
 
@@ -31,12 +31,10 @@ class Phase:
     end_ms: Finite
 
     def __post_init__(self) -> None:
-        start, end = (finite(f"{at} of phase {self.name!r}", getattr(self, at), "ms")
-                      for at in ("start_ms", "end_ms"))  # fmt: skip
-        if not self.name or not 0.0 <= start < end:
+        if not self.name or not 0.0 <= self.start_ms < self.end_ms:
             raise InputError(
-                f"A phase needs a name, a start from 0 on and a later end: got {self.name!r}, {start:g} and "
-                f"{end:g} ms."
+                f"A phase needs a name, a start from 0 on and a later end: got {self.name!r}, "
+                f"{self.start_ms:g} and {self.end_ms:g} ms."
             )
 
     @property

@@ -383,8 +383,6 @@ Outlines = Annotated[tuple[tuple[tuple[float, float], ...], ...], entries(entrie
 Points = Annotated[tuple[tuple[float, float, float], ...], entries(entries(_NUMBER, 3))]
 
 SizeMm = Annotated[float, between(0.01, 400.0)]  # Width or diameter of a body that presses a fingertip.
-DepthMm = Annotated[float, between(0.001, 20.0)]
-ForceMn = Annotated[float, between(1.0, 1e5)]
 PointsMm = Annotated[FloatArray, Check(points, {"type": "array"})]
 TimesMs = Annotated[FloatArray, Check(increasing, {"type": "array", "items": {"type": "number"}})]
 AnyArray = Annotated[FloatArray, Check(array, {})]

@@ -8,7 +8,7 @@ from typing import Annotated
 import numpy as np
 
 from fingerpad.core.checked import value_class
-from fingerpad.core.values import Finite, Seed, choice, instance, one_of
+from fingerpad.core.values import Finite, Seed, choice
 from fingerpad.data.tissues import DEFAULT_TISSUES
 from fingerpad.geometry.fingertip import Finger, Fingertip
 from fingerpad.geometry.grading import RESOLUTIONS, Grading, resolution_grading
@@ -62,14 +62,8 @@ class Conditions:
 
     resolution: Annotated[str, choice(RESOLUTIONS)] = "standard"
     seed: Seed = 0
-    tissues: str | Tissues = DEFAULT_TISSUES
+    tissues: Annotated[str, choice(TISSUES)] | Tissues = DEFAULT_TISSUES
     finger: Finger = field(default_factory=Fingertip)
-
-    def __post_init__(self) -> None:
-        if isinstance(self.tissues, str):
-            one_of("tissues", self.tissues, tuple(TISSUES))
-        else:
-            instance("tissues", self.tissues, Tissues)
 
     @property
     def afferent(self) -> Afferent:

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from fingerpad import __version__
 from fingerpad.core.checked import checked, value_class
 from fingerpad.core.errors import InputError
-from fingerpad.core.values import Finite, FloatArray, IntArray, Whole, float_array, increasing
+from fingerpad.core.values import Finite, FiniteVector, IntArray, TimesMs, Whole
 from fingerpad.export.outline import Outline, RigidMesh, face_mesh, outline_of, rigid_mesh
 from fingerpad.geometry.indenters import Indenter
 from fingerpad.geometry.mesh import LAYERS, Mesh
@@ -58,13 +58,12 @@ class Job:
     materials: tuple[Material, ...]  # One per layer of the mesh.
     indenter: Indenter
     placement: Placement  # Its position at first touch.
-    times_ms: FloatArray  # Steps, from 0, (n_times,). [ms]
-    depths_mm: FloatArray  # How far the indenter has advanced at each, from 0, (n_times,). [mm]
+    times_ms: TimesMs  # Steps, from 0, (n_times,). [ms]
+    depths_mm: FiniteVector  # How far the indenter has advanced at each, from 0, (n_times,). [mm]
     friction: Finite = 0.0  # Coulomb's coefficient between skin and indenter.
 
     def __post_init__(self) -> None:
-        times = increasing("times_ms", float_array("times_ms", self.times_ms, 1))
-        depths = float_array("depths_mm", self.depths_mm, 1)
+        times, depths = self.times_ms, self.depths_mm
         if times.size < 2 or times[0] != 0.0 or depths.shape != times.shape or depths[0] != 0.0:
             raise InputError(
                 "times_ms and depths_mm must begin with 0 and have one length of at least 2: "
@@ -79,8 +78,6 @@ class Job:
                 "materials", "needs one per layer", f"{len(self.materials)} for layer {self.mesh.layer.max()}"
             )
         check_friction(self.friction, self.indenter)
-        object.__setattr__(self, "times_ms", times)
-        object.__setattr__(self, "depths_mm", depths)
 
     @property
     def phases(self) -> tuple[Phase, ...]:

@@ -6,7 +6,7 @@ import numpy as np
 
 from fingerpad.core.checked import checked, value_class
 from fingerpad.core.errors import InputError
-from fingerpad.core.values import Finite, Flag, FloatArray, Pairs, PointsMm, SizeMm, float_array, positive
+from fingerpad.core.values import Flag, FloatArray, Pairs, PointsMm, Positive, SizeMm
 from fingerpad.geometry.indenters import Indenter
 
 BRAILLE_DOT_MM, BRAILLE_HEIGHT_MM, BRAILLE_PITCH_MM, BRAILLE_CELL_MM = 1.44, 0.48, 2.34, 6.2
@@ -43,19 +43,17 @@ class Dots(Indenter):
 
     at_mm: Pairs
     diameter_mm: SizeMm = BRAILLE_DOT_MM
-    height_mm: Finite = BRAILLE_HEIGHT_MM
+    height_mm: Positive = BRAILLE_HEIGHT_MM
 
     def __post_init__(self) -> None:
-        at = float_array("at_mm", self.at_mm, 2)
-        if not len(at) or at.shape[1] != 2:
-            raise InputError("at_mm", "must hold a pair x, z for each dot", f"shape {at.shape}")
-        if positive("height_mm", self.height_mm, "mm") > self.diameter_mm / 2:
+        if not self.at_mm:
+            raise InputError("at_mm", "must hold a pair x, z for each dot", "none")
+        if self.height_mm > self.diameter_mm / 2:
             raise InputError(
                 "height_mm",
                 f"must not exceed half of diameter_mm, {self.diameter_mm / 2:g} mm",
                 f"{self.height_mm:g} mm",
             )
-        object.__setattr__(self, "at_mm", tuple(map(tuple, at.tolist())))
 
     @property
     def radius_mm(self) -> float:

@@ -14,7 +14,7 @@ import numpy as np
 
 from fingerpad.core.checked import OtherName, other_names, value_class
 from fingerpad.core.errors import InputError
-from fingerpad.core.values import Finite, FloatArray, NotNegative, PointsMm, SizeMm, not_negative, positive
+from fingerpad.core.values import Finite, FloatArray, NotNegative, PointsMm, SizeMm, positive
 from fingerpad.data import protocol
 from fingerpad.geometry.indenters import (
     BESIDE_EDGE_MM,
@@ -118,7 +118,7 @@ class Gap(Indenter):
     symmetry_deg = 90.0
     gap_mm: NotNegative = protocol.GAP_WIDTH.value
     width_mm: SizeMm = protocol.GAPPED_BAR_WIDTH.value
-    fillet_mm: Finite = protocol.BAR_FILLET.value
+    fillet_mm: NotNegative = protocol.BAR_FILLET.value
     lip_mm: NotNegative = protocol.LIP_RADIUS.value
     edge_radius_mm = OtherName("fillet_mm")
     lip_radius_mm = OtherName("lip_mm", lambda body: min(body.lip_mm, body.gap_mm / 2))
@@ -215,7 +215,7 @@ class Grating(Indenter):
     symmetry_deg = 90.0
     ridge_mm: SizeMm = protocol.RIDGE_WIDTH.value
     groove_mm: SizeMm = protocol.RIDGE_WIDTH.value
-    lip_mm: Finite = protocol.LIP_RADIUS.value
+    lip_mm: NotNegative = protocol.LIP_RADIUS.value
     edge_radius_mm = OtherName("lip_mm")
     period_mm = OtherName(_of_period, lambda body: body.ridge_mm + body.groove_mm)
     duty = OtherName(_of_period, lambda body: body.ridge_mm / body.period_mm)
@@ -234,7 +234,7 @@ class Grating(Indenter):
         ) -> None: ...
 
     def __post_init__(self) -> None:
-        if not_negative("lip_mm", self.lip_mm, "mm") > self.ridge_mm / 2:
+        if self.lip_mm > self.ridge_mm / 2:
             raise InputError(
                 "lip_mm", f"must not exceed half of ridge_mm, {self.ridge_mm / 2:g} mm", f"{self.lip_mm:g} mm"
             )

@@ -27,12 +27,11 @@ from fingerpad.core.values import (
     FloatArray,
     NotNegative,
     Numbers,
+    Pairs,
     Positive,
+    between,
     choice,
-    finite,
-    float_array,
     increasing,
-    positive,
 )
 from fingerpad.data import fingers
 from fingerpad.data import fingertip as published
@@ -52,7 +51,8 @@ SIZES_MM = 2.0, 100.0
 _CREASE_SHARE = 1.0 - fingers.CREASE_TO_TIP.value / published.LENGTH.value
 _STATIONS_OF_SIZE = 401
 
-Readings = tuple[tuple[float, float], ...]
+Readings = Pairs
+ExtentMm = Annotated[float, between(*SIZES_MM)]  # Of a whole fingertip.
 
 
 def _readings(stations: tuple[float, ...], values: tuple[float, ...]) -> Readings:
@@ -74,17 +74,16 @@ class Profile:
 
     readings_mm: Readings
     """At least five readings, x increasing from 0 or more to less than `length_mm`, values above 0. [mm]"""
-    length_mm: Finite  # x of the tip, L. [mm]
+    length_mm: Positive  # x of the tip, L. [mm]
 
     def __post_init__(self) -> None:
-        length = positive("length_mm", self.length_mm, "mm")
-        table = float_array("readings_mm", self.readings_mm, 2)
-        if table.shape[1] != 2 or table.shape[0] < 5:
-            raise InputError("readings_mm", "needs at least five pairs (x, value)", f"shape {table.shape}")
+        table = np.array(self.readings_mm)
+        if len(table) < 5:
+            raise InputError("readings_mm", "needs at least five pairs (x, value)", str(len(table)))
         stations = increasing("x of readings_mm", table[:, 0])
-        if stations[0] < 0.0 or stations[-1] >= length:
+        if stations[0] < 0.0 or stations[-1] >= self.length_mm:
             raise InputError(
-                f"x of readings_mm must lie from 0 to below the length {length} mm: "
+                f"x of readings_mm must lie from 0 to below the length {self.length_mm} mm: "
                 f"got {stations[0]} to {stations[-1]} mm."
             )
         if (table[:, 1] <= 0.0).any():
@@ -181,20 +180,20 @@ class Fingertip(Displayed, Finger):
     9.85 9.75
     """
 
-    length_mm: Finite = published.LENGTH.value
+    length_mm: ExtentMm = published.LENGTH.value
     volar_readings_mm: Readings = VOLAR_READINGS
     dorsal_readings_mm: Readings = DORSAL_READINGS
     half_width_readings_mm: Readings = HALF_WIDTH_READINGS
-    stratum_corneum_mm: Finite = published.STRATUM_CORNEUM.value
-    living_epidermis_mm: Finite = published.LIVING_EPIDERMIS.value
-    dermis_mm: Finite = published.DERMIS.value
+    stratum_corneum_mm: Positive = published.STRATUM_CORNEUM.value
+    living_epidermis_mm: Positive = published.LIVING_EPIDERMIS.value
+    dermis_mm: Positive = published.DERMIS.value
     spine_y_mm: Finite = published.SPINE_Y.value
-    spine_end_x_mm: Finite = published.SPINE_END_X.value
-    bone_height_mm: Finite = published.BONE_HEIGHT.value
-    bone_width_mm: Finite = published.BONE_WIDTH.value
+    spine_end_x_mm: Positive = published.SPINE_END_X.value
+    bone_height_mm: Positive = published.BONE_HEIGHT.value
+    bone_width_mm: Positive = published.BONE_WIDTH.value
     bone_tip_x_mm: Finite = published.BONE_TIP_X.value
     nail_x_mm: Numbers = published.NAIL_X.value
-    nail_half_width_mm: Finite = published.NAIL_HALF_WIDTH.value
+    nail_half_width_mm: Positive = published.NAIL_HALF_WIDTH.value
 
     def __new__(cls, *given: object, **_: object) -> Fingertip:
         """Refuse the name of a preset, which is that of `of`."""
@@ -203,15 +202,9 @@ class Fingertip(Displayed, Finger):
         return super().__new__(cls)
 
     def __post_init__(self) -> None:
-        _size("length_mm", self.length_mm)
-        for name in ("stratum_corneum_mm", "living_epidermis_mm", "dermis_mm", "spine_end_x_mm"):
-            positive(name, getattr(self, name), "mm")
-        for name in ("bone_height_mm", "bone_width_mm", "nail_half_width_mm"):
-            positive(name, getattr(self, name), "mm")
-        if finite("spine_y_mm", self.spine_y_mm, "mm") >= 0.0:
+        if self.spine_y_mm >= 0.0:
             raise InputError("spine_y_mm", "must lie below 0, the widest height", repr(self.spine_y_mm))
-        nail = float_array("nail_x_mm", self.nail_x_mm, 1)
-        if nail.size != 2 or not nail[0] < nail[1]:
+        if len(self.nail_x_mm) != 2 or not self.nail_x_mm[0] < self.nail_x_mm[1]:
             raise InputError("nail_x_mm", "must be two increasing numbers", str(self.nail_x_mm))
         if not self.spine_end_x_mm < self.bone_tip_x_mm < self.length_mm:
             raise InputError(
@@ -254,9 +247,9 @@ class Fingertip(Displayed, Finger):
     def of(
         cls,
         like: Annotated[str, choice(FINGERS)] = "adult",
-        length_mm: Finite | None = None,
-        width_mm: Finite | None = None,
-        height_mm: Finite | None = None,
+        length_mm: ExtentMm | None = None,
+        width_mm: ExtentMm | None = None,
+        height_mm: ExtentMm | None = None,
         stratum_corneum_mm: Finite | None = None,
         living_epidermis_mm: Finite | None = None,
         dermis_mm: Finite | None = None,
@@ -289,7 +282,7 @@ class Fingertip(Displayed, Finger):
         preset = FINGERS[like]()
         given = {"length_mm": length_mm, "width_mm": width_mm, "height_mm": height_mm}
         factors = {
-            name: _size(name, size) / own
+            name: size / own
             for (name, size), own in zip(given.items(), preset.measures_mm, strict=True)
             if size is not None
         }
@@ -503,17 +496,6 @@ class Fingertip(Displayed, Finger):
         x, y, z = np.moveaxis(np.asarray(skin_points_mm, dtype=np.float64), -1, 0)
         proximal, distal = self.nail_x_mm
         return (y > 0.0) & (x >= proximal) & (x <= distal) & (np.abs(z) <= self.nail_half_width_mm)
-
-
-def _size(name: str, value: float) -> float:
-    """Check a length, width or height of a whole fingertip."""
-    smallest, largest = SIZES_MM
-    if not smallest <= finite(name, value, "mm") <= largest:
-        raise InputError(
-            f"{name} of a fingertip must lie between {smallest:g} and {largest:g} mm: got {value:g} mm; "
-            "check its unit."
-        )
-    return float(value)
 
 
 @cache

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
-from fingerpad.core.checked import OtherName, checked, checked_class, value_class
+from fingerpad.core.checked import OtherName, checked_class, value_class
 from fingerpad.core.errors import InputError
 from fingerpad.core.units import curvature_per_m, radius_mm
 from fingerpad.core.values import Finite, FloatArray, NotNegative, PointsMm, SizeMm, positive
@@ -380,7 +380,7 @@ class Bar(Indenter):
 
     symmetry_deg = 90.0
     width_mm: SizeMm = protocol.BAR_WIDTH.value
-    fillet_mm: Finite = protocol.BAR_FILLET.value
+    fillet_mm: NotNegative = protocol.BAR_FILLET.value
     edge_radius_mm = OtherName("fillet_mm")
 
     if TYPE_CHECKING:
@@ -438,7 +438,7 @@ class FlatPunch(Indenter):
 
     symmetry_deg = None
     diameter_mm: SizeMm = protocol.PUNCH_DIAMETER.value
-    fillet_mm: Finite = protocol.BAR_FILLET.value
+    fillet_mm: NotNegative = protocol.BAR_FILLET.value
     edge_radius_mm = OtherName("fillet_mm")
     radius_mm = OtherName(_of_diameter, lambda body: body.diameter_mm / 2)
 
@@ -493,9 +493,8 @@ class Plate(Indenter):
         return points_mm[:, 1].copy(), np.broadcast_to([0.0, 1.0, 0.0], points_mm.shape).copy()
 
 
-@checked
-def fillet_within(fillet_mm: NotNegative, width_mm: Finite, width_name: str) -> None:
-    """Raise an error if a fillet is negative or larger than half of a width. [mm]"""
+def fillet_within(fillet_mm: float, width_mm: float, width_name: str) -> None:
+    """Raise an error if a fillet is larger than half of a width. [mm]"""
     if fillet_mm > width_mm / 2:
         raise InputError(
             "fillet_mm", f"must not exceed half of {width_name}, {width_mm / 2:g} mm", f"{fillet_mm:g} mm"

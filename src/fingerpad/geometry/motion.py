@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -16,16 +17,19 @@ from fingerpad.core.values import (
     NotNegative,
     Positive,
     Whole,
+    between,
     float_array,
-    plausible,
 )
 from fingerpad.data import protocol
 
-LONGEST_MS = 1e13  # Longest ramp or hold; a quasi-static ramp of a validation takes 1e12 ms. [ms]
+_TIMES_MS = (1e-6, 1e13)  # Of a ramp or hold; a quasi-static ramp of a validation takes 1e12 ms. [ms]
 
-PLAUSIBLE = {"depth_mm": (1e-3, 20.0), "force_mn": (1.0, 1e5), "ramp_ms": (1e-6, LONGEST_MS)}
-PLAUSIBLE["hold_ms"] = PLAUSIBLE["ramp_ms"]
+PLAUSIBLE = {"depth_mm": (1e-3, 20.0), "force_mn": (1.0, 1e5), "ramp_ms": _TIMES_MS, "hold_ms": _TIMES_MS}
 """Smallest and largest peaks and times of a touch: an afferent answers to 1 mN, and pads are 10 mm thick."""
+
+DepthMm = Annotated[float, between(*PLAUSIBLE["depth_mm"])]
+ForceMn = Annotated[float, between(*PLAUSIBLE["force_mn"])]
+PhaseMs = Annotated[float, between(*_TIMES_MS)]  # Of a ramp or a hold.
 
 
 @value_class
@@ -159,11 +163,6 @@ class _OneRamp(Motion):
     ramp_ms: float
     hold_ms: float
 
-    def __post_init__(self) -> None:
-        for name, between in PLAUSIBLE.items():
-            if hasattr(self, name):
-                plausible(name, getattr(self, name), between)
-
     @property
     def end_ms(self) -> float:
         return self.ramp_ms + self.hold_ms
@@ -209,9 +208,9 @@ class RampAndHold(_OneRamp):
     [0.0, 0.5, 1.0, 1.0]
     """
 
-    depth_mm: Finite = protocol.DEPTH.value
-    ramp_ms: Finite = protocol.RAMP.value
-    hold_ms: Finite = protocol.HOLD.value
+    depth_mm: DepthMm = protocol.DEPTH.value
+    ramp_ms: PhaseMs = protocol.RAMP.value
+    hold_ms: PhaseMs = protocol.HOLD.value
 
     @property
     def largest(self) -> float:
@@ -238,9 +237,9 @@ class ForceRampAndHold(_OneRamp):
     [0.0, 50.0, 100.0]
     """
 
-    force_mn: Finite
-    ramp_ms: Finite = protocol.RAMP.value
-    hold_ms: Finite = protocol.HOLD.value
+    force_mn: ForceMn
+    ramp_ms: PhaseMs = protocol.RAMP.value
+    hold_ms: PhaseMs = protocol.HOLD.value
 
     by_force = True
 

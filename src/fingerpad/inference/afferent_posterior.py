@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike
 from fingerpad.core.checked import value_class
 from fingerpad.core.errors import InputError
 from fingerpad.core.random_streams import generator
-from fingerpad.core.values import Finite, FloatArray, finite, positive
+from fingerpad.core.values import Finite, FloatArray, Positive
 from fingerpad.data import neuron
 from fingerpad.inference.fitting.posterior import Chains, LogDensity, sample
 from fingerpad.inference.identifiable import IDENTIFIABLE_NAMES, identifiable, six_parameters
@@ -74,20 +74,18 @@ class AfferentPrior:
     fits, the paper's first one with its gains rescaled. See docs/decisions.md#priors.
     """
 
-    resting_share_sd: Finite = 1.0  # Standard deviation of the potential at rest over the threshold. [1]
-    dynamic_gain_per_kpa: Finite = float(_START[1])
-    static_gain_per_kpa_ms: Finite = float(_START[2])
-    time_constant_ms: Finite = float(_START[3])
+    resting_share_sd: Positive = 1.0  # Standard deviation of the potential at rest over the threshold. [1]
+    dynamic_gain_per_kpa: Positive = float(_START[1])
+    static_gain_per_kpa_ms: Positive = float(_START[2])
+    time_constant_ms: Positive = float(_START[3])
     """Medians of k_d/(C v), k_s/(C v) and tau. [1/kPa, 1/(kPa ms), ms]"""
     gain_factor: Finite = 10.0
     time_constant_factor: Finite = 2.0
     """Two thirds of the prior lie between the median divided and multiplied by this factor. [1]"""
 
     def __post_init__(self) -> None:
-        for name in ("resting_share_sd", *IDENTIFIABLE_NAMES[1:]):
-            positive(name, getattr(self, name))
         for name in ("gain_factor", "time_constant_factor"):
-            if finite(name, getattr(self, name)) <= 1.0:
+            if getattr(self, name) <= 1.0:
                 raise InputError(name, "must be greater than 1", repr(getattr(self, name)))
 
     @property

@@ -24,7 +24,7 @@ from scipy.special import logsumexp
 
 from fingerpad.core.checked import value_class
 from fingerpad.core.errors import InputError
-from fingerpad.core.values import FloatArray, Numbers, Positive, Whole, float_array
+from fingerpad.core.values import FiniteVector, FloatArray, Numbers, Positive, Whole
 from fingerpad.inference.rate_model import RateModel
 from fingerpad.inference.recordings import PHASES, RateRecordings
 
@@ -42,7 +42,7 @@ class CorrelatedResiduals:
     """Distribution of residuals along a line, whose deviation and correlation length are integrated out."""
 
     n_residuals: Whole
-    positions_mm: FloatArray | None = None
+    positions_mm: FiniteVector | None = None
     """Their places along a line; default: independent residuals, (n_residuals,). [mm]"""
     lengths_mm: Numbers = LENGTHS_MM  # Grid of correlation lengths; 0 for independence. [mm]
     deviation: Positive = DEVIATION_HZ  # Scale s of the prior of sigma. [unit of the residuals]
@@ -51,13 +51,13 @@ class CorrelatedResiduals:
 
     def __post_init__(self) -> None:
         n = self.n_residuals
-        lengths = float_array("lengths_mm", self.lengths_mm, 1)
+        lengths = np.array(self.lengths_mm)
         if not lengths.size or (lengths < 0.0).any():
             raise InputError("lengths_mm", "must hold lengths of at least 0", str(self.lengths_mm))
         if self.positions_mm is None:
             lengths, distances = np.zeros(1), np.zeros((n, n))
         else:
-            places = float_array("positions_mm", self.positions_mm, 1)
+            places = self.positions_mm
             if places.size != n or np.unique(places).size != n:
                 raise InputError(
                     "positions_mm",

@@ -32,7 +32,7 @@ from fingerpad.core.checked import checked, value_class
 from fingerpad.core.errors import InputError
 from fingerpad.core.signals import SpikeTrains
 from fingerpad.core.threads import in_blocks
-from fingerpad.core.values import Finite, FloatArray, Indices, Positive, float_array
+from fingerpad.core.values import FiniteArray, FloatArray, Indices, Positive
 from fingerpad.data import neuron
 from fingerpad.inference.identifiable import (
     N_PARAMETERS,
@@ -223,7 +223,7 @@ class SpikeLikelihood:
     drive: Drive
     trains: SpikeTrains
     sites: Indices | None = None
-    duration_ms: Finite | FloatArray | None = None
+    duration_ms: FiniteArray | None = None
     refractory_ms: Positive = neuron.REFRACTORY.value
     escape_ms: Positive = ESCAPE_TIME_MS
     _intervals: tuple[FloatArray, np.ndarray, np.ndarray] = field(init=False, repr=False, compare=False)
@@ -241,7 +241,7 @@ class SpikeLikelihood:
                 str(sites),
             )
         given = times[-1] if self.duration_ms is None else self.duration_ms
-        ends = np.broadcast_to(float_array("duration_ms", np.atleast_1d(given), 1), n_trains)
+        ends = np.broadcast_to(given, n_trains)
         if n_trains and (ends.min() <= times[0] or ends.max() > times[-1]):
             raise InputError(
                 "duration_ms", f"must lie within the drive, {times[0]:g} ... {times[-1]:g} ms", str(given)

@@ -132,9 +132,8 @@ class Material:
         cls, shear_kpa: Positive, poisson: Finite, prony: Prony = Prony(), moduli: str = "long_term"
     ) -> Material:
         """Neo-Hooke from shear modulus and Poisson's ratio. [kPa]"""
-        shear = shear_kpa
-        bulk = bulk_modulus(shear, poisson)
-        return cls(Polynomial(c10=shear / 2, bulk_linear=bulk / 2), prony, moduli)
+        bulk = bulk_modulus(shear_kpa, poisson)
+        return cls(Polynomial(c10=shear_kpa / 2, bulk_linear=bulk / 2), prony, moduli)
 
     @classmethod
     def linear_elastic(

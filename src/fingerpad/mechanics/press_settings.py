@@ -13,7 +13,7 @@ import numpy as np
 
 from fingerpad.core.checked import value_class
 from fingerpad.core.errors import InputError
-from fingerpad.core.values import Count, Finite, FloatArray, Numbers, float_array, increasing, positive
+from fingerpad.core.values import Count, FloatArray, Numbers, Positive, increasing
 from fingerpad.geometry.indenter_grading import SHARPEST_MM
 from fingerpad.geometry.indenters import Indenter
 from fingerpad.geometry.mesh import Mesh
@@ -126,18 +126,16 @@ class PressSettings:
     ramp_steps: Count = 8
     hold_steps: Count = 8
     newton: NewtonSettings = field(default_factory=NewtonSettings)
-    sed_tolerance: Finite | None = None
+    sed_tolerance: Positive | None = None
     times_ms: Numbers = ()
-    cycle_tolerance: Finite | None = 0.01
+    cycle_tolerance: Positive | None = 0.01
 
     def __post_init__(self) -> None:
-        wanted = increasing("times_ms", float_array("times_ms", self.times_ms, 1))
-        if wanted.size and wanted[0] <= 0.0:
-            raise InputError("times_ms", "must lie above 0, which is solved anyway", f"{wanted[0]:g}")
-        object.__setattr__(self, "times_ms", tuple(wanted.tolist()))
+        if increasing("times_ms", self.times_ms).size and self.times_ms[0] <= 0.0:
+            raise InputError("times_ms", "must lie above 0, which is solved anyway", f"{self.times_ms[0]:g}")
         for name in ("sed_tolerance", "cycle_tolerance"):
             tolerance = getattr(self, name)
-            if tolerance is not None and positive(name, tolerance) >= 1.0:
+            if tolerance is not None and tolerance >= 1.0:
                 raise InputError(name, "must be below 1", repr(tolerance))
 
     def steps_ms(self, motion: Motion) -> FloatArray:

@@ -29,7 +29,7 @@ from fingerpad.core.signals import (
     SpikeTrains,
     Traces,
 )
-from fingerpad.core.values import Finite, FloatArray, Positive, Whole, choice, not_negative
+from fingerpad.core.values import Finite, FloatArray, Positive, Share, Whole, choice
 from fingerpad.data import afferents
 from fingerpad.neuron.afferent import Afferent, check_known_quantities, check_quantities, spikes_where
 from fingerpad.neuron.band_pass import BandPass, resampled, smoothed_rate
@@ -50,14 +50,12 @@ class RapidlyAdapting:
     corner_hz: Finite  # Corner frequency of the band pass. [Hz]
     rise: Whole
     fall: Whole  # Its powers of the frequency below and above the corner.
-    retraction: Finite  # Share of the response to a decreasing quantity, 0 to 1. [1]
+    retraction: Share  # Share of the response to a decreasing quantity, 0 to 1. [1]
     membrane_ms: Finite  # Time constant of the membrane. [ms]
     refractory_ms: Finite  # Refractory period. [ms]
     quantity: str  # What is followed, by the names of `SkinResponse.sample`.
 
     def __post_init__(self) -> None:
-        if not_negative("retraction", self.retraction) > 1.0:
-            raise InputError("retraction", "must lie within 0 ... 1", f"{self.retraction:g}")
         # Both stages check their parameters when they are made.
         self.band_pass, self.membrane  # noqa: B018
 

@@ -12,7 +12,7 @@ from fingerpad.core.checked import value_class
 from fingerpad.core.errors import InputError
 from fingerpad.core.signals import CURRENTS, SpikeTrains, Traces
 from fingerpad.core.threads import in_blocks
-from fingerpad.core.values import Finite, FloatArray, Positive, finite
+from fingerpad.core.values import Finite, FloatArray, Positive
 from fingerpad.neuron.exact_spikes import exact_trains, initial_potentials
 
 
@@ -64,7 +64,7 @@ class LeakyIntegrateAndFire:
     initial_mv: Finite | None = None
 
     def __post_init__(self) -> None:
-        if self.initial_mv is not None and finite("initial_mv", self.initial_mv, "mV") >= self.threshold_mv:
+        if self.initial_mv is not None and self.initial_mv >= self.threshold_mv:
             raise InputError(
                 "initial_mv",
                 f"must be below the threshold, {self.threshold_mv:g} mV",

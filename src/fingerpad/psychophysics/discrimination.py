@@ -40,8 +40,8 @@ from fingerpad.core.values import (
     NotNegativeWhole,
     Whole,
     choice,
+    count_from,
     float_array,
-    whole,
 )
 from fingerpad.data import protocol, psychophysics
 from fingerpad.psychophysics.encoding import NORMS, check_neighbours, distance
@@ -59,6 +59,8 @@ _NOISES_AT_ONCE = 32  # Noises whose sums are held in memory together.
 MOST_REPETITIONS = 1_000_000
 
 _REPETITIONS = int(psychophysics.REPETITIONS.value)
+
+Repetitions = Annotated[int, count_from(2, MOST_REPETITIONS)]
 _REPETITIONS_VARIED = int(psychophysics.REPETITIONS_VARIED_CRITERION.value)
 
 
@@ -66,13 +68,13 @@ _REPETITIONS_VARIED = int(psychophysics.REPETITIONS_VARIED_CRITERION.value)
 class Experiment:
     """Numbers of repetitions, and decision criterion."""
 
-    presentations: Whole = _REPETITIONS
+    presentations: Repetitions = _REPETITIONS
     """Noisy presentations of each sphere: gradient sums behind one mean and standard deviation (d), or sets
     of responses from which pairs are sampled (c*)."""
-    distributions: Whole = _REPETITIONS
+    distributions: Repetitions = _REPETITIONS
     """Pairs of mean and standard deviation per sphere, Gradient Sum only (f)."""
-    pairs: Whole = _REPETITIONS  # Distances per sphere behind one hit rate, Euclidean Distance only (f*).
-    hit_rates: Whole = _REPETITIONS
+    pairs: Repetitions = _REPETITIONS  # Distances per sphere behind one hit rate, Euclidean Distance (f*).
+    hit_rates: Repetitions = _REPETITIONS
     """Hit rates per comparison, of which mean and standard deviation are reported (i, h*)."""
     criterion: Finite = psychophysics.DECISION_CRITERION.value
     """Decision point beta, as a fraction of the distance from the standard's mean to the comparison's."""
@@ -80,7 +82,7 @@ class Experiment:
     """Spread of the decision point: for each hit rate it is multiplied by Normal(1, criterion_sigma). Above 0
     this is the paper's derivative of Gradient Sum: one mean and standard deviation per sphere, from
     `presentations_varied` sums; steps (f) and (g) are omitted."""
-    presentations_varied: Whole = (
+    presentations_varied: Repetitions = (
         _REPETITIONS_VARIED  # Presentations of each sphere when the criterion varies.
     )
     criterion_moves: Annotated[str, choice(CRITERION_MOVES)] = CRITERION_MOVES[0]
@@ -88,8 +90,6 @@ class Experiment:
     1 that replaces beta."""
 
     def __post_init__(self) -> None:
-        for name in ("presentations", "distributions", "pairs", "hit_rates", "presentations_varied"):
-            whole(name, getattr(self, name), 2, MOST_REPETITIONS)
         if math.prod(self.sums_per_sphere) > MOST_REPETITIONS:
             raise InputError(
                 f"distributions times presentations must be at most {MOST_REPETITIONS:,}: got "

@@ -36,6 +36,7 @@ from fingerpad.core.values import (
     Finite,
     FiniteVector,
     FloatArray,
+    NotNegative,
     Positive,
     choice,
     finite,
@@ -177,17 +178,15 @@ class PsychometricFunction:
     threshold: Finite
     width: Positive
     guess: Finite = 0.5
-    lapse: Finite = 0.0
+    lapse: NotNegative = 0.0
     sigmoid: Annotated[str, choice(SIGMOIDS)] = "normal"
 
     def __post_init__(self) -> None:
         check = positive if self.shape.logarithmic else finite
         object.__setattr__(self, "threshold", check("threshold", self.threshold))
-        guess, lapse = finite("guess", self.guess), finite("lapse", self.lapse)
-        if guess < 0.0 or lapse < 0.0 or guess + lapse >= 1.0:
+        if self.guess + self.lapse >= 1.0:
             raise InputError(
-                "guess and lapse must not be negative and must sum to less than 1: "
-                f"got {guess:g} and {lapse:g}."
+                f"guess and lapse must sum to less than 1: got {self.guess:g} and {self.lapse:g}."
             )
 
     @property

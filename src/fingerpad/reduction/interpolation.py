@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike
 
 from fingerpad.core.checked import value_class
 from fingerpad.core.errors import InputError
-from fingerpad.core.values import Finite, FloatArray, Whole, finite, whole
+from fingerpad.core.values import Count, Finite, FloatArray
 
 
 @cache
@@ -57,13 +57,11 @@ class Axis:
     name: str  # "x_mm", "z_mm", "tilt_deg", or a parameter of the indenter.
     low: Finite
     high: Finite  # Its range; equal if it does not vary.
-    count: Whole  # Number of Chebyshev's points, 1 if it does not vary.
+    count: Count  # Number of Chebyshev's points, 1 if it does not vary.
 
     def __post_init__(self) -> None:
-        finite(f"low of {self.name}", self.low)
-        if finite(f"high of {self.name}", self.high) < self.low:
+        if self.high < self.low:
             raise InputError(f"{self.name} must range from low to high: got {self.low:g} to {self.high:g}.")
-        whole(f"count of {self.name}", self.count, at_least=1)
         if (self.count == 1) != (self.low == self.high):
             raise InputError(
                 f"{self.name} needs two points or more if it varies, and one if it does not: got "

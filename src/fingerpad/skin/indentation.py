@@ -19,7 +19,7 @@ from fingerpad.core.errors import InputError, shown
 from fingerpad.core.phases import from_onset
 from fingerpad.core.progress import NoProgress, Progress
 from fingerpad.core.threads import compiled_threads
-from fingerpad.core.values import Finite, Flag, FloatArray, Pair, Whole, choice, finite, instance, pair
+from fingerpad.core.values import Finite, Flag, FloatArray, Pair, Whole, choice, instance, limits, pair
 from fingerpad.data import fingertip as published
 from fingerpad.data.tissues import DEFAULT_TISSUES
 from fingerpad.geometry.fingertip import Finger, Fingertip
@@ -103,29 +103,19 @@ class Touch:
     grading: Grading
     settings: PressSettings = field(default_factory=PressSettings)
     at_mm: Pair = None  # type: ignore[assignment]  # a pair after initialisation
-    tilt_deg: Finite = 0.0
+    tilt_deg: Annotated[float, limits(-LARGEST_TILT_DEG, LARGEST_TILT_DEG)] = 0.0
     friction: Finite = 0.0
     spin_deg: Finite = 0.0
     whole: Flag = field(default=False, compare=False, repr=False)
     progress: Progress | None = field(default=None, compare=False, repr=False)
 
     def __post_init__(self) -> None:
-        for name, kind in (
-            ("finger", Finger), ("indenter", Indenter), ("stimulus", Motion), ("tissues", Tissues),
-            ("grading", Grading), ("settings", PressSettings),
-        ):  # fmt: skip
-            instance(name, getattr(self, name), kind)
         x, z = _position(self.at_mm, self.finger)
         object.__setattr__(self, "at_mm", (x, z))
-        if abs(finite("tilt_deg", self.tilt_deg, "degrees")) > LARGEST_TILT_DEG:
-            raise InputError(
-                "tilt_deg", f"must lie within {LARGEST_TILT_DEG:g} degrees", f"{self.tilt_deg:g}"
-            )
         if z != 0.0 and not self.grading.full:
             raise InputError(f"at_mm beside the midline (z = {z:g} mm) needs a grading with full=True.")
-        spin = finite("spin_deg", self.spin_deg, "degrees")
         body = type(self.indenter).__name__
-        for name, angle in (("tilt_deg", self.tilt_deg), ("spin_deg", spin)):
+        for name, angle in (("tilt_deg", self.tilt_deg), ("spin_deg", self.spin_deg)):
             if self.indenter.grips and angle != 0.0:
                 raise InputError(name, f"must be 0 for {body}", f"{angle:g} degrees")
         if self.indenter.grips and not self.stimulus.stays:
@@ -139,7 +129,7 @@ class Touch:
                 break
             if pose.z_mm != 0.0:
                 raise InputError(f"z_mm = {pose.z_mm:g} mm of the motion needs a grading with full=True.")
-            turned = spin + pose.spin_deg
+            turned = self.spin_deg + pose.spin_deg
             if not self.indenter.mirrors(turned):
                 raise InputError(
                     f"spin_deg = {turned:g} degrees leaves {body} without symmetry across the midline, so "
