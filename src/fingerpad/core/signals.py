@@ -29,6 +29,7 @@ from fingerpad.core.values import (
     Numbers,
     Positive,
     TimesMs,
+    TruthVector,
     Vector,
     Whole,
     choice,
@@ -252,7 +253,7 @@ class Traces(Result):
         """Traces of some of the sites."""
         return self if sites == slice(0, self.n_sites) else self.with_values(lambda values: values[:, sites])
 
-    def selected(self, sites: np.ndarray) -> Traces:
+    def selected(self, sites: TruthVector) -> Traces:
         """Traces of the sites where a mask (n_sites,) is true.
 
         Examples
@@ -260,6 +261,8 @@ class Traces(Result):
         >>> Traces([0.0, 50.0], [[0.0, 0.0], [2.0, 3.0]]).selected(np.array([False, True])).n_sites
         1
         """
+        if sites.size != self.n_sites:
+            raise InputError("sites", f"must have one truth value per site, {self.n_sites}", str(sites.size))
         return self.with_values(lambda values: values[:, sites])
 
     def scaled(self, factors: ArrayLike) -> Traces:
@@ -389,7 +392,7 @@ class SpikeTrains(Result):
         inside = np.cumsum(np.append(0, (self.times_ms > start) & (self.times_ms <= end)))
         return MS_PER_S * np.diff(inside[self.offsets]) / (end - start)
 
-    def spread(self, sites: np.ndarray) -> SpikeTrains:
+    def spread(self, sites: TruthVector) -> SpikeTrains:
         """Trains of all sites, if these are those where a mask is true and the others are silent.
 
         Examples
@@ -398,6 +401,8 @@ class SpikeTrains(Result):
         >>> [train.tolist() for train in two.spread(np.array([True, False, True]))]
         [[1.0], [], [2.0, 3.0]]
         """
+        if np.count_nonzero(sites) != len(self):
+            raise InputError("sites", f"must be true once per train, {len(self)}", str(sites))
         counts = np.zeros(sites.size, dtype=np.int64)
         counts[sites] = np.diff(self.offsets)
         return SpikeTrains(self.times_ms, np.concatenate([[0], np.cumsum(counts)]))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 import io
 from collections import Counter
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -45,14 +45,6 @@ class TableRow:
         with self.placed():
             entry = self.entries[column]
             return check(column, number_in(column, entry, unit) if isinstance(entry, str) else entry, unit)
-
-    def refuse_others(self, known: Collection[str], kind: str) -> None:
-        """Raise `InputError` if the row has an entry in a column that a `kind` does not have."""
-        for column in self.entries:
-            if self.has(column) and column not in known:
-                raise InputError(
-                    f"{self.place}: a {kind} has no {column}, only {', '.join(known)}: leave it empty."
-                )
 
     @contextmanager
     def placed(self) -> Iterator[None]:

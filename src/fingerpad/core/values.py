@@ -92,20 +92,12 @@ def not_negative(name: str, value: Any, unit: str = "") -> float:
     return number
 
 
-def plausible(name: str, value: Any, between: tuple[float, float]) -> float:
-    """Return a number as float if it is a size that a laboratory has."""
-    number = positive(name, value)
-    if not between[0] <= number <= between[1]:
-        limits = f"must lie within {between[0]:g} to {between[1]:g} {_unit(name)}"
-        raise InputError(name, limits, f"{number:g}", "check its unit")
-    return number
-
-
 def within(name: str, value: Any, low: float, high: float) -> float:
     """Return a number within limits as float."""
-    number = finite(name, value)
+    number, unit = finite(name, value), _unit(name)
     if not low <= number <= high:
-        raise InputError(name, f"must lie within {low:g} to {high:g}{_in(name)}", shown(value))
+        words = f"must lie within {low:g} to {high:g}{' ' * bool(unit)}{unit}"
+        raise InputError(name, words, f"{number:g}", "check its unit" if unit else "")
     return number
 
 
@@ -348,11 +340,6 @@ def limits(low: float, high: float) -> Check:
     return Check(partial(within, low=low, high=high), {"type": "number", "minimum": low, "maximum": high})
 
 
-def between(low: float, high: float) -> Check:
-    """Check of a size that a laboratory has."""
-    return Check(partial(plausible, between=(low, high)), {"type": "number", "minimum": low, "maximum": high})
-
-
 def count_from(at_least: int, at_most: int | None = None) -> Check:
     """Check of a whole number within limits."""
     limits = {"type": "integer", "minimum": at_least} | ({} if at_most is None else {"maximum": at_most})
@@ -382,7 +369,7 @@ Outlines = Annotated[tuple[tuple[tuple[float, float], ...], ...], entries(entrie
 
 Points = Annotated[tuple[tuple[float, float, float], ...], entries(entries(_NUMBER, 3))]
 
-SizeMm = Annotated[float, between(0.01, 400.0)]  # Width or diameter of a body that presses a fingertip.
+SizeMm = Annotated[float, limits(0.01, 400.0)]  # Width or diameter of a body that presses a fingertip.
 PointsMm = Annotated[FloatArray, Check(points, {"type": "array"})]
 TimesMs = Annotated[FloatArray, Check(increasing, {"type": "array", "items": {"type": "number"}})]
 AnyArray = Annotated[FloatArray, Check(array, {})]

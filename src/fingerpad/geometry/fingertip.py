@@ -29,9 +29,10 @@ from fingerpad.core.values import (
     Numbers,
     Pairs,
     Positive,
-    between,
     choice,
+    float_array,
     increasing,
+    limits,
 )
 from fingerpad.data import fingers
 from fingerpad.data import fingertip as published
@@ -52,7 +53,7 @@ _CREASE_SHARE = 1.0 - fingers.CREASE_TO_TIP.value / published.LENGTH.value
 _STATIONS_OF_SIZE = 401
 
 Readings = Pairs
-ExtentMm = Annotated[float, between(*SIZES_MM)]  # Of a whole fingertip.
+ExtentMm = Annotated[float, limits(*SIZES_MM)]  # Of a whole fingertip.
 
 
 def _readings(stations: tuple[float, ...], values: tuple[float, ...]) -> Readings:
@@ -417,7 +418,7 @@ class Fingertip(Displayed, Finger):
         >>> Fingertip().skin_point(17.37, 0.0).round(1).tolist()
         [17.4, -9.8, 0.0]
         """
-        x, z = np.broadcast_arrays(np.asarray(x_mm, dtype=np.float64), np.asarray(z_mm, dtype=np.float64))
+        x, z = np.broadcast_arrays(float_array("x_mm", x_mm, None), float_array("z_mm", z_mm, None))
         volar, _, half_width = self.section(x)
         outside = ~((x >= 0.0) & (x <= self.length_mm) & (np.abs(z) <= half_width))
         if outside.any():
@@ -493,7 +494,10 @@ class Fingertip(Displayed, Finger):
 
     def is_under_nail(self, skin_points_mm: ArrayLike) -> np.ndarray:
         """Whether points of the skin lie in the footprint of the nail, bool (...)."""
-        x, y, z = np.moveaxis(np.asarray(skin_points_mm, dtype=np.float64), -1, 0)
+        points = float_array("skin_points_mm", skin_points_mm, None)
+        if points.shape[-1:] != (3,):
+            raise InputError("skin_points_mm", "must have x, y and z", f"shape {points.shape}")
+        x, y, z = np.moveaxis(points, -1, 0)
         proximal, distal = self.nail_x_mm
         return (y > 0.0) & (x >= proximal) & (x <= distal) & (np.abs(z) <= self.nail_half_width_mm)
 

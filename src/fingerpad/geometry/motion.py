@@ -10,16 +10,7 @@ from numpy.typing import ArrayLike
 
 from fingerpad.core.checked import checked_class, value_class
 from fingerpad.core.phases import Phase, ramp_and_hold_phases
-from fingerpad.core.values import (
-    Count,
-    Finite,
-    FloatArray,
-    NotNegative,
-    Positive,
-    Whole,
-    between,
-    float_array,
-)
+from fingerpad.core.values import Count, Finite, FloatArray, NotNegative, Positive, Whole, float_array, limits
 from fingerpad.data import protocol
 
 _TIMES_MS = (1e-6, 1e13)  # Of a ramp or hold; a quasi-static ramp of a validation takes 1e12 ms. [ms]
@@ -27,9 +18,9 @@ _TIMES_MS = (1e-6, 1e13)  # Of a ramp or hold; a quasi-static ramp of a validati
 PLAUSIBLE = {"depth_mm": (1e-3, 20.0), "force_mn": (1.0, 1e5), "ramp_ms": _TIMES_MS, "hold_ms": _TIMES_MS}
 """Smallest and largest peaks and times of a touch: an afferent answers to 1 mN, and pads are 10 mm thick."""
 
-DepthMm = Annotated[float, between(*PLAUSIBLE["depth_mm"])]
-ForceMn = Annotated[float, between(*PLAUSIBLE["force_mn"])]
-PhaseMs = Annotated[float, between(*_TIMES_MS)]  # Of a ramp or a hold.
+DepthMm = Annotated[float, limits(*PLAUSIBLE["depth_mm"])]
+ForceMn = Annotated[float, limits(*PLAUSIBLE["force_mn"])]
+PhaseMs = Annotated[float, limits(*_TIMES_MS)]  # Of a ramp or a hold.
 
 
 @value_class

@@ -13,7 +13,7 @@ from fingerpad.core.checked import value_class
 from fingerpad.core.errors import InputError
 from fingerpad.core.phases import HOLD, RAMP, RELEASE, VIBRATION, Phase
 from fingerpad.core.units import unit_of
-from fingerpad.core.values import Finite, FloatArray, Many, Numbers, Whole, float_array, increasing, plausible
+from fingerpad.core.values import Finite, FloatArray, Many, Numbers, Whole, float_array, increasing, within
 from fingerpad.data import protocol
 from fingerpad.geometry.motion import PLAUSIBLE, STILL, Cycles, Motion, Pose, hold_ends_ms
 
@@ -165,7 +165,7 @@ class Trajectory(Motion):
         if values.max() <= 0.0 and not aside:
             raise InputError(name, "must be above 0 at some time", remedy="the indenter would never press")
         if values.max() > 0.0 and not aside:
-            plausible(f"the largest {name}", values.max(), PLAUSIBLE[name])
+            within(f"the largest {name}", values.max(), *PLAUSIBLE[name])
         object.__setattr__(self, "phases", self.phases or self._phases_of_course())
         for phase in self.phases:
             if phase.end_ms > self.end_ms:

@@ -17,7 +17,7 @@ from typing import Annotated
 import numpy as np
 
 from fingerpad.core.checked import checked
-from fingerpad.core.values import Finite, FloatArray, Whole, choice
+from fingerpad.core.values import Finite, Matrix, Whole, choice
 from fingerpad.psychophysics.encoding import distance, gradient_sum
 from fingerpad.psychophysics.ideal_observer import (
     Discriminability,
@@ -59,7 +59,7 @@ class CodeEfficiency:
 
 @checked
 def noisy_presentations(
-    table: FloatArray, noise_sigma: Finite, seed: Whole, session: Whole = 0
+    table: Matrix, noise_sigma: Finite, seed: Whole, session: Whole = 0
 ) -> list[Presentation]:
     """Draw responses to the standard and to each comparison.
 

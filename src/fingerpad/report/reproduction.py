@@ -63,27 +63,13 @@ def reproduction_page(result: ReproductionResult) -> Page:
     paper, human, deflection = result.paper, result.human, result.skin_deflection
     sets = {name: getattr(result, name).discrimination for name in COLUMNS}
 
-    def pair(
-        figure: int,
-        name: str,
-        title: str,
-        part: str,
-        draw: Callable[..., Figure],
-        caption: Callable[..., str],
+    def drawn(
+        n: int, name: str, title: str, part: Any, draw: Callable[..., Figure], caption: Callable[..., str]
     ) -> Drawing:
-        first, second = getattr(paper, part), getattr(human, part)
-        name, text = f"figure_{figure}_{name}", caption(first)
-        return Drawing(name, title, partial(draw, first), text, figure, partial(draw, second))
-
-    def single(
-        figure: int,
-        name: str,
-        title: str,
-        part: Any,
-        draw: Callable[..., Figure],
-        caption: Callable[..., str],
-    ) -> Drawing:
-        return Drawing(f"figure_{figure}_{name}", title, partial(draw, part), caption(part), figure)
+        """Figure of both sets where `part` names what they have, else of one thing."""
+        both = [getattr(each, part) for each in (paper, human)] if isinstance(part, str) else [part]
+        first, *second = (partial(draw, each) for each in both)
+        return Drawing(f"figure_{n}_{name}", title, first, caption(both[0]), n, *second)
 
     def tables(part: str, of: Callable[[Any], Sequence[Table]]) -> list[Table]:
         return [
@@ -92,47 +78,43 @@ def reproduction_page(result: ReproductionResult) -> Page:
             for table in of(getattr(getattr(result, name), part))
         ]
 
-    mesh = single(
+    mesh = drawn(
         1, "mesh", "Mesh of the finger", paper.mesh, mesh_picture.draw_mesh, mesh_picture.caption_mesh
     )
-    levels = pair(
+    levels = drawn(
         2, "three_levels", "One sphere on three levels", "levels",
         three_levels.draw_levels, three_levels.caption_levels,
     )  # fmt: skip
-    steps = single(
+    steps = drawn(
         3, "steps", "Steps to a hit rate", sets, discrimination.draw_steps, discrimination.caption_steps
     )
-    skin = single(
+    skin = drawn(
         4, "skin_deflection", "Deflection of the skin", deflection,
         skin_deflection.draw_skin_deflection, skin_deflection.caption_skin_deflection,
     )  # fmt: skip
-    rates = pair(
+    rates = drawn(
         5, "single_unit", "Rates under a bar", "single_unit",
         single_unit.draw_single_unit, single_unit.caption_single_unit,
     )  # fmt: skip
-    maps = pair(
+    maps = drawn(
         6, "population", "Rates and latencies under a sphere", "population",
         responses.draw_population, partial(responses.caption_population, human=human.population),
     )  # fmt: skip
-    observers = pair(
+    observers = drawn(
         7, "discrimination", "Discrimination of spheres", "discrimination",
         discrimination.draw_observers, discrimination.caption_observers,
     )  # fmt: skip
-    criterion = pair(
+    criterion = drawn(
         8, "varied_criterion", "The same with a varied criterion", "discrimination",
         discrimination.draw_criterion, discrimination.caption_criterion,
     )  # fmt: skip
-    border = pair(
-        9,
-        "nail",
-        "Stress at the border of the nail",
-        "nail",
-        skin_deflection.draw_nail,
-        skin_deflection.caption_nail,
-    )
+    border = drawn(
+        9, "nail", "Stress at the border of the nail", "nail",
+        skin_deflection.draw_nail, skin_deflection.caption_nail,
+    )  # fmt: skip
     more: list[Part] = []
     beyond: list[Part] = [
-        pair(
+        drawn(
             10, "noise", "Amount of noise", "discrimination",
             discrimination.draw_noise, discrimination.caption_noise,
         )
@@ -142,12 +124,12 @@ def reproduction_page(result: ReproductionResult) -> Page:
         more.append(Paragraph(f"Not run: {text}."))
     else:
         beyond += [
-            pair(
+            drawn(
                 11, "uncertainty", "Uncertainty of the fit", "single_unit_uncertainty",
                 single_unit.draw_uncertainty, single_unit.caption_uncertainty,
             ),
             *tables("single_unit_uncertainty", single_unit.uncertainty_tables),
-            pair(
+            drawn(
                 12, "curvature_thresholds", "Thresholds of curvature", "curvature_thresholds",
                 curvature_thresholds.draw_thresholds, curvature_thresholds.caption_thresholds,
             ),
