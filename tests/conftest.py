@@ -77,6 +77,13 @@ def perturbed() -> None:
     press.Body = other_body
 
 
+@pytest.fixture(scope="session")
+def shared_folder(tmp_path_factory) -> Path:
+    """Folder that all processes of one run of tests share: a touch stored there is not pressed again."""
+    own = tmp_path_factory.getbasetemp()
+    return (own.parent if "PYTEST_XDIST_WORKER" in os.environ else own) / "shared"
+
+
 @pytest.fixture
 def run_program(monkeypatch, capsys, tmp_path) -> Callable[..., tuple[int, str, str]]:
     """Run a main function with words of a command line in an empty folder: status, output and errors.
