@@ -82,22 +82,10 @@ def of_set(first, request):
     return first.results[request.param]
 
 
-def images(run):
-    """Number of images on the page of a run: many figures have one of each set."""
-    page = reproduction_page(read_results(run.folder / "results.json", ReproductionResult))
-    return sum(1 + (drawing.human is not None) for drawing in page.drawings)
-
-
 @pytest.fixture(scope="session")
 def stamps(first):
     """When each indentation was stored."""
     return {path.name: path.stat().st_mtime_ns for path in (first.folder / STORE_FOLDER).iterdir()}
-
-
-@pytest.fixture(scope="session")
-def page(first):
-    """The report with its figures as the first run wrote them."""
-    return (first.folder / "report.html").read_text(encoding="utf-8")
 
 
 @pytest.fixture(scope="session")
@@ -323,14 +311,16 @@ def test_a_fitted_number_is_told_apart_from_a_prediction(first):
 # The page
 
 
-def test_the_page_shows_every_compared_number_and_figure_and_no_machine_path(first, page):
+def test_the_page_shows_every_compared_number_and_figure_and_no_machine_path(first):
+    page = (first.folder / "report.html").read_text(encoding="utf-8")
     text = re.sub(r"\s+", " ", re.sub(r"<[^>]*>", " ", page))
     for name in SETS:
         for row in first.results[name]["comparison"]:
             assert row["ours"] in text
     assert str(first.folder) not in page
     assert str(Path.home()) + "/" not in page
-    assert page.count("<img ") == images(first)
+    drawings = reproduction_page(read_results(first.folder / "results.json", ReproductionResult)).drawings
+    assert page.count("<img ") == sum(1 + (drawing.human is not None) for drawing in drawings)
     for path in (first.folder / "figures").iterdir():
         content = path.read_bytes()
         assert content.startswith(b"\x89PNG\r\n\x1a\n")
