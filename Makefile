@@ -1,5 +1,5 @@
 # make reproduce     run the studies of the paper      (ARGS="..." goes to `fingerpad reproduce`)
-# make test          check style, types, imports, behaviour and the wheel; stops at the first failure
+# make test          check style, types, imports, behaviour and the wheel; starts nothing after the first failure
 # make test-fast     only tests that press no body and start no program: at most two minutes, for daily work
 # make checks        only style, types and imports
 # make pages         only the examples and links of README and docs
@@ -35,16 +35,21 @@ install := $(bin)/python -m pip install --quiet --disable-pip-version-check --no
 # Nothing but the environment's own packages may answer an import.
 export PYTHONNOUSERSITE := 1
 unexport PYTHONPATH
+# Compiled modules are kept: otherwise each of the hundred processes of a run compiles them again, in 3 s.
+unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: reproduce test test-fast checks pages kernels site wheel release results verification benchmarks perturbed fuzz lock audit sbom clean
+.PHONY: reproduce test pytest test-fast checks pages kernels site wheel release results verification benchmarks perturbed fuzz lock audit sbom clean
 .DEFAULT_GOAL := test
 
 reproduce: .venv/installed
 	$(bin)/fingerpad reproduce $(ARGS)
 
-# Each of the first three keeps about one core busy. Kernels are compiled before two processes need them at once.
+# What waits for packages or for one long example leaves a core to the others.
 test: .venv/installed-for-tests
-	$(MAKE) --jobs 2 wheel checks site release
+	$(MAKE) --jobs 3 checks pytest wheel site release
+
+# Kernels are compiled before two processes need them at once.
+pytest: checks kernels
 	$(bin)/pytest $(PYTEST_ARGS)
 
 test-fast: .venv/installed-for-tests

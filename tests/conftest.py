@@ -24,18 +24,19 @@ settings.load_profile("fingerpad")
 LONGEST = (
     "test_reproduction.py",
     "test_readme.py",
-    "verification/test_oracles.py",
-    "verification/test_verification.py",
-    "studies/test_tissue_posterior.py",
     "test_surfaces.py",
-    "test_recording_fit.py",
-    "studies/test_tissue_search.py",
-    "test_reduced_touch.py",
     "test_small_bodies.py",
+    "test_recording_fit.py",
+    "verification/test_verification.py",
+    "test_lab.py",
+    "verification/test_oracles.py",
     "test_store.py",
+    "studies/test_tissue_posterior.py",
+    "test_reduced_touch.py",
     "test_report.py",
     "test_view.py",
     "test_pose.py",
+    "studies/test_tissue_search.py",
     "test_own_mesh.py",
     "test_validation.py",
     "test_discrimination_task.py",
@@ -75,6 +76,13 @@ def perturbed() -> None:
         return body(replace(mesh, nodes_mm=nodes_mm), replace(table, law=law), *others, **named)
 
     press.Body = other_body
+
+
+@pytest.fixture(scope="session")
+def shared_folder(tmp_path_factory) -> Path:
+    """Folder that all processes of one run of tests share: a touch stored there is not pressed again."""
+    own = tmp_path_factory.getbasetemp()
+    return (own.parent if "PYTEST_XDIST_WORKER" in os.environ else own) / "shared"
 
 
 @pytest.fixture

@@ -1,7 +1,9 @@
-"""A small block of skin, its tissues, and presses into it: what the tests of the mechanics share."""
+"""A small block of skin, its tissues, presses into it, and a coarse finger: what tests that press share."""
 
 import numpy as np
 
+from fingerpad.experiments.conditions import RECEPTOR_X_MM, Conditions
+from fingerpad.geometry.grading import Grading
 from fingerpad.geometry.mesh import block_mesh
 from fingerpad.mechanics.contact import place
 from fingerpad.mechanics.materials import Material, Prony
@@ -10,6 +12,15 @@ from fingerpad.mechanics.press import press
 PRONY = Prony(shares=(0.2, 0.3), times_ms=(30.0, 400.0))
 ELASTIC = tuple(Material.neo_hooke(shear, 0.45) for shear in (40.0, 40.0, 20.0, 8.0))
 RELAXING = tuple(layer.with_prony(PRONY) for layer in ELASTIC)
+
+
+class Coarse(Conditions):
+    """A mesh of a few hundred elements for every press."""
+
+    def deflection_grading(self, indenter=None):
+        return Grading(RECEPTOR_X_MM, 4.0, 1.5, 1.0, 0.75, stratum_corneum=1, dermis=2, subcutis=2)
+
+    bar_grading = sphere_grading = deflection_grading
 
 
 def block(symmetric=True, layers=(0, 1, 2, 3, 3)):

@@ -16,11 +16,14 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from fingerpad import __version__
+from fingerpad import __version__, cli
 from fingerpad.core.compilation import SHORT_NOTICE, SUBJECT
+from fingerpad.core.errors import InputError
 from fingerpad.core.result_files import read_results, to_json
 from fingerpad.data import all_published
+from fingerpad.experiments import gerling2014
 from fingerpad.experiments.discrimination.task_stimuli import read_task, task_touches
+from fingerpad.experiments.gerling2014 import single_unit_uncertainty
 from fingerpad.experiments.gerling2014.claim_row import Group, Verdict
 from fingerpad.experiments.gerling2014.reproduction import Reproduction, ReproductionResult, reproduce
 from fingerpad.experiments.runner import STORE_FOLDER
@@ -79,12 +82,6 @@ def of_set(first, request):
     return first.results[request.param]
 
 
-def images(run):
-    """Number of images on the page of a run: many figures have one of each set."""
-    page = reproduction_page(read_results(run.folder / "results.json", ReproductionResult))
-    return sum(1 + (drawing.human is not None) for drawing in page.drawings)
-
-
 @pytest.fixture(scope="session")
 def stamps(first):
     """When each indentation was stored."""
@@ -92,24 +89,12 @@ def stamps(first):
 
 
 @pytest.fixture(scope="session")
-def page(first):
-    """The report with its figures as the first run wrote them."""
-    return (first.folder / "report.html").read_text(encoding="utf-8")
-
-
-@pytest.fixture(scope="session")
-def other_seed(first):
-    """The same indentations met by other observers, in this process and without a report."""
-    results = reproduce(Reproduction(first.folder, "quick", seed=7))
+def second(first, stamps):
+    """The same indentations met by other observers, in another process, and what goes beyond the paper."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(single_unit_uncertainty, "THOROUGH", single_unit_uncertainty.QUICK)  # short chains
+        results = reproduce(Reproduction(first.folder, "quick", seed=7, extended=True))
     return json.loads(to_json(results))
-
-
-@pytest.fixture(scope="session")
-def second(first, tmp_path_factory):
-    """The run again over all that it has written, and what goes beyond the paper."""
-    folder = tmp_path_factory.mktemp("second") / "out"
-    shutil.copytree(first.folder, folder)
-    return run(folder, "--extended")
 
 
 # From nothing
@@ -228,10 +213,28 @@ def test_single_unit_is_complete_and_reaches_the_papers_fss(of_set):
 
 def test_what_goes_beyond_the_paper_comes_on_top(second):
     for name in SETS:
-        assert None not in second.results[name].values()
-    assert all(math.isfinite(number) for number in numbers(second.results))
-    page = (second.folder / "report.html").read_text(encoding="utf-8")
-    assert page.count("<img ") == images(second)
+        assert None not in second[name].values()
+        assert second["summary"][name]["weber_287"] > 0.0
+    assert all(math.isfinite(number) for number in numbers(second))
+
+
+@pytest.mark.parametrize(
+    ("words", "goes_beyond"),
+    [((), True), (("--no-extended",), False), (("--resolution", "quick"), False),
+     (("--resolution", "quick", "--extended"), True)],
+)  # fmt: skip
+def test_the_command_goes_beyond_the_paper_where_asked_and_by_default_not_when_quick(
+    run_program, monkeypatch, words, goes_beyond
+):
+    asked = []
+
+    def note(run, _progress):
+        asked.append(run.goes_beyond)
+        raise InputError("That is all.")
+
+    monkeypatch.setattr(gerling2014, "reproduce", note)
+    run_program(cli.main, "fingerpad", "reproduce", *words)
+    assert asked == [goes_beyond]
 
 
 def test_discrimination_is_complete(of_set):
@@ -308,14 +311,16 @@ def test_a_fitted_number_is_told_apart_from_a_prediction(first):
 # The page
 
 
-def test_the_page_shows_every_compared_number_and_figure_and_no_machine_path(first, page):
+def test_the_page_shows_every_compared_number_and_figure_and_no_machine_path(first):
+    page = (first.folder / "report.html").read_text(encoding="utf-8")
     text = re.sub(r"\s+", " ", re.sub(r"<[^>]*>", " ", page))
     for name in SETS:
         for row in first.results[name]["comparison"]:
             assert row["ours"] in text
     assert str(first.folder) not in page
     assert str(Path.home()) + "/" not in page
-    assert page.count("<img ") == images(first)
+    drawings = reproduction_page(read_results(first.folder / "results.json", ReproductionResult)).drawings
+    assert page.count("<img ") == sum(1 + (drawing.human is not None) for drawing in drawings)
     for path in (first.folder / "figures").iterdir():
         content = path.read_bytes()
         assert content.startswith(b"\x89PNG\r\n\x1a\n")
@@ -335,30 +340,22 @@ def unmeasured(results):
     return results | {"manifest": kept(results["manifest"]), "summary": summary}
 
 
-def test_a_second_run_takes_everything_from_the_store_and_gives_the_same_bits(first, second, stamps):
-    assert second.status == 0
-    assert all(PROGRESS.fullmatch(line) for line in told(second)[1:])
-    found = {path.name: path.stat().st_mtime_ns for path in (second.folder / STORE_FOLDER).iterdir()}
+def test_a_second_run_takes_everything_from_the_store_and_another_seed_changes_what_observers_draw(
+    first, second, stamps
+):
+    found = {path.name: path.stat().st_mtime_ns for path in (first.folder / STORE_FOLDER).iterdir()}
     assert {name: found[name] for name in stamps} == stamps
-    assert [stage.get("computed") for stage in second.results["manifest"]["stages"][:2]] == [None, 0]
-    ours, theirs = unmeasured(first.results), unmeasured(second.results)
-    for section in set(ours) - set(SETS):
+    stages = {stage["name"]: stage.get("computed") for stage in second["manifest"]["stages"]}
+    assert {name: n for name, n in stages.items() if n} == dict.fromkeys(
+        (f"{name}: spheres, other curvatures" for name in SETS), 8
+    )
+    ours, theirs = unmeasured(first.results), unmeasured(second)
+    assert theirs["manifest"] == ours["manifest"] | {"seed": 7}
+    for section in set(ours) - {*SETS, "manifest", "summary", "statements"}:
         assert json.dumps(theirs[section]) == json.dumps(ours[section])
     for name in SETS:
-        for section in set(ours[name]) - BEYOND - {"comparison"}:
+        for section in set(ours[name]) - BEYOND - {"comparison", "discrimination"}:
             assert json.dumps(theirs[name][section]) == json.dumps(ours[name][section])
-        rows = ours[name]["comparison"]
-        assert [row for row in theirs[name]["comparison"] if row in rows] == rows
-
-
-def test_another_seed_changes_what_the_observer_draws_and_nothing_else(first, other_seed):
-    ours, theirs = unmeasured(first.results), unmeasured(other_seed)
-    for section in ("skin_deflection", "inputs"):
-        assert theirs[section] == ours[section]
-    for name in SETS:
-        for section in ("skin_force", "single_unit", "population", "nail"):
-            assert theirs[name][section] == ours[name][section]
-    assert theirs["manifest"] == ours["manifest"] | {"seed": 7}
     drawn, drawn_theirs = ours["human"]["discrimination"], theirs["human"]["discrimination"]
     for name in ("curvature_per_m", "goodwin", "gradient_sums", "noise_sigma_paper"):
         assert drawn_theirs[name] == drawn[name]
@@ -366,8 +363,6 @@ def test_another_seed_changes_what_the_observer_draws_and_nothing_else(first, ot
         rates, rates_theirs = drawn["gradient_sum"][measure], drawn_theirs["gradient_sum"][measure]
         assert rates_theirs["hit_rate"] != rates["hit_rate"]
         np.testing.assert_allclose(rates_theirs["hit_rate"], rates["hit_rate"], rtol=0, atol=0.1)
-    computed = [stage.get("computed") for stage in other_seed["manifest"]["stages"]]
-    assert not any(computed)
 
 
 # The paper's question as a question of one's own

@@ -25,7 +25,8 @@ from fingerpad.skin.indentation import touch_of
     ids=["punch of 1 mm", "ball on stiff skin"],
 )
 def test_small_bodies_are_pressed_deep_without_friction(body, tissues, depth_mm, force_mn):
-    skin = touch_of(Fingertip(), body, RampAndHold(depth_mm=depth_mm), tissues).solve()
+    motion, steps = RampAndHold(depth_mm=depth_mm), PressSettings(ramp_steps=5, hold_steps=1)
+    skin = touch_of(Fingertip(), body, motion, tissues, settings=steps).solve()
     peak = int(skin.force_mn.argmax())
     assert skin.force_mn[peak] == pytest.approx(force_mn, rel=0.05)
     assert (np.diff(skin.force_mn[: peak + 1]) > 0.0).all()

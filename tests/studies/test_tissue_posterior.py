@@ -10,15 +10,15 @@ import pytest
 from fingerpad.core.errors import InputError
 from fingerpad.core.result_files import from_json, to_json
 from fingerpad.core.signals import Traces
-from fingerpad.experiments.conditions import RECEPTOR_X_MM, Conditions
+from fingerpad.experiments.conditions import Conditions
 from fingerpad.experiments.gerling2014.single_unit_uncertainty import PIECES
 from fingerpad.experiments.runner import Runner
-from fingerpad.geometry.grading import Grading
 from fingerpad.inference.fitting.posterior import sample
 from fingerpad.inference.rate_model import AfferentModel
 from fingerpad.mechanics.tissues import named_tissues
 from fingerpad.neuron.afferent import Afferent
 from fingerpad.neuron.transduction import drive
+from presses import Coarse
 from studies import finger_posterior, tissue_posterior
 from studies.finger_levels import (
     RAMP_MS,
@@ -369,18 +369,9 @@ def test_experiments_use_pressed_tissues_and_an_emulator_that_has_not_seen_them(
 # One tiny run
 
 
-class Coarse(Conditions):
-    """A mesh of a few hundred elements for every press."""
-
-    def deflection_grading(self, indenter=None):
-        return Grading(RECEPTOR_X_MM, 4.0, 1.5, 1.0, 0.75, stratum_corneum=1, dermis=2, subcutis=2)
-
-    bar_grading = sphere_grading = deflection_grading
-
-
-def test_human_keeps_its_rates_and_force_through_the_reference_modulus(tmp_path):
+def test_human_keeps_its_rates_and_force_through_the_reference_modulus(shared_folder):
     """Its own skin, scaled to the reference modulus and back, and the model of the search for tissues."""
-    runner, conditions, human = Runner(tmp_path), Coarse("quick"), replace(HUMAN, finalist=False)
+    runner, conditions, human = Runner(shared_folder), Coarse("quick"), replace(HUMAN, finalist=False)
     times, outputs, _ = tissue_posterior.pressed(runner, conditions, [human])
     prior, six = Prior.about_human(), Afferent.for_tissues("human").parameters
     resting = six[0] * six[3] / (six[4] * six[5])

@@ -13,8 +13,8 @@ from fingerpad.core.signals import Traces
 from fingerpad.data import protocol
 from fingerpad.experiments.conditions import RECEPTOR_X_MM, Conditions
 from fingerpad.experiments.runner import Runner
-from fingerpad.geometry.grading import Grading
 from fingerpad.inference import rates_and_hit_rates
+from presses import Coarse
 from studies import tissue_search
 from studies.pages import DOCS
 from studies.tissue_candidates import HUMAN, HUMAN_KPA, LEVELS, STRESS, Reading, candidates
@@ -196,15 +196,6 @@ def test_a_level_is_met_or_missed_by_itself(changed, missed):
 # One tiny run
 
 
-class Coarse(Conditions):
-    """A mesh of a few hundred elements for every press."""
-
-    def deflection_grading(self, indenter=None):
-        return Grading(RECEPTOR_X_MM, 4.0, 1.5, 1.0, 0.75, stratum_corneum=1, dermis=2, subcutis=2)
-
-    bar_grading = sphere_grading = deflection_grading
-
-
 def few(patch):
     """Leave two candidates with the same presses, and shorten the fits."""
     human = replace(HUMAN, finalist=False)
@@ -214,11 +205,9 @@ def few(patch):
 
 
 @pytest.fixture(scope="module")
-def tiny(tmp_path_factory):
-    folder = tmp_path_factory.mktemp("tissues")
-
+def tiny(shared_folder):
     def run():
-        return tissue_search.run(Runner(folder), Coarse("quick"))
+        return tissue_search.run(Runner(shared_folder), Coarse("quick"))
 
     with pytest.MonkeyPatch.context() as patch:
         few(patch)

@@ -387,7 +387,7 @@ def sphere_nearly_incompressible() -> list[Row]:
     return sphere_rows(0.48)
 
 
-@case(THEME, "Sphere at the limit of incompressibility", SPHERE_SOURCE)
+@case(THEME, "Sphere at the limit of incompressibility", SPHERE_SOURCE, slow=True)
 def sphere_at_the_limit() -> list[Row]:
     """The same at nu = 0.4999, the largest value that is supported, with the direct factor."""
     return sphere_rows(0.4999)

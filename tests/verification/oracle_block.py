@@ -13,6 +13,7 @@ from functools import lru_cache
 
 import numpy as np
 
+from fingerpad.core.checks import FloatArray
 from fingerpad.export.job import Job
 from fingerpad.geometry.grading import graded_lines
 from fingerpad.geometry.indenters import Sphere
@@ -47,6 +48,16 @@ def job() -> Job:
     placement = place(BALL, mesh.nodes_mm[mesh.skin_nodes], np.zeros(3), np.eye(3))
     times = np.linspace(0.0, MOTION.ramp_ms, STEPS + 1)
     return Job(mesh, materials, BALL, placement, times, MOTION.prescribed_at(times))
+
+
+def coarse_job(times_ms: FloatArray, depths_mm: FloatArray) -> Job:
+    """The same layers and sphere on few elements."""
+    along, across = (graded_lines(1.8, 0.6, length, 1.5, 2.0) for length in (5.0, 4.0))
+    depths = (*DEPTHS_MM[:1], *DEPTHS_MM[2:4], 1.0, DEPTHS_MM[6], 3.0, DEPTHS_MM[-1])
+    both = np.concatenate([-along[:0:-1], along])
+    mesh = block_mesh(both, depths, across, (0, 1, 2, 2, 3, 3), symmetric=True)
+    placement = place(BALL, mesh.nodes_mm[mesh.skin_nodes], np.zeros(3), np.eye(3))
+    return replace(job(), mesh=mesh, placement=placement, times_ms=times_ms, depths_mm=depths_mm)
 
 
 @lru_cache(maxsize=1)

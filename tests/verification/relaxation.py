@@ -164,7 +164,12 @@ def oscillating_element() -> list[Row]:
     return rows
 
 
-@case(THEME, "Block under an oscillating plate", "Storage and loss modulus; exact for an incompressible body")
+@case(
+    THEME,
+    "Block under an oscillating plate",
+    "Storage and loss modulus; exact for an incompressible body",
+    slow=True,
+)
 def oscillating_block() -> list[Row]:
     """A plate is pressed 0.02 mm into a block, held, and vibrates by 0.005 mm for 15 cycles of 20 steps, of
     which some are interpolated: parts of its force in and out of phase, over those of the block without

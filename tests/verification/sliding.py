@@ -135,7 +135,7 @@ def reversal() -> list[Row]:
     ]
 
 
-@case(THEME, "Sphere that slides without friction", "Translation invariance of an even block")
+@case(THEME, "Sphere that slides without friction", "Translation invariance of an even block", slow=True)
 def frictionless_slide() -> list[Row]:
     """R = 2 mm, 0.3 mm deep, on a block of 12 mm in elements of 0.4 mm; the sphere slides by 2.4 mm, six
     elements, from one side of the middle of the block to the other. Above other places of an element the

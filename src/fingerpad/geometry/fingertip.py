@@ -107,7 +107,7 @@ class Profile:
         return spline(inside) + slope(inside) * (s - inside), slope(inside)
 
     def at(self, x_mm: ArrayLike) -> FloatArray:
-        s = np.sqrt(np.maximum(1.0 - np.asarray(x_mm, dtype=np.float64) / self.length_mm, 0.0))
+        s = np.sqrt(np.maximum(1.0 - float_array("x_mm", x_mm, None) / self.length_mm, 0.0))
         return s * self.over_s(s)[0]
 
 
@@ -383,11 +383,11 @@ class Fingertip(Displayed, Finger):
         Here s² = 1 - x / L; g is a / s (volar) or b / s (dorsal) for y and c / s for z, the profiles
         without their factor s.
         """
-        return self._level_and_gradient(np.asarray(points_mm, dtype=np.float64))[0]
+        return self._level_and_gradient(_points(points_mm))[0]
 
     def level_gradient(self, points_mm: ArrayLike) -> FloatArray:
         """Analytic gradient of `level`, (..., 3), pointing out of the finger [1/mm]."""
-        return self._level_and_gradient(np.asarray(points_mm, dtype=np.float64))[1]
+        return self._level_and_gradient(_points(points_mm))[1]
 
     def _level_and_gradient(self, points: FloatArray) -> tuple[FloatArray, FloatArray]:
         x, y, z = points[..., 0], points[..., 1], points[..., 2]
@@ -433,7 +433,7 @@ class Fingertip(Displayed, Finger):
 
     def subsurface(self, skin_points_mm: ArrayLike, depth_mm: NotNegative) -> FloatArray:
         """Points `depth_mm` below points of the skin, along the inward normal, (..., 3) [mm]."""
-        points = np.asarray(skin_points_mm, dtype=np.float64)
+        points = _points(skin_points_mm)
         return points - depth_mm * self.skin_normal(points)
 
     def depth_available_mm(self, x_mm: ArrayLike, z_mm: ArrayLike) -> FloatArray:
@@ -494,12 +494,17 @@ class Fingertip(Displayed, Finger):
 
     def is_under_nail(self, skin_points_mm: ArrayLike) -> np.ndarray:
         """Whether points of the skin lie in the footprint of the nail, bool (...)."""
-        points = float_array("skin_points_mm", skin_points_mm, None)
-        if points.shape[-1:] != (3,):
-            raise InputError("skin_points_mm", "must have x, y and z", f"shape {points.shape}")
-        x, y, z = np.moveaxis(points, -1, 0)
+        x, y, z = np.moveaxis(_points(skin_points_mm), -1, 0)
         proximal, distal = self.nail_x_mm
         return (y > 0.0) & (x >= proximal) & (x <= distal) & (np.abs(z) <= self.nail_half_width_mm)
+
+
+def _points(points_mm: ArrayLike) -> FloatArray:
+    """Points (..., 3). [mm]"""
+    points = float_array("points_mm", points_mm, None)
+    if points.shape[-1:] != (3,):
+        raise InputError("points_mm", "must have x, y and z", f"shape {points.shape}")
+    return points
 
 
 @cache
