@@ -13,7 +13,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from fingerpad.core.checks import FloatArray
+from fingerpad.core.values import FloatArray
 from fingerpad.export.job import Job
 from fingerpad.geometry.grading import graded_lines
 from fingerpad.geometry.indenters import Sphere
