@@ -33,10 +33,10 @@ class Indenter(ABC):
     """A rigid body with a signed gap; derive from it to define a body of your own.
 
     Only `gap` has to be written. Make the class a frozen dataclass, so that its sizes are fields: they are
-    checked, compared and part of the key of a stored press. Fields may be arrays; write
+    compared and part of the key of a stored press. Fields may be arrays; write
     `@dataclass(frozen=True, eq=False)` then, and bodies are compared by their content. Give the class
     `store_key = "wedge 1"`, and another text whenever its code changes: without one, every run computes its
-    presses again. A keyword that the class does not have raises `InputError` with the closest one.
+    presses again.
 
     Whether half a finger is enough is found from `gap`. A class that declares `symmetry_deg` is trusted.
 
