@@ -228,7 +228,10 @@ def _in_one_sentence(
     elsewhere: Mapping[str, str] = MappingProxyType({}),
 ) -> Exception:
     """Say what pydantic refused first as an `InputError`."""
-    if error.title not in (owner, f"{owner}.__init__"):  # of something that was called within
+    if error.title.rpartition("<locals>.")[2] not in (
+        owner,
+        f"{owner}.__init__",
+    ):  # of something that was called within
         return error
     entries, known = error.errors(include_url=False), [*parts]
     first = first_of(entries)
