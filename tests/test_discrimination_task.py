@@ -96,9 +96,6 @@ def decoding(section, code, measure):
     return next(one for one in section.decodings if (one.code, one.measure) == (code, measure))
 
 
-# What a code makes of known skins
-
-
 def test_hit_rates_are_those_of_the_observers_with_the_questions_own_numbers(answered):
     question = asked()
     names = [(one.code, one.measure) for one in answered.decodings]
@@ -168,9 +165,6 @@ def test_observed_points_have_a_binomial_interval_where_trials_are_known():
     assert binom.sf(29, 50, low) == pytest.approx(0.025, rel=1e-9)
     assert binom.cdf(30, 50, high) == pytest.approx(0.025, rel=1e-9)
     assert observed.points[1].interval is None
-
-
-# Curves
 
 
 def weibull(difference, at_75, steepness):
@@ -269,9 +263,6 @@ def test_a_certain_answer_has_no_finite_d_prime_and_no_noise_no_forced_choice():
         assert all(side.fit is None for side in one.curves)
 
 
-# The page
-
-
 def test_curves_show_every_code_people_with_their_intervals_and_thresholds():
     points = [{"at": 220, "hit_rate": 0.6, "trials": 50}, {"at": 300, "hit_rate": 0.9}]
     question = asked(
@@ -291,9 +282,6 @@ def test_curves_show_every_code_people_with_their_intervals_and_thresholds():
     table = {row.cells[0]: row.cells for row in report.task_tables(found)[0].rows}
     threshold = decoding(found, "gradient_sum", "static").curves[0].fit.threshold
     assert table["Gradient Sum, static rate"][3] == f"{threshold.difference:.3g}"
-
-
-# The ideal observer
 
 
 def test_no_code_beats_the_ideal_observer_and_what_it_makes_use_of_is_a_share():
@@ -328,9 +316,6 @@ def test_where_the_ideal_observer_never_fails_there_is_no_efficiency():
     assert np.isnan([found.efficiency, found.efficiency_error]).all()
 
 
-# Silence
-
-
 def test_a_population_that_stays_silent_has_no_hit_rate_and_no_fitted_noise():
     question = asked()
     with pytest.raises(InputError, match=r"is silent: by static or dynamic or latency none of its 16 "):
@@ -353,9 +338,6 @@ def test_silence_under_one_stimulus_is_silence_of_that_measure_alone():
     assert "silent under 200" in report.task_tables(found)[1].note
     assert figures.draw_task_curves(found)
     assert report.task_summary(found)[0].startswith("Gradient Sum of static rates discriminates")
-
-
-# The command
 
 
 @pytest.fixture

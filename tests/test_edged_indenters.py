@@ -162,9 +162,6 @@ def test_impossible_bodies_are_refused_in_one_sentence(make, said):
     assert "\n" not in str(refusal.value)
 
 
-# On the finger
-
-
 def pressed(body):
     """A shallow press into a coarse half finger, its lines 0.25 mm apart where the edges are."""
     grading = Grading(

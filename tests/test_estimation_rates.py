@@ -55,9 +55,6 @@ def four_numbers():
     return problem(model, FOUR)
 
 
-# Rates as a problem
-
-
 def test_residuals_make_the_score_and_the_score_is_the_papers(four_numbers):
     chosen = np.array([3, 8, 10, 11, 15])
     other = FOUR * [1.0, 1.2, 0.8, 1.1]
@@ -112,9 +109,6 @@ def test_static_phase_weighs_three_times_the_dynamic_phase():
     # The best symmetric prediction.
     score = score_of_the_bar((dynamic + dynamic[::-1]) / 2, (static + static[::-1]) / 2)
     assert score == pytest.approx(0.979, abs=5e-4)
-
-
-# The rate in closed form
 
 
 @pytest.mark.parametrize("drive_per_ms", [0.0, 0.0199, 0.0201, 0.03, 0.1, 1.0])
@@ -176,8 +170,6 @@ def test_the_truth_is_recovered_from_simulated_rates(four_numbers, by_formula):
     np.testing.assert_allclose(fit.parameters[1:3], FOUR[1:3], rtol=0.1)
 
 
-# A receptor beside the middle of its field
-
 OFFSETS_MM = (-0.4, -0.2, 0.0, 0.2, 0.4)
 
 
@@ -220,9 +212,6 @@ def test_places_that_were_not_sampled_are_refused():
         ReceptorOffset.of_traces({0.0: traces(), 0.1: Traces([0, 1000], [[0], [1]])}, PAPER_WINDOWS_MS)
     with pytest.raises(InputError, match="offsets_mm must increase strictly"):
         ReceptorOffset.of_traces({0.1: traces(), 0.0: traces()})
-
-
-# The four numbers of a fit
 
 
 def test_slopes_along_the_numbers_of_a_fit_are_the_limits_of_differences(four_numbers):

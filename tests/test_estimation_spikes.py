@@ -59,9 +59,6 @@ def recorded():
     return simulated(seed=0)
 
 
-# The likelihood
-
-
 def slow_log_likelihood(driven, train, end, parameters, escape_ms):
     """A general integrator for potential and integral of the hazard together, from knot to knot."""
     a, b, c, tau, width = parameters
@@ -179,9 +176,6 @@ def test_the_likelihood_has_the_same_bits_on_any_number_of_threads(monkeypatch):
         assert_array_equal(one, three)
 
 
-# Time rescaling
-
-
 def test_rescaled_intervals_are_exponential_under_the_truth_and_not_beside_it():
     assert time_rescaling(recorded(), TRUTH).p_value > 0.01
     for number in (1, 2, 4):
@@ -207,9 +201,6 @@ def test_operational_times_add_up_to_the_integral_of_the_hazard():
     assert_allclose(found[0], first, rtol=1e-10)
     _, gradient, _ = alone.canonical_derivatives(canonical(TRUTH))
     assert_allclose(found[2], gradient[3] + 2 + silent + third, rtol=1e-10)
-
-
-# The fit
 
 
 def test_a_fit_ends_on_top_from_near_and_far():
@@ -243,9 +234,6 @@ def test_intervals_have_their_nominal_coverage_and_estimates_scatter_by_their_er
     scores = np.array([(fit.parameters - TRUTH) / fit.standard_errors for fit in fits])
     assert np.all(np.abs(scores.mean(axis=0)) < 3.5 / math.sqrt(40))
     assert np.all(np.abs(scores.std(axis=0) - 1.0) < 3.5 / math.sqrt(80))
-
-
-# What cannot be fitted
 
 
 def test_one_strength_without_a_ramp_does_not_determine_both_gains():

@@ -65,9 +65,6 @@ def finger_job():
     return Job(mesh, (NEO_HOOKE,) * 4, BALL, placement, TIMES, DEPTHS)
 
 
-# --- a reader of keyword decks ---------------------------------------------
-
-
 def read_cards(deck):
     """Keyword, its parameters, and its data lines as written, for each card."""
     cards = []
@@ -201,8 +198,6 @@ def test_middle_nodes_lie_in_the_middle_and_are_held_with_their_edges(finger_job
     assert seen == {"C3D20R", "C3D15"}
 
 
-# --- every keyword line against the manuals --------------------------------
-
 ABAQUS = {  # Abaqus Keywords Reference Manual 6.14: parameters used of each keyword
     "HEADING": set(), "NODE": {"NSET"}, "ELEMENT": {"TYPE", "ELSET"}, "NSET": {"NSET"},
     "SOLID SECTION": {"ELSET", "MATERIAL"}, "MATERIAL": {"NAME"},
@@ -254,8 +249,6 @@ def test_every_line_is_in_the_manual(write):
         steps = re.findall(r"^\*(STEP|END STEP)", deck, re.M)
         assert steps == ["STEP", "END STEP"] * (len(steps) // 2)
 
-
-# --- laws by the formulas of the manuals -----------------------------------
 
 STRETCHES = [np.array(values) for values in ((1.3, 0.9, 0.8), (0.7, 1.1, 1.25), (1.1, 1.05, 0.95))]
 
@@ -351,9 +344,6 @@ def test_calculix_takes_the_moduli_that_are_asked_for(moduli, asked, factor):
     assert values == pytest.approx([factor * NEO_HOOKE.law.c10, 1.0 / NEO_HOOKE.law.bulk_linear], rel=1e-9)
 
 
-# --- steps and motion ------------------------------------------------------
-
-
 @pytest.mark.parametrize("material", [NEO_HOOKE, NEO_HOOKE.with_prony(PRONY)], ids=["elastic", "relaxing"])
 def test_abaqus_takes_our_steps(material):
     """Increments and ends of the steps add up to our times; the reference node goes where we go."""
@@ -387,9 +377,6 @@ def test_an_elastic_hold_is_left_out_for_calculix():
     assert [line.split(",")[0] for line in motion] == ["INDENTER"] * 3
     assert [float(line.split(",")[3]) for line in motion] == [0.0, 0.2, 0.0]
     assert {given["FREQUENCY"] for given, _ in of(cards, "EL PRINT")} == {"1"}
-
-
-# --- the indenter ----------------------------------------------------------
 
 
 @pytest.mark.parametrize("indenter", INDENTERS, ids=name_of)
@@ -491,8 +478,6 @@ def test_a_full_body_has_no_plane_of_symmetry_and_a_line_holds_the_skin_that_it_
         listed = only(cards, "SURFACE", NAME="SKIN", TYPE="NODE")[1]
         assert {int(line.split(",")[0]) - 1 for line in listed} == gripped
 
-
-# --- FEBio -----------------------------------------------------------------
 
 PRONY_NAMES = {f"{letter}{n}" for letter in "tg" for n in range(1, 7)} | {"g0"}
 FEBIO = {  # ADD_PARAMETER and ADD_PROPERTY of each class in the sources of FEBio 4.10
@@ -692,8 +677,6 @@ def test_febio_relaxes_as_we_do(moduli):
         assert modulus * shape == pytest.approx(share * ours)
 
 
-# --- bodies without an outline ---------------------------------------------
-
 FRAME = [[(-u, -u), (u, -u), (u, u), (-u, u)] for u in (1.8, 0.6)]
 
 
@@ -725,9 +708,6 @@ def test_a_deck_has_the_facets_of_such_a_body(write):
         assert f"*RIGID BODY, ELSET=INDENTER, REF NODE={len(job.mesh.nodes_mm) + 1}" in deck
         assert "ANALYTICAL" not in deck
     assert deck.count("\n") > 2 * len(job.rigid.quads)
-
-
-# --- what cannot be exported -----------------------------------------------
 
 
 @pytest.mark.parametrize("write", [abaqus_deck, calculix_deck, febio_deck])

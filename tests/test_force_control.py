@@ -93,8 +93,6 @@ def test_creep_in_uniaxial_strain_follows_the_closed_form(monkeypatch):
     assert done.depth_mm[-1] > 1.2 * done.depth_mm[20]
 
 
-# Through a touch of the finger
-
 COARSE = Grading(
     17.37, 1.2, 1.2, 0.8, 0.8, largest_mm=6.0, stratum_corneum=1, living_epidermis=1, dermis=1, subcutis=1
 )

@@ -36,9 +36,6 @@ SHEAR_KPA = 11.0
 RELAXING = Material.neo_hooke(SHEAR_KPA, 0.48, PRONY, moduli="instantaneous")
 
 
-# The terms
-
-
 def test_work_of_a_force_is_exact_for_cubics_and_stops_at_kinks():
     times = np.array([0.0, 2.0, 3.0, 5.0, 6.0, 9.0, 20.0])
     depth = np.minimum(times, 5.0) / 5.0
@@ -80,9 +77,6 @@ def test_mean_of_the_relaxed_stress_is_that_of_its_exponentials(step_ms):
 
     for found, unit in ((mean.new, (0, 1, 0)), (mean.old, (1, 0, 0)), (mean.kept, (0, 0, 1))):
         np.testing.assert_allclose(found[0, 0], average(*unit), rtol=1e-8)
-
-
-# One element
 
 
 def sheared(amount):
@@ -171,9 +165,6 @@ def slow_gradients(mesh, displacement, element):
         inverse = np.linalg.inv(mesh.nodes_mm[corners].T @ slopes)
         gradients.append(np.eye(3) + displacement[corners].T @ slopes @ inverse)
     return np.array(gradients)
-
-
-# Whole presses
 
 
 def pressed(indenter, prony, ramp_steps=6, hold_steps=6, depth_mm=0.4):

@@ -31,9 +31,6 @@ def names(body):
     return type(body).__name__
 
 
-# One node
-
-
 def at_rest(nodes):
     """No contact yet with nodes at their places in the frame of an indenter at the origin."""
     return Anchors.none_held(Approach.at_rest(nodes, nodes, tip_mm=np.zeros(3)))
@@ -133,9 +130,6 @@ def test_node_is_anchored_where_it_met_the_indenter():
     np.testing.assert_allclose(anchors.anchor_mm[1], [0.4, -rise[1], 0.0], atol=0.01 * depth)
     np.testing.assert_allclose(anchors.anchor_mm[2], nodes[2] - [0.0, depth, 0.0], atol=1e-15)
     np.testing.assert_allclose(anchors.limit_mn, 0.5 * state.pressed_mn, rtol=1e-14)
-
-
-# Whole presses
 
 
 def pressed(mesh, indenter, coefficient, materials=RELAXING, stimulus=MOTION, settings=STEPS):

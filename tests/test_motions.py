@@ -33,9 +33,6 @@ def table(columns, rows):
     return "\n".join([columns, *(",".join(f"{value:.10g}" for value in row) for row in rows)]) + "\n"
 
 
-# Ready-made
-
-
 def test_a_staircase_holds_each_of_its_levels():
     steps = staircase([0.5, 1.0, 0.2], ramp_ms=50.0, hold_ms=300.0)
     assert steps.times_ms == (0.0, 50.0, 350.0, 400.0, 700.0, 750.0, 1050.0)
@@ -73,9 +70,6 @@ def test_a_chirp_of_one_frequency_is_a_sine():
     swept, plain = chirp(0.8, 0.05, (20.0, 20.0), 500.0), sine(0.8, 0.05, 20.0, cycles=10)
     np.testing.assert_allclose(swept.times_ms, plain.times_ms, rtol=1e-12)
     np.testing.assert_allclose(swept.depth_mm, plain.depth_mm, rtol=1e-12)
-
-
-# From a function
 
 
 @given(st.floats(5.0, 900.0), st.floats(0.001, 0.05))
@@ -137,9 +131,6 @@ def test_motions_that_cannot_be_are_refused(make, said):
         make()
 
 
-# Recordings
-
-
 def recording(noise_mm=0.002, seed=3):
     """Press, slide and release, recorded at 1 kHz with noise."""
     times = np.arange(1201.0)
@@ -189,9 +180,6 @@ def test_a_hold_that_drifts_is_solved_in_growing_steps():
     # Samples of a slow vibration are close to each other and stay single steps.
     slow = sine(0.8, 0.02, 1.0, cycles=1)
     assert len(slow.step_times_ms(5, 5)) == 1 + 5 + 5 + 20
-
-
-# Files
 
 
 def test_a_file_is_read_with_its_units_from_its_first_row(tmp_path):
@@ -273,9 +261,6 @@ def test_a_gap_in_a_recording_is_refused_and_a_few_lost_samples_are_not(tmp_path
     assert read_trajectory(by_hand).end_ms == 2000.0
 
 
-# What cannot be
-
-
 def test_the_fastest_ramp_force_and_vibration_are_allowed():
     """The limit of instantaneous moduli needs the first two, a stimulator the third."""
     assert RampAndHold(1.0, ramp_ms=0.001).ramp_ms == 0.001
@@ -317,9 +302,6 @@ def test_the_skin_falls_away_along_a_path_and_rises_again():
     # Between two samples that are both shallow enough, a bone can still be in the way.
     back = Trajectory((0, 100, 500), (0, 1.0, 1.0), z_mm=(0, 0, 6.0))
     check_path(finger, back, (17.37, -3.0))
-
-
-# Wanted times
 
 
 def test_wanted_times_are_solved_at_exactly_and_others_stay():

@@ -48,9 +48,6 @@ def bumps(centre_mm=17.37, steepness=1.0):
     return 40.0 * np.exp(-(x**2 + z**2) / (2.0 * width**2))
 
 
-# People
-
-
 @pytest.mark.parametrize(("hits", "trials"), [(58, 100), (95, 100), (3, 20)])
 def test_a_binomial_interval_leaves_half_of_the_doubt_on_either_side_or_ends_at_always_or_never(hits, trials):
     """Clopper & Pearson by their definition, summed term by term."""
@@ -79,9 +76,6 @@ def test_what_is_known_of_people_is_a_straight_line_in_z_with_intervals():
         n for n in range(1, 101) if all(abs(n * rate - round(n * rate)) < 1e-9 for rate in goodwin.HIT_RATES)
     ]
     assert fits[0] == goodwin.TRIALS == 100
-
-
-# Sessions
 
 
 @pytest.fixture(scope="module")
@@ -121,9 +115,6 @@ def test_every_observer_of_a_session_is_the_one_who_is_asked_alone(sessions):
 def test_the_mean_of_ten_hit_rates_is_unsteadier_by_the_root_of_ten(sessions):
     few, many = (sessions[1].unsteadiness[count] for count in (10, 100))
     assert_allclose(few / many, math.sqrt(10.0), rtol=0.25)
-
-
-# Statistics
 
 
 def made_up(seed=3, n_sessions=400, spread=0.05):
@@ -182,9 +173,6 @@ def test_statistics_are_those_of_known_hit_rates():
     # Goodwin's own points, the last of which is farther from the line here, do not count.
     assert value(found.targets[1].largest_from_line) == np.abs(away + 0.01).max()
     assert value(found.sweep.misfit[0][1]) == 0.025
-
-
-# Interpretations of the steps
 
 
 @pytest.mark.parametrize("sigma", [0.03, 0.058, 0.12])

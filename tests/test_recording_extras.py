@@ -54,9 +54,6 @@ def fitted():
     return fit_recordings(BESIDE[0.0], ASIDE, FOLDS, beside=BESIDE, with_sensitivity=True)
 
 
-# The place of the receptor
-
-
 def test_between_two_places_the_drive_is_linear_and_at_a_place_it_is_that_of_the_place():
     for offset in PLACES_MM:
         there = AfferentModel.of_traces(felt(offset)).evaluate(KNOWN)
@@ -114,9 +111,6 @@ def test_an_offset_needs_its_method_several_places_and_sites_on_both_sides():
     check_offset("cma_es", [1.5, 1.4])
 
 
-# Profiles
-
-
 def test_profiles_hold_the_known_afferent_and_rise_to_both_sides():
     noise = np.random.default_rng(2).normal(0.0, 1.0, (2, 9))
     noisy = RateRecordings(NAMES, *np.maximum(MODEL.evaluate(KNOWN) + noise, 0.0))
@@ -133,9 +127,6 @@ def test_profiles_hold_the_known_afferent_and_rise_to_both_sides():
     _, dynamic, static, _ = found
     assert dynamic.high < 1.3 * identifiable(KNOWN)[1]
     assert static.high - static.low < 0.5 * identifiable(KNOWN)[2]
-
-
-# Sensitivity
 
 
 def test_scores_of_rows_are_those_of_the_problem_for_one_phase_as_well():
@@ -157,9 +148,6 @@ def test_ranges_are_shares_of_the_fit_and_a_gain_of_nothing_has_one_too(fitted):
     assert (nothing.upper > nothing.lower).all()
     # Without a dynamic gain to speak of, rates hang on the static one.
     assert nothing.total[2] == max(nothing.total)
-
-
-# The page
 
 
 @pytest.fixture(scope="module")

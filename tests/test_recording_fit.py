@@ -76,9 +76,6 @@ def recovered():
     return study.fit_recordings(SED, RATES, np.arange(N) % 2)
 
 
-# Recovery
-
-
 def test_rates_of_a_known_afferent_are_recovered_in_and_out_of_sample(recovered):
     assert recovered.fss_in_sample > 0.9999
     assert recovered.fss_out_of_sample > 0.998
@@ -179,9 +176,6 @@ def test_regular_trains_advise_what_the_fit_has():
         study.fit_recordings(SED, regular, np.arange(N) % 2, method="likelihood")
 
 
-# What a fit says
-
-
 def test_every_stimulus_is_predicted_without_its_fold(recovered):
     assert recovered.stimulus == NAMES
     assert recovered.fold.tolist() == [1, 2] * (N // 2)
@@ -244,9 +238,6 @@ def test_another_quantity_for_the_dynamic_term_reaches_the_afferent():
         AfferentModel.of_traces([SED, replace(SED, dynamic=replace(SED, quantity="work"))])
 
 
-# What it refuses
-
-
 @pytest.mark.parametrize(
     ("call", "said"),
     [
@@ -286,9 +277,6 @@ def touches(*stimuli):
     return ListedStimuli({}).touches(stimuli, Conditions("quick"))
 
 
-# What is pressed
-
-
 def test_the_stimuli_of_the_bar_are_the_touches_of_the_reproduction(tmp_path):
     path = tmp_path / session.EXAMPLE
     path.write_bytes(session.example_recordings()[session.EXAMPLE])
@@ -318,9 +306,6 @@ def test_stimuli_are_indented_at_their_position_with_their_motion():
     assert (gap.indenter.gap_mm, gap.grading.full, gap.spin_deg, gap.friction) == (0.5, False, 0.0, 0.3)
     assert min(gap.grading.size_x_mm, gap.grading.core_size_mm or 1.0) <= 0.5 / 4
     assert (turned.spin_deg, turned.grading.full) == (30.0, True)
-
-
-# The command
 
 
 class Pressed:
@@ -553,9 +538,6 @@ def command():
     return typer.main.get_command(cli.app).commands["fit"]
 
 
-# The figures
-
-
 def test_figures_show_what_was_recorded_and_nothing_else(recovered):
     both = report.draw_fit(recovered)
     assert [axes.get_title().split(",")[0] for axes in both.axes] == ["dynamic ramp", "static hold"]
@@ -571,9 +553,6 @@ def test_figures_show_what_was_recorded_and_nothing_else(recovered):
     np.testing.assert_allclose(points.get_ydata(), missed, rtol=0, atol=1e-9)
     assert "need five folds or more" in report.fit_summary(recovered)[1]
     assert [row.cells[2] for row in report.fit_tables(recovered)[1].rows] == ["–"] * 4
-
-
-# From nothing
 
 
 def test_a_fit_from_nothing_recovers_a_known_afferent(call, monkeypatch, tmp_path):

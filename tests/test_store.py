@@ -93,9 +93,6 @@ def stored(tmp_path, skin):
     return store
 
 
-# Keys
-
-
 def leaves(value, path=()):
     """Every number, word and flag that makes a nested frozen value another one, with the way to it."""
     if is_dataclass(value):
@@ -238,9 +235,6 @@ def test_any_change_of_the_mechanical_sources_presses_again(monkeypatch, tmp_pat
     before = code_hash.code_hash.__wrapped__()
     (tmp_path / "mechanics" / "law.py").write_text("POWER = 1.1")
     assert code_hash.code_hash.__wrapped__() != before
-
-
-# What is stored
 
 
 def test_what_comes_back_is_what_went_in_rounded_to_single_precision(stored, skin):
@@ -555,9 +549,6 @@ def test_the_rest_of_a_killed_write_does_not_count(stored):
     assert not stored.holds(TINY)
     solve_missing(stored.missing([TINY]), jobs=1)
     assert path.read_bytes() == unfinished.read_bytes()
-
-
-# What is computed
 
 
 @pytest.fixture(scope="module")

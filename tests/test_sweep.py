@@ -61,9 +61,6 @@ def files(folder):
     }
 
 
-# What varies
-
-
 def points(**sweep):
     found = sweep_of({"touch": {"object": "sphere"}, **sweep})
     return [found.values(setting) for setting in range(found.size)]
@@ -171,9 +168,6 @@ def test_a_file_is_refused_with_its_line_and_a_large_sweep_needs_consent(tmp_pat
         fp.run_sweep(many, tmp_path / "study.zarr")
 
 
-# What is written
-
-
 def test_the_data_set_has_the_fields_that_vary_as_dimensions(folder):
     data = open_sweep(folder / "study.zarr")
     assert data.force_mn.dims == ("motion_depth_mm", "time")
@@ -244,9 +238,6 @@ def test_stiffer_tissues_take_more_force(folder):
     assert forces[1] == pytest.approx(2.0 * forces[0], rel=1e-3)
 
 
-# For other programs
-
-
 @pytest.mark.parametrize("ending", ["csv", "parquet"])
 def test_a_table_of_rates_is_read_back_bit_by_bit(folder, tmp_path, ending):
     data = open_sweep(folder / "study.zarr")
@@ -309,9 +300,6 @@ def test_spikes_of_a_sweep_are_a_session_of_nwb(folder, tmp_path):
         fp.setting_response(data, motion_depth_mm=2, afferents_columns=1)
     with pytest.raises(InputError, match=r"must be within 0 \.\.\. 2: got 3"):
         fp.setting_touch(data, motion_depth_mm=3, afferents_columns=1)
-
-
-# What goes wrong
 
 
 def test_a_second_run_does_nothing_and_failures_are_tried_again_on_request(run):
@@ -389,9 +377,6 @@ def test_what_is_no_sweep_is_refused(tmp_path, there):
             fp.run_sweep(STUDY, path)
 
 
-# Progress
-
-
 def test_a_notebook_shows_one_bar_that_changes(run, monkeypatch):
     shown = []
     line = SimpleNamespace(update=lambda content, raw: shown.append(content))
@@ -405,9 +390,6 @@ def test_a_notebook_shows_one_bar_that_changes(run, monkeypatch):
     monkeypatch.setitem(sys.modules, "IPython.display", None)
     with pytest.raises(InputError, match="needs IPython, as in a notebook"):
         fp.notebook_progress()
-
-
-# The command
 
 
 def test_the_command_estimates_runs_and_tells_how_many_failed(run_program, folder, tmp_path):
@@ -436,9 +418,6 @@ def test_a_scheduler_that_cannot_be_reached_is_refused(run_program, is_refused, 
     (tmp_path.parent / "study.yaml").write_text(json.dumps(STUDY))
     outcome = run_program(main, "fingerpad", "sweep", "../study.yaml", "--scheduler", "tcp://127.0.0.1:1")
     is_refused(outcome, "fingerpad", "--scheduler", "tcp://127.0.0.1:1")
-
-
-# Observers
 
 
 STIMULI = {

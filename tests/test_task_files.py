@@ -76,9 +76,6 @@ def asked(content):
     return PreparedTask(question, task_stimuli(question), task_population(question))
 
 
-# What a file means
-
-
 def test_what_varies_makes_one_stimulus_per_value_and_the_standard_comes_first():
     stimuli = task_stimuli(parse_task(changed(SPHERES, standard=296)))
     assert [stimulus.name for stimulus in stimuli] == ["296", "287", "365"]
@@ -232,9 +229,6 @@ def test_a_folder_named_like_an_example_task_is_not_taken_for_a_file(tmp_path, m
     before = input_hashes("sphere_curvature", read_task("sphere_curvature"), ())
     monkeypatch.chdir(tmp_path)
     assert input_hashes("sphere_curvature", read_task("sphere_curvature"), ()) == before
-
-
-# How it is refused
 
 
 def refused(content):
@@ -428,9 +422,6 @@ def test_a_task_on_a_child_presses_and_samples_the_child_s_pad():
     assert next(iter(touches.values())).grading.size_x_mm < 0.45
     middle = task_population(task).positions_mm.mean(axis=0)
     assert middle == pytest.approx(child.contact_mm, abs=1e-9)
-
-
-# Random changes
 
 
 LETTERS = {

@@ -62,9 +62,6 @@ def call(run_program):
     return partial(run_program, cli.main, "fingerpad")
 
 
-# What a description means
-
-
 def test_a_description_is_the_touch_that_python_makes_and_its_defaults_are_the_papers():
     assert described_touch(FULL).touch == touch_of(
         fp.Fingertip(stratum_corneum_mm=0.5), fp.Sphere(radius_mm=4.0), fp.RampAndHold(0.5), "human", "quick",
@@ -211,8 +208,6 @@ def test_the_schema_accepts_what_is_accepted_and_explains_every_key():
     assert silent == []
 
 
-# What is refused
-
 BALL = "object: {kind: sphere, radius_mm: 4}\n"
 WRONG = [
     ("# nothing\n",
@@ -353,9 +348,6 @@ def test_any_change_of_a_description_is_possible_or_refused_in_one_sentence(plac
     assert said.startswith("touch, ")
     assert "\n" not in said
     assert said[-1] in ".?"
-
-
-# Commands
 
 
 def test_the_example_runs_as_it_is_and_is_never_overwritten(call):

@@ -50,9 +50,6 @@ def written(folder, content, name="mine.csv"):
     return path
 
 
-# Indenters as text
-
-
 def test_an_indenter_is_its_name_and_its_sizes():
     for text, body in (
         ("plate", Plate()),
@@ -73,9 +70,6 @@ def test_an_indenter_is_its_name_and_its_sizes():
     ):
         with pytest.raises(InputError, match=re.escape(said)):
             indenter_named(text)
-
-
-# Reading
 
 
 def test_columns_stand_in_any_order_and_lines_keep_their_numbers(tmp_path):
@@ -163,9 +157,6 @@ def test_any_text_is_read_or_refused_in_a_sentence(tmp_path_factory, header, row
         assert np.isfinite(found.observed).all()
 
 
-# Scores
-
-
 def test_scores_have_their_definitions():
     observed, predicted = np.array([1.0, 2.0, 4.0]), np.array([1.0, 1.0, 3.0])
     # mean 7/3, scatter 42/9; residuals 0, 1, 1; sum o p = 15, sum p p = 11
@@ -199,9 +190,6 @@ def test_ranges_are_those_of_equal_conditions(rows):
         assert (ranges.low[row], ranges.high[row]) == (min(same), max(same))
         assert inside[row] == (True if len(same) > 1 else None)
     assert [conditions[row] for row in ranges.first] == list(dict.fromkeys(conditions))
-
-
-# Predictions
 
 
 @pytest.fixture(scope="module")
@@ -346,9 +334,6 @@ def test_what_cannot_be_pressed_has_a_reason_and_the_rest_is_scored(folder, monk
     draw_validation(nothing)
 
 
-# Published observations
-
-
 @pytest.mark.parametrize("path", PUBLISHED, ids=lambda path: path.stem)
 def test_published_files_name_source_and_status(path):
     text = path.read_text(encoding="utf-8")
@@ -368,9 +353,6 @@ def test_the_published_deflection_scores_as_in_the_reproduction(folder):
     profile = Store(folder / STORE_FOLDER).load(touch).surface_profile()
     assert scored.r2 == pytest.approx(deflection_r2(profile), abs=1e-12)
     assert scored.r2_mirrored == pytest.approx(deflection_r2(profile, proximal_positive=False), abs=1e-12)
-
-
-# The command
 
 
 @pytest.fixture
