@@ -6,13 +6,12 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
-from fingerpad.core.errors import InputError
-from fingerpad.core.signals import STORED_ENERGY, Traces
+from fingerpad import Afferent, InputError, Traces, named_tissues
+from fingerpad.core.signals import STORED_ENERGY
 from fingerpad.core.threads import BLOCK
 from fingerpad.data import neuron
 from fingerpad.data.tissues import DEFAULT_TISSUES
-from fingerpad.mechanics.tissues import named_tissues
-from fingerpad.neuron.afferent import PARAMETER_NAMES, Afferent
+from fingerpad.neuron.afferent import PARAMETER_NAMES
 from fingerpad.neuron.spikes import firing_rate_hz
 from fingerpad.neuron.transduction import drive
 from sections import SED_DRIVEN, sed_driven

@@ -11,9 +11,8 @@ from scipy.optimize import brentq
 from scipy.special import ndtr
 from scipy.stats import norm
 
-from fingerpad.core.errors import ConvergenceError, InputError
+from fingerpad import ConvergenceError, InputError, Population
 from fingerpad.core.random_streams import Purpose, normals, uniforms
-from fingerpad.neuron.population import Population
 from fingerpad.psychophysics.discrimination import (
     END_OF_STIMULUS_MS,
     Experiment,

@@ -12,10 +12,8 @@ import pytest
 from scipy.special import ndtr, ndtri
 from scipy.stats import binom
 
-from fingerpad import cli
-from fingerpad.core.errors import InputError
+from fingerpad import InputError, Traces, cli, parse_task
 from fingerpad.core.results import to_json
-from fingerpad.core.signals import Traces
 from fingerpad.experiments import runner
 from fingerpad.experiments.conditions import RECEPTOR_X_MM
 from fingerpad.experiments.discrimination import run as task_run
@@ -24,7 +22,6 @@ from fingerpad.experiments.discrimination.decoding import SESSION, side_curves
 from fingerpad.experiments.discrimination.task import CurveSettings
 from fingerpad.experiments.discrimination.task_stimuli import (
     example_tasks,
-    parse_task,
     task_population,
     task_stimuli,
     task_touches,

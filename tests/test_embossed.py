@@ -6,13 +6,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from fingerpad.core.errors import InputError
-from fingerpad.geometry.embossed import MOST_CORNERS, Embossed, embossed_text, joined_outlines
-from fingerpad.geometry.fingertip import Fingertip
-from fingerpad.geometry.grading import Grading
-from fingerpad.geometry.indenters import Bar, FlatPunch
+from fingerpad import Bar, Embossed, Fingertip, FlatPunch, Grading, InputError, embossed_text, touch_of
+from fingerpad.geometry.embossed import MOST_CORNERS, joined_outlines
 from fingerpad.geometry.probing import check_gap
-from fingerpad.skin.indentation import touch_of
 from fingerpad.skin.store import touch_key
 
 COARSE = Grading(17.37, 3.0, 3.0, 0.8, 0.8, 6.0, 1.3, 1, 1, 1, 1, full=True)

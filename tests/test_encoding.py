@@ -5,10 +5,8 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy.spatial import cKDTree
 
-from fingerpad.core.errors import InputError
-from fingerpad.core.patterns import hexagonal, jittered, poisson_disc, rectangular, uniform
-from fingerpad.core.regions import Ellipse
-from fingerpad.neuron.population import Population
+from fingerpad import Ellipse, InputError, Population, hexagonal, poisson_disc
+from fingerpad.core.patterns import jittered, rectangular, uniform
 from fingerpad.psychophysics.encoding import (
     delaunay_pairs,
     distance,

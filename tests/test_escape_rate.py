@@ -9,10 +9,9 @@ from numpy.testing import assert_allclose, assert_array_equal
 from scipy.integrate import quad, solve_ivp
 from scipy.stats import kstest
 
+from fingerpad import InputError, Traces
 from fingerpad.core import threads
-from fingerpad.core.errors import InputError
 from fingerpad.core.random_streams import Presentations, Purpose, uniforms
-from fingerpad.core.signals import Traces
 from fingerpad.neuron.escape_rate import EscapeRate, _integral, panels
 from fingerpad.neuron.exact_spikes import potential_at
 from fingerpad.neuron.lif import LeakyIntegrateAndFire

@@ -9,8 +9,7 @@ import numpy as np
 import pytest
 from scipy.stats import binom, chi2, multivariate_t, norm
 
-from fingerpad.core.errors import ConvergenceError, InputError
-from fingerpad.core.signals import Traces
+from fingerpad import ConvergenceError, InputError, RateRecordings, Traces
 from fingerpad.inference.afferent_posterior import (
     AfferentPrior,
     afferent_posterior,
@@ -21,7 +20,6 @@ from fingerpad.inference.afferent_posterior import (
 from fingerpad.inference.fitting.posterior import credible_band
 from fingerpad.inference.rate_likelihood import LENGTHS_MM, RateLikelihood
 from fingerpad.inference.rate_model import AfferentModel, four_number_model
-from fingerpad.inference.recordings import RateRecordings
 from fingerpad.neuron.transduction import drive
 
 SHIFTS = np.linspace(0.0, 2.7, 10)

@@ -5,10 +5,9 @@ import pytest
 from scipy.integrate import quad
 from scipy.special import gammaln, logsumexp
 
-from fingerpad.core.errors import InputError
+from fingerpad import InputError, RateRecordings
 from fingerpad.inference.rate_likelihood import RateLikelihood
 from fingerpad.inference.rate_model import evaluate_rows
-from fingerpad.inference.recordings import RateRecordings
 
 PLACES = np.array([-1.0, -0.4, 0.0, 0.6, 1.5])
 STIMULI = ("a", "b", "c", "d", "e")

@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from fingerpad.core.errors import InputError
-from fingerpad.core.signals import Traces
+from fingerpad import InputError, Traces
 from fingerpad.inference.afferent_methods import ReceptorOffset
 from fingerpad.inference.closed_form import ClosedFormModel
 from fingerpad.inference.identifiable import identifiable

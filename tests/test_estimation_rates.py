@@ -5,8 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from fingerpad.core.errors import InputError
-from fingerpad.core.signals import Traces
+from fingerpad import InputError, RateRecordings, Traces
 from fingerpad.experiments.gerling2014.single_unit import bar_recordings
 from fingerpad.inference.afferent_methods import (
     ReceptorOffset,
@@ -23,7 +22,6 @@ from fingerpad.inference.fitting.methods import Bounds
 from fingerpad.inference.identifiable import IDENTIFIABLE_NAMES, identifiable, six_parameters
 from fingerpad.inference.rate_model import AfferentModel, Reparametrised, four_number_model
 from fingerpad.inference.rate_problem import RateProblem
-from fingerpad.inference.recordings import RateRecordings
 from fingerpad.neuron.lif import LeakyIntegrateAndFire
 from fingerpad.neuron.spikes import PAPER_WINDOWS_MS, firing_rate_hz
 from fingerpad.neuron.transduction import drive

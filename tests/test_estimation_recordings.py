@@ -3,9 +3,8 @@
 import numpy as np
 import pytest
 
-from fingerpad.core.errors import InputError
-from fingerpad.core.signals import SpikeTrains
-from fingerpad.inference.recordings import RateRecordings, SpikeRecordings
+from fingerpad import InputError, RateRecordings, SpikeTrains
+from fingerpad.inference.recordings import SpikeRecordings
 from fingerpad.neuron.spikes import PAPER_WINDOWS_MS
 
 

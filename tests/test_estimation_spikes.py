@@ -11,10 +11,9 @@ from scipy.integrate import quad, solve_ivp
 from scipy.special import ndtri
 from scipy.stats import binom
 
+from fingerpad import ConvergenceError, InputError, SpikeTrains, Traces
 from fingerpad.core import threads
-from fingerpad.core.errors import ConvergenceError, InputError
 from fingerpad.core.random_streams import Presentations
-from fingerpad.core.signals import SpikeTrains, Traces
 from fingerpad.inference.identifiable import (
     SPIKE_PARAMETER_NAMES,
     canonical,

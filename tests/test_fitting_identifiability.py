@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from fingerpad.core.errors import InputError
-from fingerpad.core.signals import Traces
+from fingerpad import InputError, Traces
 from fingerpad.inference.fitting.sensitivity import identifiability, jacobian
 from fingerpad.inference.identifiable import IDENTIFIABLE_NAMES, identifiable, six_parameters
 from fingerpad.inference.rate_model import AfferentModel

@@ -4,9 +4,7 @@ import numpy as np
 import pytest
 from scipy.optimize import minimize_scalar
 
-from fingerpad.core.errors import InputError
-from fingerpad.geometry.edged_indenters import Edge, Grating
-from fingerpad.geometry.indenters import Bar, Cylinder, FlatPunch, Line, Plate, Sphere
+from fingerpad import Bar, Cylinder, Edge, FlatPunch, Grating, InputError, Line, Plate, Sphere
 
 RADIUS = 1.5
 CYLINDER, SPHERE = Cylinder(diameter_mm=2 * RADIUS), Sphere(curvature_per_m=1000.0 / RADIUS)

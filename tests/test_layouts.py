@@ -10,11 +10,9 @@ from numpy.testing import assert_allclose, assert_array_equal
 from scipy.spatial import cKDTree
 from scipy.stats import chisquare, kstest
 
-from fingerpad.core.errors import InputError
+from fingerpad import Ellipse, InputError, Polygon, Population, Rectangle, hexagonal, poisson_disc
 from fingerpad.core.layouts import PATTERNS, Layout
-from fingerpad.core.patterns import MOST_RECEPTORS, hexagonal, jittered, poisson_disc, rectangular, uniform
-from fingerpad.core.regions import Ellipse, Polygon, Rectangle
-from fingerpad.neuron.population import Population
+from fingerpad.core.patterns import MOST_RECEPTORS, jittered, rectangular, uniform
 
 PAD = Ellipse(6.0, 5.0, (17.0, 0.5))
 MAKERS = {

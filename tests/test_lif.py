@@ -11,9 +11,8 @@ from numpy.testing import assert_allclose, assert_array_equal
 from scipy.optimize import brentq
 
 from benchmarks.runge_kutta import runge_kutta_spikes
+from fingerpad import InputError, Traces
 from fingerpad.core import threads
-from fingerpad.core.errors import InputError
-from fingerpad.core.signals import Traces
 from fingerpad.core.threads import BLOCK
 from fingerpad.neuron.exact_spikes import _next_guess
 from fingerpad.neuron.lif import LeakyIntegrateAndFire

@@ -6,11 +6,10 @@ import warnings
 import numpy as np
 import pytest
 
-from fingerpad.core.errors import InputError, MaterialWarning
+from fingerpad import Energy, Hencky, Hyperfoam, InputError, Material, MaterialWarning, Ogden, Polynomial
 from fingerpad.data import tissues
 from fingerpad.mechanics.energy import SECOND, translate
-from fingerpad.mechanics.laws import Energy, Hencky, Hyperfoam, Ogden, Polynomial
-from fingerpad.mechanics.materials import Material, MaterialTable, instability
+from fingerpad.mechanics.materials import MaterialTable, instability
 
 LOGS = np.array([0.21, -0.34, 0.13, 0.17])
 STEP = 1e-20

@@ -3,15 +3,12 @@
 import numpy as np
 import pytest
 
-from fingerpad.core.errors import ConvergenceError
-from fingerpad.geometry.indenters import Sphere
+from fingerpad import ConvergenceError, Material, PressSettings, RampAndHold, Sphere
 from fingerpad.geometry.mesh import block_mesh
-from fingerpad.geometry.motion import RampAndHold
 from fingerpad.mechanics.assembly import Sparsity
 from fingerpad.mechanics.contact import Contact, Middles, Placement, place
-from fingerpad.mechanics.materials import Material
 from fingerpad.mechanics.press import press
-from fingerpad.mechanics.press_settings import PressSettings, sag_mm
+from fingerpad.mechanics.press_settings import sag_mm
 
 SPACING_MM = 0.5
 BALL = Sphere(curvature_per_m=1000.0 / 0.4)

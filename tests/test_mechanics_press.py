@@ -6,17 +6,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from fingerpad.core.errors import ConvergenceError, InputError
-from fingerpad.geometry.indenters import FlatPunch, Line, Plate, Sphere
+from fingerpad import ConvergenceError, FlatPunch, InputError, Line, Plate, PressSettings, RampAndHold, Sphere
 from fingerpad.geometry.mesh import block_mesh
-from fingerpad.geometry.motion import RampAndHold
 from fingerpad.mechanics.assembly import Sparsity
 from fingerpad.mechanics.configuration import Body, Load
 from fingerpad.mechanics.contact import Contact, place
 from fingerpad.mechanics.linear import KeptFactor, LinearSolver, free_degrees_of_freedom
 from fingerpad.mechanics.materials import MaterialTable
 from fingerpad.mechanics.newton import NewtonSettings, find_equilibrium
-from fingerpad.mechanics.press_settings import PressSettings
 from fingerpad.mechanics.viscoelastic import StepCoefficients
 from presses import ELASTIC, RELAXING, block, press_into
 

@@ -5,9 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from fingerpad.core.errors import InputError
-from fingerpad.geometry.fingertip import Fingertip
-from fingerpad.geometry.grading import Grading, graded_lines, lines_along, lines_of_sizes, resolution_grading
+from fingerpad import Fingertip, Grading, InputError
+from fingerpad.geometry.grading import graded_lines, lines_along, lines_of_sizes, resolution_grading
 from fingerpad.geometry.mesh import LAYERS, Mesh, block_mesh, finger_mesh
 from fingerpad.geometry.mesh_checks import jacobian_at_gauss, scaled_jacobian
 

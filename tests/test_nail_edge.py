@@ -7,13 +7,10 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy.spatial import cKDTree
 
-from fingerpad.core.errors import InputError
+from fingerpad import Fingertip, InputError, NailEdge, Population
 from fingerpad.core.patterns import uniform
-from fingerpad.geometry.fingertip import Fingertip
 from fingerpad.geometry.grading import resolution_grading
 from fingerpad.geometry.mesh import finger_mesh
-from fingerpad.neuron.population import Population
-from fingerpad.skin.nail_edge import NailEdge
 from fingerpad.skin.receptor_sheet import ReceptorSheet
 
 NAIL = NailEdge()

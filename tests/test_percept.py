@@ -7,7 +7,7 @@ import pytest
 from numpy.testing import assert_allclose
 from scipy.special import ndtri
 
-from fingerpad.core.errors import InputError
+from fingerpad import InputError, Population
 from fingerpad.core.random_streams import Purpose, normals
 from fingerpad.experiments.gerling2014 import discrimination_statistics as goodwin
 from fingerpad.experiments.gerling2014.discrepancy import (
@@ -25,7 +25,6 @@ from fingerpad.experiments.gerling2014.discrimination_statistics import (
     extreme,
     observe,
 )
-from fingerpad.neuron.population import Population
 from fingerpad.psychophysics.discrimination import (
     Experiment,
     discriminate_euclidean,

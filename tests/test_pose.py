@@ -3,16 +3,11 @@
 import numpy as np
 import pytest
 
-from fingerpad.core.errors import InputError
-from fingerpad.geometry.fingertip import Fingertip
-from fingerpad.geometry.indenters import Bar, Cylinder, Line, Sphere
+from fingerpad import Bar, Cylinder, Fingertip, InputError, Line, PressSettings, Sphere, Trajectory, touch_of
 from fingerpad.geometry.mesh import block_mesh
 from fingerpad.geometry.motion import Pose
-from fingerpad.geometry.trajectory import Trajectory
 from fingerpad.mechanics.contact import Placement, place, rotation_of
 from fingerpad.mechanics.press import press
-from fingerpad.mechanics.press_settings import PressSettings
-from fingerpad.skin.indentation import touch_of
 from presses import ELASTIC, RELAXING
 
 STEPS = PressSettings(4, 2)

@@ -9,15 +9,8 @@ from hypothesis import strategies as st
 from scipy import stats
 from scipy.optimize import differential_evolution
 
-from fingerpad.core.errors import ConvergenceError, InputError
-from fingerpad.psychophysics import (
-    FunctionCloud,
-    PsychometricFunction,
-    bootstrap,
-    fit_psychometric,
-    goodness_of_fit,
-    posterior,
-)
+from fingerpad import ConvergenceError, InputError, fit_psychometric
+from fingerpad.psychophysics import FunctionCloud, PsychometricFunction, bootstrap, goodness_of_fit, posterior
 from fingerpad.psychophysics.functions import SIGMOIDS, log_probability
 from fingerpad.psychophysics.uncertainty import STEEPEST, weighted_quantiles
 

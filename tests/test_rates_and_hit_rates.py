@@ -3,14 +3,12 @@
 import numpy as np
 import pytest
 
-from fingerpad.core.errors import InputError
-from fingerpad.core.signals import Traces
+from fingerpad import InputError, RateRecordings, Traces
 from fingerpad.inference.fitting.cross_validation import cross_validate
 from fingerpad.inference.identifiable import LARGEST_RESTING_SHARE, identifiable
 from fingerpad.inference.rate_model import AfferentModel, four_number_model
 from fingerpad.inference.rate_problem import RateProblem
 from fingerpad.inference.rates_and_hit_rates import RatesAndHitRates, SphereHitRates, ToRatesAndHitRates
-from fingerpad.inference.recordings import RateRecordings
 from fingerpad.psychophysics.encoding import neighbour_pairs
 from fingerpad.psychophysics.noise_fit import expected_euclidean_hit_rates, expected_hit_rates
 

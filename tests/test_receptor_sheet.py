@@ -7,9 +7,8 @@ import pytest
 from numpy.testing import assert_allclose
 from scipy.ndimage import spline_filter1d
 
-from fingerpad.core.errors import InputError
-from fingerpad.geometry.fingertip import Fingertip
-from fingerpad.geometry.grading import Grading, resolution_grading
+from fingerpad import Fingertip, Grading, InputError
+from fingerpad.geometry.grading import resolution_grading
 from fingerpad.geometry.mesh import block_mesh, finger_mesh
 from fingerpad.skin.receptor_sheet import ReceptorSheet, coefficients
 

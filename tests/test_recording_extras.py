@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
-from fingerpad.core.errors import InputError
-from fingerpad.core.signals import Traces
+from fingerpad import InputError, RateRecordings, Traces
 from fingerpad.experiments.fit import rate_uncertainty
 from fingerpad.experiments.fit.fit import fit_recordings
 from fingerpad.experiments.fit.methods import check_offset, fit_offset
@@ -17,7 +16,6 @@ from fingerpad.inference.afferent_methods import ReceptorOffset
 from fingerpad.inference.identifiable import IDENTIFIABLE_NAMES, identifiable
 from fingerpad.inference.rate_model import AfferentModel, four_number_model
 from fingerpad.inference.rate_problem import RateProblem
-from fingerpad.inference.recordings import RateRecordings
 from fingerpad.report import recording_fit as report
 from fingerpad.report.single_unit import ALLOWED_LOSS
 from fingerpad.report.style import png

@@ -10,7 +10,6 @@ from scipy.integrate import solve_ivp
 
 import fingerpad as fp
 from fingerpad.cli import main
-from fingerpad.core.signals import Traces
 from fingerpad.geometry.motion import Pose
 from fingerpad.neuron.mixed_population import types_of_afferents
 from fingerpad.reduction.building import joint_bounds, largest_errors
@@ -26,19 +25,19 @@ from fingerpad.reduction.relaxation import (
     slope_changes,
 )
 from fingerpad.reduction.streaming import read_local
-from fingerpad.reduction.training import ReducedRange, ReducedTraining, first_touch_mm
+from fingerpad.reduction.training import first_touch_mm
 
 DEEPEST_MM = 1.0
 
 
 @pytest.fixture(scope="module")
-def training() -> ReducedTraining:
+def training() -> fp.ReducedTraining:
     touch = fp.touch_of(fp.Fingertip(), fp.Sphere(curvature_per_m=287))
-    return ReducedTraining(touch, ReducedRange(DEEPEST_MM))
+    return fp.ReducedTraining(touch, fp.ReducedRange(DEEPEST_MM))
 
 
 @pytest.fixture(scope="module")
-def model(training: ReducedTraining) -> fp.ReducedModel:
+def model(training: fp.ReducedTraining) -> fp.ReducedModel:
     return fp.reduce_touch(training, calibration=0)
 
 
@@ -123,7 +122,7 @@ def test_a_released_spring_stays_behind_and_recovers_in_closed_form() -> None:
     ids=["press and hold", "partial release", "almost released, and again"],
 )  # fmt: skip
 def test_it_agrees_with_the_full_solver_on_touches_not_used(
-    training: ReducedTraining,
+    training: fp.ReducedTraining,
     model: fp.ReducedModel,
     times_ms: list[float],
     depth_mm: list[float],
@@ -206,22 +205,22 @@ def test_a_file_has_the_same_bits_and_tells_damage(tmp_path: Path, model: fp.Red
 @pytest.mark.parametrize(
     ("call", "said"),
     [
-        (lambda _: ReducedRange(0.0), "depth_mm must be greater than 0"),
-        (lambda _: ReducedRange(1.0, x_mm=(1.0, 2.0)), "x_mm must range over 0"),
-        (lambda _: ReducedRange(1.0, z_mm=(2.0, -2.0)), "z_mm must range from low to high"),
-        (lambda _: ReducedRange(1.0, x_mm=3.0), "x_mm must be two numbers"),  # type: ignore[arg-type]
-        (lambda _: ReducedRange(1.0, parameter="curvature_per_m"), "or neither"),
-        (lambda touch: ReducedTraining(replace(touch, friction=0.5), ReducedRange(1.0, x_mm=(-1.0, 1.0))),
+        (lambda _: fp.ReducedRange(0.0), "depth_mm must be greater than 0"),
+        (lambda _: fp.ReducedRange(1.0, x_mm=(1.0, 2.0)), "x_mm must range over 0"),
+        (lambda _: fp.ReducedRange(1.0, z_mm=(2.0, -2.0)), "z_mm must range from low to high"),
+        (lambda _: fp.ReducedRange(1.0, x_mm=3.0), "x_mm must be two numbers"),  # type: ignore[arg-type]
+        (lambda _: fp.ReducedRange(1.0, parameter="curvature_per_m"), "or neither"),
+        (lambda touch: fp.ReducedTraining(replace(touch, friction=0.5), fp.ReducedRange(1.0, x_mm=(-1, 1))),
          "friction must be 0 for a range"),
-        (lambda touch: ReducedTraining(touch, ReducedRange(1.0, parameter="width", values=(1.0, 2.0))),
+        (lambda touch: fp.ReducedTraining(touch, fp.ReducedRange(1.0, parameter="width", values=(1.0, 2.0))),
          "parameter must be one of curvature_per_m"),
-        (lambda touch: fp.reduce_touch(ReducedTraining(touch, ReducedRange(1.0)), calibration=5),
+        (lambda touch: fp.reduce_touch(fp.ReducedTraining(touch, fp.ReducedRange(1.0)), calibration=5),
          "calibration must be 0 or at least 19"),
-        (lambda touch: list(ReducedTraining(touch, ReducedRange(9.0)).poses()), "bone"),
+        (lambda touch: list(fp.ReducedTraining(touch, fp.ReducedRange(9.0)).poses()), "bone"),
     ],
 )  # fmt: skip
 def test_what_cannot_be_reduced_is_told_before_a_press(
-    training: ReducedTraining, call: Callable[[fp.Touch], object], said: str
+    training: fp.ReducedTraining, call: Callable[[fp.Touch], object], said: str
 ) -> None:
     with pytest.raises(fp.InputError, match=said):
         call(training.touch)
@@ -229,7 +228,7 @@ def test_what_cannot_be_reduced_is_told_before_a_press(
 
 def test_a_pose_aside_is_met_as_by_an_indenter_that_moves_there() -> None:
     touch = fp.touch_of(fp.Fingertip(), fp.Sphere(curvature_per_m=287), tilt_deg=5.0)
-    aside = ReducedTraining(touch, ReducedRange(1.0, x_mm=(0.0, 2.0)))
+    aside = fp.ReducedTraining(touch, fp.ReducedRange(1.0, x_mm=(0.0, 2.0)))
     for pose in aside.poses():
         x_mm = pose.values[0]
         base = aside.touch_with()
@@ -271,7 +270,7 @@ def test_a_tilted_face_meets_the_skin_where_it_does_in_closed_form(
 def test_a_wire_meets_the_skin_at_its_place() -> None:
     """Its gap is that of a plate: it was lifted to the highest place of the pad."""
     touch = fp.touch_of(fp.Fingertip(), fp.Line())
-    assert [pose.meets_mm for pose in ReducedTraining(touch, ReducedRange(0.5)).poses()] == [0.0]
+    assert [pose.meets_mm for pose in fp.ReducedTraining(touch, fp.ReducedRange(0.5)).poses()] == [0.0]
 
 
 OWN = fp.OwnAfferent(
@@ -292,8 +291,8 @@ def test_streamed_spikes_are_those_of_one_go(afferent: fp.Afferent) -> None:
     sed = np.vstack([np.zeros(5), np.abs(np.cumsum(random.normal(0.0, 0.4, (400, 5)), axis=0))])
     quantities = afferent.dynamic_quantity, afferent.static_quantity
     other = None if quantities[0] == quantities[1] else sed[:, ::-1]
-    dynamic = None if other is None else Traces(times, other, quantity=quantities[0])
-    whole = afferent.spikes(Traces(times, sed, times[1:-1], quantity=quantities[1], dynamic=dynamic))
+    dynamic = None if other is None else fp.Traces(times, other, quantity=quantities[0])
+    whole = afferent.spikes(fp.Traces(times, sed, times[1:-1], quantity=quantities[1], dynamic=dynamic))
     stream = fp.AfferentStream(afferent, 5)
     rows = enumerate(times[1:].tolist(), start=1)
     parts = [stream.step(time, sed[row], None if other is None else other[row]) for row, time in rows]

@@ -7,8 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from fingerpad.core.errors import InputError
-from fingerpad.core.regions import Ellipse, Polygon, Rectangle
+from fingerpad import Ellipse, InputError, Polygon, Rectangle
 
 L_SHAPE = Polygon(((0.0, 0.0), (4.0, 0.0), (4.0, 1.0), (1.0, 1.0), (1.0, 3.0), (0.0, 3.0)))
 REGIONS = [

@@ -8,8 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 
-from fingerpad.core.errors import InputError
-from fingerpad.core.signals import SpikeTrains
+from fingerpad import InputError, SpikeTrains
 from fingerpad.neuron.response_maps import (
     NO_GROUP,
     evoked_latency_ms,

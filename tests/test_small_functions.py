@@ -5,16 +5,10 @@ from importlib import import_module
 import numpy as np
 import pytest
 
-from fingerpad.core.errors import InputError
+from fingerpad import Bar, Grading, InputError, Material, RampAndHold, Sphere, named_tissues, sine
 from fingerpad.core.phases import ramp_and_hold_phases
-from fingerpad.geometry.grading import Grading
-from fingerpad.geometry.indenters import Bar, Sphere
 from fingerpad.geometry.mesh import block_mesh
-from fingerpad.geometry.motion import RampAndHold
-from fingerpad.geometry.motions import sine
 from fingerpad.mechanics.balance import Entry
-from fingerpad.mechanics.materials import Material
-from fingerpad.mechanics.tissues import named_tissues
 from fingerpad.psychophysics.discrimination import (
     Experiment,
     compare_euclidean_observers,

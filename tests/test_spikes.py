@@ -6,8 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 
-from fingerpad.core.errors import InputError
-from fingerpad.core.signals import SpikeTrains
+from fingerpad import InputError, SpikeTrains
 from fingerpad.neuron.spikes import (
     firing_rate_hz,
     first_spike_latency_ms,

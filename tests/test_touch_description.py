@@ -32,13 +32,10 @@ from fingerpad.experiments.descriptions.pressing import MOTIONS, OBJECTS
 from fingerpad.experiments.descriptions.reading import part_from
 from fingerpad.experiments.descriptions.stimuli import StimulusSet, named_stimuli
 from fingerpad.experiments.descriptions.touch import OUTPUTS, described_touch
-from fingerpad.experiments.discrimination.task_stimuli import parse_task, task_population
-from fingerpad.export.formats import export_touch
-from fingerpad.export.touch_outputs import WRITERS, as_described, check_described, run_touch
+from fingerpad.experiments.discrimination.task_stimuli import task_population
+from fingerpad.export.touch_outputs import WRITERS, as_described, check_described
 from fingerpad.geometry import surface_files
-from fingerpad.geometry.motion import ForceRampAndHold, RampAndHold
 from fingerpad.neuron.mixed_population import types_of_afferents
-from fingerpad.skin.indentation import touch_of
 from tests.mutations import CHANGES, VALUES, changed, places
 
 ROOT = Path(__file__).parents[1]
@@ -63,12 +60,12 @@ def call(run_program):
 
 
 def test_a_description_is_the_touch_that_python_makes_and_its_defaults_are_the_papers():
-    assert described_touch(FULL).touch == touch_of(
+    assert described_touch(FULL).touch == fp.touch_of(
         fp.Fingertip(stratum_corneum_mm=0.5), fp.Sphere(radius_mm=4.0), fp.RampAndHold(0.5), "human", "quick",
         (RECEPTOR_X_MM + 0.5, 0.0), tilt_deg=3.0, friction=0.1, spin_deg=10.0, times_ms=(20.0, 400.0),
     )  # fmt: skip
     touch = described_touch({"object": "sphere"}).touch
-    assert (touch.indenter, touch.stimulus, touch.friction) == (fp.Sphere(), RampAndHold(), 0.0)
+    assert (touch.indenter, touch.stimulus, touch.friction) == (fp.Sphere(), fp.RampAndHold(), 0.0)
     assert touch.tilt_deg == Conditions().skin_tilt_deg
     assert described_touch({"object": "line"}).touch.tilt_deg == 0.0
 
@@ -96,7 +93,7 @@ def test_an_object_is_what_its_class_makes(content, body):
 @pytest.mark.parametrize(
     ("content", "motion"),
     [
-        ({"force_mn": 80}, ForceRampAndHold(80.0)),
+        ({"force_mn": 80}, fp.ForceRampAndHold(80.0)),
         ({"kind": "sine", "depth_mm": 0.5, "amplitude_mm": 0.05, "frequency_hz": 20, "cycles": 3},
          fp.sine(0.5, 0.05, 20.0, 3)),
         ({"kind": "chirp", "depth_mm": 0.5, "amplitude_mm": 0.02, "frequencies_hz": [5, 20], "sweep_ms": 400},
@@ -395,7 +392,7 @@ def test_a_touch_is_pressed_once_and_its_outputs_are_what_python_computes(call, 
     assert result.manifest.inputs.keys() == {"touch.yaml"}
     # The indentation is stored: the same touch with other afferents is not pressed again.
     monkeypatch.setattr(fp.Touch, "solve", pytest.fail)
-    again = run_touch(content | {"afferents": {"density_per_cm2": 200}, "outputs": ["spikes"]}, "out")
+    again = fp.run_touch(content | {"afferents": {"density_per_cm2": 200}, "outputs": ["spikes"]}, "out")
     assert again.summary.largest_force_mn == result.summary.largest_force_mn
     assert len(Path("out/spikes.csv").read_text(encoding="utf-8").splitlines()) == 19
     # Noise makes spikes random, and a seed repeats them.
@@ -409,7 +406,7 @@ def test_a_touch_is_pressed_once_and_its_outputs_are_what_python_computes(call, 
 def test_the_estimate_of_a_mesh_of_ones_own_counts_its_nodes_and_its_elimination(tmp_path):
     coarse = fp.Grading(17.37, 2.0, 2.0, 0.8, 0.8, 3.0, stratum_corneum=1, dermis=2, subcutis=2)
     touch = fp.touch_of(fp.Fingertip(), fp.Sphere(), fp.RampAndHold(0.5), grading=coarse)
-    path = export_touch(tmp_path, touch, "abaqus")[0]
+    path = fp.export_touch(tmp_path, touch, "abaqus")[0]
     own = estimate_press(described_touch({"object": "sphere", "finger": str(path)}))
     ours = estimate_press(described_touch({"object": "sphere"}))
     assert own.nodes == len(touch.mesh.nodes_mm) > OWN_NODES
@@ -440,7 +437,7 @@ def test_types_of_afferents_by_name_and_mixed_in_files():
     counts = np.array([len(part) for part in mixed.parts.values()])
     assert counts / counts[0] == pytest.approx([1.0, 2.0, 0.3, 9.0 / 70.0], rel=0.1)
     spheres = {"vary": "object.curvature_per_m", "values": [287, 340]}
-    task = parse_task(
+    task = fp.parse_task(
         {"question": "Which?", "stimuli": spheres, "standard": 287, "noise": 0.1, "population": asked}
     )
     laid = task_population(task)

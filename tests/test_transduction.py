@@ -5,8 +5,7 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy.interpolate import PchipInterpolator
 
-from fingerpad.core.errors import InputError
-from fingerpad.core.signals import Traces
+from fingerpad import InputError, Traces
 from fingerpad.neuron.lif import LeakyIntegrateAndFire
 from fingerpad.neuron.transduction import Drive, Transduction, drive
 

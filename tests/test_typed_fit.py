@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 import fingerpad as fp
-from fingerpad.core.signals import SpikeTrains, Traces
 from fingerpad.inference.typed_fit import TypedModel
 from fingerpad.neuron.lif import LeakyIntegrateAndFire
 
@@ -21,14 +20,14 @@ class Steady:
     dynamic_quantity: str = "compressive_stress"
     static_quantity: str = "compressive_stress"
 
-    def spikes(self, sed: Traces) -> SpikeTrains:
+    def spikes(self, sed: fp.Traces) -> fp.SpikeTrains:
         membrane = LeakyIntegrateAndFire(60.0, 1e-6, 50.0, 1.0)
         return membrane.spikes(fp.Traces(sed.times_ms, self.gain_ma * sed.values, quantity="current"))
 
 
 def ramps(quantity, heights):
     course = np.outer([0.0, 1.0, 0.9], heights)
-    return Traces([0.0, 50.0, 1000.0], course, [50.0], quantity=quantity)
+    return fp.Traces([0.0, 50.0, 1000.0], course, [50.0], quantity=quantity)
 
 
 @pytest.mark.parametrize(
