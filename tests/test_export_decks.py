@@ -18,6 +18,7 @@ from fingerpad.export.job import Job, job_of
 from fingerpad.export.outline import face_mesh, outline_of, rigid_mesh
 from fingerpad.geometry.mesh import block_mesh, finger_mesh
 from fingerpad.mechanics.contact import place
+from refusals import refusals
 
 PRONY = fp.Prony(shares=(0.1, 0.3), times_ms=(20.0, 700.0))
 BALL = fp.Sphere(curvature_per_m=1000.0 / 3.0)
@@ -722,24 +723,19 @@ def with_element_that_is_no_wedge(job):
 MANY = fp.Prony((0.1,) * 7, (1.0, 2.0, 4.0, 8.0, 16.0, 32.0, 64.0))
 
 
-@pytest.mark.parametrize(
-    ("call", "said"),
-    [
-        (lambda job: febio_deck(block_job(material=LAWS[3])), "a polynomial with D2"),
-        (lambda job: febio_deck(block_job(material=LAWS[-1])), "Hyperfoam"),
-        (lambda job: febio_deck(block_job(material=NEO_HOOKE.with_prony(MANY))),
-         "FEBio takes 6 Prony terms: layer dermis has 7"),
-        (lambda job: replace(job, depths_mm=DEPTHS[:-1]), "must begin with 0 and have one length"),
-        (lambda job: replace(job, depths_mm=np.zeros(5)), "must exceed 0 at some time"),
-        (lambda job: replace(job, materials=job.materials[:3]),
-         "materials needs one per layer: got 3 for layer 3"),
-        (lambda job: replace(job, friction=-0.1), "friction must"),
-        (lambda job: abaqus_deck(with_element_that_is_no_wedge(job)), "element 5 has the nodes"),
-    ],
+test_what_a_deck_cannot_hold_is_refused_with_its_reason = refusals(
+    (lambda job: febio_deck(block_job(material=LAWS[3])), "a polynomial with D2"),
+    (lambda job: febio_deck(block_job(material=LAWS[-1])), "Hyperfoam"),
+    (lambda job: febio_deck(block_job(material=NEO_HOOKE.with_prony(MANY))),
+     "FEBio takes 6 Prony terms: layer dermis has 7"),
+    (lambda job: replace(job, depths_mm=DEPTHS[:-1]), "must begin with 0 and have one length"),
+    (lambda job: replace(job, depths_mm=np.zeros(5)), "must exceed 0 at some time"),
+    (lambda job: replace(job, materials=job.materials[:3]),
+     "materials needs one per layer: got 3 for layer 3"),
+    (lambda job: replace(job, friction=-0.1), ("friction",)),
+    (lambda job: abaqus_deck(with_element_that_is_no_wedge(job)), "element 5 has the nodes"),
+    call=lambda call: call(block_job()),
 )  # fmt: skip
-def test_what_a_deck_cannot_hold_is_refused_with_its_reason(call, said):
-    with pytest.raises(fp.InputError, match=said):
-        call(block_job())
 
 
 @pytest.mark.parametrize(

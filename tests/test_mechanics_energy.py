@@ -10,6 +10,7 @@ from fingerpad import Energy, Hencky, Hyperfoam, InputError, Material, MaterialW
 from fingerpad.data import tissues
 from fingerpad.mechanics.energy import SECOND, translate
 from fingerpad.mechanics.materials import MaterialTable, instability
+from refusals import refusals
 
 LOGS = np.array([0.21, -0.34, 0.13, 0.17])
 STEP = 1e-20
@@ -142,26 +143,20 @@ def test_what_cannot_be_a_law_is_refused_in_one_sentence(formula, coefficients, 
     assert str(refusal.value).endswith(".")
 
 
-@pytest.mark.parametrize(
-    ("make", "said"),
-    [
-        (lambda: Ogden((), (), 10.0), "one to three moduli"),
-        (lambda: Ogden((1.0,) * 4, (1.0, 2.0, 3.0, 4.0), 10.0), "got 4 and 4"),
-        (lambda: Ogden((1.0, 2.0), (1.0,), 10.0), "got 2 and 1"),
-        (lambda: Ogden((1.0,), (0.0,), 10.0), "exponent of Ogden may be 0"),
-        (lambda: Ogden((1.0, -2.0), (1.0, 2.0), 10.0), "initial shear modulus of Ogden"),
-        (lambda: Ogden((1.0,), (2.0,), 0.0), "bulk_kpa"),
-        (lambda: Hyperfoam((1.0,), (np.inf,), 0.4), "exponents must hold finite"),
-        (lambda: Hyperfoam((1.0,), (2.0,), 0.5), "0.5; take 0.4999"),
-        (lambda: Hencky(0.0, 1.0), "shear_kpa"),
-        (lambda: Material("rubber"), "law must be"),
-        (lambda: Material(Hencky(1.0, 1.0), prony=0.3), "prony"),
-        (lambda: Material.linear_elastic(1.0, 0.3, law="st_venant"), "neo_hooke, hencky"),
-    ],
-)
-def test_unusable_laws_are_refused(make, said):
-    with pytest.raises(InputError, match=said):
-        make()
+test_unusable_laws_are_refused = refusals(
+    (lambda: Ogden((), (), 10.0), "one to three moduli"),
+    (lambda: Ogden((1.0,) * 4, (1.0, 2.0, 3.0, 4.0), 10.0), "got 4 and 4"),
+    (lambda: Ogden((1.0, 2.0), (1.0,), 10.0), "got 2 and 1"),
+    (lambda: Ogden((1.0,), (0.0,), 10.0), "exponent of Ogden may be 0"),
+    (lambda: Ogden((1.0, -2.0), (1.0, 2.0), 10.0), "initial shear modulus of Ogden"),
+    (lambda: Ogden((1.0,), (2.0,), 0.0), ("bulk_kpa",)),
+    (lambda: Hyperfoam((1.0,), (np.inf,), 0.4), ("exponents",)),
+    (lambda: Hyperfoam((1.0,), (2.0,), 0.5), "0.5; take 0.4999"),
+    (lambda: Hencky(0.0, 1.0), ("shear_kpa",)),
+    (lambda: Material("rubber"), "law must be"),
+    (lambda: Material(Hencky(1.0, 1.0), prony=0.3), ("prony",)),
+    (lambda: Material.linear_elastic(1.0, 0.3, law="st_venant"), "neo_hooke, hencky"),
+)  # fmt: skip
 
 
 STABLE_RIVLIN = Polynomial(c10=5.0, c01=1.0, bulk_linear=100.0)

@@ -5,7 +5,6 @@ from dataclasses import FrozenInstanceError
 import numpy as np
 import pytest
 
-from fingerpad.core.errors import InputError
 from fingerpad.data import (
     STATUSES,
     Published,
@@ -19,6 +18,7 @@ from fingerpad.data import (
     psychophysics,
     tissues,
 )
+from refusals import refusals
 
 QUANTITIES = {"HUMAN_QUANTITY", "RA_QUANTITY", "PC_QUANTITY", "SAII_QUANTITY"}
 NAMES = {"SPHERES", "DEFAULT_TISSUES", "TYPES", *QUANTITIES}
@@ -48,24 +48,19 @@ def test_names_are_unique_and_statuses_known() -> None:
 GOOD = {"name": "depth", "value": 1.0, "unit": "mm", "source": "here", "status": "paper"}
 
 
-@pytest.mark.parametrize(
-    ("change", "said"),
-    [
-        (
-            {"status": "guessed"},
-            "status of depth must be one of paper, read, recalled, assumed: got 'guessed'",
-        ),
-        ({"name": " "}, "as name"),
-        ({"unit": ""}, "as unit"),
-        ({"source": ""}, "as source"),
-        ({"value": float("nan")}, "depth must be a finite number"),
-        ({"value": (1.0, float("inf"))}, "depth must be a finite number"),
-        ({"value": ()}, "at least one number"),
-    ],
-)
-def test_published_refuses_numbers_without_a_story(change: dict[str, object], said: str) -> None:
-    with pytest.raises(InputError, match=said):
-        Published(**(GOOD | change))  # type: ignore[type-var, arg-type]
+test_published_refuses_numbers_without_a_story = refusals(
+    (
+        {"status": "guessed"},
+        "status of depth must be one of paper, read, recalled, assumed: got 'guessed'",
+    ),
+    ({"name": " "}, "as name"),
+    ({"unit": ""}, "as unit"),
+    ({"source": ""}, "as source"),
+    ({"value": float("nan")}, "depth must be a finite number"),
+    ({"value": (1.0, float("inf"))}, "depth must be a finite number"),
+    ({"value": ()}, "at least one number"),
+    call=lambda change: Published(**GOOD | change),
+)  # fmt: skip
 
 
 def test_geometry_is_consistent_and_profiles_have_one_value_per_station():

@@ -17,6 +17,7 @@ from fingerpad.geometry.probing import check_gap
 from fingerpad.geometry.relief import narrowest_relief
 from fingerpad.geometry.surface_files import MOST_HEIGHTS
 from fingerpad.skin.store import touch_key
+from refusals import refusals
 
 CUBE = np.array([[x, y, z] for x in (-1.0, 1.0) for y in (-2.0, 0.0) for z in (-1.5, 1.5)])
 SIDES = np.array(
@@ -367,31 +368,25 @@ FACING_AWAY = CUBE[:3] * [1, 0, 1] + [[0, 0, 0], [0, 0, 3], [3, 0, 0]]
 TOO_ROUND = "edge_radius_mm must not exceed half of the narrowest part"
 
 
-@pytest.mark.parametrize(
-    ("call", "said"),
-    [
-        (lambda: fp.Surface(CUBE * [0.3, 1.0, 1.0], SIDES, edge_radius_mm=0.5), TOO_ROUND),
-        (lambda: fp.Union([fp.Bar(0.5, 0.0), fp.Plate()], [(0, 0, 0), (0, -1, 0)], edge_radius_mm=0.3),
-         TOO_ROUND),
-        (lambda: fp.Surface(*SHUT_AT_2), "must overlap or stand apart by more than 0.01 mm"),
-        (lambda: fp.Surface(*NEAR_WALLS), "walls of two are 0.0001 mm apart"),
-        (lambda: fp.Surface(CUBE * np.nan, SIDES), "finite numbers"),
-        (lambda: fp.Surface(CUBE, np.zeros((0, 3), int)), "at least one triangle"),
-        (lambda: fp.Surface(CUBE * [1.0, 0.0, 0.0], SIDES), "triangles with an area"),
-        (lambda: fp.Surface(CUBE * 1e-4, SIDES), "check the unit"),
-        (lambda: fp.Surface(CUBE * 1e4, SIDES), "check the unit"),
-        (lambda: fp.Surface(CUBE, SIDES + 1), "numbers of vertices, 0 to 7"),
-        (lambda: fp.Surface(FACING_AWAY, np.array([[0, 2, 1]])), "outer side"),
-        # It was refused in terms of a grading that nobody gave, or took hours.
-        (lambda: fp.touch_of(fp.Fingertip(), fp.Surface(CUBE * [4.0, 1.0, 0.05], SIDES)),
-         r"^Surface has a .* dot 0\.2 mm wide, .* enlarge the body"),
-        (lambda: fp.height_surface(np.zeros((1500, 1500)), 0.01),
-         f"heights_mm must have at most {MOST_HEIGHTS:,} heights"),
-    ],
+test_a_surface_that_cannot_be_pressed_is_refused_in_one_sentence = refusals(
+    (lambda: fp.Surface(CUBE * [0.3, 1.0, 1.0], SIDES, edge_radius_mm=0.5), TOO_ROUND),
+    (lambda: fp.Union([fp.Bar(0.5, 0.0), fp.Plate()], [(0, 0, 0), (0, -1, 0)], edge_radius_mm=0.3),
+     TOO_ROUND),
+    (lambda: fp.Surface(*SHUT_AT_2), "must overlap or stand apart by more than 0.01 mm"),
+    (lambda: fp.Surface(*NEAR_WALLS), "walls of two are 0.0001 mm apart"),
+    (lambda: fp.Surface(CUBE * np.nan, SIDES), "finite numbers"),
+    (lambda: fp.Surface(CUBE, np.zeros((0, 3), int)), "at least one triangle"),
+    (lambda: fp.Surface(CUBE * [1.0, 0.0, 0.0], SIDES), "triangles with an area"),
+    (lambda: fp.Surface(CUBE * 1e-4, SIDES), "check the unit"),
+    (lambda: fp.Surface(CUBE * 1e4, SIDES), "check the unit"),
+    (lambda: fp.Surface(CUBE, SIDES + 1), "numbers of vertices, 0 to 7"),
+    (lambda: fp.Surface(FACING_AWAY, np.array([[0, 2, 1]])), "outer side"),
+    # It was refused in terms of a grading that nobody gave, or took hours.
+    (lambda: fp.touch_of(fp.Fingertip(), fp.Surface(CUBE * [4.0, 1.0, 0.05], SIDES)),
+     r"^Surface has a .* dot 0\.2 mm wide, .* enlarge the body"),
+    (lambda: fp.height_surface(np.zeros((1500, 1500)), 0.01),
+     f"heights_mm must have at most {MOST_HEIGHTS:,} heights"),
 )  # fmt: skip
-def test_a_surface_that_cannot_be_pressed_is_refused_in_one_sentence(call, said):
-    with pytest.raises(fp.InputError, match=said):
-        call()
 
 
 @pytest.mark.parametrize("ending", ["stl", "obj", "ply"])
