@@ -26,9 +26,18 @@ def refusals(*rows: tuple[object, Told], call: Callable = lambda wrong: wrong())
     def test(wrong, told):
         with pytest.raises(InputError) as error:
             call(wrong)
+        assert "\n" not in str(error.value)
         if isinstance(told, tuple):
             assert error.value.path == told, str(error.value)
         else:
             assert re.search(told, str(error.value))
 
     return test
+
+
+def misused(outcome: tuple[int, str, str], said: str, program: str = "fingerpad") -> None:
+    """Check the outcome of a misused command: status 2 and one sentence of errors, which says this."""
+    status, out, errors = outcome
+    assert (status, out) == (2, "")
+    assert re.fullmatch(rf"{program}: .*[^.][.?]\n", errors), errors
+    assert said in errors

@@ -1,4 +1,3 @@
-import timeit
 import tracemalloc
 from dataclasses import replace
 
@@ -15,7 +14,7 @@ from fingerpad.neuron.afferent import PARAMETER_NAMES
 from fingerpad.neuron.spikes import firing_rate_hz
 from fingerpad.neuron.transduction import drive
 from refusals import refusals
-from sections import SED_DRIVEN, sed_driven
+from sections import SED_DRIVEN
 
 
 def ramp_and_hold(*peaks_kpa):
@@ -30,14 +29,6 @@ def test_the_stages_are_chained():
     dynamic_hz, static_hz = afferent.rates(sed)
     assert_array_equal(dynamic_hz, firing_rate_hz(by_hand, (30.0, 50.0)))
     assert_array_equal(static_hz, firing_rate_hz(by_hand, (600.0, 950.0)))
-
-
-def test_static_rate_is_the_closed_form_of_a_steady_current():
-    afferent = replace(SED_DRIVEN, intercept_ma=0.0, static_gain=1.4e-6)
-    _, static_hz = afferent.rates(ramp_and_hold(2.0))
-    drive_mv = 1.4e-6 * 2.0 * afferent.time_constant_ms / afferent.capacitance_mf
-    charging_ms = -afferent.time_constant_ms * np.log1p(-afferent.threshold_mv / drive_mv)
-    assert_allclose(static_hz, 1000.0 / (afferent.refractory_ms + charging_ms), rtol=1e-10)
 
 
 def test_the_default_afferent_is_that_of_the_default_tissues():
@@ -98,24 +89,6 @@ def test_parameters_go_round():
     assert_array_equal(afferent.parameters, values)
     quantities = {"dynamic_quantity": "work", "static_quantity": "von_mises"}  # they are not fitted
     assert Afferent.from_parameters(Afferent().parameters, **quantities) == Afferent(**quantities)
-
-
-def test_capacitance_and_threshold_only_scale_the_gains():
-    values = SED_DRIVEN.parameters
-    scaled = sed_driven(values * [6.0, 6.0, 6.0, 1.0, 2.0, 3.0])
-    sed = ramp_and_hold(2.0, 3.0)
-    assert_allclose(scaled.spikes(sed).times_ms, SED_DRIVEN.spikes(sed).times_ms, rtol=1e-11)
-
-
-def test_a_drive_gives_what_its_traces_give_and_a_fit_can_afford_it():
-    sed = Traces(
-        np.append(np.linspace(0.0, 50.0, 9), 50.0 + np.geomspace(2.0, 950.0, 12)),
-        np.outer(np.append(np.linspace(0.0, 1.0, 9), np.linspace(0.99, 0.85, 12)), np.linspace(0.3, 3.0, 36)),
-        kinks_ms=[50.0],
-    )
-    prepared, afferent = drive(sed), SED_DRIVEN
-    assert_array_equal(afferent.rates(prepared), afferent.rates(sed))
-    assert min(timeit.repeat(lambda: afferent.rates(prepared), number=1, repeat=20)) < 2e-3
 
 
 def test_many_receptors_never_stand_on_all_knots_at_once():

@@ -15,6 +15,7 @@ from fingerpad.neuron.population import sensitivities
 from fingerpad.neuron.spikes import firing_rate_hz
 from fingerpad.neuron.transduction import drive
 from fingerpad.neuron.tuning import impulses_per_cycle, vibration
+from refusals import refusals
 from sections import SED_DRIVEN
 
 PUNCH_KPA_PER_UM, PUNCH_HOLD_KPA = 0.0200, 10.4
@@ -313,9 +314,9 @@ def own(respond):
     return fp.OwnAfferent(respond).spikes(ENERGY)
 
 
-BAD = [
+test_bad_input_is_refused_in_one_sentence = refusals(
     (lambda: fp.RA(retraction=1.5), "retraction must lie within 0 ... 1: got 1.5"),
-    (lambda: fp.RA(rise=0), "rise must be a whole number of at least 1"),
+    (lambda: fp.RA(rise=0), ("rise",)),
     (lambda: fp.RA().spikes(ENERGY), "needs 'compressive_stress': got traces of 'stored'"),
     (lambda: fp.RA(treshold=0.1), "treshold is no argument of RA: did you mean threshold"),
     (lambda: fp.OwnAfferent("sum"), "respond must be a function of Traces: got 'sum'"),
@@ -326,13 +327,13 @@ BAD = [
     (lambda: fp.EndOrgans(ENDS, [1.5, -0.5]), "must not be negative: the smallest is -0.5"),
     (lambda: fp.EndOrgans(ENDS, combine="mean"), "combine must be one of sum, largest: got 'mean'"),
     (lambda: fp.EndOrgans(np.zeros((1, 0, 2))), "afferents by end organs"),
-    (lambda: fp.EndOrgans.scattered([[0.0, 0.0]], 0, 1.0, 1), "count must be a whole number of at least 1"),
+    (lambda: fp.EndOrgans.scattered([[0.0, 0.0]], 0, 1.0, 1), ("count",)),
     (lambda: fp.Population([[17.0, 0.0]], 1.0, ends=fp.EndOrgans(np.zeros((2, 1, 2)))), "one row per"),
     (lambda: fp.Population([[17.0, 0.0]], 1.0, fp.RA), "afferent must be one such as"),
     (lambda: fp.Population.grid().respond(None), r"skin must have a method sed\(sites\), .* got None"),
     (lambda: fp.Population.grid(centre_mm=17.0), r"centre_mm must be a pair, x and z \[mm\]: got 17.0"),
-    (lambda: fp.Population.grid(finger="child"), r"finger must be one such as .* got 'child'"),
-    (lambda: fp.MixedPopulation([fp.Population.grid()]), "parts must be a mapping .* got list"),
+    (lambda: fp.Population.grid(finger="child"), ("finger",)),
+    (lambda: fp.MixedPopulation([fp.Population.grid()]), ("parts",)),
     (lambda: fp.MixedPopulation({"RA": fp.RA()}), r"parts\['RA'\] must be a Population"),
     (lambda: SPARSE(SQUARE, {"RA": 0.0}), r"densities_per_cm2\['RA'\].*greater than 0"),
     (lambda: SPARSE(SQUARE, {"FA": 10.0}), "type 'FA' without an afferent"),
@@ -340,16 +341,8 @@ BAD = [
     (lambda: SPARSE(SQUARE, {"RA": 9.0}).respond(FINGER)["SAI"], "must be one of RA: got 'SAI'"),
     (lambda: SPARSE(SQUARE, 100.0), "densities_per_cm2, with a type as each key, must be of type Mapping"),
     (lambda: SPARSE(SQUARE, afferents=[fp.RA()]), "afferents, with a type as each key, must be of type"),
-    (lambda: SPARSE("pad"), r"region must be one of fingerpad.core.regions or .* got 'pad'"),
+    (lambda: SPARSE("pad"), ("region",)),
     (lambda: SPARSE(SQUARE).respond("skin"), r"skin must have a method sed\(sites\), .* got 'skin'"),
-    (lambda: fp.tuning_curve(fp.RA(), [0.0], 0.02), "frequency_hz must be greater than 0"),
+    (lambda: fp.tuning_curve(fp.RA(), [0.0], 0.02), ("frequency_hz",)),
     (lambda: fp.tuning_curve(fp.Afferent(static_quantity="stored"), [1.0], 0.02), "follows one quantity"),
-]  # fmt: skip
-
-
-@pytest.mark.parametrize(("make", "said"), BAD)
-def test_bad_input_is_refused_in_one_sentence(make, said):
-    with pytest.raises(fp.InputError, match=said) as refused:
-        make()
-    assert "\n" not in str(refused.value)
-    assert str(refused.value).endswith((".", "?"))
+)  # fmt: skip

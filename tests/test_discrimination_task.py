@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from scipy.special import ndtr, ndtri
+from scipy.special import ndtri
 from scipy.stats import binom
 
 from fingerpad import InputError, Traces, cli, parse_task
@@ -26,7 +26,7 @@ from fingerpad.experiments.discrimination.task_stimuli import (
     task_stimuli,
     task_touches,
 )
-from fingerpad.psychophysics.code_efficiency import SMALLEST_SPREAD, code_efficiency, noisy_presentations
+from fingerpad.psychophysics.code_efficiency import code_efficiency, noisy_presentations
 from fingerpad.psychophysics.discrimination import (
     Experiment,
     discriminate_euclidean,
@@ -35,6 +35,7 @@ from fingerpad.psychophysics.discrimination import (
 from fingerpad.psychophysics.encoding import gradient_sum, neighbour_pairs, taking_part
 from fingerpad.report import discrimination_task as figures
 from fingerpad.report import discrimination_task as report
+from refusals import misused
 
 ROOT = Path(__file__).parents[1]
 QUESTION = {
@@ -296,16 +297,6 @@ def test_no_code_beats_the_ideal_observer_and_what_it_makes_use_of_is_a_share():
             assert all(0.0 < error < 0.1 for error in code.efficiency_error)
 
 
-def test_the_ideal_observer_of_one_afferent_is_known_in_closed_form():
-    # Two normal distributions of nearly one spread: d' = |mu_1 - mu_0| / sigma.
-    table = np.array([[50.0], [52.0]])
-    (shown,) = noisy_presentations(table, 0.05, seed=3)
-    expected = 2.0 / np.hypot(0.05 * 51.0, SMALLEST_SPREAD)
-    ideal = shown.ideal()
-    assert ideal.d_prime == pytest.approx(expected, abs=4.0 * ideal.d_prime_error)
-    assert shown.ideal_hit_rate() == pytest.approx(ndtr(expected / 2.0), abs=0.03)
-
-
 def test_where_the_ideal_observer_never_fails_there_is_no_efficiency():
     table = np.array([[50.0, 60.0], [150.0, 10.0]])
     (shown,) = noisy_presentations(table, 0.01, seed=3)
@@ -445,21 +436,5 @@ def test_bad_input_is_one_sentence_and_status_2_and_nothing_is_written(call, tmp
     }
     for name, text in files.items():
         (tmp_path / name).write_text(text)
-    status, out, errors = call(*arguments)
-    assert (status, out) == (2, "")
-    assert said in errors
-    assert errors.startswith("fingerpad: ")
-    assert errors.endswith(".\n")
-    assert errors.count("\n") == 1
+    misused(call(*arguments), said)
     assert {path.name for path in tmp_path.iterdir()} == set(files)
-
-
-def test_a_silent_population_writes_no_answer(call, tmp_path, monkeypatch):
-    (tmp_path / "mine.yaml").write_text(MINE)
-    monkeypatch.setattr(
-        Bump, "sed", lambda self, sites, *_: Traces([0.0, 50.0, 1000.0], np.zeros((3, len(sites))))
-    )
-    status, _, errors = call("mine.yaml")
-    assert status == 2
-    assert "is silent" in errors
-    assert not list((tmp_path / "discriminate").glob("*.*"))

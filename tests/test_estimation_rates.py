@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from fingerpad import InputError, RateRecordings, Traces
-from fingerpad.experiments.gerling2014.single_unit import bar_recordings
 from fingerpad.inference.afferent_methods import (
     ReceptorOffset,
     along_slopes,
@@ -64,6 +63,8 @@ def test_residuals_make_the_score_and_the_score_is_the_papers(four_numbers):
     papers = 0.25 * in_ramp + 0.75 * in_hold
     assert four_numbers.score(other, chosen) == papers < 0.99
     assert 1.0 - residuals @ residuals == pytest.approx(papers, abs=1e-14)
+    weighed = replace(four_numbers, dynamic_weight=0.4, static_weight=0.6).score(other, chosen)
+    assert weighed == pytest.approx(0.4 * in_ramp + 0.6 * in_hold, abs=1e-14)
     by_phase = four_numbers.score_by_phase(other, chosen)
     assert 0.25 * by_phase["dynamic"] + 0.75 * by_phase["static"] == pytest.approx(papers, abs=1e-14)
     assert four_numbers.score(FOUR, chosen) == 1.0
@@ -79,34 +80,6 @@ def test_residuals_make_the_score_and_the_score_is_the_papers(four_numbers):
         replace(four_numbers, recordings=observed.chosen([0, 1]))
     with pytest.raises(InputError, match="static_weight must not be negative"):
         replace(four_numbers, static_weight=-1.0)
-
-
-class Fixed:
-    """Rates that depend on no parameter."""
-
-    names, n_stimuli = (), 36
-
-    def __init__(self, *rates_hz):
-        self.rates_hz = rates_hz
-
-    def evaluate(self, parameters):
-        return self.rates_hz
-
-
-def score_of_the_bar(dynamic_hz, static_hz, **weights):
-    observed = bar_recordings()
-    return RateProblem(Fixed(dynamic_hz, static_hz), observed, **weights).score(np.empty(0), np.arange(36))
-
-
-def test_static_phase_weighs_three_times_the_dynamic_phase():
-    dynamic, static = bar_recordings().dynamic_rate_hz, bar_recordings().static_rate_hz
-    silent = np.zeros(36)
-    assert score_of_the_bar(dynamic, silent) == 0.25
-    assert score_of_the_bar(silent, static) == 0.75
-    assert score_of_the_bar(dynamic, silent, dynamic_weight=0.4, static_weight=0.6) == 0.4
-    # The best symmetric prediction.
-    score = score_of_the_bar((dynamic + dynamic[::-1]) / 2, (static + static[::-1]) / 2)
-    assert score == pytest.approx(0.979, abs=5e-4)
 
 
 @pytest.mark.parametrize("drive_per_ms", [0.0, 0.0199, 0.0201, 0.03, 0.1, 1.0])
@@ -138,15 +111,6 @@ def test_slopes_of_the_formula_are_those_of_its_differences(bend):
     bent = [constant_drive_rate([0.03], tau, bend=width)[0][0] for width in (0.2, 0.1, 0.01)]
     errors = np.abs(np.array(bent) - exact[1])
     assert errors[0] > errors[1] > errors[2] < 1e-6
-
-
-def test_slopes_of_the_model_are_those_of_its_residuals(four_numbers):
-    smooth = replace(four_numbers, model=ClosedFormModel(AfferentModel.of_traces(traces())))
-    slopes = smooth.jacobian_of(smooth.model.slopes)(FOUR, EVERYTHING)
-    for slope, step in zip(slopes.T, np.diag(1e-6 * FOUR), strict=True):
-        above, below = (smooth.residuals(FOUR + sign * step, EVERYTHING) for sign in (1, -1))
-        difference = (above - below) / (2.0 * step.max())
-        np.testing.assert_allclose(slope, difference, rtol=1e-4, atol=1e-7 * abs(slopes).max())
 
 
 def test_static_rates_of_the_formula_are_near_those_of_spikes(four_numbers):

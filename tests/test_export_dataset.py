@@ -15,15 +15,8 @@ import fingerpad as fp
 from fingerpad.export import dataset
 from fingerpad.export.dataset import PARTS, check_touch, spike_trains
 from fingerpad.skin.fields import Place, stored_fields
+from sections import SMALL_TOUCH as TOUCH
 
-TOUCH = fp.Touch(
-    finger=fp.Fingertip(),
-    indenter=fp.Sphere(curvature_per_m=287),
-    stimulus=fp.RampAndHold(depth_mm=0.3),
-    tissues=fp.named_tissues("trial3"),
-    grading=fp.Grading(17.37, 1.2, 1.2, 0.8, 0.8, largest_mm=4.0, stratum_corneum=1, dermis=1, subcutis=1),
-    settings=fp.PressSettings(ramp_steps=2, hold_steps=1),
-)
 RESPONSE = fp.ResponseMap(
     positions_mm=[[17.0, 0.0], [18.0, 1.0], [19.0, -1.0]],
     pitch_mm=1.0,

@@ -14,15 +14,7 @@ import fingerpad as fp
 from fingerpad.core.phases import ramp_and_hold_phases
 from fingerpad.export.responses import read_response_csv, read_responses_nwb
 from fingerpad.neuron.response_maps import recruitment_rank
-
-TOUCH = fp.Touch(
-    finger=fp.Fingertip(),
-    indenter=fp.Sphere(curvature_per_m=287),
-    stimulus=fp.RampAndHold(depth_mm=0.3),
-    tissues=fp.named_tissues("trial3"),
-    grading=fp.Grading(17.37, 1.2, 1.2, 0.8, 0.8, largest_mm=4.0, stratum_corneum=1, dermis=1, subcutis=1),
-    settings=fp.PressSettings(ramp_steps=2, hold_steps=1),
-)
+from sections import SMALL_TOUCH as TOUCH
 
 
 def random_response(columns):

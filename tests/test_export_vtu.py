@@ -18,15 +18,8 @@ import fingerpad as fp
 from fingerpad.export.vtu import HEXAHEDRON, WEDGE, cells_of, write_vtu_series
 from fingerpad.geometry.mesh import Mesh, block_mesh
 from fingerpad.geometry.mesh_checks import jacobian_at_gauss
+from sections import SMALL_TOUCH as TOUCH
 
-TOUCH = fp.Touch(
-    finger=fp.Fingertip(),
-    indenter=fp.Sphere(curvature_per_m=287),
-    stimulus=fp.RampAndHold(depth_mm=0.3),
-    tissues=fp.named_tissues("trial3"),
-    grading=fp.Grading(17.37, 1.2, 1.2, 0.8, 0.8, largest_mm=4.0, stratum_corneum=1, dermis=1, subcutis=1),
-    settings=fp.PressSettings(ramp_steps=2, hold_steps=1),
-)
 CELLS = (
     "stress_kpa", "strain", "green_lagrange_strain", "principal_stress_kpa", "principal_strain",
     "von_mises_kpa", "pressure_kpa", "compressive_strain", "compressive_stress_kpa",

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 import fingerpad as fp
-from fingerpad.core.errors import InputError
 from fingerpad.experiments.conditions import Conditions
 from fingerpad.experiments.descriptions.touch import described_touch
 from fingerpad.geometry.fingertip import FINGERS, Fingertip
@@ -21,6 +20,7 @@ from fingerpad.mechanics.materials import Material, Prony
 from fingerpad.mechanics.tissues import named_tissues
 from fingerpad.skin.indentation import touch_of
 from fingerpad.skin.unrolled_skin import PAD_X_MM, UnrolledSkin
+from refusals import refusals
 
 PAPER = Fingertip()
 CHILD = Fingertip.of("child")
@@ -131,25 +131,18 @@ def test_a_description_takes_a_preset_measures_or_an_outline():
     assert np.abs(CHILD.level(described_touch(nail).population.positions_mm)).max() < 1e-9
 
 
-@pytest.mark.parametrize(
-    ("make", "says"),
-    [
-        (lambda: Fingertip.of(length_mm=20_000.0), "length_mm of a fingertip must lie between 2 and 100 mm"),
-        (lambda: Fingertip.of(width_mm=0.016), "width_mm of a fingertip .* got 0.016 mm; check its unit"),
-        (lambda: PAPER.scaled(-1.0), "factor must be greater than 0"),
-        (lambda: Fingertip.of("baby"), "like must be one of adult, small, large, child, macaque, aged"),
-        (lambda: Fingertip.of(widht_mm=16.0), "did you mean width_mm"),
-        (lambda: Fingertip.of(height_mm=4.0), "Bone and skin layers of 1.624 mm must fit"),
-        (lambda: described_touch({"object": "sphere", "finger": "giant"}).touch, "like must be one of"),
-        (lambda: described_touch({"object": "sphere", "finger": "adult:18"}).touch, "as adult:width_mm=18"),
-        (lambda: described_touch({"object": "sphere", "finger": "adult:width_mm=x"}).touch, "width_mm must"),
-        (lambda: described_touch({"object": "sphere", "finger": {"kind": "toe"}}), "finger.kind must be one"),
-    ],
-)
-def test_impossible_fingers_are_refused_in_one_sentence(make, says):
-    with pytest.raises(InputError, match=says) as refused:
-        make()
-    assert "\n" not in str(refused.value)
+test_impossible_fingers_are_refused_in_one_sentence = refusals(
+    (lambda: Fingertip.of(length_mm=20_000.0), "length_mm of a fingertip must lie between 2 and 100 mm"),
+    (lambda: Fingertip.of(width_mm=0.016), "width_mm of a fingertip .* got 0.016 mm; check its unit"),
+    (lambda: PAPER.scaled(-1.0), ("factor",)),
+    (lambda: Fingertip.of("baby"), ("like",)),
+    (lambda: Fingertip.of(widht_mm=16.0), "did you mean width_mm"),
+    (lambda: Fingertip.of(height_mm=4.0), "Bone and skin layers of 1.624 mm must fit"),
+    (lambda: described_touch({"object": "sphere", "finger": "giant"}).touch, "like must be one of"),
+    (lambda: described_touch({"object": "sphere", "finger": "adult:18"}).touch, "as adult:width_mm=18"),
+    (lambda: described_touch({"object": "sphere", "finger": "adult:width_mm=x"}).touch, "width_mm must"),
+    (lambda: described_touch({"object": "sphere", "finger": {"kind": "toe"}}), ("finger", "kind")),
+)  # fmt: skip
 
 
 @pytest.mark.parametrize(

@@ -42,15 +42,6 @@ def skin_sample(finger):
     return np.stack([x, y, half_width * np.sin(angle)], axis=-1)
 
 
-def test_normals_and_level_of_a_paraboloid_are_its_own(paraboloid):
-    x, z = np.array([0.0, 5.0, 20.0, 29.0]), np.array([0.0, 3.0, -2.0, 0.5])
-    points = paraboloid.skin_point(x, z)
-    expected = np.stack([np.full(4, 1 / LENGTH), 2 * points[:, 1] / DEPTH**2, 2 * z / WIDTH**2], axis=1)
-    np.testing.assert_allclose(paraboloid.level(points), 0.0, atol=1e-12)
-    np.testing.assert_allclose(paraboloid.level_gradient(points), expected, rtol=0, atol=1e-9)
-    np.testing.assert_allclose(np.linalg.norm(paraboloid.skin_normal(points), axis=1), 1.0)
-
-
 def test_rays_meet_a_paraboloid_at_the_roots_of_the_quadratic(paraboloid):
     generator = np.random.default_rng(3)
     directions = generator.normal(size=(200, 3))

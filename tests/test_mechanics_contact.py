@@ -51,12 +51,6 @@ def test_first_touch_of_one_node_beside_the_axis_and_of_none():
             place(body, np.array([[5.0, 0.0, 0.0]]), np.zeros(3), np.eye(3))
 
 
-def test_frame_moves_with_the_depth():
-    placement = Placement(np.array([1.0, 2.0, 3.0]), tilted())
-    point = placement.origin_mm + 0.7 * placement.axis + 0.2 * placement.rotation[:, 0]
-    np.testing.assert_allclose(placement.to_local(point[None], 0.5), [[0.2, 0.2, 0.0]], atol=1e-14)
-
-
 def tilted_contact(body, seed=2, n=12):
     """Nodes pressed a little into a tilted body, away from its kinks, with multipliers."""
     generator = np.random.default_rng(seed)

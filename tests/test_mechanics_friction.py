@@ -251,14 +251,6 @@ def test_skin_sticks_to_an_inclined_face_or_slides_along_it(contacts):
             assert (sideways > 5e-3).all()
 
 
-def test_work_of_the_indenter_is_stored_or_rubbed_away():
-    """Elastic skin on a rough cylinder: without the heat of friction the balance would not close."""
-    settings = PressSettings(12, 1, NewtonSettings(penetration_tolerance=1e-3))
-    energy = pressed(block(), FIVE[0], 0.1, ELASTIC, settings=settings).energy
-    assert energy.dissipated_uj[-1] > 5e-3 * energy.external_uj[-1]
-    assert energy.relative_imbalance < 0.2 * energy.dissipated_uj[-1] / energy.external_uj[-1]
-
-
 def test_work_of_a_bar_that_slides_over_skin_is_rubbed_away():
     """Nodes pass its edges of 0.2 mm in steps of 0.03 mm; with chords for arcs 0.5 % would be missing."""
     lines = np.concatenate([[-4.0, -3.0, -2.2], np.arange(-1.5, 2.5, 0.15), [3.2, 4.0, 5.0]])

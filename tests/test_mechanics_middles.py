@@ -93,19 +93,6 @@ def test_forces_on_nodes_are_the_slope_of_the_potential_and_the_tangent_that_of_
             np.testing.assert_allclose(column, -change, rtol=0, atol=1e-4 * np.abs(tangent).max())
 
 
-def test_forces_of_middles_keep_their_sum_and_their_torque():
-    mesh = block()
-    contact = contact_of(mesh, at_mm=(0.23, 0.0, 0.21))
-    nodes_mm = rough(mesh)
-    points_mm = contact.points_mm(nodes_mm)
-    at_points = contact.state(points_mm, 0.3, np.zeros(len(points_mm))).force_mn
-    at_nodes = contact.on_nodes(at_points)
-    np.testing.assert_allclose(at_nodes.sum(axis=0), at_points.sum(axis=0), rtol=1e-12)
-    torque = np.cross(points_mm, at_points).sum(axis=0)
-    on_nodes = np.cross(nodes_mm[contact.nodes], at_nodes).sum(axis=0)
-    np.testing.assert_allclose(on_nodes, torque, atol=1e-9 * np.abs(at_points).sum())
-
-
 @pytest.mark.parametrize("friction", [0.0, 0.5])
 def test_facets_do_not_cut_through_a_small_ball(friction):
     """Its tip is above the middle of an edge, from which skin without friction slides away."""

@@ -32,7 +32,7 @@ from fingerpad.psychophysics.discrimination import (
 )
 from fingerpad.psychophysics.encoding import gradient_sum, neighbour_pairs, taking_part
 from fingerpad.psychophysics.functions import binomial_interval
-from fingerpad.psychophysics.noise_fit import expected_euclidean_hit_rates, expected_hit_rates
+from fingerpad.psychophysics.noise_fit import expected_euclidean_hit_rates
 
 CURVATURES = (287.0, 296.0, 305.0, 316.0, 328.0, 340.0, 365.0)
 GRID = Population.grid()
@@ -252,13 +252,3 @@ def test_the_analysis_names_every_interpretation_and_the_noise_that_fits_it():
     # A wavering fraction moves the point by a share of the small way between means, not of the point.
     point, fraction = found.criterion.point, found.criterion.fraction
     assert (fraction < 0.2 * point).all()
-
-
-def test_hit_rates_without_noise_of_a_session_are_the_expected_ones(sessions):
-    """What a session scatters about is what the fit of the noise sees."""
-    measures, observers = sessions
-    draws = normals(9, 1, 18, Purpose.RESPONSE, 20_000)[0].T
-    for position in range(2):
-        static = measures["static"][position]
-        predicted = expected_hit_rates(static.responses, PAIRS, 0.06, draws)
-        assert_allclose(observers.mean["static"][:, position].mean(axis=0), predicted, atol=0.015)

@@ -66,26 +66,6 @@ def test_each_receptor_answers_what_a_lone_afferent_would_answer_there():
         assert response.static_rate_hz[receptor] == static_hz[0]
 
 
-def test_the_map_peaks_under_the_touch_and_an_untouched_skin_is_silent():
-    population = fp.Population.grid(afferent=SED_DRIVEN)
-    response = population.respond(Bump(17.37, 0.5))
-    under = int(np.argmin(np.square(population.positions_mm - [17.37, 0.5]).sum(axis=1)))
-    assert np.argmax(response.static_rate_hz) == under
-    assert np.argmax(response.dynamic_rate_hz) == under
-    assert np.nanargmin(response.first_spike_latency_ms) == under
-    response = fp.Population.grid(afferent=SED_DRIVEN).respond(Bump(17.0, 0.0, peak_kpa=0.0))
-    assert_array_equal(response.static_rate_hz, np.zeros(18))
-    assert np.isnan(response.first_spike_latency_ms).all()
-
-
-def test_a_mirrored_touch_gives_a_mirrored_map():
-    population = fp.Population.grid(afferent=SED_DRIVEN)
-    left, right = population.respond(Bump(17.0, -0.8)), population.respond(Bump(17.0, 0.8))
-    mirrored = left.dynamic_rate_hz.reshape(3, 6)[:, ::-1].ravel()
-    assert (right.dynamic_rate_hz > 0).any()
-    assert_allclose(right.dynamic_rate_hz, mirrored, rtol=1e-9)
-
-
 class OneTrace:
     def sed(self, sites):
         return fp.Traces([0.0, 1.0], [[0.0], [1.0]])

@@ -20,19 +20,6 @@ def plain_rate(train, start, end):
     return 1000.0 * len(intervals) / sum(intervals) if intervals else 0.0
 
 
-def test_rates_count_closing_intervals_within_the_window_of_each_train():
-    trains = SpikeTrains.from_lists([np.arange(0.0, 1000.0, 8.0), np.arange(3.0, 1000.0, 20.0)])
-    assert_allclose(firing_rate_hz(trains, (600.0, 950.0)), [125.0, 50.0], rtol=1e-14)
-    trains = SpikeTrains.from_lists([[10.0, 40.0]])
-    assert firing_rate_hz(trains, (30.0, 50.0)) == pytest.approx(1000.0 / 30.0)
-    assert firing_rate_hz(trains, (5.0, 30.0)) == 0.0
-    trains = SpikeTrains.from_lists([[10.0, 30.0, 50.0, 55.0]])
-    assert firing_rate_hz(trains, (30.0, 50.0)) == 50.0
-    assert firing_rate_hz(trains, (50.0, 60.0)) == 200.0
-    trains = SpikeTrains.from_lists([[10.0, 20.0], [], [35.0], [5.0, 45.0], []])
-    assert_array_equal(firing_rate_hz(trains, (30.0, 50.0)), [0.0, 0.0, 0.0, 25.0, 0.0])
-
-
 def test_silence_has_rate_zero_and_no_latency_which_is_that_of_the_first_spike():
     for trains in ([], [[]], [[], [], []]):
         silent = SpikeTrains.from_lists(trains)

@@ -128,30 +128,9 @@ def test_key_changes_with_the_last_bit_of_every_input():
     assert len({touch_key(TINY), *keys}) == 1 + len(paths)
 
 
-@pytest.mark.parametrize(
-    "change",
-    [
-        {"indenter": fp.Sphere(curvature_per_m=296.0)},
-        {"stimulus": fp.RampAndHold(depth_mm=0.2)},
-        {"tissues": fp.named_tissues("trial1")},
-        {
-            "tissues": replace(
-                TINY.tissues, dermis=replace(TINY.tissues.dermis, prony=fp.Prony((0.1,), (9.0,)))
-            )
-        },
-        {"grading": replace(COARSE, full=True)},
-        {"settings": fp.PressSettings(2, 1)},
-        {"at_mm": (17.0, 0.0)},
-        {"tilt_deg": 3.0},
-        {"spin_deg": 3.0},
-    ],
-    ids=lambda change: next(iter(change)),
-)
-def test_key_changes_with_what_a_user_would_change(change):
-    assert touch_key(replace(TINY, **change)) != touch_key(TINY)
-
-
 def test_indenters_of_equal_numbers_have_different_keys():
+    relaxing = replace(TINY.tissues.dermis, prony=fp.Prony((0.1,), (9.0,)))
+    assert touch_key(replace(TINY, tissues=replace(TINY.tissues, dermis=relaxing))) != touch_key(TINY)
     bodies = [
         fp.Line(3.5),
         fp.Cylinder(3.5),

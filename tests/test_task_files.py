@@ -200,14 +200,6 @@ def test_an_afferent_is_ours_or_ones_own_numbers_or_of_a_file_of_results(tmp_pat
         assert found == replace(expected, **quantities)
 
 
-def test_the_resolution_can_be_replaced_and_nothing_else_changes(tmp_path):
-    path = tmp_path / "mine.yaml"
-    path.write_text(example_tasks()["sphere_curvature"], encoding="utf-8")
-    quick, own = fp.read_task(path, resolution="quick"), fp.read_task(path)
-    assert (quick.resolution, own.resolution) == ("quick", "standard")
-    assert quick.model_copy(update={"resolution": own.resolution}) == own
-
-
 @pytest.mark.parametrize("name", example_tasks())
 def test_ready_made_questions_can_be_asked(name):
     question = fp.read_task(name, resolution="quick")
@@ -239,7 +231,6 @@ def refused(content):
 # What description files have in common with touches is tried in test_touch_description.py.
 REFUSALS = """
 question: null => question must be given: it is missing.
-noise: null => noise must be given
 noise: 1e300 => noise must be a number from 0 to 1000, or fitted: got 1e+300.
 noise: much => noise must be a number from 0 to 1000, or fitted: got 'much'.
 {noise: 0, code: [gradient_sum, ideal]} => noise must be greater than 0 where code has ideal: got 0.
@@ -249,8 +240,6 @@ noise: fitted => noise can only be fitted to observed hit rates of the compariso
 {noise: fitted, observed: {points: [{at: 305, hit_rate: 0.7}]}} =>
     noise can only be fitted to observed hit rates
 nois: 0.1 => nois is unknown: did you mean noise?
-colour: red => colour is unknown: the file has resolution, finger, tissues, object,
-stimuli: null => stimuli must be given
 stimuli: [] => stimuli must be two or more
 stimuli: {vary: object.curvature_per_m, values: [287]} => stimuli must be two or more
 stimuli: {vary: object.curvature_per_m, values: [287, 287]} => '287' is repeated
@@ -267,13 +256,10 @@ stimuli: {vary: object.width_mm, values: [1, 2]} =>
     stimuli.values[1], object.width_mm is unknown: object has kind, curvature_per_m
 {stimuli: {vary: motion.depth_mm, values: [1, 15]}, standard: 1} =>
     stimuli.values[2], motion.depth_mm must stay below
-stimuli: {vary: object.curvature_per_m} => stimuli.values must be given
 stimuli: [{object: {curvature_per_m: 300}}] => stimuli[1].name must be given
 stimuli: [{name: a}, {name: a}] => 'a' is repeated
 {stimuli: [{name: a, level: 1}, {name: b}], standard: a} =>
     level must be given for all stimuli or for none: 'b' has none.
-{stimuli: [{name: a, object: {widht_mm: 3}}, {name: b}], object: bar} =>
-    stimuli[1].object.widht_mm is unknown: did you mean width_mm?
 stimuli: [{name: a, width_mm: 3}, {name: b}] =>
     stimuli[1].width_mm is unknown: stimuli[1] has object, motion, place,
 stimuli: [{name: a, friction: -1}, {name: b}] => stimuli[1].friction must be a number not below 0: got -1
@@ -334,30 +320,6 @@ LINES = REFUSALS.strip().replace("\n    ", " ").splitlines()
 @pytest.mark.parametrize(("parts", "said"), [line.split(" => ") for line in LINES])
 def test_invalid_values_are_refused_in_one_sentence_with_their_position(parts, said):
     assert said in refused(changed(SPHERES, **read_yaml(parts, "part")))
-
-
-@pytest.mark.parametrize(
-    ("text", "said"),
-    [
-        ("question: a\nquestion: b\n", "mine.yaml, line 2: question is repeated, keep one."),
-        ("", "mine.yaml, the file must be a mapping of keys to values: it is empty."),
-        ("question: &a [*a]\n", "mine.yaml cannot be read as YAML (it has an anchor or an alias"),
-    ],
-)
-def test_a_file_that_is_no_question_is_refused_with_its_name(tmp_path, monkeypatch, text, said):
-    monkeypatch.chdir(tmp_path)
-    Path("mine.yaml").write_text(text)
-    with pytest.raises(fp.InputError, match="^" + re.escape(said)):
-        fp.read_task("mine.yaml")
-
-
-def test_neither_a_file_nor_a_ready_made_question_lists_those():
-    with pytest.raises(
-        fp.InputError, match=r"must be a YAML file or one of .*sphere_curvature.*: it is neither"
-    ):
-        fp.read_task("sphere_curvatur")
-    with pytest.raises(fp.InputError, match=r"gone\.yaml must be a file that can be read"):
-        fp.read_task("gone.yaml")
 
 
 @pytest.mark.parametrize(

