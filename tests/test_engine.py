@@ -20,12 +20,9 @@ from cluster import real_cluster, slow, wait_until
 from fingerpad.cli import main
 from fingerpad.core.engine import Processes, _signals_later, engine_of
 from fingerpad.experiments import cluster as module
-from test_store import SIX
 
 pytestmark = pytest.mark.filterwarnings("default")
 """Dask's own warnings are none of ours."""
-
-TOUCHES = SIX[:2]
 
 
 @pytest.fixture(autouse=True)
@@ -126,17 +123,6 @@ def test_a_connection_that_fails_late_is_made_again(running, monkeypatch, what):
     assert len(failures) == 1
 
 
-def test_a_cluster_stores_the_same_bits_and_nothing_twice(running, tmp_path):
-    here, there = fp.Store(tmp_path / "here"), fp.Store(tmp_path / "there")
-    fp.solve_missing(here.missing(TOUCHES), 1)
-    there.folder.mkdir()
-    kept = there.path(TOUCHES[0])
-    kept.write_bytes(b"stored by another worker in the meantime")
-    fp.solve_missing({there.path(touch): touch for touch in TOUCHES}, fp.Cluster(running.address))
-    assert kept.read_bytes().startswith(b"stored by")
-    assert there.path(TOUCHES[1]).read_bytes() == here.path(TOUCHES[1]).read_bytes()
-
-
 def test_a_sweep_on_a_cluster_has_the_bits_of_one_process_and_presses_nothing_twice(running, tmp_path):
     touch = {"object": "cylinder", "motion": {"ramp_ms": 50, "hold_ms": 60}}
     sweep = {"touch": touch, "grid": {"motion.depth_mm": [0.2, 0.3], "afferents.columns": [2, 3]}}
@@ -160,17 +146,8 @@ def test_a_client_that_is_killed_goes_on_with_what_is_stored(running, tmp_path):
     touch = {"object": "cylinder", "motion": {"ramp_ms": 50, "hold_ms": 60}}
     sweep = {"touch": touch, "grid": {"motion.depth_mm": depths}}
     (tmp_path / "sweep.yaml").write_text(json.dumps(sweep))
-    command = (
-        "-m",
-        "fingerpad",
-        "sweep",
-        "sweep.yaml",
-        "--scheduler",
-        running.address,
-        "--out",
-        "study.zarr",
-    )
-    client = subprocess.Popen((sys.executable, *command), cwd=tmp_path, stderr=subprocess.DEVNULL)
+    command = f"-m fingerpad sweep sweep.yaml --scheduler {running.address} --out study.zarr".split()
+    client = subprocess.Popen([sys.executable, *command], cwd=tmp_path, stderr=subprocess.DEVNULL)
     stored = tmp_path / "indentations"
     wait_until(lambda: len(list(stored.glob("*.npz"))) >= 2, limit_s=120.0)
     client.kill()

@@ -18,8 +18,8 @@ from fingerpad.inference.closed_form import ClosedFormModel, constant_drive_rate
 from fingerpad.inference.fitting.cross_validation import fractional_sum_of_squares
 from fingerpad.inference.fitting.least_squares import LeastSquares
 from fingerpad.inference.fitting.methods import Bounds
-from fingerpad.inference.identifiable import IDENTIFIABLE_NAMES, identifiable, six_parameters
-from fingerpad.inference.rate_model import AfferentModel, Reparametrised, four_number_model
+from fingerpad.inference.identifiable import identifiable, six_parameters
+from fingerpad.inference.rate_model import AfferentModel, four_number_model
 from fingerpad.inference.rate_problem import RateProblem
 from fingerpad.neuron.lif import LeakyIntegrateAndFire
 from fingerpad.neuron.spikes import PAPER_WINDOWS_MS, firing_rate_hz
@@ -149,20 +149,6 @@ def test_the_drive_is_the_sampled_one_and_interpolated_in_between():
     for name in ("values", "rate_per_ms"):
         ends = [getattr(drive(traces(offset)), name) for offset in (0.0, 0.2)]
         np.testing.assert_allclose(getattr(middle, name), np.mean(ends, axis=0), rtol=1e-12, atol=1e-15)
-
-
-def test_a_hidden_offset_is_recovered():
-    six = six_parameters(FOUR)
-    hidden = problem(offset_model(), np.append(six, 0.13))
-    names = (*IDENTIFIABLE_NAMES, "offset_mm")
-    model = Reparametrised(hidden.model, names, lambda five: np.append(six_parameters(five[:4]), five[4]))
-    free = replace(hidden, model=model)
-    start, scales = np.append(1.2 * FOUR, -0.05), np.append(0.3 * FOUR, 0.1)
-    method = LeastSquares([start], Bounds(scales, [*(0.0 * FOUR), -0.4], [*(10.0 * FOUR), 0.4]))
-    fit = method.fit(free, EVERYTHING)
-    assert fit.parameters[-1] == pytest.approx(0.13, abs=0.02)
-    blind = replace(hidden, model=AfferentModel.of_traces(traces()))
-    assert fit.score > 0.99 > blind.score(six, EVERYTHING) + 0.02
 
 
 def test_places_that_were_not_sampled_are_refused():

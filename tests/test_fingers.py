@@ -12,7 +12,6 @@ from fingerpad.geometry.fingertip import FINGERS, Fingertip
 from fingerpad.geometry.grading import resolution_grading
 from fingerpad.geometry.indenter_grading import grading_about
 from fingerpad.geometry.indenters import Sphere
-from fingerpad.geometry.mesh import finger_mesh
 from fingerpad.geometry.mesh_checks import check_mesh, scaled_jacobian
 from fingerpad.geometry.motion import RampAndHold
 from fingerpad.mechanics.laws import Energy, Hencky, Hyperfoam, Ogden, Polynomial
@@ -72,14 +71,6 @@ def test_presets_have_the_sizes_of_their_sources():
     assert aged.volar_readings_mm == PAPER.volar_readings_mm
     assert aged.living_epidermis_mm == pytest.approx(0.1 * (1 - 4 * 0.0645))
     assert aged.dermis_mm == pytest.approx(1.153 * 0.76)
-
-
-def test_a_scaled_finger_has_the_same_mesh_in_another_size():
-    factor, grading = 0.5, resolution_grading("quick", 17.37)
-    smaller = resolution_grading("quick", 17.37 * factor, 5.0 * factor, 1.0 * factor, factor)
-    here, there = finger_mesh(PAPER, grading), finger_mesh(PAPER.scaled(factor), smaller)
-    assert here.shape == there.shape
-    assert np.abs(there.nodes_mm - factor * here.nodes_mm).max() < 1e-4
 
 
 def test_force_grows_with_the_square_of_the_size():

@@ -88,24 +88,6 @@ def test_each_fold_is_fitted_without_its_own_observations():
     assert [row.score for row in alone.history] == [row.score for row in fit.history]
 
 
-def test_training_and_testing_sets_part_the_observations():
-    memberships = np.array([0, 0, 1, 2, 1, 2, 2])
-    asked: list[tuple[int, ...]] = []
-
-    def score(parameters, chosen):
-        asked.append(tuple(chosen.tolist()))
-        return -float(parameters[0] ** 2)
-
-    result = cross_validate(Scored(score, 7), ResponseSurface([[0.0]], [0.1]), memberships)
-    everything = set(range(7))
-    assert [fold.testing.tolist() for fold in result.folds] == [[0, 1], [2, 4], [3, 5, 6]]
-    for fold in result.folds:
-        assert fold.training.tolist() == sorted(everything - set(fold.testing.tolist()))
-    expected = {tuple(fold.testing.tolist()) for fold in result.folds}
-    expected |= {tuple(sorted(everything - set(testing))) for testing in expected}
-    assert set(asked) == expected
-
-
 def test_the_better_start_on_the_training_set_is_taken():
     def two_hills(parameters, chosen):
         x = float(parameters[0])

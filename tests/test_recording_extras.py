@@ -52,18 +52,6 @@ def fitted():
     return fit_recordings(BESIDE[0.0], ASIDE, FOLDS, beside=BESIDE, with_sensitivity=True)
 
 
-def test_between_two_places_the_drive_is_linear_and_at_a_place_it_is_that_of_the_place():
-    for offset in PLACES_MM:
-        there = AfferentModel.of_traces(felt(offset)).evaluate(KNOWN)
-        assert_allclose(TRUTH.at(offset).evaluate(KNOWN), there, rtol=1e-12)
-    (between,) = TRUTH.at(0.06).drives
-    ends = [AfferentModel.of_traces(felt(offset)).drives[0].values for offset in (0.0, 0.3)]
-    assert_allclose(between.values, 0.8 * ends[0] + 0.2 * ends[1], rtol=1e-12)
-    assert TRUTH.names[-1] == "offset_mm"
-    with pytest.raises(InputError, match=r"offset_mm must lie within -0.3 ... 0.3 mm"):
-        TRUTH.at(0.5)
-
-
 def test_stimuli_with_different_motions_can_be_sampled_at_an_offset():
     slow_ms = np.append(TIMES_MS[:-1], 1500.0)
     mixed = [AfferentModel.of_traces([felt(place), felt(place, slow_ms)]) for place in (-0.2, 0.2)]
