@@ -114,10 +114,8 @@ test_impossible_afferents_and_traces_of_another_quantity_are_refused = refusals(
     (lambda: Afferent(threshold_mv=0.0), ("threshold_mv",)),
     (lambda: Afferent(dynamic_gain=np.inf), ("dynamic_gain",)),
     (lambda: Afferent().spikes(ramp_and_hold(1.0)), r"got traces of 'stored'; .*for_tissues\('paper'\)"),
-    (
-        lambda: replace(SED_DRIVEN, static_quantity="work").spikes(ramp_and_hold(1.0)),
-        "static term of this afferent needs 'work': got traces of 'stored'",
-    ),
+    (lambda: replace(SED_DRIVEN, static_quantity="work").spikes(ramp_and_hold(1.0)),
+     "static term of this afferent needs 'work': got traces of 'stored'"),
 )  # fmt: skip
 
 

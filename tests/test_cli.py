@@ -135,14 +135,11 @@ def test_a_folder_that_cannot_be_is_named_and_what_is_there_stays(call, tmp_path
     ("failure", "status", "said"),
     [
         (fp.StoreError("x.npz cannot be read: delete it."), 2, "x.npz cannot be read: delete it."),
-        (
-            fp.ConvergenceError("No equilibrium at 3 ms.", ("at 3 ms: 40 steps",)),
-            2,
-            "No equilibrium at 3 ms.",
-        ),
+        (fp.ConvergenceError("No equilibrium at 3 ms.", ("at 3 ms: 40 steps",)), 2,
+         "No equilibrium at 3 ms."),
         (KeyboardInterrupt(), 130, "stopped. The same command continues after the last"),
     ],
-)
+)  # fmt: skip
 def test_a_failed_run_is_reported_without_a_traceback(call, monkeypatch, tmp_path, failure, status, said):
     def fail(*_):
         raise failure

@@ -16,6 +16,7 @@ from fingerpad.report.discrimination_task import draw_task_responses
 from fingerpad.report.drawing import DRAWINGS
 from fingerpad.report.responses import draw_responses
 from fingerpad.report.touch import draw_spikes
+from refusals import refused
 
 TASK = {
     "question": "How strong?",
@@ -205,7 +206,7 @@ def test_unknown_drawings_and_quantities_are_refused(results, kind, arguments, o
 
 
 def test_progress_that_has_no_stages_is_refused():
-    with pytest.raises(fp.InputError, match=r"progress must have a method stage, as fp.notebook_progress"):
+    with refused("progress"):
         fp.indent(fp.Fingertip(), fp.Sphere(curvature_per_m=287.0), progress=True)
 
 

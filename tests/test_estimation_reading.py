@@ -185,31 +185,22 @@ def test_stimuli_name_finger_tissues_and_resolution_and_options_replace_them(wri
         ("a.csv", "name,object,object.width_mm\ntip,bar:2,1\n", "line 2: object.sizes must stand in"),
         ("a.csv", "name,object,motion.depth_mm\ntip,bar,[\n", "line 2, motion.depth_mm cannot be read as"),
         ("a.csv", "name,object,motion.depth_mm,motion.force_mn\ntip,bar,1,1\n", "exclude each other"),
-        (
-            "a.csv",
-            "name,object,motion.kind,motion.file\ntip,bar,recorded,no.csv\n",
-            "line 2, motion: no.csv must",
-        ),
+        ("a.csv", "name,object,motion.kind,motion.file\ntip,bar,recorded,no.csv\n",
+         "line 2, motion: no.csv must"),
         ("a.yaml", "", "a.yaml, the file must be a mapping of keys to values: it is empty"),
         ("a.yaml", "- {name: tip}\n", "a.yaml, the file must be a mapping of keys to values: got "),
         ("a.yaml", "stimuli:\n- tip\n", "a.yaml, line 2, stimuli[1] must be a mapping"),
         ("a.yaml", "stimuli: []\n", "a.yaml, line 1, stimuli must have at least one entry"),
         ("a.yaml", "object: bar\nstimuli:\n- {nane: tip}\n", "line 3, stimuli[1].nane is unknown: did you"),
         ("a.yaml", "stimuli: {name: tip, name: bar}\n", "line 1: name is repeated"),
-        (
-            "a.yaml",
-            "object: bar\nstimuli:\n- {name: tip, motion: {depth_mm: yes}}\n",
-            "line 3, stimuli[1].motion.depth_mm must be a finite",
-        ),
-        (
-            "a.yaml",
-            "object: bar\nstimuli:\n- {name: tip}\nplace: {x_mm: .nan}\n",
-            "line 4, place.x_mm must be a finite",
-        ),
+        ("a.yaml", "object: bar\nstimuli:\n- {name: tip, motion: {depth_mm: yes}}\n",
+         "line 3, stimuli[1].motion.depth_mm must be a finite"),
+        ("a.yaml", "object: bar\nstimuli:\n- {name: tip}\nplace: {x_mm: .nan}\n",
+         "line 4, place.x_mm must be a finite"),
         ("a.yaml", b"stimuli: \xff\n", "a.yaml must be text in UTF-8: byte 10 is not"),
     ],
     ids=lambda value: str(value)[-40:],
-)
+)  # fmt: skip
 def test_stimuli_that_cannot_be_are_named_by_line_and_column(written, name, content, said):
     path = written(name, content)
     with pytest.raises(fp.InputError) as refused:

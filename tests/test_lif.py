@@ -15,6 +15,7 @@ from fingerpad.core import threads
 from fingerpad.core.threads import BLOCK
 from fingerpad.neuron.exact_spikes import _next_guess
 from fingerpad.neuron.lif import LeakyIntegrateAndFire
+from refusals import refused
 
 TAU, CAPACITANCE, THRESHOLD, REFRACTORY = 68.0, 1e-6, 50.0, 1.0
 NEURON = LeakyIntegrateAndFire(TAU, CAPACITANCE, THRESHOLD, REFRACTORY)
@@ -100,7 +101,7 @@ def test_runge_kutta_approaches_the_exact_spikes_as_its_step_shrinks():
     assert late.size > 10
     assert (late > -1e-9).all()
     assert (late < 0.001 * np.arange(1, late.size + 1) + 1e-9).all()
-    with pytest.raises(InputError, match="step_ms"):
+    with refused("step_ms"):
         runge_kutta_spikes(NEURON, steady, 0.0)
 
 

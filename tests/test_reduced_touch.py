@@ -26,7 +26,7 @@ from fingerpad.reduction.relaxation import (
 )
 from fingerpad.reduction.streaming import read_local
 from fingerpad.reduction.training import first_touch_mm
-from refusals import misused
+from refusals import misused, refused
 
 DEEPEST_MM = 1.0
 
@@ -310,7 +310,7 @@ def test_a_stream_refuses_wrong_samples() -> None:
     with pytest.raises(fp.InputError, match="follows one quantity"):
         stream.step(1.0, [0.0, 0.0], [0.0, 0.0])
     stream.step(1.0, [0.0, 0.0])
-    with pytest.raises(fp.InputError, match="time_ms must go on"):
+    with refused("time_ms"):
         stream.step(1.0, [0.0, 0.0])
 
 

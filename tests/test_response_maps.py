@@ -141,10 +141,7 @@ test_what_cannot_be_used_is_refused = refusals(
     (lambda: population_rate(SpikeTrains.from_lists([[1.0]]), [0.0, 1.0], [0, 0]), "one whole number"),
     (lambda: population_rate(SpikeTrains.from_lists([[1.0]]), [0.0, 1.0], [-2]), "count from 0"),
     (lambda: population_rate(SpikeTrains.from_lists([[1.0]]), [0.0, 1.0], None, -1.0), "not be negative"),
-    (
-        lambda: population_rate(SpikeTrains.from_lists([]), [0.0, 1.0]).rate_per_area(0.0),
-        "greater than 0",
-    ),
+    (lambda: population_rate(SpikeTrains.from_lists([]), [0.0, 1.0]).rate_per_area(0.0), "greater than 0"),
     (lambda: rings([[0.0, 0.0]], [0.0, 0.0, 0.0], [0.0, 1.0]), "coordinates of the positions"),
     (lambda: rings([[0.0, 0.0]], [0.0, 0.0], [-1.0, 1.0]), "none negative"),
     (lambda: rings([[0.0, 0.0]], [0.0, 0.0], [1.0]), "at least two distances"),

@@ -13,6 +13,7 @@ from fingerpad.neuron.spikes import (
     modulation_difference,
     modulation_index,
 )
+from refusals import refused
 
 
 def plain_rate(train, start, end):
@@ -50,10 +51,10 @@ def test_modulation_index_ranges_from_0_to_1_and_ignores_scale():
 
 def test_bad_windows_and_trains_are_refused():
     for window in ((50.0, 50.0), (50.0, 30.0), (0.0, np.nan), (0.0,), (0.0, 1.0, 2.0)):
-        with pytest.raises(InputError, match="window_ms"):
+        with refused("window_ms"):
             firing_rate_hz(SpikeTrains.from_lists([[1.0]]), window)
     assert len(SpikeTrains.from_lists([[5.0, 6.0], [], [1.0, 2.0], []])) == 4  # trains may overlap
     with pytest.raises(InputError, match="increase within each afferent"):
         SpikeTrains.from_lists([[], [1.0, 3.0, 2.0]])
-    with pytest.raises(InputError, match="offsets must hold whole numbers"):
+    with refused("offsets"):
         SpikeTrains([1.0, 2.0], [0, 0.5, 2])

@@ -6,7 +6,6 @@ import re
 import signal
 import subprocess
 import sys
-import time
 from dataclasses import fields, is_dataclass, replace
 from pathlib import Path
 
@@ -17,6 +16,7 @@ from vtkmodules.vtkIOXML import vtkXMLUnstructuredGridReader
 
 import fingerpad
 import fingerpad as fp
+from cluster import wait_until
 from fingerpad.cli import main
 from fingerpad.core.units import QUANTITY_UNITS
 from fingerpad.export.vtu import write_vtu_series
@@ -57,16 +57,6 @@ SINGLE = {
     **dict.fromkeys(("instantaneous", "work", "von_mises", "compressive_strain", "compressive_stress"), "tr"),
 }
 """Arrays of a stored file: of times, skin nodes, nodes, elements, receptors' elements, components."""
-
-
-LIMIT_S = 120.0
-
-
-def wait_until(condition, limit_s=LIMIT_S):
-    end = time.monotonic() + limit_s
-    while not condition():
-        assert time.monotonic() < end, "waited too long"
-        time.sleep(0.005)
 
 
 @pytest.fixture(scope="module")
@@ -131,16 +121,8 @@ def test_key_changes_with_the_last_bit_of_every_input():
 def test_indenters_of_equal_numbers_have_different_keys():
     relaxing = replace(TINY.tissues.dermis, prony=fp.Prony((0.1,), (9.0,)))
     assert touch_key(replace(TINY, tissues=replace(TINY.tissues, dermis=relaxing))) != touch_key(TINY)
-    bodies = [
-        fp.Line(3.5),
-        fp.Cylinder(3.5),
-        fp.Bar(3.5),
-        fp.FlatPunch(3.5),
-        fp.Sphere(radius_mm=3.5),
-        fp.Plate(),
-        fp.Bar(3.5, 0.1),
-        fp.Edge(3.5),
-    ]
+    straight = [kind(3.5) for kind in (fp.Line, fp.Cylinder, fp.Bar, fp.FlatPunch, fp.Edge)]
+    bodies = [*straight, fp.Sphere(radius_mm=3.5), fp.Plate(), fp.Bar(3.5, 0.1)]
     assert len({touch_key(replace(TINY, indenter=body)) for body in bodies}) == len(bodies)
 
 

@@ -329,10 +329,8 @@ TOP, BOTTOM = [6, 7], [4, 5]
         (_shaken(0.0), ""),
         (_shaken(1e-6), "vertices joined within 0.01 mm: 28, moved by up to"),
         ((CUBE, SIDES[:, ::-1]), "normals pointed inwards, turned: 1"),
-        (
-            _together((LOW, [-5e-5, 0, 1.5], SIDES), ([5e-5, -2, -1.5], HIGH, SIDES)),
-            "0.0001 mm apart, left out: 4",
-        ),
+        (_together((LOW, [-5e-5, 0, 1.5], SIDES), ([5e-5, -2, -1.5], HIGH, SIDES)),
+         "0.0001 mm apart, left out: 4"),
         (_together((LOW, [0.3, 0, 1.5], SIDES), ([-0.3, -2, -1.5], HIGH, SIDES)), ""),
         (_together((LOW, HIGH, SIDES), ([-0.5] * 3, [0.5, -0.2, 0.5], SIDES)), "within others, left out: 1"),
         (_together((LOW, HIGH, SIDES), ([-0.5] * 3, [0.5, -0.2, 0.5], SIDES[:, ::-1])), "left out: 1"),

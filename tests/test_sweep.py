@@ -143,14 +143,12 @@ def test_a_constraint_compares_fields():
         ({"grid": {"friction": {"start": 0, "stop": 1}}}, "count must be given: it is missing"),
         ({"grid": {"friction": {"start": 0, "stop": 1, "count": 2, "spacing": "logarithmic"}}}, "above 0"),
         ({"grid": {"seed": [1]}}, "seed is unknown"),
-        (
-            {"grid": {"friction.much": [1]}, "touch": {"object": "sphere", "friction": 0.1}},
-            "must be a mapping",
-        ),
+        ({"grid": {"friction.much": [1]}, "touch": {"object": "sphere", "friction": 0.1}},
+         "must be a mapping"),
         ({"grids": {}}, "grids is unknown: did you mean grid?"),
         ({"grid": {"friction": [0.1]}, "fields": ["warmth"]}, "must be one of times_ms"),
     ],
-)
+)  # fmt: skip
 def test_a_bad_sweep_is_refused_in_one_sentence(sweep, said, tmp_path):
     with pytest.raises(InputError) as refusal:
         fp.run_sweep({"touch": {"object": "sphere"}, **sweep}, tmp_path / "study.zarr")

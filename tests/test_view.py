@@ -14,16 +14,10 @@ from fingerpad.cli import main
 from fingerpad.core.progress import Lines
 from fingerpad.export import view
 from fingerpad.export.view import fields_of
+from refusals import refused
+from sections import SMALL_TOUCH
 
-GRADING = fp.Grading(17.37, 1.2, 1.2, 0.8, 0.8, largest_mm=4.0, stratum_corneum=1, dermis=1, subcutis=1)
-TOUCH = fp.Touch(
-    finger=fp.Fingertip(),
-    indenter=fp.Sphere(curvature_per_m=287),
-    stimulus=fp.RampAndHold(depth_mm=0.5),
-    tissues=fp.named_tissues("trial3"),
-    grading=GRADING,
-    settings=fp.PressSettings(ramp_steps=2, hold_steps=1),
-)
+TOUCH = replace(SMALL_TOUCH, stimulus=fp.RampAndHold(depth_mm=0.5))
 RESPONSE = fp.ResponseMap(
     positions_mm=[[17.0, -1.0], [17.0, 1.0], [19.0, -1.0]],
     pitch_mm=2.0,
@@ -80,7 +74,9 @@ def test_afferents_that_fire_are_dark(data):
 
 
 def test_a_whole_finger_and_a_turned_body_are_cut_at_the_middle():
-    whole = replace(TOUCH, indenter=fp.Bar(3.0, 0.3), grading=replace(GRADING, full=True), spin_deg=30.0)
+    whole = replace(
+        TOUCH, indenter=fp.Bar(3.0, 0.3), grading=replace(TOUCH.grading, full=True), spin_deg=30.0
+    )
     data = fp.touch_dataset(whole.solve(whole=True))
     drawn = view._View(data, "sed_kpa")
     assert drawn._object(50.0).bounds.z_max <= 1e-9
@@ -145,7 +141,7 @@ def test_a_response_without_afferents_and_object_is_drawn(tmp_path):
 def test_what_is_no_data_set_or_has_no_library_is_refused_and_a_changed_description_is_not(
     data, tmp_path, file, monkeypatch
 ):
-    with pytest.raises(fp.InputError, match="touch must be of type Dataset"):
+    with refused("touch"):
         fp.save_view(tmp_path / "a.png", 5)
     assert view._named("Sphere") == view._named("[1]") == "object"
     assert view._named(data.attrs["indenter"]) == "Sphere"
