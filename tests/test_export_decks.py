@@ -23,6 +23,7 @@ from refusals import refusals
 PRONY = fp.Prony(shares=(0.1, 0.3), times_ms=(20.0, 700.0))
 BALL = fp.Sphere(curvature_per_m=1000.0 / 3.0)
 NEO_HOOKE = fp.Material.neo_hooke(20.0, 0.48)
+TILTED = np.array([[0.8, -0.6, 0.0], [0.6, 0.8, 0.0], [0.0, 0.0, 1.0]])
 TIMES, DEPTHS = np.array([0.0, 5.0, 10.0, 15.0, 40.0]), np.array([0.0, 0.1, 0.2, 0.2, 0.2])
 INDENTERS = [
     BALL, fp.Cylinder(3.0), fp.Bar(3.0, 0.3), fp.Bar(2.0, 0.0), fp.FlatPunch(2.0, 0.3),
@@ -342,8 +343,7 @@ def test_calculix_takes_the_moduli_that_are_asked_for(moduli, asked, factor):
 @pytest.mark.parametrize("material", [NEO_HOOKE, NEO_HOOKE.with_prony(PRONY)], ids=["elastic", "relaxing"])
 def test_abaqus_takes_our_steps(material):
     """Increments and ends of the steps add up to our times; the reference node goes where we go."""
-    tilted = np.array([[0.8, -0.6, 0.0], [0.6, 0.8, 0.0], [0.0, 0.0, 1.0]])
-    job = block_job(material=material, rotation=tilted)
+    job = block_job(material=material, rotation=TILTED)
     cards = read_cards(abaqus_deck(job))
     times, depths = [0.0], [0.0]
     procedures = [numbers(data) for keyword, _, data in cards if keyword in ("STATIC", "VISCO")]
@@ -377,8 +377,7 @@ def test_an_elastic_hold_is_left_out_for_calculix():
 @pytest.mark.parametrize("indenter", INDENTERS, ids=name_of)
 def test_abaqus_draws_the_indenter_where_it_stands(indenter):
     """Points along lines and arcs have no gap, and the normal on the left of the line points at the skin."""
-    tilted = np.array([[0.8, -0.6, 0.0], [0.6, 0.8, 0.0], [0.0, 0.0, 1.0]])
-    job = block_job(indenter, rotation=tilted)
+    job = block_job(indenter, rotation=TILTED)
     given, data = next(
         card for card in of(read_cards(abaqus_deck(job)), "SURFACE") if card[0]["NAME"] == "INDENTER"
     )
@@ -503,6 +502,11 @@ def read_febio(job):
     return xml.fromstring(febio_deck(job).encode())
 
 
+def febio_points(mesh):
+    rows = {node.get("id"): node.text.split(",") for node in mesh.iter("node")}
+    return {int(number): np.array(row, dtype=float) for number, row in rows.items()}
+
+
 def curve(root, number):
     (controller,) = [item for item in root.find("LoadData") if item.get("id") == str(number)]
     assert controller.get("type") == "loadcurve"
@@ -531,10 +535,7 @@ def test_febio_holds_the_same_mesh(finger_job):
     for job in (finger_job, block_job()):
         root = read_febio(job)
         mesh = root.find("Mesh")
-        points = {
-            int(node.get("id")): np.array([float(value) for value in node.text.split(",")])
-            for node in mesh.iter("node")
-        }
+        points = febio_points(mesh)
         materials = {item.get("name"): item.get("mat") for item in root.find("MeshDomains")}
         elements = {}
         for block in mesh.findall("Elements"):
@@ -560,9 +561,7 @@ def test_febio_holds_the_same_mesh(finger_job):
 def test_febio_faces_look_outwards(finger_job):
     """Skin and indenter face each other: their facets are counter-clockwise seen from outside of either."""
     mesh = read_febio(finger_job).find("Mesh")
-    points = {
-        int(node.get("id")): np.array([float(v) for v in node.text.split(",")]) for node in mesh.iter("node")
-    }
+    points = febio_points(mesh)
     axis = finger_job.placement.axis
     for name, sign in (("SKIN", -1.0), ("INDENTER", 1.0)):
         (surface,) = [item for item in mesh.findall("Surface") if item.get("name") == name]
@@ -574,8 +573,7 @@ def test_febio_faces_look_outwards(finger_job):
 
 
 def test_febio_moves_as_we_do():
-    tilted = np.array([[0.8, -0.6, 0.0], [0.6, 0.8, 0.0], [0.0, 0.0, 1.0]])
-    job = block_job(rotation=tilted)
+    job = block_job(rotation=TILTED)
     root = read_febio(job)
     control = root.find("Control")
     assert (control.find("time_steps").text, control.find("final_time").text) == ("-1", "40")
@@ -736,21 +734,6 @@ test_what_a_deck_cannot_hold_is_refused_with_its_reason = refusals(
     (lambda job: abaqus_deck(with_element_that_is_no_wedge(job)), "element 5 has the nodes"),
     call=lambda call: call(block_job()),
 )  # fmt: skip
-
-
-@pytest.mark.parametrize(
-    ("format_name", "moduli", "suffix"),
-    [("abaqus", None, "inp"), ("calculix", "long_term", "inp"), ("febio", None, "feb")],
-)
-def test_a_touch_is_exported_by_name(tmp_path, format_name, moduli, suffix):
-    touch = fp.touch_of(fp.Fingertip(), BALL, fp.RampAndHold(depth_mm=0.4), "trial1", grading=COARSE)
-    (path,) = fp.export_touch(tmp_path, touch, format_name, moduli)
-    assert path == tmp_path / f"touch.{suffix}"
-    decks = {"abaqus": abaqus_deck, "febio": febio_deck, "calculix": lambda job: calculix_deck(job, moduli)}
-    assert path.read_text() == decks[format_name](job_of(touch))
-    if format_name != "calculix":
-        with pytest.raises(fp.InputError, match=f"elastic_moduli is for calculix, .* not for {format_name}"):
-            fp.export_touch(tmp_path, touch, format_name, "long_term")
 
 
 def test_a_touch_becomes_a_job_and_decks():
