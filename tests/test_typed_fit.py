@@ -8,6 +8,7 @@ import pytest
 import fingerpad as fp
 from fingerpad.inference.typed_fit import TypedModel
 from fingerpad.neuron.lif import LeakyIntegrateAndFire
+from refusals import refusals
 
 NAMES = ("a", "b", "c", "d", "e", "f")
 
@@ -55,17 +56,13 @@ def test_numbers_of_any_type_are_found_again(afferent, free, factor, heights):
     np.testing.assert_array_equal(found.dynamic_rate_hz, again)
 
 
-@pytest.mark.parametrize(
-    ("afferent", "free", "said"),
-    [
-        (fp.RA(), ["treshold"], r"free must be one of .*did you mean threshold"),
-        (fp.RA(), [], "free must name at least one number of RA: got none"),
-        (fp.RA(), ["quantity"], r"quantity must be greater than 0|must be a finite number"),
-        (fp.Afferent(), ["intercept_ma"], "intercept_ma must be greater than 0"),
-        (len, ["threshold"], "free must be one of"),
-    ],
+TWO = ramps("compressive_stress", [5.0, 9.0]), fp.RateRecordings(NAMES[:2], [10.0, 20.0], None)
+
+test_numbers_that_cannot_be_fitted_are_refused = refusals(
+    ((fp.RA(), ["treshold"]), r"free must be one of .*did you mean threshold"),
+    ((fp.RA(), []), "free must name at least one number of RA: got none"),
+    ((fp.RA(), ["quantity"]), r"quantity must be greater than 0|must be a finite number"),
+    ((fp.Afferent(), ["intercept_ma"]), "intercept_ma must be greater than 0"),
+    ((len, ["threshold"]), "free must be one of"),
+    call=lambda chosen: fp.fit_afferent(*chosen, *TWO),
 )
-def test_numbers_that_cannot_be_fitted_are_refused_in_one_sentence(afferent, free, said):
-    recorded = fp.RateRecordings(NAMES[:2], [10.0, 20.0], None)
-    with pytest.raises(fp.InputError, match=said):
-        fp.fit_afferent(afferent, free, ramps("compressive_stress", [5.0, 9.0]), recorded)
