@@ -27,7 +27,7 @@ def wait_until(true, limit_s=60.0):
     end = time.monotonic() + limit_s
     while not true():
         assert time.monotonic() < end, "it took too long"
-        time.sleep(0.05)
+        time.sleep(0.005)
 
 
 class RealCluster:

@@ -6,10 +6,21 @@ from typing import TypeVar
 
 import numpy as np
 
+import fingerpad as fp
 from fingerpad.core.result_files import from_json
 from fingerpad.core.signals import STORED_ENERGY, Traces
 from fingerpad.geometry.mesh import block_mesh
 from fingerpad.neuron.afferent import Afferent
+
+SMALL_TOUCH = fp.Touch(
+    finger=fp.Fingertip(),
+    indenter=fp.Sphere(curvature_per_m=287),
+    stimulus=fp.RampAndHold(depth_mm=0.3),
+    tissues=fp.named_tissues("trial3"),
+    grading=fp.Grading(17.37, 1.2, 1.2, 0.8, 0.8, largest_mm=4.0, stratum_corneum=1, dermis=1, subcutis=1),
+    settings=fp.PressSettings(ramp_steps=2, hold_steps=1),
+)
+"""A shallow press into a coarse finger, which takes a second."""
 
 CURVATURE_PER_M = [287.0, 296.0, 305.0, 316.0, 328.0, 340.0, 365.0]
 CODES = ("static", "dynamic", "latency", "euclidean")

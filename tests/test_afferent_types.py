@@ -7,7 +7,6 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 import fingerpad as fp
-from fingerpad.core.regions import Rectangle
 from fingerpad.data import afferents as published
 from fingerpad.neuron.band_pass import BandPass
 from fingerpad.neuron.escape_rate import EscapeRate
@@ -15,7 +14,8 @@ from fingerpad.neuron.lif import LeakyIntegrateAndFire
 from fingerpad.neuron.population import sensitivities
 from fingerpad.neuron.spikes import firing_rate_hz
 from fingerpad.neuron.transduction import drive
-from fingerpad.neuron.tuning import impulses_per_cycle, tuning_curve, vibration
+from fingerpad.neuron.tuning import impulses_per_cycle, vibration
+from refusals import refusals
 from sections import SED_DRIVEN
 
 PUNCH_KPA_PER_UM, PUNCH_HOLD_KPA = 0.0200, 10.4
@@ -135,7 +135,7 @@ def test_afferents_that_fire_once_in_a_ramp_have_a_rate_and_sai_keeps_that_of_th
 
 ENDS = np.array([[[0.0, 0.0], [1.0, 0.0]]])
 FINGER = Pressed({"compressive_stress": 15.0, "deep_displacement": 1.0, "skin_stretch": 0.1, "stored": 2.0})
-SQUARE = Rectangle(10.0, 10.0, centre_mm=(17.0, 0.0))
+SQUARE = fp.Rectangle(10.0, 10.0, centre_mm=(17.0, 0.0))
 
 
 @pytest.mark.parametrize(("rise", "fall"), [(1, 1), (2, 2), (3, 1)])
@@ -173,7 +173,7 @@ def test_the_band_pass_of_a_step_of_speed_is_the_closed_form():
 def test_tuning_curves_lie_within_a_factor_of_two_of_the_published_ones(
     afferent, first_hz, observed_um, per_um, hold
 ):
-    found = tuning_curve(afferent, FREQUENCIES_HZ[first_hz:][: len(observed_um.value)], per_um, hold)
+    found = fp.tuning_curve(afferent, FREQUENCIES_HZ[first_hz:][: len(observed_um.value)], per_um, hold)
     ratio = found / np.array(observed_um.value)
     assert ratio.min() > 0.5
     assert ratio.max() < 2.0
@@ -181,14 +181,14 @@ def test_tuning_curves_lie_within_a_factor_of_two_of_the_published_ones(
 
 def test_the_best_frequencies_are_those_of_the_recordings():
     low, high, pacinian = published.BEST_FREQUENCIES.value
-    ra = tuning_curve(fp.RA(), FREQUENCIES_HZ, PUNCH_KPA_PER_UM, PUNCH_HOLD_KPA)
-    pc = tuning_curve(fp.PC(), FREQUENCIES_HZ[3:], PC_PER_UM, PC_HOLD_MM)
+    ra = fp.tuning_curve(fp.RA(), FREQUENCIES_HZ, PUNCH_KPA_PER_UM, PUNCH_HOLD_KPA)
+    pc = fp.tuning_curve(fp.PC(), FREQUENCIES_HZ[3:], PC_PER_UM, PC_HOLD_MM)
     assert low <= FREQUENCIES_HZ[np.argmin(ra)] <= high
     assert FREQUENCIES_HZ[3:][np.argmin(pc)] > pacinian
     assert pc[FREQUENCIES_HZ[3:] == 200.0] < 0.1 * ra[FREQUENCIES_HZ == 200.0]
     assert pc[FREQUENCIES_HZ[3:] == 10.0] > 2.0 * ra[FREQUENCIES_HZ == 10.0]
     # A threshold separates silence from entrainment.
-    (threshold_um,) = tuning_curve(fp.RA(), [40.0], PUNCH_KPA_PER_UM, PUNCH_HOLD_KPA)
+    (threshold_um,) = fp.tuning_curve(fp.RA(), [40.0], PUNCH_KPA_PER_UM, PUNCH_HOLD_KPA)
     amplitudes_um = threshold_um * np.array([0.98, 1.0])
     beside = vibration(40.0, amplitudes_um, PUNCH_KPA_PER_UM, PUNCH_HOLD_KPA, "compressive_stress")
     below, above = impulses_per_cycle(fp.RA(), beside)
@@ -314,9 +314,9 @@ def own(respond):
     return fp.OwnAfferent(respond).spikes(ENERGY)
 
 
-BAD = [
+test_bad_input_is_refused_in_one_sentence = refusals(
     (lambda: fp.RA(retraction=1.5), "retraction must lie within 0 ... 1: got 1.5"),
-    (lambda: fp.RA(rise=0), "rise must be a whole number of at least 1"),
+    (lambda: fp.RA(rise=0), ("rise",)),
     (lambda: fp.RA().spikes(ENERGY), "needs 'compressive_stress': got traces of 'stored'"),
     (lambda: fp.RA(treshold=0.1), "treshold is no argument of RA: did you mean threshold"),
     (lambda: fp.OwnAfferent("sum"), "respond must be a function of Traces: got 'sum'"),
@@ -327,13 +327,13 @@ BAD = [
     (lambda: fp.EndOrgans(ENDS, [1.5, -0.5]), "must not be negative: the smallest is -0.5"),
     (lambda: fp.EndOrgans(ENDS, combine="mean"), "combine must be one of sum, largest: got 'mean'"),
     (lambda: fp.EndOrgans(np.zeros((1, 0, 2))), "afferents by end organs"),
-    (lambda: fp.EndOrgans.scattered([[0.0, 0.0]], 0, 1.0, 1), "count must be a whole number of at least 1"),
+    (lambda: fp.EndOrgans.scattered([[0.0, 0.0]], 0, 1.0, 1), ("count",)),
     (lambda: fp.Population([[17.0, 0.0]], 1.0, ends=fp.EndOrgans(np.zeros((2, 1, 2)))), "one row per"),
     (lambda: fp.Population([[17.0, 0.0]], 1.0, fp.RA), "afferent must be one such as"),
     (lambda: fp.Population.grid().respond(None), r"skin must have a method sed\(sites\), .* got None"),
     (lambda: fp.Population.grid(centre_mm=17.0), r"centre_mm must be a pair, x and z \[mm\]: got 17.0"),
-    (lambda: fp.Population.grid(finger="child"), r"finger must be one such as .* got 'child'"),
-    (lambda: fp.MixedPopulation([fp.Population.grid()]), "parts must be a mapping .* got list"),
+    (lambda: fp.Population.grid(finger="child"), ("finger",)),
+    (lambda: fp.MixedPopulation([fp.Population.grid()]), ("parts",)),
     (lambda: fp.MixedPopulation({"RA": fp.RA()}), r"parts\['RA'\] must be a Population"),
     (lambda: SPARSE(SQUARE, {"RA": 0.0}), r"densities_per_cm2\['RA'\].*greater than 0"),
     (lambda: SPARSE(SQUARE, {"FA": 10.0}), "type 'FA' without an afferent"),
@@ -341,16 +341,8 @@ BAD = [
     (lambda: SPARSE(SQUARE, {"RA": 9.0}).respond(FINGER)["SAI"], "must be one of RA: got 'SAI'"),
     (lambda: SPARSE(SQUARE, 100.0), "densities_per_cm2, with a type as each key, must be of type Mapping"),
     (lambda: SPARSE(SQUARE, afferents=[fp.RA()]), "afferents, with a type as each key, must be of type"),
-    (lambda: SPARSE("pad"), r"region must be one of fingerpad.core.regions or .* got 'pad'"),
+    (lambda: SPARSE("pad"), ("region",)),
     (lambda: SPARSE(SQUARE).respond("skin"), r"skin must have a method sed\(sites\), .* got 'skin'"),
-    (lambda: tuning_curve(fp.RA(), [0.0], 0.02), "frequency_hz must be greater than 0"),
-    (lambda: tuning_curve(fp.Afferent(static_quantity="stored"), [1.0], 0.02), "follows one quantity"),
-]  # fmt: skip
-
-
-@pytest.mark.parametrize(("make", "said"), BAD)
-def test_bad_input_is_refused_in_one_sentence(make, said):
-    with pytest.raises(fp.InputError, match=said) as refused:
-        make()
-    assert "\n" not in str(refused.value)
-    assert str(refused.value).endswith((".", "?"))
+    (lambda: fp.tuning_curve(fp.RA(), [0.0], 0.02), ("frequency_hz",)),
+    (lambda: fp.tuning_curve(fp.Afferent(static_quantity="stored"), [1.0], 0.02), "follows one quantity"),
+)  # fmt: skip

@@ -10,8 +10,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from fingerpad.core.errors import InputError
-from fingerpad.geometry.surface_files import read_height_map, read_surface
+from fingerpad import InputError, read_height_map, read_surface
 
 TRIANGLE = "v 0 0 0\nv 10 0 0\nv 0 10 0\nf 1 2 3\n"
 PLY = (

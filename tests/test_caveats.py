@@ -5,16 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from fingerpad import Fingertip, FlatPunch, Population, RampAndHold, Sphere, touch_of
 from fingerpad.experiments.manifest import StageSummary
 from fingerpad.experiments.runner import Runner
-from fingerpad.geometry.fingertip import Fingertip
-from fingerpad.geometry.indenters import FlatPunch, Sphere
-from fingerpad.geometry.motion import RampAndHold
 from fingerpad.mechanics.inertia import LARGEST_SHARE
-from fingerpad.neuron.population import Population
 from fingerpad.report import touch as touch_figure
 from fingerpad.skin.caveats import LARGEST_SED_RATIO
-from fingerpad.skin.indentation import touch_of
 
 
 @pytest.fixture(scope="module")

@@ -12,20 +12,15 @@ import typer
 import fingerpad as fp
 from fingerpad import __version__, cli
 from fingerpad.cli import options as choices
-from fingerpad.core.errors import ConvergenceError, FingerpadError, StoreError
 from fingerpad.data.tissues import DEFAULT_TISSUES
 from fingerpad.experiments import gerling2014
 from fingerpad.experiments.conditions import Conditions
 from fingerpad.experiments.descriptions.stimulus import FingerDescription
 from fingerpad.export import formats
 from fingerpad.geometry.edged_indenters import INDENTERS
-from fingerpad.geometry.fingertip import FINGERS, Fingertip
+from fingerpad.geometry.fingertip import FINGERS
 from fingerpad.geometry.grading import RESOLUTIONS
-from fingerpad.geometry.indenters import Plate, Sphere
-from fingerpad.geometry.motion import RampAndHold
-from fingerpad.geometry.trajectory import Trajectory
 from fingerpad.mechanics.tissues import TISSUES
-from fingerpad.skin.indentation import touch_of
 
 COMMAND = [sys.executable, "-W", "error", "-m", "fingerpad"]
 
@@ -67,7 +62,7 @@ def test_one_set_of_tissues_is_the_default_everywhere():
     assert set(pressed) == {"reproduce", "fit", "validate", "export"}
     assert pressed.pop("reproduce") == "paper"  # the first column; the default tissues are the second
     assert pressed.pop("fit") is None  # those of the file of stimuli, which are the default tissues
-    functions = [inspect.signature(function).parameters["tissues"] for function in (fp.indent, touch_of)]
+    functions = [inspect.signature(function).parameters["tissues"] for function in (fp.indent, fp.touch_of)]
     found = {*pressed.values(), *(each.default for each in functions), Conditions().tissues}
     assert found | {FingerDescription().tissues, choices.DEFAULT_TISSUES} == {DEFAULT_TISSUES}
     assert Conditions().afferent == fp.Afferent() == fp.Population.grid().afferent
@@ -139,11 +134,12 @@ def test_a_folder_that_cannot_be_is_named_and_what_is_there_stays(call, tmp_path
 @pytest.mark.parametrize(
     ("failure", "status", "said"),
     [
-        (StoreError("x.npz cannot be read: delete it."), 2, "x.npz cannot be read: delete it."),
-        (ConvergenceError("No equilibrium at 3 ms.", ("at 3 ms: 40 steps",)), 2, "No equilibrium at 3 ms."),
+        (fp.StoreError("x.npz cannot be read: delete it."), 2, "x.npz cannot be read: delete it."),
+        (fp.ConvergenceError("No equilibrium at 3 ms.", ("at 3 ms: 40 steps",)), 2,
+         "No equilibrium at 3 ms."),
         (KeyboardInterrupt(), 130, "stopped. The same command continues after the last"),
     ],
-)
+)  # fmt: skip
 def test_a_failed_run_is_reported_without_a_traceback(call, monkeypatch, tmp_path, failure, status, said):
     def fail(*_):
         raise failure
@@ -160,7 +156,7 @@ def test_options_reach_the_run(call, monkeypatch, tmp_path):
 
     def note(run, progress):
         runs.append(run)
-        raise FingerpadError("Enough.")
+        raise fp.FingerpadError("Enough.")
 
     monkeypatch.setattr(gerling2014, "reproduce", note)
     call("reproduce", "--resolution", "paper", "--out", "a/b", "--jobs", "3", "--seed", "7")
@@ -196,12 +192,12 @@ def test_options_reach_the_export(call, monkeypatch, tmp_path):
     (played, *_), (bent, *_), (straight, *_), (same, *_) = rest
     assert (len(bent.stimulus.times_ms), len(straight.stimulus.times_ms)) == (3, 2)
     assert same == default
-    assert played.stimulus == Trajectory((0.0, 50.0, 100.0), (0.0, 0.5, 0.0))
+    assert played.stimulus == fp.Trajectory((0.0, 50.0, 100.0), (0.0, 0.5, 0.0))
     assert (relaxing, elastic) == (None, "long_term")
-    ball, motion = Sphere(curvature_per_m=340), RampAndHold(depth_mm=0.5)
-    assert touch == touch_of(Fingertip(), ball, motion, "trial1", "standard")
+    ball, motion = fp.Sphere(curvature_per_m=340), fp.RampAndHold(depth_mm=0.5)
+    assert touch == fp.touch_of(fp.Fingertip(), ball, motion, "trial1", "standard")
     assert (folder.resolve(), format_name) == (tmp_path / "a" / "b", "vtu")
-    assert default == touch_of(Fingertip(), Plate(), RampAndHold(depth_mm=1.0), "human", "quick")
+    assert default == fp.touch_of(fp.Fingertip(), fp.Plate(), fp.RampAndHold(depth_mm=1.0), "human", "quick")
 
 
 def test_a_subprocess_has_the_same_output_and_no_warning(tmp_path):

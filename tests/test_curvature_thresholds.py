@@ -5,16 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from fingerpad.core.errors import ConvergenceError
+from fingerpad import ConvergenceError, Grading, Population, PressSettings
 from fingerpad.core.random_streams import Purpose, normals
 from fingerpad.experiments.conditions import RECEPTOR_X_MM, Conditions
 from fingerpad.experiments.gerling2014 import curvature_thresholds as study
 from fingerpad.experiments.gerling2014.claim_row import Verdict, judged
 from fingerpad.experiments.gerling2014.comparison import weber_claims
 from fingerpad.experiments.gerling2014.sphere_discrimination import CURVATURES
-from fingerpad.geometry.grading import Grading
-from fingerpad.mechanics.press_settings import PressSettings
-from fingerpad.neuron.population import Population
 from fingerpad.psychophysics import yes_no
 from fingerpad.psychophysics.code_efficiency import SMALLEST_SPREAD
 from fingerpad.psychophysics.encoding import gradient_sum, neighbour_pairs

@@ -9,13 +9,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from scipy.special import ndtr, ndtri
+from scipy.special import ndtri
 from scipy.stats import binom
 
-from fingerpad import cli
-from fingerpad.core.errors import InputError
+from fingerpad import InputError, Traces, cli, parse_task
 from fingerpad.core.result_files import to_json
-from fingerpad.core.signals import Traces
 from fingerpad.experiments import runner
 from fingerpad.experiments.conditions import RECEPTOR_X_MM
 from fingerpad.experiments.discrimination import run as task_run
@@ -24,12 +22,11 @@ from fingerpad.experiments.discrimination.decoding import SESSION, side_curves
 from fingerpad.experiments.discrimination.task import CurveSettings
 from fingerpad.experiments.discrimination.task_stimuli import (
     example_tasks,
-    parse_task,
     task_population,
     task_stimuli,
     task_touches,
 )
-from fingerpad.psychophysics.code_efficiency import SMALLEST_SPREAD, code_efficiency, noisy_presentations
+from fingerpad.psychophysics.code_efficiency import code_efficiency, noisy_presentations
 from fingerpad.psychophysics.discrimination import (
     Experiment,
     discriminate_euclidean,
@@ -38,6 +35,7 @@ from fingerpad.psychophysics.discrimination import (
 from fingerpad.psychophysics.encoding import gradient_sum, neighbour_pairs, taking_part
 from fingerpad.report import discrimination_task as figures
 from fingerpad.report import discrimination_task as report
+from refusals import misused
 
 ROOT = Path(__file__).parents[1]
 QUESTION = {
@@ -94,9 +92,6 @@ def answered():
 
 def decoding(section, code, measure):
     return next(one for one in section.decodings if (one.code, one.measure) == (code, measure))
-
-
-# What a code makes of known skins
 
 
 def test_hit_rates_are_those_of_the_observers_with_the_questions_own_numbers(answered):
@@ -168,9 +163,6 @@ def test_observed_points_have_a_binomial_interval_where_trials_are_known():
     assert binom.sf(29, 50, low) == pytest.approx(0.025, rel=1e-9)
     assert binom.cdf(30, 50, high) == pytest.approx(0.025, rel=1e-9)
     assert observed.points[1].interval is None
-
-
-# Curves
 
 
 def weibull(difference, at_75, steepness):
@@ -269,9 +261,6 @@ def test_a_certain_answer_has_no_finite_d_prime_and_no_noise_no_forced_choice():
         assert all(side.fit is None for side in one.curves)
 
 
-# The page
-
-
 def test_curves_show_every_code_people_with_their_intervals_and_thresholds():
     points = [{"at": 220, "hit_rate": 0.6, "trials": 50}, {"at": 300, "hit_rate": 0.9}]
     question = asked(
@@ -293,9 +282,6 @@ def test_curves_show_every_code_people_with_their_intervals_and_thresholds():
     assert table["Gradient Sum, static rate"][3] == f"{threshold.difference:.3g}"
 
 
-# The ideal observer
-
-
 def test_no_code_beats_the_ideal_observer_and_what_it_makes_use_of_is_a_share():
     question = asked(noise=0.2, code=["gradient_sum", "euclidean", "ideal"], measure=["static", "latency"])
     found = analyse(question, bumps(question))
@@ -311,24 +297,11 @@ def test_no_code_beats_the_ideal_observer_and_what_it_makes_use_of_is_a_share():
             assert all(0.0 < error < 0.1 for error in code.efficiency_error)
 
 
-def test_the_ideal_observer_of_one_afferent_is_known_in_closed_form():
-    # Two normal distributions of nearly one spread: d' = |mu_1 - mu_0| / sigma.
-    table = np.array([[50.0], [52.0]])
-    (shown,) = noisy_presentations(table, 0.05, seed=3)
-    expected = 2.0 / np.hypot(0.05 * 51.0, SMALLEST_SPREAD)
-    ideal = shown.ideal()
-    assert ideal.d_prime == pytest.approx(expected, abs=4.0 * ideal.d_prime_error)
-    assert shown.ideal_hit_rate() == pytest.approx(ndtr(expected / 2.0), abs=0.03)
-
-
 def test_where_the_ideal_observer_never_fails_there_is_no_efficiency():
     table = np.array([[50.0, 60.0], [150.0, 10.0]])
     (shown,) = noisy_presentations(table, 0.01, seed=3)
     found = code_efficiency(shown, lambda responses: gradient_sum(responses, np.array([[0, 1]])))
     assert np.isnan([found.efficiency, found.efficiency_error]).all()
-
-
-# Silence
 
 
 def test_a_population_that_stays_silent_has_no_hit_rate_and_no_fitted_noise():
@@ -353,9 +326,6 @@ def test_silence_under_one_stimulus_is_silence_of_that_measure_alone():
     assert "silent under 200" in report.task_tables(found)[1].note
     assert figures.draw_task_curves(found)
     assert report.task_summary(found)[0].startswith("Gradient Sum of static rates discriminates")
-
-
-# The command
 
 
 @pytest.fixture
@@ -466,21 +436,5 @@ def test_bad_input_is_one_sentence_and_status_2_and_nothing_is_written(call, tmp
     }
     for name, text in files.items():
         (tmp_path / name).write_text(text)
-    status, out, errors = call(*arguments)
-    assert (status, out) == (2, "")
-    assert said in errors
-    assert errors.startswith("fingerpad: ")
-    assert errors.endswith(".\n")
-    assert errors.count("\n") == 1
+    misused(call(*arguments), said)
     assert {path.name for path in tmp_path.iterdir()} == set(files)
-
-
-def test_a_silent_population_writes_no_answer(call, tmp_path, monkeypatch):
-    (tmp_path / "mine.yaml").write_text(MINE)
-    monkeypatch.setattr(
-        Bump, "sed", lambda self, sites, *_: Traces([0.0, 50.0, 1000.0], np.zeros((3, len(sites))))
-    )
-    status, _, errors = call("mine.yaml")
-    assert status == 2
-    assert "is silent" in errors
-    assert not list((tmp_path / "discriminate").glob("*.*"))

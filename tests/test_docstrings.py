@@ -66,33 +66,3 @@ def faults(name: str, node: ast.FunctionDef | ast.ClassDef, said: str, users: se
 def test_docstrings_are_as_long_as_their_reader_needs():
     users = called_by_users()
     assert [fault for each in documented() for fault in faults(*each, users)] == []
-
-
-def test_each_fault_is_found():
-    source = '''
-def shown():
-    """Do it.
-
-    Returns
-    -------
-    Shown
-    """
-
-def _hidden():
-    """Do it.
-
-    In this way.
-    """
-
-def silent(): ...
-'''
-    shown, hidden, silent = ast.parse(source).body
-    said = ast.get_docstring(shown)
-    assert faults("m.shown", shown, said, {"m.shown"}) == ["m.shown returns what its annotation says"]
-    assert faults("m.shown", shown, "Do it.\n\nRaises\n------\nInputError\n    No.", set()) == [
-        "m.shown has sections, and no user calls it"
-    ]
-    assert faults("m._hidden", hidden, ast.get_docstring(hidden), set()) == [
-        "m._hidden is private and has more than one line"
-    ]
-    assert faults("m.silent", silent, "", {"m.silent"}) == ["m.silent has no docstring"]

@@ -7,18 +7,16 @@ from matplotlib.collections import QuadMesh
 from matplotlib.figure import Figure
 
 import fingerpad as fp
-from fingerpad.core.errors import InputError
 from fingerpad.experiments.discrimination.analysis import PreparedTask, analyse
-from fingerpad.experiments.discrimination.task_stimuli import parse_task, task_population, task_stimuli
+from fingerpad.experiments.discrimination.task_stimuli import task_population, task_stimuli
 from fingerpad.experiments.fit.fit import fit_recordings
 from fingerpad.export.result_tables import TABLES
-from fingerpad.inference.recordings import RateRecordings
 from fingerpad.inference.spike_fit import SpikeFit
-from fingerpad.psychophysics.psychometric import fit_psychometric
 from fingerpad.report.discrimination_task import draw_task_responses
 from fingerpad.report.drawing import DRAWINGS
 from fingerpad.report.responses import draw_responses
 from fingerpad.report.touch import draw_spikes
+from refusals import refused
 
 TASK = {
     "question": "How strong?",
@@ -49,7 +47,7 @@ class Strength:
 
 
 def discriminated():
-    task = parse_task(TASK)
+    task = fp.parse_task(TASK)
     prepared = PreparedTask(task, task_stimuli(task), task_population(task))
     skins = {each.name: Strength(each.indenter.curvature_per_m) for each in prepared.stimuli}
     return analyse(prepared, skins)
@@ -60,7 +58,7 @@ def fitted():
     times_ms = np.array([0.0, 25.0, 50.0, 100.0, 300.0, 1000.0])
     traces = fp.Traces(times_ms, np.outer([0, 0.3, 1, 0.9, 0.8, 0.7], np.linspace(2, 9, 6)), [50.0])
     names = tuple(f"height {number}" for number in range(6))
-    return fit_recordings(traces, RateRecordings(names, *afferent.rates(traces)), np.arange(6) % 2)
+    return fit_recordings(traces, fp.RateRecordings(names, *afferent.rates(traces)), np.arange(6) % 2)
 
 
 @pytest.fixture(scope="module")
@@ -96,7 +94,7 @@ def results():
             force_error_mn=0.2,
             field_errors={"stored": 0.02},
         ),
-        "PsychometricFit": fit_psychometric([10.0, 20.0, 40.0], [55, 70, 95], [100] * 3),
+        "PsychometricFit": fp.fit_psychometric([10.0, 20.0, 40.0], [55, 70, 95], [100] * 3),
         "Fingertip": finger,
     }
 
@@ -203,12 +201,12 @@ def test_a_notebook_shows_a_small_picture_and_one_line(results, kind):
     ],
 )  # fmt: skip
 def test_unknown_drawings_and_quantities_are_refused(results, kind, arguments, options, said):
-    with pytest.raises(InputError, match=said):
+    with pytest.raises(fp.InputError, match=said):
         results[kind].plot(*arguments, **options)
 
 
 def test_progress_that_has_no_stages_is_refused():
-    with pytest.raises(InputError, match=r"progress must have a method stage, as fp.notebook_progress"):
+    with refused("progress"):
         fp.indent(fp.Fingertip(), fp.Sphere(curvature_per_m=287.0), progress=True)
 
 

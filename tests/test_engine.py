@@ -19,16 +19,10 @@ import fingerpad as fp
 from cluster import real_cluster, slow, wait_until
 from fingerpad.cli import main
 from fingerpad.core.engine import Processes, _signals_later, engine_of
-from fingerpad.core.errors import InputError, StoreError
 from fingerpad.experiments import cluster as module
-from fingerpad.experiments.cluster import Cluster
-from fingerpad.skin.store import Store, solve_missing
-from test_store import SIX
 
 pytestmark = pytest.mark.filterwarnings("default")
 """Dask's own warnings are none of ours."""
-
-TOUCHES = SIX[:2]
 
 
 @pytest.fixture(autouse=True)
@@ -63,7 +57,7 @@ def test_every_item_is_done_once_and_known_by_its_number(jobs):
 
 @pytest.mark.parametrize("jobs", [0, 1.5, "two"])
 def test_a_number_of_processes_is_a_whole_number(jobs):
-    with pytest.raises(InputError, match="jobs must be a whole number"):
+    with pytest.raises(fp.InputError, match="jobs must be a whole number"):
         engine_of(jobs)
 
 
@@ -86,12 +80,12 @@ def test_a_signal_waits_until_a_process_has_started(number):
 
 
 def test_a_lost_process_is_told_in_a_sentence():
-    with pytest.raises(StoreError, match="ended from outside"):
+    with pytest.raises(fp.StoreError, match="ended from outside"):
         done(Processes(2), end_this_process, [1, 2])
 
 
 def test_a_killed_worker_and_a_restarted_scheduler_lose_nothing(running):
-    found, engine = [], Cluster(running.address, patience_s=60.0)
+    found, engine = [], fp.Cluster(running.address, patience_s=60.0)
     for number, outcome in engine.map(slow, list(range(30))):
         found.append((number, outcome()))
         if len(found) == 3:
@@ -125,19 +119,8 @@ def test_a_connection_that_fails_late_is_made_again(running, monkeypatch, what):
         monkeypatch.setattr(distributed.Client, "close", closed)
     else:
         monkeypatch.setattr(distributed.Future, "result", fetched)
-    assert done(Cluster(running.address), slow, [7, 8, 9]) == [(0, (7, 1)), (1, (8, 1)), (2, (9, 1))]
+    assert done(fp.Cluster(running.address), slow, [7, 8, 9]) == [(0, (7, 1)), (1, (8, 1)), (2, (9, 1))]
     assert len(failures) == 1
-
-
-def test_a_cluster_stores_the_same_bits_and_nothing_twice(running, tmp_path):
-    here, there = Store(tmp_path / "here"), Store(tmp_path / "there")
-    solve_missing(here.missing(TOUCHES), 1)
-    there.folder.mkdir()
-    kept = there.path(TOUCHES[0])
-    kept.write_bytes(b"stored by another worker in the meantime")
-    solve_missing({there.path(touch): touch for touch in TOUCHES}, Cluster(running.address))
-    assert kept.read_bytes().startswith(b"stored by")
-    assert there.path(TOUCHES[1]).read_bytes() == here.path(TOUCHES[1]).read_bytes()
 
 
 def test_a_sweep_on_a_cluster_has_the_bits_of_one_process_and_presses_nothing_twice(running, tmp_path):
@@ -148,7 +131,7 @@ def test_a_sweep_on_a_cluster_has_the_bits_of_one_process_and_presses_nothing_tw
     (there / "indentations").mkdir(parents=True)
     kept = sorted((here / "indentations").iterdir())[0]
     shutil.copy2(kept, there / "indentations" / kept.name)
-    done = fp.run_sweep(sweep, there / "study.zarr", Cluster(running.address))
+    done = fp.run_sweep(sweep, there / "study.zarr", fp.Cluster(running.address))
     assert (done.done, done.pressed, done.loaded) == (4, 1, 1)
     for kind in ("study.zarr/*/c/**/*", "indentations/*"):
         written = {path.relative_to(here): path.read_bytes() for path in here.glob(kind) if path.is_file()}
@@ -163,24 +146,15 @@ def test_a_client_that_is_killed_goes_on_with_what_is_stored(running, tmp_path):
     touch = {"object": "cylinder", "motion": {"ramp_ms": 50, "hold_ms": 60}}
     sweep = {"touch": touch, "grid": {"motion.depth_mm": depths}}
     (tmp_path / "sweep.yaml").write_text(json.dumps(sweep))
-    command = (
-        "-m",
-        "fingerpad",
-        "sweep",
-        "sweep.yaml",
-        "--scheduler",
-        running.address,
-        "--out",
-        "study.zarr",
-    )
-    client = subprocess.Popen((sys.executable, *command), cwd=tmp_path, stderr=subprocess.DEVNULL)
+    command = f"-m fingerpad sweep sweep.yaml --scheduler {running.address} --out study.zarr".split()
+    client = subprocess.Popen([sys.executable, *command], cwd=tmp_path, stderr=subprocess.DEVNULL)
     stored = tmp_path / "indentations"
     wait_until(lambda: len(list(stored.glob("*.npz"))) >= 2, limit_s=120.0)
     client.kill()
     client.wait()
     written = {path: path.stat().st_mtime_ns for path in stored.glob("*.npz")}
     assert 2 <= len(written) < len(depths)
-    done = fp.run_sweep(tmp_path / "sweep.yaml", tmp_path / "study.zarr", Cluster(running.address))
+    done = fp.run_sweep(tmp_path / "sweep.yaml", tmp_path / "study.zarr", fp.Cluster(running.address))
     assert (done.done, done.failed) == (6, 0)
     assert done.pressed <= len(depths) - len(written)
     assert written.items() <= {path: path.stat().st_mtime_ns for path in stored.glob("*.npz")}.items()
@@ -215,7 +189,7 @@ def test_the_script_for_slurm_runs_as_it_is(tmp_path, unused_port):
 
 
 def test_an_error_of_the_work_is_that_of_the_item(running):
-    outcomes = dict(Cluster(running.address).map(divmod, [4, "four"]))
+    outcomes = dict(fp.Cluster(running.address).map(divmod, [4, "four"]))
     with pytest.raises(TypeError):
         outcomes[1]()
 
@@ -223,20 +197,20 @@ def test_an_error_of_the_work_is_that_of_the_item(running):
 def test_a_worker_of_another_version_is_refused(running, monkeypatch):
     mine = module._software() | {"numba": "0.1"}
     monkeypatch.setattr(module, "_software", lambda: mine)
-    with pytest.raises(InputError, match=r"^Worker tcp.* must have numba 0.1, as .*: got .*\.$"):
-        Cluster(running.address).check()
+    with pytest.raises(fp.InputError, match=r"^Worker tcp.* must have numba 0.1, as .*: got .*\.$"):
+        fp.Cluster(running.address).check()
 
 
 def test_a_task_of_another_version_is_refused_by_the_worker(monkeypatch):
     task = pickle.loads(pickle.dumps(partial(module._task, module._software() | {"fingerpad": "9"}, divmod)))
-    with pytest.raises(InputError, match="must have fingerpad 9"):
+    with pytest.raises(fp.InputError, match="must have fingerpad 9"):
         task(1)
 
 
 def test_an_address_without_a_scheduler_is_refused(monkeypatch):
     monkeypatch.setattr(module, "_CONNECT_S", 0.5)
-    with pytest.raises(InputError, match=r"^--scheduler must .*: .* cannot be reached; .*\.$"):
-        Cluster("tcp://127.0.0.1:1").check()
+    with pytest.raises(fp.InputError, match=r"^--scheduler must .*: .* cannot be reached; .*\.$"):
+        fp.Cluster("tcp://127.0.0.1:1").check()
 
 
 @pytest.mark.parametrize(
@@ -245,14 +219,16 @@ def test_an_address_without_a_scheduler_is_refused(monkeypatch):
 def test_an_address_that_nobody_can_have_is_refused_before_anything_connects(address, monkeypatch):
     distributed = pytest.importorskip("distributed")
     monkeypatch.setattr(distributed, "Client", pytest.fail)
-    with pytest.raises(InputError, match=rf"with a port, such as tcp://localhost:8786: got '{address}'\.$"):
-        Cluster(address).check()
+    with pytest.raises(
+        fp.InputError, match=rf"with a port, such as tcp://localhost:8786: got '{address}'\.$"
+    ):
+        fp.Cluster(address).check()
 
 
 def test_without_dask_the_error_says_what_to_install(monkeypatch):
     monkeypatch.setitem(__import__("sys").modules, "distributed", None)
-    with pytest.raises(InputError, match=r"pip install 'fingerpad\[cluster\]'"):
-        Cluster("tcp://127.0.0.1:1").check()
+    with pytest.raises(fp.InputError, match=r"pip install 'fingerpad\[cluster\]'"):
+        fp.Cluster("tcp://127.0.0.1:1").check()
 
 
 def test_a_command_presses_on_a_scheduler_or_in_processes_here(run_program):

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from fingerpad.core.errors import InputError
-from fingerpad.core.signals import SpikeTrains
-from fingerpad.inference.recordings import RateRecordings, SpikeRecordings
+from fingerpad import InputError, RateRecordings, SpikeTrains
+from fingerpad.inference.recordings import SpikeRecordings
 from fingerpad.neuron.spikes import PAPER_WINDOWS_MS
+from refusals import refusals
 
 
 def test_chosen_rows_keep_names_rates_and_a_phase_that_was_not_recorded():
@@ -21,24 +21,18 @@ def spikes(trains, duration_ms):
     return SpikeRecordings(("a", "b"), SpikeTrains.from_lists(trains), duration_ms)
 
 
-@pytest.mark.parametrize(
-    ("call", "said"),
-    [
-        (lambda: RateRecordings(("a", "a"), [1.0, 2.0], None), "'a' is repeated"),
-        (lambda: RateRecordings(("a", "b"), [1.0], None), "dynamic_rate_hz needs one rate per stimulus"),
-        (lambda: RateRecordings(("a",), None, [-2.0]), "static_rate_hz must not be negative: the smallest"),
-        (lambda: RateRecordings(("a",), [np.nan], None), "dynamic_rate_hz must hold finite numbers only"),
-        (lambda: RateRecordings(("a", "b"), None, None), "got neither"),
-        (lambda: spikes([[1.0]], 1000.0), "one train per presentation: got 1 for 2"),
-        (lambda: spikes([[1.0], [-1.0, 2.0]], 1000.0), "'b' has one at -1 ms"),
-        (lambda: spikes([[1.0], [2.0, 1001.0]], 1000.0), "'b' has one at 1001 ms"),
-        (lambda: spikes([[1.0], [2.0]], [1000.0, 0.0]), "duration_ms must be above 0"),
-        (lambda: spikes([[1.0], [2.0]], [1.0, 1.0, 1.0]), "one for all or for each of 2"),
-    ],
-)
-def test_recordings_that_cannot_be_are_refused(call, said):
-    with pytest.raises(InputError, match=said):
-        call()
+test_recordings_that_cannot_be_are_refused = refusals(
+    (lambda: RateRecordings(("a", "a"), [1.0, 2.0], None), "'a' is repeated"),
+    (lambda: RateRecordings(("a", "b"), [1.0], None), "dynamic_rate_hz needs one rate per stimulus"),
+    (lambda: RateRecordings(("a",), None, [-2.0]), ("static_rate_hz",)),
+    (lambda: RateRecordings(("a",), [np.nan], None), "dynamic_rate_hz must hold finite numbers only"),
+    (lambda: RateRecordings(("a", "b"), None, None), "got neither"),
+    (lambda: spikes([[1.0]], 1000.0), "one train per presentation: got 1 for 2"),
+    (lambda: spikes([[1.0], [-1.0, 2.0]], 1000.0), "'b' has one at -1 ms"),
+    (lambda: spikes([[1.0], [2.0, 1001.0]], 1000.0), "'b' has one at 1001 ms"),
+    (lambda: spikes([[1.0], [2.0]], [1000.0, 0.0]), "duration_ms must be above 0"),
+    (lambda: spikes([[1.0], [2.0]], [1.0, 1.0, 1.0]), "one for all or for each of 2"),
+)  # fmt: skip
 
 
 def test_rates_of_spikes_are_means_over_presentations_in_the_order_of_their_first():

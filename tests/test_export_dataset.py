@@ -11,31 +11,16 @@ import numpy as np
 import pytest
 import xarray
 
-from fingerpad.core.errors import InputError, StoreError
-from fingerpad.core.signals import ResponseMap, SpikeTrains
+import fingerpad as fp
 from fingerpad.export import dataset
-from fingerpad.export.dataset import PARTS, check_touch, read_touch, spike_trains, touch_dataset, write_touch
-from fingerpad.geometry.fingertip import Fingertip
-from fingerpad.geometry.grading import Grading
-from fingerpad.geometry.indenters import Sphere
-from fingerpad.geometry.motion import RampAndHold
-from fingerpad.mechanics.press_settings import PressSettings
-from fingerpad.mechanics.tissues import named_tissues
+from fingerpad.export.dataset import PARTS, check_touch, spike_trains
 from fingerpad.skin.fields import Place, stored_fields
-from fingerpad.skin.indentation import Touch
+from sections import SMALL_TOUCH as TOUCH
 
-TOUCH = Touch(
-    finger=Fingertip(),
-    indenter=Sphere(curvature_per_m=287),
-    stimulus=RampAndHold(depth_mm=0.3),
-    tissues=named_tissues("trial3"),
-    grading=Grading(17.37, 1.2, 1.2, 0.8, 0.8, largest_mm=4.0, stratum_corneum=1, dermis=1, subcutis=1),
-    settings=PressSettings(ramp_steps=2, hold_steps=1),
-)
-RESPONSE = ResponseMap(
+RESPONSE = fp.ResponseMap(
     positions_mm=[[17.0, 0.0], [18.0, 1.0], [19.0, -1.0]],
     pitch_mm=1.0,
-    spikes=SpikeTrains.from_lists([[12.5, 40.0, 300.0], [], [41.0]]),
+    spikes=fp.SpikeTrains.from_lists([[12.5, 40.0, 300.0], [], [41.0]]),
     dynamic_rate_hz=[36.4, 0.0, 0.0],
     static_rate_hz=[3.8, 0.0, 0.0],
     first_spike_latency_ms=[12.5, np.nan, 41.0],
@@ -49,28 +34,28 @@ def skin():
 
 @pytest.fixture(scope="module")
 def file(skin, tmp_path_factory):
-    return write_touch(tmp_path_factory.mktemp("touch") / "touch.nc", skin, RESPONSE, seed=7)[0]
+    return fp.write_touch(tmp_path_factory.mktemp("touch") / "touch.nc", skin, RESPONSE, seed=7)[0]
 
 
 @pytest.fixture(scope="module")
 def written(file):
-    return read_touch(file)
+    return fp.read_touch(file)
 
 
 @pytest.mark.parametrize("file_name", ["touch.nc", "touch.zarr"])
 def test_what_is_written_is_read_back(skin, tmp_path, file_name):
-    written = touch_dataset(skin, RESPONSE, quantities=("stress",))
-    files = write_touch(tmp_path / file_name, skin, RESPONSE, quantities=("stress",))
+    written = fp.touch_dataset(skin, RESPONSE, quantities=("stress",))
+    files = fp.write_touch(tmp_path / file_name, skin, RESPONSE, quantities=("stress",))
     assert files == (tmp_path / file_name,)
-    again = read_touch(tmp_path)
+    again = fp.read_touch(tmp_path)
     xarray.testing.assert_equal(written, again)
     assert written.sizes == again.sizes
     assert [path.name for path in tmp_path.iterdir()] == [file_name]
     for name, variable in again.variables.items():
         assert variable.attrs["long_name"], name
         assert ("units" in variable.attrs) != (name in PARTS and PARTS[name].unit == ""), name
-    write_touch(tmp_path / file_name, skin)  # an older file is replaced as a whole
-    assert "spike_count" not in read_touch(tmp_path)
+    fp.write_touch(tmp_path / file_name, skin)  # an older file is replaced as a whole
+    assert "spike_count" not in fp.read_touch(tmp_path)
     assert [path.name for path in tmp_path.iterdir()] == [file_name]
 
 
@@ -105,30 +90,30 @@ def test_attributes_describe_the_touch_and_its_spikes(file, written):
 
 def test_the_object_lies_where_the_press_had_it(skin, file):
     """No node of the skin penetrates the mapped face by more than the press says; one is at it."""
-    data = read_touch(file)
+    data = fp.read_touch(file)
     skin_mm = data.node_mm.values[data.skin_node] + data.skin_displacement_mm.values
     beside = np.array([0.0, 1.0, 2.0])
     mapped = data.object_front_mm.interp(object_x=0.0, object_z=beside).values
-    radius = Sphere(curvature_per_m=287).radius_mm
+    radius = fp.Sphere(curvature_per_m=287).radius_mm
     np.testing.assert_allclose(mapped, np.sqrt(radius**2 - beside**2) - radius, atol=1e-3)
     for step in range(1, data.time.size):
         local = (skin_mm[step] - data.object_tip_mm.values[step]) @ data.object_axes.values[step]
-        gap = Sphere(curvature_per_m=287).gap(local)[0]
+        gap = fp.Sphere(curvature_per_m=287).gap(local)[0]
         assert -1.1 * skin.penetration_mm <= gap.min() <= 1e-5
 
 
 def test_without_the_deformation_the_last_displacement_is_there(skin, monkeypatch):
     without = replace(skin, deformation=None)
-    data = touch_dataset(without)
+    data = fp.touch_dataset(without)
     assert data.displacement_mm.dims == ("node", "axis")
     assert data.displacement_mm.at_time_ms == 1000.0
-    with pytest.raises(InputError, match=r"quantity stress needs .* whole=True"):
-        touch_dataset(without, quantities=("stress",))
-    with pytest.raises(InputError, match="quantity must be one of"):
-        touch_dataset(skin, quantities=("stres",))
+    with pytest.raises(fp.InputError, match=r"quantity stress needs .* whole=True"):
+        fp.touch_dataset(without, quantities=("stress",))
+    with pytest.raises(fp.InputError, match="quantity must be one of"):
+        fp.touch_dataset(skin, quantities=("stres",))
     monkeypatch.setitem(sys.modules, "xarray", None)
-    with pytest.raises(InputError, match=r"needs xarray: .*fingerpad\[netcdf\]"):
-        touch_dataset(skin)
+    with pytest.raises(fp.InputError, match=r"needs xarray: .*fingerpad\[netcdf\]"):
+        fp.touch_dataset(skin)
 
 
 @pytest.mark.parametrize("name", ["touch.nc", "touch.zarr"])
@@ -138,18 +123,18 @@ def test_a_killed_write_leaves_nothing(skin, tmp_path, name, monkeypatch):
 
     monkeypatch.setattr(dataset, "write_atomically", fails)
     monkeypatch.setattr(Path, "rename", fails)
-    with pytest.raises((OSError, StoreError), match="no space"):
-        write_touch(tmp_path / name, skin)
+    with pytest.raises((OSError, fp.StoreError), match="no space"):
+        fp.write_touch(tmp_path / name, skin)
     assert list(tmp_path.iterdir()) == []
 
 
 def test_no_place_to_write_and_no_known_ending_are_refused(skin, tmp_path):
     (tmp_path / "file").write_text("")
     for name in ("touch.nc", "touch.zarr"):
-        with pytest.raises(StoreError, match="cannot be written"):
-            write_touch(tmp_path / "file" / name, skin)
-    with pytest.raises(InputError, match=r"as .nc or .zarr: got touch.h5"):
-        write_touch(tmp_path / "touch.h5", skin)
+        with pytest.raises(fp.StoreError, match="cannot be written"):
+            fp.write_touch(tmp_path / "file" / name, skin)
+    with pytest.raises(fp.InputError, match=r"as .nc or .zarr: got touch.h5"):
+        fp.write_touch(tmp_path / "touch.h5", skin)
 
 
 def _changed(change):
@@ -244,8 +229,8 @@ MALFORMED = {
 def test_a_malformed_file_is_refused_in_one_sentence(case, written, tmp_path):
     make, message = MALFORMED[case]
     made = make(tmp_path, written)
-    with pytest.raises(InputError, match=message) as refused:
-        check_touch(f"{tmp_path}", made) if isinstance(made, xarray.Dataset) else read_touch(made)
+    with pytest.raises(fp.InputError, match=message) as refused:
+        check_touch(f"{tmp_path}", made) if isinstance(made, xarray.Dataset) else fp.read_touch(made)
     said = str(refused.value)
     assert "\n" not in said
     assert said.endswith(".")

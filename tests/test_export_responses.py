@@ -11,36 +11,20 @@ import pytest
 from numpy.testing import assert_array_equal
 
 import fingerpad as fp
-from fingerpad.core.errors import InputError, StoreError
 from fingerpad.core.phases import ramp_and_hold_phases
-from fingerpad.core.signals import ResponseMap, SpikeTrains
-from fingerpad.experiments.recording_files import read_recordings
-from fingerpad.experiments.stimuli import read_stimuli
-from fingerpad.export.responses import (
-    read_response_csv,
-    read_responses_nwb,
-    write_response_csv,
-    write_responses_nwb,
-)
+from fingerpad.export.responses import read_response_csv, read_responses_nwb
 from fingerpad.neuron.response_maps import recruitment_rank
-
-TOUCH = fp.Touch(
-    finger=fp.Fingertip(),
-    indenter=fp.Sphere(curvature_per_m=287),
-    stimulus=fp.RampAndHold(depth_mm=0.3),
-    tissues=fp.named_tissues("trial3"),
-    grading=fp.Grading(17.37, 1.2, 1.2, 0.8, 0.8, largest_mm=4.0, stratum_corneum=1, dermis=1, subcutis=1),
-    settings=fp.PressSettings(ramp_steps=2, hold_steps=1),
-)
+from refusals import refused
+from sections import SMALL_TOUCH as TOUCH
 
 
 def random_response(columns):
     generator = np.random.default_rng(3)
     trains = [np.cumsum(generator.exponential(17.0, count)) for count in generator.integers(0, 6, size=40)]
-    return ResponseMap(
+    return fp.ResponseMap(
         positions_mm=generator.normal(size=(40, columns)),
         pitch_mm=1.0,
-        spikes=SpikeTrains.from_lists(trains),
+        spikes=fp.SpikeTrains.from_lists(trains),
         dynamic_rate_hz=generator.exponential(100.0, 40),
         static_rate_hz=generator.exponential(30.0, 40),
         first_spike_latency_ms=[train[0] if train.size else np.nan for train in trains],
@@ -51,7 +35,7 @@ def random_response(columns):
 @pytest.mark.parametrize(("columns", "places"), [(2, ["x_mm", "z_mm"]), (3, ["x_mm", "y_mm", "z_mm"])])
 def test_every_number_comes_back_to_the_last_bit(tmp_path, columns, places):
     response = random_response(columns)
-    with open(write_response_csv(tmp_path / "deeper" / "map.csv", response), encoding="utf-8") as file:
+    with open(fp.write_response_csv(tmp_path / "deeper" / "map.csv", response), encoding="utf-8") as file:
         rows = list(csv.DictReader(file))
     assert [int(row["receptor"]) for row in rows] == list(range(40))
 
@@ -69,7 +53,7 @@ def test_every_number_comes_back_to_the_last_bit(tmp_path, columns, places):
 
 def mixed_response():
     one = replace(random_response(3), phases=ramp_and_hold_phases(50.0, 1000.0))
-    later = SpikeTrains.from_lists([one.spikes[39 - receptor] + 0.25 for receptor in range(40)])
+    later = fp.SpikeTrains.from_lists([one.spikes[39 - receptor] + 0.25 for receptor in range(40)])
     return fp.MixedResponse({"RA": one, "own": replace(one, spikes=later, pitch_mm=2.5)})
 
 
@@ -87,46 +71,46 @@ def alike(read, written, within_ms):
 
 def test_mixed_responses_come_back_with_the_type_of_every_unit(tmp_path):
     written = mixed_response()
-    alike(read_response_csv(write_response_csv(tmp_path / "mixed.csv", written)), written, 0.0)
+    alike(read_response_csv(fp.write_response_csv(tmp_path / "mixed.csv", written)), written, 0.0)
     touches = {"edge": written, "flat": fp.MixedResponse({"RA": written["RA"], "own": written["own"]})}
-    read = read_responses_nwb(write_responses_nwb(tmp_path / "mixed.nwb", touches, pause_ms=250.0))
+    read = read_responses_nwb(fp.write_responses_nwb(tmp_path / "mixed.nwb", touches, pause_ms=250.0))
     assert list(read) == ["edge", "flat"]
     for name, response in read.items():
         alike(response, touches[name], 1e-6)
         assert response["own"].phases == written["own"].phases
         assert response["RA"].duration_ms == pytest.approx(1000.0, rel=1e-12)
-    one = read_response_csv(write_response_csv(tmp_path / "one.csv", written["RA"]))
+    one = read_response_csv(fp.write_response_csv(tmp_path / "one.csv", written["RA"]))
     assert not one.types
     assert one.pitch_mm == 1.0
 
 
 def test_a_table_that_is_no_response_is_refused(tmp_path):
     (tmp_path / "other.csv").write_text("receptor,x_mm\n0,1.0\n", encoding="utf-8")
-    with pytest.raises(InputError, match="must have the column z_mm"):
+    with pytest.raises(fp.InputError, match="must have the column z_mm"):
         read_response_csv(tmp_path / "other.csv")
     (tmp_path / "other.nwb").write_text("no session", encoding="utf-8")
-    with pytest.raises(InputError, match="must be a session of write_responses_nwb"):
+    with pytest.raises(fp.InputError, match="must be a session of write_responses_nwb"):
         read_responses_nwb(tmp_path / "other.nwb")
-    with pytest.raises(InputError, match="response must be of type ResponseMap"):
-        write_response_csv(tmp_path / "map.csv", [1.0])
-    with pytest.raises(StoreError, match=r"other\.csv"):
-        write_response_csv(tmp_path / "other.csv" / "map.csv", random_response(2))
+    with refused("response"):
+        fp.write_response_csv(tmp_path / "map.csv", [1.0])
+    with pytest.raises(fp.StoreError, match=r"other\.csv"):
+        fp.write_response_csv(tmp_path / "other.csv" / "map.csv", random_response(2))
 
 
 def responses_to_two_touches():
     first = random_response(3)
-    later = SpikeTrains.from_lists([first.spikes[39 - receptor] + 1.5 for receptor in range(40)])
+    later = fp.SpikeTrains.from_lists([first.spikes[39 - receptor] + 1.5 for receptor in range(40)])
     return {"edge": first, "flat": replace(first, spikes=later)}
 
 
 def test_a_session_is_read_back_as_recordings_of_every_receptor(tmp_path):
     (tmp_path / "two.csv").write_text("name,object\nedge,bar\nflat,bar\n", encoding="utf-8")
     responses = responses_to_two_touches()
-    path = write_responses_nwb(tmp_path / "deeper" / "session.nwb", responses, pause_ms=250.0)
+    path = fp.write_responses_nwb(tmp_path / "deeper" / "session.nwb", responses, pause_ms=250.0)
     assert [entry.name for entry in path.parent.iterdir()] == ["session.nwb"]
-    stimuli = read_stimuli(tmp_path / "two.csv")
+    stimuli = fp.read_stimuli(tmp_path / "two.csv")
     receptor = next(n for n in range(40) if all(answer.spikes[n].size > 1 for answer in responses.values()))
-    recorded = read_recordings(path, stimuli, unit=receptor).recordings
+    recorded = fp.read_recordings(path, stimuli, unit=receptor).recordings
     assert recorded.stimuli == ("edge", "flat")
     for train, answer in zip(recorded.trains, responses.values(), strict=True):
         np.testing.assert_allclose(train, answer.spikes[receptor], rtol=0, atol=1e-9)
@@ -150,13 +134,13 @@ def without_duration(touches):
     ],
 )
 def test_a_session_that_cannot_be_is_refused(tmp_path, monkeypatch, change, options, message):
-    with pytest.raises(InputError, match=message):
-        write_responses_nwb(tmp_path / "session.nwb", change(responses_to_two_touches()), **options)
-    with pytest.raises(InputError, match=r"A session is written as .nwb, .h5, .hdf5: got s.csv\."):
-        write_responses_nwb(tmp_path / "s.csv", responses_to_two_touches())
+    with pytest.raises(fp.InputError, match=message):
+        fp.write_responses_nwb(tmp_path / "session.nwb", change(responses_to_two_touches()), **options)
+    with pytest.raises(fp.InputError, match=r"A session is written as .nwb, .h5, .hdf5: got s.csv\."):
+        fp.write_responses_nwb(tmp_path / "s.csv", responses_to_two_touches())
     monkeypatch.setitem(sys.modules, "pynwb", None)
-    with pytest.raises(InputError, match=r"pip install 'fingerpad\[nwb\]'"):
-        write_responses_nwb(tmp_path / "session.nwb", responses_to_two_touches())
+    with pytest.raises(fp.InputError, match=r"pip install 'fingerpad\[nwb\]'"):
+        fp.write_responses_nwb(tmp_path / "session.nwb", responses_to_two_touches())
     assert list(tmp_path.iterdir()) == []
 
 
@@ -174,7 +158,7 @@ def test_a_session_takes_times_from_the_motions(tmp_path):
         windows = [phase.window_ms for phase in (skin.phases[0], skin.phases[-1])]
         responses[name] = population.respond(skin, *windows)
     started = datetime(2026, 3, 1, 12, tzinfo=UTC)
-    path = write_responses_nwb(tmp_path / "session.nwb", responses, pause_ms=500.0, started=started)
+    path = fp.write_responses_nwb(tmp_path / "session.nwb", responses, pause_ms=500.0, started=started)
     ends = {name: motion.end_ms for name, motion in motions.items()}
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")

@@ -14,28 +14,12 @@ from vtkmodules.vtkFiltersGeneral import vtkCellValidator
 from vtkmodules.vtkFiltersVerdict import vtkCellSizeFilter
 from vtkmodules.vtkIOXML import vtkXMLUnstructuredGridReader
 
-from fingerpad.core.errors import InputError, StoreError
-from fingerpad.export.dataset import read_touch
-from fingerpad.export.formats import export_touch
-from fingerpad.export.vtu import HEXAHEDRON, WEDGE, cells_of, read_vtu_series, write_vtu_series
-from fingerpad.geometry.fingertip import Fingertip
-from fingerpad.geometry.grading import Grading
-from fingerpad.geometry.indenters import Sphere
+import fingerpad as fp
+from fingerpad.export.vtu import HEXAHEDRON, WEDGE, cells_of, write_vtu_series
 from fingerpad.geometry.mesh import Mesh, block_mesh
 from fingerpad.geometry.mesh_checks import jacobian_at_gauss
-from fingerpad.geometry.motion import RampAndHold
-from fingerpad.mechanics.press_settings import PressSettings
-from fingerpad.mechanics.tissues import named_tissues
-from fingerpad.skin.indentation import Touch
+from sections import SMALL_TOUCH as TOUCH
 
-TOUCH = Touch(
-    finger=Fingertip(),
-    indenter=Sphere(curvature_per_m=287),
-    stimulus=RampAndHold(depth_mm=0.3),
-    tissues=named_tissues("trial3"),
-    grading=Grading(17.37, 1.2, 1.2, 0.8, 0.8, largest_mm=4.0, stratum_corneum=1, dermis=1, subcutis=1),
-    settings=PressSettings(ramp_steps=2, hold_steps=1),
-)
 CELLS = (
     "stress_kpa", "strain", "green_lagrange_strain", "principal_stress_kpa", "principal_strain",
     "von_mises_kpa", "pressure_kpa", "compressive_strain", "compressive_stress_kpa",
@@ -93,7 +77,7 @@ def test_fields_come_back_at_every_time(skin, files):
     sets = xml.parse(index).getroot().findall("./Collection/DataSet")
     assert [float(item.get("timestep")) for item in sets] == done.times_ms.tolist() == [0, 25, 50, 1000]
     assert [index.parent / item.get("file") for item in sets] == steps
-    series = read_vtu_series(index)
+    series = fp.read_vtu_series(index)
     np.testing.assert_array_equal(series.times_ms, done.times_ms)
     np.testing.assert_array_equal(series.points_mm, mesh.nodes_mm)
     np.testing.assert_array_equal(series.points["displacement_mm"], done.displacement_mm.astype("f4"))
@@ -138,8 +122,8 @@ def test_fields_come_back_at_every_time(skin, files):
 )
 def test_what_is_no_series_is_refused(tmp_path, text, said):
     (tmp_path / "touch.pvd").write_text(text)
-    with pytest.raises(InputError, match=said):
-        read_vtu_series(tmp_path / "touch.pvd")
+    with pytest.raises(fp.InputError, match=said):
+        fp.read_vtu_series(tmp_path / "touch.pvd")
 
 
 def test_element_that_is_neither_brick_nor_wedge_is_named():
@@ -147,47 +131,47 @@ def test_element_that_is_neither_brick_nor_wedge_is_named():
     elements = block.elements.copy()
     elements[1, 4] = elements[1, 0]
     parts = {name: getattr(block, name) for name in Mesh.__dataclass_fields__}
-    with pytest.raises(InputError, match="element 1 has the nodes"):
+    with pytest.raises(fp.InputError, match="element 1 has the nodes"):
         cells_of(Mesh(**(parts | {"elements": elements})))
 
 
 def test_what_cannot_be_written_is_refused_and_nothing_is_pressed(skin, tmp_path, monkeypatch):
-    with pytest.raises(InputError, match=r"does not hold: solve the touch with whole=True\."):
+    with pytest.raises(fp.InputError, match=r"does not hold: solve the touch with whole=True\."):
         write_vtu_series(tmp_path / "other.pvd", replace(skin, deformation=None))
-    monkeypatch.setattr(Touch, "solve", lambda touch, **_: pytest.fail("the touch was solved for nothing"))
+    monkeypatch.setattr(fp.Touch, "solve", lambda touch, **_: pytest.fail("the touch was solved for nothing"))
     monkeypatch.setitem(sys.modules, "vtkmodules.vtkIOXML", None)
     monkeypatch.setitem(sys.modules, "xarray", None)
-    with pytest.raises(InputError, match=r"pip install 'fingerpad\[vtk\]'"):
+    with pytest.raises(fp.InputError, match=r"pip install 'fingerpad\[vtk\]'"):
         write_vtu_series(tmp_path / "a.pvd", skin)
     for format_name, said in (("vtu", "need the package vtk"), ("netcdf", r"'fingerpad\[netcdf\]'")):
-        with pytest.raises(InputError, match=said):
-            export_touch(tmp_path, TOUCH, format_name)
+        with pytest.raises(fp.InputError, match=said):
+            fp.export_touch(tmp_path, TOUCH, format_name)
     assert list(tmp_path.iterdir()) == []
     for format_name, file_name in (("abaqus", "touch.inp"), ("febio", "touch.feb")):  # without a press
-        (written,) = export_touch(tmp_path, TOUCH, format_name)
+        (written,) = fp.export_touch(tmp_path, TOUCH, format_name)
         assert written == tmp_path / file_name
         assert written.stat().st_size > 10_000
     monkeypatch.undo()
-    with pytest.raises(StoreError, match=r"touch\.inp"):
+    with pytest.raises(fp.StoreError, match=r"touch\.inp"):
         write_vtu_series(tmp_path / "touch.inp" / "a.pvd", skin)
 
 
 def test_a_touch_is_exported_by_the_name_of_a_format(skin, files, tmp_path, monkeypatch):
-    monkeypatch.setattr(Touch, "solve", lambda touch, **_: skin)
-    written = export_touch(tmp_path, TOUCH, "vtu")
+    monkeypatch.setattr(fp.Touch, "solve", lambda touch, **_: skin)
+    written = fp.export_touch(tmp_path, TOUCH, "vtu")
     assert written[0] == tmp_path / "touch.pvd"
     assert [path.read_bytes() for path in written[1:]] == [path.read_bytes() for path in files[1:]]
     for format_name, file_name in (("netcdf", "touch.nc"), ("zarr", "touch.zarr")):
         folder = tmp_path / format_name
-        assert export_touch(folder, TOUCH, format_name) == (folder / file_name,)
-        moved_mm = read_touch(folder).displacement_mm
+        assert fp.export_touch(folder, TOUCH, format_name) == (folder / file_name,)
+        moved_mm = fp.read_touch(folder).displacement_mm
         np.testing.assert_array_equal(moved_mm, skin.deformation.displacement_mm.astype(np.float32))
-    with pytest.raises(InputError, match="format must be one of vtu"):
-        export_touch(tmp_path, TOUCH, "stl")
+    with pytest.raises(fp.InputError, match="format must be one of vtu"):
+        fp.export_touch(tmp_path, TOUCH, "stl")
 
 
 def test_table_of_a_touch_has_one_row_per_time_and_loses_no_digit(skin, tmp_path):
-    (written,) = export_touch(tmp_path, TOUCH, "csv")
+    (written,) = fp.export_touch(tmp_path, TOUCH, "csv")
     with written.open(encoding="utf-8", newline="") as file:
         rows = list(csv.DictReader(file))
     for name in ("times_ms", "force_mn", "depth_mm", "contact_area_mm2", "external_uj", "dissipated_uj"):
@@ -197,7 +181,7 @@ def test_table_of_a_touch_has_one_row_per_time_and_loses_no_digit(skin, tmp_path
 
 
 def test_one_file_holds_force_depth_contact_surface_and_energy_density_with_their_mesh(skin, tmp_path):
-    (written,) = export_touch(tmp_path, TOUCH, "npz")
+    (written,) = fp.export_touch(tmp_path, TOUCH, "npz")
     with np.load(written) as file:
         units = json.loads(str(file["units"]))
         assert set(units) == set(skin.fields)

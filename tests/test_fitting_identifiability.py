@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
-from fingerpad.core.errors import InputError
-from fingerpad.core.signals import Traces
+from fingerpad import Traces
 from fingerpad.inference.fitting.sensitivity import identifiability, jacobian
 from fingerpad.inference.identifiable import IDENTIFIABLE_NAMES, identifiable, six_parameters
 from fingerpad.inference.rate_model import AfferentModel
 from fingerpad.neuron.afferent import PARAMETER_NAMES
+from refusals import refusals
 from sections import SED_DRIVEN
 
 PEAKS = np.array([0.3, 0.8, 1.4, 1.9, 2.5])
@@ -47,16 +47,10 @@ def test_a_wide_step_averages_over_jumps():
     assert jacobian(staircase, [0.55], [1.0], step=5.0)[0, 0] == pytest.approx(1.0, abs=0.02)
 
 
-@pytest.mark.parametrize(
-    ("call", "words"),
-    [
-        (lambda: identifiability(np.exp, [1.0, 0.0], ("a", "b")), "scales must be greater than 0"),
-        (lambda: identifiability(np.exp, [1.0, 2.0], ("a",)), "names must name 2 parameters"),
-        (lambda: identifiability(lambda p: p[:1], [1.0, 2.0], ("a", "b")), "at least 2 numbers: got 1"),
-        (lambda: jacobian(np.exp, [1.0], [1.0], step=0.0), "step must be greater than 0"),
-        (lambda: jacobian(lambda p: p * np.nan, [1.0], [1.0]), "answer must hold finite numbers only"),
-    ],
-)
-def test_what_has_no_jacobian_is_refused(call, words):
-    with pytest.raises(InputError, match=words):
-        call()
+test_what_has_no_jacobian_is_refused = refusals(
+    (lambda: identifiability(np.exp, [1.0, 0.0], ("a", "b")), ("scales",)),
+    (lambda: identifiability(np.exp, [1.0, 2.0], ("a",)), ("names",)),
+    (lambda: identifiability(lambda p: p[:1], [1.0, 2.0], ("a", "b")), "at least 2 numbers: got 1"),
+    (lambda: jacobian(np.exp, [1.0], [1.0], step=0.0), ("step",)),
+    (lambda: jacobian(lambda p: p * np.nan, [1.0], [1.0]), "answer must hold finite numbers only"),
+)  # fmt: skip

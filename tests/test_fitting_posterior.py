@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from fingerpad.core.errors import ConvergenceError, InputError
+from fingerpad.core.errors import ConvergenceError
 from fingerpad.core.threads import compiled_threads
 from fingerpad.inference.fitting.posterior import (
     credible_band,
@@ -12,6 +12,7 @@ from fingerpad.inference.fitting.posterior import (
     sample,
     split_r_hat,
 )
+from refusals import refusals
 
 COVARIANCE = np.array([[4.0, 1.9, 0.0], [1.9, 1.0, 0.0], [0.0, 0.0, 0.01]])
 CENTRE = np.array([3.0, -1.0, 0.5])
@@ -121,22 +122,16 @@ def round_density(**changes):
     return sample(**(given | {"centre": [0.0, 0.0], "spread": [1.0, 1.0]} | changes))
 
 
-@pytest.mark.parametrize(
-    ("call", "words"),
-    [
-        (lambda: round_density(spread=[1.0, 0.0]), "spread must be greater than 0"),
-        (lambda: round_density(names=("a",)), "one entry per parameter: got 2, 2 and 1"),
-        (lambda: round_density(n_walkers=6), "n_walkers must be a whole number of at least 8"),
-        (lambda: round_density(n_walkers=41), "n_walkers must be even"),
-        (lambda: round_density(n_ensembles=1), "n_ensembles must be a whole number of at least 2"),
-        (lambda: round_density(seed=-1), "seed must be a whole number"),
-        (lambda: round_density(log_density=lambda p: np.full(len(p), np.nan)), "must be a number or -inf"),
-        (lambda: round_density(log_density=lambda p: np.full(len(p), -np.inf)), "finite near the centre"),
-        (lambda: round_density(log_density=lambda p: np.zeros((len(p), 1))), "one number per point"),
-        (lambda: credible_band(np.zeros((3, 2)), 1.0), "level must lie between 0 and 1"),
-        (lambda: split_r_hat(np.zeros((1, 8, 2))), "at least 2 ensembles and 4 steps"),
-    ],
-)
-def test_what_cannot_be_sampled_is_refused(call, words):
-    with pytest.raises(InputError, match=words):
-        call()
+test_what_cannot_be_sampled_is_refused = refusals(
+    (lambda: round_density(spread=[1.0, 0.0]), ("spread",)),
+    (lambda: round_density(names=("a",)), "one entry per parameter: got 2, 2 and 1"),
+    (lambda: round_density(n_walkers=6), "n_walkers must be a whole number of at least 8"),
+    (lambda: round_density(n_walkers=41), "n_walkers must be even"),
+    (lambda: round_density(n_ensembles=1), ("n_ensembles",)),
+    (lambda: round_density(seed=-1), ("seed",)),
+    (lambda: round_density(log_density=lambda p: np.full(len(p), np.nan)), "must be a number or -inf"),
+    (lambda: round_density(log_density=lambda p: np.full(len(p), -np.inf)), "finite near the centre"),
+    (lambda: round_density(log_density=lambda p: np.zeros((len(p), 1))), "one number per point"),
+    (lambda: credible_band(np.zeros((3, 2)), 1.0), ("level",)),
+    (lambda: split_r_hat(np.zeros((1, 8, 2))), "at least 2 ensembles and 4 steps"),
+)  # fmt: skip

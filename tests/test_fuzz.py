@@ -19,21 +19,17 @@ from hypothesis import strategies as st
 
 import fingerpad as fp
 from fingerpad.cli import main
-from fingerpad.core.errors import FingerpadError
 from fingerpad.core.layouts import Layout
 from fingerpad.core.plain_yaml import read_yaml
-from fingerpad.core.regions import Ellipse, Polygon, Rectangle
 from fingerpad.experiments.afferent_files import fitted_afferent
 from fingerpad.experiments.conditions import Conditions
 from fingerpad.experiments.descriptions.example import EXAMPLE
 from fingerpad.experiments.descriptions.reduction import read_reduction
 from fingerpad.experiments.descriptions.stimulus import TactileStimulus
-from fingerpad.experiments.discrimination.task_stimuli import example_tasks, read_task
-from fingerpad.experiments.recording_files import read_recordings
+from fingerpad.experiments.discrimination.task_stimuli import example_tasks
 from fingerpad.experiments.runner import Runner
-from fingerpad.experiments.stimuli import ShiftedBar, read_stimuli
+from fingerpad.experiments.stimuli import ShiftedBar
 from fingerpad.experiments.sweep.description import read_sweep
-from fingerpad.inference.recordings import RateRecordings
 from fingerpad.mechanics.newton import NewtonSettings
 from fingerpad.neuron.band_pass import BandPass
 from fingerpad.neuron.lif import LeakyIntegrateAndFire
@@ -41,7 +37,6 @@ from fingerpad.neuron.transduction import Transduction
 from fingerpad.psychophysics.discrimination import Experiment
 from fingerpad.psychophysics.functions import JudgementCounts, PsychometricFunction
 from fingerpad.psychophysics.ideal_observer import GaussianResponses
-from fingerpad.skin.sampling import SurfaceProfile
 
 LONGEST = 2600
 """Characters of an error."""
@@ -109,15 +104,15 @@ VALUES = {
     fp.SpikeTrains: {"times_ms": [1.0, 2.0, 1.5], "offsets": [0, 2, 3]},
     fp.HitRates: {"hit_rate": [0.5, 0.7], "hit_rate_sd": [0.1, 0.1], "seed": 3, "session": 0},
     Layout: {"places_mm": [[0.0, 0.0], [1.0, 0.0]], "pitch_mm": 1.0, "pattern": "uniform", "seed": 1},
-    Rectangle: {"length_mm": 3.0, "width_mm": 6.0, "centre_mm": (1.0, 2.0)},
-    Ellipse: {"semi_length_mm": 3.0, "semi_width_mm": 6.0, "centre_mm": (1.0, 2.0)},
-    Polygon: {"corners_mm": ((0.0, 0.0), (1.0, 0.0), (1.0, 1.0))},
+    fp.Rectangle: {"length_mm": 3.0, "width_mm": 6.0, "centre_mm": (1.0, 2.0)},
+    fp.Ellipse: {"semi_length_mm": 3.0, "semi_width_mm": 6.0, "centre_mm": (1.0, 2.0)},
+    fp.Polygon: {"corners_mm": ((0.0, 0.0), (1.0, 0.0), (1.0, 1.0))},
     Experiment: {"presentations": 10, "criterion": 0.5, "criterion_sigma": 0.0, "criterion_moves": "point"},
     PsychometricFunction: {"threshold": 1.0, "width": 0.5, "guess": 0.5, "lapse": 0.0, "sigmoid": "weibull"},
     JudgementCounts: {"levels": [1.0, 2.0], "n_correct": [5, 9], "n_trials": [10, 10]},
     GaussianResponses: {"mean": [1.0, 2.0], "covariance": [[1.0, 0.1], [0.1, 1.0]]},
-    RateRecordings: {"stimuli": ("a", "b"), "dynamic_rate_hz": [1.0, 2.0], "static_rate_hz": [1.0, 2.0]},
-    SurfaceProfile: {"distance_mm": [0.0, 1.0], "deflection_mm": [0.1, 0.2]},
+    fp.RateRecordings: {"stimuli": ("a", "b"), "dynamic_rate_hz": [1.0, 2.0], "static_rate_hz": [1.0, 2.0]},
+    fp.SurfaceProfile: {"distance_mm": [0.0, 1.0], "deflection_mm": [0.1, 0.2]},
     Conditions: {"resolution": "quick", "seed": 3, "tissues": "human"},
     TactileStimulus: {"indenter": BALL, "x_mm": 1.0, "tilt_deg": 3.0, "friction": 0.3},
     fp.ReducedRange: {"depth_mm": 1.0, "x_mm": (-1, 1), "parameter": "curvature_per_m", "values": (200, 300)},
@@ -169,7 +164,7 @@ def test_a_value_type_takes_a_value_or_refuses_it_in_one_sentence(kind, which, o
     given_values = fields | {name: changed(fields[name], odd, place)}
     try:
         made = kind(**given_values)
-    except FingerpadError as error:
+    except fp.FingerpadError as error:
         said = str(error)
         assert "\n" not in said.rstrip("\n") or "x" in str(odd)
         assert len(said) < LONGEST
@@ -225,20 +220,20 @@ def _picture():
 
 
 FILES = {
-    "task.yaml": (example_tasks()["sphere_curvature"].encode(), lambda path: read_task(str(path))),
+    "task.yaml": (example_tasks()["sphere_curvature"].encode(), lambda path: fp.read_task(str(path))),
     "touch.yaml": (EXAMPLE.encode(), fp.read_touch_description),
     "sweep.yaml": (b"touch:\n  object: {kind: sphere}\ngrid:\n  object.radius_mm: [2, 3]\n", read_sweep),
     "reduction.yaml": (b"touch:\n  object: {kind: sphere}\nrange: {depth_mm: 1}\n", read_reduction),
     "any.yaml": (b"a: [1, 2.5, {b: 'c'}]\n", lambda path: read_yaml(path.read_text(errors="ignore"), "any")),
-    "stimuli.csv": (b"name,object,object.diameter_mm\nprobe,punch,1.0\nwide,punch,4\n", read_stimuli),
-    "stimuli.yaml": (b"stimuli:\n- {name: a, object: {kind: sphere, radius_mm: 3}}\n", read_stimuli),
+    "stimuli.csv": (b"name,object,object.diameter_mm\nprobe,punch,1.0\nwide,punch,4\n", fp.read_stimuli),
+    "stimuli.yaml": (b"stimuli:\n- {name: a, object: {kind: sphere, radius_mm: 3}}\n", fp.read_stimuli),
     "rates.csv": (
         b"shift_mm,static_rate_hz,dynamic_rate_hz,fold\n-1.5,60,20,1\n0,10,5,2\n",
-        lambda path: read_recordings(path, ShiftedBar()),
+        lambda path: fp.read_recordings(path, ShiftedBar()),
     ),
     "spikes.csv": (
         b"shift_mm,spike_times_ms,duration_ms\n-1.5,1 2 30,900\n0,,800\n",
-        lambda path: read_recordings(path, ShiftedBar()),
+        lambda path: fp.read_recordings(path, ShiftedBar()),
     ),
     "motion.csv": (b"time_ms,depth_mm,x_mm\n0,0,0\n50,1,0\n60,1,0.2\n", fp.read_trajectory),
     "fit.json": (FIT, fitted_afferent),
@@ -281,7 +276,7 @@ def test_a_damaged_file_is_read_or_refused_in_one_sentence(tmp_path_factory, nam
     path.write_bytes(data.draw(damaged(whole)))
     try:
         read(path)
-    except FingerpadError as error:
+    except fp.FingerpadError as error:
         said = str(error)
         assert len(said) < LONGEST
 
@@ -315,7 +310,7 @@ def test_a_command_line_ends_with_a_status_and_at_most_one_sentence(tmp_path_fac
     said, errors = io.StringIO(), io.StringIO()
 
     def refuse(*args, **kwargs):
-        raise FingerpadError("This would press.")
+        raise fp.FingerpadError("This would press.")
 
     with pytest.MonkeyPatch.context() as patched:
         patched.chdir(folder)

@@ -5,32 +5,24 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from fingerpad.core.errors import InputError
-from fingerpad.geometry.dots import Dots
-from fingerpad.geometry.edged_indenters import Edge, Grating
-from fingerpad.geometry.fingertip import Fingertip
-from fingerpad.geometry.grading import Grading
+import fingerpad as fp
 from fingerpad.geometry.indenter_grading import THIN_SIZE_MM, first_touch_x_mm, grading_about
-from fingerpad.geometry.indenters import Bar, Cylinder, FlatPunch, Line, Plate, Sphere
-from fingerpad.geometry.motion import RampAndHold
-from fingerpad.geometry.trajectory import Trajectory
 from fingerpad.mechanics.assembly import Sparsity, assemble
 from fingerpad.mechanics.contact import place
-from fingerpad.mechanics.materials import Material, MaterialTable, Tissues
-from fingerpad.mechanics.press_settings import PressSettings
-from fingerpad.mechanics.tissues import named_tissues
+from fingerpad.mechanics.materials import MaterialTable
 from fingerpad.skin.fields import FIELDS, Place, sampled_fields
-from fingerpad.skin.indentation import Touch, indent, settings_of, touch_of
+from fingerpad.skin.indentation import settings_of
+from refusals import refusals
 
-FINGER, BALL = Fingertip(), Sphere(curvature_per_m=287)
+FINGER, BALL = fp.Fingertip(), fp.Sphere(curvature_per_m=287)
 NAMES = ["Sphere", "Cylinder", "Bar", "Line", "Plate"]
-SHALLOW = RampAndHold(depth_mm=0.05)
-COARSE = Grading(17.37, 1.2, 1.2, 0.6, 0.6, largest_mm=4.0, stratum_corneum=1, dermis=1, subcutis=2)
+SHALLOW = fp.RampAndHold(depth_mm=0.05)
+COARSE = fp.Grading(17.37, 1.2, 1.2, 0.6, 0.6, largest_mm=4.0, stratum_corneum=1, dermis=1, subcutis=2)
 
 
 def coarse_touch(**changes):
-    settings, motion = PressSettings(ramp_steps=2, hold_steps=2), RampAndHold(depth_mm=0.5)
-    return replace(Touch(FINGER, BALL, motion, named_tissues("trial3"), COARSE, settings), **changes)
+    settings, motion = fp.PressSettings(ramp_steps=2, hold_steps=2), fp.RampAndHold(depth_mm=0.5)
+    return replace(fp.Touch(FINGER, BALL, motion, fp.named_tissues("trial3"), COARSE, settings), **changes)
 
 
 @pytest.fixture(scope="module")
@@ -49,20 +41,6 @@ def test_skin_moves_with_the_indenter_and_only_there(skin):
     assert 0.45 < tip_mm < 0.5  # the pad is inclined: the ball touches first beside its axis
     assert abs(profile.at(10.0)) < 0.1 * 0.5
     assert not skin.surface_profile(0).deflection_mm.any()
-
-
-def test_response_holds_one_row_per_time(skin):
-    n_times = skin.times_ms.size
-    assert skin.times_ms[[0, -1]].tolist() == [0.0, 1000.0]
-    assert skin.kinks_ms == (50.0,)
-    assert skin.kinks_ms[0] in skin.times_ms
-    assert skin.force_mn.shape == (n_times,)
-    assert skin.sed_kpa.shape == (n_times, len(skin.mesh.elements))
-    assert skin.skin_displacement_mm.shape == (n_times, skin.mesh.skin_nodes.size, 3)
-    np.testing.assert_array_equal(skin.skin_displacement_mm[-1], skin.displacement_mm[skin.mesh.skin_nodes])
-    assert skin.force_mn[0] == 0.0
-    assert skin.force_mn[2] > skin.force_mn[1] > 0.0
-    assert (np.diff(skin.force_mn[2:]) < 0).all()
 
 
 def test_all_that_is_known_of_a_touch_agrees_with_what_the_skin_keeps(skin):
@@ -96,7 +74,7 @@ def test_all_that_is_known_of_a_touch_agrees_with_what_the_skin_keeps(skin):
 
 def test_the_nail_takes_its_share_of_the_reaction():
     """Internal forces of an elastic finger at the nodes of the nail, assembled anew."""
-    elastic = Tissues(*(Material.neo_hooke(shear, 0.48) for shear in (30.0, 30.0, 20.0, 8.0)))
+    elastic = fp.Tissues(*(fp.Material.neo_hooke(shear, 0.48) for shear in (30.0, 30.0, 20.0, 8.0)))
     touch = coarse_touch(tissues=elastic)
     mesh, done, table = touch.mesh, touch.solve(whole=True).deformation, MaterialTable.of(elastic.layers)
     sparsity = Sparsity.of(mesh.elements, len(mesh.nodes_mm))
@@ -124,24 +102,24 @@ def test_quantities_that_may_drive_an_afferent_peak_below_the_indenter(skin):
 
 def test_a_touch_is_that_which_its_arguments_describe():
     """The named resolution and tissues, spelt out."""
-    described = touch_of(FINGER, BALL, SHALLOW, tissues="trial1", resolution="quick", at_mm=(16.0, 0.0))
-    tissues, grading = named_tissues("trial1"), grading_about(BALL, "quick", 16.0)
-    touch = Touch(FINGER, BALL, SHALLOW, tissues, grading, settings_of("quick"), at_mm=(16.0, 0.0))
+    described = fp.touch_of(FINGER, BALL, SHALLOW, tissues="trial1", resolution="quick", at_mm=(16.0, 0.0))
+    tissues, grading = fp.named_tissues("trial1"), grading_about(BALL, "quick", 16.0)
+    touch = fp.Touch(FINGER, BALL, SHALLOW, tissues, grading, settings_of("quick"), at_mm=(16.0, 0.0))
     assert described == touch
     softer = coarse_touch(stimulus=SHALLOW).solve()  # stiffer tissues need more force
     assert coarse_touch(stimulus=SHALLOW, tissues=tissues).solve().force_mn[-1] > 1.1 * softer.force_mn[-1]
 
 
 def test_touches_are_values_and_settings_of_your_own_replace_those_of_the_resolution():
-    adaptive = PressSettings(sed_tolerance=0.1)
-    assert touch_of(FINGER, BALL, settings=adaptive).settings == adaptive
-    assert touch_of(FINGER, BALL, resolution="standard").settings == settings_of("standard")
+    adaptive = fp.PressSettings(sed_tolerance=0.1)
+    assert fp.touch_of(FINGER, BALL, settings=adaptive).settings == adaptive
+    assert fp.touch_of(FINGER, BALL, resolution="standard").settings == settings_of("standard")
     assert coarse_touch(at_mm=[17.37, 0]) == coarse_touch()
     assert hash(coarse_touch()) == hash(coarse_touch())
-    assert coarse_touch(indenter=Cylinder()) != coarse_touch()
+    assert coarse_touch(indenter=fp.Cylinder()) != coarse_touch()
 
 
-@pytest.mark.parametrize("indenter", [BALL, Cylinder(), Bar(), Line(), Plate()], ids=NAMES)
+@pytest.mark.parametrize("indenter", [BALL, fp.Cylinder(), fp.Bar(), fp.Line(), fp.Plate()], ids=NAMES)
 def test_mesh_is_fine_wherever_an_indenter_touches_first(indenter):
     grading = grading_about(indenter, "standard", 17.37)
     assert grading.size_x_mm <= max(0.25, indenter.half_width_mm)
@@ -153,49 +131,32 @@ def test_mesh_is_fine_wherever_an_indenter_touches_first(indenter):
 
 
 def test_a_wire_at_the_papers_size_keeps_the_papers_pad():
-    plain, wire = (grading_about(indenter, "paper", 17.37) for indenter in (Cylinder(), Line()))
+    plain, wire = (grading_about(indenter, "paper", 17.37) for indenter in (fp.Cylinder(), fp.Line()))
     assert replace(wire, core_half_length_mm=0.0, core_size_mm=0.0) == plain
-    assert wire.core_size_mm == THIN_SIZE_MM <= Line().half_width_mm < wire.core_half_length_mm
+    assert wire.core_size_mm == THIN_SIZE_MM <= fp.Line().half_width_mm < wire.core_half_length_mm
 
 
-def refused(said, **changes):
-    arguments = {"finger": FINGER, "indenter": BALL, "stimulus": SHALLOW}
-    return pytest.param(arguments | changes, said, id=", ".join(f"{k}={v}" for k, v in changes.items()))
-
-
-@pytest.mark.parametrize(
-    ("arguments", "said"),
-    [
-        refused("gerling2014_fit: got 'steel'", tissues="steel"),
-        refused("tissues must be one of", tissues=None),
-        refused("resolution must be one of quick, standard, paper: got 'fine'", resolution="fine"),
-        refused("depth_mm must stay below", stimulus=RampAndHold(depth_mm=6.0)),
-        refused(r"at_mm\[0\] must be a finite number", at_mm=(np.nan, 0.0)),
-        refused("at_mm must be a pair", at_mm=17.37),
-        refused("x = 50", at_mm=(50.0, 0.0)),
-        refused("z = 12", at_mm=(17.37, 12.0)),
-        refused("x = -1", at_mm=(-1.0, 0.0)),
-        refused("go between the nodes", indenter=Sphere(radius_mm=0.02), at_mm=(17.0, 3.3)),
-    ],
+test_unusable_arguments_are_refused = refusals(
+    ({"tissues": "steel"}, "gerling2014_fit: got 'steel'"),
+    ({"tissues": None}, ("tissues",)),
+    ({"resolution": "fine"}, ("resolution",)),
+    ({"stimulus": fp.RampAndHold(depth_mm=6.0)}, ("depth_mm",)),
+    ({"at_mm": (np.nan, 0.0)}, ("at_mm", 0)),
+    ({"at_mm": 17.37}, ("at_mm",)),
+    ({"at_mm": (50.0, 0.0)}, "x = 50"),
+    ({"at_mm": (17.37, 12.0)}, "z = 12"),
+    ({"at_mm": (-1.0, 0.0)}, "x = -1"),
+    ({"indenter": fp.Sphere(radius_mm=0.02), "at_mm": (17.0, 3.3)}, "go between the nodes"),
+    call=lambda changes: fp.indent(**{"finger": FINGER, "indenter": BALL, "stimulus": SHALLOW} | changes),
 )
-def test_unusable_arguments_are_refused_in_one_sentence(arguments, said):
-    with pytest.raises(InputError, match=said) as refusal:
-        indent(**arguments)
-    assert str(refusal.value).endswith(".")
-    assert "\n" not in str(refusal.value)
 
 
-@pytest.mark.parametrize(
-    ("changes", "said"),
-    [
-        ({"at_mm": (17.37, 1.0)}, "full=True"),
-        ({"tilt_deg": 50.0}, "tilt_deg"),
-        ({"tilt_deg": np.nan}, "tilt_deg"),
-    ],
-)
-def test_half_a_finger_is_touched_on_its_midline_within_a_limit_of_tilt(changes, said):
-    with pytest.raises(InputError, match=said):
-        coarse_touch(**changes)
+test_half_a_finger_is_touched_on_its_midline_within_a_limit_of_tilt = refusals(
+    ({"at_mm": (17.37, 1.0)}, "full=True"),
+    ({"tilt_deg": 50.0}, "tilt_deg"),
+    ({"tilt_deg": np.nan}, "tilt_deg"),
+    call=lambda changes: coarse_touch(**changes),
+)  # fmt: skip
 
 
 def test_tilted_indenter_presses_along_its_axis_and_meets_its_point():
@@ -212,25 +173,25 @@ def test_tilted_indenter_presses_along_its_axis_and_meets_its_point():
 
 @pytest.mark.parametrize("resolution", ["quick", "standard"])
 def test_bodies_of_the_paper_keep_their_meshes(resolution):
-    spheres = (Sphere(curvature_per_m=curvature) for curvature in (144.0, 287.0, 694.0))
-    for body in (Line(), Cylinder(), Bar(), Plate(), *spheres):
+    spheres = (fp.Sphere(curvature_per_m=curvature) for curvature in (144.0, 287.0, 694.0))
+    for body in (fp.Line(), fp.Cylinder(), fp.Bar(), fp.Plate(), *spheres):
         grading = grading_about(body, resolution, 17.37)
         assert grading.finer_along == grading.finer_across == ()
-        assert touch_of(Fingertip(), body, resolution=resolution).body is body
+        assert fp.touch_of(fp.Fingertip(), body, resolution=resolution).body is body
 
 
 @pytest.mark.parametrize(
     ("body", "size_mm"),
     [
-        (Sphere(curvature_per_m=4000.0), 0.25 / 4), (Cylinder(0.5), 0.25 / 4), (FlatPunch(1.0, 0.1), 0.1),
-        (FlatPunch(10.0, 0.05), 0.2), (Bar(3.0, 0.05), 0.05), (Edge(0.0), 0.05),
-        (Grating(1.0, 1.0, 0.05), 0.05),
+        (fp.Sphere(curvature_per_m=4000.0), 0.25 / 4), (fp.Cylinder(0.5), 0.25 / 4),
+        (fp.FlatPunch(1.0, 0.1), 0.1), (fp.FlatPunch(10.0, 0.05), 0.2), (fp.Bar(3.0, 0.05), 0.05),
+        (fp.Edge(0.0), 0.05), (fp.Grating(1.0, 1.0, 0.05), 0.05),
     ],
     ids=lambda value: type(value).__name__ if not isinstance(value, float) else "",
 )  # fmt: skip
 def test_small_bodies_and_sharp_edges_are_meshed_finer(body, size_mm):
     """By their radius; an edge that the mesh cannot resolve is pressed as round as its elements are long."""
-    touch = touch_of(Fingertip(), body, RampAndHold(depth_mm=0.5))
+    touch = fp.touch_of(fp.Fingertip(), body, fp.RampAndHold(depth_mm=0.5))
     assert touch.grading.finest_x_mm == pytest.approx(size_mm)
     fillet = getattr(touch.body, "fillet_mm", getattr(touch.body, "lip_mm", np.inf))
     assert fillet >= size_mm
@@ -240,9 +201,9 @@ def test_small_bodies_and_sharp_edges_are_meshed_finer(body, size_mm):
 @pytest.mark.parametrize(
     ("body", "size_mm", "through"),
     [
-        (Sphere(radius_mm=1.1), 1.1 / 4, 2), (Sphere(radius_mm=1.3), 0.45, 2),
-        (FlatPunch(0.5, 0.1), 0.1, 2), (FlatPunch(1.0, 0.1), 0.1, 4), (Bar(3.0, 0.1), 0.1, 4),
-        (Bar(3.0, 0.3), 0.2, 2), (Edge(0.05), 0.05, 4), (Grating(1.0, 1.0, 0.05), 0.05, 2),
+        (fp.Sphere(radius_mm=1.1), 1.1 / 4, 2), (fp.Sphere(radius_mm=1.3), 0.45, 2),
+        (fp.FlatPunch(0.5, 0.1), 0.1, 2), (fp.FlatPunch(1.0, 0.1), 0.1, 4), (fp.Bar(3.0, 0.1), 0.1, 4),
+        (fp.Bar(3.0, 0.3), 0.2, 2), (fp.Edge(0.05), 0.05, 4), (fp.Grating(1.0, 1.0, 0.05), 0.05, 2),
     ],
     ids=lambda value: str(value) if not isinstance(value, float) else "",
 )  # fmt: skip
@@ -255,9 +216,9 @@ def test_quick_is_finer_from_where_it_was_too_coarse(body, size_mm, through):
 
 def test_force_of_a_grating_is_that_of_a_mesh_that_is_fine_everywhere():
     """It first touches where the pad is highest; ridges passed between coarse nodes, with 43 % less force."""
-    few_steps = PressSettings(ramp_steps=3, hold_steps=1)
-    motion = RampAndHold(depth_mm=0.3, ramp_ms=50, hold_ms=1)
-    touch = touch_of(FINGER, Grating(1.5, 1.5), motion, at_mm=(25.0, 0.0), settings=few_steps)
+    few_steps = fp.PressSettings(ramp_steps=3, hold_steps=1)
+    motion = fp.RampAndHold(depth_mm=0.3, ramp_ms=50, hold_ms=1)
+    touch = fp.touch_of(FINGER, fp.Grating(1.5, 1.5), motion, at_mm=(25.0, 0.0), settings=few_steps)
     everywhere = replace(touch, grading=replace(touch.grading, centre_mm=15.0, half_length_mm=14.0))
     force_mn = touch.solve().force_mn.max()
     assert force_mn == pytest.approx(everywhere.solve().force_mn.max(), rel=0.01)
@@ -265,13 +226,13 @@ def test_force_of_a_grating_is_that_of_a_mesh_that_is_fine_everywhere():
 
 def test_fine_mesh_reaches_to_the_first_touch_of_wide_ridges_and_dots_alone():
     """A body that is pressed straight touches at its axis, and a flat one needs no fine mesh elsewhere."""
-    field = Dots([(x, 0.0) for x in np.arange(-12.0, 12.1, 2.4)])
-    motion, highest_mm = RampAndHold(depth_mm=0.3), first_touch_x_mm(FINGER, 17.37, np.inf, 0.0)
+    field = fp.Dots([(x, 0.0) for x in np.arange(-12.0, 12.1, 2.4)])
+    motion, highest_mm = fp.RampAndHold(depth_mm=0.3), first_touch_x_mm(FINGER, 17.37, np.inf, 0.0)
     for body, tilt_deg, reaches in (
-        (Grating(), 0.0, True), (field, 0.0, True), (Grating(), 8.0, False),
-        (field, 8.0, False), (Bar(), 0.0, False), (Plate(), 0.0, False),
+        (fp.Grating(), 0.0, True), (field, 0.0, True), (fp.Grating(), 8.0, False),
+        (field, 8.0, False), (fp.Bar(), 0.0, False), (fp.Plate(), 0.0, False),
     ):  # fmt: skip
-        grading = touch_of(FINGER, body, motion, tilt_deg=tilt_deg).grading
+        grading = fp.touch_of(FINGER, body, motion, tilt_deg=tilt_deg).grading
         begins_mm = grading.centre_mm - grading.half_length_mm
         assert (begins_mm < highest_mm - 4.0) == reaches
         if not reaches:
@@ -280,8 +241,10 @@ def test_fine_mesh_reaches_to_the_first_touch_of_wide_ridges_and_dots_alone():
 
 def test_ridges_that_slide_meet_no_coarse_elements_near_the_place_of_contact():
     """A grating of 0.6 mm depth slid for 0.4 mm, and found no equilibrium 8 mm beside its middle."""
-    stroke = Trajectory((0.0, 50.0, 100.0), depth_mm=(0.0, 0.6, 0.6), x_mm=(0.0, 0.0, 5.0))
-    touches = [touch_of(FINGER, Grating(), each, at_mm=(15.0, 0.0)) for each in (RampAndHold(0.6), stroke)]
+    stroke = fp.Trajectory((0.0, 50.0, 100.0), depth_mm=(0.0, 0.6, 0.6), x_mm=(0.0, 0.0, 5.0))
+    touches = [
+        fp.touch_of(FINGER, fp.Grating(), each, at_mm=(15.0, 0.0)) for each in (fp.RampAndHold(0.6), stroke)
+    ]
     still, slides = (touch.grading for touch in touches)
     assert slides.centre_mm - slides.half_length_mm <= 5.0
     assert slides.centre_mm + slides.half_length_mm >= 25.0
@@ -290,9 +253,11 @@ def test_ridges_that_slide_meet_no_coarse_elements_near_the_place_of_contact():
 
 
 def test_a_body_narrower_than_an_element_is_refused_before_it_is_pressed():
-    coarse = grading_about(Sphere(curvature_per_m=287.0), "quick", 17.37)
-    with pytest.raises(InputError, match=r"at most 0.0333333 mm, .*: got 0.45 mm"):
-        touch_of(Fingertip(), FlatPunch(0.1, 0.01), grading=coarse)
-    with pytest.raises(InputError, match=r"got 0.05 mm; give a finer grading or a wider body than 0.1 mm\."):
-        touch_of(Fingertip(), FlatPunch(0.1, 0.01))
-    touch_of(Fingertip(), FlatPunch(0.2, 0.01))
+    coarse = grading_about(fp.Sphere(curvature_per_m=287.0), "quick", 17.37)
+    with pytest.raises(fp.InputError, match=r"at most 0.0333333 mm, .*: got 0.45 mm"):
+        fp.touch_of(fp.Fingertip(), fp.FlatPunch(0.1, 0.01), grading=coarse)
+    with pytest.raises(
+        fp.InputError, match=r"got 0.05 mm; give a finer grading or a wider body than 0.1 mm\."
+    ):
+        fp.touch_of(fp.Fingertip(), fp.FlatPunch(0.1, 0.01))
+    fp.touch_of(fp.Fingertip(), fp.FlatPunch(0.2, 0.01))

@@ -4,9 +4,8 @@ import numpy as np
 import pytest
 from scipy.optimize import minimize_scalar
 
-from fingerpad.core.errors import InputError
-from fingerpad.geometry.edged_indenters import Edge, Grating
-from fingerpad.geometry.indenters import Bar, Cylinder, FlatPunch, Line, Plate, Sphere
+from fingerpad import Bar, Cylinder, Edge, FlatPunch, Grating, Line, Plate, Sphere
+from refusals import refusals
 
 RADIUS = 1.5
 CYLINDER, SPHERE = Cylinder(diameter_mm=2 * RADIUS), Sphere(curvature_per_m=1000.0 / RADIUS)
@@ -98,16 +97,6 @@ def test_front_is_where_the_gap_changes_sign(body):
         assert (body.front(beside_it) == -np.inf).all()
 
 
-@pytest.mark.parametrize("body", ALL, ids=NAMES)
-def test_bodies_are_mirror_symmetric(body):
-    points = points_about(body, seed=3)
-    gap, normal = body.gap(points)
-    for mirror in ([-1.0, 1.0, 1.0], [1.0, 1.0, -1.0]):
-        mirrored_gap, mirrored_normal = body.gap(points * mirror)
-        np.testing.assert_array_equal(mirrored_gap, gap)
-        np.testing.assert_array_equal(mirrored_normal, normal * mirror)
-
-
 @pytest.mark.parametrize("body", [CYLINDER, SPHERE], ids=NAMES[:2])
 def test_a_ball_goes_on_as_a_rod_behind_its_widest_section(body):
     """The gap has no jump there and its slope is the normal, so that a contact force has a potential."""
@@ -154,20 +143,12 @@ def test_bodies_across_the_finger_do_not_end_in_z_and_round_ones_have_no_preferr
     assert [type(body).__name__ for body in ALL if body.grips] == ["Line"]
 
 
-@pytest.mark.parametrize(
-    ("make", "said"),
-    [
-        (lambda: Cylinder(0.0), "diameter_mm"),
-        (lambda: Line(-0.05), "diameter_mm"),
-        (lambda: Sphere(curvature_per_m=np.nan), "curvature_per_m"),
-        (lambda: Bar(width_mm=np.inf), "width_mm"),
-        (lambda: Bar(width_mm=1.0, fillet_mm=0.6), "half of width_mm, 0.5 mm: got 0.6 mm"),
-        (lambda: FlatPunch(diameter_mm=1.0, fillet_mm=-0.1), "fillet_mm"),
-        (lambda: FlatPunch(diameter_mm="wide"), "diameter_mm"),
-    ],
-)
-def test_impossible_bodies_are_refused_in_one_sentence(make, said):
-    with pytest.raises(InputError, match=said) as refusal:
-        make()
-    assert str(refusal.value).endswith(".")
-    assert "\n" not in str(refusal.value)
+test_impossible_bodies_are_refused_in_one_sentence = refusals(
+    (lambda: Cylinder(0.0), "diameter_mm"),
+    (lambda: Line(-0.05), "diameter_mm"),
+    (lambda: Sphere(curvature_per_m=np.nan), ("curvature_per_m",)),
+    (lambda: Bar(width_mm=np.inf), ("width_mm",)),
+    (lambda: Bar(width_mm=1.0, fillet_mm=0.6), "half of width_mm, 0.5 mm: got 0.6 mm"),
+    (lambda: FlatPunch(diameter_mm=1.0, fillet_mm=-0.1), "fillet_mm"),
+    (lambda: FlatPunch(diameter_mm="wide"), "diameter_mm"),
+)  # fmt: skip

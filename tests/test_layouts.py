@@ -7,14 +7,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
-from scipy.spatial import cKDTree
 from scipy.stats import chisquare, kstest
 
-from fingerpad.core.errors import InputError
+from fingerpad import Ellipse, Polygon, Population, Rectangle, hexagonal, poisson_disc
 from fingerpad.core.layouts import PATTERNS, Layout
-from fingerpad.core.patterns import MOST_RECEPTORS, hexagonal, jittered, poisson_disc, rectangular, uniform
-from fingerpad.core.regions import Ellipse, Polygon, Rectangle
-from fingerpad.neuron.population import Population
+from fingerpad.core.patterns import MOST_RECEPTORS, jittered, rectangular, uniform
+from refusals import refusals
 
 PAD = Ellipse(6.0, 5.0, (17.0, 0.5))
 MAKERS = {
@@ -24,10 +22,6 @@ MAKERS = {
     "jittered": lambda region, density: jittered(region, density, seed=3),
     "poisson-disc": lambda region, density: poisson_disc(region, density, seed=3),
 }
-
-
-def nearest_mm(layout, k=1):
-    return cKDTree(layout.places_mm).query(layout.places_mm, k=k + 1)[0][:, 1:]
 
 
 @settings(deadline=None, max_examples=25)
@@ -60,17 +54,6 @@ def test_a_rectangle_of_whole_pitches_holds_the_papers_grid():
     assert [make(PAD, 70.0).pattern for make in MAKERS.values()] == list(PATTERNS)
 
 
-@pytest.mark.parametrize("density", [25.0, 70.0, 140.0])
-def test_lattices_have_the_pitch_of_their_density(density):
-    square, hexagons = rectangular(PAD, density), hexagonal(PAD, density)
-    assert square.pitch_mm == pytest.approx(10.0 / math.sqrt(density), rel=1e-14)
-    assert hexagons.pitch_mm == pytest.approx(10.0 * math.sqrt(2.0 / (math.sqrt(3.0) * density)), rel=1e-14)
-    for layout, count in ((square, 4), (hexagons, 6)):
-        inner = cKDTree(layout.places_mm).query(PAD.centre_mm)[1]
-        assert_allclose(nearest_mm(layout, count)[inner], layout.pitch_mm, rtol=1e-9)
-        assert nearest_mm(layout).min() >= layout.pitch_mm * (1.0 - 1e-9)
-
-
 def test_uniform_places_are_as_likely_anywhere():
     layout = uniform(Ellipse(5.0, 5.0), 6000.0, seed=11)
     x, z = layout.places_mm.T
@@ -92,22 +75,6 @@ def test_jitter_has_its_spread_and_none_leaves_the_lattice():
     assert abs(numbers.std() - 1.0) < 4.0 / math.sqrt(2.0 * numbers.size)
 
 
-@pytest.mark.parametrize("separation", [0.4, 0.75, 0.8])
-def test_poisson_discs_keep_their_distance(separation):
-    layout = poisson_disc(PAD, 400.0, seed=2, separation=separation)
-    assert nearest_mm(layout).min() >= separation * layout.pitch_mm * (1.0 - 1e-9)
-    assert len(layout) == round(400.0 * PAD.area_mm2 / 100.0)
-
-    def stretched(places):
-        return np.column_stack([places[:, 0], np.zeros(len(places)), 3.0 * places[:, 1]])
-
-    # Distances count on the skin where the skin is given.
-    layout = poisson_disc(PAD, 100.0, seed=2, place=stretched)
-    there = stretched(layout.places_mm)
-    assert cKDTree(there).query(there, k=2)[0][:, 1].min() >= 0.75 * layout.pitch_mm
-    assert nearest_mm(layout).min() < 0.75 * layout.pitch_mm
-
-
 def test_poisson_discs_are_those_of_one_dart_after_the_other():
     """Slow reference: each candidate against all that were kept before it."""
     batches = []
@@ -116,10 +83,10 @@ def test_poisson_discs_are_those_of_one_dart_after_the_other():
         batches.append(places)
         return places
 
-    layout = poisson_disc(PAD, 100.0, seed=9, place=recorded)
+    layout = poisson_disc(PAD, 100.0, seed=9, place=recorded, separation=0.6)
     kept: list[np.ndarray] = []
     for dart in np.concatenate(batches):
-        if all(np.linalg.norm(dart - other) >= 0.75 * layout.pitch_mm for other in kept):
+        if all(np.linalg.norm(dart - other) >= 0.6 * layout.pitch_mm for other in kept):
             kept.append(dart)
     assert_array_equal(layout.places_mm, kept[: len(layout)])
 
@@ -140,21 +107,15 @@ def test_the_seed_decides(make):
 THIN_CORNER = Polygon(((0, 0), (100, 0), (100, 0.02), (0.02, 0.02), (0.02, 100), (0, 100)))
 
 
-@pytest.mark.parametrize(
-    ("wrong", "message"),
-    [
-        (lambda: rectangular(PAD, 0.0), "density_per_cm2 must be greater than 0"),
-        (lambda: hexagonal(PAD, math.inf), "density_per_cm2 must be a finite number"),
-        (lambda: uniform(Rectangle(0.1, 0.1), 10.0, 1), "gives no receptor"),
-        (lambda: poisson_disc(PAD, 1e7, 1), f"A layout may have {MOST_RECEPTORS:,} receptors"),
-        (lambda: rectangular(THIN_CORNER, 100.0), "No receptor of a rectangular lattice"),
-        (lambda: uniform(PAD, 70.0, -1), "seed must be a whole number"),
-        (lambda: jittered(PAD, 70.0, 1, jitter=-0.1), "jitter must not be negative"),
-        (lambda: poisson_disc(PAD, 70.0, 1, separation=0.9), "separation must not exceed 0.8"),
-        (lambda: Layout(np.empty((0, 2)), 1.0, "uniform"), "rows of two numbers"),
-        (lambda: Layout([[0.0, 1.0]], 0.0, "uniform"), "pitch_mm must be greater"),
-    ],
-)
-def test_what_cannot_be_laid_out_is_refused(wrong, message):
-    with pytest.raises(InputError, match=message):
-        wrong()
+test_what_cannot_be_laid_out_is_refused = refusals(
+    (lambda: rectangular(PAD, 0.0), "density_per_cm2 must be greater than 0"),
+    (lambda: hexagonal(PAD, math.inf), "density_per_cm2 must be a finite number"),
+    (lambda: uniform(Rectangle(0.1, 0.1), 10.0, 1), "gives no receptor"),
+    (lambda: poisson_disc(PAD, 1e7, 1), f"A layout may have {MOST_RECEPTORS:,} receptors"),
+    (lambda: rectangular(THIN_CORNER, 100.0), "No receptor of a rectangular lattice"),
+    (lambda: uniform(PAD, 70.0, -1), ("seed",)),
+    (lambda: jittered(PAD, 70.0, 1, jitter=-0.1), ("jitter",)),
+    (lambda: poisson_disc(PAD, 70.0, 1, separation=0.9), ("separation",)),
+    (lambda: Layout(np.empty((0, 2)), 1.0, "uniform"), "rows of two numbers"),
+    (lambda: Layout([[0.0, 1.0]], 0.0, "uniform"), ("pitch_mm",)),
+)  # fmt: skip

@@ -164,16 +164,6 @@ def test_solution_that_is_not_reached_is_refused():
     assert solver.renewals == 1
 
 
-@pytest.mark.parametrize("poisson", [0.48, 0.499, 0.4999])
-def test_factor_serves_a_body_that_is_nearly_incompressible(poisson):
-    blocks, residual = tangent(poisson=poisson), residual_of()
-    solver = LinearSolver(KeptFactor(SPARSITY, FREE))
-    solution = solver.solve(blocks, residual, 1e-8)
-    exact = direct(blocks, residual)
-    np.testing.assert_allclose(solution, exact, rtol=0, atol=1e-7 * np.abs(exact).max())
-    assert solver.iterations <= 4
-
-
 def chosen(poisson):
     return choose_preconditioner(SPARSITY, FREE, BLOCK, poisson)
 

@@ -6,9 +6,9 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from fingerpad.core.errors import InputError
 from fingerpad.mechanics.materials import Material, MaterialTable, Polynomial, Prony
 from fingerpad.mechanics.tissues import TISSUES, named_tissues
+from refusals import refusals
 
 
 def test_linear_elastic_has_the_moduli_asked_for():
@@ -32,31 +32,23 @@ def test_table_holds_instantaneous_coefficients_and_pads_short_series():
     assert (table.times_ms > 0).all()
 
 
-@pytest.mark.parametrize(
-    ("make", "said"),
-    [
-        (lambda: Material.neo_hooke(shear_kpa=-1.0, poisson=0.48), "shear_kpa"),
-        (lambda: Material.neo_hooke(shear_kpa=np.nan, poisson=0.48), "shear_kpa"),
-        (lambda: Material.neo_hooke(shear_kpa=1.0, poisson=0.5), "poisson"),
-        (lambda: Material.linear_elastic(young_kpa=0.0, poisson=0.3), "young_kpa"),
-        (lambda: Material.linear_elastic(young_kpa=1.0, poisson=-1.0), "poisson"),
-        (lambda: Material.polynomial(1.0, -2.0, 0, 0, 0, poisson=0.48), "c10"),
-        (lambda: Polynomial(c10=np.inf, bulk_linear=1.0), "c10"),
-        (lambda: Polynomial(c10=1.0, bulk_linear=0.0), "bulk_linear"),
-        (lambda: Polynomial(c10=1.0, bulk_linear=1.0, bulk_cubic=-1.0), "bulk_cubic"),
-        (lambda: Material(Polynomial(c10=1.0, bulk_linear=1.0), moduli="relaxed"), "moduli"),
-        (lambda: Prony(shares=(0.5,), times_ms=()), "one time per share"),
-        (lambda: Prony(shares=(0.5, 0.5), times_ms=(1.0, 2.0)), "less than 1"),
-        (lambda: Prony(shares=(-0.1,), times_ms=(1.0,)), "share"),
-        (lambda: Prony(shares=(0.1,), times_ms=(0.0,)), "time"),
-        (lambda: named_tissues("trial9"), "trial1"),
-    ],
-)
-def test_unusable_materials_are_refused_in_one_sentence(make, said):
-    with pytest.raises(InputError, match=said) as refusal:
-        make()
-    assert "\n" not in str(refusal.value)
-    assert str(refusal.value).endswith(".")
+test_unusable_materials_are_refused_in_one_sentence = refusals(
+    (lambda: Material.neo_hooke(shear_kpa=-1.0, poisson=0.48), "shear_kpa"),
+    (lambda: Material.neo_hooke(shear_kpa=np.nan, poisson=0.48), "shear_kpa"),
+    (lambda: Material.neo_hooke(shear_kpa=1.0, poisson=0.5), "poisson"),
+    (lambda: Material.linear_elastic(young_kpa=0.0, poisson=0.3), ("young_kpa",)),
+    (lambda: Material.linear_elastic(young_kpa=1.0, poisson=-1.0), "poisson"),
+    (lambda: Material.polynomial(1.0, -2.0, 0, 0, 0, poisson=0.48), "c10"),
+    (lambda: Polynomial(c10=np.inf, bulk_linear=1.0), ("c10",)),
+    (lambda: Polynomial(c10=1.0, bulk_linear=0.0), "bulk_linear"),
+    (lambda: Polynomial(c10=1.0, bulk_linear=1.0, bulk_cubic=-1.0), "bulk_cubic"),
+    (lambda: Material(Polynomial(c10=1.0, bulk_linear=1.0), moduli="relaxed"), ("moduli",)),
+    (lambda: Prony(shares=(0.5,), times_ms=()), "one time per share"),
+    (lambda: Prony(shares=(0.5, 0.5), times_ms=(1.0, 2.0)), "less than 1"),
+    (lambda: Prony(shares=(-0.1,), times_ms=(1.0,)), "share"),
+    (lambda: Prony(shares=(0.1,), times_ms=(0.0,)), "time"),
+    (lambda: named_tissues("trial9"), "trial1"),
+)  # fmt: skip
 
 
 def test_the_sets_paper_and_human_have_a_long_term_ratio_of_0_40_and_0_34_at_once():

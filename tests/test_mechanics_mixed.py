@@ -5,17 +5,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from fingerpad.geometry.indenters import Sphere
+from fingerpad import ForceRampAndHold, Hencky, Material, Polynomial, PressSettings, RampAndHold, Sphere
 from fingerpad.geometry.mesh import block_mesh
 from fingerpad.geometry.mesh_checks import jacobian_at_gauss
-from fingerpad.geometry.motion import ForceRampAndHold, RampAndHold
 from fingerpad.mechanics import press as press_module
 from fingerpad.mechanics.assembly import Sparsity
-from fingerpad.mechanics.laws import Hencky, Polynomial
-from fingerpad.mechanics.materials import Material, MaterialTable
+from fingerpad.mechanics.materials import MaterialTable
 from fingerpad.mechanics.mixed import Pressures, exchange_pressure
 from fingerpad.mechanics.newton import NewtonSettings
-from fingerpad.mechanics.press_settings import PressSettings
 from presses import block, press_into
 
 SHEAR, BULK = 3.0, 700.0

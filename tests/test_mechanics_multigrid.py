@@ -4,22 +4,19 @@ import numpy as np
 import pytest
 from scipy import sparse
 
+from fingerpad import Fingertip, Material, PressSettings, Prony, RampAndHold, Sphere
 from fingerpad.core.threads import available_threads, compiled_threads
-from fingerpad.geometry.fingertip import Fingertip
 from fingerpad.geometry.grading import resolution_grading
-from fingerpad.geometry.indenters import Sphere
 from fingerpad.geometry.mesh import block_mesh, finger_mesh
-from fingerpad.geometry.motion import RampAndHold
 from fingerpad.mechanics import linear, multigrid
 from fingerpad.mechanics.assembly import Sparsity, assemble
 from fingerpad.mechanics.columns import find_scales, round_matrix
 from fingerpad.mechanics.contact import place
 from fingerpad.mechanics.linear import LinearSolver, free_degrees_of_freedom
-from fingerpad.mechanics.materials import Material, MaterialTable, Prony
+from fingerpad.mechanics.materials import MaterialTable
 from fingerpad.mechanics.multigrid import Multigrid
 from fingerpad.mechanics.newton import NewtonSettings
 from fingerpad.mechanics.press import press
-from fingerpad.mechanics.press_settings import PressSettings
 
 SMALL = block_mesh(
     np.arange(7.0), [0.0, 0.3, 0.5, 1.5], np.array([0.0, 0.5, 1.0, 1.5, 2.5, 3.5]), [0, 2, 3], symmetric=True

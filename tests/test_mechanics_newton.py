@@ -6,21 +6,17 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from fingerpad.core.errors import ConvergenceError, InputError
-from fingerpad.geometry.edged_indenters import Gap
-from fingerpad.geometry.indenters import Bar, Sphere
-from fingerpad.geometry.motion import ForceRampAndHold, RampAndHold
+import fingerpad as fp
 from fingerpad.mechanics.newton import NewtonSettings, _Search
 from fingerpad.mechanics.press import _Press
-from fingerpad.mechanics.press_settings import PressSettings
 from presses import RELAXING, block, press_into
 
-BALL = Sphere(curvature_per_m=500.0)
-MOTION = RampAndHold(depth_mm=0.2, ramp_ms=50.0, hold_ms=500.0)
+BALL = fp.Sphere(curvature_per_m=500.0)
+MOTION = fp.RampAndHold(depth_mm=0.2, ramp_ms=50.0, hold_ms=500.0)
 
 
 def pressed(mesh, indenter, newton_settings, at_mm=(0.0, 0.0, 0.0), ramp_steps=3):
-    settings = PressSettings(ramp_steps, 3, newton_settings)
+    settings = fp.PressSettings(ramp_steps, 3, newton_settings)
     return press_into(mesh, RELAXING, indenter, MOTION, settings, at_mm)
 
 
@@ -33,21 +29,21 @@ def test_balance_is_met_where_the_residual_alone_would_pass_as_solved():
     assert found.newton_steps > unbalanced.newton_steps
     # The number reported is that of the forces reported.
     np.testing.assert_allclose(found.reaction_mn[1:, 1], found.force_mn[1:], rtol=1e-4)
-    with pytest.raises(InputError, match="balance_tolerance must be"):
+    with pytest.raises(fp.InputError, match="balance_tolerance must be"):
         NewtonSettings(balance_tolerance=0.0)
     differs = np.abs(unbalanced.reaction_mn[1:, :2] - np.outer(unbalanced.force_mn[1:], [0.0, 1.0]))
     assert unbalanced.force_imbalance >= (differs.max(axis=1) / unbalanced.force_mn[1:]).max() * (1 - 1e-9)
 
 
 @pytest.mark.parametrize(
-    "indenter", [Bar(1.7, 0.1), Gap(0.75, 4.0, 0.3, 0.03)], ids=lambda body: type(body).__name__
+    "indenter", [fp.Bar(1.7, 0.1), fp.Gap(0.75, 4.0, 0.3, 0.03)], ids=lambda body: type(body).__name__
 )
 def test_skin_that_slides_round_an_edge_is_followed(indenter):
     """Edges much sharper than the spacing of the nodes: with their curvature the tangent is not definite."""
     done = pressed(block(), indenter, NewtonSettings())
     assert done.force_imbalance <= 1e-4
     assert 0.0 < done.penetration_mm <= 0.005 * MOTION.depth_mm
-    blunt = {"fillet_mm": 0.3} if isinstance(indenter, Bar) else {"lip_mm": 0.3}
+    blunt = {"fillet_mm": 0.3} if isinstance(indenter, fp.Bar) else {"lip_mm": 0.3}
     similar = pressed(block(), replace(indenter, **blunt), NewtonSettings())
     np.testing.assert_allclose(done.force_mn[-1], similar.force_mn[-1], rtol=0.25)
 
@@ -59,13 +55,13 @@ def test_a_shifted_tangent_leads_to_the_same_equilibrium(monkeypatch):
     states before and the force at the end do not.
     """
     steps = 16
-    usual = pressed(block(), Bar(1.7, 0.1), NewtonSettings(), ramp_steps=steps)
+    usual = pressed(block(), fp.Bar(1.7, 0.1), NewtonSettings(), ramp_steps=steps)
     shifted = []
     found = _Search.found
     monkeypatch.setattr("fingerpad.mechanics.newton.MOST_STRAIGHT", 0)
     watched = lambda search, *how: shifted.append(search.was_shifted) or found(search, *how)  # noqa: E731
     monkeypatch.setattr(_Search, "found", watched)
-    done = pressed(block(), Bar(1.7, 0.1), NewtonSettings(persistent=True), ramp_steps=steps)
+    done = pressed(block(), fp.Bar(1.7, 0.1), NewtonSettings(persistent=True), ramp_steps=steps)
     assert any(shifted)
     stands = done.depth_mm < 0.17
     np.testing.assert_allclose(done.force_mn[stands], usual.force_mn[stands], rtol=1e-4)
@@ -78,7 +74,7 @@ def test_a_shifted_tangent_leads_to_the_same_equilibrium(monkeypatch):
 @pytest.mark.parametrize("ramp_steps", [3, 12])
 def test_skin_that_snaps_ends_in_one_state_with_any_number_of_steps(ramp_steps):
     """The edge is sharper than the elements: near the largest depth skin slides round it at once."""
-    done = pressed(block(), Bar(1.7, 0.1), NewtonSettings(persistent=True), ramp_steps=ramp_steps)
+    done = pressed(block(), fp.Bar(1.7, 0.1), NewtonSettings(persistent=True), ramp_steps=ramp_steps)
     np.testing.assert_allclose(done.force_mn[-1], 64.0, rtol=2e-3)
     assert done.energy.relative_imbalance <= 0.015  # what the snap sets free
 
@@ -102,11 +98,11 @@ def test_balance_holds_beside_the_middle_of_a_whole_block():
 
 def test_a_search_about_a_small_body_may_take_more_newton_steps(monkeypatch):
     """Nodes find their place one after the other, and friction is renewed after each."""
-    few = PressSettings(1, 1, NewtonSettings(most_iterations=5))
+    few = fp.PressSettings(1, 1, NewtonSettings(most_iterations=5))
     small_body = {"friction": 0.5, "finest_mm": 0.08}
     assert press_into(block(), RELAXING, BALL, MOTION, few, **small_body).force_mn[-1] > 0.0
     monkeypatch.setattr("fingerpad.mechanics.press_settings.MORE_NEWTON_STEPS", 1)
-    with pytest.raises(ConvergenceError, match="after 5 Newton steps"):
+    with pytest.raises(fp.ConvergenceError, match="after 5 Newton steps"):
         press_into(block(), RELAXING, BALL, MOTION, few, **small_body)
 
 
@@ -130,7 +126,7 @@ def test_node_that_only_just_left_comes_back_by_a_short_step(persistent, monkeyp
     start = at(0.0)
     step = np.array([push_mn / soft])
     if not persistent:
-        with pytest.raises(ConvergenceError, match="found no better configuration"):
+        with pytest.raises(fp.ConvergenceError, match="found no better configuration"):
             search.line_search(start, step, [start.potential_uj])
         return
     found = search.line_search(start, step, [start.potential_uj])
@@ -140,9 +136,9 @@ def test_node_that_only_just_left_comes_back_by_a_short_step(persistent, monkeyp
 
 @pytest.mark.parametrize("friction", [0.0, 0.5])
 def test_both_searches_find_the_same_depth_for_a_force(friction):
-    motion = ForceRampAndHold(force_mn=60.0, ramp_ms=50.0, hold_ms=200.0)
-    searches = (PressSettings(4, 3, NewtonSettings(persistent=each)) for each in (False, True))
-    bar, limits = Bar(1.7, 0.1), {"deepest_mm": 1.0, "friction": friction}
+    motion = fp.ForceRampAndHold(force_mn=60.0, ramp_ms=50.0, hold_ms=200.0)
+    searches = (fp.PressSettings(4, 3, NewtonSettings(persistent=each)) for each in (False, True))
+    bar, limits = fp.Bar(1.7, 0.1), {"deepest_mm": 1.0, "friction": friction}
     plain, persistent = (press_into(block(), RELAXING, bar, motion, each, **limits) for each in searches)
     np.testing.assert_allclose(persistent.force_mn, plain.force_mn, rtol=1e-4)
     np.testing.assert_allclose(persistent.depth_mm, plain.depth_mm, rtol=2e-4)

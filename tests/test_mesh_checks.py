@@ -7,9 +7,7 @@ from itertools import product
 import numpy as np
 import pytest
 
-from fingerpad.core.errors import InputError
-from fingerpad.geometry.fingertip import Fingertip
-from fingerpad.geometry.grading import Grading
+from fingerpad import Fingertip, Grading, InputError
 from fingerpad.geometry.mesh import CORNERS, block_mesh, finger_mesh
 from fingerpad.geometry.mesh_checks import check_mesh
 

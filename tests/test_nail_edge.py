@@ -7,14 +7,12 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy.spatial import cKDTree
 
-from fingerpad.core.errors import InputError
+from fingerpad import Fingertip, NailEdge, Population
 from fingerpad.core.patterns import uniform
-from fingerpad.geometry.fingertip import Fingertip
 from fingerpad.geometry.grading import resolution_grading
 from fingerpad.geometry.mesh import finger_mesh
-from fingerpad.neuron.population import Population
-from fingerpad.skin.nail_edge import NailEdge
 from fingerpad.skin.receptor_sheet import ReceptorSheet
+from refusals import refusals
 
 NAIL = NailEdge()
 FINGER = NAIL.finger
@@ -91,20 +89,14 @@ def test_receptors_beside_the_nail_have_their_density_and_end_organs():
     assert len(np.unique(sheet.below(population.positions_mm).round(6), axis=0)) == len(population) // 2 + 1
 
 
-@pytest.mark.parametrize(
-    ("wrong", "message"),
-    [
-        (lambda: NailEdge(reach_mm=0.0), "reach_mm must be greater than 0"),
-        (lambda: NailEdge(replace(Fingertip(), nail_half_width_mm=9.0)), "must leave skin beside it"),
-        (lambda: NAIL.points([[0.0, 4.5]]), "within 4 mm of the edge of the nail"),
-        (lambda: NAIL.points([[0.0, 1.0], [30.0, 1.0]]), "got along = 30, distance = 1 mm"),
-        (lambda: NAIL.points([[0.0, 1.0, 2.0]]), "two columns"),
-        (lambda: NAIL.region(5.0), "width_mm must not exceed the reach of 4 mm"),
-        (lambda: NAIL.rows(0, 100.0), "count must be a whole number"),
-        (lambda: NAIL.rows(9, 100.0), "last row must not exceed the reach"),
-        (lambda: NAIL.rows(1, 0.0), "density_per_cm2 must be greater than 0"),
-    ],
-)
-def test_what_is_not_beside_the_nail_is_refused(wrong, message):
-    with pytest.raises(InputError, match=message):
-        wrong()
+test_what_is_not_beside_the_nail_is_refused = refusals(
+    (lambda: NailEdge(reach_mm=0.0), ("reach_mm",)),
+    (lambda: NailEdge(replace(Fingertip(), nail_half_width_mm=9.0)), "must leave skin beside it"),
+    (lambda: NAIL.points([[0.0, 4.5]]), "within 4 mm of the edge of the nail"),
+    (lambda: NAIL.points([[0.0, 1.0], [30.0, 1.0]]), "got along = 30, distance = 1 mm"),
+    (lambda: NAIL.points([[0.0, 1.0, 2.0]]), "two columns"),
+    (lambda: NAIL.region(5.0), ("width_mm",)),
+    (lambda: NAIL.rows(0, 100.0), ("count",)),
+    (lambda: NAIL.rows(9, 100.0), "last row must not exceed the reach"),
+    (lambda: NAIL.rows(1, 0.0), ("density_per_cm2",)),
+)  # fmt: skip

@@ -6,42 +6,32 @@ import numpy as np
 import pytest
 
 import fingerpad as fp
-from fingerpad.core.errors import InputError
 from fingerpad.experiments.descriptions.touch import described_touch
 from fingerpad.experiments.discrimination.run import DiscriminationRun
-from fingerpad.experiments.discrimination.task_stimuli import input_hashes, read_task, task_text
-from fingerpad.experiments.stimuli import read_stimuli
+from fingerpad.experiments.discrimination.task_stimuli import input_hashes, task_text
 from fingerpad.export.abaqus import abaqus_deck
-from fingerpad.export.formats import export_touch
 from fingerpad.export.job import job_of
 from fingerpad.export.vtu import write_vtu_series
-from fingerpad.geometry.fingertip import Fingertip
 from fingerpad.geometry.free_mesh import FACES, FreeMesh, closest_on_triangles
-from fingerpad.geometry.grading import Grading
-from fingerpad.geometry.indenters import Sphere
 from fingerpad.geometry.mesh import LAYERS
 from fingerpad.geometry.mesh_checks import jacobian_at_gauss
-from fingerpad.geometry.mesh_files import _read_inp, _read_msh, read_finger
+from fingerpad.geometry.mesh_files import _read_inp, _read_msh
 from fingerpad.geometry.mesh_parts import MeshParts, finger_from
-from fingerpad.geometry.motion import RampAndHold
-from fingerpad.mechanics.press_settings import PressSettings
 from fingerpad.skin.free_receptors import FreeReceptors
-from fingerpad.skin.indentation import touch_of
 from fingerpad.skin.section import SURFACE_QUANTITIES, middle_section
 from fingerpad.skin.store import touch_key
-from fingerpad.skin.unrolled_skin import UnrolledSkin
 from tests import gmsh_finger
 
-BALL, MOTION = Sphere(radius_mm=4.0), RampAndHold(depth_mm=0.6, hold_ms=50.0)
-STEPS = PressSettings(ramp_steps=2, hold_steps=1)
-COARSE = Grading(17.37, 2.0, 2.0, 0.6, 0.6, 3.0, stratum_corneum=1, dermis=2, subcutis=2)
+BALL, MOTION = fp.Sphere(radius_mm=4.0), fp.RampAndHold(depth_mm=0.6, hold_ms=50.0)
+STEPS = fp.PressSettings(ramp_steps=2, hold_steps=1)
+COARSE = fp.Grading(17.37, 2.0, 2.0, 0.6, 0.6, 3.0, stratum_corneum=1, dermis=2, subcutis=2)
 
 
 @pytest.fixture(scope="module")
 def sent(tmp_path_factory):
     """Our own finger, pressed, with its files."""
     folder = tmp_path_factory.mktemp("sent")
-    touch = touch_of(Fingertip(), BALL, MOTION, grading=COARSE, settings=STEPS)
+    touch = fp.touch_of(fp.Fingertip(), BALL, MOTION, grading=COARSE, settings=STEPS)
     skin = touch.solve(whole=True)
     write_vtu_series(folder / "finger.pvd", skin)
     (folder / "finger.inp").write_text(abaqus_deck(job_of(touch)))
@@ -64,7 +54,7 @@ def parts(made):
 @pytest.mark.parametrize("name", ["finger_0000.vtu", "finger.inp"])
 def test_our_own_finger_comes_back_with_its_numbers(sent, name):
     folder, skin = sent
-    own = read_finger(folder / name)
+    own = fp.read_finger(folder / name)
     mesh = own.mesh
     assert len(mesh.nodes_mm) == len(skin.mesh.nodes_mm)
     assert sorted(mesh.layer) == sorted(skin.mesh.layer)
@@ -76,7 +66,7 @@ def test_our_own_finger_comes_back_with_its_numbers(sent, name):
     assert mesh.receptor_depth_mm == pytest.approx(0.471, abs=1e-3)
     assert float(own.depth_available_mm(17.37, 0.0)) == pytest.approx(5.549, abs=1e-3)
     if name != "finger.inp":  # the same nodes and elements have the same numbers
-        deck = read_finger(folder / "finger.inp").mesh
+        deck = fp.read_finger(folder / "finger.inp").mesh
         order, deck_order = (np.lexsort(np.round(each.nodes_mm, 6).T) for each in (mesh, deck))
         np.testing.assert_allclose(mesh.nodes_mm[order], deck.nodes_mm[deck_order], rtol=0, atol=1e-6)
         place = np.empty(len(order), dtype=int)
@@ -84,7 +74,7 @@ def test_our_own_finger_comes_back_with_its_numbers(sent, name):
         ours, theirs = place[mesh.elements], deck.elements
         np.testing.assert_array_equal(ours[np.lexsort(ours.T)], theirs[np.lexsort(theirs.T)])
         return
-    read = touch_of(own, BALL, MOTION, at_mm=(17.37, 0.0), settings=STEPS).solve()
+    read = fp.touch_of(own, BALL, MOTION, at_mm=(17.37, 0.0), settings=STEPS).solve()
     np.testing.assert_allclose(read.force_mn, skin.force_mn, rtol=2e-6, atol=1e-9)
     np.testing.assert_allclose(read.contact_area_mm2, skin.contact_area_mm2, rtol=1e-5)
     np.testing.assert_allclose(np.sort(read.sed_kpa), np.sort(skin.sed_kpa), rtol=1e-3, atol=1e-5)
@@ -94,12 +84,12 @@ def test_our_own_finger_comes_back_with_its_numbers(sent, name):
     for quantity in SURFACE_QUANTITIES:
         values = skin.sample(quantity, sites)
         np.testing.assert_allclose(read.sample(quantity, sites), values, atol=0.06 * values.max())
-    on_skin = Fingertip().skin_point(*np.transpose(sites))
+    on_skin = fp.Fingertip().skin_point(*np.transpose(sites))
     np.testing.assert_allclose(read.sed(on_skin).values, skin.sed(on_skin).values, rtol=0.03, atol=2e-3)
 
 
 def test_a_finger_of_gmsh_is_a_finger(made, parts):
-    own = read_finger(made)
+    own = fp.read_finger(made)
     mesh = own.mesh
     assert isinstance(mesh, FreeMesh)
     wedges = (np.diff(np.sort(mesh.elements, axis=1), axis=1) == 0).any(axis=1)
@@ -118,7 +108,7 @@ def test_a_finger_of_gmsh_is_a_finger(made, parts):
     assert own.skin_normal(own.skin_point(10.0, 4.0)).round(2).tolist() == pytest.approx(
         [0.0, -0.87, 0.5], abs=0.03
     )
-    skin = touch_of(own, BALL, MOTION).solve()
+    skin = fp.touch_of(own, BALL, MOTION).solve()
     assert skin.force_imbalance < 1e-3
     assert skin.energy_imbalance < 5e-3
 
@@ -130,22 +120,22 @@ def test_the_finger_of_gmsh_yields_as_ours_of_the_same_shape(tmp_path):
     stations = np.concatenate([np.linspace(0.0, 15.5, 32), 16.0 + 8.0 * np.sin(np.linspace(0.0, 1.4, 30))])
     radius = np.sqrt(64.0 - np.maximum(stations - 16.0, 0.0) ** 2)
     readings = tuple(zip(stations.tolist(), radius.tolist(), strict=True))
-    ours = Fingertip(
+    ours = fp.Fingertip(
         24.0, readings, readings, readings, *np.diff([0.0, *gmsh_finger.DEPTHS_MM]), -1e-6, 16.0, 2.5, 2.5,
         18.5, (0.1, 0.2), 0.01,
     )  # fmt: skip
-    own, place = read_finger(path), (10.0, 0.0)
-    grading = Grading(10.0, 6.0, 6.0, 0.66, 1.05, 2.0, stratum_corneum=1, dermis=2, subcutis=4)
-    here = touch_of(own, BALL, MOTION, at_mm=place, settings=STEPS).solve()
-    there = touch_of(ours, BALL, MOTION, at_mm=place, settings=STEPS, grading=grading).solve()
+    own, place = fp.read_finger(path), (10.0, 0.0)
+    grading = fp.Grading(10.0, 6.0, 6.0, 0.66, 1.05, 2.0, stratum_corneum=1, dermis=2, subcutis=4)
+    here = fp.touch_of(own, BALL, MOTION, at_mm=place, settings=STEPS).solve()
+    there = fp.touch_of(ours, BALL, MOTION, at_mm=place, settings=STEPS, grading=grading).solve()
     assert here.force_mn[-1] == pytest.approx(there.force_mn[-1], rel=0.005)
     assert here.sed([place]).values[-1] == pytest.approx(there.sed([place]).values[-1], rel=0.015)
 
 
 def test_older_files_units_and_axes_give_the_same_finger(made, parts, tmp_path):
-    own = read_finger(made)
+    own = fp.read_finger(made)
     gmsh_finger.write_gmsh_finger(tmp_path / "old.msh", version=2.2, scale=1e-3, skin="Outer surface")
-    old = read_finger(tmp_path / "old.msh", unit="m", names={"skin": "outer_surface"})
+    old = fp.read_finger(tmp_path / "old.msh", unit="m", names={"skin": "outer_surface"})
     order = np.lexsort(np.round(own.mesh.nodes_mm, 6).T), np.lexsort(np.round(old.mesh.nodes_mm, 6).T)
     np.testing.assert_allclose(old.mesh.nodes_mm[order[1]], own.mesh.nodes_mm[order[0]], atol=1e-9)
     assert old.mesh.living_epidermis.size == own.mesh.living_epidermis.size
@@ -161,12 +151,14 @@ def test_a_whole_finger_of_gmsh_gives_the_force_of_the_half(tmp_path):
     half, whole = finger_from(parts), finger_from(mirrored(parts))
     assert whole.mesh.full
     place = (10.0, 0.0)
-    one, both = (touch_of(own, BALL, MOTION, at_mm=place, settings=STEPS).solve() for own in (half, whole))
+    one, both = (fp.touch_of(own, BALL, MOTION, at_mm=place, settings=STEPS).solve() for own in (half, whole))
     np.testing.assert_allclose(both.force_mn, one.force_mn, rtol=1e-4, atol=1e-9)
     sites = [[10.0, 0.0], [11.0, 1.0], [10.0, -2.0]]
     np.testing.assert_allclose(both.sed(sites).values, one.sed(sites).values, rtol=1e-3, atol=1e-6)
     # A body of revolution yields alike on every side.
-    turned = touch_of(finger_from(mirrored(parts), axes="x z -y"), BALL, MOTION, at_mm=place, settings=STEPS)
+    turned = fp.touch_of(
+        finger_from(mirrored(parts), axes="x z -y"), BALL, MOTION, at_mm=place, settings=STEPS
+    )
     np.testing.assert_allclose(turned.solve().force_mn, both.force_mn, rtol=1e-4, atol=1e-9)
 
 
@@ -208,7 +200,7 @@ def test_end_organs_stay_in_their_sheet_and_skin_faces_look_outwards(parts):
     deeper = finger_from(parts, receptor_depth_mm=1.0)
     assert set(deeper.mesh.layer[deeper.mesh.living_epidermis]) == {LAYERS.index("dermis")}
     for sites, says in (([[40.0, 0.0]], "volar skin"), ([[10.0, 0.0, 0.0]], "mm beside it")):
-        with pytest.raises(InputError, match=says):
+        with pytest.raises(fp.InputError, match=says):
             (receptors.under if len(sites[0]) == 2 else receptors.below)(np.array(sites))
     mesh = finger_from(parts).mesh
     middle = mesh.nodes_mm[mesh.skin_faces].mean(axis=1) - np.array([8.0, 0.0, 0.0])
@@ -236,10 +228,10 @@ def test_closest_points_lie_on_the_surface():
 
 
 def test_exports_take_a_mesh_of_one_s_own(parts, tmp_path):
-    touch = touch_of(finger_from(parts), BALL, MOTION, tissues="trial1", settings=STEPS)
+    touch = fp.touch_of(finger_from(parts), BALL, MOTION, tissues="trial1", settings=STEPS)
     for kind in ("vtu", "csv", "npz", "netcdf", "abaqus", "calculix", "febio"):
         moduli = "long_term" if kind == "calculix" else None
-        for file in export_touch(tmp_path / kind, touch, kind, moduli):
+        for file in fp.export_touch(tmp_path / kind, touch, kind, moduli):
             assert file.stat().st_size > 300
     again = finger_from(_read_inp(next((tmp_path / "abaqus").glob("*.inp"))))
     assert again.mesh.skin_area_mm2.sum() == pytest.approx(touch.mesh.skin_area_mm2.sum())
@@ -255,21 +247,21 @@ def test_a_population_and_a_file_of_a_touch_use_it(made, tmp_path):
             "outputs": ["figures", "csv", "spikes"],
         }
     )
-    assert described.touch.finger == read_finger(made, receptor_depth_mm=0.5)
-    assert described_touch({"finger": str(made), "object": "sphere"}).finger == read_finger(made)
+    assert described.touch.finger == fp.read_finger(made, receptor_depth_mm=0.5)
+    assert described_touch({"finger": str(made), "object": "sphere"}).finger == fp.read_finger(made)
     assert described.population.positions_mm.mean(axis=0) == pytest.approx(
         described.finger.contact_mm, abs=1e-9
     )
-    assert touch_key(described.touch) != touch_key(replace(described.touch, finger=read_finger(made)))
+    assert touch_key(described.touch) != touch_key(replace(described.touch, finger=fp.read_finger(made)))
     pressed = fp.run_touch(described, tmp_path / "touch")
     assert pressed.summary.largest_force_mn > 5.0
     assert (tmp_path / "touch" / "figures" / "touch.png").exists()
     laid = {"layout": "hexagonal", "region": {"shape": "pad"}}
     elsewhere = described_touch({"finger": str(made), "object": "sphere", "afferents": laid})
-    with pytest.raises(InputError, match="layout must be grid on a mesh"):
+    with pytest.raises(fp.InputError, match="layout must be grid on a mesh"):
         _ = elsewhere.population
-    with pytest.raises(InputError, match="finger must be of type Fingertip: got FingerMesh"):
-        UnrolledSkin(described.finger)
+    with pytest.raises(fp.InputError, match="finger must be of type Fingertip: got FingerMesh"):
+        fp.UnrolledSkin(described.finger)
 
 
 def without(parts, *sets):
@@ -351,7 +343,7 @@ def swapped_layers(parts):
     ],
 )  # fmt: skip
 def test_bad_meshes_are_refused_with_file_set_and_element(parts, change, given, says):
-    with pytest.raises(InputError, match=says) as refused:
+    with pytest.raises(fp.InputError, match=says) as refused:
         finger_from(change(parts), **given)
     assert "\n" not in str(refused.value)
     if given.keys() <= {"receptor_depth_mm"} and "greater" not in says:
@@ -424,8 +416,8 @@ def test_bad_files_are_refused_with_their_line(tmp_path, name, text, says):
     path = tmp_path / name
     if text is not None:
         path.write_text(text)
-    with pytest.raises(InputError, match=says) as refused:
-        read_finger(path)
+    with pytest.raises(fp.InputError, match=says) as refused:
+        fp.read_finger(path)
     assert "\n" not in str(refused.value)
     assert name in str(refused.value)
 
@@ -439,8 +431,8 @@ def test_files_that_are_cut_short_or_garbled_are_refused_or_read(sent, made, tmp
         for broken in (text[:place], f"{text[:place]}#{text[place + 1 :]}"):
             path.write_text(broken)
             try:
-                read_finger(path)
-            except InputError as error:
+                fp.read_finger(path)
+            except fp.InputError as error:
                 assert f"finger.{end}" in str(error)  # noqa: PT017
 
 
@@ -459,21 +451,21 @@ def test_a_task_presses_all_stimuli_into_the_mesh(sent, tmp_path):
     folder, skin = sent
     path = folder / "task.yaml"
     path.write_text(BALLS)
-    run = DiscriminationRun(read_task(path), tmp_path, 1, str(path), task_text(path))
+    run = DiscriminationRun(fp.read_task(path), tmp_path, 1, str(path), task_text(path))
     meshes = [touch.mesh for touch in run.touches.values()]
     assert meshes[0] is meshes[1]
     assert len(meshes[0].nodes_mm) == len(skin.mesh.nodes_mm)
     assert str(folder / "finger.inp") in input_hashes(path, run.task, run.prepared.stimuli)
     path.write_text(BALLS + "reach_mm: 3\n")
-    with pytest.raises(InputError, match="reach_mm must not be given: the finger has a mesh of its own"):
-        DiscriminationRun(read_task(path), tmp_path, 1, str(path), task_text(path))
+    with pytest.raises(fp.InputError, match="reach_mm must not be given: the finger has a mesh of its own"):
+        DiscriminationRun(fp.read_task(path), tmp_path, 1, str(path), task_text(path))
 
 
 def test_stimuli_of_a_fit_are_pressed_into_the_mesh(sent):
     folder, skin = sent
     path = folder / "stimuli.yaml"
     path.write_text("finger: finger.inp\nobject: sphere\nstimuli: [{name: probe}]\n")
-    read = read_stimuli(path)
+    read = fp.read_stimuli(path)
     assert read.finger_files == (folder / "finger.inp",)
     (touch,) = read.touches([read.named("probe")], read.conditions).values()
     assert len(touch.mesh.nodes_mm) == len(skin.mesh.nodes_mm)

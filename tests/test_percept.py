@@ -7,7 +7,7 @@ import pytest
 from numpy.testing import assert_allclose
 from scipy.special import ndtri
 
-from fingerpad.core.errors import InputError
+from fingerpad import InputError, Population
 from fingerpad.core.random_streams import Purpose, normals
 from fingerpad.experiments.gerling2014 import discrimination_statistics as goodwin
 from fingerpad.experiments.gerling2014.discrepancy import (
@@ -25,7 +25,6 @@ from fingerpad.experiments.gerling2014.discrimination_statistics import (
     extreme,
     observe,
 )
-from fingerpad.neuron.population import Population
 from fingerpad.psychophysics.discrimination import (
     Experiment,
     discriminate_euclidean,
@@ -33,7 +32,7 @@ from fingerpad.psychophysics.discrimination import (
 )
 from fingerpad.psychophysics.encoding import gradient_sum, neighbour_pairs, taking_part
 from fingerpad.psychophysics.functions import binomial_interval
-from fingerpad.psychophysics.noise_fit import expected_euclidean_hit_rates, expected_hit_rates
+from fingerpad.psychophysics.noise_fit import expected_euclidean_hit_rates
 
 CURVATURES = (287.0, 296.0, 305.0, 316.0, 328.0, 340.0, 365.0)
 GRID = Population.grid()
@@ -46,9 +45,6 @@ def bumps(centre_mm=17.37, steepness=1.0):
     x, z = (GRID.positions_mm - [centre_mm, 0.0]).T
     width = 1.8 * (287.0 / np.array(CURVATURES)[:, np.newaxis]) ** steepness
     return 40.0 * np.exp(-(x**2 + z**2) / (2.0 * width**2))
-
-
-# People
 
 
 @pytest.mark.parametrize(("hits", "trials"), [(58, 100), (95, 100), (3, 20)])
@@ -79,9 +75,6 @@ def test_what_is_known_of_people_is_a_straight_line_in_z_with_intervals():
         n for n in range(1, 101) if all(abs(n * rate - round(n * rate)) < 1e-9 for rate in goodwin.HIT_RATES)
     ]
     assert fits[0] == goodwin.TRIALS == 100
-
-
-# Sessions
 
 
 @pytest.fixture(scope="module")
@@ -121,9 +114,6 @@ def test_every_observer_of_a_session_is_the_one_who_is_asked_alone(sessions):
 def test_the_mean_of_ten_hit_rates_is_unsteadier_by_the_root_of_ten(sessions):
     few, many = (sessions[1].unsteadiness[count] for count in (10, 100))
     assert_allclose(few / many, math.sqrt(10.0), rtol=0.25)
-
-
-# Statistics
 
 
 def made_up(seed=3, n_sessions=400, spread=0.05):
@@ -182,9 +172,6 @@ def test_statistics_are_those_of_known_hit_rates():
     # Goodwin's own points, the last of which is farther from the line here, do not count.
     assert value(found.targets[1].largest_from_line) == np.abs(away + 0.01).max()
     assert value(found.sweep.misfit[0][1]) == 0.025
-
-
-# Interpretations of the steps
 
 
 @pytest.mark.parametrize("sigma", [0.03, 0.058, 0.12])
@@ -265,13 +252,3 @@ def test_the_analysis_names_every_interpretation_and_the_noise_that_fits_it():
     # A wavering fraction moves the point by a share of the small way between means, not of the point.
     point, fraction = found.criterion.point, found.criterion.fraction
     assert (fraction < 0.2 * point).all()
-
-
-def test_hit_rates_without_noise_of_a_session_are_the_expected_ones(sessions):
-    """What a session scatters about is what the fit of the noise sees."""
-    measures, observers = sessions
-    draws = normals(9, 1, 18, Purpose.RESPONSE, 20_000)[0].T
-    for position in range(2):
-        static = measures["static"][position]
-        predicted = expected_hit_rates(static.responses, PAIRS, 0.06, draws)
-        assert_allclose(observers.mean["static"][:, position].mean(axis=0), predicted, atol=0.015)

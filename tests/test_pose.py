@@ -3,17 +3,13 @@
 import numpy as np
 import pytest
 
-from fingerpad.core.errors import InputError
-from fingerpad.geometry.fingertip import Fingertip
-from fingerpad.geometry.indenters import Bar, Cylinder, Line, Sphere
+from fingerpad import Bar, Cylinder, Fingertip, InputError, Line, PressSettings, Sphere, Trajectory, touch_of
 from fingerpad.geometry.mesh import block_mesh
 from fingerpad.geometry.motion import Pose
-from fingerpad.geometry.trajectory import Trajectory
 from fingerpad.mechanics.contact import Placement, place, rotation_of
 from fingerpad.mechanics.press import press
-from fingerpad.mechanics.press_settings import PressSettings
-from fingerpad.skin.indentation import touch_of
 from presses import ELASTIC, RELAXING
+from refusals import refused
 
 STEPS = PressSettings(4, 2)
 PITCH_MM = 0.4
@@ -66,13 +62,6 @@ def sliding(way_mm, mu, materials=RELAXING, **aside):
     return press(mesh, materials, indenter, first, motion, PressSettings(16, 2), friction=mu)
 
 
-def test_sliding_to_either_side_is_a_mirror_image():
-    there, back = sliding(0.5, 0.3), sliding(-0.5, 0.3)
-    np.testing.assert_allclose(back.force_mn, there.force_mn, rtol=1e-5)
-    mirrored = back.contact_force_mn * [-1.0, 1.0, 1.0]
-    np.testing.assert_allclose(mirrored, there.contact_force_mn, atol=1e-4 * there.force_mn.max())
-
-
 @pytest.mark.parametrize("mu", [0.0, 0.8])
 def test_sliding_is_resisted_by_friction_times_force_and_balances_its_energy(mu):
     done = sliding(1.2, mu, materials=ELASTIC)
@@ -86,13 +75,6 @@ def test_sliding_is_resisted_by_friction_times_force_and_balances_its_energy(mu)
     limit = mu * done.contact.pressure_kpa
     shear = np.linalg.norm(done.contact.shear_kpa, axis=2)
     assert (shear <= limit * (1.0 + 1e-3) + 1e-9).all()
-
-
-def test_skin_sticks_until_the_force_aside_reaches_the_limit():
-    done = sliding(0.4, 2.0, materials=ELASTIC)
-    assert np.median(done.contact.slip_mm[-1][done.contact.pressure_kpa[-1] > 0.0]) < 0.01
-    aside = done.contact_force_mn[:, 0]
-    assert (np.diff(aside[done.times_ms >= 100.0]) > 0.0).all()
 
 
 def test_spin_of_a_sphere_meets_a_torque_within_its_limit():
@@ -121,7 +103,7 @@ def test_half_a_finger_and_a_wire_are_refused_what_they_cannot_do_and_bone_on_th
     mesh = block()
     indenter = Bar(1.6, 0.4)
     deep = Trajectory((0.0, 50.0, 100.0), (0.0, 0.5, 1.9), tilt_deg=(0.0, 0.0, 30.0))
-    with pytest.raises(InputError, match=r"depth_mm must stay below .* mm at sample 3"):
+    with refused("depth_mm"):
         press(mesh, ELASTIC, indenter, touching(indenter, mesh), deep, STEPS)
 
 

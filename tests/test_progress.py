@@ -7,6 +7,7 @@ import time
 import pytest
 
 import fingerpad as fp
+from cluster import wait_until
 from fingerpad.cli import main
 from fingerpad.cli.running import progress
 from fingerpad.core import progress as progress_module
@@ -52,13 +53,6 @@ def test_a_long_part_is_told_of_before_it_ends(monkeypatch):
     time.sleep(0.1)
     assert len(told) == said
     assert not [thread for thread in threading.enumerate() if thread.name == "progress"]
-
-
-def wait_until(true, most_s=5.0):
-    began = time.monotonic()
-    while not true():
-        assert time.monotonic() - began < most_s
-        time.sleep(0.005)
 
 
 def test_a_press_tells_how_far_it_is(monkeypatch, caplog):

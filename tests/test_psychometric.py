@@ -9,17 +9,11 @@ from hypothesis import strategies as st
 from scipy import stats
 from scipy.optimize import differential_evolution
 
-from fingerpad.core.errors import ConvergenceError, InputError
-from fingerpad.psychophysics import (
-    FunctionCloud,
-    PsychometricFunction,
-    bootstrap,
-    fit_psychometric,
-    goodness_of_fit,
-    posterior,
-)
+from fingerpad import ConvergenceError, fit_psychometric
+from fingerpad.psychophysics import FunctionCloud, PsychometricFunction, bootstrap, goodness_of_fit, posterior
 from fingerpad.psychophysics.functions import SIGMOIDS, log_probability
 from fingerpad.psychophysics.uncertainty import STEEPEST, weighted_quantiles
+from refusals import refusals
 
 LEVELS = np.array([2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0])
 TRUTH = PsychometricFunction(threshold=5.0, width=4.0, guess=0.5, lapse=0.02)
@@ -228,26 +222,20 @@ def test_thresholds_agree_with_psignifit():
 GOOD = ([1.0, 2.0, 3.0], [5, 7, 9], [10] * 3)
 
 
-@pytest.mark.parametrize(
-    ("call", "said"),
-    [
-        (lambda: fit_psychometric([1, 2], [3, 4], [5]), "one entry per level"),
-        (lambda: fit_psychometric([2, 1], [3, 4], [5, 5]), "increase strictly"),
-        (lambda: fit_psychometric([1, 2], [3.5, 4], [5, 5]), "whole numbers"),
-        (lambda: fit_psychometric([1, 2], [3, 6], [5, 5]), "within 0 ... n_trials"),
-        (lambda: fit_psychometric([1], [3], [5]), "at least 2"),
-        (lambda: fit_psychometric(*GOOD, sigmoid="cauchy"), "sigmoid"),
-        (lambda: fit_psychometric(*GOOD, guess=0.6, lapse=0.5), "sum to less than 1"),
-        (lambda: fit_psychometric(*GOOD, overdispersion=1.0), "overdispersion"),
-        (lambda: fit_psychometric(*GOOD, width=0.0), "width"),
-        (lambda: fit_psychometric([-1.0, 2.0, 3.0], *GOOD[1:], sigmoid="weibull"), "greater than 0"),
-        (lambda: fit_psychometric(*GOOD).threshold(0.4), "between guess and 1 - lapse"),
-        (lambda: posterior(fit_psychometric(*GOOD)).interval("slope"), "parameter"),
-    ],
-)
-def test_bad_input_is_refused(call, said):
-    with pytest.raises(InputError, match=said):
-        call()
+test_bad_input_is_refused = refusals(
+    (lambda: fit_psychometric([1, 2], [3, 4], [5]), "one entry per level"),
+    (lambda: fit_psychometric([2, 1], [3, 4], [5, 5]), "increase strictly"),
+    (lambda: fit_psychometric([1, 2], [3.5, 4], [5, 5]), "whole numbers"),
+    (lambda: fit_psychometric([1, 2], [3, 6], [5, 5]), "within 0 ... n_trials"),
+    (lambda: fit_psychometric([1], [3], [5]), "at least 2"),
+    (lambda: fit_psychometric(*GOOD, sigmoid="cauchy"), ("sigmoid",)),
+    (lambda: fit_psychometric(*GOOD, guess=0.6, lapse=0.5), "sum to less than 1"),
+    (lambda: fit_psychometric(*GOOD, overdispersion=1.0), ("overdispersion",)),
+    (lambda: fit_psychometric(*GOOD, width=0.0), ("width",)),
+    (lambda: fit_psychometric([-1.0, 2.0, 3.0], *GOOD[1:], sigmoid="weibull"), "greater than 0"),
+    (lambda: fit_psychometric(*GOOD).threshold(0.4), "between guess and 1 - lapse"),
+    (lambda: posterior(fit_psychometric(*GOOD)).interval("slope"), ("parameter",)),
+)  # fmt: skip
 
 
 def test_levels_that_do_not_contain_the_threshold_are_an_error():

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
-from fingerpad.core.errors import InputError
-from fingerpad.core.signals import Traces
+from fingerpad import InputError, RateRecordings, Traces
 from fingerpad.experiments.fit import rate_uncertainty
 from fingerpad.experiments.fit.fit import fit_recordings
 from fingerpad.experiments.fit.methods import check_offset, fit_offset
@@ -17,7 +16,6 @@ from fingerpad.inference.afferent_methods import ReceptorOffset
 from fingerpad.inference.identifiable import IDENTIFIABLE_NAMES, identifiable
 from fingerpad.inference.rate_model import AfferentModel, four_number_model
 from fingerpad.inference.rate_problem import RateProblem
-from fingerpad.inference.recordings import RateRecordings
 from fingerpad.report import recording_fit as report
 from fingerpad.report.single_unit import ALLOWED_LOSS
 from fingerpad.report.style import png
@@ -52,21 +50,6 @@ IN_PLACE = RateRecordings(NAMES, *MODEL.evaluate(KNOWN))
 def fitted():
     """The fit to rates of a receptor that lies beside its place."""
     return fit_recordings(BESIDE[0.0], ASIDE, FOLDS, beside=BESIDE, with_sensitivity=True)
-
-
-# The place of the receptor
-
-
-def test_between_two_places_the_drive_is_linear_and_at_a_place_it_is_that_of_the_place():
-    for offset in PLACES_MM:
-        there = AfferentModel.of_traces(felt(offset)).evaluate(KNOWN)
-        assert_allclose(TRUTH.at(offset).evaluate(KNOWN), there, rtol=1e-12)
-    (between,) = TRUTH.at(0.06).drives
-    ends = [AfferentModel.of_traces(felt(offset)).drives[0].values for offset in (0.0, 0.3)]
-    assert_allclose(between.values, 0.8 * ends[0] + 0.2 * ends[1], rtol=1e-12)
-    assert TRUTH.names[-1] == "offset_mm"
-    with pytest.raises(InputError, match=r"offset_mm must lie within -0.3 ... 0.3 mm"):
-        TRUTH.at(0.5)
 
 
 def test_stimuli_with_different_motions_can_be_sampled_at_an_offset():
@@ -114,9 +97,6 @@ def test_an_offset_needs_its_method_several_places_and_sites_on_both_sides():
     check_offset("cma_es", [1.5, 1.4])
 
 
-# Profiles
-
-
 def test_profiles_hold_the_known_afferent_and_rise_to_both_sides():
     noise = np.random.default_rng(2).normal(0.0, 1.0, (2, 9))
     noisy = RateRecordings(NAMES, *np.maximum(MODEL.evaluate(KNOWN) + noise, 0.0))
@@ -133,9 +113,6 @@ def test_profiles_hold_the_known_afferent_and_rise_to_both_sides():
     _, dynamic, static, _ = found
     assert dynamic.high < 1.3 * identifiable(KNOWN)[1]
     assert static.high - static.low < 0.5 * identifiable(KNOWN)[2]
-
-
-# Sensitivity
 
 
 def test_scores_of_rows_are_those_of_the_problem_for_one_phase_as_well():
@@ -157,9 +134,6 @@ def test_ranges_are_shares_of_the_fit_and_a_gain_of_nothing_has_one_too(fitted):
     assert (nothing.upper > nothing.lower).all()
     # Without a dynamic gain to speak of, rates hang on the static one.
     assert nothing.total[2] == max(nothing.total)
-
-
-# The page
 
 
 @pytest.fixture(scope="module")

@@ -13,12 +13,11 @@ import numpy as np
 import pytest
 import typer
 
+import fingerpad as fp
 from fingerpad import cli
 from fingerpad.cli import options as choices
 from fingerpad.core.compilation import SHORT_NOTICE, SUBJECT
-from fingerpad.core.errors import ConvergenceError, InputError
 from fingerpad.core.random_streams import Presentations
-from fingerpad.core.signals import SpikeTrains, Traces
 from fingerpad.data import bar_firing_rates
 from fingerpad.experiments import runner
 from fingerpad.experiments.afferent_files import fitted_afferent
@@ -32,22 +31,18 @@ from fingerpad.experiments.fit.rate_uncertainty import rate_posterior
 from fingerpad.experiments.fit.results import ParameterProfile, PhaseBands, RateBand, RatePosterior
 from fingerpad.experiments.gerling2014 import single_unit
 from fingerpad.experiments.manifest import sha256
-from fingerpad.experiments.recording_files import read_recordings
 from fingerpad.experiments.stimuli import ListedStimuli, ShiftedBar
-from fingerpad.geometry.edged_indenters import INDENTERS, Gap
-from fingerpad.geometry.indenters import Bar, Line, Sphere
-from fingerpad.geometry.motion import ForceRampAndHold, RampAndHold
+from fingerpad.geometry.edged_indenters import INDENTERS
 from fingerpad.inference.afferent_methods import OFFSETS_MM
 from fingerpad.inference.closed_form import ClosedFormModel
 from fingerpad.inference.identifiable import IDENTIFIABLE_NAMES, identifiable
 from fingerpad.inference.rate_model import AfferentModel
-from fingerpad.inference.recordings import RateRecordings, SpikeRecordings
+from fingerpad.inference.recordings import SpikeRecordings
 from fingerpad.inference.spike_fit import soft_spikes
-from fingerpad.neuron.afferent import Afferent
-from fingerpad.neuron.afferent_types import RA
 from fingerpad.neuron.spikes import PAPER_WINDOWS_MS
 from fingerpad.neuron.transduction import drive
 from fingerpad.report import recording_fit as report
+from refusals import misused, refusals
 from sections import sed_driven
 
 ROOT = Path(__file__).parents[1]
@@ -60,23 +55,20 @@ def traces(height_kpa, times_ms=TIMES_MS, **more):
     """Energy density that rises with the square of time in 50 ms and relaxes by a third, one column each."""
     ramp = np.minimum(times_ms / 50.0, 1.0) ** 2
     relaxed = 1.0 - 0.3 * (1.0 - np.exp(-np.maximum(times_ms - 50.0, 0.0) / 300.0))
-    return Traces(times_ms, np.outer(ramp * relaxed, height_kpa), kinks_ms=[50.0], **more)
+    return fp.Traces(times_ms, np.outer(ramp * relaxed, height_kpa), kinks_ms=[50.0], **more)
 
 
 N = 10
 HEIGHT_KPA = np.linspace(0.6, 3.0, N)
 SED = traces(HEIGHT_KPA)
 NAMES = tuple(f"height {number}" for number in range(N))
-RATES = RateRecordings(NAMES, *AFFERENT.rates(SED), "simulated")
+RATES = fp.RateRecordings(NAMES, *AFFERENT.rates(SED), "simulated")
 
 
 @pytest.fixture(scope="module")
 def recovered():
     """The fit to rates of a known afferent."""
     return study.fit_recordings(SED, RATES, np.arange(N) % 2)
-
-
-# Recovery
 
 
 def test_rates_of_a_known_afferent_are_recovered_in_and_out_of_sample(recovered):
@@ -100,7 +92,7 @@ def test_every_method_recovers_them(method, fss):
 
 
 def test_one_phase_is_enough_for_a_fit_and_the_other_is_reported_missing():
-    fitted = study.fit_recordings(SED, RateRecordings(NAMES, None, RATES.static_rate_hz), np.arange(N) % 2)
+    fitted = study.fit_recordings(SED, fp.RateRecordings(NAMES, None, RATES.static_rate_hz), np.arange(N) % 2)
     assert fitted.fss_in_sample == fitted.phases["static"].fss_in_sample > 0.99
     assert fitted.phases["dynamic"].observed_hz is None
     assert fitted.phases["dynamic"].fss_in_sample is None
@@ -108,7 +100,7 @@ def test_one_phase_is_enough_for_a_fit_and_the_other_is_reported_missing():
 
 def test_noisy_rates_leave_a_posterior_that_holds_the_known_afferent():
     noise = np.random.default_rng(4).normal(0.0, 1.0, (2, N))
-    noisy = RateRecordings(NAMES, *np.maximum(AFFERENT.rates(SED) + noise, 0.0))
+    noisy = fp.RateRecordings(NAMES, *np.maximum(AFFERENT.rates(SED) + noise, 0.0))
     model, known = AfferentModel.of_traces(SED), identifiable(KNOWN)
     few = {"n_ensembles": 2, "n_walkers": 32, "largest_r_hat": 1.1, "smallest_effective_size": 50.0}
     drawn = rate_posterior(model, noisy, known, 1, **few)
@@ -174,12 +166,9 @@ def test_regular_trains_advise_what_the_fit_has():
     """One train per stimulus that an afferent without noise fires: no width of the threshold is likeliest."""
     regular = SpikeRecordings(NAMES, AFFERENT.spikes(SED), 1000.0)
     with pytest.raises(
-        ConvergenceError, match="more than once, or choose another method, such as least_squares"
+        fp.ConvergenceError, match="more than once, or choose another method, such as least_squares"
     ):
         study.fit_recordings(SED, regular, np.arange(N) % 2, method="likelihood")
-
-
-# What a fit says
 
 
 def test_every_stimulus_is_predicted_without_its_fold(recovered):
@@ -240,60 +229,47 @@ def test_another_quantity_for_the_dynamic_term_reaches_the_afferent():
     halved = [KNOWN[0], KNOWN[1] / 2.0, *KNOWN[2:]]
     for rates, expected in zip(doubled.evaluate(np.array(halved)), AFFERENT.rates(SED), strict=True):
         np.testing.assert_allclose(rates, expected, rtol=1e-9)
-    with pytest.raises(InputError, match="got stored and stored, work and stored"):
+    with pytest.raises(fp.InputError, match="got stored and stored, work and stored"):
         AfferentModel.of_traces([SED, replace(SED, dynamic=replace(SED, quantity="work"))])
 
 
-# What it refuses
-
-
-@pytest.mark.parametrize(
-    ("call", "said"),
-    [
-        (lambda: study.check_enough(RATES, np.array([0, 1])),
-         "memberships needs one fold per stimulus: got 2 for"),
-        (lambda: study.check_enough(RATES.chosen([0, 1, 2]), np.array([0, 0, 1])),
-         "without fold 1 there are 2, record more"),
-        (lambda: study.check_enough(RateRecordings(NAMES[:8], None, range(1, 9)), np.repeat([0, 1], [5, 3])),
-         "without fold 1 there are 3"),
-        (lambda: study.check_enough(RateRecordings(NAMES[:4], [0, 1, 0, 1], [1] * 4), np.array([0, 1, 0, 1])),
-         r"\(height 0, height 2\)"),
-        (lambda: check_spikes(RATES, 1), "likelihood needs spike times: got rates"),
-        (lambda: check_spikes(train(1, 5, 9, 14, 20), 2), "got 2 motions"),
-        (lambda: check_spikes(train(1, 5, 9, 14), 1), "at least 5 spikes"),
-        (lambda: check_spikes(train(0, 5, 9, 14, 20), 1), "a has one at 0 ms"),
-        (lambda: check_spikes(train(1, 5, 5.5, 9, 14), 1), "0.5 ms apart"),
-        (lambda: AfferentModel.of_traces([SED, traces([1.0], TIMES_MS[:-1])], PAPER_WINDOWS_MS),
-         "one ends at 950 ms, stimulus 11 at 700 ms"),
-        (lambda: touches(ShiftedBar(motion=RampAndHold(9.0)).named("1")),
-         "^Stimulus 1 cannot be used: motion.depth_mm must stay"),
-        (lambda: touches(ShiftedBar().named("-80")),
-         "^Stimulus -80 cannot be used: place must lie on the finger"),
-        (lambda: touches(NamedStimulus(Line(), tilt_deg=5.0, name="deep")),
-         "^place.tilt_deg must be 0 for Line"),
-    ],
+test_what_cannot_be_fitted_or_pressed_is_refused = refusals(
+    (lambda: study.check_enough(RATES, np.array([0, 1])),
+     "memberships needs one fold per stimulus: got 2 for"),
+    (lambda: study.check_enough(RATES.chosen([0, 1, 2]), np.array([0, 0, 1])),
+     "without fold 1 there are 2, record more"),
+    (lambda: study.check_enough(fp.RateRecordings(NAMES[:8], None, range(8)), np.repeat([0, 1], [5, 3])),
+     "without fold 1 there are 3"),
+    (lambda: study.check_enough(fp.RateRecordings(NAMES[:4], [0, 1, 0, 1], [1] * 4), np.arange(4) % 2),
+     r"\(height 0, height 2\)"),
+    (lambda: check_spikes(RATES, 1), "likelihood needs spike times: got rates"),
+    (lambda: check_spikes(train(1, 5, 9, 14, 20), 2), "got 2 motions"),
+    (lambda: check_spikes(train(1, 5, 9, 14), 1), "at least 5 spikes"),
+    (lambda: check_spikes(train(0, 5, 9, 14, 20), 1), "a has one at 0 ms"),
+    (lambda: check_spikes(train(1, 5, 5.5, 9, 14), 1), "0.5 ms apart"),
+    (lambda: AfferentModel.of_traces([SED, traces([1.0], TIMES_MS[:-1])], PAPER_WINDOWS_MS),
+     "one ends at 950 ms, stimulus 11 at 700 ms"),
+    (lambda: touches(ShiftedBar(motion=fp.RampAndHold(9.0)).named("1")),
+     "^Stimulus 1 cannot be used: motion.depth_mm must stay"),
+    (lambda: touches(ShiftedBar().named("-80")),
+     "^Stimulus -80 cannot be used: place must lie on the finger"),
+    (lambda: touches(NamedStimulus(fp.Line(), tilt_deg=5.0, name="deep")), ("place", "tilt_deg")),
 )  # fmt: skip
-def test_what_cannot_be_fitted_or_pressed_is_refused(call, said):
-    with pytest.raises(InputError, match=said):
-        call()
 
 
 def train(*times_ms):
-    return SpikeRecordings(("a",), SpikeTrains.from_lists([times_ms]), 50.0)
+    return SpikeRecordings(("a",), fp.SpikeTrains.from_lists([times_ms]), 50.0)
 
 
 def touches(*stimuli):
     return ListedStimuli({}).touches(stimuli, Conditions("quick"))
 
 
-# What is pressed
-
-
 def test_the_stimuli_of_the_bar_are_the_touches_of_the_reproduction(tmp_path):
     path = tmp_path / session.EXAMPLE
     path.write_bytes(session.example_recordings()[session.EXAMPLE])
     bar, conditions = ShiftedBar(), Conditions("quick")
-    recorded = read_recordings(path, bar)
+    recorded = fp.read_recordings(path, bar)
     touches = bar.touches(list(recorded.stimuli.values()), conditions)
     assert list(touches.values()) == single_unit.bar_touches(conditions)
     observed = bar_firing_rates()
@@ -305,11 +281,16 @@ def test_the_stimuli_of_the_bar_are_the_touches_of_the_reproduction(tmp_path):
 def test_stimuli_are_indented_at_their_position_with_their_motion():
     stimuli = [
         NamedStimulus(
-            Sphere(curvature_per_m=340.0), RampAndHold(0.4), x_mm=1.0, z_mm=0.5, tilt_deg=3.0, name="beside"
+            fp.Sphere(curvature_per_m=340.0),
+            fp.RampAndHold(0.4),
+            x_mm=1.0,
+            z_mm=0.5,
+            tilt_deg=3.0,
+            name="beside",
         ),
-        NamedStimulus(Line(), ForceRampAndHold(50.0), name="wire"),
-        NamedStimulus(Gap(gap_mm=0.5), x_mm=0.2, friction=0.3, name="gap"),
-        NamedStimulus(Bar(), spin_deg=30.0, name="turned"),
+        NamedStimulus(fp.Line(), fp.ForceRampAndHold(50.0), name="wire"),
+        NamedStimulus(fp.Gap(gap_mm=0.5), x_mm=0.2, friction=0.3, name="gap"),
+        NamedStimulus(fp.Bar(), spin_deg=30.0, name="turned"),
     ]
     beside, wire, gap, turned = touches(*stimuli).values()
     assert beside.at_mm == (RECEPTOR_X_MM + 1.0, 0.5)
@@ -318,9 +299,6 @@ def test_stimuli_are_indented_at_their_position_with_their_motion():
     assert (gap.indenter.gap_mm, gap.grading.full, gap.spin_deg, gap.friction) == (0.5, False, 0.0, 0.3)
     assert min(gap.grading.size_x_mm, gap.grading.core_size_mm or 1.0) <= 0.5 / 4
     assert (turned.spin_deg, turned.grading.full) == (30.0, True)
-
-
-# The command
 
 
 class Pressed:
@@ -437,7 +415,7 @@ def test_chosen_numbers_of_another_type_are_fitted_and_read_by_a_touch(call, tmp
     assert said.startswith("RA fitted to 6 stimuli: threshold ")
     results = json.loads((tmp_path / "fit" / "fit.json").read_text())
     afferent = fitted_afferent(tmp_path / "fit" / "fit.json")
-    assert isinstance(afferent, RA)
+    assert isinstance(afferent, fp.RA)
     assert results["fitted"] == {"threshold": afferent.threshold}
     assert results["windows_ms"][0] == [0.0, 50.0]  # RA are counted in all of the ramp
 
@@ -526,10 +504,7 @@ def test_bad_input_is_one_sentence_and_status_2_and_nothing_is_written(
 ):
     (tmp_path / "mine.csv").write_bytes(content if isinstance(content, bytes) else content.encode())
     (tmp_path / "list.csv").write_text("name,object\nedge,bar\nwide,bar\n")
-    status, out, errors = call(*arguments)
-    assert (status, out) == (2, "")
-    assert re.fullmatch(r"fingerpad: .*\.\n", errors)
-    assert said in errors
+    misused(call(*arguments), said)
     assert sorted(path.name for path in tmp_path.iterdir()) == ["list.csv", "mine.csv"]
 
 
@@ -538,7 +513,7 @@ def test_the_example_prints_its_command_and_writes_recordings(call, tmp_path):
     assert (status, errors) == (0, "")
     assert said == "Try: fingerpad fit try/bar.csv --stimulus bar --resolution quick --out try/fit\n"
     tried = said.split()[3:]
-    assert read_recordings(tmp_path / tried[0], ShiftedBar()).recordings.n_rates == 72
+    assert fp.read_recordings(tmp_path / tried[0], ShiftedBar()).recordings.n_rates == 72
     assert call("--example", "try") == (
         2, "", "fingerpad: try/bar.csv exists and is not overwritten: choose another folder.\n"
     )  # fmt: skip
@@ -551,9 +526,6 @@ def test_options_are_those_of_the_modules():
 
 def command():
     return typer.main.get_command(cli.app).commands["fit"]
-
-
-# The figures
 
 
 def test_figures_show_what_was_recorded_and_nothing_else(recovered):
@@ -573,12 +545,9 @@ def test_figures_show_what_was_recorded_and_nothing_else(recovered):
     assert [row.cells[2] for row in report.fit_tables(recovered)[1].rows] == ["–"] * 4
 
 
-# From nothing
-
-
 def test_a_fit_from_nothing_recovers_a_known_afferent(call, monkeypatch, tmp_path):
     """Presses included, in a process whose warnings are errors; then the same stimuli with other rates."""
-    listed, known = ["-1.5", "1.3", "1.5"], Afferent()
+    listed, known = ["-1.5", "1.3", "1.5"], fp.Afferent()
     (tmp_path / "mine.csv").write_text(ROWS.splitlines()[0] + "".join(f"\n{name},100,30" for name in listed))
     options = ("mine.csv", "--stimulus", "bar", "--resolution", "quick", "--jobs", "1")
     shell = subprocess.run(

@@ -3,11 +3,8 @@
 import numpy as np
 import pytest
 
-from fingerpad.geometry.fingertip import Fingertip
-from fingerpad.geometry.indenters import Sphere
-from fingerpad.geometry.motions import repeated
-from fingerpad.neuron.afferent import Afferent
-from fingerpad.skin.indentation import CONTACT_POINT_MM, indent
+from fingerpad import Afferent, Fingertip, Sphere, indent, repeated
+from fingerpad.skin.indentation import CONTACT_POINT_MM
 
 TOUCHES = repeated(0.8, touches=2, ramp_ms=50.0, hold_ms=400.0, pause_ms=400.0)
 HOLDS, PAUSES = ((100.0, 450.0), (1000.0, 1350.0)), ((500.0, 900.0), (1400.0, 1800.0))

@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_array_equal
 
-from fingerpad.core.errors import InputError
-from fingerpad.core.signals import ResponseMap, SpikeTrains
+from fingerpad import InputError, ResponseMap, SpikeTrains
 from fingerpad.report import responses
 from fingerpad.report.responses import draw_mixed_responses
 from fingerpad.report.style import png, write_png

@@ -12,7 +12,6 @@ from matplotlib.patches import Polygon
 from numpy.testing import assert_allclose, assert_array_equal
 
 import fingerpad as fp
-from fingerpad.core.errors import InputError
 from fingerpad.geometry.mesh import block_mesh
 from fingerpad.geometry.motion import Pose
 from fingerpad.report import touch as touch_figure
@@ -47,7 +46,7 @@ def test_the_section_of_a_block_is_one_of_its_sides_and_a_body_without_its_plane
     assert section.skin_mm[..., 1].tolist() == [[0.0, 0.0]] * 2
     assert section.nail_mm.shape == (0, 2, 2)
     mesh = block_mesh([0.0, 1.0], [0.0, 1.0], [1.0, 2.0], layers=[0])
-    with pytest.raises(InputError, match="face on the plane z = 0"):
+    with pytest.raises(fp.InputError, match="face on the plane z = 0"):
         middle_section(mesh, np.zeros_like(mesh.nodes_mm))
 
 

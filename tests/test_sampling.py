@@ -8,12 +8,10 @@ import numpy as np
 import pytest
 from scipy.interpolate import CloughTocher2DInterpolator
 
-from fingerpad.core.errors import InputError
-from fingerpad.geometry.fingertip import Fingertip
+from fingerpad import Fingertip, InputError, SkinResponse
 from fingerpad.geometry.grading import resolution_grading
 from fingerpad.geometry.mesh import LAYERS, block_mesh, finger_mesh
 from fingerpad.skin.receptor_sheet import ReceptorSheet
-from fingerpad.skin.sampling import SkinResponse, SurfaceProfile
 from sections import DEPTHS_MM, LAYER_OF_INTERVAL, layered_block
 
 TIMES_MS = np.array([0.0, 50.0, 1000.0])
@@ -79,15 +77,6 @@ def bump(centre):
     return 0.1 + np.exp(-((centre[:, 0] - 0.2) ** 2 + centre[:, 2] ** 2))
 
 
-def test_smooth_field_is_read_within_the_error_of_its_mesh_and_the_same_on_both_sides():
-    for symmetric in (True, False):
-        read = response(layered_block(symmetric=symmetric), bump).sed(SITES).values[-1]
-        expected = bump(np.column_stack([SITES[:, 0], np.zeros(len(SITES)), SITES[:, 1]]))
-        np.testing.assert_allclose(read, expected, rtol=0, atol=0.01)
-    skin = response(layered_block(), bump)
-    np.testing.assert_array_equal(skin.sed(SITES).values, skin.sed(SITES * [1.0, -1.0]).values)
-
-
 def test_sites_are_found_once_on_equal_meshes_and_anew_on_others(monkeypatch):
     found, under = [], ReceptorSheet.under
 
@@ -130,16 +119,6 @@ def test_other_quantities_are_read_like_the_stored_energy_and_may_take_its_place
     np.testing.assert_array_equal(both.values, stress)
     assert both.dynamic is None
     assert both.static_quantity == both.dynamic_quantity == "von_mises"
-
-
-def test_finger_is_read_on_its_volar_side_only():
-    sites = np.random.default_rng(1).uniform([10.0, -7.0], [26.0, 7.0], (80, 2))
-    along = response(QUICK, lambda centre: centre[:, 0]).sed(sites).values[-1]
-    np.testing.assert_allclose(along, sites[:, 0], rtol=0, atol=1e-8)
-    height = response(QUICK, lambda centre: 50.0 + centre[:, 1]).sed(sites).values[-1] - 50.0
-    depth = Fingertip().skin_point(*sites.T)[:, 1]
-    assert (height < -2.0).all()
-    assert (np.abs(height - depth) < 0.8).all()
 
 
 def test_a_point_of_the_skin_is_read_where_its_end_organ_lies():
@@ -279,11 +258,6 @@ def test_profile_is_the_deflection_towards_the_bone_along_the_midline():
     np.testing.assert_allclose(profile.deflection_mm, np.exp(-(profile.distance_mm**2)), rtol=1e-12)
     np.testing.assert_allclose(skin.surface_profile(1).deflection_mm, 0.5 * profile.deflection_mm, rtol=1e-15)
     assert not skin.surface_profile(0).deflection_mm.any()
-
-
-def test_profile_between_nodes_is_linear():
-    profile = SurfaceProfile(np.array([-1.0, 0.0, 2.0]), np.array([0.0, 1.0, 0.5]))
-    np.testing.assert_allclose(profile.at([-0.5, 0.0, 1.0]), [0.5, 1.0, 0.75], rtol=1e-15)
 
 
 @pytest.mark.parametrize(

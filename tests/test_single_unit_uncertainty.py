@@ -5,14 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from fingerpad.core.signals import Traces
+from fingerpad import RateRecordings, Traces
 from fingerpad.data import bar_firing_rates
 from fingerpad.experiments.fit import rate_uncertainty
 from fingerpad.experiments.gerling2014 import single_unit, single_unit_uncertainty
 from fingerpad.experiments.gerling2014.single_unit_uncertainty import UncertaintyResult
 from fingerpad.inference.identifiable import IDENTIFIABLE_NAMES, identifiable
 from fingerpad.inference.rate_model import AfferentModel
-from fingerpad.inference.recordings import RateRecordings
 from fingerpad.report import single_unit as report
 from fingerpad.report.style import png
 from sections import SED_DRIVEN

@@ -3,14 +3,11 @@
 import numpy as np
 import pytest
 
-from fingerpad.geometry.indenters import Sphere
+from fingerpad import Material, PressSettings, RampAndHold, Sphere
 from fingerpad.geometry.mesh import block_mesh
-from fingerpad.geometry.motion import RampAndHold
 from fingerpad.mechanics.contact import place
 from fingerpad.mechanics.fields import skin_contact
-from fingerpad.mechanics.materials import Material
 from fingerpad.mechanics.press import press
-from fingerpad.mechanics.press_settings import PressSettings
 
 E_STAR_KPA = 100.0
 

@@ -6,32 +6,19 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 
-from fingerpad.core.errors import InputError
-from fingerpad.core.signals import SpikeTrains
+from fingerpad import InputError, SpikeTrains
 from fingerpad.neuron.spikes import (
     firing_rate_hz,
     first_spike_latency_ms,
     modulation_difference,
     modulation_index,
 )
+from refusals import refused
 
 
 def plain_rate(train, start, end):
     intervals = [later - earlier for earlier, later in pairwise(train) if start < later <= end]
     return 1000.0 * len(intervals) / sum(intervals) if intervals else 0.0
-
-
-def test_rates_count_closing_intervals_within_the_window_of_each_train():
-    trains = SpikeTrains.from_lists([np.arange(0.0, 1000.0, 8.0), np.arange(3.0, 1000.0, 20.0)])
-    assert_allclose(firing_rate_hz(trains, (600.0, 950.0)), [125.0, 50.0], rtol=1e-14)
-    trains = SpikeTrains.from_lists([[10.0, 40.0]])
-    assert firing_rate_hz(trains, (30.0, 50.0)) == pytest.approx(1000.0 / 30.0)
-    assert firing_rate_hz(trains, (5.0, 30.0)) == 0.0
-    trains = SpikeTrains.from_lists([[10.0, 30.0, 50.0, 55.0]])
-    assert firing_rate_hz(trains, (30.0, 50.0)) == 50.0
-    assert firing_rate_hz(trains, (50.0, 60.0)) == 200.0
-    trains = SpikeTrains.from_lists([[10.0, 20.0], [], [35.0], [5.0, 45.0], []])
-    assert_array_equal(firing_rate_hz(trains, (30.0, 50.0)), [0.0, 0.0, 0.0, 25.0, 0.0])
 
 
 def test_silence_has_rate_zero_and_no_latency_which_is_that_of_the_first_spike():
@@ -64,10 +51,10 @@ def test_modulation_index_ranges_from_0_to_1_and_ignores_scale():
 
 def test_bad_windows_and_trains_are_refused():
     for window in ((50.0, 50.0), (50.0, 30.0), (0.0, np.nan), (0.0,), (0.0, 1.0, 2.0)):
-        with pytest.raises(InputError, match="window_ms"):
+        with refused("window_ms"):
             firing_rate_hz(SpikeTrains.from_lists([[1.0]]), window)
     assert len(SpikeTrains.from_lists([[5.0, 6.0], [], [1.0, 2.0], []])) == 4  # trains may overlap
     with pytest.raises(InputError, match="increase within each afferent"):
         SpikeTrains.from_lists([[], [1.0, 3.0, 2.0]])
-    with pytest.raises(InputError, match="offsets must hold whole numbers"):
+    with refused("offsets"):
         SpikeTrains([1.0, 2.0], [0, 0.5, 2])

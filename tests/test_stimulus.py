@@ -5,8 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from fingerpad.core.errors import InputError
-from fingerpad.geometry.motion import ForceRampAndHold, RampAndHold
+from fingerpad import ForceRampAndHold, InputError, RampAndHold
 
 
 def test_depth_or_force_rises_linearly_then_stays_at_the_same_times():

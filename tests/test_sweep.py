@@ -61,9 +61,6 @@ def files(folder):
     }
 
 
-# What varies
-
-
 def points(**sweep):
     found = sweep_of({"touch": {"object": "sphere"}, **sweep})
     return [found.values(setting) for setting in range(found.size)]
@@ -146,14 +143,12 @@ def test_a_constraint_compares_fields():
         ({"grid": {"friction": {"start": 0, "stop": 1}}}, "count must be given: it is missing"),
         ({"grid": {"friction": {"start": 0, "stop": 1, "count": 2, "spacing": "logarithmic"}}}, "above 0"),
         ({"grid": {"seed": [1]}}, "seed is unknown"),
-        (
-            {"grid": {"friction.much": [1]}, "touch": {"object": "sphere", "friction": 0.1}},
-            "must be a mapping",
-        ),
+        ({"grid": {"friction.much": [1]}, "touch": {"object": "sphere", "friction": 0.1}},
+         "must be a mapping"),
         ({"grids": {}}, "grids is unknown: did you mean grid?"),
         ({"grid": {"friction": [0.1]}, "fields": ["warmth"]}, "must be one of times_ms"),
     ],
-)
+)  # fmt: skip
 def test_a_bad_sweep_is_refused_in_one_sentence(sweep, said, tmp_path):
     with pytest.raises(InputError) as refusal:
         fp.run_sweep({"touch": {"object": "sphere"}, **sweep}, tmp_path / "study.zarr")
@@ -169,9 +164,6 @@ def test_a_file_is_refused_with_its_line_and_a_large_sweep_needs_consent(tmp_pat
     many = {"touch": TOUCH, "grid": {"motion.depth_mm": {"start": 0.1, "stop": 1, "count": 10_001}}}
     with pytest.raises(InputError, match=r"at most 10000 settings, or --yes be given: it has 10001"):
         fp.run_sweep(many, tmp_path / "study.zarr")
-
-
-# What is written
 
 
 def test_the_data_set_has_the_fields_that_vary_as_dimensions(folder):
@@ -244,9 +236,6 @@ def test_stiffer_tissues_take_more_force(folder):
     assert forces[1] == pytest.approx(2.0 * forces[0], rel=1e-3)
 
 
-# For other programs
-
-
 @pytest.mark.parametrize("ending", ["csv", "parquet"])
 def test_a_table_of_rates_is_read_back_bit_by_bit(folder, tmp_path, ending):
     data = open_sweep(folder / "study.zarr")
@@ -309,9 +298,6 @@ def test_spikes_of_a_sweep_are_a_session_of_nwb(folder, tmp_path):
         fp.setting_response(data, motion_depth_mm=2, afferents_columns=1)
     with pytest.raises(InputError, match=r"must be within 0 \.\.\. 2: got 3"):
         fp.setting_touch(data, motion_depth_mm=3, afferents_columns=1)
-
-
-# What goes wrong
 
 
 def test_a_second_run_does_nothing_and_failures_are_tried_again_on_request(run):
@@ -389,9 +375,6 @@ def test_what_is_no_sweep_is_refused(tmp_path, there):
             fp.run_sweep(STUDY, path)
 
 
-# Progress
-
-
 def test_a_notebook_shows_one_bar_that_changes(run, monkeypatch):
     shown = []
     line = SimpleNamespace(update=lambda content, raw: shown.append(content))
@@ -405,9 +388,6 @@ def test_a_notebook_shows_one_bar_that_changes(run, monkeypatch):
     monkeypatch.setitem(sys.modules, "IPython.display", None)
     with pytest.raises(InputError, match="needs IPython, as in a notebook"):
         fp.notebook_progress()
-
-
-# The command
 
 
 def test_the_command_estimates_runs_and_tells_how_many_failed(run_program, folder, tmp_path):
@@ -436,9 +416,6 @@ def test_a_scheduler_that_cannot_be_reached_is_refused(run_program, is_refused, 
     (tmp_path.parent / "study.yaml").write_text(json.dumps(STUDY))
     outcome = run_program(main, "fingerpad", "sweep", "../study.yaml", "--scheduler", "tcp://127.0.0.1:1")
     is_refused(outcome, "fingerpad", "--scheduler", "tcp://127.0.0.1:1")
-
-
-# Observers
 
 
 STIMULI = {

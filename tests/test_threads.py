@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 
 import fingerpad as fp
-from fingerpad.core.errors import InputError
 from fingerpad.core.threads import available_threads, compiled_threads, current_threads, in_blocks, in_chunks
 
 needs_two_threads = pytest.mark.skipif(available_threads() < 2, reason="this machine has one core")
@@ -24,7 +23,7 @@ def test_number_is_what_it_was_afterwards():
     assert current_threads() == before == available_threads()
     touch = fp.touch_of(fp.Fingertip(), fp.Sphere(curvature_per_m=287))
     for wrong in (0, -1, 1.5, True, 10_000):
-        with pytest.raises(InputError, match="threads must"):
+        with pytest.raises(fp.InputError, match="threads must"):
             touch.solve(threads=wrong)
     with pytest.raises(ZeroDivisionError), compiled_threads(1):
         raise ZeroDivisionError

@@ -4,14 +4,13 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
-from fingerpad.core.signals import Traces
+from fingerpad import Fingertip, Traces
 from fingerpad.experiments.gerling2014.three_levels import (
     membrane_potential,
     mesh_picture,
     outline_elements,
     outline_nodes,
 )
-from fingerpad.geometry.fingertip import Fingertip
 from fingerpad.geometry.grading import resolution_grading
 from fingerpad.geometry.mesh import finger_mesh
 from fingerpad.neuron.lif import LeakyIntegrateAndFire

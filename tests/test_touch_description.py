@@ -32,13 +32,10 @@ from fingerpad.experiments.descriptions.pressing import MOTIONS, OBJECTS
 from fingerpad.experiments.descriptions.reading import part_from
 from fingerpad.experiments.descriptions.stimuli import StimulusSet, named_stimuli
 from fingerpad.experiments.descriptions.touch import OUTPUTS, described_touch
-from fingerpad.experiments.discrimination.task_stimuli import parse_task, task_population
-from fingerpad.export.formats import export_touch
-from fingerpad.export.touch_outputs import WRITERS, as_described, check_described, run_touch
+from fingerpad.experiments.discrimination.task_stimuli import task_population
+from fingerpad.export.touch_outputs import WRITERS, as_described, check_described
 from fingerpad.geometry import surface_files
-from fingerpad.geometry.motion import ForceRampAndHold, RampAndHold
 from fingerpad.neuron.mixed_population import types_of_afferents
-from fingerpad.skin.indentation import touch_of
 from tests.mutations import CHANGES, VALUES, changed, places
 
 ROOT = Path(__file__).parents[1]
@@ -62,16 +59,13 @@ def call(run_program):
     return partial(run_program, cli.main, "fingerpad")
 
 
-# What a description means
-
-
 def test_a_description_is_the_touch_that_python_makes_and_its_defaults_are_the_papers():
-    assert described_touch(FULL).touch == touch_of(
+    assert described_touch(FULL).touch == fp.touch_of(
         fp.Fingertip(stratum_corneum_mm=0.5), fp.Sphere(radius_mm=4.0), fp.RampAndHold(0.5), "human", "quick",
         (RECEPTOR_X_MM + 0.5, 0.0), tilt_deg=3.0, friction=0.1, spin_deg=10.0, times_ms=(20.0, 400.0),
     )  # fmt: skip
     touch = described_touch({"object": "sphere"}).touch
-    assert (touch.indenter, touch.stimulus, touch.friction) == (fp.Sphere(), RampAndHold(), 0.0)
+    assert (touch.indenter, touch.stimulus, touch.friction) == (fp.Sphere(), fp.RampAndHold(), 0.0)
     assert touch.tilt_deg == Conditions().skin_tilt_deg
     assert described_touch({"object": "line"}).touch.tilt_deg == 0.0
 
@@ -99,7 +93,7 @@ def test_an_object_is_what_its_class_makes(content, body):
 @pytest.mark.parametrize(
     ("content", "motion"),
     [
-        ({"force_mn": 80}, ForceRampAndHold(80.0)),
+        ({"force_mn": 80}, fp.ForceRampAndHold(80.0)),
         ({"kind": "sine", "depth_mm": 0.5, "amplitude_mm": 0.05, "frequency_hz": 20, "cycles": 3},
          fp.sine(0.5, 0.05, 20.0, 3)),
         ({"kind": "chirp", "depth_mm": 0.5, "amplitude_mm": 0.02, "frequencies_hz": [5, 20], "sweep_ms": 400},
@@ -211,27 +205,21 @@ def test_the_schema_accepts_what_is_accepted_and_explains_every_key():
     assert silent == []
 
 
-# What is refused
-
 BALL = "object: {kind: sphere, radius_mm: 4}\n"
 WRONG = [
     ("# nothing\n",
      "touch.yaml, the file is empty: write what is pressed, as the example of `fingerpad init`."),
     ("- object: sphere\n", "must be a mapping of keys to values"),
-    ("just words\n", "must be a mapping of keys to values: got 'just words'"),
     ("object:\n\tkind: sphere\n",
      "cannot be read as YAML (found character '\\t' that cannot start any token, line 2)"),
     ("object: sphere\nobject: plate\n", "line 2: object is repeated, keep one"),
-    ("object: {kind: sphere, kind: plate}\n", "kind is repeated"),
     ("1: 2\n", "must have texts as keys"),
     ("motion: {depth_mm: 1}\n", "object must be given: it is missing"),
     (BALL + "frictoin: 0.1\n", "line 2, frictoin is unknown: did you mean friction?"),
     (BALL + "colour: red\n", "line 2, colour is unknown: the file has resolution, finger, tissues"),
     ("object:\n", "line 1, object must be a mapping of keys to values: got None"),
-    ("object: [sphere]\n", "object must be a mapping of keys to values"),
     ("object: cone\n", "line 1, object.indenter must be one of sphere"),
     ("object: 'sphere:raduis_mm=3'\n", "line 1, object.raduis_mm is no argument of Sphere: did"),
-    ("object: {kind: 3}\n", "object.kind must be one of sphere, cylinder, bar"),
     ("object: {kind: shpere}\n", "got 'shpere' (did you mean sphere?)."),
     ("object: {radius_mm: 3}\n", "object.kind must be given: it is missing"),
     ("object:\n  kind: sphere\n  raduis_mm: 3\n",
@@ -240,7 +228,6 @@ WRONG = [
     ("object: {kind: sphere, radius_mm: wide}\n", "object.radius_mm must be a finite number: got 'wide'"),
     ("object: {kind: sphere, radius_mm: .nan}\n", "object.radius_mm must be a finite number: got '.nan'"),
     ("object: {kind: sphere, radius_mm: true}\n", "object.radius_mm must be a finite number: got True"),
-    ("object: {kind: sphere, radius_mm: 2020-01-01}\n", "object.radius_mm must be a finite number"),
     ("object: {kind: sphere, radius_mm: -3}\n",
      "line 1, object.radius_mm must be greater than 0 [mm]: got -3"),
     ("object: {kind: sphere, radius_mm: 4, curvature_per_m: 250}\n",
@@ -251,13 +238,11 @@ WRONG = [
     ("object: {kind: grating, period_mm: 2, duty: 1.5}\n", "duty must be below 1"),
     ("object: {kind: grating, groove_mm: 1, duty: 0.5}\n", "duty and groove_mm exclude each other"),
     ("object: {kind: dots, at_mm: [[0, 0, 0]]}\n", "object.at_mm must be a list of pairs of numbers"),
-    ("object: {kind: dots, at_mm: []}\n", "object.at_mm must"),
     ("object: {kind: braille, text: A}\n",
      "line 1, object.text must have letters a to z and spaces: got 'A'; write 'a'."),
     ("object: {kind: braille, text: 7}\n", "object.text must be a text: got 7"),
     ("object: {kind: braille, text: a, along_finger: maybe}\n",
      "object.along_finger must be true or false: got 'maybe'"),
-    (BALL + "motion: {kind: sien}\n", "line 2, motion.kind must be one of ramp_and_hold, sine"),
     (BALL + "motion: {kind: sien}\n", "got 'sien' (did you mean sine?)."),
     (BALL + "motion: {depth_mm: 1, force_mn: 100}\n",
      "line 2, motion: depth_mm and force_mn exclude each other"),
@@ -282,17 +267,13 @@ WRONG = [
     (BALL + "motion: {kind: recorded, file: touch.yaml}\n", "line 2, motion"),
     (BALL + "place: {x_mm: 40}\n", "touch.yaml, line 2, place must lie on the finger"),
     (BALL + "place: {tilt_deg: 80}\n", "line 2, place.tilt_deg must lie within 45 degrees: got 80"),
-    (BALL + "place: [0, 0]\n", "place must be a mapping of keys to values"),
     ("object: line\nplace: {spin_deg: 30}\n", "spin_deg must be 0 for Line"),
     (BALL + "friction: -0.1\n", "line 2, friction must be a number not below 0: got -0.1"),
     ("object: line\nfriction: 0.3\n", "friction"),
     (BALL + "tissues: humn\n", "line 2, tissues must be one of human, paper"),
-    (BALL + "tissues: humn\n", "got 'humn' (did you mean human?)."),
-    (BALL + "tissues: [human]\n", "tissues must be one of human"),
     (BALL + "resolution: fine\n", "line 2, resolution must be one of quick, standard, paper: got 'fine'"),
     (BALL + "title: ''\n", "title must be a text: got ''"),
     (BALL + "finger: {dermis_mm: 9}\n", "line 2, finger: Bone and skin layers"),
-    (BALL + "finger: {lenght_mm: 30}\n", "finger.lenght_mm is unknown: did you mean length_mm?"),
     (BALL + "finger: baby\n", "touch.yaml, line 2, finger.like must be one of adult, "),
     (BALL + "finger: nope.msh\n", "touch.yaml, line 2, finger: nope.msh must be a file that can be read: "),
     (BALL + "times_ms: [4000]\n", "line 2, times_ms must lie within the motion"),
@@ -300,15 +281,11 @@ WRONG = [
     (BALL + "afferents: {layout: hexagonal}\n", "afferents.region must be given for the layout hexagonal"),
     (BALL + "afferents: {jitter: 0.1}\n", "afferents.jitter must not be given"),
     (BALL + "afferents: {rows: 0}\n", "afferents.rows must be a whole number of at least 1: got 0"),
-    (BALL + "afferents: {noise: -1}\n", "afferents.noise must be a number not below 0: got -1"),
     (BALL + "afferents: {afferent: fit.json}\n", "afferent: "),
     (BALL + "afferents: {afferent: RB}\n", "RB"),
-    (BALL + "afferents: {afferent: {static_gian: 1}}\n",
-     "afferents.afferent.static_gian is unknown: did you mean static_gain?"),
     (BALL + "afferents: {windows_ms: {static: [900, 600]}}\n", "afferents.windows_ms.window_ms must"),
     (BALL + "outputs: []\n", "outputs must have at least one entry: got []"),
     (BALL + "outputs: [csv, figure]\n", "line 2, outputs[2] must be one of figures, csv"),
-    (BALL + "outputs: 3\n", "outputs must be a list: got 3"),
     (BALL + "motion: {kind: stroke, depth_mm: 0.4, speed_mm_per_s: 20, x_mm: 2}\noutputs: febio\n",
      "line 3, outputs[1]: febio decks move the indenter only along its axis"),
 ]  # fmt: skip
@@ -353,9 +330,6 @@ def test_any_change_of_a_description_is_possible_or_refused_in_one_sentence(plac
     assert said.startswith("touch, ")
     assert "\n" not in said
     assert said[-1] in ".?"
-
-
-# Commands
 
 
 def test_the_example_runs_as_it_is_and_is_never_overwritten(call):
@@ -403,7 +377,7 @@ def test_a_touch_is_pressed_once_and_its_outputs_are_what_python_computes(call, 
     assert result.manifest.inputs.keys() == {"touch.yaml"}
     # The indentation is stored: the same touch with other afferents is not pressed again.
     monkeypatch.setattr(fp.Touch, "solve", pytest.fail)
-    again = run_touch(content | {"afferents": {"density_per_cm2": 200}, "outputs": ["spikes"]}, "out")
+    again = fp.run_touch(content | {"afferents": {"density_per_cm2": 200}, "outputs": ["spikes"]}, "out")
     assert again.summary.largest_force_mn == result.summary.largest_force_mn
     assert len(Path("out/spikes.csv").read_text(encoding="utf-8").splitlines()) == 19
     # Noise makes spikes random, and a seed repeats them.
@@ -417,7 +391,7 @@ def test_a_touch_is_pressed_once_and_its_outputs_are_what_python_computes(call, 
 def test_the_estimate_of_a_mesh_of_ones_own_counts_its_nodes_and_its_elimination(tmp_path):
     coarse = fp.Grading(17.37, 2.0, 2.0, 0.8, 0.8, 3.0, stratum_corneum=1, dermis=2, subcutis=2)
     touch = fp.touch_of(fp.Fingertip(), fp.Sphere(), fp.RampAndHold(0.5), grading=coarse)
-    path = export_touch(tmp_path, touch, "abaqus")[0]
+    path = fp.export_touch(tmp_path, touch, "abaqus")[0]
     own = estimate_press(described_touch({"object": "sphere", "finger": str(path)}))
     ours = estimate_press(described_touch({"object": "sphere"}))
     assert own.nodes == len(touch.mesh.nodes_mm) > OWN_NODES
@@ -448,7 +422,7 @@ def test_types_of_afferents_by_name_and_mixed_in_files():
     counts = np.array([len(part) for part in mixed.parts.values()])
     assert counts / counts[0] == pytest.approx([1.0, 2.0, 0.3, 9.0 / 70.0], rel=0.1)
     spheres = {"vary": "object.curvature_per_m", "values": [287, 340]}
-    task = parse_task(
+    task = fp.parse_task(
         {"question": "Which?", "stimuli": spheres, "standard": 287, "noise": 0.1, "population": asked}
     )
     laid = task_population(task)

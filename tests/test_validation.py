@@ -13,9 +13,9 @@ import typer
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+import fingerpad as fp
 from fingerpad import cli
 from fingerpad.cli import options as choices
-from fingerpad.core.errors import ConvergenceError, InputError
 from fingerpad.data import cylinder_deflection, protocol
 from fingerpad.experiments import scores
 from fingerpad.experiments.conditions import RECEPTOR_X_MM, Conditions
@@ -27,15 +27,8 @@ from fingerpad.experiments.validation import predictions
 from fingerpad.experiments.validation.observations import COLUMNS, KINDS, example_file, read_observations
 from fingerpad.experiments.validation.predictions import LOADINGS, FingertipModel, predict
 from fingerpad.experiments.validation.validation import ValidationRequest, validate
-from fingerpad.geometry.edged_indenters import Grating
-from fingerpad.geometry.indenters import Bar, FlatPunch, Plate, Sphere
-from fingerpad.geometry.motion import RampAndHold
-from fingerpad.mechanics.materials import Prony, Tissues
-from fingerpad.mechanics.tissues import named_tissues
-from fingerpad.neuron.afferent import Afferent
 from fingerpad.report.validation import draw_validation, validation_summary
-from fingerpad.skin.indentation import Touch
-from fingerpad.skin.store import Store
+from refusals import misused
 
 ROOT = Path(__file__).parents[1]
 PUBLISHED = sorted((ROOT / "studies" / "observations").glob("*.csv"))
@@ -50,17 +43,14 @@ def written(folder, content, name="mine.csv"):
     return path
 
 
-# Indenters as text
-
-
 def test_an_indenter_is_its_name_and_its_sizes():
     for text, body in (
-        ("plate", Plate()),
-        ("punch:6.35", FlatPunch(6.35)),
-        ("punch", FlatPunch()),
-        (" sphere : 287 ", Sphere(curvature_per_m=287.0)),
-        ("bar:3:0.2", Bar(3.0, 0.2)),
-        ("grating:1.5:0.75", Grating(1.5, 0.75)),
+        ("plate", fp.Plate()),
+        ("punch:6.35", fp.FlatPunch(6.35)),
+        ("punch", fp.FlatPunch()),
+        (" sphere : 287 ", fp.Sphere(curvature_per_m=287.0)),
+        ("bar:3:0.2", fp.Bar(3.0, 0.2)),
+        ("grating:1.5:0.75", fp.Grating(1.5, 0.75)),
     ):
         assert indenter_named(text) == body
     for text, said in (
@@ -71,11 +61,8 @@ def test_an_indenter_is_its_name_and_its_sizes():
         ("cylinder:-1", "diameter_mm must be greater than 0"),
         ("punch:0.4", "fillet_mm must not exceed half of diameter_mm, 0.2 mm"),
     ):
-        with pytest.raises(InputError, match=re.escape(said)):
+        with pytest.raises(fp.InputError, match=re.escape(said)):
             indenter_named(text)
-
-
-# Reading
 
 
 def test_columns_stand_in_any_order_and_lines_keep_their_numbers(tmp_path):
@@ -105,7 +92,6 @@ def test_the_header_decides_the_kind_and_every_example_is_read(tmp_path, kind):
 
 
 UNFIT = [
-    ("", "mine.csv must hold a header and at least one row: it has 0 of them."),
     (FORCE, "mine.csv must hold a header and at least one row: it has 1 of them."),
     (
         "indenter,depth_mm\nplate,1\n",
@@ -114,17 +100,12 @@ UNFIT = [
     ("indenter,depth_mm\nplate,1\n", "got indenter,depth_mm; for the kind force, add force_n."),
     ("indenter,depth_mm,position_mm,force_n\nplate,1,0,1\n", "for the kind force, leave out position_mm."),
     ("indenter;depth_mm;force_n\nplate;1;2\n", "Separate entries by commas, not by ';'."),
-    ("indenter,depth,force_n\nplate,1,1\n", "mine.csv, line 1: column 'depth' is unknown"),
-    ("force_n,indenter,depth_mm,force_n\n1,plate,1,1\n", "mine.csv, line 1: column force_n is repeated"),
-    (FORCE + "plate,1\n", "mine.csv, line 2: must have 3 entries, one per column: got 2."),
     (FORCE + "plate,1,1\nplate,-1,1\n", "mine.csv, line 3: depth_mm must not be negative [mm]: got -1.0."),
     (FORCE + "plate,nan,1\n", "mine.csv, line 2: depth_mm must be a finite number [mm]"),
     (FORCE + "plate,1,\n", "mine.csv, line 2: force_n must be given"),
-    (FORCE + ",1,1\n", "mine.csv, line 2: indenter must be given"),
     (FORCE + "punch:x,1,1\n", "mine.csv, line 2: diameter_mm must be a finite number"),
     (RATE + "0.2,-30,1\n", "mine.csv, line 2: curvature_per_m must not be negative [1/m], because"),
     (RATE + "0.2,30,-1\n", "mine.csv, line 2: rate_hz must not be negative [spikes/s]"),
-    (b"\xff\xfef\x00o\x00", "mine.csv must be text in UTF-8"),
     (FORCE + "plate,1,1\n" * 1_000_000, "mine.csv must be at most 1 MB: it has 10.0 MB; split it"),
 ]
 
@@ -133,7 +114,7 @@ UNFIT = [
 def test_unfit_files_are_one_sentence_with_file_and_line(tmp_path, monkeypatch, content, said):
     monkeypatch.chdir(tmp_path)
     written(tmp_path, content)
-    with pytest.raises(InputError) as refused:
+    with pytest.raises(fp.InputError) as refused:
         read_observations(Path("mine.csv"))
     assert said in str(refused.value)
     assert "\n" not in str(refused.value)
@@ -156,14 +137,11 @@ def test_any_text_is_read_or_refused_in_a_sentence(tmp_path_factory, header, row
     path.write_bytes("\n".join([header, *rows]).encode("utf-8", "surrogatepass"))
     try:
         found = read_observations(path)
-    except InputError as error:
+    except fp.InputError as error:
         assert "any.csv" in str(error)  # noqa: PT017
     else:
         assert len(found.rows) <= len(rows)
         assert np.isfinite(found.observed).all()
-
-
-# Scores
 
 
 def test_scores_have_their_definitions():
@@ -201,9 +179,6 @@ def test_ranges_are_those_of_equal_conditions(rows):
     assert [conditions[row] for row in ranges.first] == list(dict.fromkeys(conditions))
 
 
-# Predictions
-
-
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
     """A folder that keeps the presses of this file."""
@@ -232,7 +207,7 @@ def test_force_at_depth_0_is_0_and_grows_with_depth(folder):
 def test_quasi_static_force_is_that_of_relaxed_tissues(folder):
     """Tissues whose Prony series is left out have the long-term moduli at all times."""
     tissues = QUICK.conditions.tissues
-    relaxed = Tissues(*(layer.with_prony(Prony()) for layer in named_tissues(tissues).layers))
+    relaxed = fp.Tissues(*(layer.with_prony(fp.Prony()) for layer in fp.named_tissues(tissues).layers))
     elastic = FingertipModel(Conditions(resolution="quick", tissues=relaxed))
     slow = replace(QUICK, loading="quasi_static")
     of_fast, of_elastic, of_slow = (
@@ -300,8 +275,8 @@ def test_curvature_0_is_a_plate_on_the_mesh_of_all_spheres(pressed, tmp_path):
     touches, sites = pressed
     found = read_observations(written(tmp_path, RATE + "0.2,0,3\n0.2,900,3\n0.8,80,3\n0.2,900,4\n"))
     predict(found, QUICK, Runner(tmp_path))
-    spheres = [Sphere(curvature_per_m=curvature) for curvature in (900.0, 80.0)]
-    assert [touch.indenter for touch in touches] == [Plate(), *spheres]
+    spheres = [fp.Sphere(curvature_per_m=curvature) for curvature in (900.0, 80.0)]
+    assert [touch.indenter for touch in touches] == [fp.Plate(), *spheres]
     assert [touch.stimulus.force_mn for touch in touches] == [200.0, 200.0, 800.0]
     assert len({touch.grading for touch in touches}) == 1
     assert {touch.tilt_deg for touch in touches} == {QUICK.conditions.skin_tilt_deg}
@@ -313,7 +288,7 @@ def test_positions_on_a_grating_repeat_with_its_period(pressed, tmp_path):
     header = "force_n,ridge_mm,groove_mm,position_mm,rate_hz\n"
     found = read_observations(written(tmp_path, header + "0.2,1,2,0.5,3\n0.2,1,2,-2.5,3\n0.2,0.3,2,0,3\n"))
     assert predict(found, QUICK, Runner(tmp_path)).values.tolist() == [7.0, 7.0, 7.0]
-    assert [touch.indenter for touch in touches] == [Grating(1.0, 2.0), Grating(0.3, 2.0, 0.15)]
+    assert [touch.indenter for touch in touches] == [fp.Grating(1.0, 2.0), fp.Grating(0.3, 2.0, 0.15)]
     along = np.cos(np.deg2rad(QUICK.conditions.skin_tilt_deg))
     assert np.array(sites)[:3] == pytest.approx(
         np.array([[RECEPTOR_X_MM - 0.5 * along, 0.0]] * 2 + [[RECEPTOR_X_MM, 0.0]])
@@ -321,14 +296,14 @@ def test_positions_on_a_grating_repeat_with_its_period(pressed, tmp_path):
 
 
 def test_what_cannot_be_pressed_has_a_reason_and_the_rest_is_scored(folder, monkeypatch):
-    solve = Touch.solve
+    solve = fp.Touch.solve
 
     def limited(touch, threads=None):
-        if isinstance(touch.stimulus, RampAndHold) and touch.stimulus.depth_mm == 0.3:
-            raise ConvergenceError("The press stopped.", ("at 3 ms",))
+        if isinstance(touch.stimulus, fp.RampAndHold) and touch.stimulus.depth_mm == 0.3:
+            raise fp.ConvergenceError("The press stopped.", ("at 3 ms",))
         return solve(touch, threads)
 
-    monkeypatch.setattr(Touch, "solve", limited)
+    monkeypatch.setattr(fp.Touch, "solve", limited)
     rows = "plate,0.3,1\nplate,0.2,0.01\nplate,9,3\nplate,0.4,0.04\nplate,0.3,2\n"
     found = result_of(folder, FORCE + rows)
     assert [np.isfinite(row.predicted) for row in found.predictions] == [False, True, False, True, False]
@@ -344,9 +319,6 @@ def test_what_cannot_be_pressed_has_a_reason_and_the_rest_is_scored(folder, monk
     assert nothing.n_predicted == 0
     assert np.isnan([nothing.r2, nothing.gain, nothing.correlation, nothing.share_inside]).all()
     draw_validation(nothing)
-
-
-# Published observations
 
 
 @pytest.mark.parametrize("path", PUBLISHED, ids=lambda path: path.stem)
@@ -365,12 +337,9 @@ def test_the_published_deflection_scores_as_in_the_reproduction(folder):
     third = Conditions(resolution="quick", tissues="trial3")
     scored = validate(ValidationRequest(found, FingertipModel(third), folder))
     touch = deflection_touches(third)["trial3", "cylinder"]
-    profile = Store(folder / STORE_FOLDER).load(touch).surface_profile()
+    profile = fp.Store(folder / STORE_FOLDER).load(touch).surface_profile()
     assert scored.r2 == pytest.approx(deflection_r2(profile), abs=1e-12)
     assert scored.r2_mirrored == pytest.approx(deflection_r2(profile, proximal_positive=False), abs=1e-12)
-
-
-# The command
 
 
 @pytest.fixture
@@ -403,7 +372,7 @@ def test_the_command_writes_page_figure_and_results(call, folder, tmp_path):
 def test_an_interrupted_run_keeps_what_is_finished_and_goes_on(call, folder, tmp_path, monkeypatch):
     rows = "plate,0.2,0.01\nplate,0.4,0.05\n"
     expected = result_of(folder, FORCE + rows)
-    source, target = Store(folder / STORE_FOLDER), Store(tmp_path / "validate" / STORE_FOLDER)
+    source, target = fp.Store(folder / STORE_FOLDER), fp.Store(tmp_path / "validate" / STORE_FOLDER)
     pressed = {}
 
     def press_until_stopped(touch, threads=None):
@@ -413,7 +382,7 @@ def test_an_interrupted_run_keeps_what_is_finished_and_goes_on(call, folder, tmp
         return source.load(touch)
 
     is_resumed = False
-    monkeypatch.setattr(Touch, "solve", press_until_stopped)
+    monkeypatch.setattr(fp.Touch, "solve", press_until_stopped)
     written(tmp_path, FORCE + rows)
     options = ("mine.csv", "--resolution", "quick", "--jobs", "1")
     status, said, errors = call(*options)
@@ -463,11 +432,7 @@ def test_an_example_can_be_tried_as_it_says(call, tmp_path, kind):
 def test_misuse_is_one_sentence_and_status_2_and_nothing_is_written(call, tmp_path, arguments, said):
     content = "plate,1,1\n" if len(arguments) > 1 else "plate,-1,1\n"
     written(tmp_path, FORCE + content)
-    status, out, errors = call(*arguments)
-    assert (status, out) == (2, "")
-    assert errors.startswith("fingerpad: ")
-    assert said in errors
-    assert errors.count("\n") == 1
+    misused(call(*arguments), said)
     assert [path.name for path in tmp_path.iterdir()] == ["mine.csv"]
 
 
@@ -476,11 +441,13 @@ def command():
 
 
 @pytest.mark.parametrize(
-    "tissues", ["human", "paper", "trial3", "wu2007", named_tissues("human")], ids=lambda each: str(each)[:6]
+    "tissues",
+    ["human", "paper", "trial3", "wu2007", fp.named_tissues("human")],
+    ids=lambda each: str(each)[:6],
 )
 def test_the_afferent_is_that_of_the_tissues_unless_one_is_given(tissues):
-    conditions, own = Conditions(tissues=tissues), Afferent(static_gain=1e-6)
-    assert FingertipModel(conditions).responding == Afferent.for_tissues(tissues)
+    conditions, own = Conditions(tissues=tissues), fp.Afferent(static_gain=1e-6)
+    assert FingertipModel(conditions).responding == fp.Afferent.for_tissues(tissues)
     assert FingertipModel(conditions, own).responding == own
 
 

@@ -7,27 +7,21 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from fingerpad.core.errors import InertiaWarning, InputError
+import fingerpad as fp
 from fingerpad.data.tissues import DENSITY
-from fingerpad.geometry.fingertip import Fingertip
-from fingerpad.geometry.indenters import Plate, Sphere
 from fingerpad.geometry.mesh import block_mesh
-from fingerpad.geometry.motion import Cycles, RampAndHold
-from fingerpad.geometry.motions import SAMPLES_PER_CYCLE, chirp, sine
-from fingerpad.geometry.trajectory import Trajectory
+from fingerpad.geometry.motions import SAMPLES_PER_CYCLE
 from fingerpad.mechanics import cycles
 from fingerpad.mechanics.contact import place
 from fingerpad.mechanics.cycles import PronyCycle
 from fingerpad.mechanics.inertia import fastest_hz, resonance_hz
-from fingerpad.mechanics.materials import Material, MaterialTable, Prony
+from fingerpad.mechanics.materials import MaterialTable
 from fingerpad.mechanics.press import press
-from fingerpad.mechanics.press_settings import PressSettings
 from fingerpad.mechanics.viscoelastic import StepCoefficients, StressHistory
-from fingerpad.skin.indentation import touch_of
 
-PRONY = Prony(shares=(0.2, 0.3), times_ms=(30.0, 400.0))
-LAYERS = tuple(Material.neo_hooke(shear, 0.45, PRONY) for shear in (40.0, 40.0, 20.0, 8.0))
-BALL = Sphere(curvature_per_m=500.0)
+PRONY = fp.Prony(shares=(0.2, 0.3), times_ms=(30.0, 400.0))
+LAYERS = tuple(fp.Material.neo_hooke(shear, 0.45, PRONY) for shear in (40.0, 40.0, 20.0, 8.0))
+BALL = fp.Sphere(curvature_per_m=500.0)
 
 
 def block():
@@ -39,7 +33,7 @@ def block():
 def vibrated(motion, cycle_tolerance=0.01, friction=0.0):
     mesh = block()
     placement = place(BALL, mesh.nodes_mm[mesh.skin_nodes], np.zeros(3), np.eye(3))
-    settings = PressSettings(3, 3, cycle_tolerance=cycle_tolerance)
+    settings = fp.PressSettings(3, 3, cycle_tolerance=cycle_tolerance)
     return press(mesh, LAYERS, BALL, placement, motion, settings, friction=friction)
 
 
@@ -59,7 +53,7 @@ def solved(monkeypatch):
 @pytest.mark.parametrize("amplitude_mm", [0.02, 0.45])
 def test_few_solved_cycles_give_what_all_of_them_give(amplitude_mm, solved):
     """Also when contact is lost in every cycle, and while the slow branch still relaxes."""
-    motion = sine(0.4, amplitude_mm, 50.0, cycles=24, hold_ms=50.0)
+    motion = fp.sine(0.4, amplitude_mm, 50.0, cycles=24, hold_ms=50.0)
     some, all_of_them = vibrated(motion), vibrated(motion, cycle_tolerance=None)
     assert len(solved) <= 10
     assert solved[-1] == 23
@@ -79,7 +73,7 @@ def test_few_solved_cycles_give_what_all_of_them_give(amplitude_mm, solved):
 
 
 def test_a_tighter_tolerance_solves_more_cycles_and_errs_less(solved):
-    motion = sine(0.4, 0.1, 20.0, cycles=24, hold_ms=50.0)
+    motion = fp.sine(0.4, 0.1, 20.0, cycles=24, hold_ms=50.0)
     truth, errors, counts = vibrated(motion, cycle_tolerance=None), [], []
     for tolerance in (0.03, 0.001):
         solved.clear()
@@ -91,9 +85,9 @@ def test_a_tighter_tolerance_solves_more_cycles_and_errs_less(solved):
 
 
 def test_motion_goes_on_after_the_cycles():
-    wave = sine(0.4, 0.1, 50.0, cycles=20, hold_ms=50.0)
+    wave = fp.sine(0.4, 0.1, 50.0, cycles=20, hold_ms=50.0)
     times_ms = (*wave.times_ms, wave.end_ms + 50.0, wave.end_ms + 200.0)
-    motion = Trajectory(times_ms, (*wave.prescribed, 0.0, 0.0), cycles=wave.cycles)
+    motion = fp.Trajectory(times_ms, (*wave.prescribed, 0.0, 0.0), cycles=wave.cycles)
     some, all_of_them = vibrated(motion), vibrated(motion, cycle_tolerance=None)
     np.testing.assert_array_equal(some.times_ms, all_of_them.times_ms)
     np.testing.assert_allclose(some.force_mn, all_of_them.force_mn, atol=0.01 * some.force_mn.max())
@@ -103,8 +97,8 @@ def test_motion_goes_on_after_the_cycles():
 @pytest.mark.parametrize(
     ("motion", "friction"),
     [
-        (sine(0.4, 0.1, 50.0, cycles=10, hold_ms=50.0), 0.0),
-        (sine(0.4, 0.02, 50.0, cycles=11, hold_ms=50.0), 0.3),
+        (fp.sine(0.4, 0.1, 50.0, cycles=10, hold_ms=50.0), 0.0),
+        (fp.sine(0.4, 0.02, 50.0, cycles=11, hold_ms=50.0), 0.3),
     ],
     ids=["ten cycles", "friction"],
 )
@@ -132,24 +126,24 @@ def test_closed_form_of_relaxation_over_cycles_is_that_of_the_steps():
 
 
 def test_sine_knows_its_cycles_and_false_ones_are_refused():
-    motion = sine(0.8, 0.1, 20.0, cycles=4, hold_ms=100.0)
-    assert motion.cycles == Cycles(start_ms=150.0, period_ms=50.0, count=4)
+    motion = fp.sine(0.8, 0.1, 20.0, cycles=4, hold_ms=100.0)
+    assert motion.cycles == fp.Cycles(start_ms=150.0, period_ms=50.0, count=4)
     assert motion.cycles.end_ms == motion.end_ms
     assert sum(motion.cycles.start_ms < time for time in motion.times_ms) == 4 * SAMPLES_PER_CYCLE
-    for wrong in (Cycles(150.0, 50.0, 5), Cycles(151.0, 50.0, 3), Cycles(100.0, 50.0, 5)):
-        with pytest.raises(InputError, match="cycles must repeat the samples of the first"):
+    for wrong in (fp.Cycles(150.0, 50.0, 5), fp.Cycles(151.0, 50.0, 3), fp.Cycles(100.0, 50.0, 5)):
+        with pytest.raises(fp.InputError, match="cycles must repeat the samples of the first"):
             replace(motion, cycles=wrong)
     grown = np.array(motion.depth_mm)
     grown[-5] += 0.01
-    with pytest.raises(InputError, match="cycles must repeat the samples of the first"):
+    with pytest.raises(fp.InputError, match="cycles must repeat the samples of the first"):
         replace(motion, depth_mm=grown)
-    with pytest.raises(InputError, match="cycle_tolerance must be below 1"):
-        PressSettings(cycle_tolerance=2.0)
+    with pytest.raises(fp.InputError, match="cycle_tolerance must be below 1"):
+        fp.PressSettings(cycle_tolerance=2.0)
 
 
 def test_column_of_one_layer_has_its_quarter_wave_resonance():
     """f = c / (4 h) with c = sqrt(E / rho), and E at once whichever moduli are given."""
-    layer = Material.neo_hooke(10.0, 0.45, Prony((0.5,), (100.0,)))
+    layer = fp.Material.neo_hooke(10.0, 0.45, fp.Prony((0.5,), (100.0,)))
     shear, bulk = 2 * 10.0, layer.bulk_modulus_kpa
     young = 9 * bulk * shear / (3 * bulk + shear)
     expected = np.sqrt(1e3 * young / DENSITY.value) / (4 * 5e-3)
@@ -160,44 +154,48 @@ def test_column_of_one_layer_has_its_quarter_wave_resonance():
 
 
 def test_a_motion_is_as_fast_as_its_fastest_part():
-    assert fastest_hz(sine(0.8, 0.1, 30.0, cycles=3)) == pytest.approx(30.0, rel=0.02)
-    assert fastest_hz(sine(0.8, 0.001, 300.0, cycles=3)) == pytest.approx(300.0, rel=0.02)
-    assert fastest_hz(RampAndHold(1.0, 10.0, 100.0)) == pytest.approx(1e3 / (np.pi * 10.0))
+    assert fastest_hz(fp.sine(0.8, 0.1, 30.0, cycles=3)) == pytest.approx(30.0, rel=0.02)
+    assert fastest_hz(fp.sine(0.8, 0.001, 300.0, cycles=3)) == pytest.approx(300.0, rel=0.02)
+    assert fastest_hz(fp.RampAndHold(1.0, 10.0, 100.0)) == pytest.approx(1e3 / (np.pi * 10.0))
     # The slow beginning of a ramp does not hide its fast end, and noise on a hold does not count.
-    late = Trajectory((0.0, 1000.0, 1001.0), (0.0, 0.1, 1.0))
+    late = fp.Trajectory((0.0, 1000.0, 1001.0), (0.0, 0.1, 1.0))
     assert fastest_hz(late) == pytest.approx(1e3 * 0.9 / np.pi)
-    noisy = Trajectory((0.0, 50.0, 51.0, 52.0, 53.0), (0.0, 1.0, 1.0005, 1.0, 1.0005))
+    noisy = fp.Trajectory((0.0, 50.0, 51.0, 52.0, 53.0), (0.0, 1.0, 1.0005, 1.0, 1.0005))
     assert fastest_hz(noisy) < 10.0
 
 
 def test_a_vibration_by_force_has_its_forces_and_its_skipped_cycles_those_of_all():
-    motion = sine(force_mn=20.0, amplitude_mn=5.0, frequency_hz=20.0, cycles=14, ramp_ms=50.0, hold_ms=100.0)
+    motion = fp.sine(
+        force_mn=20.0, amplitude_mn=5.0, frequency_hz=20.0, cycles=14, ramp_ms=50.0, hold_ms=100.0
+    )
     assert motion.by_force
     assert [phase.name for phase in motion.phases] == ["ramp", "hold", "vibration"]
     assert motion.prescribed_at([25.0, 150.0, 162.5, 187.5]) == pytest.approx([10.0, 20.0, 25.0, 15.0])
-    swept = chirp(force_mn=20.0, amplitude_mn=5.0, frequencies_hz=(5.0, 50.0), sweep_ms=400.0)
+    swept = fp.chirp(force_mn=20.0, amplitude_mn=5.0, frequencies_hz=(5.0, 50.0), sweep_ms=400.0)
     assert swept.by_force
     assert swept.largest == pytest.approx(25.0, rel=1e-3)
     for wrong in ({"depth_mm": 1.0}, {"amplitude_mn": 5.0}, {"amplitude_mm": 0.1, "force_mn": 20.0}):
-        with pytest.raises(InputError, match="either depth_mm and amplitude_mm or force_mn and amplitude_mn"):
-            sine(**wrong, frequency_hz=20.0, cycles=2)
-    with pytest.raises(InputError, match="amplitude_mn must be at most force_mn"):
-        sine(force_mn=5.0, amplitude_mn=6.0, frequency_hz=20.0, cycles=2)
+        with pytest.raises(
+            fp.InputError, match="either depth_mm and amplitude_mm or force_mn and amplitude_mn"
+        ):
+            fp.sine(**wrong, frequency_hz=20.0, cycles=2)
+    with pytest.raises(fp.InputError, match="amplitude_mn must be at most force_mn"):
+        fp.sine(force_mn=5.0, amplitude_mn=6.0, frequency_hz=20.0, cycles=2)
     some, every = vibrated(motion), vibrated(motion, cycle_tolerance=None)
     np.testing.assert_allclose(some.force_mn[1:], motion.prescribed_at(some.times_ms[1:]), rtol=1e-3)
     np.testing.assert_allclose(some.depth_mm, every.depth_mm, atol=0.01 * every.depth_mm.max())
 
 
 def test_touch_warns_of_inertia_before_anything_is_pressed():
-    finger = Fingertip()
+    finger = fp.Fingertip()
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        touch_of(finger, Plate(), RampAndHold())
-        touch_of(finger, Plate(), sine(0.8, 0.1, 30.0, cycles=2))
+        fp.touch_of(finger, fp.Plate(), fp.RampAndHold())
+        fp.touch_of(finger, fp.Plate(), fp.sine(0.8, 0.1, 30.0, cycles=2))
         # Little is accelerated beside what the hold compresses, and air has no mass.
-        touch_of(finger, Plate(), sine(0.8, 0.01, 200.0, cycles=2))
-        touch_of(finger, Plate(), Trajectory((0.0, 2.0, 52.0, 100.0), (-9.0, 0.0, 0.8, 0.8)))
-    for motion in (sine(0.8, 0.1, 200.0, cycles=2), RampAndHold(ramp_ms=2.0)):
-        with pytest.warns(InertiaWarning, match=r"as a vibration of .* Hz, at which the inertia") as said:
-            touch_of(finger, Plate(), motion)
+        fp.touch_of(finger, fp.Plate(), fp.sine(0.8, 0.01, 200.0, cycles=2))
+        fp.touch_of(finger, fp.Plate(), fp.Trajectory((0.0, 2.0, 52.0, 100.0), (-9.0, 0.0, 0.8, 0.8)))
+    for motion in (fp.sine(0.8, 0.1, 200.0, cycles=2), fp.RampAndHold(ramp_ms=2.0)):
+        with pytest.warns(fp.InertiaWarning, match=r"as a vibration of .* Hz, at which the inertia") as said:
+            fp.touch_of(finger, fp.Plate(), motion)
         assert said[0].filename == __file__

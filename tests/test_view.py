@@ -12,24 +12,16 @@ from PIL import Image
 import fingerpad as fp
 from fingerpad.cli import main
 from fingerpad.core.progress import Lines
-from fingerpad.core.signals import ResponseMap, SpikeTrains
 from fingerpad.export import view
-from fingerpad.export.dataset import read_touch, touch_dataset, write_touch
-from fingerpad.export.view import fields_of, save_view
+from fingerpad.export.view import fields_of
+from refusals import refused
+from sections import SMALL_TOUCH
 
-GRADING = fp.Grading(17.37, 1.2, 1.2, 0.8, 0.8, largest_mm=4.0, stratum_corneum=1, dermis=1, subcutis=1)
-TOUCH = fp.Touch(
-    finger=fp.Fingertip(),
-    indenter=fp.Sphere(curvature_per_m=287),
-    stimulus=fp.RampAndHold(depth_mm=0.5),
-    tissues=fp.named_tissues("trial3"),
-    grading=GRADING,
-    settings=fp.PressSettings(ramp_steps=2, hold_steps=1),
-)
-RESPONSE = ResponseMap(
+TOUCH = replace(SMALL_TOUCH, stimulus=fp.RampAndHold(depth_mm=0.5))
+RESPONSE = fp.ResponseMap(
     positions_mm=[[17.0, -1.0], [17.0, 1.0], [19.0, -1.0]],
     pitch_mm=2.0,
-    spikes=SpikeTrains.from_lists([[12.5, 40.0, 300.0], [45.0], []]),
+    spikes=fp.SpikeTrains.from_lists([[12.5, 40.0, 300.0], [45.0], []]),
     dynamic_rate_hz=[36.4, 0.0, 0.0],
     static_rate_hz=[3.8, 0.0, 0.0],
     first_spike_latency_ms=[12.5, 45.0, np.nan],
@@ -38,12 +30,12 @@ RESPONSE = ResponseMap(
 
 @pytest.fixture(scope="module")
 def data():
-    return touch_dataset(TOUCH.solve(whole=True), RESPONSE)
+    return fp.touch_dataset(TOUCH.solve(whole=True), RESPONSE)
 
 
 @pytest.fixture(scope="module")
 def file(tmp_path_factory):
-    return write_touch(tmp_path_factory.mktemp("touch") / "touch.nc", TOUCH.solve(), RESPONSE)[0]
+    return fp.write_touch(tmp_path_factory.mktemp("touch") / "touch.nc", TOUCH.solve(), RESPONSE)[0]
 
 
 def test_points_are_marked_where_the_scene_shows_them(data):
@@ -82,8 +74,10 @@ def test_afferents_that_fire_are_dark(data):
 
 
 def test_a_whole_finger_and_a_turned_body_are_cut_at_the_middle():
-    whole = replace(TOUCH, indenter=fp.Bar(3.0, 0.3), grading=replace(GRADING, full=True), spin_deg=30.0)
-    data = touch_dataset(whole.solve(whole=True))
+    whole = replace(
+        TOUCH, indenter=fp.Bar(3.0, 0.3), grading=replace(TOUCH.grading, full=True), spin_deg=30.0
+    )
+    data = fp.touch_dataset(whole.solve(whole=True))
     drawn = view._View(data, "sed_kpa")
     assert drawn._object(50.0).bounds.z_max <= 1e-9
     assert view._View(data, "contact_pressure_kpa")._object(50.0).bounds.z_max > 3.0
@@ -91,12 +85,12 @@ def test_a_whole_finger_and_a_turned_body_are_cut_at_the_middle():
 
 
 def test_pictures_and_films_are_written(data, tmp_path):
-    assert save_view(tmp_path / "deep" / "a.png", data, time_ms=30.0) == (tmp_path / "deep" / "a.png",)
+    assert fp.save_view(tmp_path / "deep" / "a.png", data, time_ms=30.0) == (tmp_path / "deep" / "a.png",)
     with Image.open(tmp_path / "deep" / "a.png") as picture:
         assert picture.size[0] > 1200
     said: list[str] = []
     told = Lines(said.append, every_s=0.0)
-    save_view(tmp_path / "a.gif", data, field="pressure", frames=3, progress=told)
+    fp.save_view(tmp_path / "a.gif", data, field="pressure", frames=3, progress=told)
     assert said[-1].startswith("pictures: 3 of 3")
     assert any(line.startswith("pictures: 1 of 3") for line in said)
     with Image.open(tmp_path / "a.gif") as film:
@@ -107,53 +101,53 @@ def test_pictures_and_films_are_written(data, tmp_path):
 def test_a_film_for_other_players_needs_ffmpeg(data, tmp_path, monkeypatch):
     monkeypatch.setattr(shutil, "which", lambda name: None)
     with pytest.raises(fp.InputError, match="needs the program ffmpeg"):
-        save_view(tmp_path / "a.mp4", data)
+        fp.save_view(tmp_path / "a.mp4", data)
     monkeypatch.undo()
     (tmp_path / "bin").mkdir()
     program = tmp_path / "bin" / "ffmpeg"
     program.write_text('#!/bin/sh\nfor last; do :; done\ncat "${6%\\%05d.png}"/*.png > "$last"\n')
     program.chmod(0o755)
     monkeypatch.setenv("PATH", f"{program.parent}{os.pathsep}{os.environ['PATH']}")
-    save_view(tmp_path / "a.mp4", data, frames=2)
+    fp.save_view(tmp_path / "a.mp4", data, frames=2)
     assert (tmp_path / "a.mp4").read_bytes().count(b"IEND") == 2
     program.write_text("#!/bin/sh\necho no encoder >&2\nexit 1\n")
     with pytest.raises(fp.InputError, match=r"could not write the film \(no encoder\)"):
-        save_view(tmp_path / "b.mp4", data, frames=2)
+        fp.save_view(tmp_path / "b.mp4", data, frames=2)
 
 
 def test_without_the_deformation_the_skin_is_shown_at_any_time(file, tmp_path):
     shown = {"skin_displacement_mm", "displacement", "pressure", "shear", "slip", "sed"}
     shown |= {"von_mises_kpa", "compressive_stress_kpa"}
-    assert set(fields_of(read_touch(file))) == shown
-    save_view(tmp_path / "skin.png", file.parent, field="pressure", time_ms=30.0)
-    save_view(tmp_path / "end.png", file, time_ms=1000.0)
+    assert set(fields_of(fp.read_touch(file))) == shown
+    fp.save_view(tmp_path / "skin.png", file.parent, field="pressure", time_ms=30.0)
+    fp.save_view(tmp_path / "end.png", file, time_ms=1000.0)
     for options in ({"time_ms": 30.0}, {}, {"field": "von_mises_kpa", "time_ms": 0.0}):
         with pytest.raises(fp.InputError, match="is known at 1000 ms only: choose that time"):
-            save_view(tmp_path / "no.png", file, **options)
+            fp.save_view(tmp_path / "no.png", file, **options)
     with pytest.raises(fp.InputError, match="is known at 1000 ms only"):
-        save_view(tmp_path / "no.gif", file)
+        fp.save_view(tmp_path / "no.gif", file)
     assert sorted(path.name for path in tmp_path.iterdir()) == ["end.png", "skin.png"]
 
 
 def test_a_response_without_afferents_and_object_is_drawn(tmp_path):
     skin = TOUCH.solve()
-    (picture,) = save_view(tmp_path / "a.png", skin, field="pressure")
+    (picture,) = fp.save_view(tmp_path / "a.png", skin, field="pressure")
     assert picture.stat().st_size > 10_000
-    bare = touch_dataset(replace(skin, touch=None))
+    bare = fp.touch_dataset(replace(skin, touch=None))
     assert "object_front_mm" not in bare
-    assert save_view(tmp_path / "bare.png", bare, time_ms=1000.0)
+    assert fp.save_view(tmp_path / "bare.png", bare, time_ms=1000.0)
 
 
 def test_what_is_no_data_set_or_has_no_library_is_refused_and_a_changed_description_is_not(
     data, tmp_path, file, monkeypatch
 ):
-    with pytest.raises(fp.InputError, match="touch must be of type Dataset"):
-        save_view(tmp_path / "a.png", 5)
+    with refused("touch"):
+        fp.save_view(tmp_path / "a.png", 5)
     assert view._named("Sphere") == view._named("[1]") == "object"
     assert view._named(data.attrs["indenter"]) == "Sphere"
     monkeypatch.setitem(sys.modules, "pyvista", None)
     with pytest.raises(fp.InputError, match=r"needs pyvista: .*fingerpad\[view\]"):
-        save_view(tmp_path / "a.png", file)
+        fp.save_view(tmp_path / "a.png", file)
 
 
 def test_the_command_writes_a_picture(file, run_program, tmp_path):
