@@ -126,7 +126,7 @@ SURFACES = {
         ({"up": "z"}, "up must be one of"),
         ({"up": "-z"}, "outer side"),
         ({"at_mm": ("left", 0.0)}, "at_mm"),
-        ({"at_mm": (1.0, 2.0, 3.0)}, "at_mm must be two numbers"),
+        ({"at_mm": (1.0, 2.0, 3.0)}, "at_mm must be a pair"),
         ({"at_mm": 3.0}, "at_mm"),
         ({"pitch_mm": 0.0}, "pitch_mm must be greater than 0"),
         ({"pitch_mm": "fine"}, "pitch_mm must be a finite number"),

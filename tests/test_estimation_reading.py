@@ -180,7 +180,7 @@ def test_stimuli_name_finger_tissues_and_resolution_and_options_replace_them(wri
         ("a.csv", "name,object\ntip,bar\ntip,bar\n", "a.csv, line 3, stimuli must differ: 'tip' is repeated"),
         ("a.csv", "name,object,radius_mm\ntip,bar,1\n", "line 1: column 'radius_mm' is unknown: did you"),
         ("a.csv", "name,object,object.width_mm\ntip,sphere,1\n", "line 2, object.width_mm is unknown"),
-        ("a.csv", "name,object,object.width_mm\ntip,bar,0\n", "line 2, object.width_mm must be greater"),
+        ("a.csv", "name,object,object.width_mm\ntip,bar,0\n", "line 2, object.width_mm must lie within"),
         ("a.csv", "name,object,object.fillet_mm\ntip,bar,9\n", "line 2, object.fillet_mm must not exceed"),
         ("a.csv", "name,object,object.width_mm\ntip,bar:2,1\n", "line 2: object.sizes must stand in"),
         ("a.csv", "name,object,motion.depth_mm\ntip,bar,[\n", "line 2, motion.depth_mm cannot be read as"),

@@ -123,8 +123,8 @@ def test_a_description_takes_a_preset_measures_or_an_outline():
 
 
 test_impossible_fingers_are_refused_in_one_sentence = refusals(
-    (lambda: Fingertip.of(length_mm=20_000.0), "length_mm of a fingertip must lie between 2 and 100 mm"),
-    (lambda: Fingertip.of(width_mm=0.016), "width_mm of a fingertip .* got 0.016 mm; check its unit"),
+    (lambda: Fingertip.of(length_mm=20_000.0), "length_mm must lie within 2 to 100 mm"),
+    (lambda: Fingertip.of(width_mm=0.016), "width_mm .* got 0.016; check its unit"),
     (lambda: PAPER.scaled(-1.0), ("factor",)),
     (lambda: Fingertip.of("baby"), ("like",)),
     (lambda: Fingertip.of(widht_mm=16.0), "did you mean width_mm"),

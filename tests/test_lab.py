@@ -68,19 +68,19 @@ def waited(laboratory, state, exact=False):
 @pytest.mark.parametrize(
     ("asked", "said"),
     [
-        (None, "must be a mapping: got NoneType"),
-        ({}, "object must be given"),
+        (None, "must be a mapping of keys to values: got None"),
+        ({}, "LabState needs object: it is not given"),
         ({"object": "ball", "depht_mm": 1}, "did you mean depth_mm"),
-        ({"object": "ball", "depth_mm": "deep"}, "depth_mm must be a number within 0.05 to 5: got 'deep'"),
-        ({"object": "ball", "depth_mm": float("nan")}, "got 'nan'"),
-        ({"object": "ball", "x_mm": 1e9}, "x_mm must be a number within -20 to 20"),
-        ({"object": "ball", "x_mm": [1]}, "x_mm must be a number"),
-        ({"object": "ball", "hold_ms": True}, "hold_ms must be a number"),
-        ({"object": "ball", "afferent": "PC"}, "afferent must be SAI or RA, because .*: got 'PC'"),
+        ({"object": "ball", "depth_mm": "deep"}, "depth_mm must be a finite number [mm]: got 'deep'"),
+        ({"object": "ball", "depth_mm": float("nan")}, "depth_mm must be a finite number"),
+        ({"object": "ball", "x_mm": 1e9}, "x_mm must lie within -20 to 20 mm"),
+        ({"object": "ball", "x_mm": [1]}, "x_mm must be a finite number"),
+        ({"object": "ball", "hold_ms": True}, "hold_ms must be a finite number"),
+        ({"object": "ball", "afferent": "PC"}, "afferent must be one of SAI, RA: got 'PC'"),
     ],
 )
 def test_a_wrong_state_is_one_sentence(asked, said):
-    with pytest.raises(fp.InputError, match=said.replace("(", r"\(")):
+    with pytest.raises(fp.InputError, match=re.escape(said)):
         state_of(asked)
     assert state_of({name: str(value) for name, value in asdict(PRESS).items()}) == PRESS
 

@@ -131,7 +131,7 @@ test_what_cannot_be_a_law_is_refused_in_one_sentence = refusals(
     ((" + ".join(f"I1**{n}" for n in range(2, 150)), {}), "operations, more than 200"),
     (("(" * 300 + "I1" + ")" * 300, {}), "not a formula|cannot be evaluated"),
     ((5.0, {}), "must be a text"),
-    (("mu * I1", {"mu": np.nan}), ("coefficients", 0, 1)),
+    (("mu * I1", {"mu": np.nan}), ("mu",)),
     call=lambda given: Energy(given[0], tuple(given[1].items())),
 )  # fmt: skip
 

@@ -193,7 +193,7 @@ def test_noise_of_a_force_before_contact_is_no_force(tmp_path):
         ("time_ms,x_mm\n0,0\n1,1\n", "motion.csv: A trajectory needs either depth_mm or force_mn"),
         ("time_ms,depth_mm,depth_um\n0,0,0\n1,1,1000\n", "one column for depth_mm: depth_um is another one"),
         ("# a\ntime_ms,depth_mm\n0,0\n2,\n", "line 4: depth_mm must be given, its entry is empty"),
-        ("time_ms,depth_mm\n0,0\n1,nan\n", "line 3: depth_mm must be a finite number: got 'nan'"),
+        ("time_ms,depth_mm\n0,0\n1,nan\n", "line 3: depth_mm must be a finite number \\[mm\\]: got 'nan'"),
         ("time_ms,depth_mm\n0,0\n1,1\n\n1,1\n", "line 5: the time must increase: got 1 ms after 1 ms"),
         ("time_ms,depth_mm\n0,0\n2,1\n1,1\n", "line 4: the time must increase: got 1 ms after 2 ms"),
         ("time_ms,depth_mm\n0,0\n1,20\n2,1\n", "line 3: depth_mm must not change faster than 10 m/s"),

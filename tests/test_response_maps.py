@@ -132,7 +132,7 @@ def test_rings_part_the_plane_and_space_by_distance(places):
 
 
 test_what_cannot_be_used_is_refused = refusals(
-    (lambda: recruitment_rank([[1.0]]), "latency_ms must be a one-dimensional array"),
+    (lambda: recruitment_rank([[1.0]]), "latency_ms must have 1 dimension"),
     (lambda: recruitment_rank([np.inf]), "infinite times"),
     (lambda: evoked_latency_ms([1.0], -1.0), ("resting_latency_ms",)),
     (lambda: order_change([1.0], [1.0, 2.0]), "same afferents twice: got 1 and 2"),

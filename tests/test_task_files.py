@@ -244,7 +244,7 @@ stimuli: [] => stimuli must be two or more
 stimuli: {vary: object.curvature_per_m, values: [287]} => stimuli must be two or more
 stimuli: {vary: object.curvature_per_m, values: [287, 287]} => '287' is repeated
 stimuli: {vary: object.curvature_per_m, values: [287, x]} =>
-    stimuli.values[2], object.curvature_per_m must be a finite number: got 'x'.
+    stimuli.values[2], object.curvature_per_m must be a finite number [1/m]: got 'x'.
 stimuli: {vary: object.curvature_per_m, values: [287, 0]} =>
     stimuli.values[2], object.curvature_per_m must be greater than 0
 stimuli: {vary: object.curvature_per_m, values: 287} => stimuli.values must be a list: got 287.
@@ -262,7 +262,7 @@ stimuli: [{name: a}, {name: a}] => 'a' is repeated
     level must be given for all stimuli or for none: 'b' has none.
 stimuli: [{name: a, width_mm: 3}, {name: b}] =>
     stimuli[1].width_mm is unknown: stimuli[1] has object, motion, place,
-stimuli: [{name: a, friction: -1}, {name: b}] => stimuli[1].friction must be a number not below 0: got -1
+stimuli: [{name: a, friction: -1}, {name: b}] => stimuli[1].friction must not be negative: got -1
 standard: 300 => standard must be one of the stimuli, 287, 296, 365: got 300.0.
 standard: [287] => standard must be a number or a name: got [287].
 object: null => object.kind must be given: it is missing.
@@ -272,15 +272,15 @@ motion: {kind: stroke, depth_mm: 0.5, speed_mm_per_s: 20, x_mm: 40} =>
     motion: The indenter must not leave the finger
 place: {x_mm: 90} => place must lie on the finger
 finger: giant => finger.like must
-reach_mm: 0 => reach_mm must be a number greater than 0: got 0.
+reach_mm: 0 => reach_mm must be greater than 0 [mm]: got 0.
 skin: {materials: human} => skin is unknown
-population: {density_per_cm2: 0} => population.density_per_cm2 must be a number greater than 0: got 0.
+population: {density_per_cm2: 0} => population.density_per_cm2 must be greater than 0 [1/cm²]: got 0.
 population: {layout: hexagonal, rows: 3, region: {shape: rectangle, length_mm: 3, width_mm: 6}} =>
     population.rows must not be given: it belongs to the layout grid
 population: {region: {shape: rectangle, length_mm: 3, width_mm: 6}} =>
     population.region must not be given: it belongs to the layout rectangular or hexagonal
 population: {layout: uniform, region: {shape: rectangle, length_mm: 0, width_mm: 6.0}} =>
-    population.region.length_mm must be a number greater than 0: got 0.
+    population.region.length_mm must be greater than 0 [mm]: got 0.
 population: {layout: uniform, region: {shape: rectangle, length_mm: 1}} =>
     population.region.width_mm must be given for a rectangle
 population: {layout: uniform, region: {shape: rectangle, length_mm: 3, width_mm: 6, corners_mm: []}} =>
@@ -294,15 +294,15 @@ population: {layout: uniform, density_per_cm2: 1.0e+9, region: {shape: rectangle
     =>
     population: A layout may have
 population: {seed: -1} => population.seed must be a whole number of at least 0: got -1.
-population: {sensitivity_spread: -1} => population.sensitivity_spread must be a number not below 0: got -1.
-afferent: {time_constant_ms: 0} => afferent.time_constant_ms must be a number greater than 0: got 0.
+population: {sensitivity_spread: -1} => population.sensitivity_spread must not be negative: got -1.
+afferent: {time_constant_ms: 0} => afferent.time_constant_ms must be greater than 0 [ms]: got 0.
 afferent: none.json => afferent: none.json must be a file that can be read
 code: guess => code[1] must be one of gradient_sum, euclidean
 measure: pressure => measure[1] must be one of static, dynamic, latency: got 'pressure'.
 windows_ms: {static: [600, 1200]} =>
     windows_ms.static must end with the stimuli, not at 1200 ms: '287' ends at 1000 ms.
 experiment: {hit_rates: 1} => experiment.hit_rates must be a whole number of at least 2: got 1.
-experiment: {criterion: 2} => experiment.criterion must be a number within 0 ... 1: got 2.
+experiment: {criterion: 2} => experiment.criterion must lie within 0 to 1: got 2.
 experiment: {trials: 0} => experiment.trials must be a whole number of at least 1: got 0.
 {experiment: {criterion_sigma: 0.1}, code: euclidean} =>
     experiment.criterion_sigma must be 0 where code has euclidean
@@ -311,7 +311,7 @@ curve: {lapse: 0.6} => curve.lapse must be a number within 0 ... 0.5, or free: g
 curve: {proportion: 0.5} => curve.proportion must be a number between 0.5 and 1: got 0.5.
 observed: {} => observed.points must be given
 observed: {points: [{at: 296, hit_rate: 58}]} =>
-    observed.points[1].hit_rate must be a number within 0 ... 1: got 58.
+    observed.points[1].hit_rate must lie within 0 to 1: got 58.
 observed: {points: [{at: flat, hit_rate: 0.5}]} => observed.points[1].at must be one of the stimuli
 """
 LINES = REFUSALS.strip().replace("\n    ", " ").splitlines()

@@ -63,6 +63,6 @@ test_numbers_that_cannot_be_fitted_are_refused = refusals(
     ((fp.RA(), []), "free must name at least one number of RA: got none"),
     ((fp.RA(), ["quantity"]), r"quantity must be greater than 0|must be a finite number"),
     ((fp.Afferent(), ["intercept_ma"]), "intercept_ma must be greater than 0"),
-    ((len, ["threshold"]), "free must be one of"),
+    ((len, ["threshold"]), "afferent must be like AnyAfferent, with"),
     call=lambda chosen: fp.fit_afferent(*chosen, *TWO),
 )

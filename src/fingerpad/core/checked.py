@@ -8,10 +8,10 @@ from __future__ import annotations
 import inspect
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import MISSING, Field, field, fields
-from functools import wraps
+from functools import partial, wraps
 from itertools import takewhile
 from types import FunctionType, MappingProxyType
-from typing import TYPE_CHECKING, Any, ParamSpec, TypeVar, dataclass_transform, overload
+from typing import TYPE_CHECKING, Annotated, Any, ParamSpec, TypeVar, dataclass_transform, overload
 
 from fingerpad.core.errors import InputError, Place, did_you_mean, named, shown
 
@@ -208,10 +208,15 @@ def hints_of(makes: Callable[..., Any]) -> dict[str, Any]:
 
 def _hint(text: Any, known: dict[str, Any], unchecked: dict[str, Any]) -> Any:
     """Annotation as pydantic can check it; `Any` for what the function itself converts or consumes."""
+    from fingerpad.core.values import Check, like
+
     try:
-        return eval(text, known, unchecked) if isinstance(text, str) else text
+        hint = eval(text, known, unchecked) if isinstance(text, str) else text
     except NameError:  # a type that only type checkers import
         return Any
+    if getattr(hint, "_is_protocol", False):
+        return Annotated[Any, Check(partial(like, kind=hint), {})]
+    return hint
 
 
 class _Unchecked:

@@ -145,6 +145,15 @@ def instance(name: str, value: _Kind, kind: type) -> _Kind:
     return value
 
 
+def like(name: str, value: Any, kind: type) -> Any:
+    """Return a value that has all members of a protocol."""
+    members = [member for member in (vars(kind) | kind.__annotations__) if not member.startswith("_")]
+    lacking = [member for member in members if not hasattr(value, member)]
+    if lacking:
+        raise InputError(name, f"must be like {kind.__name__}, with {', '.join(lacking)}", shown(value))
+    return value
+
+
 def tuple_of(name: str, values: Any, each: Callable[[str, Any], Any], length: int | None = None) -> Any:
     """Return a sequence as a tuple whose entries have passed a check."""
     many = isinstance(values, Sequence) and not isinstance(values, str | bytes | bytearray | memoryview)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 
 import numpy as np
+from pydantic import SkipValidation
 
 from fingerpad.core.checked import value_class
 from fingerpad.core.errors import InputError
@@ -22,7 +23,7 @@ class RateProblem:
     Gerling et al. 2014, Eqs. 12-14. The sums run over the chosen stimuli.
     """
 
-    model: RateModel  # Predicts the rates under all stimuli, in the order of the recordings.
+    model: SkipValidation[RateModel]  # Predicts the rates under all stimuli, in the order of the recordings.
     recordings: RateRecordings  # Observed rates. A phase that was not recorded does not enter the score.
     dynamic_weight: NotNegative = protocol.DYNAMIC_WEIGHT.value
     static_weight: NotNegative = protocol.STATIC_WEIGHT.value

@@ -17,7 +17,7 @@ from fingerpad.core.displayed import Result
 from fingerpad.core.errors import ConvergenceError, InputError
 from fingerpad.core.random_streams import Presentations
 from fingerpad.core.signals import SpikeTrains, Traces
-from fingerpad.core.values import Count, Finite, FloatArray, Numbers, Whole
+from fingerpad.core.values import Count, FloatArray, Number, Numbers, Whole
 from fingerpad.inference.identifiable import (
     N_PARAMETERS,
     SPIKE_PARAMETER_NAMES,
@@ -61,7 +61,7 @@ class SpikeFit(Result):
 
     parameters: FloatArray
     covariance: FloatArray
-    log_likelihood: Finite
+    log_likelihood: Number
     n_spikes: Whole
     history: Numbers
 

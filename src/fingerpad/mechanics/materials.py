@@ -9,6 +9,7 @@ from functools import lru_cache
 from typing import Annotated
 
 import numpy as np
+from pydantic import SkipValidation
 from scipy.optimize import brentq
 
 from fingerpad.core.checked import value_class
@@ -116,7 +117,7 @@ class Material:
     27.0
     """
 
-    law: Law
+    law: SkipValidation[Law]
     prony: Prony = field(default_factory=Prony)
     moduli: Annotated[str, choice(("long_term", "instantaneous"))] = "long_term"
 

@@ -123,7 +123,7 @@ class RA(RapidlyAdapting):
     corner_hz: Finite = afferents.RA_CORNER.value
     rise: Whole = int(afferents.RA_RISE.value)
     fall: Whole = int(afferents.RA_FALL.value)
-    retraction: Finite = afferents.RA_RETRACTION.value
+    retraction: Share = afferents.RA_RETRACTION.value
     membrane_ms: Finite = afferents.RA_MEMBRANE.value
     refractory_ms: Finite = afferents.RA_REFRACTORY.value
     quantity: str = afferents.RA_QUANTITY
@@ -158,7 +158,7 @@ class PC(RapidlyAdapting):
     corner_hz: Finite = afferents.PC_CORNER.value
     rise: Whole = int(afferents.PC_RISE.value)
     fall: Whole = int(afferents.PC_FALL.value)
-    retraction: Finite = afferents.PC_RETRACTION.value
+    retraction: Share = afferents.PC_RETRACTION.value
     membrane_ms: Finite = afferents.PC_MEMBRANE.value
     refractory_ms: Finite = afferents.PC_REFRACTORY.value
     quantity: str = afferents.PC_QUANTITY

@@ -190,7 +190,7 @@ class MixedPopulation:
     def at_densities(
         cls,
         region: Region,
-        densities_per_cm2: Mapping[str, float] = PUBLISHED_DENSITIES,
+        densities_per_cm2: Mapping[str, float] | None = None,
         afferents: Mapping[str, AnyAfferent] | None = None,
         place: Place | None = None,
         spread: Finite = 0.0,
@@ -224,15 +224,13 @@ class MixedPopulation:
         # Files of touches load this module, and only a layout at random needs that one.
         from fingerpad.core.patterns import poisson_disc
 
-        for argument, given in (("densities_per_cm2", densities_per_cm2), ("afferents", afferents or {})):
-            instance(f"{argument}, with a type as each key,", given, Mapping)
         if not hasattr(region, "area_mm2"):
             raise InputError(
                 "region", "must be one of fingerpad.core.regions or UnrolledSkin(finger).pad()", repr(region)
             )
         known = types_of_afferents() | dict(afferents or {})
         parts = {}
-        for number, (name, density) in enumerate(densities_per_cm2.items()):
+        for number, (name, density) in enumerate((densities_per_cm2 or PUBLISHED_DENSITIES).items()):
             if name not in known:
                 raise InputError(
                     f"densities_per_cm2 has type {name!r} without an afferent: the types are "

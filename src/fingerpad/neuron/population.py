@@ -9,6 +9,7 @@ from typing import Annotated, Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import ArrayLike
+from pydantic import SkipValidation
 
 from fingerpad.core.checked import checked, value_class
 from fingerpad.core.errors import InputError, TissuesWarning, level_of_caller, shown
@@ -113,7 +114,7 @@ class Population:
 
     positions_mm: FiniteMatrix
     pitch_mm: Positive
-    afferent: AnyAfferent = field(default_factory=Afferent)
+    afferent: SkipValidation[AnyAfferent] = field(default_factory=Afferent)
     sensitivity: FiniteVector | None = None
     places_mm: FiniteMatrix | None = None
     ends: EndOrgans | None = None

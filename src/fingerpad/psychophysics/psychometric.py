@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 from fingerpad.core.checked import checked, value_class
 from fingerpad.core.displayed import Result
 from fingerpad.core.errors import ConvergenceError, InputError
-from fingerpad.core.values import Finite, FloatArray, choice, finite
+from fingerpad.core.values import Finite, FloatArray, Number, choice, finite
 from fingerpad.psychophysics.functions import (
     SIGMOIDS,
     SMALLEST_OVERDISPERSION,
@@ -57,8 +57,8 @@ class PsychometricFit(Result):
 
     counts: JudgementCounts
     function: PsychometricFunction
-    overdispersion: Finite
-    log_likelihood: Finite
+    overdispersion: Number
+    log_likelihood: Number
     model: Model
 
     def __repr__(self) -> str:

@@ -19,7 +19,7 @@ from fingerpad.core.checked import checked_class, value_class
 from fingerpad.core.displayed import Result
 from fingerpad.core.errors import InputError
 from fingerpad.core.units import with_unit
-from fingerpad.core.values import Finite, FloatArray, finite, float_array, not_negative
+from fingerpad.core.values import Finite, FloatArray, Number, finite, float_array, not_negative
 from fingerpad.reduction.interpolation import weighted
 from fingerpad.reduction.model import GRID_POINTS, ReducedModel
 from fingerpad.reduction.relaxation import Springs, amplitudes, depth_scale, filter_step, lost
@@ -56,12 +56,12 @@ class ReducedSample(Result):
         The same of each quantity, at all receptors. [its unit]
     """
 
-    time_ms: Finite
-    depth_mm: Finite
-    force_mn: Finite
-    contact_area_mm2: Finite
+    time_ms: Number
+    depth_mm: Number
+    force_mn: Number
+    contact_area_mm2: Number
     fields: dict[str, FloatArray]
-    force_error_mn: Finite
+    force_error_mn: Number
     field_errors: dict[str, float]
 
     def __repr__(self) -> str:

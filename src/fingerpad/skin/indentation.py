@@ -10,6 +10,7 @@ from typing import Annotated, Any, cast
 
 import numpy as np
 from numpy.typing import ArrayLike
+from pydantic import SkipValidation
 from scipy.optimize import brentq
 from threadpoolctl import threadpool_limits
 
@@ -107,7 +108,7 @@ class Touch:
     friction: Finite = 0.0
     spin_deg: Finite = 0.0
     whole: Flag = field(default=False, compare=False, repr=False)
-    progress: Progress | None = field(default=None, compare=False, repr=False)
+    progress: SkipValidation[Progress | None] = field(default=None, compare=False, repr=False)
 
     def __post_init__(self) -> None:
         x, z = _position(self.at_mm, self.finger)

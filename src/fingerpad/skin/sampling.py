@@ -19,10 +19,10 @@ from fingerpad.core.phases import Phase
 from fingerpad.core.signals import STORED_ENERGY, ResponseMap, Traces
 from fingerpad.core.values import (
     Check,
-    Finite,
     FiniteVector,
     FloatArray,
     Many,
+    Number,
     Numbers,
     Whole,
     float_array,
@@ -147,12 +147,12 @@ class SkinResponse(Result):
 
     mesh: Mesh
     kinks_ms: Numbers
-    axis_x_mm: Finite
+    axis_x_mm: Number
     direction: FloatArray
     fields: Mapping[str, FloatArray]
-    force_imbalance: Finite
-    energy_imbalance: Finite
-    penetration_mm: Finite
+    force_imbalance: Number
+    energy_imbalance: Number
+    penetration_mm: Number
     newton_steps: Whole
     factorisations: Whole
     linear_solver: str
@@ -160,7 +160,7 @@ class SkinResponse(Result):
     phases: Many[Phase] = ()
     pose: Pose = STILL
     touch: Touch | None = None
-    onset_ms: Finite = 0.0
+    onset_ms: Number = 0.0
 
     def __post_init__(self) -> None:
         declared = {field.name: field for field in stored_fields()}
