@@ -91,7 +91,7 @@ def test_one_set_of_tissues_is_the_default_everywhere():
         (["export", "out", "--indenter", "sphere:3", "--curvature", "287"], "without a size", "sphere:3"),
         (["export", "out", "--indenter", "punch:wide"], "diameter_mm must be a finite number", "'wide'"),
         (["export", "out", "--curvature", "round"], "'--curvature': must be a number", "'round'"),
-        (["export", "out", "--depth", "-1"], "depth_mm must be greater than 0", "-1"),
+        (["export", "out", "--depth", "-1"], "depth_mm must lie within 0.001 to 20 mm", "-1"),
         (["export", "out", "--depth", "1", "--trajectory", "a.csv"], "--depth is that of a hold", "a.csv"),
         (["export", "out", "--tolerance", "0.02"], "--tolerance is that of a --trajectory", "give both"),
         (["export", "out", "--trajectory", "gone.csv"], "gone.csv must be a file", "No such file"),

@@ -332,7 +332,7 @@ def swapped_layers(parts):
         (lambda p: p, {"names": {"dermis": "corium"}}, "set corium of elements is missing"),
         (lambda p: p, {"receptor_depth_mm": 30.0}, "end organs 30 mm below the skin must lie in the mesh"),
         (lambda p: p, {"receptor_depth_mm": -1.0}, "receptor_depth_mm must be greater than 0"),
-        (lambda p: p, {"contact_mm": 10.0}, r"contact_mm must be a pair, x and z \[mm\]: got 10.0"),
+        (lambda p: p, {"contact_mm": 10.0}, r"contact_mm must be a pair \[mm\]: got 10.0"),
         (lambda p: p, {"names": ["skin"]}, r"names must be of type Mapping: got \['skin'\]"),
         (lambda p: p, {"contact_mm": (90.0, 0.0)}, "position must lie on the finger"),
         (lambda p: moved(p, 5, np.nan), {}, "nodes must have finite coordinates"),

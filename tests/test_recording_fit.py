@@ -465,7 +465,7 @@ def static_rates(column, rows):
         (BAR, static_rates("shift_mm", (0, 1)), "at least 4 rates"),
         (BAR, ROWS + "90,1,3\n", "Stimulus 90 cannot be used: place must lie"),
         ([*BAR, "--depth", "9"], ROWS, "Stimulus -2 cannot be used: motion.depth_mm"),
-        ([*BAR, "--width", "0"], ROWS, "width_mm must be greater than 0"),
+        ([*BAR, "--width", "0"], ROWS, "width_mm must lie within"),
         ([*BAR, "--fillet", "2"], ROWS, "fillet_mm must not exceed half"),
         ([*BAR, "--folds", "7"], ROWS, "n_folds must be at most the number of stimuli"),
         ([*BAR, "--folds", "1"], ROWS, "n_folds must be a whole number of at least 2"),

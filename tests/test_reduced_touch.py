@@ -341,7 +341,7 @@ def test_a_stream_refuses_wrong_samples() -> None:
     [
         ("object: sphere\n", "range must be given"),
         ("object: sphere\nrange: {depth_mm: -1}\n", "range.depth_mm must be greater than 0"),
-        ("object: sphere\nrange: {depth_mm: 1, x_mm: 3}\n", "range.x_mm must be a pair of numbers"),
+        ("object: sphere\nrange: {depth_mm: 1, x_mm: 3}\n", "range.x_mm must be a pair [mm]"),
         ("object: sphere\nrange: {depth_mm: 1, y_mm: [0, 1]}\n", "y_mm"),
         ("object: sphere\nrange: {depth_mm: 1}\nmotion: {depth_mm: 1}\n", "motion must be left out"),
         ("object: sphere\nrange: {depth_mm: 1, x_mm: [-30, 30]}\n", "finger"),

@@ -58,7 +58,7 @@ def test_an_indenter_is_its_name_and_its_sizes():
         ("plate:3", "indenter must be written plate, sizes from the right may be left out: got 'plate:3'"),
         ("sphere:287:1", "indenter must be written sphere:curvature_per_m"),
         ("punch:", "diameter_mm must be a finite number [mm]: got ''"),
-        ("cylinder:-1", "diameter_mm must be greater than 0"),
+        ("cylinder:-1", "diameter_mm must lie within 0.01 to 400 mm"),
         ("punch:0.4", "fillet_mm must not exceed half of diameter_mm, 0.2 mm"),
     ):
         with pytest.raises(fp.InputError, match=re.escape(said)):

@@ -175,7 +175,7 @@ WRONG = {
     "one picture for a film": (
         ("{file}", "--out", "a.gif", "--field", "pressure", "--frames", "1"), "frames", "1"),
     "endless pictures": (
-        ("{file}", "--out", "a.gif", "--field", "slip", "--frames", "1" + 12 * "0"), "frames", "most 2000"),
+        ("{file}", "--out", "a.gif", "--field", "slip", "--frames", "1" + 12 * "0"), "frames", "most 2,000"),
     "an empty name": (("",), "An argument", "must not be empty"),
     "a long name": (("a" * 300,), "file or folder", "name too long"),
     "a device": (("/dev/zero",), "/dev/zero", "neither"),

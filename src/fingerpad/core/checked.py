@@ -10,8 +10,9 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import MISSING, Field, field, fields
 from functools import partial, wraps
 from itertools import takewhile
-from types import FunctionType, MappingProxyType
-from typing import TYPE_CHECKING, Annotated, Any, ParamSpec, TypeVar, dataclass_transform, overload
+from pathlib import Path
+from types import FunctionType, MappingProxyType, NoneType
+from typing import TYPE_CHECKING, Annotated, Any, ParamSpec, TypeVar, dataclass_transform, get_args, overload
 
 from fingerpad.core.errors import InputError, Place, did_you_mean, named, shown
 
@@ -187,7 +188,9 @@ def _validated(function: Callable[..., _Made]) -> Callable[..., _Made]:
         function.__closure__,
     )
     same.__kwdefaults__, same.__qualname__ = function.__kwdefaults__, function.__qualname__
-    same.__annotations__ = {name: hint for name, hint in hints_of(function).items() if name != "return"}
+    same.__annotations__ = {
+        name: _path_or(hint) for name, hint in hints_of(function).items() if name != "return"
+    }
     return validate_call(config=ConfigDict(arbitrary_types_allowed=True, strict=True))(same)
 
 
@@ -200,7 +203,8 @@ def hints_of(makes: Callable[..., Any]) -> dict[str, Any]:
         found = {name: part.rebuild_annotation() for name, part in given.items()}
         return dict.fromkeys(other_names(makes), Finite) | found
     function = inspect.unwrap(makes)
-    unchecked = {"FloatArray": AnyArray, "ArrayLike": Any, "Iterable": _Unchecked, "Iterator": _Unchecked}
+    unchecked = {"FloatArray": AnyArray, "ArrayLike": Any, "Sequence": _SequenceOf}
+    unchecked |= {"Iterable": _Unchecked, "Iterator": _Unchecked}
     return {
         name: _hint(text, function.__globals__, unchecked) for name, text in function.__annotations__.items()
     }
@@ -224,6 +228,30 @@ class _Unchecked:
 
     def __class_getitem__(cls, _: Any) -> Any:
         return Any
+
+
+class _SequenceOf:
+    """Stands for `Sequence`: one of numbers may be an array."""
+
+    def __class_getitem__(cls, entry: Any) -> Any:
+        from fingerpad.core.values import Check, numbers
+
+        return Annotated[Any, Check(numbers, _NUMBERS)] if entry is float else Sequence[entry]
+
+
+_NUMBERS = {"type": "array", "items": {"type": "number"}}
+
+
+def _path_or(hint: Any) -> Any:
+    """Annotation of a path, which may be given as a text; any other as it is."""
+    from fingerpad.core.files import path_of
+    from fingerpad.core.values import Check
+
+    kinds = get_args(hint) or (hint,)
+    if Path not in kinds or not all(kind in (str, Path, NoneType) for kind in kinds):
+        return hint
+    path = Annotated[Path, Check(path_of, {})]
+    return path | None if NoneType in kinds else path
 
 
 def _in_one_sentence(

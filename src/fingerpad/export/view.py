@@ -18,7 +18,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import matplotlib
 import numpy as np
@@ -33,7 +33,7 @@ from fingerpad.core.checked import checked
 from fingerpad.core.errors import InputError
 from fingerpad.core.files import path_of, write_atomically
 from fingerpad.core.progress import NoProgress, Progress
-from fingerpad.core.values import Finite, FloatArray, Several, finite, instance, one_of
+from fingerpad.core.values import Finite, FloatArray, count_from, finite, instance, one_of
 from fingerpad.export.dataset import check_touch, library, read_touch, spike_trains, touch_dataset
 from fingerpad.report.style import BLACK, BLUE, STYLE, new_figure, say_nothing_to_draw
 from fingerpad.report.touch import BONE, DECADES, SKIN
@@ -75,7 +75,7 @@ def save_view(
     *,
     field: str = "sed",
     time_ms: Finite | None = None,
-    frames: Several = 40,
+    frames: Annotated[int, count_from(2, MOST_FRAMES)] = 40,
     progress: Progress | None = None,
 ) -> tuple[Path, ...]:
     """Draw a touch in three dimensions: a picture at one time, or a film.
@@ -131,8 +131,6 @@ def save_view(
         deepest_ms = float(data["time"].values[data["depth_mm"].values.argmax()])
         write_atomically(path, view.png(view.checked(deepest_ms if time_ms is None else time_ms)))
         return (path,)
-    if frames > MOST_FRAMES:
-        raise InputError("frames", f"must be at most {MOST_FRAMES}", str(frames))
     times = data["time"].values
     steps = np.linspace(0.0, times.size - 1.0, frames)
     shown = np.interp(steps, np.arange(times.size), times)

@@ -20,6 +20,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 
 import numpy as np
+from pydantic import SkipValidation
 from scipy.special import logsumexp
 
 from fingerpad.core.checked import value_class
@@ -102,7 +103,7 @@ class CorrelatedResiduals:
 class RateLikelihood:
     """Likelihood of the parameters of a rate model, given the observed rates of one afferent."""
 
-    model: RateModel  # Predicts the rates under all stimuli.
+    model: SkipValidation[RateModel]  # Predicts the rates under all stimuli.
     recordings: RateRecordings  # Observed rates, one row per stimulus.
     positions_mm: FloatArray | None = None
     """Position of each stimulus along a line; default: independent residuals, (n_stimuli,). [mm]"""

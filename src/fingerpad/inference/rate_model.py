@@ -13,6 +13,7 @@ from functools import cached_property
 from typing import Protocol, runtime_checkable
 
 import numpy as np
+from pydantic import SkipValidation
 
 from fingerpad.core.checked import value_class
 from fingerpad.core.errors import InputError
@@ -61,7 +62,7 @@ class SmoothRateModel(RateModel, Protocol):
 
 
 def evaluate_rows(
-    model: RateModel, points: FloatArray, new_evaluator: Callable[[], Evaluate] | None = None
+    model: SkipValidation[RateModel], points: FloatArray, new_evaluator: Callable[[], Evaluate] | None = None
 ) -> Rates:
     """Evaluate a model row by row on all threads: what `evaluate_batch` of most models does."""
     rows = checked_rows(model, points)
@@ -224,7 +225,7 @@ class AfferentModel:
 class Reparametrised:
     """A rate model in other parameters."""
 
-    model: RateModel
+    model: SkipValidation[RateModel]
     names: tuple[str, ...]
     transform: Callable[[FloatArray], FloatArray]  # From the new parameters to those of `model`.
 

@@ -14,6 +14,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
+from pydantic import SkipValidation
 
 from fingerpad.core.checked import value_class
 from fingerpad.core.errors import InputError
@@ -72,7 +73,7 @@ class RatesAndHitRates:
 class SphereHitRates:
     """Hit rates of two codes, predicted from the parameters of every afferent of a population."""
 
-    model: RateModel
+    model: SkipValidation[RateModel]
     """Rates, a column per receptor, sphere and position, receptors fastest and positions slowest."""
     n_positions: int
     n_receptors: int  # Sizes; the number of spheres, the standard first, follows.

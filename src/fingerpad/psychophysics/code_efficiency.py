@@ -14,7 +14,7 @@ import math
 from dataclasses import dataclass
 from typing import Annotated
 
-import numpy as np
+from numpy.typing import ArrayLike
 
 from fingerpad.core.checked import checked
 from fingerpad.core.values import Finite, Matrix, Whole, choice
@@ -80,7 +80,7 @@ def noisy_presentations(
 def code_statistic(
     code: Annotated[str, choice(POPULATION_CODES)],
     standard: ResponseModel,
-    neighbours: np.ndarray,
+    neighbours: ArrayLike,
     seed: Whole,
     session: Whole = 0,
 ) -> Statistic:

@@ -18,7 +18,7 @@ from fingerpad.core.checked import checked
 from fingerpad.core.errors import InputError
 from fingerpad.core.layouts import PATTERNS
 from fingerpad.core.signals import ResponseMap
-from fingerpad.core.values import Finite, FloatArray, Positive, Whole, choice, float_array
+from fingerpad.core.values import Finite, FloatArray, Positive, Whole, array, choice, float_array
 
 RESPONSE_MEASURES: dict[str, Callable[[ResponseMap], FloatArray]] = {
     "static": lambda response: response.static_rate_hz,
@@ -142,7 +142,7 @@ def gradient_sum(values: ArrayLike, neighbours: ArrayLike) -> FloatArray:
     >>> float(gradient_sum([10.0, 30.0, 25.0], in_a_row))
     50.0
     """
-    responses = np.asarray(values, dtype=np.float64)
+    responses = array("values", values)
     pairs = check_neighbours(neighbours, responses.shape[-1] if responses.ndim else 0)
     # Receptors first: whole rows are gathered and subtracted, which is several times faster.
     by_receptor = np.ascontiguousarray(np.moveaxis(responses, -1, 0))

@@ -41,7 +41,7 @@ class NoiseFit:
 @checked
 def expected_hit_rates(
     responses: ArrayLike,
-    neighbours: np.ndarray,
+    neighbours: ArrayLike,
     noise_sigma: Finite,
     standard_normals: ArrayLike,
     criterion: Finite = psychophysics.DECISION_CRITERION.value,

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import numpy as np
 from numba import njit
+from numpy.typing import ArrayLike
 
 from fingerpad.core.checked import checked
 from fingerpad.core.errors import InputError
@@ -56,7 +57,7 @@ def noisy_responses(
 @checked
 def noisy_gradient_sums(
     responses: FloatArray,
-    neighbours: np.ndarray,
+    neighbours: ArrayLike,
     noise_sigma: Finite | FloatArray,
     seed: Whole,
     trials: IntArray,
@@ -84,7 +85,7 @@ def noisy_gradient_sums(
 
 
 def shared_noise_gradient_sums(
-    responses: FloatArray, neighbours: np.ndarray, noise_sigma: float, standard_normals: FloatArray
+    responses: FloatArray, neighbours: ArrayLike, noise_sigma: float, standard_normals: FloatArray
 ) -> FloatArray:
     """Sum the gradients of every stimulus under the same noise."""
     values = np.ascontiguousarray(responses, dtype=np.float64)
