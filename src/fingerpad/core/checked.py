@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import MISSING, Field, field, fields
+from dataclasses import MISSING, field, fields
 from functools import partial, wraps
 from itertools import takewhile
 from pathlib import Path
@@ -40,12 +40,7 @@ _EXPECTED = {
 }
 """What must be, by pydantic's name of an error; any other error keeps pydantic's words."""
 
-_MISSING = (
-    "missing",
-    "missing_argument",
-    "missing_keyword_only_argument",
-    "missing_positional_only_argument",
-)
+_MISSING = ("missing", "missing_argument", "missing_keyword_only_argument")
 _UNKNOWN = ("unexpected_keyword_argument", "extra_forbidden", "invalid_key")
 _INSTANCES = ("is_instance_of", "dataclass_type", "dataclass_exact_type")
 _CALLS = {
@@ -99,8 +94,8 @@ def checked(function: Callable[_Given, _Made]) -> Callable[_Given, _Made]:
         try:
             return call(*args, **given)
         except _refusal() as error:
-            owner, parts = _owner(function), inspect.signature(function).parameters
-            raise _in_one_sentence(error, owner, parts.values()) from None
+            owner = function.__qualname__.rpartition("<locals>.")[2]
+            raise _in_one_sentence(error, owner, inspect.signature(function).parameters.values()) from None
 
     return checking
 
@@ -148,7 +143,9 @@ def _parts_of(kind: Any) -> list[inspect.Parameter]:
         inspect.Parameter(
             part.name,
             inspect.Parameter.KEYWORD_ONLY if part.kw_only else inspect.Parameter.POSITIONAL_OR_KEYWORD,
-            default=inspect.Parameter.empty if _is_needed(part) else part.default,
+            default=inspect.Parameter.empty
+            if part.default is part.default_factory is MISSING
+            else part.default,
             annotation=part.type,
         )
         for part in fields(kind)
@@ -160,14 +157,6 @@ def _parts_of(kind: Any) -> list[inspect.Parameter]:
         if name not in {part.name for part in parts}
     ]
     return sorted(parts, key=lambda part: part.kind)
-
-
-def _is_needed(part: Field[Any]) -> bool:
-    return part.default is MISSING and part.default_factory is MISSING
-
-
-def _owner(function: Callable[..., Any]) -> str:
-    return function.__qualname__.rpartition("<locals>.")[2]
 
 
 def _refusal() -> type[ValidationError]:
@@ -261,10 +250,7 @@ def _in_one_sentence(
     elsewhere: Mapping[str, str] = MappingProxyType({}),
 ) -> Exception:
     """Say what pydantic refused first as an `InputError`."""
-    if error.title.rpartition("<locals>.")[2] not in (
-        owner,
-        f"{owner}.__init__",
-    ):  # of something that was called within
+    if error.title.rpartition("<locals>.")[2].removesuffix(".__init__") != owner:  # something called within
         return error
     entries, known = error.errors(include_url=False), [*parts]
     first = first_of(entries)

@@ -50,7 +50,7 @@ class Cluster:
     def check(self) -> None:
         """Raise `InputError` unless the scheduler answers and its workers have this version of fingerpad."""
         with self._client(_CONNECT_S) as client:
-            for worker, found in client.run(_versions_here).items():
+            for worker, found in client.run(_software).items():
                 _check_same(worker, _software(), found)
 
     @property
@@ -161,7 +161,8 @@ def _task(expected: Versions, work: Work, item: Any) -> Any:
 def _outcome(future: Any) -> Callable[[], Any]:
     """Fetch what a task returned or raised; workers killed again and again are an error of its item."""
     if future.status != "error":
-        return partial(_identity, future.result())
+        found = future.result()
+        return lambda: found
     error = future.exception()
     if isinstance(error, _library().KilledWorker):
         error = StoreError(
@@ -169,10 +170,6 @@ def _outcome(future: Any) -> Callable[[], Any]:
             "again."
         )
     return partial(_raise, error)
-
-
-def _identity(value: Any) -> Any:
-    return value
 
 
 def _raise(error: Exception) -> Any:
@@ -187,10 +184,6 @@ def _check_same(worker: str, expected: Versions, found: Versions) -> None:
                 f"Worker {worker} must have {name} {version}, as this computer has: got {found.get(name)}; "
                 "install the same version there."
             )
-
-
-def _versions_here() -> Versions:
-    return _software()
 
 
 @cache

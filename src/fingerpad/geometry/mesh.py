@@ -247,7 +247,10 @@ def finger_lines(finger: Fingertip, grading: Grading) -> GridLines:
     volar = slice(int(z.argmax()) + 1)
     right, left = (
         np.interp(lines_across(grading, girth[-1], _strips(strips, z[volar], girth[volar])), girth, angle)
-        for strips in (grading.finer_across, _mirrored(grading.finer_across))
+        for strips in (
+            grading.finer_across,
+            [(-end, -begin, size) for begin, end, size in grading.finer_across],
+        )
     )
     around = np.concatenate([-left[:0:-1], right]) if grading.full else right
     through = [np.zeros(1)]
@@ -264,10 +267,6 @@ def _strips(strips: Sequence[Strip], place_mm: FloatArray, arc_mm: FloatArray) -
         if far > 0.0:
             on_skin.append((near, far, size))
     return on_skin
-
-
-def _mirrored(strips: Sequence[Strip]) -> list[Strip]:
-    return [(-end, -begin, size) for begin, end, size in strips]
 
 
 def _subcutis_fractions(finger: Fingertip, grading: Grading) -> FloatArray:

@@ -380,7 +380,7 @@ def _msh_41(read: _Read, blocks: Mapping[str, list[Row]], names: Mapping[tuple[i
     lines = iter(blocks["Nodes"][1:])
     for line, words in lines:
         count = _whole(read, line, words[3])
-        tags = [_whole(read, *_one(next(lines))) for _ in range(count)]
+        tags = [_whole(read, at, words[0]) for at, words in [next(lines) for _ in range(count)]]
         read.node_numbers += tags
         read.nodes += [_numbers(read, at, row[:3]) for at, row in [next(lines) for _ in range(count)]]
     lines = iter(blocks["Elements"][1:])
@@ -390,10 +390,6 @@ def _msh_41(read: _Read, blocks: Mapping[str, list[Row]], names: Mapping[tuple[i
             at, row = next(lines)
             label, *nodes = (_whole(read, at, word) for word in row)
             _msh_element(read, at, kind, label, nodes, groups.get((dimension, entity), []))
-
-
-def _one(row: Row) -> tuple[int, str]:
-    return row[0], row[1][0]
 
 
 def _msh_entities(

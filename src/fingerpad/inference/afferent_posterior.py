@@ -150,7 +150,10 @@ def afferent_posterior(
         return density(_constrained(points)) + points[:, 0]  # the Jacobian's logarithm is ln(1 - u)
 
     begin = _unconstrained(centre), START_SPREAD, COORDINATE_NAMES
-    chains = _constrained_chains(sample(unconstrained_density, *begin, seed=seed, **settings))
+    chains = sample(unconstrained_density, *begin, seed=seed, **settings)
+    # Draws become u; R-hat and effective sizes depend on ranks only and stay.
+    logs = chains.log_densities - chains.draws[..., 0]
+    chains = replace(chains, draws=_constrained(chains.draws), log_densities=logs)
     some = from_coordinates(chains.spread_out(N_PREDICTED))
     return AfferentPosterior(
         chains, from_coordinates(chains.flat), likelihood.residual_draws(some, generator([seed, 1]))
@@ -165,10 +168,3 @@ def _unconstrained(coordinates: FloatArray) -> FloatArray:
 def _constrained(points: FloatArray) -> FloatArray:
     """Replace ln(1 - u) by u: the inverse of `_unconstrained`."""
     return np.concatenate([1.0 - np.exp(points[..., :1]), points[..., 1:]], axis=-1)
-
-
-def _constrained_chains(chains: Chains) -> Chains:
-    """Transform draws to u; R-hat and effective sizes depend on ranks only and stay."""
-    return replace(
-        chains, draws=_constrained(chains.draws), log_densities=chains.log_densities - chains.draws[..., 0]
-    )

@@ -27,7 +27,6 @@ from fingerpad.core.values import (
     Whole,
     count_from,
     float_array,
-    pair,
 )
 from fingerpad.data import fingertip, psychophysics
 from fingerpad.data.tissues import DEFAULT_TISSUES
@@ -232,14 +231,12 @@ class Population:
             raise InputError(
                 "finger", "must be one such as Fingertip() or Fingertip.of('child')", shown(finger)
             )
-        centre = centre_mm or (CENTRE_MM if finger is None else finger.contact_mm)
-        centre_x, centre_z = pair("centre_mm", centre)
-        counts = rows, columns
-        if math.prod(counts) > MOST_RECEPTORS:
+        centre_x, centre_z = centre_mm or (CENTRE_MM if finger is None else finger.contact_mm)
+        if rows * columns > MOST_RECEPTORS:
             raise InputError(
                 f"rows times columns must be at most {MOST_RECEPTORS:,} receptors: got {rows} by {columns}."
             )
-        x, z = centre_x + pitch_mm * around_zero(counts[0]), centre_z + pitch_mm * around_zero(counts[1])
+        x, z = centre_x + pitch_mm * around_zero(rows), centre_z + pitch_mm * around_zero(columns)
         positions = np.stack(np.meshgrid(x, z, indexing="ij"), axis=-1).reshape(-1, 2)
         return cls(positions, pitch_mm, afferent or Afferent(), centre_mm=CENTRE_MM if follows else None)
 

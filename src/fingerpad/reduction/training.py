@@ -18,7 +18,7 @@ from scipy.optimize import brentq
 
 from fingerpad.core.checked import value_class
 from fingerpad.core.errors import InputError
-from fingerpad.core.values import Pair, Positive, choice, finite, instance
+from fingerpad.core.values import Pair, Positive, choice, instance
 from fingerpad.geometry.fingertip import Fingertip
 from fingerpad.geometry.grading import RESOLUTIONS
 from fingerpad.geometry.indenter_grading import grading_along
@@ -86,14 +86,13 @@ class ReducedRange:
 
     def __post_init__(self) -> None:
         for name in SPACING:
-            low, high = _pair(name, getattr(self, name))
+            low, high = getattr(self, name)
             if not low <= 0.0 <= high:
                 raise InputError(name, "must range over 0, the pose of the touch", f"{low:g} to {high:g}")
-            object.__setattr__(self, name, (low, high))
         if (self.parameter is None) != (self.values is None):
             raise InputError("A range needs both a parameter of the indenter and its values, or neither.")
-        if self.values is not None:
-            object.__setattr__(self, "values", _pair("values", self.values))
+        if self.values is not None and self.values[0] > self.values[1]:
+            raise InputError("values", "must range from low to high", str(self.values))
 
     @property
     def axes(self) -> tuple[Axis, ...]:
@@ -114,16 +113,6 @@ class ReducedRange:
     def moves(self) -> bool:
         """Whether the indenter moves aside."""
         return self.x_mm != (0.0, 0.0) or self.z_mm != (0.0, 0.0)
-
-
-def _pair(name: str, values: tuple[float, float]) -> tuple[float, float]:
-    try:
-        low, high = values
-    except (TypeError, ValueError):
-        raise InputError(name, "must be a pair, lowest and highest", repr(values)) from None
-    if finite(f"lowest {name}", low) > finite(f"highest {name}", high):
-        raise InputError(name, "must range from low to high", f"{low:g} to {high:g}")
-    return float(low), float(high)
 
 
 @dataclass(frozen=True)

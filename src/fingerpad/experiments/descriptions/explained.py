@@ -85,14 +85,12 @@ def _parts_of(
     return list(found)
 
 
-def _serves_errors(item: Any) -> bool:
-    return isinstance(item, dict) and str(item.get("$ref")).startswith(f"#/$defs/{UNKNOWN_MODEL}")
-
-
 def _tidied(schema: Any) -> Any:
     """Return a schema without titles, null as a value to write, and the form that only serves errors."""
     if isinstance(schema, list):
-        return [_tidied(item) for item in schema if not _serves_errors(item)]
+        unknown = f"#/$defs/{UNKNOWN_MODEL}"
+        said = [item for item in schema if not (isinstance(item, dict) and unknown in item.get("$ref", ""))]
+        return [_tidied(item) for item in said]
     if not isinstance(schema, dict):
         return schema
     kept = {

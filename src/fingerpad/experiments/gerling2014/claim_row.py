@@ -127,12 +127,9 @@ class Statement:
 def paired(paper: Sequence[ClaimRow], human: Sequence[ClaimRow]) -> tuple[Statement, ...]:
     """Join the rows of both sets that can fail with at least one of them, in the order of the sections."""
     rows = [{row.quantity: row for row in rows} for rows in (paper, human)]
-    asked = [row.quantity for row in sorted((*paper, *human), key=_place) if row.group is Group.STATEMENT]
+    ranked = sorted((*paper, *human), key=lambda row: [int(part) for part in row.section.split(".") if part])
+    asked = [row.quantity for row in ranked if row.group is Group.STATEMENT]
     return tuple(_joined(*(found.get(quantity) for found in rows)) for quantity in dict.fromkeys(asked))
-
-
-def _place(row: ClaimRow) -> list[int]:
-    return [int(part) for part in row.section.split(".") if part]
 
 
 def _joined(paper: ClaimRow | None, human: ClaimRow | None) -> Statement:

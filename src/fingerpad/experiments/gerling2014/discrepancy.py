@@ -130,7 +130,9 @@ def discrepancy_analysis(
     codes: dict[str, Callable[..., FloatArray]] = {
         name: partial(expected_of_measure, both, standard_normals=draws) for name, both in measures.items()
     }
-    codes["euclidean"] = partial(_expected_euclidean, measures["static"])
+    codes["euclidean"] = lambda noise_sigma: np.array(
+        [expected_euclidean_hit_rates(one.responses, noise_sigma) for one in measures["static"]]
+    )
     misfit = {
         name: np.array([goodwin_misfit(rates(noise_sigma=sigma)[:, columns]) for sigma in CURVE_NOISE])
         for name, rates in codes.items()
@@ -154,10 +156,6 @@ def discrepancy_analysis(
         misfit_curve=MisfitCurve(noise_sigma=np.array(CURVE_NOISE), misfit=misfit),
         euclidean=euclidean,
     )
-
-
-def _expected_euclidean(static: Sequence[Measured], noise_sigma: float) -> FloatArray:
-    return np.array([expected_euclidean_hit_rates(one.responses, noise_sigma) for one in static])
 
 
 def rise_needed(measured: Measured, noise_sigma: float, standard_normals: FloatArray) -> float:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import lru_cache
 from pathlib import Path
@@ -79,7 +79,8 @@ def settle(case: Case, threads: int | None = None) -> Settled:
             failures[setting] = str(error)
     names = dict.fromkeys((*TRACES, *sweep.description.fields))
     kept = {name: skin.fields[name] for name in names}
-    kept |= {PLACES_MM[place][0]: PLACES_MM[place][1](skin.mesh) for place in _places(names)}
+    places = dict.fromkeys(FIELDS[name].place for name in names)
+    kept |= {PLACES_MM[place][0]: PLACES_MM[place][1](skin.mesh) for place in places if place in PLACES_MM}
     return Settled(case.press, pressed, seconds, kept, responses, failures)
 
 
@@ -91,10 +92,6 @@ def skin_of(described: DescribedTouch, store: Store, threads: int | None) -> tup
     store.save(described.touch, skin)
     # What was stored is in single precision: a sweep that goes on has the same bits as one that did not stop.
     return store.load(described.touch), True
-
-
-def _places(names: Iterable[str]) -> list[Place]:
-    return [place for place in dict.fromkeys(FIELDS[name].place for name in names) if place in PLACES_MM]
 
 
 @lru_cache(maxsize=2)
