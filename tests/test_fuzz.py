@@ -31,6 +31,7 @@ from fingerpad.experiments.discrimination.task_stimuli import example_tasks
 from fingerpad.experiments.runner import Runner
 from fingerpad.experiments.stimuli import ShiftedBar
 from fingerpad.experiments.sweep.description import read_sweep
+from fingerpad.experiments.validation.observations import read_observations
 from fingerpad.mechanics.newton import NewtonSettings
 from fingerpad.neuron.band_pass import BandPass
 from fingerpad.neuron.lif import LeakyIntegrateAndFire
@@ -207,6 +208,7 @@ FILES = {
         b"shift_mm,spike_times_ms,duration_ms\n-1.5,1 2 30,900\n0,,800\n",
         lambda path: fp.read_recordings(path, ShiftedBar()),
     ),
+    "force.csv": (b"indenter,depth_mm,force_n\nplate,1,0.2\npunch:6.35,1,0.1\n", read_observations),
     "motion.csv": (b"time_ms,depth_mm,x_mm\n0,0,0\n50,1,0\n60,1,0.2\n", fp.read_trajectory),
     "fit.json": (FIT, fitted_afferent),
     "body.stl": (STL, fp.read_surface),
