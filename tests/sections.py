@@ -1,6 +1,7 @@
 """Inputs of several test files: sections of results as JSON holds them, and skins given by a formula."""
 
 import json
+from copy import deepcopy
 from dataclasses import replace
 from typing import TypeVar
 
@@ -81,6 +82,71 @@ RESTLESS = replace(SENSITIVE, intercept_ma=8e-7)
 def typed(cls: type[Kind], section: dict) -> Kind:
     """The section as its class."""
     return from_json(cls, json.dumps(section).encode())
+
+
+SHIFT_MM = np.linspace(-3.5, 3.5, 36)
+PARAMETERS = {
+    "intercept_ma": 4.1e-7, "dynamic_gain": 2.2e-4, "static_gain": 8.3e-7, "time_constant_ms": 71.0,
+    "capacitance_mf": 1e-6, "threshold_mv": 50.0,
+}  # fmt: skip
+
+
+def skin_deflection_section() -> dict:
+    """Deflection of the three trials, of which Trial 3 is closest to the observed one, as in the paper."""
+    distance = np.arange(-10.0, 10.1, 0.5)
+
+    def profile(scale: float, **more: float) -> dict:
+        deflection = scale * np.exp(-np.abs(distance))
+        more |= {"peak_force_mn": 250.0, "penetration_mm": 0.001}
+        return {"distance_mm": distance.tolist(), "deflection_mm": deflection.tolist(), **more}
+
+    section: dict = {
+        trial: {
+            "line": profile(scale, force_mn=90.0),
+            "cylinder": profile(scale, force_mn=210.0, r2=r2, r2_mirrored=0.91),
+        }
+        for trial, scale, r2 in (("trial1", 0.9, 0.93), ("trial2", 1.1, 0.94), ("trial3", 1.0, 0.95))
+    }
+    observed = np.linspace(-9.25, 9.25, 45)
+    section["observed"] = {
+        "distance_mm": observed.tolist(),
+        "deflection_mm": (np.round(20.0 * np.exp(-np.abs(observed))) / 20.0).tolist(),
+        "is_artefact": [True] + [False] * 44,
+    }
+    return section
+
+
+def single_unit_section() -> dict:
+    """A fit of the paper's afferent that reaches what the paper states."""
+    edges = np.exp(-(((np.abs(SHIFT_MM) - 1.6) / 0.5) ** 2))
+    dynamic, static = 130.0 * edges + 70.0 * (np.abs(SHIFT_MM) < 1.5), 55.0 * edges
+    history = [{"iteration": n, "fss": 0.78 + 0.02 * n, "parameters": PARAMETERS} for n in range(4)]
+    scores = {"fss_train": 0.85, "fss_test": 0.84}
+    climbs = [{"start": n, "runs": 400 + n, "history": history, **scores} for n in (1, 2)]
+    folds = [
+        {
+            "fold": fold, "start": 1 + fold % 2, "fss_start": [0.7, 0.78], "parameters": PARAMETERS,
+            "testing_shift_mm": SHIFT_MM[fold - 1 :: 6].tolist(), "climbs": deepcopy(climbs), **scores,
+        }
+        for fold in range(1, 7)
+    ]  # fmt: skip
+
+    def modulated(minimum: float, maximum: float, index: float) -> dict:
+        ours = {"minimum_hz": minimum, "maximum_hz": maximum, "index": index}
+        ours |= {"difference_hz": maximum - minimum}
+        return {"ours": ours, "observed": ours | {"minimum_hz": 70.0, "maximum_hz": 210.0}}
+
+    return {
+        "fss_in_sample": 0.83, "fss_in_sample_dynamic": 0.7, "fss_in_sample_static": 0.9,
+        "fss_out_of_sample": 0.82, "fss_training_mean": 0.85, "method": "response surface",
+        "dynamic_quantity": "stored", "static_quantity": "stored", "parameters": dict(PARAMETERS),
+        "units": dict(zip(PARAMETERS, ("mA", "mA ms/kPa", "mA/kPa", "ms", "mF", "mV"), strict=True)),
+        "shift_mm": SHIFT_MM.tolist(), "dynamic_rate_hz": dynamic.tolist(), "static_rate_hz": static.tolist(),
+        "observed_dynamic_rate_hz": np.round(0.95 * dynamic + 4.0).tolist(),
+        "observed_static_rate_hz": np.round(0.9 * static + 2.0).tolist(),
+        "start_points": [PARAMETERS, PARAMETERS | {"static_gain": 3.0e-7}], "folds": folds,
+        "modulation": {"dynamic": modulated(54.0, 212.0, 0.6), "static": modulated(5.0, 57.0, 0.8)},
+    }  # fmt: skip
 
 
 def discrimination_section() -> dict:

@@ -49,14 +49,15 @@ from fingerpad.report.parts import (
 )
 from fingerpad.report.reproduction import reproduction_page, write_report
 from fingerpad.report.style import BLUE, GREEN, ORANGE, RESOLUTION_DPI, STYLE, new_figure, png
-from sections import CURVATURE_PER_M, discrimination_section, nail_section, typed
-
-SHIFT_MM = np.linspace(-3.5, 3.5, 36)
-PARAMETERS = {
-    "intercept_ma": 4.1e-7, "dynamic_gain": 2.2e-4, "static_gain": 8.3e-7, "time_constant_ms": 71.0,
-    "capacitance_mf": 1e-6, "threshold_mv": 50.0,
-}  # fmt: skip
-
+from sections import (
+    CURVATURE_PER_M,
+    SHIFT_MM,
+    discrimination_section,
+    nail_section,
+    single_unit_section,
+    skin_deflection_section,
+    typed,
+)
 
 QUICK = finger_mesh(Fingertip(), resolution_grading("quick", 17.37))
 
@@ -75,7 +76,7 @@ def synthetic_set(tissues: str = "paper") -> dict:
         "levels": _levels(),
         "skin_force": dict.fromkeys([field.name for field in fields(SkinForce)], 0.5),
         "firing": firing,
-        "single_unit": _single_unit(),
+        "single_unit": single_unit_section(),
         "single_unit_uncertainty": _single_unit_uncertainty(),
         "discrimination": discrimination_section(),
         "curvature_thresholds": _curvature_thresholds(),
@@ -117,7 +118,7 @@ def synthetic_results() -> dict:
     return sets | {
         "summary": {"paper": numbers, "human": numbers, "wall_s": 1.0, "peak_memory_mb": 1.0},
         "statements": [json.loads(to_json(each)) for each in paired(*rows)],
-        "skin_deflection": _skin_deflection(),
+        "skin_deflection": skin_deflection_section(),
         "tissues": [json.loads(to_json(layer)) for layer in tissue_layers()],
         "inputs": [dict(zip(keys, each, strict=True)) for each in inputs],
         "manifest": manifest,
@@ -142,69 +143,6 @@ def _levels() -> dict:
         "times_ms": times.tolist(), "until_ms": 200.0,
         "current_ma": (1e-6 * np.exp(-times / 50.0)).tolist(), "potential_mv": (times % 50.0).tolist(),
         "rheobase_ma": 7e-7, "threshold_mv": 50.0,
-    }  # fmt: skip
-
-
-def _skin_deflection() -> dict:
-    distance = np.arange(-10.0, 10.01, 0.1)
-
-    def profile(width: float, **more: float) -> dict:
-        deflection = np.exp(-((np.abs(distance) / width) ** 1.2))
-        more |= {"peak_force_mn": 250.0, "penetration_mm": 0.001}
-        return {"distance_mm": distance.tolist(), "deflection_mm": deflection.tolist(), **more}
-
-    widths = {"trial1": 2.6, "trial2": 3.8, "trial3": 3.1}
-    section: dict = {
-        trial: {
-            "line": profile(0.6 * width, force_mn=90.0),
-            "cylinder": profile(width, force_mn=210.0, r2=0.9 + 0.01 * index, r2_mirrored=0.88),
-        }
-        for index, (trial, width) in enumerate(widths.items())
-    }
-    observed = np.linspace(-9.25, 9.25, 45)
-    section["observed"] = {
-        "distance_mm": observed.tolist(),
-        "deflection_mm": (np.round(20.0 * np.exp(-((np.abs(observed) / 3.0) ** 1.2))) / 20.0).tolist(),
-        "is_artefact": [True] + [False] * 44,
-    }
-    return section
-
-
-def _single_unit() -> dict:
-    edges = np.exp(-(((np.abs(SHIFT_MM) - 1.6) / 0.5) ** 2))
-    dynamic, static = 130.0 * edges + 70.0 * (np.abs(SHIFT_MM) < 1.5), 55.0 * edges
-    observed = {"maximum_hz": 210.0, "minimum_hz": 70.0, "difference_hz": 140.0, "index": 0.5}
-    ours = {"maximum_hz": 205.0, "minimum_hz": 64.0, "difference_hz": 141.0, "index": 0.52}
-    history = [
-        {"iteration": n, "fss": 0.7 + 0.03 * n, "parameters": PARAMETERS | {"time_constant_ms": 68.0 + n}}
-        for n in range(5)
-    ]
-    climb = {"fss_test": 0.80, "history": history}
-    climbs = [climb | {"start": n, "fss_train": 0.81 + 0.01 * n, "runs": 400 + n} for n in (1, 2)]
-    folds = [
-        {
-            "fold": fold, "start": 1 + fold % 2, "fss_start": [0.7, 0.7],
-            "testing_shift_mm": SHIFT_MM[fold - 1 :: 6].tolist(),
-            "fss_train": 0.85, "fss_test": 0.80 + 0.01 * fold, "parameters": PARAMETERS,
-            "climbs": [dict(each) for each in climbs],
-        }
-        for fold in range(1, 7)
-    ]  # fmt: skip
-    starts = PARAMETERS | {"intercept_ma": 0.0}
-    return {
-        "fss_in_sample": 0.86, "fss_in_sample_dynamic": 0.7, "fss_in_sample_static": 0.92,
-        "fss_out_of_sample": 0.84, "fss_training_mean": 0.85, "method": "response surface",
-        "dynamic_quantity": "stored", "static_quantity": "stored", "parameters": dict(PARAMETERS),
-        "units": dict(zip(PARAMETERS, ("mA", "mA ms/kPa", "mA/kPa", "ms", "mF", "mV"), strict=True)),
-        "shift_mm": SHIFT_MM.tolist(), "dynamic_rate_hz": dynamic.tolist(), "static_rate_hz": static.tolist(),
-        "observed_dynamic_rate_hz": np.round(0.95 * dynamic + 4.0).tolist(),
-        "observed_static_rate_hz": np.round(0.9 * static + 2.0).tolist(),
-        "start_points": [
-            starts | {"dynamic_gain": 2.0e-4, "static_gain": 7.0e-7},
-            starts | {"dynamic_gain": 2.05e-4, "static_gain": 3.0e-7},
-        ],
-        "folds": folds,
-        "modulation": {phase: {"observed": observed, "ours": ours} for phase in ("dynamic", "static")},
     }  # fmt: skip
 
 
@@ -477,7 +415,7 @@ def test_the_first_screen_has_verdicts_and_the_contents_stand_beside_the_page(re
     assert (first.count("<table"), first.count("<img"), first.count("<figcaption>")) == (1, 3, 3)
     skin, afferent, percept = (drawing.caption for drawing in page.opening)
     assert skin == "Skin: Trial 3 is closest to the observed deflection, as in the paper."
-    assert afferent == "Afferent: FSS out of sample `paper` 0.84 and `human` 0.84; the paper 0.81."
+    assert afferent == "Afferent: FSS out of sample `paper` 0.82 and `human` 0.82; the paper 0.81."
     assert "`paper` 0.12 and `human` 0.12; the paper 0.055" in percept
     results = synthetic_results()
     results["skin_deflection"]["trial1"]["cylinder"]["r2"] = 0.99
@@ -515,11 +453,11 @@ def test_steps_and_searches_of_the_fit_have_a_table_each():
         next(table for table in made if table.title.startswith(each)) for each in ("Steps", "Searches")
     )
     assert "fold 3, start 2" in steps.title
-    assert [row.kind for row in steps.rows] == ["", "", "", "", "final"]
-    assert steps.rows[-1].cells[:2] == ("4", "0.820")
+    assert [row.kind for row in steps.rows] == ["", "", "", "final"]
+    assert steps.rows[-1].cells[:2] == ("3", "0.840")
     pairs = [f"{fold}, {start}" for fold in range(1, 7) for start in (1, 2)]
     assert [row.cells[0] for row in searches.rows] == pairs
-    assert searches.rows[5].cells == ("3, 2", "0.700", "0.830", "0.800", "4", "402")
+    assert searches.rows[5].cells == ("3, 2", "0.780", "0.850", "0.840", "3", "402")
     assert [row.kind for row in searches.rows[:4]] == ["", "final", "final", ""]
 
 
@@ -550,13 +488,13 @@ def lines(axes):
 
 
 def test_figure_4_draws_the_profiles_given_and_sets_the_artefact_apart():
-    section = _skin_deflection()
+    section = skin_deflection_section()
     given = typed(ReproductionResult, synthetic_results()).skin_deflection
     line, cylinder = skin_deflection.draw_skin_deflection(given).axes
     for trial, name in (("trial1", "Trial 1"), ("trial2", "Trial 2"), ("trial3", "Trial 3")):
         np.testing.assert_array_equal(lines(line)[name].get_ydata(), section[trial]["line"]["deflection_mm"])
     drawn = lines(cylinder)
-    assert "Trial 3, R² = 0.92" in drawn
+    assert "Trial 3, R² = 0.95" in drawn
     assert drawn["observed"].get_xdata().size == 44
     # The artefact lies on the proximal side by the results; figures have the distal side on the right.
     assert drawn["observed, artefact (left out)"].get_xdata().tolist() == [9.25]
@@ -566,7 +504,7 @@ def test_figure_4_draws_the_profiles_given_and_sets_the_artefact_apart():
 
 
 def test_figure_5_draws_the_fitted_line_over_observed_points_and_the_papers_levels():
-    section = _single_unit()
+    section = single_unit_section()
     given = typed(SetResult, synthetic_set()).single_unit
     for axes, phase in zip(single_unit.draw_single_unit(given).axes, ("dynamic", "static"), strict=True):
         drawn = lines(axes)

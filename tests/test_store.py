@@ -25,6 +25,7 @@ from fingerpad.skin import code_hash
 from fingerpad.skin.code_hash import MECHANICAL_SOURCES
 from fingerpad.skin.fields import FIELDS, Field, Place, Times
 from fingerpad.skin.store import _checksum, touch_key
+from refusals import misused
 
 COARSE = fp.Grading(
     17.37, 1.2, 1.2, 0.8, 0.8, largest_mm=6.0, stratum_corneum=1, living_epidermis=1, dermis=1, subcutis=1
@@ -205,19 +206,16 @@ def test_what_comes_back_is_what_went_in_rounded_to_single_precision(stored, ski
     np.testing.assert_array_equal(back.direction, skin.direction)
     assert back.mesh is TINY.mesh
     assert (skin.sed_kpa != back.sed_kpa).any()  # or rounding would not have been tested
+    content = stored.path(TINY).read_bytes()
+    stored.save(TINY, back)
+    assert stored.path(TINY).read_bytes() == content
 
 
 def test_arrays_that_are_not_known_are_left_aside_and_a_missing_one_is_named(tmp_path):
     """The direction of pressing stood in files once; the area of contact did not."""
     store, mesh, rng = fp.Store(tmp_path), TINY.mesh, np.random.default_rng(3)
-    sizes = {
-        "t": 4,
-        "s": mesh.skin_nodes.size,
-        "n": len(mesh.nodes_mm),
-        "e": len(mesh.elements),
-        "r": mesh.living_epidermis.size,
-        "3": 3,
-    }
+    sizes = {"t": 4, "s": mesh.skin_nodes.size, "n": len(mesh.nodes_mm), "e": len(mesh.elements)}
+    sizes |= {"r": mesh.living_epidermis.size, "3": 3}
     content = {
         name: rng.random([sizes[axis] for axis in axes]).astype(np.float32 if name in SINGLE else np.float64)
         for name, axes in {**DOUBLE, **SINGLE}.items()
@@ -286,15 +284,6 @@ def test_fields_that_are_not_declared_or_have_another_shape_are_refused(skin):
         skin.with_fields(depth_mm=np.full(3, np.inf))
 
 
-def test_a_second_round_changes_no_bit(stored):
-    first, content = stored.load(TINY), stored.path(TINY).read_bytes()
-    stored.save(TINY, first)
-    assert stored.path(TINY).read_bytes() == content
-    again = stored.load(TINY)
-    for name, values in first.fields.items():
-        np.testing.assert_array_equal(again.fields[name], values)
-
-
 def test_only_the_touch_itself_is_held(stored):
     assert stored.holds(TINY)
     assert not stored.holds(SIX[0])
@@ -357,23 +346,16 @@ def a_folder(path):
 DAMAGES = {
     "edited": edited,
     "of an older version": unsigned,
-    "empty": lambda path: path.write_bytes(b""),
-    "truncated by a byte": lambda path: path.write_bytes(path.read_bytes()[:-1]),
     "half": lambda path: path.write_bytes(path.read_bytes()[: path.stat().st_size // 2]),
-    "head only": lambda path: path.write_bytes(path.read_bytes()[:20]),
     "one bit": one_bit_in_the_middle,
     "text": lambda path: path.write_text("not a result\n"),
     "pickle": lambda path: path.write_bytes(pickle.dumps({"sed_kpa": [1.0]})),
     "array": an_array_of_its_own,
     "folder": a_folder,
     "array missing": without("sed_kpa"),
-    "solution missing": without("solution"),
     "linear solver missing": without("linear_solver"),
     "solution of other shape": with_array("solution", np.zeros(2)),
-    "strain missing": without("compressive_strain"),
-    "strain of another sheet": with_array("compressive_strain", np.zeros((3, 7))),
     "times of other shape": with_array("times_ms", np.zeros((3, 1))),
-    "one time too few": with_array("times_ms", np.array([0.0, 50.0])),
     "one force too few": with_array("force_mn", np.zeros(2)),
     "other mesh": with_array("sed_kpa", np.zeros((3, 7))),
     "not a number": with_array("force_mn", np.array([0.0, np.nan, 1.0])),
@@ -409,15 +391,12 @@ def test_a_damaged_file_is_set_aside_and_computed_again(stored, caplog, damage):
     assert stored.missing([TINY]) == {}
 
 
-def test_swapped_files_are_noticed(stored, skin):
+def test_a_file_of_another_touch_is_noticed(stored, skin):
     stored.save(SIX[0], skin)
-    one, other = stored.path(TINY), stored.path(SIX[0])
-    content = one.read_bytes()
-    one.write_bytes(other.read_bytes())
-    other.write_bytes(content)
+    stored.path(TINY).write_bytes(stored.path(SIX[0]).read_bytes())
     with pytest.raises(fp.StoreError, match="it is the result of another touch"):
         stored.load(TINY)
-    assert set(stored.missing([TINY, SIX[0]])) == {one, other}
+    assert set(stored.missing([TINY, SIX[0]])) == {stored.path(TINY)}
 
 
 def test_the_command_lists_verifies_and_prunes(stored, skin, run_program, caplog):
@@ -447,10 +426,7 @@ def test_the_command_lists_verifies_and_prunes(stored, skin, run_program, caplog
         (("list", stored.folder / "none"), "must be a folder of stored indentations"),
         (("prune", stored.folder, "--days", -1), "must not be negative"),
     ):
-        status, _, errors = call(*words)
-        assert status == 2
-        assert expected in errors
-        assert errors.count("\n") == 1
+        misused(call(*words), expected)
 
 
 def test_any_byte_changed_is_noticed_or_harmless(stored):

@@ -1,7 +1,7 @@
 """The levels of the reproduction: indentations as in the paper, and statements about their results."""
 
-from copy import deepcopy
 from dataclasses import asdict, replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -36,6 +36,7 @@ from fingerpad.mechanics.tissues import named_tissues
 from fingerpad.neuron.afferent import Afferent
 from fingerpad.skin.indentation import Touch
 from fingerpad.skin.sampling import SurfaceProfile
+from refusals import refusals
 from sections import (
     RESTLESS,
     SED_DRIVEN,
@@ -44,6 +45,8 @@ from sections import (
     SphereSkin,
     discrimination_section,
     nail_section,
+    single_unit_section,
+    skin_deflection_section,
     typed,
 )
 
@@ -134,43 +137,17 @@ def test_tissues_of_the_conditions_reach_the_later_studies_but_not_the_trials(na
     )
 
 
-@pytest.mark.parametrize(
-    ("wrong", "said"),
-    [
-        (lambda: Conditions("fine"), "resolution must be one of quick, standard, paper: got 'fine'"),
-        (lambda: Conditions(tissues="humann"), "tissues must be one of human, paper, .*got 'humann'"),
-        (lambda: Conditions(seed=-1), "seed must be a whole number of at least 0: got -1"),
-        (lambda: Conditions(seed=0.5), "seed must be a whole number: got 0.5"),
-        (lambda: Reproduction("here", jobs=0), "jobs must be a whole number of at least 1"),
-        (lambda: Reproduction("here", jobs=True), "jobs must be a whole number of at least 1"),
-    ],
+test_unusable_conditions_are_refused = refusals(
+    (lambda: Conditions("fine"), "resolution must be one of quick, standard, paper: got 'fine'"),
+    (lambda: Conditions(tissues="humann"), "tissues must be one of human, paper, .*got 'humann'"),
+    (lambda: Conditions(seed=-1), ("seed",)),
+    (lambda: Conditions(seed=0.5), ("seed",)),
+    (lambda: Reproduction(Path("here"), jobs=0), ("jobs",)),
+    (lambda: Reproduction(Path("here"), jobs=True), ("jobs",)),
 )
-def test_unusable_conditions_are_refused(wrong, said):
-    with pytest.raises(InputError, match=said):
-        wrong()
 
 
 # Level 1
-
-
-def test_r2_has_its_closed_forms():
-    observed = np.array([0.1, 0.5, 0.9, 0.4, 0.2])
-    scatter = np.square(observed - observed.mean()).sum()
-    r2 = skin_deflection.coefficient_of_determination
-    assert r2(observed, observed) == 1.0
-    assert r2(observed, np.full(5, observed.mean())) == pytest.approx(0.0, abs=1e-14)
-    assert r2(observed, observed + 0.1) == pytest.approx(1.0 - 5 * 0.1**2 / scatter, rel=1e-12)
-    assert r2(observed, 2 * observed.mean() - observed) == pytest.approx(-3.0, rel=1e-12)
-    assert r2(10 * observed + 3, 10 * (observed + 0.1) + 3) == pytest.approx(r2(observed, observed + 0.1))
-
-
-def test_r2_of_a_regression_is_the_squared_correlation():
-    generator = np.random.default_rng(3)
-    x = generator.normal(size=40)
-    y = 0.7 * x + generator.normal(size=40)
-    regressed = np.polyval(np.polyfit(x, y, 1), x)
-    expected = np.corrcoef(x, y)[0, 1] ** 2
-    assert skin_deflection.coefficient_of_determination(y, regressed) == pytest.approx(expected, rel=1e-12)
 
 
 def observed_profile(direction, at_artefact_mm=None):
@@ -183,19 +160,11 @@ def observed_profile(direction, at_artefact_mm=None):
     return SurfaceProfile((direction * observed.distance_mm)[order], deflection[order])
 
 
-@pytest.mark.parametrize(("direction", "proximal_positive"), [(-1.0, True), (1.0, False)])
-def test_deflection_r2_reads_the_observations_in_the_direction_asked_for(direction, proximal_positive):
-    profile = observed_profile(direction)
-    assert skin_deflection.deflection_r2(profile, proximal_positive) == 1.0
-    assert skin_deflection.deflection_r2(profile, not proximal_positive) < 0.999
-
-
-def test_deflection_r2_takes_proximal_as_positive_by_default():
-    assert skin_deflection.deflection_r2(observed_profile(-1.0)) == 1.0
-
-
-def test_deflection_r2_leaves_the_artefact_out():
-    assert skin_deflection.deflection_r2(observed_profile(-1.0, at_artefact_mm=50.0)) == 1.0
+def test_deflection_r2_reads_proximal_as_positive_unless_asked_otherwise_and_leaves_the_artefact_out():
+    mirrored, straight = observed_profile(-1.0, at_artefact_mm=50.0), observed_profile(1.0)
+    assert skin_deflection.deflection_r2(mirrored) == 1.0
+    assert skin_deflection.deflection_r2(straight) < 0.999
+    assert skin_deflection.deflection_r2(straight, proximal_positive=False) == 1.0
 
 
 @pytest.fixture(scope="module")
@@ -376,12 +345,6 @@ def test_every_strategy_measure_and_variant_has_six_hit_rates_at_both_positions(
     assert list(discrimination.curvature_per_m) == CURVATURES
     for sums in discrimination.gradient_sums.values():
         assert np.shape(sums) == (2, 7)
-
-
-def test_more_noise_lowers_the_hit_rates(discrimination):
-    variants = discrimination.variants
-    rates = [np.mean(variants[f"sigma_{sigma}"].hit_rate) for sigma in ("0.025", "0.055", "0.085")]
-    assert rates[0] > rates[1] > rates[2]
 
 
 def test_a_seed_gives_the_same_bits_and_another_seed_gives_others(discrimination):
@@ -612,50 +575,10 @@ def test_charges_of_both_terms_and_the_shortest_interval_are_those_of_closed_for
 def good_results():
     """Numbers that meet everything the comparison asks for."""
 
-    def profile(scale):
-        x = np.arange(-6.0, 6.5, 0.5)
-        deflection = scale * np.exp(-np.abs(x))
-        forces = dict.fromkeys(("force_mn", "peak_force_mn", "penetration_mm"), 1.0)
-        return {"distance_mm": x.tolist(), "deflection_mm": deflection.tolist(), **forces}
-
-    trials = {
-        f"trial{number}": {
-            "line": profile(scale),
-            "cylinder": profile(scale) | {"r2": 0.95, "r2_mirrored": 0.91},
-        }
-        for number, scale in ((1, 0.9), (2, 1.1), (3, 1.0))
-    }
-    observed = {"distance_mm": [0.0], "deflection_mm": [1.0], "is_artefact": [False]}
-    dynamic = {"minimum_hz": 54.0, "maximum_hz": 212.0, "difference_hz": 158.0, "index": 0.6}
-    static = {"minimum_hz": 5.0, "maximum_hz": 57.0, "difference_hz": 52.0, "index": 0.8}
-    scores = {"fss_train": 0.85, "fss_test": 0.84}
-    history = [{"iteration": step, "fss": fss, "parameters": {}} for step, fss in enumerate((0.78, 0.85))]
-    climbs = [{"start": start, "runs": 1, "history": history, **scores} for start in (1, 2)]
-    fold = {"start": 1, "testing_shift_mm": [], "fss_start": [0.7, 0.78], "parameters": {}, "climbs": climbs}
-    rates = ("dynamic_rate_hz", "static_rate_hz", "observed_dynamic_rate_hz", "observed_static_rate_hz")
     return {
-        "skin_deflection": {**trials, "observed": observed},
+        "skin_deflection": skin_deflection_section(),
         "skin_force": {"deflection_r2": 0.97, "plate_1mm_n": 0.2, "plate_2mm_n": 0.7, "disc_1mm_n": 0.1},
-        "single_unit": {
-            "fss_out_of_sample": 0.82,
-            "fss_in_sample": 0.83,
-            "fss_in_sample_dynamic": 0.7,
-            "fss_in_sample_static": 0.9,
-            "fss_training_mean": 0.85,
-            "method": "response surface",
-            "dynamic_quantity": "stored",
-            "static_quantity": "stored",
-            "parameters": {},
-            "units": {},
-            "shift_mm": [-0.1, 0.1],
-            **{name: [50.0, 60.0] if "static" in name else [90.0, 200.0] for name in rates},
-            "start_points": [],
-            "folds": [{"fold": number, **deepcopy(fold), **scores} for number in range(1, 7)],
-            "modulation": {
-                "dynamic": {"ours": dynamic, "observed": dynamic},
-                "static": {"ours": static, "observed": static},
-            },
-        },
+        "single_unit": single_unit_section(),
         "firing": {
             "peak_ms": [None, 35.0, 40.0, 20.0],
             "window_ms": [30.0, 50.0],
@@ -765,7 +688,7 @@ READINGS = ("discrimination", "reasons", "readings")
         (worse("firing", "peak_ms", [40.0, 51.0, 40.0, 60.0]), {WINDOW}),
         (worse("firing", "static_rate_by_depth_hz", [20.0, 20.0]), {DEPTH}),
         (worse("single_unit", "modulation", "static", "ours", "difference_hz", 159.0), {EDGE, STATIC}),
-        (worse("single_unit", "dynamic_rate_hz", [50.0, 60.0]), {MOVEMENT}),
+        (worse("single_unit", "dynamic_rate_hz", single_unit_section()["static_rate_hz"]), {MOVEMENT}),
         (worse("nail", "ratio_range", [0.99, 3.0]), {NAIL}),
         (worse(*STATISTICS, "shift", "euclidean", "value", 0.04), {ROBUST_EUCLIDEAN}),
         (worse("discrimination", "noise_sigma", 0.0661), {NOISE}),
@@ -792,8 +715,8 @@ READINGS = ("discrimination", "reasons", "readings")
         (worse(*STATISTICS, "unsteadiness", "ratio", "value", 0.5), {STABLE}),
         (worse(*STATISTICS, "misfit", "euclidean", "value", 0.0521), {EUCLIDEAN}),
         (worse(*STATISTICS, "misfit", "dynamic", "value", 0.01), {EUCLIDEAN}),
-        (worse("skin_deflection", "trial1", "line", "deflection_mm", [2.0] * 25), {ORDER}),
-        (worse("skin_deflection", "trial2", "line", "deflection_mm", [-1.0] * 25), {ORDER}),
+        (worse("skin_deflection", "trial1", "line", "deflection_mm", [2.0] * 41), {ORDER}),
+        (worse("skin_deflection", "trial2", "line", "deflection_mm", [-1.0] * 41), {ORDER}),
     ],
 )
 def test_a_number_made_worse_is_marked_as_a_miss_and_no_other(change, missed):
@@ -829,13 +752,6 @@ def test_deflection_far_from_the_indenter_does_not_decide_between_trials():
     far = np.abs(line["distance_mm"]) > 5.0
     line["deflection_mm"] = np.where(far, 100.0, line["deflection_mm"]).tolist()
     assert rows(results)[ORDER].verdict is Verdict.MET
-
-
-def test_the_order_of_the_trials_holds_as_the_figure_is_drawn():
-    results = good_results()
-    trials = results["skin_deflection"]
-    trials["trial1"], trials["trial2"] = trials["trial2"], trials["trial1"]
-    assert rows(results)[ORDER].verdict is Verdict.MISSED
 
 
 @pytest.mark.parametrize(

@@ -10,7 +10,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 import typer
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 import fingerpad as fp
@@ -104,7 +104,6 @@ UNFIT = [
     (FORCE + "plate,nan,1\n", "mine.csv, line 2: depth_mm must be a finite number [mm]"),
     (FORCE + "plate,1,\n", "mine.csv, line 2: force_n must be given"),
     (FORCE + "punch:x,1,1\n", "mine.csv, line 2: diameter_mm must be a finite number"),
-    (RATE + "0.2,-30,1\n", "mine.csv, line 2: curvature_per_m must not be negative [1/m], because"),
     (RATE + "0.2,30,-1\n", "mine.csv, line 2: rate_hz must not be negative [spikes/s]"),
     (FORCE + "plate,1,1\n" * 1_000_000, "mine.csv must be at most 1 MB: it has 10.0 MB; split it"),
 ]
@@ -120,30 +119,6 @@ def test_unfit_files_are_one_sentence_with_file_and_line(tmp_path, monkeypatch, 
     assert "\n" not in str(refused.value)
 
 
-ENTRY = st.one_of(
-    st.sampled_from(["plate", "punch:6.35", "sphere:1e3", "1", "-1", "nan", "", " 0 ", '"', "1,2", "#", "é"]),
-    st.text(max_size=6),
-    st.floats().map(str),
-)
-
-
-@settings(max_examples=200, deadline=None)
-@given(
-    st.sampled_from([",".join(kind.columns) for kind in KINDS.values()]),
-    st.lists(st.lists(ENTRY, min_size=2, max_size=5).map(",".join), max_size=3),
-)
-def test_any_text_is_read_or_refused_in_a_sentence(tmp_path_factory, header, rows):
-    path = tmp_path_factory.getbasetemp() / "any.csv"
-    path.write_bytes("\n".join([header, *rows]).encode("utf-8", "surrogatepass"))
-    try:
-        found = read_observations(path)
-    except fp.InputError as error:
-        assert "any.csv" in str(error)  # noqa: PT017
-    else:
-        assert len(found.rows) <= len(rows)
-        assert np.isfinite(found.observed).all()
-
-
 def test_scores_have_their_definitions():
     observed, predicted = np.array([1.0, 2.0, 4.0]), np.array([1.0, 1.0, 3.0])
     # mean 7/3, scatter 42/9; residuals 0, 1, 1; sum o p = 15, sum p p = 11
@@ -152,19 +127,21 @@ def test_scores_have_their_definitions():
     assert scores.correlation(observed, predicted) == pytest.approx(np.corrcoef(observed, predicted)[0, 1])
 
 
-@pytest.mark.parametrize(
-    ("observed", "predicted", "undefined"),
-    [
-        ([], [], ["coefficient_of_determination", "gain_through_origin", "correlation"]),
-        ([1.0], [2.0], ["coefficient_of_determination", "correlation"]),
-        ([0.1, 0.1, 0.1], [0.1, 0.2, 0.3], ["coefficient_of_determination", "correlation"]),
-        ([1.0, 2.0], [0.3, 0.3], ["correlation"]),
-        ([1.0, 2.0], [0.0, 0.0], ["correlation", "gain_through_origin"]),
-    ],
-)
-def test_scores_that_do_not_exist_are_nan(observed, predicted, undefined):
-    for name in ("coefficient_of_determination", "gain_through_origin", "correlation"):
-        assert np.isnan(getattr(scores, name)(observed, predicted)) == (name in undefined), name
+def test_scores_that_do_not_exist_are_nan():
+    r2, gain, correlation = (
+        scores.coefficient_of_determination,
+        scores.gain_through_origin,
+        scores.correlation,
+    )
+    for observed, predicted, undefined in (
+        ([], [], [r2, gain, correlation]),
+        ([1.0], [2.0], [r2, correlation]),
+        ([0.1, 0.1, 0.1], [0.1, 0.2, 0.3], [r2, correlation]),
+        ([1.0, 2.0], [0.3, 0.3], [correlation]),
+        ([1.0, 2.0], [0.0, 0.0], [correlation, gain]),
+    ):
+        for score in (r2, gain, correlation):
+            assert np.isnan(score(observed, predicted)) == (score in undefined), score
 
 
 @given(st.lists(st.tuples(st.integers(0, 3), st.floats(-1e3, 1e3)), min_size=1, max_size=12))
@@ -436,10 +413,6 @@ def test_misuse_is_one_sentence_and_status_2_and_nothing_is_written(call, tmp_pa
     assert [path.name for path in tmp_path.iterdir()] == ["mine.csv"]
 
 
-def command():
-    return typer.main.get_command(cli.app).commands["validate"]
-
-
 @pytest.mark.parametrize(
     "tissues",
     ["human", "paper", "trial3", "wu2007", fp.named_tissues("human")],
@@ -453,7 +426,8 @@ def test_the_afferent_is_that_of_the_tissues_unless_one_is_given(tissues):
 
 def test_the_page_of_the_format_names_every_option_and_kind_and_shows_commands_that_parse():
     assert (tuple(KINDS), LOADINGS) == (choices.KIND_CHOICES, choices.LOADING_CHOICES)
-    defaults = {option.name: option.default for option in command().params}
+    command = typer.main.get_command(cli.app).commands["validate"]
+    defaults = {option.name: option.default for option in command.params}
     assert defaults["loading"] == FingertipModel(Conditions()).loading
     assert defaults["static_window"] == protocol.STATIC_WINDOW.value
     page = (ROOT / "docs" / "validate.md").read_text(encoding="utf-8")

@@ -1,13 +1,11 @@
 """Posterior over tissues: the emulator against known functions, the sampler against closed forms, one run."""
 
-import re
 from dataclasses import replace
 
 import emcee
 import numpy as np
 import pytest
 
-from fingerpad.core.errors import InputError
 from fingerpad.core.result_files import from_json, to_json
 from fingerpad.core.signals import Traces
 from fingerpad.experiments.conditions import Conditions
@@ -20,15 +18,7 @@ from fingerpad.neuron.afferent import Afferent
 from fingerpad.neuron.transduction import drive
 from presses import Coarse
 from studies import finger_posterior, tissue_posterior
-from studies.finger_levels import (
-    RAMP_MS,
-    SITES,
-    Afferents,
-    bar_rates,
-    deflection_distances_mm,
-    euclidean_hit_rates,
-    gradient_hit_rates,
-)
+from studies.finger_levels import RAMP_MS, SITES, Afferents, bar_rates, deflection_distances_mm
 from studies.finger_posterior import (
     LOGARITHMIC,
     PARAMETERS,
@@ -103,19 +93,6 @@ def test_points_left_out_are_predicted_by_an_emulator_that_has_not_seen_them():
     assert own == pytest.approx(points[5:6, :1], abs=0.2)
 
 
-@pytest.mark.parametrize(
-    ("call", "said"),
-    [
-        (lambda: Emulator.fit(design(3), {}), "points needs at least 4 rows: got 3"),
-        (lambda: Emulator.fit(design(4), {"y": np.zeros((3, 1))}), "y needs one row per point: got 3 for 4"),
-        (lambda: GaussianProcess(design(4), np.zeros(3), np.zeros(8)), "one entry per point: got 3 for 4"),
-    ],
-)
-def test_unfit_designs_are_refused(call, said):
-    with pytest.raises(InputError, match=re.escape(said)):
-        call()
-
-
 # Calibration
 
 
@@ -140,13 +117,6 @@ def test_a_correct_posterior_is_calibrated():
 @pytest.mark.parametrize("width", [0.4, 2.5])
 def test_a_wrong_width_is_detected(width):
     assert gaussian_experiments(100, width).wrong() == ("mean",)
-
-
-def test_a_calibration_needs_replicates_and_one_number_per_name():
-    with pytest.raises(InputError, match="at least one experiment"):
-        calibrate(("a",), [])
-    with pytest.raises(InputError, match=re.escape("1 true parameters and draws of them: got (2,)")):
-        calibrate(("a",), [(np.zeros(2), np.zeros((5, 2)))])
 
 
 # Sampler
@@ -261,12 +231,10 @@ def test_the_prior_has_the_medians_and_bounds_that_it_is_given():
     assert values[:, RESTING].max() <= 0.95
     assert np.median(shares_of(values[:, : len(RANGES)])) == pytest.approx(0.5, abs=0.02)
     assert np.isfinite(PRIOR.log_density(values)).all()
-    beyond = truth()
-    beyond[0, RESTING] = 0.96
-    assert PRIOR.log_density(beyond)[0] == -np.inf
-    beyond = truth()
-    beyond[0, 3] = 0.49
-    assert PRIOR.log_density(beyond)[0] == -np.inf
+    resting, poisson = truth(), truth()
+    resting[0, RESTING], poisson[0, 3] = 0.96, 0.49
+    for beyond in (resting, poisson):
+        assert PRIOR.log_density(beyond)[0] == -np.inf
 
 
 def test_the_prior_is_sampled_where_nothing_is_observed(finger):
@@ -328,12 +296,6 @@ def test_rates_of_a_point_are_those_of_the_papers_model():
     assert found[1, 0] == pytest.approx(static, abs=0.1)
 
 
-def test_silent_receptors_make_an_observer_guess():
-    silent = np.zeros((2, 2, 3, 18))
-    for code in (gradient_hit_rates, euclidean_hit_rates):
-        assert (code(silent, np.array([0.05, 0.1])) == 0.5).all()
-
-
 # Results
 
 
@@ -344,13 +306,14 @@ FEW = replace(QUICK, n_steps=24, most_steps=24, largest_r_hat=9.0, smallest_effe
 """Draws for tests of what is made of them, not of their distribution."""
 
 
-@pytest.fixture
-def short_search(monkeypatch):
-    monkeypatch.setattr(finger_posterior, "N_TRIED", 150)
-    monkeypatch.setattr(finger_posterior, "N_BEST", 40)
+def shorten(patch):
+    """Shorten the search for the start of the chains."""
+    patch.setattr(finger_posterior, "N_TRIED", 150)
+    patch.setattr(finger_posterior, "N_BEST", 40)
 
 
-def test_experiments_use_pressed_tissues_and_an_emulator_that_has_not_seen_them(short_search):
+def test_experiments_use_pressed_tissues_and_an_emulator_that_has_not_seen_them(monkeypatch):
+    shorten(monkeypatch)
     outputs = synthetic_outputs(SHARES)
     human = synthetic_outputs(np.full((1, len(RANGES)), 0.5))
     centres = like_human(SHARES, outputs, human, PRIOR, 0.2)
@@ -362,8 +325,6 @@ def test_experiments_use_pressed_tissues_and_an_emulator_that_has_not_seen_them(
         assert shares_of(case.truth[: len(RANGES)]) == pytest.approx(SHARES[number])
         assert case.finger.emulator is tissues.emulators[tissues.unseen[number]]
     assert cases[0].draw().shape[1] == len(PARAMETERS)
-    unseen = tissues.emulators[tissues.unseen[3]].predict(SHARES[3:4])["log_force"]
-    assert tissues.emulated()["log_force"][3] == pytest.approx(unseen[0])
 
 
 # One tiny run
@@ -394,18 +355,11 @@ def synthetic_presses(runner, conditions, candidates):
 @pytest.fixture(scope="module")
 def tiny(tmp_path_factory):
     with pytest.MonkeyPatch.context() as patch:
-        for name, value in (
-            ("N_TISSUES", 8),
-            ("N_FOLDS", 2),
-            ("N_DRAWN", 20),
-            ("N_REPLICATES", 1),
-            ("SAMPLING", FEW),
-            ("REPEATED", FEW),
-            ("pressed", synthetic_presses),
-        ):
+        sizes = {"N_TISSUES": 8, "N_FOLDS": 2, "N_DRAWN": 20, "N_REPLICATES": 1}
+        parts = {"SAMPLING": FEW, "REPEATED": FEW, "pressed": synthetic_presses}
+        for name, value in (sizes | parts).items():
             patch.setattr(tissue_posterior, name, value)
-        patch.setattr(finger_posterior, "N_TRIED", 150)
-        patch.setattr(finger_posterior, "N_BEST", 40)
+        shorten(patch)
         return tissue_posterior.run(Runner(tmp_path_factory.mktemp("posterior")), Conditions("quick", 0))
 
 
