@@ -202,7 +202,6 @@ def sampled(
     >>> [round(time, 3) for time in motion.times_ms]
     [0.0, 80.0, 1000.0]
     """
-    end = end_ms
     given = (("depth_mm", depth_mm), ("force_mn", force_mn), ("x_mm", x_mm), ("z_mm", z_mm),
              ("tilt_deg", tilt_deg), ("spin_deg", spin_deg))  # fmt: skip
     courses = {name: course for name, course in given if course is not None}
@@ -220,7 +219,7 @@ def sampled(
             ]
         )
 
-    scale = _extent(values_at(np.linspace(0.0, end, looks + 1)), tuple(courses))
+    scale = _extent(values_at(np.linspace(0.0, end_ms, looks + 1)), tuple(courses))
 
     def deviation(times: FloatArray, start: float, stop: float) -> FloatArray:
         """Largest deviation of any column from its chord between two times, over its extent."""
@@ -228,16 +227,16 @@ def sampled(
         share = ((times - start) / (stop - start))[:, None]
         return (np.abs(values_at(times) - first - share * (last - first)) / scale).max(axis=1)
 
-    kept, waiting = [0.0, end], [(0.0, end)]
+    kept, waiting = [0.0, end_ms], [(0.0, end_ms)]
     while waiting:
         start, stop = waiting.pop()
-        parts = max(LOOKS_PER_PIECE, int(np.ceil(looks * (stop - start) / end)))
+        parts = max(LOOKS_PER_PIECE, int(np.ceil(looks * (stop - start) / end_ms)))
         times = np.linspace(start, stop, parts + 1)
         found = deviation(times, start, stop)
         worst = int(found.argmax())
         if found[worst] <= tolerance:
             continue
-        if stop - start < SHORTEST_SHARE * end:
+        if stop - start < SHORTEST_SHARE * end_ms:
             raise InputError(f"A motion must not jump: it does at {start:g} ms; give the jump a duration.")
         nearby = float(times[max(worst - 1, 0)]), float(times[min(worst + 1, parts)])
         refined = minimize_scalar(

@@ -38,14 +38,13 @@ def constant_drive_rate(
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Rate under a constant drive, and its derivatives along the drive and the time constant."""
     tau = time_constant_ms
-    rest = refractory_ms
     g = np.asarray(drive_per_ms, dtype=np.float64)
     above, slope = _bent(tau * g - 1.0, bend)
     fires = above > 0.0
     above = np.where(fires, above, 1.0)
     x = above + 1.0
     log = np.log1p(1.0 / above)
-    rate = 1.0 / (rest + tau * log)
+    rate = 1.0 / (refractory_ms + tau * log)
     # dT/dx = -tau / (x (x - 1)), dT/dtau = ln(x / (x - 1)) at given x; x itself moves with g and with tau.
     per_x = rate**2 * tau / (x * above) * slope
     found = rate, per_x * tau, per_x * g - rate**2 * log

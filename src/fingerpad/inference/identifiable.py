@@ -59,10 +59,10 @@ def six_parameters(
 ) -> FloatArray:
     """Return the six parameters with given C and v that are equivalent to four identifiable ones."""
     numbers = _rows("four", four, IDENTIFIABLE_NAMES)
-    capacitance = capacitance_mf
-    threshold = threshold_mv
-    kept = np.broadcast_to([capacitance, threshold], (*numbers.shape[:-1], 2))
-    return np.concatenate([numbers[..., :3] * (capacitance * threshold), numbers[..., 3:], kept], axis=-1)
+    kept = np.broadcast_to([capacitance_mf, threshold_mv], (*numbers.shape[:-1], 2))
+    return np.concatenate(
+        [numbers[..., :3] * (capacitance_mf * threshold_mv), numbers[..., 3:], kept], axis=-1
+    )
 
 
 def silent_at_rest(parameters: ArrayLike) -> FloatArray:

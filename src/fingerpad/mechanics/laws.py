@@ -377,15 +377,14 @@ class Hencky(_OfModuli):
 @checked
 def check_poisson(poisson: Finite) -> float:
     """Return Poisson's ratio as float if it lies between 0 and 0.5, else raise `InputError`."""
-    ratio = poisson
-    if not 0.0 < ratio < 0.5:
+    if not 0.0 < poisson < 0.5:
         raise InputError(
             "poisson",
             "must lie between 0 and 0.5, both excluded",
             repr(poisson),
             "take 0.4999 for a tissue that hardly changes its volume",
         )
-    return ratio
+    return poisson
 
 
 def bulk_modulus(shear_kpa: float, poisson: float) -> float:

@@ -106,9 +106,8 @@ class EndOrgans:
         (2, 5, 2)
         """
         centres = float_array("places_mm", places_mm, 2)
-        radius_mm = reach_mm
         drawn = uniforms(seed, 1, len(centres), Purpose.END_ORGAN, 2 * count)[0]
-        distance, angle = radius_mm * np.sqrt(drawn[:, :count]), 2.0 * np.pi * drawn[:, count:]
+        distance, angle = reach_mm * np.sqrt(drawn[:, :count]), 2.0 * np.pi * drawn[:, count:]
         offsets = np.stack([distance * np.cos(angle), distance * np.sin(angle)], axis=-1)
         ends = centres[:, None] + offsets
         if place is not None:

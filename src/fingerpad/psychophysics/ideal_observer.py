@@ -158,14 +158,13 @@ def multiplied_responses(
     """
     values = float_array("responses", responses, 1)
     sigma = checked_noise(noise_sigma, above_zero=True)
-    floor = smallest_spread
-    if floor == 0.0 and (values == 0.0).any():
+    if smallest_spread == 0.0 and (values == 0.0).any():
         raise InputError(
             f"{np.count_nonzero(values == 0.0)} of {values.size} receptors are silent, so multiplicative "
             "noise has no effect on them: leave out receptors that no stimulus excites, or give "
             "smallest_spread."
         )
-    return GaussianResponses(values, np.diag(np.square(sigma * values) + floor**2))
+    return GaussianResponses(values, np.diag(np.square(sigma * values) + smallest_spread**2))
 
 
 Statistic = Callable[[FloatArray], FloatArray]
@@ -376,8 +375,7 @@ def gaussian_information(
     """
     values, rises = float_array("responses", responses, 1), float_array("slopes", slopes, 1)
     sigma = checked_noise(noise_sigma, above_zero=True)
-    floor = smallest_spread
-    zeros = np.count_nonzero(values == 0.0) if floor == 0.0 else 0
+    zeros = np.count_nonzero(values == 0.0) if smallest_spread == 0.0 else 0
     if values.size != rises.size or zeros:
         raise InputError(
             "responses",
@@ -385,5 +383,5 @@ def gaussian_information(
             f"{rises.size} slopes for {values.size} responses, {zeros} of them zero",
             "leave those out or give smallest_spread",
         )
-    variance = np.square(sigma * values) + floor**2
+    variance = np.square(sigma * values) + smallest_spread**2
     return float((np.square(rises) / variance + 2.0 * np.square(sigma**2 * values * rises / variance)).sum())

@@ -235,14 +235,15 @@ def d_prime_of_proportion(
     >>> round(d_prime_of_proportion(0.75), 4), round(d_prime_of_proportion(0.75, yes_no), 4)
     (0.9539, 1.349)
     """
-    wanted = proportion_correct
     guessing, never_failed = task(0.0), task(LARGEST_D_PRIME)
-    if not guessing - _SMALL <= wanted < never_failed:
+    if not guessing - _SMALL <= proportion_correct < never_failed:
         raise InputError(
-            "proportion_correct", f"must lie between the chance level, {guessing:g}, and 1", f"{wanted:g}"
+            "proportion_correct",
+            f"must lie between the chance level, {guessing:g}, and 1",
+            f"{proportion_correct:g}",
         )
-    if wanted <= guessing:
+    if proportion_correct <= guessing:
         return 0.0
     if task is forced_choice:
-        return float(math.sqrt(2.0) * ndtri(wanted))
-    return float(brentq(lambda d: task(d) - wanted, 0.0, LARGEST_D_PRIME, xtol=1e-12))
+        return float(math.sqrt(2.0) * ndtri(proportion_correct))
+    return float(brentq(lambda d: task(d) - proportion_correct, 0.0, LARGEST_D_PRIME, xtol=1e-12))

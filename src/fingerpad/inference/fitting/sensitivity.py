@@ -163,11 +163,10 @@ def jacobian(
         raise InputError(
             "scales", f"must be greater than 0, one for each of {centre.size} parameters", str(units.tolist())
         )
-    width = step
     columns = [
         (float_array("answer", answer(centre + move), 1) - float_array("answer", answer(centre - move), 1))
-        / (2.0 * width)
-        for move in np.diag(width * units)
+        / (2.0 * step)
+        for move in np.diag(step * units)
     ]
     return np.stack(columns, axis=1)
 
