@@ -323,12 +323,7 @@ def test_a_foam_relaxes_as_a_whole():
 
 @pytest.mark.parametrize(
     ("moduli", "asked", "factor"),
-    [
-        ("long_term", "long_term", 1.0),
-        ("long_term", "instantaneous", 1 / 0.6),
-        ("instantaneous", "long_term", 0.6),
-        ("instantaneous", "instantaneous", 1.0),
-    ],
+    [("long_term", "instantaneous", 1 / 0.6), ("instantaneous", "long_term", 0.6)],
 )
 def test_calculix_takes_the_moduli_that_are_asked_for(moduli, asked, factor):
     material = replace(NEO_HOOKE, prony=PRONY, moduli=moduli)

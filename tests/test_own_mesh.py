@@ -390,7 +390,6 @@ def test_a_deck_of_abaqus_may_use_every_way_to_name_a_set(tmp_path):
         ("a.inp", "*NODE\n1, 0, 0, up\n", "line 2: numbers must stand here: got"),
         ("a.inp", "*NODE\na, 0, 0, 0\n", "line 2: a whole number must stand here: got 'a'"),
         ("a.inp", CUBE + "\n*ELEMENT, TYPE=C3D4\n1, 1, 2, 3, 4\n", "line 10: .* got C3D4: .*lock"),
-
         ("a.inp", CUBE + "\n*ELEMENT, TYPE=C3D8\n1, 1, 2, 3\n", "line 11: an element C3D8 must have"),
         ("a.inp", WHOLE.replace("7, 8", "7, 80"), "element 1 must name nodes that exist: there is no 80"),
         ("a.inp", WHOLE + BRICK, "element 1 must be defined once: it is there 2 times"),
@@ -420,20 +419,6 @@ def test_bad_files_are_refused_with_their_line(tmp_path, name, text, says):
         fp.read_finger(path)
     assert "\n" not in str(refused.value)
     assert name in str(refused.value)
-
-
-@pytest.mark.parametrize("end", ["inp", "msh"])
-def test_files_that_are_cut_short_or_garbled_are_refused_or_read(sent, made, tmp_path, end):
-    text = (sent[0] / "finger.inp" if end == "inp" else made).read_text()
-    generator = np.random.default_rng(3)
-    path = tmp_path / f"finger.{end}"
-    for place in generator.integers(0, len(text), size=12).tolist():
-        for broken in (text[:place], f"{text[:place]}#{text[place + 1 :]}"):
-            path.write_text(broken)
-            try:
-                fp.read_finger(path)
-            except fp.InputError as error:
-                assert f"finger.{end}" in str(error)  # noqa: PT017
 
 
 BALLS = """\

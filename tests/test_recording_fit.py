@@ -11,7 +11,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-import typer
 
 import fingerpad as fp
 from fingerpad import cli
@@ -117,18 +116,12 @@ def test_noisy_rates_leave_a_posterior_that_holds_the_known_afferent():
 def test_a_posterior_is_part_of_the_fit_and_of_its_page(recovered, monkeypatch):
     asked = []
     band = RateBand(low_hz=[1.0] * N, high_hz=[90.0] * N)
+    numbers = {"level": 0.95, "seed": 5, "n_draws": 10, "n_evaluations": 20, "largest_r_hat": 1.0}
     drawn = RatePosterior(
-        level=0.95,
-        seed=5,
-        n_draws=10,
-        n_evaluations=20,
-        largest_r_hat=1.0,
-        smallest_effective_size=9.0,
-        median=dict.fromkeys(IDENTIFIABLE_NAMES, 1.5),
-        interval=dict.fromkeys(IDENTIFIABLE_NAMES, (1.0, 2.0)),
-        covariance=np.eye(4),
-        bands={"static": PhaseBands(predicted=band, new=band)},
-    )
+        smallest_effective_size=9.0, median=dict.fromkeys(IDENTIFIABLE_NAMES, 1.5),
+        interval=dict.fromkeys(IDENTIFIABLE_NAMES, (1.0, 2.0)), covariance=np.eye(4),
+        bands={"static": PhaseBands(predicted=band, new=band)}, **numbers,
+    )  # fmt: skip
     monkeypatch.setattr(recording_posterior, "rate_posterior", lambda *given: asked.append(given) or drawn)
     fitted = study.fit_recordings(
         SED, RATES, np.arange(N) % 2, seed=5, with_posterior=True, positions_mm=range(N)
@@ -279,15 +272,9 @@ def test_the_stimuli_of_the_bar_are_the_touches_of_the_reproduction(tmp_path):
 
 
 def test_stimuli_are_indented_at_their_position_with_their_motion():
+    sphere = fp.Sphere(curvature_per_m=340.0)
     stimuli = [
-        NamedStimulus(
-            fp.Sphere(curvature_per_m=340.0),
-            fp.RampAndHold(0.4),
-            x_mm=1.0,
-            z_mm=0.5,
-            tilt_deg=3.0,
-            name="beside",
-        ),
+        NamedStimulus(sphere, fp.RampAndHold(0.4), x_mm=1.0, z_mm=0.5, tilt_deg=3.0, name="beside"),
         NamedStimulus(fp.Line(), fp.ForceRampAndHold(50.0), name="wire"),
         NamedStimulus(fp.Gap(gap_mm=0.5), x_mm=0.2, friction=0.3, name="gap"),
         NamedStimulus(fp.Bar(), spin_deg=30.0, name="turned"),
@@ -457,18 +444,12 @@ def static_rates(column, rows):
         (["mine.csv"], ROWS, "--stimulus is missing: write --stimulus bar"),
         (["none.csv", "--stimulus", "bar"], ROWS, "none.csv must be a file that can be read"),
         (["mine.csv", "--stimulus", "none.csv"], ROWS, "none.csv must be a file that can be read"),
-        (["mine.csv", "--stimulus", "none.yaml"], ROWS, "none.yaml must be a file that can be read"),
-        (BAR, b"\xff\xfe", "mine.csv must be text in UTF-8"),
-        (BAR, "", "mine.csv must hold a header and at least one row"),
-        (BAR, ROWS + "2,-1,3\n", "mine.csv, line 8: dynamic_rate_hz must not"),
         (BAR, ROWS + "2,1,nan\n", "mine.csv, line 8: static_rate_hz must be a"),
         (BAR, static_rates("shift_mm", (0, 1)), "at least 4 rates"),
         (BAR, ROWS + "90,1,3\n", "Stimulus 90 cannot be used: place must lie"),
         ([*BAR, "--depth", "9"], ROWS, "Stimulus -2 cannot be used: motion.depth_mm"),
         ([*BAR, "--width", "0"], ROWS, "width_mm must lie within"),
-        ([*BAR, "--fillet", "2"], ROWS, "fillet_mm must not exceed half"),
         ([*BAR, "--folds", "7"], ROWS, "n_folds must be at most the number of stimuli"),
-        ([*BAR, "--folds", "1"], ROWS, "n_folds must be a whole number of at least 2"),
         ([*BAR, "--unit", "1"], ROWS, "unit belongs to NWB files"),
         ([*BAR, "--method", "guess"], ROWS, "method must be one of least_squares"),
         ([*BAR, "--method", "likelihood"], ROWS, "likelihood needs spike times"),
@@ -480,13 +461,9 @@ def static_rates(column, rows):
          "recordings must leave at least 5 rates"),
         ([*BAR, "--finger", "chid"], ROWS, "--finger.like must be one of adult"),
         ([*LIST, "--finger", "a.inp"], ROWS, "--finger: a.inp must be a file"),
-        ([*BAR, "--jobs", "0"], ROWS, "jobs must be a whole number of at least 1"),
-        ([*BAR, "--tissues", "wood"], ROWS, "tissues must be one of"),
-        ([*BAR, "--resolution", "high"], ROWS, "resolution must be one of quick"),
         ([*BAR, "--dynamic-quantity", "heat"], ROWS, "dynamic_quantity must be one"),
         ([*BAR, "--static-window", "600", "1100"], ROWS, "not at 1100 ms"),
         ([*BAR, "--static-window", "600", "500"], ROWS, "a later end: got 600, 500"),
-        ([*BAR, "--static-window", "600", "x"], ROWS, "'--static-window'"),
         ([*LIST, "--width", "2"], ROWS, "--width is that of the bar"),
         (LIST, ROWS, "mine.csv, line 1: column 'shift_mm' is unknown"),
         (LIST, static_rates("stimulus", ("edge", "side")),
@@ -502,7 +479,7 @@ def static_rates(column, rows):
 def test_bad_input_is_one_sentence_and_status_2_and_nothing_is_written(
     call, tmp_path, arguments, content, said
 ):
-    (tmp_path / "mine.csv").write_bytes(content if isinstance(content, bytes) else content.encode())
+    (tmp_path / "mine.csv").write_text(content)
     (tmp_path / "list.csv").write_text("name,object\nedge,bar\nwide,bar\n")
     misused(call(*arguments), said)
     assert sorted(path.name for path in tmp_path.iterdir()) == ["list.csv", "mine.csv"]
@@ -522,10 +499,6 @@ def test_the_example_prints_its_command_and_writes_recordings(call, tmp_path):
 def test_options_are_those_of_the_modules():
     assert METHODS == choices.METHOD_CHOICES
     assert set(INDENTERS) == set(choices.INDENTER_CHOICES)
-
-
-def command():
-    return typer.main.get_command(cli.app).commands["fit"]
 
 
 def test_figures_show_what_was_recorded_and_nothing_else(recovered):
@@ -567,10 +540,8 @@ def test_a_fit_from_nothing_recovers_a_known_afferent(call, monkeypatch, tmp_pat
     monkeypatch.undo()
     monkeypatch.chdir(tmp_path)
     stimuli = [ShiftedBar().named(name) for name in listed]
-    store, pressed = (
-        runner.Store(folder / runner.STORE_FOLDER),
-        ShiftedBar().touches(stimuli, Conditions("quick")),
-    )
+    store = runner.Store(folder / runner.STORE_FOLDER)
+    pressed = ShiftedBar().touches(stimuli, Conditions("quick"))
     followed = (known.dynamic_quantity, known.static_quantity)
     stress = [store.load(touch).sed([[RECEPTOR_X_MM, 0.0]], *followed) for touch in pressed.values()]
     rates = zip(listed, *AfferentModel.of_traces(stress).evaluate(known.parameters), strict=True)

@@ -211,15 +211,11 @@ def _population() -> dict:
     static = np.where(away > 4.0, 0.0, 50.0 * np.exp(-((away / 2.0) ** 2)))
     latency = [[None if r > 4.0 else 6.0 + 6.0 * r for r in row] for row in away]
     return {
-        "curvature_per_m": 287.0,
-        "x_mm": x.tolist(),
-        "z_mm": z.tolist(),
-        "dynamic_rate_hz": (4.0 * static).tolist(),
-        "static_rate_hz": static.tolist(),
-        "first_spike_latency_ms": latency,
+        "curvature_per_m": 287.0, "x_mm": x.tolist(), "z_mm": z.tolist(), "static_rate_hz": static.tolist(),
+        "dynamic_rate_hz": (4.0 * static).tolist(), "first_spike_latency_ms": latency,
         "receptors_mm": [[15.0 + i, j - 1.0] for i in range(6) for j in range(3)],
         "at_rest": {"dynamic_rate_hz": 0.0, "static_rate_hz": 4.0, "first_spike_latency_ms": 251.0},
-    }
+    }  # fmt: skip
 
 
 DRAWINGS = reproduction_page(typed(ReproductionResult, synthetic_results())).drawings
@@ -229,9 +225,8 @@ DRAWINGS = reproduction_page(typed(ReproductionResult, synthetic_results())).dra
 def report(tmp_path_factory):
     results, settings = typed(ReproductionResult, synthetic_results()), dict(matplotlib.rcParams)
     path = write_report(results, tmp_path_factory.mktemp("report"))
-    assert to_json(results) == to_json(typed(ReproductionResult, synthetic_results())), (
-        "drawing changed the results"
-    )
+    again = to_json(typed(ReproductionResult, synthetic_results()))
+    assert to_json(results) == again, "drawing changed the results"
     assert dict(matplotlib.rcParams) == settings, "drawing changed settings that others share"
     return path
 
@@ -379,14 +374,9 @@ def test_parts_beyond_the_paper_are_left_out_where_they_were_not_run():
     for name in COLUMNS:
         for key in ("single_unit_uncertainty", "curvature_thresholds"):
             short[name].pop(key)
-    whole, short = (
-        reproduction_page(typed(ReproductionResult, results)) for results in (synthetic_results(), short)
-    )
-    assert [[drawing.number for drawing in page.drawings][-2:] for page in (whole, short)] == [
-        [11, 12],
-        [9, 10],
-    ]
-    (beyond,) = (chapter for chapter in short.chapters if chapter.title == "Beyond the paper")
+    pages = [reproduction_page(typed(ReproductionResult, each)) for each in (synthetic_results(), short)]
+    assert [[drawing.number for drawing in page.drawings][-2:] for page in pages] == [[11, 12], [9, 10]]
+    (beyond,) = (chapter for chapter in pages[1].chapters if chapter.title == "Beyond the paper")
     assert "`fingerpad reproduce --extended`" in beyond.parts[0].text
 
 
@@ -421,9 +411,8 @@ def test_the_first_screen_has_verdicts_and_the_contents_stand_beside_the_page(re
     results["skin_deflection"]["trial1"]["cylinder"]["r2"] = 0.99
     skin = reproduction_page(typed(ReproductionResult, results)).opening[0].caption
     assert skin == "Skin: Trial 1 is closest to the observed deflection; in the paper Trial 3 is."
-    assert re.findall(r'<a href="#([^"]+)"', text[: text.index("<main>")]) == [
-        c.anchor for c in page.chapters
-    ]
+    contents = re.findall(r'<a href="#([^"]+)"', text[: text.index("<main>")])
+    assert contents == [chapter.anchor for chapter in page.chapters]
     open_parts = re.sub(r"<details>.*?</details>", "", text, flags=re.DOTALL)
     assert open_parts.count("<table") == 1
     assert open_parts.count("<img") == 3 + 2 * len([1, 2, 3, 4, 5, 6, 7, 8, 9]) - 3

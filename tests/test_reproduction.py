@@ -5,7 +5,6 @@ import math
 import os
 import re
 import shutil
-import signal
 import struct
 import subprocess
 import sys
@@ -22,21 +21,15 @@ from fingerpad.core.errors import InputError
 from fingerpad.core.result_files import read_results, to_json
 from fingerpad.data import all_published
 from fingerpad.experiments import gerling2014
-from fingerpad.experiments.discrimination.task_stimuli import read_task, task_touches
 from fingerpad.experiments.gerling2014 import single_unit_uncertainty
-from fingerpad.experiments.gerling2014.claim_row import Group, Verdict
 from fingerpad.experiments.gerling2014.reproduction import Reproduction, ReproductionResult, reproduce
 from fingerpad.experiments.runner import STORE_FOLDER
 from fingerpad.report.reproduction import reproduction_page
-from fingerpad.skin.store import Store
 from studies.results_page import excerpt, readme_table
 
 COMMAND = (sys.executable, "-W", "error", "-m", "fingerpad", "reproduce")
 MEASURES = ("static", "dynamic", "latency")
 HIT_RATES = ("hit_rate", "hit_rate_sd", "hit_rate_shifted", "hit_rate_shifted_sd")
-PARAMETERS = {
-    "intercept_ma", "dynamic_gain", "static_gain", "time_constant_ms", "capacitance_mf", "threshold_mv",
-}  # fmt: skip
 MEASURED = ("started", "wall_s", "peak_memory_mb", "stages", "weber_144", "weber_287")
 """Parts of the manifest and of the summary that differ between runs, or are left out at quick resolution."""
 
@@ -184,13 +177,10 @@ def test_one_set_serves_four_levels(first):
 
 def test_skin_deflection_is_complete_and_trial_3_follows_the_observed_skin(first):
     found = first.results["skin_deflection"]
-    assert set(found) == {"trial1", "trial2", "trial3", "observed"}
     for trial in ("trial1", "trial2", "trial3"):
-        assert set(found[trial]) == {"line", "cylinder"}
         for profile in found[trial].values():
             distance, deflection = profile["distance_mm"], profile["deflection_mm"]
             assert len(distance) == len(deflection) > 20
-            assert distance == sorted(distance)
             assert 0.5 < max(deflection) <= 1.01
             assert abs(distance[int(np.argmax(deflection))]) < 0.6
             assert 50.0 < profile["force_mn"] < 1000.0
@@ -200,15 +190,10 @@ def test_skin_deflection_is_complete_and_trial_3_follows_the_observed_skin(first
 
 def test_single_unit_is_complete_and_reaches_the_papers_fss(of_set):
     found = of_set["single_unit"]
-    assert {len(found[name]) for name in ("shift_mm", "dynamic_rate_hz", "static_rate_hz")} == {36}
     np.testing.assert_allclose(np.diff(found["shift_mm"]), 0.2, rtol=0, atol=1e-12)
     assert len(found["folds"]) == 6
-    for fit in (found, *found["folds"]):
-        assert set(fit["parameters"]) == PARAMETERS
-    assert max(fold[name] for fold in found["folds"] for name in ("fss_train", "fss_test")) <= 1.0
     mean = np.mean([fold["fss_test"] for fold in found["folds"]])
     assert 0.81 <= found["fss_out_of_sample"] == pytest.approx(mean, rel=1e-12)
-    assert found["fss_in_sample"] <= 1.0
 
 
 def test_what_goes_beyond_the_paper_comes_on_top(second):
@@ -239,28 +224,19 @@ def test_the_command_goes_beyond_the_paper_where_asked_and_by_default_not_when_q
 
 def test_discrimination_is_complete(of_set):
     found = of_set["discrimination"]
-    assert len(found["curvature_per_m"]) == 7
-    assert found["curvature_per_m"] == sorted(found["curvature_per_m"])
     assert 0.0 < found["noise_sigma"] < 1.0
     assert set(found["gradient_sum"]) == set(MEASURES)
     assert set(found["euclidean"]) == {"static"}
     for table in (*found["gradient_sum"].values(), found["euclidean"]["static"]):
-        assert set(table) == set(HIT_RATES)
-        for values in table.values():
-            assert len(values) == 6
-            assert all(0.0 <= value <= 1.0 for value in values)
+        for name in HIT_RATES:
+            assert len(table[name]) == 6
+            assert all(0.0 <= value <= 1.0 for value in table[name])
     for position in ("hit_rate", "hit_rate_shifted"):
         assert (np.diff(found["gradient_sum"]["static"][position]) > 0).all()
 
 
-def test_population_and_nail_are_maps(of_set):
-    population, nail = of_set["population"], of_set["nail"]
-    shape = (len(population["x_mm"]), len(population["z_mm"]))
-    for name in ("dynamic_rate_hz", "static_rate_hz", "first_spike_latency_ms"):
-        assert np.shape(population[name]) == shape
-    assert np.shape(population["receptors_mm"]) == (18, 2)
-    along, around = np.shape(nail["x_mm"])
-    assert np.shape(nail["von_mises_kpa"]) == (along - 1, around - 1)
+def test_the_nail_concentrates_stress(of_set):
+    nail = of_set["nail"]
     assert nail["border_kpa"] > nail["far_kpa"] > 0.0
     # Figure 9: stress at the border of the nail stands out from the skin beside it in every section.
     low, high = nail["ratio_range"]
@@ -282,30 +258,6 @@ def test_the_manifest_holds_the_command_that_repeats_the_run(first):
         assert 0.0 < stage["largest_energy_imbalance"] < BALANCE
         assert all(reason.startswith("geometric multigrid") for reason in stage["linear_solvers"])
     assert all(mesh["smallest_gauss_jacobian_mm3"] > 0 for mesh in manifest["meshes"].values())
-
-
-# The claims
-
-
-def test_the_comparison_marks_what_it_misses(of_set):
-    rows = of_set["comparison"]
-    assert len(rows) >= 20
-    for row in rows:
-        assert row["verdict"] in list(Verdict)
-        assert (row["group"] == Group.FITTED) == bool(row["fitted_to"])
-    assert {row["group"] for row in rows} == set(Group)
-    assert any(row["verdict"] == "met" for row in rows if row["group"] == "statement")
-
-
-def test_a_fitted_number_is_told_apart_from_a_prediction(first):
-    """The set human is fitted to hit rates of people, and its moduli to deflection and force."""
-    group = {row["quantity"]: row["group"] for row in first.results["human"]["comparison"]}
-    chosen = (
-        "Tissues of the run", "Hit rate at", "Dynamic rate", "Static rate,", "Euclidean", "Noise sigma_1",
-    )  # fmt: skip
-    fitted = {quantity: found for quantity, found in group.items() if quantity.startswith(chosen)}
-    assert fitted == dict.fromkeys(fitted, "fitted") != {}
-    assert group["Single unit, FSS out of sample (mean of six folds)"] == "statement"
 
 
 # The page
@@ -382,75 +334,21 @@ noise: {noise}
 """
 
 
-def discriminate(folder, *options, **more):
-    """Ask the paper's question in a subprocess whose warnings are errors."""
-    command = (*COMMAND[:-1], "discriminate", folder / "question.yaml", "--out", folder, *options)
-    return subprocess.Popen(
-        list(map(str, command)), stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, cwd=folder, **more
-    )
-
-
-def prepared(first, folder):
-    """A folder with the question, the fitted afferent, and the presses of the reproduction."""
-    shutil.copytree(first.folder / STORE_FOLDER, folder / STORE_FOLDER)
-    shutil.copy(first.folder / "results.json", folder)
-    noise = first.results["human"]["discrimination"]["noise_sigma"]
-    (folder / "question.yaml").write_text(PAPERS_QUESTION.replace("{noise}", repr(noise)))
-    return folder
-
-
-def answer(folder):
-    results = json.loads((folder / "discriminate.json").read_text())
+def test_the_papers_question_asked_as_ones_own_has_the_papers_hit_rates(first, tmp_path):
+    """Every press is stored already; warnings are errors."""
+    shutil.copytree(first.folder / STORE_FOLDER, tmp_path / STORE_FOLDER)
+    shutil.copy(first.folder / "results.json", tmp_path)
+    theirs = first.results["human"]["discrimination"]
+    (tmp_path / "question.yaml").write_text(PAPERS_QUESTION.replace("{noise}", repr(theirs["noise_sigma"])))
+    command = (*COMMAND[:-1], "discriminate", "question.yaml", "--out", ".", "--jobs", "1")
+    done = subprocess.run(command, capture_output=True, text=True, check=False, cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.startswith("Gradient Sum of static rates discriminates 296 from 287 in ")
+    results = json.loads((tmp_path / "discriminate.json").read_text())
     (stimuli,) = (stage for stage in results["manifest"]["stages"] if stage["name"] == "stimuli")
-    return results["discrimination"], stimuli
-
-
-@pytest.fixture(scope="session")
-def asked(first, tmp_path_factory):
-    """The question asked where every press is stored already."""
-    folder = prepared(first, tmp_path_factory.mktemp("question"))
-    said, errors = (run := discriminate(folder, "--jobs", "1")).communicate()
-    assert (run.returncode, errors) == (0, "")
-    assert said.startswith("Gradient Sum of static rates discriminates 296 from 287 in ")
-    return folder
-
-
-def test_the_papers_question_asked_as_ones_own_has_the_papers_hit_rates(first, asked):
-    found, stimuli = answer(asked)
-    theirs = first.results["human"]["discrimination"]["gradient_sum"]
     assert (stimuli["computed"], stimuli["indentations"]) == (0, 7)
-    assert {decoding["measure"] for decoding in found["decodings"]} == set(MEASURES)
-    for decoding in found["decodings"]:
-        rates = theirs[decoding["measure"]]
-        assert decoding["hit_rate"] == rates["hit_rate"]
-        assert decoding["hit_rate_sd"] == rates["hit_rate_sd"]
-
-
-@pytest.mark.skipif(sys.platform == "win32", reason="kill -9 and process groups are POSIX")
-def test_a_question_killed_at_any_moment_goes_on_and_ends_with_the_same_bits(first, asked, tmp_path):
-    folder = prepared(first, tmp_path)
-    store = folder / STORE_FOLDER
-    spheres = [
-        Store(store).path(touch) for touch in task_touches(read_task(folder / "question.yaml")).values()
-    ]
-    for path in spheres[:3]:
-        path.unlink()
-    run = discriminate(folder, "--jobs", "2", start_new_session=True)
-    while run.poll() is None and not any(path.exists() for path in spheres[:3]):
-        time.sleep(0.02)
-    assert run.poll() is None
-    os.killpg(run.pid, signal.SIGKILL)
-    run.communicate()
-    assert not (folder / "discriminate.json").exists()
-    assert sum(path.exists() for path in spheres[:3]) < 3
-
-    _, errors = (again := discriminate(folder, "--jobs", "2")).communicate()
-    assert again.returncode == 0
-    assert all(PROGRESS.fullmatch(line) for line in errors.splitlines())
-    found, stimuli = answer(folder)
-    assert 0 < stimuli["computed"] < 3
-    for path in spheres:
-        with np.load(path) as here, np.load(asked / STORE_FOLDER / path.name) as there:
-            assert [name for name in there if here[name].tobytes() != there[name].tobytes()] == [], path.name
-        assert path.read_bytes() == (asked / STORE_FOLDER / path.name).read_bytes()
-    assert found == answer(asked)[0]
+    decodings = results["discrimination"]["decodings"]
+    assert {decoding["measure"] for decoding in decodings} == set(MEASURES)
+    for decoding in decodings:
+        rates = theirs["gradient_sum"][decoding["measure"]]
+        assert [decoding[name] for name in HIT_RATES[:2]] == [rates[name] for name in HIT_RATES[:2]]

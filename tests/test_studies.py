@@ -34,7 +34,6 @@ from fingerpad.inference.afferent_methods import increments, printed_starts, sta
 from fingerpad.mechanics.press_settings import PressSettings
 from fingerpad.mechanics.tissues import named_tissues
 from fingerpad.neuron.afferent import Afferent
-from fingerpad.skin.indentation import Touch
 from fingerpad.skin.sampling import SurfaceProfile
 from refusals import refusals
 from sections import (
@@ -42,6 +41,7 @@ from sections import (
     SED_DRIVEN,
     SENSITIVE,
     SKINS,
+    SMALL_TOUCH,
     SphereSkin,
     discrimination_section,
     nail_section,
@@ -170,17 +170,7 @@ def test_deflection_r2_reads_proximal_as_positive_unless_asked_otherwise_and_lea
 @pytest.fixture(scope="module")
 def tiny_skin():
     """A coarse, shallow press: its numbers are rough, but all that the studies read is there."""
-    grading = Grading(
-        17.37, 1.2, 1.2, 0.8, 0.8, largest_mm=4.0, stratum_corneum=1, living_epidermis=1, dermis=1, subcutis=1
-    )
-    touch = Touch(
-        finger=Fingertip(),
-        indenter=Sphere(curvature_per_m=287.0),
-        stimulus=RampAndHold(depth_mm=0.2),
-        tissues=named_tissues("trial3"),
-        grading=grading,
-        settings=PressSettings(1, 1),
-    )
+    touch = replace(SMALL_TOUCH, stimulus=RampAndHold(depth_mm=0.2), settings=PressSettings(1, 1))
     return touch.solve()
 
 
@@ -384,9 +374,8 @@ def test_a_measure_that_stays_silent_is_left_out_and_named():
 def test_positions_draw_their_noise_apart():
     """Equal skins at both positions: hit rates agree within their scatter but not to the bit."""
     same = {(position, curvature): SKINS[0.0, curvature] for position, curvature in SKINS}
-    static = sphere_discrimination.discriminate_spheres(same, SENSITIVE, seed=0, sessions=2).gradient_sum[
-        "static"
-    ]
+    found = sphere_discrimination.discriminate_spheres(same, SENSITIVE, seed=0, sessions=2)
+    static = found.gradient_sum["static"]
     first, second = static.hit_rate, static.hit_rate_shifted
     assert (first != second).any()
     np.testing.assert_allclose(first, second, rtol=0, atol=0.05)

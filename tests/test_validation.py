@@ -93,10 +93,7 @@ def test_the_header_decides_the_kind_and_every_example_is_read(tmp_path, kind):
 
 UNFIT = [
     (FORCE, "mine.csv must hold a header and at least one row: it has 1 of them."),
-    (
-        "indenter,depth_mm\nplate,1\n",
-        "mine.csv, header: must be that of one kind (indenter,depth_mm,force_n;",
-    ),
+    ("indenter,depth_mm\nplate,1\n", "mine.csv, header: must be that of one kind (indenter,"),
     ("indenter,depth_mm\nplate,1\n", "got indenter,depth_mm; for the kind force, add force_n."),
     ("indenter,depth_mm,position_mm,force_n\nplate,1,0,1\n", "for the kind force, leave out position_mm."),
     ("indenter;depth_mm;force_n\nplate;1;2\n", "Separate entries by commas, not by ';'."),
@@ -128,11 +125,8 @@ def test_scores_have_their_definitions():
 
 
 def test_scores_that_do_not_exist_are_nan():
-    r2, gain, correlation = (
-        scores.coefficient_of_determination,
-        scores.gain_through_origin,
-        scores.correlation,
-    )
+    r2, gain = scores.coefficient_of_determination, scores.gain_through_origin
+    correlation = scores.correlation
     for observed, predicted, undefined in (
         ([], [], [r2, gain, correlation]),
         ([1.0], [2.0], [r2, correlation]),

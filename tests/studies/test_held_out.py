@@ -10,9 +10,7 @@ from fingerpad.core.result_files import from_json, to_json
 from fingerpad.core.signals import Traces
 from fingerpad.experiments.conditions import RECEPTOR_X_MM, Conditions
 from fingerpad.experiments.runner import Runner
-from fingerpad.experiments.validation.predictions import FingertipModel
 from fingerpad.geometry.mesh import block_mesh
-from fingerpad.neuron.afferent import Afferent
 from fingerpad.neuron.population import Population
 from sections import SENSITIVE
 from studies import held_out
@@ -28,7 +26,6 @@ from studies.held_out import (
     grating_checks,
     half_width_mm,
     period_rates_hz,
-    predicted,
     sphere_checks,
     threshold_checks,
     volume_checks,
@@ -160,16 +157,6 @@ def test_a_rate_that_stays_does_not_decline():
     population = Population(np.array([(RECEPTOR_X_MM, 0.0)]), 1.0, SENSITIVE)
     found = decline(population, WavySkin(0, 2.0), [(400.0, 600.0), (600.0, 950.0)])
     assert found == pytest.approx(0.0, abs=1e-3)
-
-
-def test_predictions_without_observations_are_those_of_validate(tmp_path, monkeypatch):
-    """At depth and force 0 nothing is pressed."""
-    monkeypatch.setattr("fingerpad.experiments.runner.solve_missing", lambda missing, *_: None)
-    model = FingertipModel(QUICK, Afferent.for_tissues("human"))
-    runner = Runner(tmp_path)
-    assert predicted("force", [("plate", 0.0), ("sphere:287", 0.0)], model, runner).tolist() == [0.0, 0.0]
-    resting = predicted("rate_position", [(0.0, 287.0, 1.0)], model, runner)
-    assert resting.tolist() == [0.0]
 
 
 # The page

@@ -132,12 +132,6 @@ def test_the_fit_finds_an_afferent_that_responds_like_the_true_one(short_fits):
     assert six[0] * six[3] / (six[4] * six[5]) <= 0.95 + 1e-12
 
 
-def test_a_common_factor_on_the_drive_changes_gains_only(short_fits):
-    (soft, first), (stiff, second) = (fitted(synthetic_skins(scale), folds=False) for scale in (1.0, 8.0))
-    assert soft.fss == pytest.approx(stiff.fss, abs=1e-6)
-    assert second[1:3] == pytest.approx(first[1:3] / 8.0, rel=1e-4)
-
-
 # Verdicts
 
 

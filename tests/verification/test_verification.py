@@ -65,19 +65,16 @@ def test_stored_errors_of_meshes_are_those_of_the_stored_profiles():
     rows = [(refined, each["mesh"], each["against"], each["errors"]) for each in refined["against_finer"]]
     rows += [(sized, mesh, "paper", errors) for mesh, errors in sized["errors"].items()]
     assert len(rows) == 6
+    columns = {"sed": ("sed_ramp_kpa", "sed_hold_kpa"), "rate_hz": ("dynamic_rate_hz", "static_rate_hz")}
     for run, mesh, against, errors in rows:
         ours, finest = run["profiles"][mesh], run["profiles"][against]
         chosen = [ours["shift_mm"].index(shift) for shift in finest["shift_mm"]]
-        for kind, phase, column in (
-            ("sed", "ramp", "sed_ramp_kpa"),
-            ("sed", "hold", "sed_hold_kpa"),
-            ("rate_hz", "dynamic", "dynamic_rate_hz"),
-            ("rate_hz", "static", "static_rate_hz"),
-        ):
-            finer = np.array(finest[column])
-            unit = finer.max() if kind == "sed" else 1.0
-            largest = np.abs(np.array(ours[column])[chosen] - finer).max() / unit
-            assert errors[kind][phase]["max"] == pytest.approx(largest, rel=1e-12)
+        for kind, names in columns.items():
+            for phase, column in zip(errors[kind].values(), names, strict=True):
+                finer = np.array(finest[column])
+                unit = finer.max() if kind == "sed" else 1.0
+                largest = np.abs(np.array(ours[column])[chosen] - finer).max() / unit
+                assert phase["max"] == pytest.approx(largest, rel=1e-12)
 
 
 def test_names_and_titles_of_cases_are_their_own():
