@@ -5,6 +5,7 @@ import math
 import os
 import re
 import shutil
+import signal
 import struct
 import subprocess
 import sys
@@ -21,10 +22,12 @@ from fingerpad.core.errors import InputError
 from fingerpad.core.result_files import read_results, to_json
 from fingerpad.data import all_published
 from fingerpad.experiments import gerling2014
+from fingerpad.experiments.discrimination.task_stimuli import read_task, task_touches
 from fingerpad.experiments.gerling2014 import single_unit_uncertainty
 from fingerpad.experiments.gerling2014.reproduction import Reproduction, ReproductionResult, reproduce
 from fingerpad.experiments.runner import STORE_FOLDER
 from fingerpad.report.reproduction import reproduction_page
+from fingerpad.skin.store import Store
 from studies.results_page import excerpt, readme_table
 
 COMMAND = (sys.executable, "-W", "error", "-m", "fingerpad", "reproduce")
@@ -334,12 +337,13 @@ noise: {noise}
 """
 
 
-def test_the_papers_question_asked_as_ones_own_has_the_papers_hit_rates(first, tmp_path):
-    """Every press is stored already; warnings are errors."""
+def test_the_papers_question_asked_as_ones_own_has_the_papers_hit_rates_also_if_killed(first, tmp_path):
+    """Every press is stored already, until three are lost; warnings are errors."""
     shutil.copytree(first.folder / STORE_FOLDER, tmp_path / STORE_FOLDER)
     shutil.copy(first.folder / "results.json", tmp_path)
     theirs = first.results["human"]["discrimination"]
-    (tmp_path / "question.yaml").write_text(PAPERS_QUESTION.replace("{noise}", repr(theirs["noise_sigma"])))
+    question = tmp_path / "question.yaml"
+    question.write_text(PAPERS_QUESTION.replace("{noise}", repr(theirs["noise_sigma"])))
     command = (*COMMAND[:-1], "discriminate", "question.yaml", "--out", ".", "--jobs", "1")
     done = subprocess.run(command, capture_output=True, text=True, check=False, cwd=tmp_path)
     assert done.returncode == 0, done.stderr
@@ -352,3 +356,30 @@ def test_the_papers_question_asked_as_ones_own_has_the_papers_hit_rates(first, t
     for decoding in decodings:
         rates = theirs["gradient_sum"][decoding["measure"]]
         assert [decoding[name] for name in HIT_RATES[:2]] == [rates[name] for name in HIT_RATES[:2]]
+
+    spheres = [
+        Store(tmp_path / STORE_FOLDER).path(touch) for touch in task_touches(read_task(question)).values()
+    ]
+    stored = {path: path.read_bytes() for path in spheres}
+    for path in spheres[:3]:
+        path.unlink()
+    run = subprocess.Popen(
+        [*command[:-1], "2"],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        cwd=tmp_path,
+        start_new_session=True,
+    )
+    while run.poll() is None and not any(path.exists() for path in spheres[:3]):
+        time.sleep(0.02)
+    assert run.poll() is None
+    os.killpg(run.pid, signal.SIGKILL)
+    run.communicate()
+    assert sum(path.exists() for path in spheres[:3]) < 3
+    (tmp_path / "discriminate.json").unlink()
+    assert subprocess.run(command, capture_output=True, check=False, cwd=tmp_path).returncode == 0
+    assert {path: path.read_bytes() for path in spheres} == stored
+    assert (
+        json.loads((tmp_path / "discriminate.json").read_text())["discrimination"]
+        == results["discrimination"]
+    )
