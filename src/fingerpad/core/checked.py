@@ -11,8 +11,19 @@ from dataclasses import MISSING, field, fields
 from functools import partial, wraps
 from itertools import takewhile
 from pathlib import Path
-from types import FunctionType, MappingProxyType, NoneType
-from typing import TYPE_CHECKING, Annotated, Any, ParamSpec, TypeVar, dataclass_transform, get_args, overload
+from types import FunctionType, MappingProxyType, NoneType, UnionType
+from typing import (
+    TYPE_CHECKING,
+    Annotated,
+    Any,
+    ParamSpec,
+    TypeVar,
+    Union,
+    dataclass_transform,
+    get_args,
+    get_origin,
+    overload,
+)
 
 from fingerpad.core.errors import InputError, Place, did_you_mean, named, shown
 
@@ -122,7 +133,7 @@ def _init_of(kind: Any, init: FunctionType) -> Callable[..., None]:
         kind.__signature__ = inspect.Signature(parts)
         init.__annotations__ = {part.name: part.annotation for part in parts}
     else:
-        parts, call = list(inspect.signature(init).parameters.values())[1:], _validated(init)
+        parts, call = list(inspect.signature(init).parameters.values()), _validated(init)
     others = other_names(kind)
 
     @wraps(init)
@@ -233,14 +244,12 @@ _NUMBERS = {"type": "array", "items": {"type": "number"}}
 
 def _path_or(hint: Any) -> Any:
     """Annotation of a path, which may be given as a text; any other as it is."""
-    from fingerpad.core.files import path_of
-    from fingerpad.core.values import Check
+    from fingerpad.core.values import AnyPath
 
-    kinds = get_args(hint) or (hint,)
+    kinds = get_args(hint) if get_origin(hint) in (Union, UnionType) else (hint,)
     if Path not in kinds or not all(kind in (str, Path, NoneType) for kind in kinds):
         return hint
-    path = Annotated[Path, Check(path_of, {})]
-    return path | None if NoneType in kinds else path
+    return AnyPath | None if NoneType in kinds else AnyPath
 
 
 def _in_one_sentence(

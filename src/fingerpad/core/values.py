@@ -13,6 +13,7 @@ import warnings
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
 from functools import lru_cache, partial
+from pathlib import Path
 from typing import Annotated, Any, TypeGuard, TypeVar
 
 import numpy as np
@@ -21,6 +22,7 @@ from pydantic import Strict
 from pydantic_core import core_schema
 
 from fingerpad.core.errors import InputError, got, shown
+from fingerpad.core.files import path_of
 from fingerpad.core.units import unit_of
 
 FloatArray = NDArray[np.float64]
@@ -370,6 +372,7 @@ Count = Annotated[int, count_from(1, _MOST)]
 Several = Annotated[int, count_from(2, _MOST)]
 Flag = Annotated[bool, Check(flag, {"type": "boolean"})]
 Text = Annotated[str, Check(text, {"type": "string", "minLength": 1})]
+AnyPath = Annotated[Path, Check(path_of, {"type": "string"})]
 Pair = Annotated[tuple[float, float], _PAIR]
 Numbers = Annotated[tuple[float, ...], Check(numbers, {"type": "array", "items": {"type": "number"}})]
 Pairs = Annotated[tuple[tuple[float, float], ...], entries(_PAIR)]

@@ -44,6 +44,7 @@ class Indenter(ABC):
     --------
     A wedge with an angle of 90 degrees, its ridge along z, rounded with a radius of 0.5 mm:
 
+    >>> from dataclasses import dataclass
     >>> @dataclass(frozen=True)
     ... class Wedge(Indenter):
     ...     radius_mm: float = 0.5

@@ -240,12 +240,12 @@ class Population:
         positions = np.stack(np.meshgrid(x, z, indexing="ij"), axis=-1).reshape(-1, 2)
         return cls(positions, pitch_mm, afferent or Afferent(), centre_mm=CENTRE_MM if follows else None)
 
-    def on(self, skin: Skin) -> Population:
+    def on(self, skin: object) -> Population:
         """Return this population as it lies on the finger of a skin.
 
         Parameters
         ----------
-        skin : Skin
+        skin
             Its `pad_mm` is the middle of the pad, as of a `SkinResponse`; a skin without one moves nothing.
 
         Returns

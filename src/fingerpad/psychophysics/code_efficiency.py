@@ -111,6 +111,7 @@ def code_efficiency(shown: Presentation, statistic: Statistic) -> CodeEfficiency
     --------
     Of two afferents one changes its rate. The Gradient Sum also contains the noise of the other:
 
+    >>> import numpy as np
     >>> table = np.array([[50.0, 50.0], [50.0, 53.0]])
     >>> (shown,) = noisy_presentations(table, 0.1, seed=1)
     >>> standard = multiplied_responses(table[0], 0.1, SMALLEST_SPREAD)

@@ -11,6 +11,7 @@ from typing import Literal
 from fingerpad.core.checked import result_class
 from fingerpad.core.engine import Engine, engine_of
 from fingerpad.core.progress import Progress
+from fingerpad.core.values import AnyPath
 from fingerpad.experiments.conditions import Conditions
 from fingerpad.experiments.descriptions.reading import Origin, at
 from fingerpad.experiments.descriptions.stimuli import touches_of
@@ -41,7 +42,7 @@ class DiscriminationRun:
     """A task with all that it takes to run it."""
 
     task: DiscriminationTask  # From `task_stimuli.read_task`.
-    folder: Path
+    folder: AnyPath
     jobs: int | Engine = 1  # Processes or engine that press; the numbers do not depend on it.
     source: str = "task"  # File of the task: beside it files are searched; errors begin with it.
     text: str = ""  # Its content, for the lines of errors.

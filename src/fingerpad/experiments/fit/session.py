@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property
-from pathlib import Path
 from typing import Annotated, Literal
 
 import numpy as np
@@ -15,7 +14,7 @@ from fingerpad.core.engine import Engine, engine_of
 from fingerpad.core.errors import InputError
 from fingerpad.core.progress import Progress
 from fingerpad.core.signals import INTERVAL
-from fingerpad.core.values import Flag, IntArray, Many, Vector, Whole, choice, one_of, positive
+from fingerpad.core.values import AnyPath, Flag, IntArray, Many, Vector, Whole, choice, one_of, positive
 from fingerpad.data.afferents import TYPES
 from fingerpad.data.observations import bar_firing_rates
 from fingerpad.experiments.conditions import Conditions
@@ -90,7 +89,7 @@ class FitRequest:
 
     recorded: Recorded
     stimuli: Stimuli
-    folder: Path
+    folder: AnyPath
     method: Annotated[str, choice(METHODS)] = "least_squares"
     n_folds: Whole | None = None
     windows_ms: tuple[Window | None, Window | None] = (None, None)

@@ -12,7 +12,7 @@ from fingerpad.core.checked import result_class, value_class
 from fingerpad.core.engine import Engine, Processes, engine_of
 from fingerpad.core.progress import Progress
 from fingerpad.core.signals import STORED_ENERGY
-from fingerpad.core.values import Flag, Number, Whole, choice
+from fingerpad.core.values import AnyPath, Flag, Number, Whole, choice
 from fingerpad.data import all_published
 from fingerpad.data.neuron import PAPER_INITIAL
 from fingerpad.experiments.conditions import RECEPTOR_X_MM, Conditions, Touch
@@ -53,7 +53,7 @@ PAPER, HUMAN = "paper", "human"  # The paper's own system; the set that serves a
 class Reproduction:
     """A run of all parts of the paper with two sets of tissues."""
 
-    folder: Path
+    folder: AnyPath
     resolution: str = "standard"  # How fine meshes and steps are.
     seed: Whole = 0  # Seed of the observers' noise.
     tissues: Annotated[str, choice(tuple(name for name in TISSUES if name != HUMAN))] = PAPER

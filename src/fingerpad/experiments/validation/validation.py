@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import asdict
-from pathlib import Path
 from typing import Literal
 
 import numpy as np
@@ -12,7 +11,7 @@ import numpy as np
 from fingerpad.core.checked import checked, result_class, value_class
 from fingerpad.core.engine import Engine, engine_of
 from fingerpad.core.progress import Progress
-from fingerpad.core.values import Number, Whole
+from fingerpad.core.values import AnyPath, Number, Whole
 from fingerpad.data import fingertip
 from fingerpad.experiments.manifest import Manifest
 from fingerpad.experiments.runner import Runner
@@ -97,7 +96,7 @@ class ValidationRequest:
 
     observations: Observations
     model: FingertipModel
-    folder: Path
+    folder: AnyPath
     jobs: Whole | Engine = 1
 
     def __post_init__(self) -> None:
