@@ -234,12 +234,9 @@ class _SequenceOf:
     """Stands for `Sequence`: one of numbers may be an array."""
 
     def __class_getitem__(cls, entry: Any) -> Any:
-        from fingerpad.core.values import Check, numbers
+        from fingerpad.core.values import Numbers
 
-        return Annotated[Any, Check(numbers, _NUMBERS)] if entry is float else Sequence[entry]
-
-
-_NUMBERS = {"type": "array", "items": {"type": "number"}}
+        return Numbers if entry is float else Sequence[entry]
 
 
 def _path_or(hint: Any) -> Any:
