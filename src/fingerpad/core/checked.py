@@ -205,9 +205,8 @@ def hints_of(makes: Callable[..., Any]) -> dict[str, Any]:
     function = inspect.unwrap(makes)
     unchecked = {"FloatArray": AnyArray, "ArrayLike": Any, "Sequence": _SequenceOf}
     unchecked |= {"Iterable": _Unchecked, "Iterator": _Unchecked}
-    return {
-        name: _hint(text, function.__globals__, unchecked) for name, text in function.__annotations__.items()
-    }
+    known, hints = function.__globals__, function.__annotations__
+    return {name: _hint(text, known, unchecked) for name, text in hints.items()}
 
 
 def _hint(text: Any, known: dict[str, Any], unchecked: dict[str, Any]) -> Any:

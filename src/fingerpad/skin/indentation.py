@@ -20,7 +20,7 @@ from fingerpad.core.errors import InputError, shown
 from fingerpad.core.phases import from_onset
 from fingerpad.core.progress import NoProgress, Progress
 from fingerpad.core.threads import compiled_threads
-from fingerpad.core.values import Finite, Flag, FloatArray, Pair, Whole, choice, instance, limits, pair
+from fingerpad.core.values import Finite, Flag, FloatArray, Pair, Whole, choice, instance, limits
 from fingerpad.data import fingertip as published
 from fingerpad.data.tissues import DEFAULT_TISSUES
 from fingerpad.geometry.fingertip import Finger, Fingertip
@@ -111,7 +111,7 @@ class Touch:
     progress: SkipValidation[Progress | None] = field(default=None, compare=False, repr=False)
 
     def __post_init__(self) -> None:
-        x, z = _position(self.at_mm, self.finger)
+        x, z = self.at_mm or self.finger.contact_mm
         object.__setattr__(self, "at_mm", (x, z))
         if z != 0.0 and not self.grading.full:
             raise InputError(f"at_mm beside the midline (z = {z:g} mm) needs a grading with full=True.")
@@ -317,7 +317,7 @@ def touch_of(
     progress: Progress | None = None,
 ) -> Touch:
     """Describe a touch without solving it: `indent` takes the same arguments and solves it."""
-    x, z = _position(at_mm, finger)
+    x, z = at_mm or finger.contact_mm
     stimulus = instance("stimulus", stimulus or RampAndHold(), Motion)
     # The grading depends on this point, so finger, indenter and point are checked first.
     check_path(finger, stimulus, (x, z))
@@ -420,8 +420,3 @@ def indent(
 def settings_of(resolution: str) -> PressSettings:
     ramp_steps, hold_steps = STEPS[resolution]
     return PressSettings(ramp_steps, hold_steps)
-
-
-def _position(at_mm: Sequence[float] | None, finger: Finger) -> tuple[float, float]:
-    """Check a place of contact; without one it is the finger's."""
-    return finger.contact_mm if at_mm is None else pair("at_mm", at_mm)
