@@ -195,10 +195,13 @@ def test_an_error_of_the_work_is_that_of_the_item(running):
 
 
 def test_a_worker_of_another_version_is_refused(running, monkeypatch):
-    mine = module._software() | {"numba": "0.1"}
-    monkeypatch.setattr(module, "_software", lambda: mine)
+    here = module.software()
+    mine = here | {"packages": here["packages"] | {"numba": "0.1"}}
+    monkeypatch.setattr(module, "software", lambda: mine)
+    module._software.cache_clear()
     with pytest.raises(fp.InputError, match=r"^Worker tcp.* must have numba 0.1, as .*: got .*\.$"):
         fp.Cluster(running.address).check()
+    module._software.cache_clear()
 
 
 def test_a_task_of_another_version_is_refused_by_the_worker(monkeypatch):

@@ -74,13 +74,6 @@ def _wu_polynomials() -> tuple[Material, Material]:
     return dermis, subcutis
 
 
-def _wu_foams() -> tuple[Material, Material]:
-    return (
-        _foam(published.WU_SKIN_HYPERFOAM_MU, published.WU_SKIN_HYPERFOAM_ALPHA),
-        _foam(published.WU_SUBCUTIS_HYPERFOAM_MU, published.WU_SUBCUTIS_HYPERFOAM_ALPHA),
-    )
-
-
 def _paper() -> Tissues:
     """Trial 3 with another Poisson's ratio and nothing else changed."""
     epidermis = _linear(SOFT, LONG_TERM)
@@ -123,7 +116,13 @@ TISSUES: dict[str, Callable[[], Tissues]] = {
     # Linear elastic layers after Maeno, without relaxation.
     "maeno1998": lambda: Tissues(*(layer.with_prony(Prony()) for layer in _layers(SOFT, _maeno()).layers)),
     # Wu's hyperfoams in dermis and subcutis, nearly a tenth as stiff as Maeno's, under a stiff epidermis.
-    "wu2007": lambda: _layers(STIFF, _wu_foams()),
+    "wu2007": lambda: _layers(
+        STIFF,
+        (
+            _foam(published.WU_SKIN_HYPERFOAM_MU, published.WU_SKIN_HYPERFOAM_ALPHA),
+            _foam(published.WU_SUBCUTIS_HYPERFOAM_MU, published.WU_SUBCUTIS_HYPERFOAM_ALPHA),
+        ),
+    ),
     # Neo-Hookean fit of this fingertip, published later by the authors' laboratory.
     "gerling2014_fit": _laboratory,
 }

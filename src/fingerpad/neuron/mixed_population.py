@@ -9,13 +9,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from fingerpad.core.checked import value_class
+from fingerpad.core.checked import checked, value_class
 from fingerpad.core.displayed import Result
 from fingerpad.core.errors import InputError
 from fingerpad.core.layouts import Place
 from fingerpad.core.random_streams import seed_of
 from fingerpad.core.signals import ResponseMap, Skin, SpikeTrains, traces_below
-from fingerpad.core.values import Finite, FloatArray, NotNegativeWhole, instance, positive
+from fingerpad.core.values import Finite, FloatArray, NotNegativeWhole, positive
 from fingerpad.data import afferents as published
 from fingerpad.data.tissues import DEFAULT_TISSUES
 from fingerpad.neuron.afferent import AnyAfferent, checked_afferent
@@ -37,13 +37,10 @@ def types_of_afferents(tissues: object = DEFAULT_TISSUES) -> dict[str, AnyAffere
     return dict(zip(published.TYPES, (SAI.for_tissues(tissues), RA(), PC(), SAII()), strict=True))
 
 
+@checked
 def one_map(response: ResponseMap | MixedResponse) -> ResponseMap:
     """Return responses as one map, with the types of a mixed population."""
-    return (
-        response.joined
-        if isinstance(response, MixedResponse)
-        else instance("response", response, ResponseMap)
-    )
+    return response.joined if isinstance(response, MixedResponse) else response
 
 
 @value_class

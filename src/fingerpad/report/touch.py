@@ -125,6 +125,13 @@ def save_figure(
     >>> fp.save_figure(Path(mkdtemp()) / "touch.png", skin, response, sphere).name
     'touch.png'
     """
+    # Only a call needs these classes.
+    from fingerpad.geometry.indenters import Indenter
+    from fingerpad.skin.sampling import SkinResponse
+
+    instance("skin", skin, SkinResponse)
+    if indenter is not None:
+        instance("indenter", indenter, Indenter)
     file = path_of("path", path)
     if file.suffix.lower() != ".png":
         raise InputError(f"A figure is written as .png: got {file.name}.")
