@@ -317,6 +317,7 @@ def own(respond):
 test_bad_input_is_refused_in_one_sentence = refusals(
     (lambda: fp.RA(retraction=1.5), "retraction must lie within 0 to 1: got 1.5"),
     (lambda: fp.RA(rise=0), ("rise",)),
+    (lambda: fp.RA(threshold=-1.0), ("threshold",)),
     (lambda: fp.RA().spikes(ENERGY), "needs 'compressive_stress': got traces of 'stored'"),
     (lambda: fp.RA(treshold=0.1), "treshold is no argument of RA: did you mean threshold"),
     (lambda: fp.OwnAfferent("sum"), "respond must be a function: got 'sum'"),
@@ -336,6 +337,7 @@ test_bad_input_is_refused_in_one_sentence = refusals(
     (lambda: fp.MixedPopulation([fp.Population.grid()]), ("parts",)),
     (lambda: fp.MixedPopulation({"RA": fp.RA()}), "parts must be of type Population: got RA"),
     (lambda: SPARSE(SQUARE, {"RA": 0.0}), r"densities_per_cm2\['RA'\].*greater than 0"),
+    (lambda: SPARSE(SQUARE, {}), "needs at least one Population"),
     (lambda: SPARSE(SQUARE, {"FA": 10.0}), "type 'FA' without an afferent"),
     (lambda: SPARSE(SQUARE, {"X": 50.0}, {"X": None}), "afferents must be of type AnyAfferent: got None"),
     (lambda: SPARSE(SQUARE, {"RA": 9.0}).respond(FINGER)["SAI"], "must be one of RA: got 'SAI'"),

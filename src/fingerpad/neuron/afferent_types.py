@@ -119,7 +119,7 @@ class RA(RapidlyAdapting):
     (True, True)
     """
 
-    threshold: Finite = afferents.RA_THRESHOLD.value
+    threshold: Positive = afferents.RA_THRESHOLD.value
     corner_hz: Finite = afferents.RA_CORNER.value
     rise: Whole = int(afferents.RA_RISE.value)
     fall: Whole = int(afferents.RA_FALL.value)
@@ -154,7 +154,7 @@ class PC(RapidlyAdapting):
     (True, 0)
     """
 
-    threshold: Finite = afferents.PC_THRESHOLD.value
+    threshold: Positive = afferents.PC_THRESHOLD.value
     corner_hz: Finite = afferents.PC_CORNER.value
     rise: Whole = int(afferents.PC_RISE.value)
     fall: Whole = int(afferents.PC_FALL.value)

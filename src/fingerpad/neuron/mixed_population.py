@@ -227,7 +227,8 @@ class MixedPopulation:
             )
         known = types_of_afferents() | dict(afferents or {})
         parts = {}
-        for number, (name, density) in enumerate((densities_per_cm2 or PUBLISHED_DENSITIES).items()):
+        densities = PUBLISHED_DENSITIES if densities_per_cm2 is None else densities_per_cm2
+        for number, (name, density) in enumerate(densities.items()):
             if name not in known:
                 raise InputError(
                     f"densities_per_cm2 has type {name!r} without an afferent: the types are "

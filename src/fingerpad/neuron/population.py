@@ -80,11 +80,10 @@ def sensitivities(
     >>> bool((sensitivities(5, 0.4, seed=7)[:3] == sensitivities(3, 0.4, seed=7)).all())
     True
     """
-    sigma = spread
-    if sigma > LARGEST_SPREAD:
-        raise InputError("spread", f"must be at most {LARGEST_SPREAD:g}, a factor of 10^4", f"{sigma:g}")
+    if spread > LARGEST_SPREAD:
+        raise InputError("spread", f"must be at most {LARGEST_SPREAD:g}, a factor of 10^4", f"{spread:g}")
     drawn = normals(seed, 1, count, Purpose.SENSITIVITY, 1)[0, :, 0]
-    return np.exp(sigma * drawn - 0.5 * sigma**2)
+    return np.exp(spread * drawn - 0.5 * spread**2)
 
 
 @value_class
