@@ -11,7 +11,7 @@ import fingerpad as fp
 from benchmarks.measuring import Spread, run_job
 from benchmarks.results import Report, Table
 from fingerpad.core.regions import Ellipse
-from fingerpad.neuron.mixed_population import PUBLISHED_DENSITIES
+from fingerpad.neuron.population import PUBLISHED_DENSITIES
 
 AFFERENTS, THREADS, REPEATS = 4000, 2, 5
 DISC = Ellipse(5.0, 5.0, centre_mm=(17.37, 0.0))
@@ -29,11 +29,11 @@ TOUCHES: dict[str, tuple[str, dict[str, float]]] = {
 }
 
 
-def crowd(afferents: int = AFFERENTS) -> fp.MixedPopulation:
+def crowd(afferents: int = AFFERENTS) -> fp.Population:
     """Afferents of the four types, at a multiple of the published densities, on a disc of the pad."""
     densities = PUBLISHED_DENSITIES
     factor = afferents / (sum(densities.values()) * DISC.area_mm2 / 100.0)
-    return fp.MixedPopulation.at_densities(DISC, {name: factor * each for name, each in densities.items()})
+    return fp.Population.at_densities(DISC, {name: factor * each for name, each in densities.items()})
 
 
 def answer(kind: str) -> dict[str, Any]:

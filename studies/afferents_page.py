@@ -27,7 +27,7 @@ from fingerpad.core.regions import Ellipse
 from fingerpad.core.values import FloatArray
 from fingerpad.data import afferents as published
 from fingerpad.neuron.afferent import AnyAfferent
-from fingerpad.neuron.mixed_population import types_of_afferents
+from fingerpad.neuron.afferent_types import afferent_types
 from fingerpad.neuron.tuning import tuning_curve
 from fingerpad.report.responses import STYLES, draw_mixed_responses
 from fingerpad.report.style import BLACK, BLUE, GREY, ORANGE, new_figure, write_png
@@ -77,10 +77,10 @@ def indented(indenter: fp.Indenter, motion: Any, tissues: str = "human", **more:
 
 def mixed() -> None:
     """Draw a mixed population under a press, a vibration and a stroke."""
-    population = fp.MixedPopulation.at_densities(DISC, seed=1)
+    population = fp.Population.at_densities(DISC, seed=1)
     windows = (0.0, 50.0), (100.0, 300.0)
     maps = {
-        name: population.respond(indented(BALL, motion), *windows).maps for name, motion in TOUCHES.items()
+        name: population.respond(indented(BALL, motion), *windows).parts for name, motion in TOUCHES.items()
     }
     write_png(draw_mixed_responses, maps, IMAGES / "mixed_responses.png")
 
@@ -112,7 +112,7 @@ def linear_response(name: str, afferent: AnyAfferent) -> tuple[float, float]:
 def tuning() -> None:
     """Write the table and the figure of the tuning curves."""
     curves, rows = {}, []
-    for name, afferent in types_of_afferents().items():
+    for name, afferent in afferent_types().items():
         hold, per_um = linear_response(name, afferent)
         curves[name] = tuning_curve(afferent, FREQUENCIES_HZ, per_um, LIGHT.get(name, hold))
     seen = {name: observed_um(name) for name in OBSERVED}
@@ -203,7 +203,7 @@ def branched_area_mm2(name: str, times: float, seed: int) -> float:
 
     By the profile across the finger, the probe at a place acts on an end organ as by their distance.
     """
-    afferent = types_of_afferents()[name]
+    afferent = afferent_types()[name]
     count, reach_mm = BRANCHES[name]
     ends = fp.EndOrgans.scattered(np.zeros((seed + 1, 2)), count, reach_mm, seed=17).positions_mm[seed]
     grid = np.arange(-4.0, 4.01, 0.25)
@@ -220,7 +220,7 @@ def fields() -> None:
     """Write thresholds of indentation and areas of receptive fields, and their figure."""
     depths: dict[str, list[FloatArray]] = {}
     rows = []
-    for name, afferent in types_of_afferents().items():
+    for name, afferent in afferent_types().items():
         profiles = [ramp_traces(afferent, sites) for sites in profile_sites()]
         best = []
         for speed in SPEEDS_MM_PER_S:
@@ -228,14 +228,14 @@ def fields() -> None:
             best.append(min(each.min() for each in found))
             if speed == PROBING_MM_PER_S:
                 depths[name] = found
-        observed = published.INDENTATION_THRESHOLDS.value[published.TYPES.index(name)]
+        observed = published.INDENTATION_THRESHOLDS.value[list(published.TYPES).index(name)]
         rows.append([name, *(_micrometres(each) for each in best), f"{observed:g}"])
     _write_table(
         "indentation", ["type", "4 mm/s [µm]", "20 mm/s [µm]", "100 mm/s [µm]", "median of units [µm]"], rows
     )
     rows = []
     for name, units in (("RA", published.RA_VELOCITIES), ("PC", published.PC_VELOCITIES)):
-        slowest = velocity_threshold(types_of_afferents()[name], SITES[name])
+        slowest = velocity_threshold(afferent_types()[name], SITES[name])
         rows.append([name, f"{slowest:.1f}", "{:g} to {:g}".format(*units.value)])
     _write_table("velocity", ["type", "model [mm/s]", "units [mm/s]"], rows)
     rows, areas_of = [], {}
@@ -246,7 +246,7 @@ def fields() -> None:
             areas = [[branched_area_mm2(name, times, seed) for seed in range(8)] for times in TIMES_THRESHOLD]
             areas_of[name].append((np.median(areas[0]), np.median(areas[1])))
             branched = f"{np.median(areas[0]):.0f} to {np.median(areas[1]):.0f}"
-        observed = published.FIELD_AREAS.value[published.TYPES.index(name)]
+        observed = published.FIELD_AREAS.value[list(published.TYPES).index(name)]
         rows.append([name, f"{low:.1f} to {high:.1f}", branched, f"{observed:g}"])
     _write_table("fields", ["type", "one end organ [mm²]", "several [mm²]", "median of units [mm²]"], rows)
     write_png(lambda found: draw_fields(*found), (depths, areas_of), IMAGES / "afferent_fields.png")
@@ -273,7 +273,7 @@ def draw_fields(depths: dict[str, list[FloatArray]], areas: dict[str, list[tuple
                 (low, high), (row + 0.15 * branched,) * 2, color=colour, linestyle="-", marker=marker,
                 markersize=5.0, markerfacecolor="white" if branched else colour,
             )  # fmt: skip
-        median = published.FIELD_AREAS.value[published.TYPES.index(name)]
+        median = published.FIELD_AREAS.value[list(published.TYPES).index(name)]
         right.plot((median / 2.0, 2.0 * median), (row - 0.15,) * 2, color=GREY, linewidth=6.0, alpha=0.35)
         right.plot(median, row - 0.15, "x", color=BLACK, markersize=8.0)
     right.set(
@@ -304,7 +304,7 @@ def adaptation() -> None:
     skin = indented(BALL, fp.RampAndHold(depth_mm=1.0, hold_ms=12950.0))
     sites = [(X_MM + x, z) for x, z in product((-1.5, -1.0, -0.5, 0.0, 0.5, 1.0, 1.5), (0.0, 0.5, 1.0, 1.5))]
     found = {}
-    for name, afferent in types_of_afferents().items():
+    for name, afferent in afferent_types().items():
         traces = skin.sed(sites, afferent.dynamic_quantity, afferent.static_quantity)
         trains = afferent.spikes(traces)
         found[name] = max((trains[n] for n in range(len(sites))), key=len)

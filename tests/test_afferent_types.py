@@ -239,11 +239,9 @@ def test_one_end_organ_is_the_afferent_itself_and_two_are_their_weighted_sum():
     assert_allclose(halved.spikes.times_ms, half.spikes.times_ms, rtol=1e-12)
 
 
-@pytest.mark.parametrize(
-    "afferent", [fp.SAI(), fp.RA(), fp.PC(), fp.SAII()], ids=lambda each: type(each).__name__
-)
+@pytest.mark.parametrize("afferent", [fp.SAI(), fp.RA(), fp.PC(), fp.SAII()], ids=lambda each: each.type)
 def test_sites_that_move_too_little_are_silent_and_leave_the_others_as_they_are(afferent):
-    scale = {"SAI": 6.0, "RA": 2.0, "PC": 0.2, "SAII": 0.1}[type(afferent).__name__]
+    scale = {"SAI": 6.0, "RA": 2.0, "PC": 0.2, "SAII": 0.1}[afferent.type]
     heights = scale * np.geomspace(1e-4, 1.0, 40)
     quantity = afferent.static_quantity
     sed = traces(quantity, [0.0, 20.0, 300.0], np.outer([0.0, 1.0, 1.0], heights), [20.0])
@@ -288,18 +286,17 @@ def test_scattered_end_organs_lie_within_reach_and_depend_on_seed_and_number_onl
 
 
 def test_a_mixed_population_has_the_published_densities_and_one_response():
-    population = fp.MixedPopulation.at_densities(SQUARE, seed=4)
+    population = fp.Population.at_densities(SQUARE, seed=4)
     sizes = {name: len(part) for name, part in population.parts.items()}
     assert sizes == {"SAI": 70, "RA": 140, "PC": 21, "SAII": 10}
     assert sum(published.DENSITIES.value) == published.DENSITY_TOTAL.value == len(population)
     response = population.respond(FINGER)
-    assert list(response) == ["SAI", "RA", "PC", "SAII"]
-    assert len(response) == 4
-    assert len(response.spikes) == response.types.size == len(response.positions_mm) == len(population)
+    assert list(response.parts) == ["SAI", "RA", "PC", "SAII"]
+    assert len(response.spikes) == len(response.types) == len(response.positions_mm) == len(population)
     assert_array_equal(response.spikes[70], response["RA"].spikes[0])
     assert (response["SAI"].static_rate_hz > 0.0).any()
     assert not response["RA"].static_rate_hz.any()
-    alone = fp.MixedPopulation.at_densities(SQUARE, {"SAI": 70.0}, seed=4).respond(FINGER)
+    alone = fp.Population.at_densities(SQUARE, {"SAI": 70.0}, seed=4).respond(FINGER)
     assert_array_equal(alone["SAI"].spikes.times_ms, response["SAI"].spikes.times_ms)
     factors = SPARSE(SQUARE, {"RA": 140.0}, spread=0.4, seed=4).parts["RA"].sensitivity
     assert np.log(factors).std() == pytest.approx(0.4, abs=0.06)
@@ -307,7 +304,7 @@ def test_a_mixed_population_has_the_published_densities_and_one_response():
 
 
 ENERGY = press("stored", 1.0)
-SPARSE = fp.MixedPopulation.at_densities
+SPARSE = fp.Population.at_densities
 
 
 def own(respond):
@@ -319,7 +316,7 @@ test_bad_input_is_refused_in_one_sentence = refusals(
     (lambda: fp.RA(rise=0), ("rise",)),
     (lambda: fp.RA(threshold=-1.0), ("threshold",)),
     (lambda: fp.RA().spikes(ENERGY), "needs 'compressive_stress': got traces of 'stored'"),
-    (lambda: fp.RA(treshold=0.1), "treshold is no argument of RA: did you mean threshold"),
+    (lambda: fp.RA(treshold=0.1), "treshold is no argument of RapidlyAdapting: did you mean threshold"),
     (lambda: fp.OwnAfferent("sum"), "respond must be a function: got 'sum'"),
     (lambda: own(lambda sed: sed), "respond must return .* got Traces"),
     (lambda: own(lambda sed: fp.SpikeTrains.from_lists([])), "respond must return .* 1 in all: got 0 trains"),
@@ -334,10 +331,10 @@ test_bad_input_is_refused_in_one_sentence = refusals(
     (lambda: fp.Population.grid().respond(None), "skin must be like Skin, with sed: got None"),
     (lambda: fp.Population.grid(centre_mm=17.0), r"centre_mm must be a pair \[mm\]: got 17.0"),
     (lambda: fp.Population.grid(finger="child"), ("finger",)),
-    (lambda: fp.MixedPopulation([fp.Population.grid()]), ("parts",)),
-    (lambda: fp.MixedPopulation({"RA": fp.RA()}), "parts must be of type Population: got RA"),
+    (lambda: fp.Population.mixed([fp.Population.grid()]), ("parts",)),
+    (lambda: fp.Population.mixed({"RA": fp.RA()}), "parts must be of type Population: got RapidlyAdapting"),
     (lambda: SPARSE(SQUARE, {"RA": 0.0}), r"densities_per_cm2\['RA'\].*greater than 0"),
-    (lambda: SPARSE(SQUARE, {}), "needs at least one Population"),
+    (lambda: SPARSE(SQUARE, {}), "must hold at least one Population"),
     (lambda: SPARSE(SQUARE, {"FA": 10.0}), "type 'FA' without an afferent"),
     (lambda: SPARSE(SQUARE, {"X": 50.0}, {"X": None}), "afferents must be of type AnyAfferent: got None"),
     (lambda: SPARSE(SQUARE, {"RA": 9.0}).respond(FINGER)["SAI"], "must be one of RA: got 'SAI'"),

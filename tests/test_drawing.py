@@ -73,7 +73,6 @@ def results():
         "ResponseMap": response,
         "SpikeTrains": response.spikes,
         "Traces": skin.sed([(17.37, 0.0), (19.0, 0.0)]),
-        "MixedResponse": fp.MixedResponse({"SAI": response, "RA": response}),
         "SurfaceProfile": skin.surface_profile(),
         "HitRates": fp.HitRates([0.6, 0.9], [0.05, 0.02], seed=1),
         "FitResult": fitted(),
@@ -117,7 +116,7 @@ def test_rasters_begin_on_top_and_maps_have_distal_to_the_right(results):
         for what, into in (("raster", rasters), ("map", maps), ("pad", maps)):
             if what in drawings:
                 into.append(results[kind].plot(Figure().add_subplot(), what))
-    assert (len(rasters), len(maps)) == (4, 7)
+    assert (len(rasters), len(maps)) == (3, 6)
     for axes in rasters:
         bottom, top = axes.get_ylim()
         assert bottom > top
@@ -161,7 +160,7 @@ def test_few_sites_have_a_key_and_many_have_none(results):
     axes = fp.SpikeTrains.from_lists([[], []]).plot(Figure().add_subplot())
     assert "no afferent fires" in axes.texts[0].get_text()
     axes = Figure().add_subplot()
-    results["MixedResponse"].plot(axes, "map")
+    fp.ResponseMap.joined({"SAI": results["ResponseMap"], "RA": results["ResponseMap"]}).plot(axes, "map")
     axes.figure.draw_without_rendering()
     assert axes.get_legend().get_window_extent().x0 >= axes.get_window_extent().x1  # beside the map
     matplotlib.use("agg")
@@ -223,7 +222,7 @@ def test_tables_hold_the_numbers_of_the_result(results):
     for number, train in enumerate(response.spikes):
         assert spikes.time_ms[spikes.index == number].tolist() == train.tolist()
     assert response.to_xarray().spike_time_ms.units == "ms"
-    mixed = results["MixedResponse"].to_pandas()
+    mixed = fp.ResponseMap.joined({"SAI": results["ResponseMap"], "RA": results["ResponseMap"]}).to_pandas()
     assert mixed.type.value_counts().to_dict() == {"SAI": len(response.spikes), "RA": len(response.spikes)}
     fit = results["FitResult"]
     static = fit.to_pandas().query("phase == 'static'")

@@ -54,13 +54,13 @@ def test_every_number_comes_back_to_the_last_bit(tmp_path, columns, places):
 def mixed_response():
     one = replace(random_response(3), phases=ramp_and_hold_phases(50.0, 1000.0))
     later = fp.SpikeTrains.from_lists([one.spikes[39 - receptor] + 0.25 for receptor in range(40)])
-    return fp.MixedResponse({"RA": one, "own": replace(one, spikes=later, pitch_mm=2.5)})
+    return fp.ResponseMap.joined({"RA": one, "own": replace(one, spikes=later, pitch_mm=2.5)})
 
 
 def alike(read, written, within_ms):
-    assert list(read) == list(written)
-    assert read.types.tolist() == ["RA"] * 40 + ["own"] * 40
-    for name in written:
+    assert list(read.parts) == list(written.parts)
+    assert read.types == ("RA",) * 40 + ("own",) * 40
+    for name in written.parts:
         assert read[name].pitch_mm == written[name].pitch_mm
         assert_array_equal(read[name].positions_mm, written[name].positions_mm)
         for measure, values in written[name].measures.items():
@@ -72,7 +72,7 @@ def alike(read, written, within_ms):
 def test_mixed_responses_come_back_with_the_type_of_every_unit(tmp_path):
     written = mixed_response()
     alike(read_response_csv(fp.write_response_csv(tmp_path / "mixed.csv", written)), written, 0.0)
-    touches = {"edge": written, "flat": fp.MixedResponse({"RA": written["RA"], "own": written["own"]})}
+    touches = {"edge": written, "flat": fp.ResponseMap.joined({"RA": written["RA"], "own": written["own"]})}
     read = read_responses_nwb(fp.write_responses_nwb(tmp_path / "mixed.nwb", touches, pause_ms=250.0))
     assert list(read) == ["edge", "flat"]
     for name, response in read.items():

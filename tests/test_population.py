@@ -46,7 +46,7 @@ def test_the_default_grid_follows_the_finger_that_is_touched_and_others_stay():
     assert_allclose(response.positions_mm, expected.positions_mm, rtol=1e-12)
     assert_allclose(response.static_rate_hz, expected.static_rate_hz, rtol=1e-9)
     assert response.static_rate_hz.max() > 0.0
-    mixed = fp.MixedPopulation({"SAI": fp.Population.grid(afferent=SENSITIVE)}).respond(skin)
+    mixed = fp.Population.mixed({"SAI": fp.Population.grid(afferent=SENSITIVE)}).respond(skin)
     assert_array_equal(mixed["SAI"].positions_mm, response.positions_mm)
     stays = fp.Population.grid(centre_mm=CENTRE_MM, afferent=SENSITIVE).respond(skin)
     assert_array_equal(stays.positions_mm, fp.Population.grid().positions_mm)

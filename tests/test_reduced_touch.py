@@ -14,7 +14,7 @@ import fingerpad as fp
 from fingerpad.cli import main
 from fingerpad.core.signals import Traces
 from fingerpad.geometry.motion import Pose
-from fingerpad.neuron.mixed_population import types_of_afferents
+from fingerpad.neuron.afferent_types import afferent_types
 from fingerpad.reduction.building import joint_bounds, largest_errors
 from fingerpad.reduction.interpolation import Axis, chebyshev_points, lagrange
 from fingerpad.reduction.model import AT_ONCE
@@ -305,7 +305,7 @@ OWN = fp.OwnAfferent(
 
 @pytest.mark.parametrize(
     "afferent",
-    [fp.Afferent(), *types_of_afferents().values(), fp.Afferent(static_quantity="stored"), OWN],
+    [fp.Afferent(), *afferent_types().values(), fp.Afferent(static_quantity="stored"), OWN],
     ids=lambda afferent: type(afferent).__name__,
 )
 def test_streamed_spikes_are_those_of_one_go(afferent: fp.Afferent) -> None:

@@ -35,7 +35,7 @@ from fingerpad.experiments.descriptions.touch import OUTPUTS, described_touch
 from fingerpad.experiments.discrimination.task_stimuli import task_population
 from fingerpad.export.touch_outputs import WRITERS, as_described, check_described
 from fingerpad.geometry import surface_files
-from fingerpad.neuron.mixed_population import types_of_afferents
+from fingerpad.neuron.afferent_types import afferent_types
 from tests.mutations import CHANGES, VALUES, changed, places
 
 ROOT = Path(__file__).parents[1]
@@ -411,14 +411,14 @@ def test_the_estimate_grows_with_mesh_steps_force_and_friction():
     assert more[0].memory_mb > base.memory_mb
 
 
-def test_types_of_afferents_by_name_and_mixed_in_files():
+def test_afferent_types_by_name_and_mixed_in_files():
     """One type by its name, several by their densities, and the same names in a task."""
     one = described_touch({"object": "sphere", "afferents": {"afferent": "RA"}}).population
     assert one.afferent == fp.RA()
     densities = {"SAI": 70, "RA": 140, "PC": 21, "SAII": 9}
     asked = {"layout": "poisson-disc", "region": {"shape": "pad"}, "densities_per_cm2": densities}
     mixed = described_touch({"object": "sphere", "afferents": asked}).population
-    assert {name: part.afferent for name, part in mixed.parts.items()} == types_of_afferents()
+    assert {name: part.afferent for name, part in mixed.parts.items()} == afferent_types()
     counts = np.array([len(part) for part in mixed.parts.values()])
     assert counts / counts[0] == pytest.approx([1.0, 2.0, 0.3, 9.0 / 70.0], rel=0.1)
     spheres = {"vary": "object.curvature_per_m", "values": [287, 340]}

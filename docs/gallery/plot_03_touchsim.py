@@ -12,7 +12,7 @@ import fingerpad as fp
 
 finger = fp.Fingertip()
 pad = fp.UnrolledSkin(finger)
-population = fp.MixedPopulation.at_densities(pad.pad(), place=pad.points, seed=1)
+population = fp.Population.at_densities(pad.pad(), place=pad.points, seed=1)
 pin = fp.FlatPunch(diameter_mm=1.0, edge_radius_mm=0.3)
 skin = fp.indent(finger, pin, fp.RampAndHold(depth_mm=0.5, hold_ms=200))
 response = population.respond(skin)

@@ -98,9 +98,8 @@ from fingerpad.neuron.afferent_types import RA as RA
 from fingerpad.neuron.afferent_types import SAI as SAI
 from fingerpad.neuron.afferent_types import SAII as SAII
 from fingerpad.neuron.afferent_types import OwnAfferent as OwnAfferent
+from fingerpad.neuron.afferent_types import afferent_of as afferent_of
 from fingerpad.neuron.end_organs import EndOrgans as EndOrgans
-from fingerpad.neuron.mixed_population import MixedPopulation as MixedPopulation
-from fingerpad.neuron.mixed_population import MixedResponse as MixedResponse
 from fingerpad.neuron.population import Population as Population
 from fingerpad.neuron.tuning import tuning_curve as tuning_curve
 from fingerpad.psychophysics.psychometric import fit_psychometric as fit_psychometric

@@ -6,9 +6,10 @@ Skin -> `Traces` -> `Traces` of a current -> `SpikeTrains` -> `ResponseMap` -> `
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import field, fields, replace
 from inspect import signature
+from types import MappingProxyType
 from typing import Annotated, Any, Protocol, runtime_checkable
 
 import numpy as np
@@ -446,8 +447,9 @@ class ResponseMap(Result):
         which is 0 without an interval; or spikes over the length of the window.
     quantity : str, optional
         What the static term of the afferents follows, a name of `SkinResponse.sample`. Default: SED.
-    types : tuple of str
-        Type of each receptor, in a mixed population; empty where all have one.
+    parts : mapping of str to ResponseMap
+        In a mixed population, the response of each type, which follow each other: `response["RA"]`, or
+        `response[name] for name in response.parts`. From `joined`.
     """
 
     positions_mm: FiniteMatrix
@@ -461,23 +463,74 @@ class ResponseMap(Result):
     windows_ms: tuple[Numbers, Numbers] | None = None
     rate_measure: Annotated[str, choice((INTERVAL, COUNT))] = INTERVAL
     quantity: str = STORED_ENERGY
-    types: Many[str] = ()
+    parts: Mapping[str, ResponseMap] = field(default_factory=lambda: MappingProxyType({}))
 
-    @property
-    def by_type(self) -> dict[str, ResponseMap]:
-        """Maps of the afferents of each type, by name; empty where there are no types."""
+    @classmethod
+    def joined(cls, parts: Mapping[str, ResponseMap]) -> ResponseMap:
+        """Join responses of several types of afferents to the same touch.
+
+        Parameters
+        ----------
+        parts : mapping of str to ResponseMap
+            One per type, by its name.
+        """
+        maps = list(parts.values())
+        measures: dict[str, Any] = {
+            name: np.concatenate([each.measures[name] for each in maps]) for name in maps[0].measures
+        }
+        return replace(
+            maps[0],
+            positions_mm=np.concatenate([each.positions_mm for each in maps]),
+            pitch_mm=min(each.pitch_mm for each in maps),
+            spikes=SpikeTrains.joined([each.spikes for each in maps]),
+            parts=MappingProxyType(dict(parts)),
+            **measures,
+        )
+
+    def of_types(self, types: Sequence[str], pitches_mm: ArrayLike | None = None) -> ResponseMap:
+        """Part a response of one map by the type of each receptor, for example as a file tells them.
+
+        Parameters
+        ----------
+        types : sequence of str
+            One per receptor; those of a type follow each other. Empty for a response as it is.
+        pitches_mm : array_like (n_receptors,), optional
+            Distance between neighbours of the same type; by default that of the map. [mm]
+        """
+        if not len(types):
+            return self
+        if len(types) != len(self.spikes):
+            raise InputError("types", f"needs one per receptor, {len(self.spikes)}", str(len(types)))
+        pitches = np.full(len(types), self.pitch_mm) if pitches_mm is None else np.asarray(pitches_mm)
         parts = {}
-        for name in dict.fromkeys(self.types):
-            rows = np.flatnonzero(np.array(self.types) == name)
+        for name in dict.fromkeys(types):
+            rows = np.flatnonzero(np.array(types) == name)
             measures: dict[str, Any] = {key: values[rows] for key, values in self.measures.items()}
             parts[name] = replace(
                 self,
                 positions_mm=self.positions_mm[rows],
+                pitch_mm=float(pitches[rows[0]]),
                 spikes=SpikeTrains.from_lists([self.spikes[row] for row in rows.tolist()]),
-                types=(),
                 **measures,
             )
-        return parts
+        return self.joined(parts)
+
+    @property
+    def types(self) -> tuple[str, ...]:
+        """Type of each receptor of a mixed population; empty where all are of one type."""
+        return tuple(name for name, part in self.parts.items() for _ in range(len(part.spikes)))
+
+    @property
+    def pitches_mm(self) -> FloatArray:
+        """Distance between neighbours of the same type, of each receptor, (n_receptors,). [mm]"""
+        several = list(self.parts.values()) or [self]
+        return np.repeat([each.pitch_mm for each in several], [len(each.spikes) for each in several])
+
+    def __getitem__(self, name: str) -> ResponseMap:
+        if name not in self.parts:
+            known = ", ".join(self.parts) or "a mixed population"
+            raise InputError("type", f"must be one of {known}", repr(name))
+        return self.parts[name]
 
     @property
     def measures(self) -> dict[str, FloatArray]:
@@ -489,6 +542,10 @@ class ResponseMap(Result):
 
     def __repr__(self) -> str:
         firing = np.count_nonzero(self.spike_count)
+        if self.parts:
+            counts = {name: each.spike_count for name, each in self.parts.items()}
+            parts = (f"{np.count_nonzero(n)} of {n.size} {name} fire {n.sum()}" for name, n in counts.items())
+            return f"ResponseMap({', '.join(parts)} spikes)"
         return (
             f"ResponseMap({firing} of {len(self.spikes)} afferents fire {self.spikes.times_ms.size} spikes, "
             f"at most {self.dynamic_rate_hz.max(initial=0.0):.3g} spikes/s in the ramp and "
@@ -528,7 +585,6 @@ class ResponseMap(Result):
             ("dynamic_rate_hz", self.dynamic_rate_hz.size),
             ("static_rate_hz", self.static_rate_hz.size),
             ("first_spike_latency_ms", self.first_spike_latency_ms.size),
-            ("types", len(self.types) or n),
         ):
             if size != n:
                 raise InputError(f"ResponseMap needs one entry of {name} per receptor: got {size} for {n}.")

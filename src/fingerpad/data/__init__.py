@@ -7,6 +7,7 @@ contains the results for comparison.
 from types import ModuleType
 
 from fingerpad.data import afferents, fingers, fingertip, neuron, paper, protocol, psychophysics, tissues
+from fingerpad.data.afferents import TYPES
 from fingerpad.data.observations import (
     BarObservations,
     DeflectionObservations,
@@ -58,6 +59,9 @@ def all_published() -> tuple[Published, ...]:
     >>> {number.status for number in all_published()} == {"paper", "read", "recalled", "assumed"}
     True
     """
-    return tuple(
-        value for module in _MODULES for value in vars(module).values() if isinstance(value, Published)
-    )
+    found: list[object] = []
+    for value in (value for module in _MODULES for value in vars(module).values()):
+        found += value.values() if isinstance(value, dict) else [value]
+        if value is TYPES:
+            found += [each for row in TYPES.values() for each in (row.density_per_cm2, *row.numbers.values())]
+    return tuple({id(each): each for each in found if isinstance(each, Published)}.values())

@@ -4,6 +4,10 @@ Parameters with the status *assumed* were fitted by us to the observations below
 docs/afferents.md describes.
 """
 
+from collections.abc import Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+
 from fingerpad.data.published import Published, Source
 
 _SINUSOIDS = Source(
@@ -13,18 +17,16 @@ _SINUSOIDS = Source(
 )
 _SHARED_REFRACTORY = Source("shorter than any interval in RA and PC trains that are entrained", "assumed")
 
-RA_QUANTITY = "compressive_stress"
-"""Quantity that RA afferents follow: Meissner corpuscles lie at the depth of the Merkel cells."""
-RA_THRESHOLD = _SINUSOIDS("RA: band-passed stress at the threshold of the membrane", 0.082, "kPa")
-RA_CORNER = _SINUSOIDS("RA: corner frequency of the band pass", 60.0, "Hz")
-RA_RISE = _SINUSOIDS("RA: power of the frequency below the corner", 1.0, "1")
-RA_FALL = _SINUSOIDS("RA: power of the frequency above the corner", 1.0, "1")
-RA_RETRACTION = _SINUSOIDS("RA: share of the response to retraction", 0.3, "1")
-RA_MEMBRANE = _SINUSOIDS("RA: time constant of the membrane", 5.0, "ms")
-RA_REFRACTORY = _SHARED_REFRACTORY("RA: refractory period", 2.0, "ms")
-
-PC_QUANTITY = "deep_displacement"
-"""Quantity that PC afferents follow: the corpuscle lies deep; its thresholds are known as displacements."""
+_RA: dict[str, Published[float] | float | str] = {
+    "threshold": _SINUSOIDS("RA: band-passed stress at the threshold of the membrane", 0.082, "kPa"),
+    "corner_hz": _SINUSOIDS("RA: corner frequency of the band pass", 60.0, "Hz"),
+    "rise": _SINUSOIDS("RA: power of the frequency below the corner", 1.0, "1"),
+    "fall": _SINUSOIDS("RA: power of the frequency above the corner", 1.0, "1"),
+    "retraction": _SINUSOIDS("RA: share of the response to retraction", 0.3, "1"),
+    "membrane_ms": _SINUSOIDS("RA: time constant of the membrane", 5.0, "ms"),
+    "refractory_ms": _SHARED_REFRACTORY("RA: refractory period", 2.0, "ms"),
+    "quantity": "compressive_stress",  # Meissner corpuscles lie at the depth of the Merkel cells.
+}
 PC_REACH = Published(
     "PC: radius of the skin whose mean displacement the corpuscle follows",
     3.0,
@@ -32,15 +34,17 @@ PC_REACH = Published(
     "chosen by us for the published area of the field (FIELD_AREAS); corpuscles lie 2 to 3 mm deep",
     "assumed",
 )
-PC_THRESHOLD = _SINUSOIDS("PC: band-passed displacement at the threshold of the membrane", 4.84e-5, "mm")
-PC_CORNER = _SINUSOIDS("PC: corner frequency of the band pass", 500.0, "Hz")
-PC_RISE = _SINUSOIDS("PC: power of the frequency below the corner", 2.0, "1")
-PC_FALL = _SINUSOIDS("PC: power of the frequency above the corner", 2.0, "1")
-PC_RETRACTION = _SINUSOIDS("PC: share of the response to retraction", 0.5, "1")
-PC_MEMBRANE = _SINUSOIDS("PC: time constant of the membrane", 1.0, "ms")
-PC_REFRACTORY = _SHARED_REFRACTORY("PC: refractory period", 1.0, "ms")
-
-SAI_SMOOTHING = Published(
+_PC: dict[str, Published[float] | float | str] = {
+    "threshold": _SINUSOIDS("PC: band-passed displacement at the threshold of the membrane", 4.84e-5, "mm"),
+    "corner_hz": _SINUSOIDS("PC: corner frequency of the band pass", 500.0, "Hz"),
+    "rise": _SINUSOIDS("PC: power of the frequency below the corner", 2.0, "1"),
+    "fall": _SINUSOIDS("PC: power of the frequency above the corner", 2.0, "1"),
+    "retraction": _SINUSOIDS("PC: share of the response to retraction", 0.5, "1"),
+    "membrane_ms": _SINUSOIDS("PC: time constant of the membrane", 1.0, "ms"),
+    "refractory_ms": _SHARED_REFRACTORY("PC: refractory period", 1.0, "ms"),
+    "quantity": "deep_displacement",  # The corpuscle lies deep; its thresholds are known as displacements.
+}
+SMOOTHING = Published(
     "SAI and SAII: time constant by which the dynamic term lags behind",
     17.0,
     "ms",
@@ -48,18 +52,23 @@ SAI_SMOOTHING = Published(
     "hardly determine (docs/single-unit.md, slow dynamic term)",
     "assumed",
 )
-SAII_QUANTITY = "skin_stretch"
-"""Quantity that SAII afferents follow: Knibestöl 1975 tells them from SAI by their response to stretch."""
 _STRETCH = Source(
     "set so that the afferent first fires at the published indentation threshold (INDENTATION_THRESHOLDS), "
     "1 mm punch, default tissues; rates of tens per second at strains of some per cent",
     "assumed",
 )
-SAII_STATIC_GAIN = _STRETCH("SAII: static gain, inverse of the strain at threshold", 80.0, "1")
-SAII_DYNAMIC_GAIN = _STRETCH("SAII: dynamic gain", 4000.0, "ms")
-SAII_MEMBRANE = _STRETCH("SAII: time constant of the membrane", 80.0, "ms")
-
-TYPES = ("SAI", "RA", "PC", "SAII")  # The four types, in the order of the rows below.
+_SAII: dict[str, Published[float] | float | str] = {
+    "intercept_ma": 0.0,
+    "static_gain": _STRETCH("SAII: static gain, inverse of the strain at threshold", 80.0, "1"),
+    "dynamic_gain": _STRETCH("SAII: dynamic gain", 4000.0, "ms"),
+    "time_constant_ms": _STRETCH("SAII: time constant of the membrane", 80.0, "ms"),
+    "capacitance_mf": 80.0,  # Equal to the time constant, so that the resistance is 1.
+    "threshold_mv": 1.0,
+    "smoothing_ms": SMOOTHING,
+    # Knibestöl 1975 tells SAII from SAI by their response to stretch.
+    "dynamic_quantity": "skin_stretch",
+    "static_quantity": "skin_stretch",
+}
 
 _DENSITY_TOTAL = Source("Johansson & Vallbo 1979, J Physiol 286:283, abstract", "read")
 DENSITY_TOTAL = _DENSITY_TOTAL("density of all tactile afferents in the fingertip", 241.0, "1/cm2")
@@ -71,6 +80,46 @@ DENSITIES = Published(
     "(49 is also quoted, with which the sum would be 280)",
     "recalled",
 )
+
+
+Number = Published[float] | float
+
+
+def value_of(number: Number | str) -> float | str:
+    """Return a number without its source."""
+    return number.value if isinstance(number, Published) else number
+
+
+@dataclass(frozen=True)
+class AfferentRow:
+    """One type of afferents: the chain from the skin to the spikes, its numbers, and how dense it is."""
+
+    chain: str
+    """"slow", the paper's Eqs. 1-5; or "rapid", a band pass and a membrane."""
+    density_per_cm2: Number
+    """In the fingertip. [1/cm2]"""
+    numbers: Mapping[str, Number | str]
+    """By the fields of the chain; those that are absent have its defaults."""
+    of_tissues: bool = False
+    """Whether the defaults are those that were fitted with the tissues."""
+
+    @property
+    def values(self) -> dict[str, float | str]:
+        """The numbers without their sources; powers are whole."""
+        plain = {name: value_of(number) for name, number in self.numbers.items()}
+        return {name: int(value) if name in ("rise", "fall") else value for name, value in plain.items()}
+
+
+TYPES: Mapping[str, AfferentRow] = MappingProxyType(
+    {
+        "SAI": AfferentRow("slow", DENSITIES.value[0], {"smoothing_ms": SMOOTHING}, of_tissues=True),
+        "RA": AfferentRow("rapid", DENSITIES.value[1], _RA),
+        "PC": AfferentRow("rapid", DENSITIES.value[2], _PC),
+        "SAII": AfferentRow("slow", DENSITIES.value[3], _SAII),
+    }
+)
+"""The types of afferents by their names: one more row is one more type, in Python, files and commands."""
+
 INDENTATION_THRESHOLDS = Published(
     "median indentation that makes a unit fire: SAI, RA, PC, SAII",
     (56.5, 13.8, 9.2, 331.0),

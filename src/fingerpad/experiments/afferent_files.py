@@ -12,7 +12,7 @@ from fingerpad.data.tissues import DEFAULT_TISSUES
 from fingerpad.experiments import schemas
 from fingerpad.mechanics.materials import Tissues
 from fingerpad.neuron.afferent import PARAMETER_NAMES, Afferent, AnyAfferent
-from fingerpad.neuron.mixed_population import types_of_afferents
+from fingerpad.neuron.afferent_types import afferent_types
 
 CHOSEN = "fingerpad fit of chosen numbers"  # Format of a fit of some numbers of one type.
 
@@ -26,7 +26,7 @@ def fitted_afferent(path: Path, tissues: str | Tissues = DEFAULT_TISSUES) -> Any
         raise InputError(f"afferent: {error}") from error
     try:
         if "fitted" in values:
-            kind: Any = types_of_afferents(tissues)[values["type"]]
+            kind: Any = afferent_types(tissues)[values["type"]]
             return cast(AnyAfferent, replace(kind, **values["fitted"]))
         column = "human" if tissues == "human" else "paper"
         fitted = values["fit"] if "fit" in values else values[column]["single_unit"]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 import io
 import warnings
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from datetime import UTC, datetime
 from importlib.metadata import version
@@ -24,7 +24,7 @@ from fingerpad.core.units import MS_PER_S
 from fingerpad.core.values import Finite, FloatArray, NotNegative, instance, positive
 from fingerpad.experiments.recording_files import SUFFIXES_OF_NWB
 from fingerpad.export.dataset import library
-from fingerpad.neuron.mixed_population import MixedResponse, one_map
+from fingerpad.neuron.afferent_types import afferent_types
 from fingerpad.neuron.response_maps import recruitment_rank
 
 PLACES = {2: ("x_mm", "z_mm"), 3: ("x_mm", "y_mm", "z_mm")}
@@ -44,7 +44,7 @@ MEASURED = ("dynamic_rate_hz", "static_rate_hz", "first_spike_latency_ms")
 
 
 @checked
-def write_response_csv(path: Path, response: ResponseMap | MixedResponse) -> Path:
+def write_response_csv(path: Path, response: ResponseMap) -> Path:
     """Write one row per receptor: position, rates, latency of the first spike, and all spike times.
 
     Spike times are one entry, separated by spaces, as `fingerpad fit` reads them. A value that does not
@@ -55,7 +55,7 @@ def write_response_csv(path: Path, response: ResponseMap | MixedResponse) -> Pat
     ----------
     path : Path
         The file, in UTF-8, written as a whole; folders are created if needed.
-    response : ResponseMap or MixedResponse
+    response : ResponseMap
         Responses of a population to one indentation.
 
     Raises
@@ -74,39 +74,37 @@ def write_response_csv(path: Path, response: ResponseMap | MixedResponse) -> Pat
     0,17.0,0.5,1.0,36.4,0.0,,,2,12.5,1.0,12.5 40.0
     1,17.0,1.5,1.0,0.0,0.0,,,0,,,
     """
-    joined = one_map(response)
     text = io.StringIO()
     table = csv.writer(text, lineterminator="\n")
-    kind = (TYPE,) if joined.types else ()
-    places = PLACES[joined.positions_mm.shape[1]]
+    kind = (TYPE,) if response.types else ()
+    places = PLACES[response.positions_mm.shape[1]]
     table.writerow(("receptor", *kind, *places, PITCH, *ANSWERS))
-    table.writerows(_rows(joined, pitches_mm(response)))
+    table.writerows(_rows(response))
     write_atomically(path_of("path", path), text.getvalue().encode())
     return path_of("path", path)
 
 
-def pitches_mm(response: ResponseMap | MixedResponse) -> FloatArray:
-    """Distance between neighbours of the same type, of every receptor, (n_receptors,). [mm]"""
-    maps = list(response.maps.values()) if isinstance(response, MixedResponse) else [response]
-    return np.repeat([each.pitch_mm for each in maps], [len(each.spikes) for each in maps])
-
-
-def by_type(response: ResponseMap, pitches: FloatArray) -> ResponseMap | MixedResponse:
-    """Return what was written: the map, or parts of it with their pitches where it has types."""
-    if not response.types:
-        return response
-    of_type = dict(zip(response.types, pitches.tolist(), strict=True))
-    return MixedResponse(
+def by_type(response: ResponseMap, types: Sequence[str], pitches_mm: FloatArray) -> ResponseMap:
+    """Part what was read by the types of the afferents, whose rates are measured as those of each type."""
+    parted = response.of_types(types, pitches_mm)
+    if not parted.parts:
+        return parted
+    known = afferent_types()
+    return ResponseMap.joined(
         {
-            name: replace(part, pitch_mm=of_type[name])
-            for name, part in MixedResponse.of(response).maps.items()
+            name: replace(
+                part,
+                rate_measure=getattr(known.get(name), "rate_measure", part.rate_measure),
+                quantity=getattr(known.get(name), "static_quantity", part.quantity),
+            )
+            for name, part in parted.parts.items()
         }
     )
 
 
-def _rows(response: ResponseMap, pitches: FloatArray) -> Iterator[list[object]]:
+def _rows(response: ResponseMap) -> Iterator[list[object]]:
     ranked = {"recruitment_rank": recruitment_rank(response.first_spike_latency_ms)}
-    columns = [pitches]
+    columns = [response.pitches_mm]
     columns += [ranked[name] if name in ranked else getattr(response, name) for name in ANSWERS[:-1]]
     places = zip(response.positions_mm.tolist(), *(column.tolist() for column in columns), strict=True)
     for receptor, (place, *row) in enumerate(places):
@@ -116,7 +114,7 @@ def _rows(response: ResponseMap, pitches: FloatArray) -> Iterator[list[object]]:
 
 
 @checked
-def read_response_csv(path: Path) -> ResponseMap | MixedResponse:
+def read_response_csv(path: Path) -> ResponseMap:
     """Read what `write_response_csv` wrote."""
     rows = list(csv.DictReader(io.StringIO(read_text(path_of("path", path)))))
     have = list(rows[0]) if rows else []
@@ -144,10 +142,9 @@ def read_response_csv(path: Path) -> ResponseMap | MixedResponse:
         positions_mm=np.column_stack([numbers(column) for column in places]),
         pitch_mm=float(pitches.min()),
         spikes=spikes,
-        types=tuple(row[TYPE] for row in rows) if TYPE in have else (),
         **measured,
     )
-    return by_type(response, pitches)
+    return by_type(response, [row[TYPE] for row in rows] if TYPE in have else (), pitches)
 
 
 _RESOLUTION_S = 1e-9  # Spike times are roots of a closed form; those of two processors differ by less. [s]
@@ -156,7 +153,7 @@ _RESOLUTION_S = 1e-9  # Spike times are roots of a closed form; those of two pro
 @checked
 def write_responses_nwb(
     path: Path,
-    responses: Mapping[str, ResponseMap | MixedResponse],
+    responses: Mapping[str, ResponseMap],
     duration_ms: Finite | None = None,
     pause_ms: NotNegative = 1000.0,
     started: datetime | None = None,
@@ -172,7 +169,7 @@ def write_responses_nwb(
     ----------
     path : Path
         The file, .nwb, .h5 or .hdf5, written as a whole; folders are created if needed.
-    responses : mapping of str to ResponseMap or MixedResponse
+    responses : mapping of str to ResponseMap
         Responses of the same receptors, by the names of the touches. Each lasts as long as its motion.
     duration_ms : float, optional
         Duration of all touches, for responses that do not know their own. [ms]
@@ -202,7 +199,7 @@ def write_responses_nwb(
     began = started or datetime.now(UTC)
     if began.tzinfo is None:
         raise InputError("started", "must have a time zone, such as datetime.UTC", str(began.isoformat()))
-    touches = {name: one_map(response) for name, response in responses.items()}
+    touches = dict(responses)
     positions_mm, durations_ms = _places(touches), _durations(touches, duration_ms)
     first = next(iter(touches.values()))
     onsets_ms = np.cumsum(durations_ms + pause_ms) - durations_ms - pause_ms
@@ -244,7 +241,7 @@ def write_responses_nwb(
             session.add_unit_column(
                 name, "in each trial, in the unit at the end of the name; NaN if there is none"
             )
-        pitches = pitches_mm(next(iter(responses.values())))
+        pitches = next(iter(responses.values())).pitches_mm
         for receptor, place in enumerate(positions_mm.tolist()):
             trains = [answer.spikes[receptor] for answer in touches.values()]
             times_ms = [onset + train for onset, train in zip(onsets_ms, trains, strict=True)]
@@ -268,7 +265,7 @@ def write_responses_nwb(
 
 
 @checked
-def read_responses_nwb(path: Path) -> dict[str, ResponseMap | MixedResponse]:
+def read_responses_nwb(path: Path) -> dict[str, ResponseMap]:
     """Read what `write_responses_nwb` wrote."""
     pynwb = require_pynwb()
     try:
@@ -285,7 +282,7 @@ def read_responses_nwb(path: Path) -> dict[str, ResponseMap | MixedResponse]:
         ) from error
 
 
-def _responses(session: Any) -> dict[str, ResponseMap | MixedResponse]:
+def _responses(session: Any) -> dict[str, ResponseMap]:
     units, trials = session.units, session.trials
     places = PLACES[3 if "y_mm" in units.colnames else 2]
     known = {"spike_times", "obs_intervals", TYPE, PITCH, *places}
@@ -311,10 +308,10 @@ def _responses(session: Any) -> dict[str, ResponseMap | MixedResponse]:
             ),
             duration_ms=MS_PER_S * (stop - start),
             phases=tuple(phases.get(name, ())),
-            types=tuple(units[TYPE][:]) if TYPE in units.colnames else (),
             **measures,
         )
-        found[str(name)] = by_type(response, np.asarray(units[PITCH][:]))
+        types = list(units[TYPE][:]) if TYPE in units.colnames else ()
+        found[str(name)] = by_type(response, types, np.asarray(units[PITCH][:]))
     return found
 
 

@@ -24,7 +24,6 @@ if TYPE_CHECKING:
     from fingerpad.experiments.discrimination.analysis import TaskResult
     from fingerpad.experiments.fit.results import FitResult
     from fingerpad.inference.spike_fit import SpikeFit
-    from fingerpad.neuron.mixed_population import MixedResponse
     from fingerpad.psychophysics.psychometric import PsychometricFit
     from fingerpad.reduction.streaming import ReducedSample
     from fingerpad.skin.sampling import SkinResponse, SurfaceProfile
@@ -66,18 +65,10 @@ def response_columns(response: ResponseMap) -> Columns:
     )
     return {
         "afferent": np.arange(len(response.spikes)),
+        **({"type": response.types} if response.types else {}),
         **dict(zip(axes, response.positions_mm.T, strict=True)),
         **{name: getattr(response, name) for name in rates},
         "spikes": response.spike_count,
-    }
-
-
-def mixed_columns(response: MixedResponse) -> Columns:
-    """Those of `response_columns` and the type, by afferent."""
-    parts = [response_columns(part) for part in response.maps.values()]
-    columns = {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
-    return {"afferent": np.arange(len(response.types)), "type": response.types} | {
-        name: values for name, values in columns.items() if name != "afferent"
     }
 
 
@@ -155,7 +146,6 @@ TABLES: Mapping[str, Callable[[Any], Columns]] = {
     "Traces": traces_columns,
     "SpikeTrains": spike_columns,
     "ResponseMap": response_columns,
-    "MixedResponse": mixed_columns,
     "HitRates": hit_rate_columns,
     "PsychometricFit": psychometric_columns,
     "FitResult": fit_columns,

@@ -146,8 +146,7 @@ def setting_response(data: xarray.Dataset, **where: int) -> ResponseMap:
         duration_ms=float(np.nanmax(one["time_ms"].values)),
         phases=phases,
         windows_ms=rate_windows_ms(phases, asked.dynamic, asked.static),
-        types=described.population.types,
-    )
+    ).of_types(described.population.types)
 
 
 @checked

@@ -20,7 +20,7 @@ from fingerpad.inference.fitting.methods import Bounds
 from fingerpad.inference.rate_model import Rates, evaluate_rows
 from fingerpad.inference.rate_problem import RateProblem
 from fingerpad.inference.recordings import RateRecordings
-from fingerpad.neuron.afferent import AnyAfferent
+from fingerpad.neuron.afferent import AnyAfferent, type_of
 from fingerpad.neuron.spikes import RATE_OF, Windows, rate_windows_ms
 
 LARGEST_FACTOR = 30.0  # How far a fitted number may lie from that of the afferent given, as a factor.
@@ -134,7 +134,7 @@ def fit_afferent(
         afferent, tuple(free), (traces,) if isinstance(traces, Traces) else tuple(traces), windows_ms
     )
     if not model.names:
-        raise InputError("free", f"must name at least one number of {type(afferent).__name__}", "none")
+        raise InputError("free", f"must name at least one number of {type_of(afferent)}", "none")
     problem = RateProblem(model, recordings)
     low = np.full(len(model.names), -np.log(LARGEST_FACTOR))
     high = np.log([_largest_factor(afferent, name) for name in model.names])

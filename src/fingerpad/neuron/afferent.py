@@ -1,4 +1,4 @@
-"""One SAI afferent: strain energy density -> current -> spikes -> rates."""
+"""A slowly adapting afferent: strain energy density -> current -> spikes -> rates (paper, Eqs. 1-10)."""
 
 from __future__ import annotations
 
@@ -16,6 +16,7 @@ from fingerpad.core.threads import in_blocks
 from fingerpad.core.units import SKIN_QUANTITY_UNITS, gain_unit, units_of
 from fingerpad.core.values import Finite, FloatArray, NotNegative, float_array, one_of
 from fingerpad.data import neuron
+from fingerpad.neuron.band_pass import resampled, smoothed_rate
 from fingerpad.neuron.lif import LeakyIntegrateAndFire
 from fingerpad.neuron.spikes import Window, firing_rate_hz, rate_windows_ms
 from fingerpad.neuron.transduction import Drive, Transduction, drive
@@ -97,6 +98,11 @@ def check_known_quantities(afferent: Follows) -> None:
         one_of(name, getattr(afferent, name), tuple(SKIN_QUANTITY_UNITS))
 
 
+def type_of(afferent: object) -> str:
+    """Name of the type of an afferent: that of its class where it has none."""
+    return str(getattr(afferent, "type", type(afferent).__name__))
+
+
 _NEEDED = ("dynamic_quantity", "static_quantity", "spikes")
 
 
@@ -131,6 +137,12 @@ class Afferent:
     initial_mv : float, optional
         Potential of the membrane at the start. By default that at rest, beta tau/C, so that spikes do not
         depend on how long nothing happened before a touch. [mV]
+    smoothing_ms : float
+        Time constant tau_s of a low pass before the dynamic term, which then follows |S'| with
+        tau_s S' + S = Q; 0, as in the paper, for none. It makes an afferent right under vibration: the rate
+        of change of a fast one would otherwise make it as sensitive at 400 Hz as at 20 Hz. [ms]
+    type : str
+        Name of its type, of `fingerpad.data.afferents.TYPES` or of one's own.
 
     Examples
     --------
@@ -154,6 +166,8 @@ class Afferent:
     dynamic_quantity: str = neuron.HUMAN_QUANTITY
     static_quantity: str = neuron.HUMAN_QUANTITY
     initial_mv: Finite | None = None
+    smoothing_ms: NotNegative = 0.0
+    type: str = "SAI"
 
     def __post_init__(self) -> None:
         check_known_quantities(self)
@@ -314,6 +328,10 @@ class Afferent:
         """
         check_quantities(self, traces)
         if isinstance(traces, Drive):
+            if self.smoothing_ms:
+                raise InputError(
+                    "traces", "must be Traces, since smoothing_ms smooths those of the skin", "a Drive"
+                )
             return SpikeTrains.joined(
                 in_blocks(lambda sites: self._fired(traces.part(sites)), traces.n_sites)
             )
@@ -326,11 +344,19 @@ class Afferent:
 
     def _driven(self, traces: Traces) -> Drive:
         """Resample what the two terms follow, and the rate of change of the dynamic one."""
-        return drive(traces)
+        if not self.smoothing_ms:
+            return drive(traces)
+        times_ms, rate = smoothed_rate(traces.dynamic_term, self.smoothing_ms)
+        return replace(resampled(traces, self.smoothing_ms), times_ms=times_ms, rate_per_ms=np.abs(rate))
 
     def _largest_current_ma(self, traces: Traces) -> FloatArray:
         """Bound of the current at every site, (n_sites,)."""
-        return self.transduction.largest_current_ma(traces)
+        if not self.smoothing_ms:
+            return self.transduction.largest_current_ma(traces)
+        # A low pass changes at most by the range of its input in one time constant.
+        fastest = np.ptp(traces.dynamic_term.values, axis=0) / self.smoothing_ms
+        static = (self.static_gain * traces.values).max(axis=0)
+        return self.intercept_ma + abs(self.dynamic_gain) * fastest + static
 
     def rates(
         self,

@@ -7,8 +7,6 @@ state; an afferent of one's own has none that is known, and is given the whole t
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 from numpy.typing import ArrayLike
 
@@ -17,7 +15,7 @@ from fingerpad.core.errors import InputError
 from fingerpad.core.signals import SpikeTrains, Traces
 from fingerpad.core.values import Finite, FloatArray, Whole, finite, float_array, whole
 from fingerpad.neuron.afferent import Afferent, AnyAfferent, checked_afferent
-from fingerpad.neuron.afferent_types import SAI, RapidlyAdapting
+from fingerpad.neuron.afferent_types import RapidlyAdapting
 from fingerpad.neuron.band_pass import continued_stage, knots_between
 from fingerpad.neuron.exact_spikes import continued_trains
 
@@ -98,9 +96,10 @@ class AfferentStream:
         def between(before: FloatArray, now: FloatArray) -> FloatArray:
             return before + share[:, None] * (now - before)
 
-        filters = isinstance(afferent, SAI | RapidlyAdapting)
-        tau_ms = afferent.smoothing_ms if isinstance(afferent, SAI) else math.inf
-        tau_ms = afferent.band_pass.time_constant_ms if isinstance(afferent, RapidlyAdapting) else tau_ms
+        tau_ms = (
+            afferent.smoothing_ms if isinstance(afferent, Afferent) else afferent.band_pass.time_constant_ms
+        )
+        filters = tau_ms > 0.0
         ends = np.array([self._time_ms, time_ms])
         knots_ms = knots_between(self._time_ms, time_ms, tau_ms) if filters else ends
         share = (knots_ms - self._time_ms) / (time_ms - self._time_ms)

@@ -1,4 +1,4 @@
-"""Types of afferents beside SAI: RA, PC, SAII, and any of one's own.
+"""Types of afferents: SAI, RA, PC, SAII, each a row of `fingerpad.data.afferents.TYPES`, and one's own.
 
 Whatever names the quantities of the skin that it follows and makes spikes of their traces is an afferent
 (`fingerpad.neuron.afferent.AnyAfferent`). RA and PC share one chain:
@@ -12,13 +12,14 @@ transmits no constant. SAII has the chain of SAI (Eqs. 1-5), but follows the str
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import replace
-from typing import Annotated, ClassVar
+from types import MappingProxyType
+from typing import Annotated, Any, ClassVar, cast
 
 import numpy as np
 
-from fingerpad.core.checked import value_class
+from fingerpad.core.checked import checked, value_class
 from fingerpad.core.errors import InputError, shown
 from fingerpad.core.signals import (
     COUNT,
@@ -30,11 +31,17 @@ from fingerpad.core.signals import (
     Traces,
 )
 from fingerpad.core.values import Finite, FloatArray, Positive, Share, Whole, choice
-from fingerpad.data import afferents
-from fingerpad.neuron.afferent import Afferent, check_known_quantities, check_quantities, spikes_where
-from fingerpad.neuron.band_pass import BandPass, resampled, smoothed_rate
+from fingerpad.data.afferents import TYPES
+from fingerpad.data.tissues import DEFAULT_TISSUES
+from fingerpad.neuron.afferent import (
+    Afferent,
+    AnyAfferent,
+    check_known_quantities,
+    check_quantities,
+    spikes_where,
+)
+from fingerpad.neuron.band_pass import BandPass
 from fingerpad.neuron.lif import LeakyIntegrateAndFire
-from fingerpad.neuron.transduction import Drive
 
 
 @value_class
@@ -54,6 +61,7 @@ class RapidlyAdapting:
     membrane_ms: Finite  # Time constant of the membrane. [ms]
     refractory_ms: Finite  # Refractory period. [ms]
     quantity: str  # What is followed, by the names of `SkinResponse.sample`.
+    type: str = "rapidly adapting"  # Name of its type.
 
     def __post_init__(self) -> None:
         # Both stages check their parameters when they are made.
@@ -96,17 +104,71 @@ class RapidlyAdapting:
         return spikes_where(may_fire, traces, lambda some: self.membrane.spikes(self.current(some)))
 
 
-@value_class
-class RA(RapidlyAdapting):
-    """A rapidly adapting afferent (RA, FA-I), which ends in Meissner corpuscles.
+CHAINS: Mapping[str, type[Afferent] | type[RapidlyAdapting]] = MappingProxyType(
+    {"slow": Afferent, "rapid": RapidlyAdapting}
+)
+"""From the skin to the spikes, by the names that the rows of `fingerpad.data.afferents.TYPES` give."""
 
-    It responds to the speed at which the compressive stress at its end organ changes, most to 8 to 64 Hz, and
-    is silent in a hold. The defaults, their sources and status are in `fingerpad.data.afferents`.
+
+@checked
+def afferent_of(
+    type_name: Annotated[str, choice(TYPES)], tissues: Any = DEFAULT_TISSUES, **numbers: Any
+) -> Afferent | RapidlyAdapting:
+    """Return an afferent of a type by its name: a row of `fingerpad.data.afferents.TYPES`.
 
     Parameters
     ----------
-    threshold, corner_hz, rise, fall, retraction, membrane_ms, refractory_ms, quantity
-        As in `RapidlyAdapting`.
+    type_name : str
+        "SAI", "RA", "PC", "SAII", or another row.
+    tissues : str or Tissues, optional
+        Those with which an SAI was fitted, as of `Afferent.for_tissues`.
+    **numbers
+        Numbers that replace those of the row, by the names of the fields of `Afferent` or `RapidlyAdapting`.
+
+    Examples
+    --------
+    >>> afferent_of("RA", threshold=0.2).threshold, afferent_of("SAI").smoothing_ms
+    (0.2, 17.0)
+    """
+    row = TYPES[type_name]
+    values: dict[str, Any] = {"type": type_name} | row.values | numbers
+    if row.of_tissues:
+        return replace(Afferent.for_tissues(tissues), **values)
+    return CHAINS[row.chain](**values)
+
+
+def SAI(**numbers: Any) -> Afferent:
+    """Return a slowly adapting type I (SAI) afferent that is also right under vibration.
+
+    It is `Afferent` with `smoothing_ms`. Rates in a hold are those of `Afferent`; those in the ramps to which
+    it was fitted are 3 to 9 % lower.
+
+    Parameters
+    ----------
+    **numbers
+        As of `afferent_of`.
+
+    Examples
+    --------
+    >>> from fingerpad.neuron.tuning import tuning_curve
+    >>> tuning_curve(SAI(), [10.0, 100.0], per_um=0.02).round(-1).tolist()
+    [70.0, 210.0]
+    >>> tuning_curve(Afferent(), [10.0, 100.0], per_um=0.02).round(-1).tolist()
+    [50.0, 30.0]
+    """
+    return cast(Afferent, afferent_of("SAI", **numbers))
+
+
+def RA(**numbers: Any) -> RapidlyAdapting:
+    """Return a rapidly adapting afferent (RA, FA-I), which ends in Meissner corpuscles.
+
+    It responds to the speed at which the compressive stress at its end organ changes, most to 8 to 64 Hz, and
+    is silent in a hold.
+
+    Parameters
+    ----------
+    **numbers
+        As of `afferent_of`.
 
     Examples
     --------
@@ -118,29 +180,19 @@ class RA(RapidlyAdapting):
     >>> bool(spikes.size > 2), bool((spikes < 60.0).all())
     (True, True)
     """
-
-    threshold: Positive = afferents.RA_THRESHOLD.value
-    corner_hz: Finite = afferents.RA_CORNER.value
-    rise: Whole = int(afferents.RA_RISE.value)
-    fall: Whole = int(afferents.RA_FALL.value)
-    retraction: Share = afferents.RA_RETRACTION.value
-    membrane_ms: Finite = afferents.RA_MEMBRANE.value
-    refractory_ms: Finite = afferents.RA_REFRACTORY.value
-    quantity: str = afferents.RA_QUANTITY
+    return cast(RapidlyAdapting, afferent_of("RA", **numbers))
 
 
-@value_class
-class PC(RapidlyAdapting):
-    """A Pacinian afferent (PC, FA-II).
+def PC(**numbers: Any) -> RapidlyAdapting:
+    """Return a Pacinian afferent (PC, FA-II).
 
     It responds to vibration of the skin above 64 Hz, most at 200 to 400 Hz, and is silent in a hold. It
-    follows how far the skin within 3 mm has moved, because its corpuscle lies deep. The defaults, their
-    sources and status are in `fingerpad.data.afferents`.
+    follows how far the skin within 3 mm has moved, because its corpuscle lies deep. Its threshold is in mm.
 
     Parameters
     ----------
-    threshold, corner_hz, rise, fall, retraction, membrane_ms, refractory_ms, quantity
-        As in `RapidlyAdapting`; the threshold is in mm.
+    **numbers
+        As of `afferent_of`.
 
     Examples
     --------
@@ -153,86 +205,19 @@ class PC(RapidlyAdapting):
     >>> PC().spikes(moved(250.0))[0].size > 80, PC().spikes(moved(10.0))[0].size
     (True, 0)
     """
-
-    threshold: Positive = afferents.PC_THRESHOLD.value
-    corner_hz: Finite = afferents.PC_CORNER.value
-    rise: Whole = int(afferents.PC_RISE.value)
-    fall: Whole = int(afferents.PC_FALL.value)
-    retraction: Share = afferents.PC_RETRACTION.value
-    membrane_ms: Finite = afferents.PC_MEMBRANE.value
-    refractory_ms: Finite = afferents.PC_REFRACTORY.value
-    quantity: str = afferents.PC_QUANTITY
+    return cast(RapidlyAdapting, afferent_of("PC", **numbers))
 
 
-@value_class
-class SAI(Afferent):
-    """A slowly adapting type I (SAI) afferent that is also right under vibration.
+def SAII(**numbers: Any) -> Afferent:
+    """Return a slowly adapting type II (SAII) afferent, which follows the stretch of the skin.
 
-    It is `Afferent`, except that the dynamic term follows the quantity as a first-order low pass leaves it::
-
-        I = beta + k_d |S'| + k_s Q,    tau_s S' + S = Q.
-
-    The rate of change of a fast vibration would otherwise make it as sensitive at 400 Hz as at 20 Hz. Rates
-    in a hold are those of `Afferent`; those in the ramps to which it was fitted are 3 to 9 % lower.
+    Its chain is that of `SAI`, with the largest tensile strain within the skin in both terms; its gains refer
+    to strain.
 
     Parameters
     ----------
-    intercept_ma, dynamic_gain, static_gain, time_constant_ms, capacitance_mf, threshold_mv, refractory_ms
-        As in `Afferent`.
-    dynamic_quantity, static_quantity : str
-        As in `Afferent`.
-    smoothing_ms : float
-        Time constant of the low pass, tau_s. [ms]
-
-    Examples
-    --------
-    >>> from fingerpad.neuron.tuning import tuning_curve
-    >>> tuning_curve(SAI(), [10.0, 100.0], per_um=0.02).round(-1).tolist()
-    [70.0, 210.0]
-    >>> tuning_curve(Afferent(), [10.0, 100.0], per_um=0.02).round(-1).tolist()
-    [50.0, 30.0]
-    """
-
-    smoothing_ms: Positive = afferents.SAI_SMOOTHING.value
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-
-    def spikes(self, traces: Traces | Drive) -> SpikeTrains:
-        """Simulate the spikes of this afferent at every site, as `Afferent.spikes`."""
-        if isinstance(traces, Drive):
-            check_quantities(self, traces)
-            raise InputError("SAI smooths the traces of the skin: got a Drive; pass the Traces.")
-        return super().spikes(traces)
-
-    def _driven(self, traces: Traces) -> Drive:
-        """Both terms between common knots: the quantity, and its rate of change behind the low pass."""
-        times_ms, rate = smoothed_rate(traces.dynamic_term, self.smoothing_ms)
-        return replace(resampled(traces, self.smoothing_ms), times_ms=times_ms, rate_per_ms=np.abs(rate))
-
-    def _largest_current_ma(self, traces: Traces) -> FloatArray:
-        """Bound of the current at every site: a low pass changes at most by its input's range in tau_s."""
-        fastest = np.ptp(traces.dynamic_term.values, axis=0) / self.smoothing_ms
-        return (
-            self.intercept_ma
-            + abs(self.dynamic_gain) * fastest
-            + (self.static_gain * traces.values).max(axis=0)
-        )
-
-
-@value_class
-class SAII(SAI):
-    """A slowly adapting type II (SAII) afferent, which follows the stretch of the skin.
-
-    Its chain is that of `SAI`, with the largest tensile strain within the skin in both terms. The defaults,
-    their sources and status are in `fingerpad.data.afferents`.
-
-    Parameters
-    ----------
-    intercept_ma, dynamic_gain, static_gain, time_constant_ms, capacitance_mf, threshold_mv, refractory_ms
-        As in `Afferent`; the gains refer to strain.
-    dynamic_quantity, static_quantity, smoothing_ms
-        As in `SAI`.
+    **numbers
+        As of `afferent_of`.
 
     Examples
     --------
@@ -244,15 +229,12 @@ class SAII(SAI):
     >>> bool(dynamic_hz[0] > static_hz[0] > 5.0)
     True
     """
+    return cast(Afferent, afferent_of("SAII", **numbers))
 
-    intercept_ma: Finite = 0.0
-    dynamic_gain: Finite = afferents.SAII_DYNAMIC_GAIN.value
-    static_gain: Finite = afferents.SAII_STATIC_GAIN.value
-    time_constant_ms: Finite = afferents.SAII_MEMBRANE.value
-    capacitance_mf: Finite = afferents.SAII_MEMBRANE.value
-    threshold_mv: Finite = 1.0
-    dynamic_quantity: str = afferents.SAII_QUANTITY
-    static_quantity: str = afferents.SAII_QUANTITY
+
+def afferent_types(tissues: object = DEFAULT_TISSUES) -> dict[str, AnyAfferent]:
+    """Return an afferent of each type by its name, SAI as it was fitted with a set of tissues."""
+    return {name: afferent_of(name, tissues) for name in TYPES}
 
 
 @value_class
@@ -269,6 +251,8 @@ class OwnAfferent:
         What the traces hold, by the names of `SkinResponse.sample`; SED, unless another one is given.
     rate_measure : {"interval", "count"}
         What its rates are, as of `ResponseMap`: one over the mean interval, unless counts are wanted.
+    type : str
+        Name of the type.
 
     Examples
     --------
@@ -296,6 +280,7 @@ class OwnAfferent:
     dynamic_quantity: str = STORED_ENERGY
     static_quantity: str = STORED_ENERGY
     rate_measure: Annotated[str, choice((INTERVAL, COUNT))] = INTERVAL
+    type: str = "own"
 
     MUST_RETURN: ClassVar[str] = "respond must return Traces of a current, or SpikeTrains, an entry per site"
 

@@ -1,11 +1,13 @@
-"""A population of afferents of one type: positions of the end organs and responses to one indentation."""
+"""A population of afferents, of one type or several: their end organs, and their responses to a touch."""
 
 from __future__ import annotations
 
 import math
 import warnings
+from collections.abc import Mapping
 from dataclasses import field, replace
-from typing import Annotated, Protocol, runtime_checkable
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Annotated, Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -14,25 +16,38 @@ from pydantic import SkipValidation
 from fingerpad.core.checked import checked, value_class
 from fingerpad.core.errors import InputError, TissuesWarning, level_of_caller, shown
 from fingerpad.core.layouts import MOST_RECEPTORS, Layout, Place, around_zero
-from fingerpad.core.random_streams import Purpose, normals
+from fingerpad.core.random_streams import Purpose, normals, seed_of
 from fingerpad.core.signals import INTERVAL, ResponseMap, Skin, Traces, traces_below
 from fingerpad.core.values import (
     Count,
+    Finite,
     FiniteMatrix,
     FiniteVector,
     FloatArray,
     NotNegative,
+    NotNegativeWhole,
     Pair,
     Positive,
     Whole,
     count_from,
     float_array,
+    positive,
 )
 from fingerpad.data import fingertip, psychophysics
+from fingerpad.data.afferents import TYPES, value_of
 from fingerpad.data.tissues import DEFAULT_TISSUES
-from fingerpad.neuron.afferent import Afferent, AnyAfferent, checked_afferent
+from fingerpad.neuron.afferent import Afferent, AnyAfferent, checked_afferent, type_of
+from fingerpad.neuron.afferent_types import afferent_types
 from fingerpad.neuron.end_organs import EndOrgans
 from fingerpad.neuron.spikes import RATE_OF, Window, first_spike_latency_ms, rate_windows_ms
+
+if TYPE_CHECKING:
+    from fingerpad.core.regions import Region
+
+PUBLISHED_DENSITIES: Mapping[str, float] = MappingProxyType(
+    {name: float(value_of(row.density_per_cm2)) for name, row in TYPES.items()}
+)
+"""Densities of the types in the human fingertip. [1/cm2]"""
 
 MM_PER_CM = 10.0
 LARGEST_SPREAD = 9.0
@@ -88,7 +103,9 @@ def sensitivities(
 
 @value_class
 class Population:
-    """Afferents of one type at different positions of the skin, with their sensitivities and end organs.
+    """Afferents at different positions of the skin, with their sensitivities and end organs.
+
+    All are of one type, unless the population was made by `mixed` or `at_densities`.
 
     Parameters
     ----------
@@ -108,6 +125,8 @@ class Population:
     centre_mm : (float, float), optional
         Middle of the pad about which the positions lie, if they follow the finger that is touched: `on` moves
         them to the middle of its pad. By default they stay. [mm]
+    parts : mapping of str to Population
+        Of a mixed population, the afferents of each type, which follow each other; from `mixed`.
     """
 
     positions_mm: FiniteMatrix
@@ -117,6 +136,7 @@ class Population:
     places_mm: FiniteMatrix | None = None
     ends: EndOrgans | None = None
     centre_mm: Pair | None = None
+    parts: Mapping[str, Population] = field(default_factory=lambda: MappingProxyType({}))
 
     def __post_init__(self) -> None:
         positions, factors = self.positions_mm, self.sensitivity
@@ -139,9 +159,18 @@ class Population:
         object.__setattr__(self, "places_mm", float_array("places_mm", places, 2))
 
     def __repr__(self) -> str:
+        if self.parts:
+            return f"Population({', '.join(f'{len(part)} {name}' for name, part in self.parts.items())})"
         unequal = "" if self.sensitivity is None else ", each with its sensitivity"
-        kind = type(self.afferent).__name__
+        kind = type_of(self.afferent)
         return f"Population({len(self)} afferents of type {kind}, {self.pitch_mm:.3g} mm apart{unequal})"
+
+    def __getitem__(self, name: str) -> Population:
+        if name not in self.parts:
+            raise InputError(
+                "type", f"must be one of {', '.join(self.parts) or 'a mixed population'}", repr(name)
+            )
+        return self.parts[name]
 
     def __len__(self) -> int:
         return len(self.positions_mm)
@@ -239,6 +268,104 @@ class Population:
         positions = np.stack(np.meshgrid(x, z, indexing="ij"), axis=-1).reshape(-1, 2)
         return cls(positions, pitch_mm, afferent or Afferent(), centre_mm=CENTRE_MM if follows else None)
 
+    @classmethod
+    def mixed(cls, parts: Mapping[str, Population]) -> Population:
+        """Join populations of several types in the same skin.
+
+        Parameters
+        ----------
+        parts : mapping of str to Population
+            One per type, by any name.
+
+        Examples
+        --------
+        >>> from fingerpad.neuron.afferent_types import RA
+        >>> both = Population.mixed({"SAI": Population.grid(), "RA": Population.grid(afferent=RA())})
+        >>> len(both), both["RA"].afferent.type, both.types[0], both.types[-1]
+        (36, 'RA', 'SAI', 'RA')
+        """
+        if not parts:
+            raise InputError("parts", "must hold at least one Population", "none")
+        several = list(parts.values())
+        factors = [part.sensitivity for part in several]
+        unequal = any(each is not None for each in factors)
+        return cls(
+            np.concatenate([part.positions_mm for part in several]),
+            min(part.pitch_mm for part in several),
+            several[0].afferent,
+            np.concatenate(
+                [
+                    np.ones(len(part)) if each is None else each
+                    for part, each in zip(several, factors, strict=True)
+                ]
+            )
+            if unequal
+            else None,
+            np.concatenate([np.asarray(part.places_mm) for part in several]),
+            parts=MappingProxyType(dict(parts)),
+        )
+
+    @classmethod
+    @checked
+    def at_densities(
+        cls,
+        region: Region,
+        densities_per_cm2: Mapping[str, float] | None = None,
+        afferents: Mapping[str, AnyAfferent] | None = None,
+        place: Place | None = None,
+        spread: Finite = 0.0,
+        seed: NotNegativeWhole = 0,
+    ) -> Population:
+        """Place afferents of each type at random, evenly, at a density each.
+
+        Parameters
+        ----------
+        region : Region
+            Part of a plane, from `fingerpad.core.regions` or `UnrolledSkin.pad`.
+        densities_per_cm2 : mapping of str to float, optional
+            Density of each type; the published ones by default. A type that is left out has no afferents.
+            [1/cm2]
+        afferents : mapping of str to AnyAfferent, optional
+            Afferents of types whose parameters are not the default ones, or of types of one's own.
+        place : callable, optional
+            From the plane to points of the skin, as in `of_layout`.
+        spread : float, optional
+            Standard deviation of the logarithm of the sensitivity, as in `sensitivities`; 0 for equal ones.
+        seed : int, optional
+            Seed of positions and sensitivities. Each type has random numbers of its own.
+
+        Examples
+        --------
+        >>> from fingerpad.core.regions import Ellipse, Rectangle
+        >>> Population.at_densities(Ellipse(5.0, 5.0, centre_mm=(17.37, 0.0)), seed=1)
+        Population(55 SAI, 110 RA, 16 PC, 8 SAII)
+        >>> square = Rectangle(10.0, 10.0, centre_mm=(17.0, 0.0))
+        >>> len(Population.at_densities(square, {"RA": 140.0, "PC": 20.0}))
+        160
+        """
+        # Files of touches load this module, and only a layout at random needs that one.
+        from fingerpad.core.patterns import poisson_disc
+
+        if not hasattr(region, "area_mm2"):
+            raise InputError(
+                "region", "must be one of fingerpad.core.regions or UnrolledSkin(finger).pad()", repr(region)
+            )
+        known = afferent_types() | dict(afferents or {})
+        parts = {}
+        densities = PUBLISHED_DENSITIES if densities_per_cm2 is None else densities_per_cm2
+        for number, (name, density) in enumerate(densities.items()):
+            if name not in known:
+                raise InputError(
+                    f"densities_per_cm2 has type {name!r} without an afferent: the types are "
+                    f"{', '.join(known)}; give one in afferents={{{name!r}: ...}}."
+                )
+            positive(f"densities_per_cm2[{name!r}] of a type that is not left out", density, "1/cm2")
+            afferent = checked_afferent(known[name])
+            layout = poisson_disc(region, density, seed=seed_of(seed, number))
+            unequal = sensitivities(len(layout), spread, seed_of(seed, number)) if spread else None
+            parts[name] = cls.of_layout(layout, place, afferent, unequal)
+        return cls.mixed(parts)
+
     def on(self, skin: object) -> Population:
         """Return this population as it lies on the finger of a skin.
 
@@ -261,6 +388,8 @@ class Population:
         >>> Population.grid(rows=1, columns=1, centre_mm=(17.0, 0.0)).on(Child()).positions_mm.tolist()
         [[17.0, 0.0]]
         """
+        if self.parts:
+            return self.mixed({name: part.on(skin) for name, part in self.parts.items()})
         pad_mm = getattr(skin, "pad_mm", None)
         if pad_mm is None or self.centre_mm in (None, pad_mm) or self.ends is not None:
             return self
@@ -289,10 +418,25 @@ class Population:
         TissuesWarning
             If the afferent is the default one and the skin has another set of tissues that ships.
         """
-        self._check_tissues(skin)
         there = self.on(skin)
-        traces = traces_below(skin, there.sites_mm, *self.quantities)
-        return there.respond_to(traces, dynamic_window_ms, static_window_ms)
+        parts = there.parts or {"": there}
+        maps: dict[str, ResponseMap] = {}
+        # Afferents that follow the same quantities are sampled at once.
+        kinds = {name: (part.quantities, part.sites_mm.shape[1]) for name, part in parts.items()}
+        for kind in dict.fromkeys(kinds.values()):
+            some = {name: part for name, part in parts.items() if kinds[name] == kind}
+            sites = np.concatenate([part.sites_mm for part in some.values()])
+            traces, start = traces_below(skin, sites, *kind[0]), 0
+            for name, part in some.items():
+                part._check_tissues(skin)
+                end = start + len(part.sites_mm)
+                maps[name] = part.respond_to(
+                    traces.part(slice(start, end)) if len(some) > 1 else traces,
+                    dynamic_window_ms,
+                    static_window_ms,
+                )
+                start = end
+        return ResponseMap.joined({name: maps[name] for name in parts}) if there.parts else maps[""]
 
     def _check_tissues(self, skin: Skin) -> None:
         """Warn if the default afferent responds to tissues with which it was not fitted."""
@@ -307,23 +451,25 @@ class Population:
 
     @property
     def types(self) -> tuple[str, ...]:
-        """Types of the afferents of a mixed population: none here."""
-        return ()
+        """Type of each afferent of a mixed population; empty where all are of one type."""
+        return tuple(name for name, part in self.parts.items() for _ in range(len(part)))
 
     @property
     def sites_mm(self) -> FloatArray:
         """Where the skin is sampled, (n_sites, 2 or 3): the end organs, afferent by afferent. [mm]"""
+        if self.parts:
+            return np.concatenate([part.sites_mm for part in self.parts.values()])
         return self.positions_mm if self.ends is None else self.ends.sites_mm
 
     @property
     def quantities(self) -> tuple[str, str]:
-        """Quantities of the dynamic and of the static term."""
+        """Quantities of the dynamic and of the static term of the afferents of one type."""
         return self.afferent.dynamic_quantity, self.afferent.static_quantity
 
     def respond_to(
         self, traces: Traces, dynamic_window_ms: Window | None = None, static_window_ms: Window | None = None
     ) -> ResponseMap:
-        """Simulate each afferent under traces that are known already.
+        """Simulate each afferent of a population of one type under traces that are known already.
 
         Parameters
         ----------
@@ -332,6 +478,10 @@ class Population:
         dynamic_window_ms, static_window_ms : (float, float), optional
             As in `respond`. [ms]
         """
+        if self.parts:
+            raise InputError(
+                "traces", "must be of one type of afferents", remedy="give those of population[type]"
+            )
         sites = self.sites_mm
         if traces.n_sites != len(sites):
             raise InputError(

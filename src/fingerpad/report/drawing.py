@@ -36,7 +36,6 @@ from fingerpad.report.touch import BONE, BONE_INSIDE, draw_section
 if TYPE_CHECKING:
     from fingerpad.geometry.fingertip import Fingertip
     from fingerpad.inference.spike_fit import SpikeFit
-    from fingerpad.neuron.mixed_population import MixedResponse
     from fingerpad.psychophysics.psychometric import PsychometricFit
     from fingerpad.reduction.streaming import ReducedSample
     from fingerpad.skin.sampling import SkinResponse, SurfaceProfile
@@ -104,7 +103,10 @@ def draw_pad(axes: Axes, skin: SkinResponse, quantity: str = "stored", reach_mm:
 
 
 def draw_raster(axes: Axes, spikes: SpikeTrains | ResponseMap) -> None:
-    """Draw the spikes of the afferents that fire, in their order from the top."""
+    """Draw the spikes of the afferents that fire, in their order from the top; in a band per type."""
+    if isinstance(spikes, ResponseMap) and spikes.parts:
+        draw_raster_by_type(axes, spikes.parts)
+        return
     trains = spikes.spikes if isinstance(spikes, ResponseMap) else spikes
     firing = [train for train in trains if train.size]
     if not firing:
@@ -115,7 +117,11 @@ def draw_raster(axes: Axes, spikes: SpikeTrains | ResponseMap) -> None:
 
 
 def draw_map(axes: Axes, response: ResponseMap, quantity: str | None = None) -> None:
-    """Draw a quantity of every afferent at its place, seen onto the pad."""
+    """Draw a quantity of every afferent at its place, seen onto the pad; by type, larger for more spikes."""
+    if response.parts and quantity is None:
+        draw_map_by_type(axes, response.parts)
+        axes.legend(**BESIDE)
+        return
     quantity = quantity or ("spike_count" if response.rate_measure == COUNT else "static_rate_hz")
     mapped = {**QUANTITIES, "spike_count": ("whole touch", "spikes", "viridis", Normalize)}
     phase, label, colours, _ = mapped[one_of("quantity", quantity, tuple(mapped))]
@@ -145,17 +151,6 @@ def _draw_by_site(axes: Axes, times_ms: FloatArray, values: FloatArray) -> None:
         return
     for site, (column, (colour, dashes)) in enumerate(zip(values.T, SITE_STYLES, strict=False), start=1):
         axes.plot(times_ms, column, color=colour, linestyle=dashes, linewidth=1.2, label=f"site {site}")
-    axes.legend(**BESIDE)
-
-
-def draw_types(axes: Axes, response: MixedResponse) -> None:
-    """Draw all spikes over time, in a band per type."""
-    draw_raster_by_type(axes, response.maps)
-
-
-def draw_types_map(axes: Axes, response: MixedResponse) -> None:
-    """Draw where the afferents of each type lie, with larger marks for more spikes."""
-    draw_map_by_type(axes, response.maps)
     axes.legend(**BESIDE)
 
 
@@ -245,7 +240,6 @@ DRAWINGS: Mapping[str, Mapping[str, Callable[..., None]]] = {
     "ResponseMap": {"raster": draw_raster, "map": draw_map},
     "SpikeTrains": {"raster": draw_raster},
     "Traces": {"traces": draw_traces},
-    "MixedResponse": {"raster": draw_types, "map": draw_types_map},
     "SurfaceProfile": {"profile": draw_surface_profile},
     "HitRates": {"hit_rates": draw_hit_rates},
     "PsychometricFit": {"curve": draw_curve},

@@ -54,7 +54,7 @@ def draw_mixed_responses(touches: Mapping[str, Mapping[str, ResponseMap]]) -> Fi
     Parameters
     ----------
     touches : mapping of str to mapping of str to ResponseMap
-        Responses by the name of the touch and by type, such as `MixedResponse.maps`.
+        Responses by the name of the touch and by type, such as `ResponseMap.parts`.
     """
     if not touches:
         raise InputError("touches", "must hold at least one response", remedy="it is empty")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 from textwrap import fill
-from typing import TYPE_CHECKING, Any, Protocol, runtime_checkable
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -82,19 +82,9 @@ BONE, BONE_INSIDE = "#9a9488", "#d9dde0"
 """Colours of the outline of bone and nail, and of the bone itself, unlike any of `SKIN` and the paper."""
 
 
-@runtime_checkable
-class Joinable(Protocol):
-    """A response of several types of afferents, such as a `MixedResponse`."""
-
-    @property
-    def joined(self) -> ResponseMap:
-        """One map of all afferents."""
-        ...
-
-
 @checked
 def save_figure(
-    path: str | Path, skin: SkinResponse, response: ResponseMap | Joinable, indenter: Indenter | None = None
+    path: str | Path, skin: SkinResponse, response: ResponseMap, indenter: Indenter | None = None
 ) -> Path:
     """Draw a touch and save the picture: the finger, coloured by what the afferents follow, and the spikes.
 
@@ -104,7 +94,7 @@ def save_figure(
         The PNG file; folders are made as needed.
     skin : SkinResponse
         From `indent`.
-    response : ResponseMap or MixedResponse
+    response : ResponseMap
         Response of a population to it.
     indenter : Indenter, optional
         The body that pressed, to be drawn as well; as it stands when it is not spun.
@@ -135,7 +125,7 @@ def save_figure(
     file = path_of("path", path)
     if file.suffix.lower() != ".png":
         raise InputError(f"A figure is written as .png: got {file.name}.")
-    answer = instance("response", getattr(response, "joined", response), ResponseMap)
+    answer = instance("response", response, ResponseMap)
     return write_png(lambda parts: draw(*parts), (skin, answer, indenter), file)
 
 
@@ -247,7 +237,7 @@ def draw_spikes(axes: Axes, skin: SkinResponse, response: ResponseMap) -> None:
     Afferents of a mixed population have a band per type.
     """
     if response.types:
-        draw_raster_by_type(axes, response.by_type)
+        draw_raster_by_type(axes, response.parts)
         axes.set_xlim(0.0, skin.times_ms[-1])
         return
     plane = response.positions_mm[:, [0, -1]] - [skin.axis_x_mm, 0.0]

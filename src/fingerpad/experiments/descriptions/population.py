@@ -23,7 +23,7 @@ from fingerpad.experiments.descriptions.parts import (
 )
 from fingerpad.geometry.fingertip import Finger, Fingertip
 from fingerpad.neuron.afferent import Afferent, AnyAfferent
-from fingerpad.neuron.mixed_population import MixedPopulation, types_of_afferents
+from fingerpad.neuron.afferent_types import afferent_types
 from fingerpad.neuron.population import Population, sensitivities
 from fingerpad.psychophysics.encoding import neighbours_of
 
@@ -44,7 +44,7 @@ def afferent_of(chosen: AfferentSettings | str, tissues: str, beside: Path = Pat
         return replace(fitted, **chosen.given)
     if file := file_of(chosen):
         return fitted_afferent(Path(beside) / file, tissues)
-    return fitted if chosen == DEFAULT else types_of_afferents(tissues)[chosen]
+    return fitted if chosen == DEFAULT else afferent_types(tissues)[chosen]
 
 
 def population_of(
@@ -54,7 +54,7 @@ def population_of(
     beside: Path = Path(),
     place: str = "population",
     finger: Finger | None = None,
-) -> Population | MixedPopulation:
+) -> Population:
     """Lay out the afferents of a file."""
     for key, layouts in _OF_LAYOUT.items():
         if key in settings.given and settings.layout not in layouts:
@@ -72,12 +72,12 @@ def population_of(
             "both",
             "leave one out",
         )
-    types = types_of_afferents(tissues) | ({} if chosen == DEFAULT else {TYPES[0]: afferent})
+    types = afferent_types(tissues) | ({} if chosen == DEFAULT else {"SAI": afferent})
     parts = {}
     for number, (name, density) in enumerate(settings.densities_per_cm2.items()):
         one = {"density_per_cm2": density, "seed": seed_of(settings.seed, number)}
         parts[name] = _laid(settings.model_copy(update=one), types[name], place, finger)
-    return MixedPopulation(parts)
+    return Population.mixed(parts)
 
 
 def _laid(
@@ -93,12 +93,12 @@ def _laid(
     return replace(laid, sensitivity=sensitivities(len(laid), settings.sensitivity_spread, settings.seed))
 
 
-def population_neighbours(settings: PopulationSettings, population: Population | MixedPopulation) -> IntArray:
+def population_neighbours(settings: PopulationSettings, population: Population) -> IntArray:
     """Return who is whose neighbour in a population that was laid out by `settings`, (n_pairs, 2).
 
     Afferents of a mixed population have neighbours of their own type.
     """
-    if isinstance(population, MixedPopulation):
+    if population.parts:
         parts = list(population.parts.values())
         starts = np.cumsum([0, *map(len, parts)])
         return np.concatenate(

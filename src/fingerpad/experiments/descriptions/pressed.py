@@ -19,7 +19,6 @@ from fingerpad.experiments.runner import Runner
 from fingerpad.neuron.afferent import as_sai
 from fingerpad.neuron.afferent_types import OwnAfferent
 from fingerpad.neuron.escape_rate import EscapeRate
-from fingerpad.neuron.mixed_population import MixedPopulation, one_map
 from fingerpad.skin.sampling import SkinResponse
 
 
@@ -137,8 +136,8 @@ def respond(described: DescribedTouch, skin: SkinResponse) -> ResponseMap:
     """Responses of the described afferents to a skin, random if they have noise."""
     asked, population = described.description.afferents, described.population
     windows = asked.windows_ms.dynamic, asked.windows_ms.static
-    if asked.noise == 0.0 or isinstance(population, MixedPopulation):
-        return one_map(population.respond(skin, *windows))
+    if asked.noise == 0.0 or population.parts:
+        return population.respond(skin, *windows)
     afferent = as_sai(population.afferent)
     membrane = EscapeRate(afferent.membrane, asked.noise)
     noisy = OwnAfferent(

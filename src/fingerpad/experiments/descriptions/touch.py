@@ -26,7 +26,6 @@ from fingerpad.experiments.descriptions.values import Content, Part
 from fingerpad.geometry.fingertip import Finger
 from fingerpad.mechanics.tissues import named_tissues
 from fingerpad.neuron.afferent import Afferent
-from fingerpad.neuron.mixed_population import MixedPopulation
 from fingerpad.neuron.population import Population
 from fingerpad.neuron.spikes import rate_windows_ms
 from fingerpad.skin.indentation import Touch
@@ -123,7 +122,7 @@ class DescribedTouch:
             return made.touch(self.finger, tissues, asked.resolution, times_ms=asked.times_ms)
 
     @cached_property
-    def population(self) -> Population | MixedPopulation:
+    def population(self) -> Population:
         """The afferents."""
         asked = self.description.afferents
         with self.origin.located():

@@ -30,7 +30,6 @@ from fingerpad.experiments.discrimination.decoding import (
 )
 from fingerpad.experiments.discrimination.task import FITTED, IDEAL, DiscriminationTask
 from fingerpad.experiments.discrimination.task_stimuli import stimulus_index
-from fingerpad.neuron.mixed_population import MixedPopulation, one_map
 from fingerpad.neuron.population import Population
 from fingerpad.neuron.spikes import Windows, rate_windows_ms
 from fingerpad.psychophysics.code_efficiency import (
@@ -193,13 +192,13 @@ class PreparedTask:
         As it was read.
     stimuli : tuple of NamedStimulus
         From `task_stimuli`, the standard first.
-    population : Population or MixedPopulation
+    population : Population
         From `task_population`, or one's own.
     """
 
     task: DiscriminationTask
     stimuli: Many[NamedStimulus]
-    population: Population | MixedPopulation
+    population: Population
 
     def __post_init__(self) -> None:
         task = self.task
@@ -278,7 +277,7 @@ class PreparedTask:
     def responses(self, skins: Mapping[str, Skin]) -> list[ResponseMap]:
         """Responses of the population to every stimulus."""
         return [
-            one_map(self.population.respond(skins[stimulus.name], *self._windows_ms(stimulus)))
+            self.population.respond(skins[stimulus.name], *self._windows_ms(stimulus))
             for stimulus in self.stimuli
         ]
 

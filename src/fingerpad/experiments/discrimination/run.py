@@ -20,7 +20,6 @@ from fingerpad.experiments.discrimination.task import DiscriminationTask
 from fingerpad.experiments.discrimination.task_stimuli import task_conditions, task_population, task_stimuli
 from fingerpad.experiments.manifest import Manifest
 from fingerpad.experiments.runner import Runner
-from fingerpad.neuron.mixed_population import MixedPopulation
 from fingerpad.neuron.population import Population
 from fingerpad.skin.indentation import Touch
 
@@ -46,7 +45,7 @@ class DiscriminationRun:
     jobs: int | Engine = 1  # Processes or engine that press; the numbers do not depend on it.
     source: str = "task"  # File of the task: beside it files are searched; errors begin with it.
     text: str = ""  # Its content, for the lines of errors.
-    population: Population | MixedPopulation | None = None  # In the place of those of the task.
+    population: Population | None = None  # In the place of those of the task.
 
     def __post_init__(self) -> None:
         engine_of(self.jobs)
@@ -94,9 +93,9 @@ def discriminate(
     )
 
 
-def _parameters(population: Population | MixedPopulation) -> dict[str, float | str]:
+def _parameters(population: Population) -> dict[str, float | str]:
     """Parameters of the afferents by name; a function by its own."""
-    parts = population.parts.items() if isinstance(population, MixedPopulation) else [("", population)]
+    parts = population.parts.items() or [("", population)]
     found: dict[str, float | str] = {}
     for kind, part in parts:
         names: list[str] = (

@@ -21,7 +21,6 @@ from fingerpad.experiments.descriptions.stimuli import NamedStimulus, named_stim
 from fingerpad.experiments.discrimination.task import DiscriminationTask
 from fingerpad.experiments.manifest import sha256
 from fingerpad.geometry.fingertip import Finger
-from fingerpad.neuron.mixed_population import MixedPopulation
 from fingerpad.neuron.population import Population
 from fingerpad.skin.indentation import Touch
 
@@ -74,7 +73,7 @@ def stimulus_index(stimuli: Sequence[NamedStimulus], place: float | str, key: st
 @checked
 def task_population(
     task: DiscriminationTask, beside: Path = Path(), finger: Finger | None = None
-) -> Population | MixedPopulation:
+) -> Population:
     """Lay out the afferents of a task; files that it names are searched in `beside`."""
     finger = task_conditions(task, beside).finger if finger is None else finger
     return population_of(task.population, task.afferent, task.tissues, beside, finger=finger)

@@ -31,7 +31,7 @@ from fingerpad.inference.identifiable import IDENTIFIABLE_NAMES
 from fingerpad.inference.recordings import RateRecordings
 from fingerpad.inference.typed_fit import fit_afferent
 from fingerpad.neuron.afferent import AnyAfferent
-from fingerpad.neuron.mixed_population import types_of_afferents
+from fingerpad.neuron.afferent_types import afferent_types
 from fingerpad.neuron.spikes import Window, Windows, common_rate_windows_ms
 from fingerpad.skin.fields import sampled_fields
 from fingerpad.skin.indentation import Touch
@@ -154,12 +154,12 @@ class FitRequest:
     @property
     def kind(self) -> str:
         """Type of the afferent, SAI unless another is named."""
-        return one_of("--afferent", self.afferent_type or TYPES[0], TYPES)
+        return one_of("--afferent", self.afferent_type or "SAI", tuple(TYPES))
 
     @cached_property
     def afferent(self) -> AnyAfferent:
         """Afferent about whose numbers is searched: that of its type with the tissues pressed."""
-        return types_of_afferents(self.conditions.tissues)[self.kind]
+        return afferent_types(self.conditions.tissues)[self.kind]
 
     @cached_property
     def measure(self) -> str:
