@@ -1,109 +1,154 @@
-"""The command line: its commands in the order of the help, and its errors."""
+"""The command line: each request is a command, and its fields are the options.
+
+Names, explanations and choices are those of the packaged schemas of the requests, so that help needs nothing
+else. An option within a block is written with its place: `--motion.depth_mm 0.5`.
+"""
 
 from __future__ import annotations
 
+import argparse
 import logging
 import os
 import sys
 import warnings
+from collections.abc import Callable, Sequence
 from contextlib import suppress
-from typing import Annotated, Any
-
-import typer
+from typing import Any, NoReturn
 
 from fingerpad import __version__
-from fingerpad.cli.discriminate import discriminate_command
-from fingerpad.cli.export import export_command
-from fingerpad.cli.fit import fit_command
-from fingerpad.cli.lab import lab_command
-from fingerpad.cli.options import Command
-from fingerpad.cli.reduce import reduce_command
-from fingerpad.cli.reproduce import reproduce_command
+from fingerpad.cli import commands
 from fingerpad.cli.running import INTERRUPTED, TERMINATED, Terminated, forget_interrupt, signals_raise
-from fingerpad.cli.store import store_app
-from fingerpad.cli.sweep import sweep_command
-from fingerpad.cli.touch import check_command, init_command, touch_command
-from fingerpad.cli.validate import validate_command
-from fingerpad.cli.view import view_command
-from fingerpad.core.errors import FingerpadError, InputError
+from fingerpad.core.errors import FingerpadError, InputError, closest
 from fingerpad.core.logger import LOGGER
 
-# What a command runs is imported where it runs: help and version need none of it and come at once.
-
-app = typer.Typer(
-    help="Simulate touch: a finite-element fingertip, the spikes of SAI afferents, discrimination.",
-    add_completion=False,
-    pretty_exceptions_enable=False,
-    rich_markup_mode=None,  # which would take a unit, [mm], for markup
-)
-
-MISUSE: Any = typer.BadParameter.__base__
-"""What typer raises for options that it does not know or cannot read; it names only this child of it."""
+GENERAL = ("--quiet", "--verbose")  # Options of every command, before its name or after it.
 
 
-GENERAL_OPTIONS = ("--quiet", "--verbose")  # Of every command, before its name or after it.
+class Parser(argparse.ArgumentParser):
+    """Parser whose errors are one sentence."""
+
+    def __init__(self, **options: Any):
+        super().__init__(allow_abbrev=False, formatter_class=argparse.RawDescriptionHelpFormatter, **options)
+
+    def error(self, message: str) -> NoReturn:
+        raise InputError(f"{message[:1].upper()}{message[1:].rstrip('.')}.")
 
 
-def _show_version(wanted: bool) -> None:
-    if wanted:
-        typer.echo(f"fingerpad {__version__}")
-        raise typer.Exit
+def _command(name: str) -> tuple[Parser, Callable[[argparse.Namespace, dict[str, Any]], int | None]]:
+    """Make the parser of a command."""
+    what, add, run = commands.COMMANDS[name]
+    parser = Parser(prog=f"fingerpad {name}", description=what)
+    add(parser)
+    for option, words in zip(GENERAL, ("Show only results and errors.", "Show each step."), strict=True):
+        parser.add_argument(option, action="store_true", help=words)
+    return parser, run
 
 
-@app.callback(invoke_without_command=True)
-def _options(
-    context: typer.Context,
-    version: Annotated[
-        bool,
-        typer.Option("--version", callback=_show_version, is_eager=True, help="Show the version and exit."),
-    ] = False,
-    quiet: Annotated[
-        bool, typer.Option("--quiet", help="Show no progress and no notices, only results and errors.")
-    ] = False,
-    verbose: Annotated[
-        bool,
-        typer.Option(
-            "--verbose",
-            help="Also tell of the steps of a press, what is stored and how long each stage takes.",
-        ),
-    ] = False,
-) -> None:
-    if quiet and verbose:
-        raise InputError("--quiet and --verbose exclude each other: leave one out.")
-    LOGGER.setLevel(logging.ERROR if quiet else logging.DEBUG if verbose else logging.NOTSET)
-    if verbose:
-        logging.basicConfig(format="%(asctime)s %(name)s: %(message)s", datefmt="%H:%M:%S")
-    if context.invoked_subcommand is None:
-        typer.echo(context.get_help())
-        raise typer.Exit(2)
+def main(words: Sequence[str] | None = None) -> NoReturn:
+    """Run a command line; an error is one sentence on standard error and exit status 2."""
+    try:
+        with signals_raise(), warnings.catch_warnings():
+            warnings.showwarning = _show_warning
+            status = _run([*(sys.argv[1:] if words is None else words)])
+            sys.stdout.flush()
+        sys.exit(status)
+    except KeyboardInterrupt as stop:
+        forget_interrupt()
+        print(f"fingerpad: stopped. {commands.ENDING}", file=sys.stderr)
+        sys.exit(TERMINATED if isinstance(stop, Terminated) else INTERRUPTED)
+    except FingerpadError as error:
+        print(f"fingerpad: {error}", file=sys.stderr)
+        sys.exit(2)
+    except OSError as error:  # a folder without rights, a full disk, a closed pipe
+        _give_up_output()
+        what = error.filename or "The output"
+        print(f"fingerpad: {what} cannot be used ({error.strerror or error}).", file=sys.stderr)
+        sys.exit(2)
 
 
-# In the order of the help.
-app.command("touch", cls=Command)(touch_command)
-app.command("init", cls=Command)(init_command)
-app.command("check", cls=Command)(check_command)
-app.command("sweep", cls=Command)(sweep_command)
-app.command("reproduce", cls=Command)(reproduce_command)
-app.command("fit", cls=Command)(fit_command)
-app.command("discriminate", cls=Command)(discriminate_command)
-app.command("validate", cls=Command)(validate_command)
-app.command("export", cls=Command)(export_command)
-app.command("view", cls=Command)(view_command)
-app.command("reduce", cls=Command)(reduce_command)
-app.command("lab", cls=Command)(lab_command)
-
-app.add_typer(store_app, name="store")
-
-
-def main() -> None:
-    run(app, "fingerpad")
-
-
-def _general_first(words: list[str]) -> list[str]:
-    """Put the options of all commands before the name of the command, where they are read."""
+def _run(words: list[str]) -> int | None:
     end = words.index("--") if "--" in words else len(words)
-    general = [word for word in words[:end] if word in GENERAL_OPTIONS]
-    return [*general, *(word for word in words[:end] if word not in GENERAL_OPTIONS), *words[end:]]
+    general = [word for word in words[:end] if word in GENERAL]
+    words = [word for word in words if word not in general]
+    if set(GENERAL) <= set(general):
+        raise InputError("--quiet and --verbose exclude each other: leave one out.")
+    if words[:1] == ["--version"]:
+        print(f"fingerpad {__version__}")
+        return 0
+    if not words or words[0] in ("--help", "-h"):
+        print(_help())
+        return 0 if words else 2
+    name, *rest = words
+    if name not in commands.COMMANDS:
+        if name.startswith("-"):
+            raise InputError(f"No such option: {name}; the name of a command comes first.")
+        near = closest(name, commands.COMMANDS)
+        raise InputError(f"No such command: {name!r}" + (f"; did you mean {near}?" if near else "."))
+    LOGGER.setLevel(logging.ERROR if "--quiet" in general else logging.DEBUG if general else logging.NOTSET)
+    if "--verbose" in general:
+        logging.basicConfig(format="%(asctime)s %(name)s: %(message)s", datefmt="%H:%M:%S")
+    parser, run = _command(name)
+    _check_words(parser, rest)
+    rest, within = _within_blocks(parser, rest)
+    given, unknown = parser.parse_known_args(rest)
+    for word in unknown:
+        if not word.startswith("-"):
+            raise InputError(f"Got an unexpected extra argument: {word!r}.")
+        option = word.partition("=")[0]
+        near = closest(option.lstrip("-"), _names(parser))
+        raise InputError(f"No such option: {option}" + (f"; write --{near}." if near else "."))
+    return run(given, within)
+
+
+def _check_words(parser: Parser, words: Sequence[str]) -> None:
+    """Raise `InputError` for an option in the place of a value, and for an empty name."""
+    flags = {name for each in parser._actions for name in each.option_strings if each.nargs == 0}
+    known = {name for each in parser._actions for name in each.option_strings}
+    for before, word in zip(["An argument", *words], words, strict=False):
+        if not word:
+            raise InputError(f"{before} must not be empty: write a name, or leave it out.")
+        if before in known - flags and word in known:
+            raise InputError(f"Option {before!r} requires an argument: got {word!r}; write its value first.")
+
+
+def _names(parser: Parser) -> list[str]:
+    return [name.lstrip("-") for each in parser._actions for name in each.option_strings]
+
+
+def _within_blocks(parser: Parser, words: Sequence[str]) -> tuple[list[str], dict[str, Any]]:
+    """Take options such as `--motion.depth_mm 0.5` out of the words: what is left, and values by place."""
+    found: dict[str, Any] = {}
+    left, rest = [], list(words)
+    while rest:
+        word = rest.pop(0)
+        option, equals, value = word.partition("=")
+        place = option.removeprefix("--").replace("-", "_")
+        if not option.startswith("--") or place.partition(".")[0] not in _names(parser) or "." not in place:
+            left.append(word)
+            continue
+        if not equals:
+            if not rest:
+                raise InputError(f"Option {option!r} requires an argument.")
+            value = rest.pop(0)
+        found[place] = commands.plain(value, option)
+    return left, found
+
+
+def _help() -> str:
+    """Return the list of commands."""
+    width = max(map(len, commands.COMMANDS)) + 2
+    return "\n".join(
+        [
+            "usage: fingerpad [--version] [--help] COMMAND ...",
+            "",
+            "Simulate touch: a finite-element fingertip, the spikes of afferents, discrimination.",
+            "",
+            "commands:",
+            *(f"  {name:{width}}{what}" for name, (what, _, _) in commands.COMMANDS.items()),
+            "",
+            "`fingerpad COMMAND --help` explains its options. All take --quiet and --verbose.",
+        ]
+    )
 
 
 def _give_up_output() -> None:
@@ -117,29 +162,3 @@ def _give_up_output() -> None:
 def _show_warning(message: Warning | str, *_: object, **__: object) -> None:
     """Show a warning as a sentence: its place in the code says nothing to the user of a command."""
     print(f"fingerpad: {message}", file=sys.stderr)
-
-
-def run(commands: typer.Typer, program: str) -> None:
-    """Run a command line; an error is one sentence on standard error and exit status 2."""
-    try:
-        with signals_raise(), warnings.catch_warnings():
-            warnings.showwarning = _show_warning
-            status = commands(args=_general_first(sys.argv[1:]), standalone_mode=False)
-            sys.stdout.flush()
-        sys.exit(status)
-    except (typer.Abort, KeyboardInterrupt) as stop:  # click makes the first of the second
-        forget_interrupt()
-        terminated = isinstance(stop.__cause__ or stop, Terminated)
-        print(f"{program}: stopped. Run the same command again.", file=sys.stderr)
-        sys.exit(TERMINATED if terminated else INTERRUPTED)
-    except FingerpadError as error:
-        print(f"{program}: {error}", file=sys.stderr)
-        sys.exit(2)
-    except OSError as error:  # a folder without rights, a full disk, a closed pipe
-        _give_up_output()
-        what = error.filename or "The output"
-        print(f"{program}: {what} cannot be used ({error.strerror or error}).", file=sys.stderr)
-        sys.exit(2)
-    except MISUSE as error:
-        print(f"{program}: {FingerpadError(error.format_message().rstrip('.'))}.", file=sys.stderr)
-        sys.exit(2)

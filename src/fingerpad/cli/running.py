@@ -9,16 +9,13 @@ import signal
 import sys
 import tempfile
 import threading
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator
 from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import typer
-
 from fingerpad.core.errors import InputError
-from fingerpad.core.files import check_new, write_atomically
 from fingerpad.core.logger import LOGGER
 from fingerpad.core.progress import Bars, Lines, NoProgress, Progress
 
@@ -26,7 +23,6 @@ if TYPE_CHECKING:
     from fingerpad.core.engine import Engine
 
 INTERRUPTED, TERMINATED = 130, 143  # Exit statuses after Ctrl-C and after SIGTERM, by convention.
-CONTINUES = "The same command continues after the last finished indentation."
 
 
 class Terminated(KeyboardInterrupt):
@@ -74,18 +70,6 @@ def forget_interrupt() -> None:
     exec("")
 
 
-@contextmanager
-def interruptible(ending: str = CONTINUES) -> Iterator[None]:
-    """After Ctrl-C or SIGTERM, exit with a sentence on how to go on."""
-    try:
-        yield
-    except KeyboardInterrupt as error:
-        forget_interrupt()
-        typer.echo(f"fingerpad: stopped. {ending}", err=True)
-        status = TERMINATED if isinstance(error, Terminated) else INTERRUPTED
-        raise typer.Exit(status) from error
-
-
 def processes(jobs: int | None) -> int:
     """Return what `--jobs` says, or one process per core that this process may use."""
     cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
@@ -111,12 +95,6 @@ def command_line() -> str:
     return shlex.join(["fingerpad", *sys.argv[1:]])
 
 
-def tell(paragraphs: Sequence[str], page: Path, results: Path) -> None:
-    """Print a summary, and where page and results lie."""
-    for paragraph in (*paragraphs, f"Report: {page}", f"Results: {results}"):
-        typer.echo(paragraph)
-
-
 def make_writable(folder: Path, name: str = "--out") -> None:
     """Create `folder` if needed, and check that a file can be written into it."""
     try:
@@ -129,15 +107,6 @@ def make_writable(folder: Path, name: str = "--out") -> None:
         ) from error
 
 
-def write_examples(folder: Path, files: Mapping[str, bytes], name: str = "--out") -> None:
-    """Write example files into a folder, unless one of them exists: a user may have changed it."""
-    for file in files:
-        check_new(folder / file, "folder")
-    make_writable(folder, name)
-    for file, content in files.items():
-        write_atomically(folder / file, content)
-
-
 def progress() -> Progress:
     """Bars on a terminal, else a line every ten seconds; nothing after `--quiet`. On standard error."""
     from rich.console import Console
@@ -145,4 +114,4 @@ def progress() -> Progress:
     if not LOGGER.isEnabledFor(logging.WARNING):
         return NoProgress()
     console = Console(stderr=True)
-    return Bars(console) if console.is_terminal else Lines(partial(typer.echo, err=True), short=False)
+    return Bars(console) if console.is_terminal else Lines(partial(print, file=sys.stderr), short=False)

@@ -58,12 +58,15 @@ class Conditions:
         Tissues of all but the paper's three trials: a name, see `mechanics.tissues`, or your own.
     finger : Fingertip or FingerMesh
         The finger.
+    grading : Grading, optional
+        Mesh instead of those that the resolution grades.
     """
 
     resolution: Annotated[str, choice(RESOLUTIONS)] = "standard"
     seed: Seed = 0
     tissues: Annotated[str, choice(TISSUES)] | Tissues = DEFAULT_TISSUES
     finger: Finger = field(default_factory=Fingertip)
+    grading: Grading | None = None
 
     @property
     def afferent(self) -> Afferent:
@@ -132,10 +135,14 @@ class Conditions:
     def deflection_grading(self, indenter: Indenter) -> Grading:
         """Mesh of the skin deflection study: fine about the indenter."""
         place = self.receptor_x_mm
-        return grading_about(indenter, self.resolution, place, finger_size=self.finger.relative_size)
+        return self.grading or grading_about(
+            indenter, self.resolution, place, finger_size=self.finger.relative_size
+        )
 
     def bar_grading(self) -> Grading:
         """Mesh of the single-unit study: fine about the receptor, the same for all shifts."""
+        if self.grading is not None:
+            return self.grading
         grading = resolution_grading(
             self.resolution, self.receptor_x_mm, BAR_REACH_MM, 0.6, self.finger.relative_size
         )
@@ -147,4 +154,6 @@ class Conditions:
     def sphere_grading(self) -> Grading:
         """Mesh of the population study: fine about both positions, the same for all spheres."""
         reach_mm, size = SPHERE_REACH_MM, self.finger.relative_size
-        return resolution_grading(self.resolution, self.receptor_x_mm, reach_mm, reach_mm, size)
+        return self.grading or resolution_grading(
+            self.resolution, self.receptor_x_mm, reach_mm, reach_mm, size
+        )

@@ -20,8 +20,7 @@ from fingerpad.core.signals import SpikeTrains
 from fingerpad.core.tables import TableRow, column_of, read_csv
 from fingerpad.core.units import MS_PER_S
 from fingerpad.core.values import FloatArray, Whole, not_negative, numbers_in, positive
-from fingerpad.experiments.descriptions.stimuli import NamedStimulus
-from fingerpad.experiments.stimuli import Stimuli
+from fingerpad.experiments.requests.stimuli import NamedStimulus, Stimuli
 from fingerpad.inference.recordings import PHASES, RateRecordings, SpikeRecordings
 
 RATES = tuple(f"{phase}_rate_hz" for phase in PHASES)
@@ -44,6 +43,14 @@ class Recorded:
     presentations: Mapping[str, int]  # How often each was presented.
     spikes_after_hold: int = 0
     """Spikes that came after the motion had ended and are not used, since the model ends there."""
+
+
+def recorded_of(recordings: RateRecordings | SpikeRecordings | Recorded, stimuli: Stimuli) -> Recorded:
+    """Return recordings of Python with the stimuli that their names mean."""
+    if isinstance(recordings, Recorded):
+        return recordings
+    known = {name: stimuli.named(name) for name in dict.fromkeys(recordings.stimuli)}
+    return Recorded(recordings, known, None, dict(Counter(recordings.stimuli)))
 
 
 @checked
@@ -71,7 +78,7 @@ def read_recordings(path: str | Path, stimuli: Stimuli, unit: Whole | None = Non
     Examples
     --------
     >>> from tempfile import TemporaryDirectory
-    >>> from fingerpad.experiments.stimuli import ShiftedBar
+    >>> from fingerpad.experiments.requests.stimuli import ShiftedBar
     >>> with TemporaryDirectory() as folder:
     ...     path = Path(folder) / "rates.csv"
     ...     _ = path.write_text("shift_mm,static_rate_hz\n-1.5,60\n0,10\n-1.5,62\n", encoding="utf-8")

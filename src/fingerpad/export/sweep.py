@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import hashlib
+import json
 import time
 from collections.abc import Mapping, Sequence
 from contextlib import closing
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -17,11 +19,10 @@ from fingerpad.core.engine import Engine, engine_of
 from fingerpad.core.errors import InputError
 from fingerpad.core.progress import NoProgress, Progress
 from fingerpad.core.values import Flag, Whole
-from fingerpad.experiments.descriptions.values import Content
 from fingerpad.experiments.manifest import software
 from fingerpad.experiments.runner import STORE_FOLDER
-from fingerpad.experiments.sweep.description import Sweep, SweepDescription, read_sweep, sweep_of
 from fingerpad.experiments.sweep.observers import observe
+from fingerpad.experiments.sweep.request import SweepRequest
 from fingerpad.experiments.sweep.settle import Case, settle, unsettled
 from fingerpad.export.sweep_dataset import DONE, FAILED, LEFT_OUT, PENDING, SweepFile
 from fingerpad.mechanics.kernels import KERNELS
@@ -57,39 +58,32 @@ class SweepOutcome:
         )
 
 
-def as_sweep(sweep: str | Path | Content | SweepDescription | Sweep) -> Sweep:
-    """Return what `run_sweep` takes as a `Sweep`."""
-    if isinstance(sweep, Sweep):
-        return sweep
-    if isinstance(sweep, SweepDescription):
-        return Sweep(sweep)
-    return read_sweep(sweep) if isinstance(sweep, str | Path) else sweep_of(sweep)
-
-
-def check_sweep(sweep: Sweep, out: Path, any_size: bool = False) -> None:
+def check_sweep(sweep: SweepRequest, out: Path, any_size: bool = False) -> None:
     """Raise `InputError` if a sweep is impossible, larger than `MOST_SETTINGS`, or has no place."""
     if out.suffix != ".zarr":
         raise InputError(f"A sweep is written as .zarr: got {out.name}.")
     for shape, of in ((sweep.shape, "settings"), (sweep.observer_shape, "settings of its observer")):
         if (size := int(np.prod(shape))) > MOST_SETTINGS and not any_size:
             raise InputError(
-                f"{sweep.source} must have at most {MOST_SETTINGS} {of}, or --yes be given: it has "
+                f"{sweep.origin.name} must have at most {MOST_SETTINGS} {of}, or --yes be given: it has "
                 f"{size}, {' x '.join(map(str, shape))}."
             )
     sweep.check()
 
 
 @checked
-def run_sweep(
-    sweep: str | Path | Content | SweepDescription | Sweep,
+def sweep(
+    request: Any = None,
+    *,
     out: str | Path,
     jobs: Whole | Engine = 1,
-    *,
+    progress: Progress | None = None,
+    command: str | None = None,
+    allow_python: Flag = False,
     retry_failed: Flag = False,
     any_size: Flag = False,
     store: str | Path | None = None,
-    progress: Progress | None = None,
-    command: str = "",
+    **given: Any,
 ) -> SweepOutcome:
     """Press all settings of a sweep, let the afferents respond, and write one labelled data set.
 
@@ -98,22 +92,22 @@ def run_sweep(
 
     Parameters
     ----------
-    sweep : str, Path, mapping, SweepDescription or Sweep
-        A YAML file (docs/sweeps.md), or the same in Python.
+    request : str, Path, mapping or SweepRequest, optional
+        A YAML file (docs/sweeps.md), or its content.
     out : str or Path
         The data set, a folder that ends in .zarr.
     jobs : int or Engine
         Number of processes, or a `Cluster`; the numbers do not depend on it.
+    progress, command, allow_python
+        As of `touch`.
     retry_failed : bool
         Whether settings that failed are tried again.
     any_size : bool
         Whether there may be more than `MOST_SETTINGS` settings.
     store : str or Path, optional
         Folder of stored indentations; by default `indentations` beside `out`.
-    progress : Progress, optional
-        Shown each finished press.
-    command : str, optional
-        The command line, for the provenance.
+    **given
+        Keys of the request, such as `touch` and `grid`.
 
     Raises
     ------
@@ -126,28 +120,28 @@ def run_sweep(
     --------
     >>> from tempfile import TemporaryDirectory
     >>> touch = {"object": "sphere", "motion": {"hold_ms": 100}}
-    >>> sweep = {"touch": touch, "grid": {"motion.depth_mm": [0.2]}}
     >>> with TemporaryDirectory() as folder:
-    ...     outcome = run_sweep(sweep, Path(folder) / "study.zarr")
+    ...     outcome = sweep(touch=touch, grid={"motion.depth_mm": [0.2]}, out=Path(folder) / "study.zarr")
     >>> outcome.done, outcome.pressed
     (1, 1)
     """
-    sweep, out, began = as_sweep(sweep), Path(out), time.perf_counter()
-    check_sweep(sweep, out, any_size)
+    asked: SweepRequest = SweepRequest.read(request, given, allow_python)
+    out, began = Path(out), time.perf_counter()
+    check_sweep(asked, out, any_size)
     folder = out.parent / STORE_FOLDER if store is None else Path(store)
     engine = engine_of(jobs, KERNELS)
-    file = SweepFile(out, sweep, _attributes(sweep, command))
+    file = SweepFile(out, asked, _attributes(asked, command or ""))
     status = file.status()
-    _leave_out(file, sweep, status)
+    _leave_out(file, asked, status)
     status = file.status()
     todo = (status == PENDING) | ((status == FAILED) & retry_failed)
-    cases = unsettled(sweep, ~todo, folder)
+    cases = unsettled(asked, ~todo, folder)
     pressed, loaded, press_s = _settle(engine, cases, file, progress or NoProgress())
-    if sweep.observers and (cases or not file.observed):
+    if asked.observers and (cases or not file.observed):
         _observe(file, progress or NoProgress())
     done, failed, left_out = (int((file.status() == kind).sum()) for kind in (DONE, FAILED, LEFT_OUT))
     wall_s = time.perf_counter() - began
-    return SweepOutcome(out, sweep.size, done, failed, left_out, pressed, loaded, press_s, wall_s)
+    return SweepOutcome(out, asked.size, done, failed, left_out, pressed, loaded, press_s, wall_s)
 
 
 def _settle(
@@ -184,28 +178,28 @@ def _observe(file: SweepFile, progress: Progress) -> None:
     file.finish()
 
 
-def _leave_out(file: SweepFile, sweep: Sweep, status: np.ndarray) -> None:
+def _leave_out(file: SweepFile, sweep: SweepRequest, status: np.ndarray) -> None:
     """Note the settings that do not meet the constraints, once."""
-    if sweep.description.where and not (status == LEFT_OUT).any():
+    if sweep.where and not (status == LEFT_OUT).any():
         allowed = np.fromiter((sweep.allowed(setting) for setting in range(sweep.size)), bool, sweep.size)
         if not allowed.all():
             file.leave_out(~allowed)
 
 
-def _attributes(sweep: Sweep, command: str) -> Mapping[str, object]:
+def _attributes(sweep: SweepRequest, command: str) -> Mapping[str, object]:
     """Provenance of a data set."""
     found = software()
-    sample = sweep.description.sample
+    sample = sweep.sample
     return {
-        "title": sweep.description.title,
-        "sweep": sweep.description.model_dump_json(),
-        "source": sweep.source,
+        "title": sweep.title,
+        "sweep": json.dumps(sweep.model_dump(), default=repr),
+        "source": sweep.origin.name,
         "inputs_sha256": hashlib.sha256(sweep.hashed.encode()).hexdigest(),
         "version": found["version"],
         "code_hash": found["code_hash"],
         "packages": found["packages"],
         "platform": found["platform"],
-        "seed": sweep.described(0).description.afferents.seed,
+        "seed": sweep.described(0).afferents.seed,
         **({} if sample is None else {"sample_seed": sample.seed}),
         "started": datetime.now(UTC).isoformat(timespec="seconds"),
         "command": command,

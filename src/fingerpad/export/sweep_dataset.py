@@ -29,9 +29,9 @@ from fingerpad.core.errors import InputError, StoreError, shown
 from fingerpad.core.files import path_of
 from fingerpad.core.signals import SpikeTrains
 from fingerpad.core.units import unit_of
-from fingerpad.experiments.descriptions.values import Content
-from fingerpad.experiments.sweep.description import OBSERVER, Sweep, sweep_of
+from fingerpad.experiments.requests.parts import Content
 from fingerpad.experiments.sweep.observers import MEASURED, observe
+from fingerpad.experiments.sweep.request import OBSERVER, SweepRequest
 from fingerpad.experiments.sweep.settle import PLACES_MM, Settled
 from fingerpad.export.dataset import (
     RESPONSE_PARTS,
@@ -92,11 +92,11 @@ def variables(fields: Sequence[str] = ()) -> dict[str, Variable]:
 class SweepFile:
     """The data set of a sweep, opened for writing."""
 
-    def __init__(self, path: Path, sweep: Sweep, attributes: Mapping[str, Any]):
+    def __init__(self, path: Path, sweep: SweepRequest, attributes: Mapping[str, Any]):
         zarr = library("zarr")
         self.path, self.sweep = path_of("path", path), sweep
         self._dims = tuple(axis.name for axis in sweep.axes)
-        self._variables = variables(sweep.description.fields)
+        self._variables = variables(sweep.fields)
         self._rows: dict[tuple[str, tuple[int, ...], int], dict[int, np.ndarray]] = {}
         with _written(self.path):
             if self.path.exists() and any(self.path.iterdir()):
@@ -323,7 +323,9 @@ def observe_sweep(data: xarray.Dataset, observer: Content, grid: Content | None 
         for field, values in content.get("grid", {}).items()
         if field.partition(".")[0] != OBSERVER
     }
-    sweep = sweep_of({**content, OBSERVER: dict(observer), "grid": own | varied}, "observe_sweep")
+    sweep = SweepRequest.read(
+        {**content, OBSERVER: dict(observer), "grid": own | varied}, name="observe_sweep"
+    )
     kept = [name for name in data.dims if name in {axis.name for axis in sweep.axes}]
     responses = {name: data[name].values for name in MEASURED.values() if name in data}
     values = observe(sweep, responses, data["status"].values == DONE, lambda: None)
@@ -333,9 +335,9 @@ def observe_sweep(data: xarray.Dataset, observer: Content, grid: Content | None 
     return library("xarray").DataArray(values, dims=dims, coords=coords, name=HIT_RATE)
 
 
-def sweep_settings(data: xarray.Dataset) -> Sweep:
+def sweep_settings(data: xarray.Dataset) -> SweepRequest:
     check_sweep_data(data)
-    return sweep_of(json.loads(data.attrs["sweep"]), data.attrs.get("source", "sweep"))
+    return SweepRequest.read(json.loads(data.attrs["sweep"]), name=data.attrs.get("source", "sweep"))
 
 
 @checked
@@ -345,7 +347,7 @@ def setting_touch(data: xarray.Dataset, **where: int) -> Content:
     return sweep.content(setting_number(sweep, where))
 
 
-def setting_number(sweep: Sweep, where: Mapping[str, int]) -> int:
+def setting_number(sweep: SweepRequest, where: Mapping[str, int]) -> int:
     """Return the number of the setting with an index along each dimension, or raise `InputError`."""
     names = [axis.name for axis in sweep.axes]
     if set(where) != set(names):

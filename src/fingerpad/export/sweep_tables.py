@@ -134,7 +134,7 @@ def setting_response(data: xarray.Dataset, **where: int) -> ResponseMap:
     if int(one["status"]) != DONE:
         raise InputError(f"The setting {where} must be done: {str(one['reason'].values) or 'it is not'}")
     described = sweep.described(setting)
-    phases, asked = described.touch.stimulus.phases, described.description.afferents.windows_ms
+    phases, asked = described.touch.stimulus.phases, described.afferents.windows_ms
     count = len(described.population)
     return ResponseMap(
         positions_mm=one["receptor_mm"].values[:count],
@@ -145,7 +145,7 @@ def setting_response(data: xarray.Dataset, **where: int) -> ResponseMap:
         first_spike_latency_ms=one["first_spike_latency_ms"].values[:count],
         duration_ms=float(np.nanmax(one["time_ms"].values)),
         phases=phases,
-        windows_ms=rate_windows_ms(phases, asked.dynamic, asked.static),
+        windows_ms=rate_windows_ms(phases, *asked.both),
     ).of_types(described.population.types)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from functools import cache
@@ -15,13 +16,13 @@ from fingerpad.core.errors import InputError
 from fingerpad.core.signals import STORED_ENERGY, ResponseMap, Traces
 from fingerpad.core.values import FloatArray, Whole
 from fingerpad.data import psychophysics
-from fingerpad.experiments.descriptions.reduction import DescribedReduction
+from fingerpad.experiments.requests.reduction import ReductionRequest
 from fingerpad.geometry.fingertip import Fingertip
 from fingerpad.geometry.motion import Pose
 from fingerpad.geometry.trajectory import Trajectory
-from fingerpad.lab.state import LabState
-from fingerpad.neuron.afferent import Afferent
-from fingerpad.neuron.afferent_types import RA
+from fingerpad.lab.state import OF_RANGE, LabState
+from fingerpad.neuron.afferent import Afferent, AnyAfferent, type_of
+from fingerpad.neuron.afferent_types import afferent_of
 from fingerpad.neuron.population import Population
 from fingerpad.psychophysics.ideal_observer import multiplied_responses, present
 from fingerpad.reduction.model import ON_THE_PAD, ReducedModel
@@ -59,7 +60,7 @@ class Answer:
     response: ResponseMap  # Spikes and rates of the afferents.
 
 
-def shape_of(described: DescribedReduction, size: float) -> tuple[float, ...]:
+def shape_of(described: ReductionRequest, size: float) -> tuple[float, ...]:
     """Value of the parameter of the object that varies, if one does; 0 is that of the description."""
     name = described.training.range.parameter
     if name is None:
@@ -68,7 +69,7 @@ def shape_of(described: DescribedReduction, size: float) -> tuple[float, ...]:
 
 
 def motion_of(
-    described: DescribedReduction, model: ReducedModel | None, state: LabState
+    described: ReductionRequest, model: ReducedModel | None, state: LabState
 ) -> tuple[Trajectory, tuple[float, ...]]:
     """Press, hold and perhaps slide, lift; and the shape of the object.
 
@@ -113,16 +114,28 @@ def sample_times_ms(motion: Trajectory) -> FloatArray:
     return np.concatenate([[0.0], *(a + (b - a) * np.arange(1, n + 1) / n for a, b, n in ends)])
 
 
-def population_of(described: DescribedReduction, state: LabState) -> Population:
-    """Afferents of one type in the pad, 1 mm apart."""
-    afferent = RA() if state.afferent == "RA" else Afferent.for_tissues(described.description.tissues)
+def population_of(described: ReductionRequest, state: LabState) -> Population:
+    """Afferents of one type or several in the pad, each 1 mm apart."""
     finger = finger_of(described)
-    grid = Population.grid(
-        psychophysics.RECEPTOR_DENSITY.value, ROWS, COLUMNS, afferent=afferent, finger=finger
-    )
+    grid = Population.grid(psychophysics.RECEPTOR_DENSITY.value, ROWS, COLUMNS, finger=finger)
     x, z = grid.positions_mm.T
     positions = grid.positions_mm[_on_pad(finger, x, z)]
-    return Population(positions, grid.pitch_mm, afferent)
+    parts = {
+        name: Population(positions, grid.pitch_mm, afferent)
+        for name, afferent in afferents_in(described, state).items()
+    }
+    return Population.mixed(parts) if len(parts) > 1 else next(iter(parts.values()))
+
+
+def afferents_in(described: ReductionRequest, state: LabState) -> Mapping[str, AnyAfferent]:
+    """Afferents of a state by type: of one type by its name, or those of the range."""
+    if state.afferent == OF_RANGE:
+        laid = described.population
+        return {name: part.afferent for name, part in (laid.parts or {type_of(laid.afferent): laid}).items()}
+    fitted = state.afferent == "SAI"
+    return {
+        state.afferent: Afferent.for_tissues(described.tissues) if fitted else afferent_of(state.afferent)
+    }
 
 
 def _on_pad(finger: Fingertip, x_mm: FloatArray, z_mm: FloatArray) -> FloatArray:
@@ -142,12 +155,12 @@ def _controller() -> ThreadpoolController:
     return ThreadpoolController()
 
 
-def finger_of(described: DescribedReduction) -> Fingertip:
+def finger_of(described: ReductionRequest) -> Fingertip:
     """Return the finger that is pressed; only a `Fingertip` can be reduced."""
     return cast(Fingertip, described.training.touch.finger)
 
 
-def map_axes(described: DescribedReduction) -> tuple[FloatArray, FloatArray]:
+def map_axes(described: ReductionRequest) -> tuple[FloatArray, FloatArray]:
     middle = described.training.touch.finger.contact_mm
     along, across = (
         centre + np.arange(-reach, reach + 0.5 * MAP_STEP_MM, MAP_STEP_MM)
@@ -156,7 +169,7 @@ def map_axes(described: DescribedReduction) -> tuple[FloatArray, FloatArray]:
     return along, across
 
 
-def reduced_answer(described: DescribedReduction, model: ReducedModel, state: LabState) -> Answer:
+def reduced_answer(described: ReductionRequest, model: ReducedModel, state: LabState) -> Answer:
     motion, shape = motion_of(described, model, state)
     weights = [
         model.pose_weights((pose.x_mm, pose.z_mm, pose.tilt_deg, *shape))
@@ -177,11 +190,12 @@ def reduced_answer(described: DescribedReduction, model: ReducedModel, state: La
     )  # fmt: skip
 
 
-def in_full(described: DescribedReduction, motion: Trajectory, state: LabState, skin: SkinResponse) -> Answer:
+def in_full(described: ReductionRequest, motion: Trajectory, state: LabState, skin: SkinResponse) -> Answer:
     """Answer by a full solution of the same motion."""
     population = population_of(described, state)
     sites = _sites(described, population)
-    fields = {name: skin.sample(name, sites) for name in {STORED_ENERGY, *population.quantities}}
+    followed = [name for part in population.parts.values() or [population] for name in part.quantities]
+    fields = {name: skin.sample(name, sites) for name in {STORED_ENERGY, *followed}}
     none = np.zeros(skin.times_ms.size)
     totals = skin.times_ms, skin.depth_mm, skin.force_mn, none, skin.contact_area_mm2
     nodes_mm = skin.mesh.nodes_mm[skin.mesh.skin_nodes]
@@ -193,15 +207,15 @@ def in_full(described: DescribedReduction, motion: Trajectory, state: LabState, 
     return _answer(described, motion, population, fields, middles_mm, *totals)
 
 
-def _sites(described: DescribedReduction, population: Population) -> FloatArray:
+def _sites(described: ReductionRequest, population: Population) -> FloatArray:
     """Points of the map that lie on the pad, then the afferents."""
     x, z = (grid.ravel() for grid in np.meshgrid(*map_axes(described), indexing="ij"))
     inside = _on_pad(finger_of(described), x, z)
-    return np.vstack([np.column_stack([x, z])[inside], population.positions_mm])
+    return np.vstack([np.column_stack([x, z])[inside], population.sites_mm])
 
 
 def _answer(
-    described: DescribedReduction,
+    described: ReductionRequest,
     motion: Trajectory,
     population: Population,
     fields: dict[str, FloatArray],
@@ -217,15 +231,18 @@ def _answer(
     sed = np.full((times.size, x.size, z.size), np.nan)
     n_map = np.count_nonzero(on_skin)
     sed[:, on_skin] = fields[STORED_ENERGY][:, :n_map]
-    dynamic, static = (fields[name][:, n_map:] for name in population.quantities)
-    other, quantity = population.quantities
-    rate_of = None if other == quantity else Traces(times, dynamic, quantity=other)
-    traces = Traces(times, static, np.intersect1d(motion.times_ms[1:-1], times), quantity, rate_of)
     start, held, ends = motion.times_ms[2:5]
-    return Answer(
-        times, depth, force, error, area, middles_mm, x, z, sed,
-        population.respond_to(traces, (start, held), (held, ends)),
-    )  # fmt: skip
+    kinks_ms, first = np.intersect1d(motion.times_ms[1:-1], times), n_map
+    maps = {}
+    for name, part in (population.parts or {"": population}).items():
+        here = slice(first, first + len(part.sites_mm))
+        dynamic, static = (fields[quantity][:, here] for quantity in part.quantities)
+        other, quantity = part.quantities
+        rate_of = None if other == quantity else Traces(times, dynamic, quantity=other)
+        traces = Traces(times, static, kinks_ms, quantity, rate_of)
+        maps[name], first = part.respond_to(traces, (start, held), (held, ends)), here.stop
+    response = ResponseMap.joined(maps) if population.parts else maps[""]
+    return Answer(times, depth, force, error, area, middles_mm, x, z, sed, response)
 
 
 @dataclass(frozen=True)

@@ -20,22 +20,25 @@ import numpy as np
 from fingerpad.core.checked import checked_class
 from fingerpad.core.engine import Engine
 from fingerpad.core.errors import InputError
-from fingerpad.core.files import path_of, read_text
-from fingerpad.core.plain_yaml import read_yaml
+from fingerpad.core.files import path_of
 from fingerpad.core.progress import Progress
 from fingerpad.core.values import Flag, Whole
-from fingerpad.experiments.descriptions.reduction import (
-    DescribedReduction,
-    described_reduction,
-    run_reduction,
-)
+from fingerpad.experiments.requests.reduction import ReductionRequest
 from fingerpad.experiments.runner import Runner
 from fingerpad.geometry.fingertip import FINGERS
 from fingerpad.lab.answer import Answer, in_full, motion_of, reduced_answer
 from fingerpad.lab.state import LabState
 from fingerpad.mechanics.tissues import TISSUES
+from fingerpad.neuron.afferent_types import afferent_types
 from fingerpad.reduction.model import ReducedModel, read_reduced, write_reduced
 from fingerpad.skin.code_hash import code_hash
+
+FOLLOWED = tuple(
+    dict.fromkeys(
+        name for each in afferent_types().values() for name in (each.dynamic_quantity, each.static_quantity)
+    )
+)
+"""Quantities that the types of afferents follow: a reduced touch of the laboratory keeps them all."""
 
 KEPT_ANSWERS = 16  # Answers that are kept, so that a comparison and a second user do not compute again.
 
@@ -61,28 +64,36 @@ class Laboratory:
         Files of `fingerpad reduce`, each an object by the name of its file; default: those of the package.
     jobs : int or Engine, optional
         Processes that press.
+    allow_python : bool, optional
+        Whether the files may name objects of Python as module:object, from a module beside them.
     """
 
-    def __init__(self, folder: str | Path, ranges: Sequence[Path] = (), jobs: Whole | Engine = 1):
+    def __init__(
+        self,
+        folder: str | Path,
+        ranges: Sequence[Path] = (),
+        jobs: Whole | Engine = 1,
+        allow_python: Flag = False,
+    ):
         self.folder, self._engine = path_of("folder", folder), jobs
-        self._contents = {path.stem: read_yaml(read_text(path), str(path)) for path in ranges or shipped()}
+        self._allow_python = allow_python
         self._files = {path.stem: path for path in ranges or shipped()}
         if len(self._files) < len(ranges):
             raise InputError("The files of ranges must have different names, by which objects are chosen.")
-        self._described: dict[tuple[str, str, str], DescribedReduction] = {}
+        self._described: dict[tuple[str, str, str], ReductionRequest] = {}
         self._models: dict[Path, ReducedModel] = {}
         self._answers: OrderedDict[tuple[LabState, bool], Answer] = OrderedDict()
         self._making: dict[object, tuple[Future[Any], _Told]] = {}
         self._lock = threading.RLock()
         # Reduced touches, full solutions, and errors, which nobody waits for: each one after the other.
         self._worker, self._full, self._later = _Worker(), _Worker(), _Worker()
-        for name in self._contents:
+        for name in self._files:
             self.described(LabState(name))
 
     @property
     def names(self) -> tuple[str, ...]:
         """Names of the objects."""
-        return tuple(self._contents)
+        return tuple(self._files)
 
     def source(self, state: LabState) -> Path:
         """File of the range of a state."""
@@ -93,30 +104,25 @@ class Laboratory:
         for process in multiprocessing.active_children():
             process.kill()
 
-    def described(self, state: LabState) -> DescribedReduction:
+    def described(self, state: LabState) -> ReductionRequest:
         """Describe the range of a state."""
-        for name, known in (
-            ("object", self._contents),
-            ("finger", ("", *FINGERS)),
-            ("tissues", ("", *TISSUES)),
-        ):
+        for name, known in (("object", self._files), ("finger", ("", *FINGERS)), ("tissues", ("", *TISSUES))):
             if getattr(state, name) not in known:
                 words = ", ".join(each for each in known if each)
                 raise InputError(name, f"must be one of {words}", repr(getattr(state, name)[:40]))
         key = state.object, state.finger, state.tissues
         with self._lock:
             if key not in self._described:
-                content = self._contents[state.object]
-                chosen = {
-                    name: getattr(state, name) for name in ("finger", "tissues") if getattr(state, name)
-                }
-                asked = {**content, **chosen} if isinstance(content, dict) else content
-                self._described[key] = described_reduction(asked, str(self._files[state.object]))
+                given = {name: getattr(state, name) or None for name in ("finger", "tissues")}
+                source = self._files[state.object]
+                request: ReductionRequest = ReductionRequest.read(source, given, self._allow_python)
+                request.check()
+                self._described[key] = request.changed(quantities=(*request.quantities, *FOLLOWED))
             return self._described[key]
 
     def path(self, state: LabState) -> Path:
         """File of the reduced touch of a state, by what it depends on."""
-        text = self.described(state).description.model_dump_json() + code_hash()
+        text = repr(self.described(state).model_dump()) + code_hash()
         return self.folder / f"{state.object}-{hashlib.sha256(text.encode()).hexdigest()[:16]}.npz"
 
     def model(self, state: LabState) -> ReducedModel | None:
@@ -137,9 +143,8 @@ class Laboratory:
         """
         described, path = self.described(state), self.path(state)
         if not with_error:
-            asked = described.description.model_copy(update={"calibration": 0})
-            described = replace(described, description=asked)
-        model = run_reduction(described, Runner(self.folder, self._engine, told))
+            described = described.changed(calibration=0)
+        model = described.run(Runner(self.folder, self._engine, told))
         write_reduced(model, path)
         with self._lock:
             self._models[path] = model
@@ -149,7 +154,7 @@ class Laboratory:
     def measured(self, state: LabState) -> bool:
         """Whether the error of the reduced touch of a state is known, or not wanted by its file."""
         model = self.model(state)
-        wanted = self.described(state).description.calibration > 0
+        wanted = self.described(state).calibration > 0
         return not wanted or (model is not None and bool(np.isfinite(model.error).all()))
 
     def answer(self, state: LabState, exact: Flag = False, told: Progress | None = None) -> Answer:

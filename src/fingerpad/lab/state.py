@@ -7,8 +7,10 @@ from typing import Annotated, Any
 
 from fingerpad.core.checked import checked, value_class
 from fingerpad.core.values import Text, choice, limits, number_in
+from fingerpad.data.afferents import TYPES
 
-AFFERENTS = ("SAI", "RA")  # Types of afferents that follow what a reduced touch keeps.
+OF_RANGE = "range"  # Name of the afferents that the file of a range describes.
+AFFERENTS = (*TYPES, OF_RANGE)  # Who may respond.
 
 BOUNDS = {
     "depth_mm": (0.05, 5.0),

@@ -17,9 +17,10 @@ from fingerpad.core.progress import NoProgress, Progress
 from fingerpad.core.units import unit_of
 from fingerpad.lab.laboratory import Laboratory
 from fingerpad.lab.server import CONTROLS as ALL
-from fingerpad.lab.state import AFFERENTS, LabState
+from fingerpad.lab.state import LabState
 from fingerpad.lab.view import comparison, view_of_answer
 
+AFFERENTS = ("SAI", "RA")  # Who responds: each type makes the file as much longer.
 DEPTHS, PLACES = 6, 5  # Depths, and places along the finger, of every object.
 FRAMES = 24  # Pictures of the skin over time in each answer.
 CONTROLS = [each for each in ALL if each[0] in ("object", "depth_mm", "x_mm", "other", "afferent")]

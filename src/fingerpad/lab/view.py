@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from fingerpad.core.values import FloatArray
+from fingerpad.experiments.requests.reduction import ReductionRequest
 from fingerpad.lab.answer import (
     COLUMNS,
     ROWS,
@@ -21,7 +22,7 @@ from fingerpad.lab.answer import (
     shape_of,
 )
 from fingerpad.lab.laboratory import Laboratory, Making
-from fingerpad.lab.state import LabState
+from fingerpad.lab.state import OF_RANGE, LabState
 from fingerpad.reduction.model import ON_THE_PAD
 
 OFF_THE_PAD = 255  # Byte of a point beside the pad; the others are shares of the peak, 0 to 254.
@@ -95,7 +96,7 @@ def view_of_answer(
     x = np.linspace(0.3, finger.length_mm - 0.3, OUTLINE_POINTS)
     positions = answer.response.positions_mm
     nearest = np.linalg.norm(positions - answer.middle_mm[answer.force_mn.argmax()], axis=1)
-    asked, there = described.description, laboratory.model(state) is not None
+    asked, there = described, laboratory.model(state) is not None
     body = described.training.touch_with(shape_of(described, state.size)).indenter
     return View(
         answer=_shown(answer, frames),
@@ -185,11 +186,10 @@ def _plain(values: FloatArray) -> list[Any]:
 TEMPLATE = """import numpy as np
 
 import fingerpad as fp
-from fingerpad.experiments.descriptions.reduction import described_reduction
 
 # {title}
-described = described_reduction({content}, {source!r})
-training, shape = described.training, {shape}
+request = fp.ReductionRequest.read({content}, name={source!r})
+training, shape = request.training, {shape}
 model = fp.read_reduced({path!r}, training.touch)
 motion = fp.Trajectory(
     {times},
@@ -202,7 +202,7 @@ times_ms = {samples}
 
 # The reduced touch at the afferents, and what these fire.
 finger = training.touch.finger
-afferent = {afferent}
+afferents = {afferents}
 grid_mm = fp.Population.grid(rows={rows}, columns={columns}, finger=finger).positions_mm
 inside_mm = grid_mm[(grid_mm[:, 0] > 1.0) & (grid_mm[:, 0] < finger.length_mm - 1.0)]
 sites_mm = inside_mm[np.abs(inside_mm[:, 1]) < {pad} * finger.section(inside_mm[:, 0])[2]]
@@ -212,19 +212,29 @@ for time in times_ms:
     pose, depth_mm = motion.pose_at(time), float(motion.prescribed_at(time))
     samples.append(stream.step(time, depth_mm, None, pose.x_mm, pose.z_mm, pose.tilt_deg))
 force_mn = np.array([sample.force_mn for sample in samples])
-traces = fp.Traces(
-    times_ms,
-    np.array([sample.fields[afferent.static_quantity] for sample in samples]),
-    kinks_ms=motion.times_ms[1:-1],
-    quantity=afferent.static_quantity,
-)
-spikes = afferent.spikes(traces)
-print(f"{{force_mn.max():.1f}} mN, {{sum(len(train) for train in spikes)}} spikes")
+spikes = 0
+for afferent in afferents:
+    traces = fp.Traces(
+        times_ms,
+        np.array([sample.fields[afferent.static_quantity] for sample in samples]),
+        kinks_ms=motion.times_ms[1:-1],
+        quantity=afferent.static_quantity,
+    )
+    spikes += sum(len(train) for train in afferent.spikes(traces))
+print(f"{{force_mn.max():.1f}} mN, {{spikes}} spikes")
 
 # The full solution of the same touch; it takes seconds to a minute.
 exact = training.touch_with(shape, motion)
 # skin = exact.solve()
 """
+
+
+def python_of(described: ReductionRequest, state: LabState) -> str:
+    """Write the afferents of a state in Python."""
+    if state.afferent == OF_RANGE:
+        return "[part.afferent for part in request.population.parts.values() or [request.population]]"
+    fitted = f"fp.Afferent.for_tissues({described.tissues!r})"
+    return f"[{fitted if state.afferent == 'SAI' else f'fp.{state.afferent}()'}]"
 
 
 def python_lines(laboratory: Laboratory, state: LabState, path: str = "") -> str:
@@ -233,7 +243,7 @@ def python_lines(laboratory: Laboratory, state: LabState, path: str = "") -> str
     motion, shape = motion_of(described, laboratory.model(state), state)
     return TEMPLATE.format(
         title=str(state),
-        content=described.description.model_dump(mode="json", exclude_unset=True),
+        content=described.model_dump(exclude_unset=True),
         source=laboratory.source(state).name if path else str(laboratory.source(state).resolve()),
         shape=shape,
         rows=ROWS,
@@ -246,7 +256,5 @@ def python_lines(laboratory: Laboratory, state: LabState, path: str = "") -> str
         z=motion.z_mm,
         tilt=motion.tilt_deg,
         samples=[round(time, 6) for time in sample_times_ms(motion).tolist()],
-        afferent="fp.RA()"
-        if state.afferent == "RA"
-        else f"fp.Afferent.for_tissues({described.description.tissues!r})",
+        afferents=python_of(described, state),
     )

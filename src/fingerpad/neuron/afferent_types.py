@@ -137,6 +137,7 @@ def afferent_of(
     return CHAINS[row.chain](**values)
 
 
+@checked
 def SAI(**numbers: Any) -> Afferent:
     """Return a slowly adapting type I (SAI) afferent that is also right under vibration.
 
@@ -159,6 +160,7 @@ def SAI(**numbers: Any) -> Afferent:
     return cast(Afferent, afferent_of("SAI", **numbers))
 
 
+@checked
 def RA(**numbers: Any) -> RapidlyAdapting:
     """Return a rapidly adapting afferent (RA, FA-I), which ends in Meissner corpuscles.
 
@@ -183,6 +185,7 @@ def RA(**numbers: Any) -> RapidlyAdapting:
     return cast(RapidlyAdapting, afferent_of("RA", **numbers))
 
 
+@checked
 def PC(**numbers: Any) -> RapidlyAdapting:
     """Return a Pacinian afferent (PC, FA-II).
 
@@ -208,6 +211,7 @@ def PC(**numbers: Any) -> RapidlyAdapting:
     return cast(RapidlyAdapting, afferent_of("PC", **numbers))
 
 
+@checked
 def SAII(**numbers: Any) -> Afferent:
     """Return a slowly adapting type II (SAII) afferent, which follows the stretch of the skin.
 

@@ -12,9 +12,13 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from fingerpad.core.values import FloatArray
-from fingerpad.experiments.discrimination.analysis import Decoding, ForcedChoice, TaskResult
+from fingerpad.experiments.discrimination.analysis import (
+    Decoding,
+    DiscriminationFile,
+    ForcedChoice,
+    TaskResult,
+)
 from fingerpad.experiments.discrimination.decoding import SideCurve
-from fingerpad.experiments.discrimination.run import DiscriminationFile
 from fingerpad.report.formatting import ABSENT, fixed, joined, number, whole_percent
 from fingerpad.report.parts import (
     Chapter,

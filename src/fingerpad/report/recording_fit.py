@@ -13,8 +13,8 @@ from matplotlib.figure import Figure
 from fingerpad.core.checked import checked
 from fingerpad.core.signals import STORED_ENERGY
 from fingerpad.core.values import FloatArray
+from fingerpad.experiments.fit.request import FitFile
 from fingerpad.experiments.fit.results import FitResult, OffsetFit, PhaseRates, SpikeFitSummary
-from fingerpad.experiments.fit.session import FitFile
 from fingerpad.report.formatting import (
     ABSENT,
     IDENTIFIABLE_SYMBOLS,

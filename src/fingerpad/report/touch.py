@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 from collections.abc import Callable
 from dataclasses import asdict
 
-from fingerpad.experiments.descriptions.pressed import TouchFile
+from fingerpad.experiments.requests.touch import TouchFile
 from fingerpad.report.formatting import number
 from fingerpad.report.parts import Chapter, Drawing, Page, edition, facts_table, manifest_chapter, write_html
 

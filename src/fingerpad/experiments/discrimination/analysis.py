@@ -2,22 +2,18 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from functools import cached_property
+from typing import Literal
 
 import numpy as np
 from scipy.special import ndtr, ndtri
 
-from fingerpad.core.checked import checked, result_class, value_class
+from fingerpad.core.checked import checked, result_class
 from fingerpad.core.displayed import Result
 from fingerpad.core.errors import InputError
-from fingerpad.core.signals import ResponseMap, Skin
-from fingerpad.core.units import name_and_unit
-from fingerpad.core.values import FloatArray, IntArray, Many, Matrix, Vector
-from fingerpad.experiments.descriptions.population import population_neighbours
-from fingerpad.experiments.descriptions.stimuli import NamedStimulus, VariedStimuli
+from fingerpad.core.signals import Skin
+from fingerpad.core.values import FloatArray, IntArray, Matrix, Vector
 from fingerpad.experiments.discrimination.decoding import (
     SideCurve,
     TaskStatistic,
@@ -28,10 +24,12 @@ from fingerpad.experiments.discrimination.decoding import (
     silent_stimuli,
     task_statistic,
 )
-from fingerpad.experiments.discrimination.task import FITTED, IDEAL, DiscriminationTask
-from fingerpad.experiments.discrimination.task_stimuli import stimulus_index
-from fingerpad.neuron.population import Population
-from fingerpad.neuron.spikes import Windows, rate_windows_ms
+from fingerpad.experiments.discrimination.request import IDEAL, DiscriminationRequest, stimulus_index
+from fingerpad.experiments.manifest import Manifest
+from fingerpad.experiments.requests.afferents import parameters_of
+from fingerpad.experiments.requests.parts import at
+from fingerpad.experiments.requests.stimuli import NamedStimulus
+from fingerpad.experiments.runner import Runner
 from fingerpad.psychophysics.code_efficiency import (
     EFFICIENCY_TRIALS,
     SMALLEST_SPREAD,
@@ -39,7 +37,6 @@ from fingerpad.psychophysics.code_efficiency import (
     code_statistic,
     noisy_presentations,
 )
-from fingerpad.psychophysics.discrimination import Experiment
 from fingerpad.psychophysics.encoding import taking_part
 from fingerpad.psychophysics.functions import binomial_interval
 from fingerpad.psychophysics.ideal_observer import Presentation, multiplied_responses
@@ -182,113 +179,13 @@ class TaskResult(Result):
         )
 
 
-@value_class
-class PreparedTask:
-    """A task with its stimuli and its population.
-
-    Parameters
-    ----------
-    task : DiscriminationTask
-        As it was read.
-    stimuli : tuple of NamedStimulus
-        From `task_stimuli`, the standard first.
-    population : Population
-        From `task_population`, or one's own.
-    """
-
-    task: DiscriminationTask
-    stimuli: Many[NamedStimulus]
-    population: Population
-
-    def __post_init__(self) -> None:
-        task = self.task
-        for key, names in (("code", task.code), ("measure", task.measure)):
-            for name, count in Counter(names).items():
-                if count > 1:
-                    raise InputError(key, "must name each once", remedy=f"{name} is given {count} times")
-        self._check_windows()
-        for number, point in enumerate(task.observed.points if task.observed else (), start=1):
-            if isinstance(point.at, str) or self.stimuli[0].level is None:
-                stimulus_index(self.stimuli, point.at, f"observed.points[{number}].at")
-        if task.noise == FITTED and not self.observed_comparisons:
-            raise InputError(
-                "noise can only be fitted to observed hit rates of the comparisons, "
-                f"{', '.join(stimulus.name for stimulus in self.stimuli[1:])}: observed.points has none."
-            )
-        if IDEAL in task.code and task.noise == 0.0:
-            raise InputError("noise", "must be greater than 0 where code has ideal", "0")
-        if task.noise == FITTED and task.code[0] == IDEAL:
-            raise InputError(
-                "code", "must not begin with ideal where noise is fitted", remedy="put another first"
-            )
-        if task.experiment.criterion_sigma > 0.0 and "euclidean" in task.code:
-            raise InputError(
-                "experiment.criterion_sigma",
-                "must be 0 where code has euclidean, whose decision point does not vary",
-                f"{task.experiment.criterion_sigma:g}",
-            )
-
-    def _check_windows(self) -> None:
-        for stimulus in self.stimuli:
-            for key, (start, end) in zip(("dynamic", "static"), self._windows_ms(stimulus), strict=True):
-                if not 0.0 <= start < end:
-                    raise InputError(
-                        f"windows_ms.{key} must be a start from 0 on and a later end: got {start:g}, {end:g}."
-                    )
-                if stimulus.motion.end_ms < end:
-                    raise InputError(
-                        f"windows_ms.{key} must end with the stimuli, not at {end:g} ms: {stimulus.name!r} "
-                        f"ends at {stimulus.motion.end_ms:g} ms."
-                    )
-
-    def _windows_ms(self, stimulus: NamedStimulus) -> Windows:
-        asked = self.task.windows_ms
-        return rate_windows_ms(stimulus.motion.phases, asked.dynamic, asked.static)
-
-    @cached_property
-    def observed_comparisons(self) -> dict[int, float]:
-        """Observed hit rates of comparisons that are pressed, by their row among the stimuli."""
-        points = self.task.observed.points if self.task.observed else ()
-        return {
-            row: point.hit_rate
-            for point in points
-            for row, stimulus in enumerate(self.stimuli[1:], start=1)
-            if point.at in (stimulus.name, stimulus.level)
-        }
-
-    @cached_property
-    def neighbours(self) -> IntArray:
-        """Who is whose neighbour, (n_pairs, 2)."""
-        return population_neighbours(self.task.population, self.population)
-
-    @property
-    def plan(self) -> Experiment:
-        """Repetitions and criterion."""
-        return self.task.experiment.plan
-
-    @property
-    def axis(self) -> str:
-        """Say what the levels are."""
-        if self.task.axis or not isinstance(self.task.stimuli, VariedStimuli):
-            return self.task.axis or "level"
-        name, unit = name_and_unit(self.task.stimuli.vary.rpartition(".")[2])
-        return name.replace("_", " ") + (f" [{unit}]" if unit else "")
-
-    def responses(self, skins: Mapping[str, Skin]) -> list[ResponseMap]:
-        """Responses of the population to every stimulus."""
-        return [
-            self.population.respond(skins[stimulus.name], *self._windows_ms(stimulus))
-            for stimulus in self.stimuli
-        ]
-
-
 @checked
-def analyse(prepared: PreparedTask, skins: Mapping[str, Skin]) -> TaskResult:
+def analyse(task: DiscriminationRequest, skins: Mapping[str, Skin]) -> TaskResult:
     """Compute the responses to indented stimuli, and decode them by every code and measure.
 
     Parameters
     ----------
-    prepared : PreparedTask
+    task : DiscriminationRequest
         The task.
     skins : mapping of str to Skin
         Response of the skin to each stimulus, by its name.
@@ -298,26 +195,26 @@ def analyse(prepared: PreparedTask, skins: Mapping[str, Skin]) -> TaskResult:
     ConvergenceError
         If no noise gives the observed hit rates.
     """
-    task, stimuli, latest_ms = prepared.task, prepared.stimuli, prepared.task.windows_ms.latency
-    maps = prepared.responses(skins)
+    stimuli, latest_ms = task.pressed, task.latest_ms
+    maps = task.responses(skins)
     tables = {measure: response_table(maps, measure, latest_ms) for measure in task.measure}
     silent = {measure: silent_stimuli(table, measure, latest_ms) for measure, table in tables.items()}
     if all(rows.size for rows in silent.values()):
         raise InputError(
-            f"The population is silent: by {' or '.join(silent)} none of its {len(prepared.population)} "
+            f"The population is silent: by {' or '.join(silent)} none of its {len(task.population)} "
             f"afferents responds to {_named(stimuli, next(iter(silent.values())))}, so that there is no hit "
             "rate; indent deeper, or place the population below the stimuli."
         )
-    encoded = {measure: taking_part(table, prepared.neighbours) for measure, table in tables.items()}
-    noise = _noise(prepared, encoded, silent)
-    settings, population = task.population, prepared.population
+    encoded = {measure: taking_part(table, task.neighbours) for measure, table in tables.items()}
+    noise = _noise(task, encoded, silent)
+    settings, population = task.afferents, task.population
     return TaskResult(
         question=task.question,
-        axis=prepared.axis,
+        axis=task.said_axis,
         stimulus=tuple(stimulus.name for stimulus in stimuli),
         level=None if stimuli[0].level is None else np.array([stimulus.level for stimulus in stimuli]),
         population=TaskPopulation(
-            layout=settings.layout,
+            layout=settings.layout if settings.population is None else "own",
             n_receptors=len(population),
             pitch_mm=population.pitch_mm,
             density_per_cm2=sum((settings.densities_per_cm2 or {"": settings.density_per_cm2}).values()),
@@ -329,9 +226,9 @@ def analyse(prepared: PreparedTask, skins: Mapping[str, Skin]) -> TaskResult:
         decodings=tuple(
             decoding
             for measure in task.measure
-            for decoding in _decodings(prepared, measure, encoded[measure], silent[measure], noise.sigma)
+            for decoding in _decodings(task, measure, encoded[measure], silent[measure], noise.sigma)
         ),
-        observed=_observed(prepared),
+        observed=_observed(task),
     )
 
 
@@ -342,26 +239,26 @@ def _named(stimuli: Sequence[NamedStimulus], rows: Sequence[int] | IntArray) -> 
 
 
 def _noise(
-    prepared: PreparedTask, encoded: Mapping[str, Encoded], silent: Mapping[str, IntArray]
+    task: DiscriminationRequest, encoded: Mapping[str, Encoded], silent: Mapping[str, IntArray]
 ) -> TaskNoise:
     """Find the noise: as it is given, or as the first code and measure need it for the observed hit rates."""
-    task, points = prepared.task, prepared.observed_comparisons
+    points = task.observed_comparisons
     if not isinstance(task.noise, str):
         return TaskNoise(sigma=task.noise)
     code, measure = task.code[0], task.measure[0]
     if silent[measure].size:
         raise InputError(
             f"noise cannot be fitted: by the measure {measure} the population is silent under "
-            f"{_named(prepared.stimuli, silent[measure])}; give a number, or another measure first."
+            f"{_named(task.pressed, silent[measure])}; give a number, or another measure first."
         )
     rows, observed = [row - 1 for row in points], list(points.values())
-    fit = fit_task_noise(code, *encoded[measure], rows, observed, task.experiment.seed, prepared.plan)
+    fit = fit_task_noise(code, *encoded[measure], rows, observed, task.experiment.seed, task.experiment.plan)
     return TaskNoise(
         sigma=fit.noise_sigma,
         fitted_to=FittedNoise(
             code=code,
             measure=measure,
-            stimulus=tuple(prepared.stimuli[row].name for row in points),
+            stimulus=tuple(task.pressed[row].name for row in points),
             observed=np.array(observed),
             hit_rate=np.asarray(fit.hit_rates),
         ),
@@ -370,21 +267,26 @@ def _noise(
 
 
 def _decodings(
-    prepared: PreparedTask, measure: str, encoded: Encoded, silent: IntArray, sigma: float
+    task: DiscriminationRequest, measure: str, encoded: Encoded, silent: IntArray, sigma: float
 ) -> list[Decoding]:
     """Decode one measure by every code; there is no hit rate without responses."""
-    codes, seed = prepared.task.code, prepared.task.experiment.seed
+    codes, seed = task.code, task.experiment.seed
     if silent.size:
-        names = tuple(prepared.stimuli[row].name for row in silent)
+        names = tuple(task.pressed[row].name for row in silent)
         return [Decoding(code=code, measure=measure, silent=names) for code in codes]
     shown = noisy_presentations(encoded[0], sigma, seed, SESSION) if sigma > 0.0 else []
-    return [_decoding(prepared, code, measure, encoded, sigma, shown) for code in codes]
+    return [_decoding(task, code, measure, encoded, sigma, shown) for code in codes]
 
 
 def _decoding(
-    prepared: PreparedTask, code: str, measure: str, encoded: Encoded, sigma: float, shown: list[Presentation]
+    task: DiscriminationRequest,
+    code: str,
+    measure: str,
+    encoded: Encoded,
+    sigma: float,
+    shown: list[Presentation],
 ) -> Decoding:
-    settings, (table, neighbours) = prepared.task.experiment, encoded
+    settings, (table, neighbours) = task.experiment, encoded
     if code == IDEAL:
         best = np.array([presentation.ideal_hit_rate() for presentation in shown])
         decoding = Decoding(
@@ -395,7 +297,7 @@ def _decoding(
             d_prime=np.array([presentation.ideal().d_prime for presentation in shown]),
         )
     else:
-        rates = code_hit_rates(code, table, neighbours, sigma, settings.seed, prepared.plan)
+        rates = code_hit_rates(code, table, neighbours, sigma, settings.seed, task.experiment.plan)
         decoding = Decoding(
             code=code,
             measure=measure,
@@ -415,17 +317,17 @@ def _decoding(
             )
     if decoding.d_prime is not None:
         decoding = replace(decoding, forced_choice=forced_choice_of(decoding.d_prime, settings.trials))
-    levels = [stimulus.level for stimulus in prepared.stimuli if stimulus.level is not None]
+    levels = [stimulus.level for stimulus in task.pressed if stimulus.level is not None]
     # One comparison has no curve: what is asked of two stimuli is how well they are told apart.
     if len(levels) < 3 or decoding.hit_rate is None:
         return decoding
-    found = side_curves(levels, decoding.hit_rate, settings.trials, prepared.task.curve, settings.seed)
+    found = side_curves(levels, decoding.hit_rate, settings.trials, task.curve, settings.seed)
     return replace(decoding, curves=found)
 
 
-def _observed(prepared: PreparedTask) -> TaskObservations | None:
+def _observed(task: DiscriminationRequest) -> TaskObservations | None:
     """Observed points with their levels, and binomial intervals where the trials are known."""
-    observed, stimuli, points = prepared.task.observed, prepared.stimuli, []
+    observed, stimuli, points = task.observed, task.pressed, []
     if observed is None:
         return None
     for point in observed.points:
@@ -441,3 +343,37 @@ def _observed(prepared: PreparedTask) -> TaskObservations | None:
             )
         )
     return TaskObservations(source=observed.source, points=tuple(points))
+
+
+@result_class
+class DiscriminationFile:
+    """The file `discriminate.json`."""
+
+    format: Literal["fingerpad discrimination"] = "fingerpad discrimination"
+    format_version: Literal[3] = 3
+    discrimination: TaskResult
+    task: DiscriminationRequest  # What was asked, defaults included.
+    afferent: dict[str, float | str]  # By name; in a mixed population with the type, "RA.threshold".
+    manifest: Manifest
+
+
+def discriminate(
+    task: DiscriminationRequest, runner: Runner, command: str | None = None
+) -> DiscriminationFile:
+    """Indent with all stimuli, compute the responses of the population, and decode them."""
+    task.check()
+    with task.origin.located(), at("afferents"):
+        # The mesh is needed to tell, so this is left to the run; still it comes before anything is solved.
+        next(iter(task.touches.values())).check_sites(task.population.sites_mm)
+        task.neighbours  # noqa: B018
+    skins = runner.responses({"stimuli": task.touches})["stimuli"]
+    with runner.stage("discrimination", 1) as advance:
+        found = analyse(task, skins)
+        advance()
+    meshes = {"stimuli": next(iter(skins.values())).mesh}
+    return DiscriminationFile(
+        discrimination=found,
+        task=task,
+        afferent=parameters_of(task.population),
+        manifest=runner.manifest(task.settings, meshes, command=command, inputs=task.input_hashes()),
+    )

@@ -12,7 +12,7 @@ from fingerpad.core.errors import ConvergenceError, InputError
 from fingerpad.core.random_streams import Purpose, normals
 from fingerpad.core.signals import HitRates, ResponseMap
 from fingerpad.core.values import FloatArray, IntArray, Number, Vector
-from fingerpad.experiments.discrimination.task import CurveSettings
+from fingerpad.experiments.discrimination.request import CurveSettings
 from fingerpad.psychophysics.discrimination import (
     Experiment,
     discriminate_euclidean,

@@ -9,13 +9,15 @@ import json
 from functools import cache
 from importlib.resources import files
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from fingerpad.core.result_files import ResultFile, check_schema, read_format, write_results
-from fingerpad.core.values import JsonSchema
+if TYPE_CHECKING:  # the help of commands needs schemas alone
+    from fingerpad.core.result_files import ResultFile
+    from fingerpad.core.values import JsonSchema
+
 
 TOUCH_SCHEMA = "fingerpad-touch.schema.json"
-"""Schema of the description of a touch, from which editors complete."""
+"""Schema of the request of a touch, from which editors complete."""
 
 
 @cache
@@ -24,9 +26,10 @@ def schema(file_format: str) -> JsonSchema:
     return _packaged(file_name(file_format))
 
 
-def touch_schema() -> JsonSchema:
-    """JSON schema of the description of a touch."""
-    return _packaged(TOUCH_SCHEMA)
+@cache
+def request_schema(name: str) -> JsonSchema:
+    """JSON schema of a request, with its explanations, by the name of its command."""
+    return _packaged(f"fingerpad-{name}-request.schema.json")
 
 
 def _packaged(name: str) -> JsonSchema:
@@ -40,11 +43,15 @@ def file_name(file_format: str) -> str:
 
 def write(path: Path, results: ResultFile) -> None:
     """Write a file of results that meets the schema of its format."""
+    from fingerpad.core.result_files import write_results
+
     write_results(path, results, schema(results.format))
 
 
 def read(path: Path, *formats: str) -> dict[str, Any]:
     """Read the values of a file of results without its types."""
+    from fingerpad.core.result_files import check_schema, read_format
+
     versions = {name: schema(name)["properties"]["format_version"]["const"] for name in formats}
     values = read_format(path, versions)
     check_schema(path, values, schema(values["format"]))

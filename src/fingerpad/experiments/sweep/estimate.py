@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from fingerpad.core.errors import InputError
-from fingerpad.experiments.descriptions.estimate import estimate_press
-from fingerpad.experiments.sweep.description import Sweep
+from fingerpad.experiments.requests.touch import estimate_press
+from fingerpad.experiments.sweep.request import SweepRequest
 from fingerpad.skin.fields import Place, stored_fields
 
 MOST_LOOKED_AT = 8  # Presses whose meshes are built for the estimate, spread evenly over the sweep.
@@ -37,7 +37,7 @@ class SweepEstimate:
         )
 
 
-def estimate_sweep(sweep: Sweep, processes: int) -> SweepEstimate:
+def estimate_sweep(sweep: SweepRequest, processes: int) -> SweepEstimate:
     kept = [press for press in range(sweep.presses) if any(map(sweep.allowed, sweep.settings_of(press)))]
     chosen = [kept[n] for n in np.unique(np.linspace(0, len(kept) - 1, MOST_LOOKED_AT).round().astype(int))]
     found, bytes_each = [], []
@@ -56,12 +56,12 @@ def estimate_sweep(sweep: Sweep, processes: int) -> SweepEstimate:
         )
     if not found:
         raise InputError(
-            f"{sweep.source} must have a press that is possible: none of {len(chosen)} looked at is."
+            f"{sweep.origin.name} must have a press that is possible: none of {len(chosen)} looked at is."
         )
     at_once = min(processes, len(kept))
     each_s = float(np.mean([one.time_s for one in found])) * (CORES if at_once > 1 else 1)
     return SweepEstimate(
-        settings=sum(map(sweep.allowed, range(sweep.size))) if sweep.description.where else sweep.size,
+        settings=sum(map(sweep.allowed, range(sweep.size))) if sweep.where else sweep.size,
         presses=len(kept),
         looked_at=len(found),
         time_s=each_s * len(kept) / at_once,

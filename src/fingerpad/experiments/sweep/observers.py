@@ -8,9 +8,9 @@ import numpy as np
 
 from fingerpad.core.signals import HitRates
 from fingerpad.core.values import FloatArray, IntArray
-from fingerpad.experiments.descriptions.population import population_neighbours
 from fingerpad.experiments.discrimination.decoding import SESSION, silent_stimuli
-from fingerpad.experiments.sweep.description import ObserverSettings, Sweep
+from fingerpad.experiments.requests.afferents import population_neighbours
+from fingerpad.experiments.sweep.request import ObserverSettings, SweepRequest
 from fingerpad.psychophysics.discrimination import compare_euclidean_observers, compare_gradient_sum_observers
 from fingerpad.psychophysics.encoding import taking_part
 
@@ -19,7 +19,10 @@ MEASURED = {"static": "static_rate_hz", "dynamic": "dynamic_rate_hz", "latency":
 
 
 def observe(
-    sweep: Sweep, responses: Mapping[str, FloatArray], done: np.ndarray, on_finished: Callable[[], None]
+    sweep: SweepRequest,
+    responses: Mapping[str, FloatArray],
+    done: np.ndarray,
+    on_finished: Callable[[], None],
 ) -> FloatArray:
     observers = sweep.observers
     along, _ = sweep.stimuli_axis(observers[0])
@@ -37,20 +40,25 @@ def observe(
 
 
 def _neighbours(
-    sweep: Sweep, index: Sequence[int | slice], along: int, known: dict[str, tuple[IntArray, int]]
+    sweep: SweepRequest, index: Sequence[int | slice], along: int, known: dict[str, tuple[IntArray, int]]
 ) -> tuple[IntArray, int]:
     """Pairs of neighbours and number of receptors of a group; found once for equal afferents."""
     place = [0 if number == along else int(where) for number, where in enumerate(index)]  # type: ignore[arg-type]
     described = sweep.described(int(np.ravel_multi_index(place, sweep.shape)))
-    asked = described.description
-    key = f"{asked.finger!r} {asked.afferents!r}"
+    key = f"{described.finger!r} {described.afferents!r}"
     if key not in known:
-        known[key] = population_neighbours(asked.afferents, described.population), len(described.population)
+        known[key] = (
+            population_neighbours(described.afferents, described.population),
+            len(described.population),
+        )
     return known[key]
 
 
 def _group(
-    sweep: Sweep, tables: Mapping[str, FloatArray], pairs: IntArray, observers: Sequence[ObserverSettings]
+    sweep: SweepRequest,
+    tables: Mapping[str, FloatArray],
+    pairs: IntArray,
+    observers: Sequence[ObserverSettings],
 ) -> FloatArray:
     """Hit rates of all observers of one group, (n_stimuli, n_observers)."""
     n_stimuli = len(next(iter(tables.values())))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pickle
 import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -11,11 +12,9 @@ from pathlib import Path
 import numpy as np
 
 from fingerpad.core.errors import ConvergenceError, InputError
-from fingerpad.core.plain_yaml import read_yaml
 from fingerpad.core.signals import ResponseMap
-from fingerpad.experiments.descriptions.pressed import respond
-from fingerpad.experiments.descriptions.touch import DescribedTouch
-from fingerpad.experiments.sweep.description import Sweep, sweep_of
+from fingerpad.experiments.requests.touch import TouchRequest
+from fingerpad.experiments.sweep.request import SweepRequest
 from fingerpad.geometry.mesh import Mesh
 from fingerpad.skin.fields import FIELDS, Place
 from fingerpad.skin.sampling import SkinResponse
@@ -39,8 +38,7 @@ PLACES_MM: dict[Place, tuple[str, Callable[[Mesh], np.ndarray]]] = {
 class Case:
     """One press with the settings that are wanted of it."""
 
-    text: str
-    source: str  # Description of the sweep in JSON, and its file.
+    sweep: bytes  # The pickled request.
     press: int
     settings: tuple[int, ...]  # Numbers of the settings, all of this press.
     store: Path  # Folder of stored indentations.
@@ -60,7 +58,7 @@ class Settled:
 
 def settle(case: Case, threads: int | None = None) -> Settled:
     """Press, or load what is stored, and let the afferents of every setting respond."""
-    sweep = _sweep(case.text, case.source)
+    sweep = _sweep(case.sweep)
     began = time.perf_counter()
     first = case.settings[0]
     try:
@@ -74,17 +72,17 @@ def settle(case: Case, threads: int | None = None) -> Settled:
     responses, failures = {}, {}
     for setting in case.settings:
         try:
-            responses[setting] = respond(sweep.described(setting).pressed_as(described), skin)
+            responses[setting] = sweep.described(setting).pressed_as(described).respond(skin)
         except InputError as error:
             failures[setting] = str(error)
-    names = dict.fromkeys((*TRACES, *sweep.description.fields))
+    names = dict.fromkeys((*TRACES, *sweep.fields))
     kept = {name: skin.fields[name] for name in names}
     places = dict.fromkeys(FIELDS[name].place for name in names)
     kept |= {PLACES_MM[place][0]: PLACES_MM[place][1](skin.mesh) for place in places if place in PLACES_MM}
     return Settled(case.press, pressed, seconds, kept, responses, failures)
 
 
-def skin_of(described: DescribedTouch, store: Store, threads: int | None) -> tuple[SkinResponse, bool]:
+def skin_of(described: TouchRequest, store: Store, threads: int | None) -> tuple[SkinResponse, bool]:
     """Response of the skin to a touch, and whether it was pressed for it."""
     if not store.missing([described.touch]):
         return store.load(described.touch), False
@@ -95,17 +93,17 @@ def skin_of(described: DescribedTouch, store: Store, threads: int | None) -> tup
 
 
 @lru_cache(maxsize=2)
-def _sweep(text: str, source: str) -> Sweep:
+def _sweep(pickled: bytes) -> SweepRequest:
     """Read a sweep once per process."""
-    return sweep_of(read_yaml(text, source), source)
+    return pickle.loads(pickled)
 
 
-def unsettled(sweep: Sweep, done: np.ndarray, store: Path) -> Sequence[Case]:
+def unsettled(sweep: SweepRequest, done: np.ndarray, store: Path) -> Sequence[Case]:
     """Cases of a sweep of which some settings are not done and meet the constraints."""
-    text = sweep.description.model_dump_json()
+    pickled = pickle.dumps(sweep.changed())  # without what it has computed
     cases = []
     for press in range(sweep.presses):
         wanted = tuple(setting for setting in sweep.settings_of(press) if not done[setting])
         if wanted:
-            cases.append(Case(text, sweep.source, press, wanted, store.absolute()))
+            cases.append(Case(pickled, press, wanted, store.absolute()))
     return cases

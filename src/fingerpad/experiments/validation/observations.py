@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 
@@ -14,7 +14,8 @@ from fingerpad.core.errors import InputError
 from fingerpad.core.tables import TableRow, read_csv
 from fingerpad.core.units import unit_of
 from fingerpad.core.values import FloatArray, finite, float_array, not_negative, one_of, positive
-from fingerpad.experiments.indenter_text import indenter_named
+from fingerpad.experiments.requests.stimulus import indenter_named
+from fingerpad.geometry.indenters import Indenter
 
 LARGEST_FILE_MB = 1.0  # Larger files are refused: they hold no published table. [MB]
 _BYTES_PER_MB = 1e6
@@ -123,23 +124,28 @@ class Observations:
     kind: Kind
     rows: tuple[Observation, ...]
     source: str
+    objects: Mapping[str, Indenter] = field(default_factory=dict)  # Objects by the names that rows give.
 
     @cached_property
     def observed(self) -> FloatArray:
         """What was observed, (n_rows,). [unit of the kind]"""
         return float_array("observed", [row.observed for row in self.rows], 1)
 
+    def indenter(self, text: str) -> Indenter:
+        """Return the body that a row names."""
+        return self.objects[text] if text in self.objects else indenter_named(text)
+
     @property
     def conditions(self) -> list[tuple[object, ...]]:
         """Conditions of the rows, equal where they mean the same: `punch:6.35` and `punch:6.350` are one."""
         return [
-            tuple(indenter_named(value) if isinstance(value, str) else value for value in row.condition)
+            tuple(self.indenter(value) if isinstance(value, str) else value for value in row.condition)
             for row in self.rows
         ]
 
 
 @checked
-def read_observations(path: str | Path) -> Observations:
+def read_observations(path: str | Path, objects: Mapping[str, Indenter] | None = None) -> Observations:
     r"""Read a file of observations.
 
     Parameters
@@ -147,6 +153,8 @@ def read_observations(path: str | Path) -> Observations:
     path : str or Path
         A CSV file in UTF-8, of at most `LARGEST_FILE_MB`. Its header decides the kind; columns may stand in
         any order, and lines that begin with # are comments.
+    objects : mapping of str to Indenter, optional
+        Bodies of one's own, by the names that the column of the indenter has for them.
 
     Examples
     --------
@@ -168,7 +176,8 @@ def read_observations(path: str | Path) -> Observations:
         )
     lines = read_csv(path, (INDENTER, *COLUMNS))
     kind = _kind(path, tuple(lines[0].entries))
-    return Observations(kind, tuple(_observation(line, kind) for line in lines), str(path))
+    own = dict(objects or {})
+    return Observations(kind, tuple(_observation(line, kind, own) for line in lines), str(path), own)
 
 
 def _kind(path: Path, columns: tuple[str, ...]) -> Kind:
@@ -188,9 +197,9 @@ def _kind(path: Path, columns: tuple[str, ...]) -> Kind:
     )
 
 
-def _observation(line: TableRow, kind: Kind) -> Observation:
-    condition = tuple(_value(line, column) for column in kind.conditions)
-    observed = _value(line, kind.observed)
+def _observation(line: TableRow, kind: Kind, own: Mapping[str, Indenter]) -> Observation:
+    condition = tuple(_value(line, column, own) for column in kind.conditions)
+    observed = _value(line, kind.observed, own)
     assert isinstance(observed, float)
     stiffest = STIFFEST_N_PER_MM * line.number("depth_mm", "mm") if kind.observed == "force_n" else np.inf
     if observed > stiffest:
@@ -201,12 +210,13 @@ def _observation(line: TableRow, kind: Kind) -> Observation:
     return Observation(line.line, condition, observed)
 
 
-def _value(line: TableRow, column: str) -> Value:
+def _value(line: TableRow, column: str, own: Mapping[str, Indenter]) -> Value:
     if column != INDENTER:
         return line.number(column, unit_of(column), COLUMNS[column])
     text = line.text(column)
     with line.placed():
-        indenter_named(text)
+        if text not in own:
+            indenter_named(text)
     return text
 
 

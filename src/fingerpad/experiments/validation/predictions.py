@@ -4,70 +4,27 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from typing import Annotated
 
 import numpy as np
 
-from fingerpad.core.checked import value_class
 from fingerpad.core.errors import ConvergenceError, InputError
-from fingerpad.core.signals import Traces
+from fingerpad.core.signals import INTERVAL, Traces
 from fingerpad.core.units import MN_PER_N
-from fingerpad.core.values import FloatArray, Numbers, choice
+from fingerpad.core.values import FloatArray
 from fingerpad.data import protocol
-from fingerpad.experiments.conditions import Conditions
-from fingerpad.experiments.indenter_text import indenter_named
 from fingerpad.experiments.runner import Runner
-from fingerpad.experiments.validation.observations import Kind, Observations, Value
+from fingerpad.experiments.validation.observations import Kind, Value
+from fingerpad.experiments.validation.request import QUASI_STATIC, ValidationRequest
 from fingerpad.geometry.edged_indenters import Grating
 from fingerpad.geometry.indenter_grading import grading_about
 from fingerpad.geometry.indenters import Indenter, Plate, Sphere
 from fingerpad.geometry.motion import ForceRampAndHold, RampAndHold
-from fingerpad.neuron.afferent import Afferent
 from fingerpad.neuron.population import Population
-from fingerpad.neuron.spikes import firing_rate_hz
+from fingerpad.neuron.spikes import RATE_OF
 from fingerpad.skin.indentation import Touch, settings_of, touch_of
 from fingerpad.skin.sampling import SkinResponse
 
-RAMP_AND_HOLD, QUASI_STATIC = "ramp_and_hold", "quasi_static"
-LOADINGS = (RAMP_AND_HOLD, QUASI_STATIC)  # Read at the end of the paper's hold, or with relaxed tissues.
 QUASI_STATIC_MS = 1e12  # After such a ramp all Prony terms have relaxed to 1 in 10⁶. [ms]
-
-
-@value_class
-class FingertipModel:
-    """The fingertip, its afferent and the loading whose predictions are scored.
-
-    Parameters
-    ----------
-    conditions : Conditions
-        Finger, tissues and accuracy.
-    afferent : Afferent, optional
-        Responds to the touches of rates; default: the one that was fitted with the tissues.
-    loading : {"ramp_and_hold", "quasi_static"}
-        How depths of force and deflection are reached.
-    static_window_ms : (float, float)
-        Window in which rates are counted, within the paper's ramp and hold. [ms]
-    """
-
-    conditions: Conditions
-    afferent: Afferent | None = None
-    loading: Annotated[str, choice(LOADINGS)] = RAMP_AND_HOLD
-    static_window_ms: Numbers = protocol.STATIC_WINDOW.value
-
-    def __post_init__(self) -> None:
-        start, end = self.static_window_ms
-        end_ms = RampAndHold().end_ms
-        if not 0.0 <= start < end <= end_ms:
-            raise InputError(
-                "static_window",
-                f"must be a start from 0 on and a later end, at most {end_ms:g} ms, where the hold ends",
-                f"{start:g}, {end:g}",
-            )
-
-    @property
-    def responding(self) -> Afferent:
-        """The afferent that responds: the given one, or that of the tissues."""
-        return self.afferent or self.conditions.afferent
 
 
 @dataclass(frozen=True)
@@ -92,8 +49,9 @@ class Predictions:
     meshed: SkinResponse | None  # One of the responses, for its mesh.
 
 
-def predict(observations: Observations, model: FingertipModel, runner: Runner) -> Predictions:
+def predict(model: ValidationRequest, runner: Runner) -> Predictions:
     """Press what is not stored yet, and read the prediction of every row."""
+    observations = model.observed
     kind, axis = observations.kind, observations.kind.axis
     given = {
         row.condition: dict(zip(kind.conditions, row.condition, strict=True)) for row in observations.rows
@@ -124,7 +82,7 @@ def predict(observations: Observations, model: FingertipModel, runner: Runner) -
     return Predictions(values, mirrored, reasons, next(iter(skins.values()), None))
 
 
-def _plan(kind: Kind, given: Mapping[str, Value], model: FingertipModel) -> Plan:
+def _plan(kind: Kind, given: Mapping[str, Value], model: ValidationRequest) -> Plan:
     """How a condition is predicted, or why it cannot be pressed."""
     try:
         return _READING[kind.observed](given, model)
@@ -151,28 +109,27 @@ def _number(value: Value) -> float:
     return value
 
 
-def _pressed_to(given: Mapping[str, Value], model: FingertipModel) -> Touch | None:
+def _pressed_to(given: Mapping[str, Value], model: ValidationRequest) -> Touch | None:
     """Touch that reaches a depth, perpendicular to the long axis of the finger; None at depth 0."""
-    indenter, depth_mm = indenter_named(str(given["indenter"])), _number(given["depth_mm"])
+    indenter, depth_mm = model.observed.indenter(str(given["indenter"])), _number(given["depth_mm"])
     if depth_mm == 0.0:
         return None
-    conditions = model.conditions
+    conditions = model.settings
     motion, settings = RampAndHold(depth_mm=depth_mm), settings_of(conditions.resolution)
     if model.loading == QUASI_STATIC:
         motion = replace(motion, ramp_ms=QUASI_STATIC_MS)
         settings = replace(settings, hold_steps=1)
-    return touch_of(
-        conditions.finger, indenter, motion, conditions.tissues, conditions.resolution, settings=settings
-    )
+    pressed = conditions.finger, indenter, motion, conditions.tissues, conditions.resolution
+    return touch_of(*pressed, settings=settings, grading=conditions.grading)
 
 
-def _force(given: Mapping[str, Value], model: FingertipModel) -> Reading:
+def _force(given: Mapping[str, Value], model: ValidationRequest) -> Reading:
     return Reading(
         _pressed_to(given, model), lambda skin: float(skin.force_mn[-1]) / MN_PER_N if skin else 0.0
     )
 
 
-def _deflection(given: Mapping[str, Value], model: FingertipModel) -> Reading:
+def _deflection(given: Mapping[str, Value], model: ValidationRequest) -> Reading:
     """Deflection of the skin at a distance from the indenter's axis, proximal positive. [mm]"""
     distance_mm = _number(given["distance_mm"])
 
@@ -192,21 +149,23 @@ def _deflection(given: Mapping[str, Value], model: FingertipModel) -> Reading:
     return Reading(_pressed_to(given, model), read)
 
 
-def _rate(given: Mapping[str, Value], model: FingertipModel) -> Reading:
+def _rate(given: Mapping[str, Value], model: ValidationRequest) -> Reading:
     """Rate of an afferent at a position from the middle of a touch by force, proximal positive. [spikes/s]"""
-    conditions, force_n = model.conditions, _number(given["force_n"])
+    conditions, force_n = model.settings, _number(given["force_n"])
     position_mm = _number(given.get("position_mm", 0.0))
     body: Indenter
     if "ridge_mm" in given:
         ridge_mm, groove_mm = _number(given["ridge_mm"]), _number(given["groove_mm"])
         body = Grating(ridge_mm, groove_mm, min(protocol.LIP_RADIUS.value, ridge_mm / 2))
         position_mm -= body.period_mm * round(position_mm / body.period_mm)
-        grading = None
+        grading = conditions.grading
     else:
         curvature = _number(given["curvature_per_m"])
         body = Sphere(curvature_per_m=curvature) if curvature > 0.0 else Plate()
         # One mesh for all curvatures, so that no difference between them is one between meshes.
-        grading = grading_about(Plate(), conditions.resolution, conditions.receptor_x_mm)
+        grading = conditions.grading or grading_about(
+            Plate(), conditions.resolution, conditions.receptor_x_mm
+        )
     along = np.cos(np.deg2rad(conditions.skin_tilt_deg))
     site = (conditions.receptor_x_mm - position_mm * along, 0.0)
     conditions.finger.skin_point(*site)
@@ -224,14 +183,15 @@ def _rate(given: Mapping[str, Value], model: FingertipModel) -> Reading:
     return Reading(touch, read)
 
 
-def _resting_rate(model: FingertipModel) -> float:
+def _resting_rate(model: ValidationRequest) -> float:
     """Rate of the afferent without any touch. [spikes/s]"""
     afferent = model.responding
     rest = Traces.at_rest(RampAndHold().end_ms, afferent.dynamic_quantity, afferent.static_quantity)
-    return float(firing_rate_hz(afferent.spikes(rest), model.static_window_ms)[0])
+    measure = getattr(afferent, "rate_measure", INTERVAL)
+    return float(RATE_OF[measure](afferent.spikes(rest), model.static_window_ms)[0])
 
 
-_READING: Mapping[str, Callable[[Mapping[str, Value], FingertipModel], Reading]] = {
+_READING: Mapping[str, Callable[[Mapping[str, Value], ValidationRequest], Reading]] = {
     "force_n": _force,
     "deflection_mm": _deflection,
     "rate_hz": _rate,

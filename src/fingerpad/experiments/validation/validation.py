@@ -2,18 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import asdict
 from typing import Literal
 
 import numpy as np
 
-from fingerpad.core.checked import checked, result_class, value_class
-from fingerpad.core.engine import Engine, engine_of
-from fingerpad.core.progress import Progress
-from fingerpad.core.values import AnyPath, Number, Whole
+from fingerpad.core.checked import result_class
+from fingerpad.core.values import Number
 from fingerpad.data import fingertip
 from fingerpad.experiments.manifest import Manifest
+from fingerpad.experiments.requests.afferents import parameters_of
 from fingerpad.experiments.runner import Runner
 from fingerpad.experiments.scores import (
     coefficient_of_determination,
@@ -21,10 +18,10 @@ from fingerpad.experiments.scores import (
     gain_through_origin,
     observed_ranges,
 )
-from fingerpad.experiments.validation.observations import Observations
-from fingerpad.experiments.validation.predictions import FingertipModel, predict
+from fingerpad.experiments.validation.predictions import predict
+from fingerpad.experiments.validation.request import ValidationRequest
 from fingerpad.geometry.motion import RampAndHold
-from fingerpad.mechanics.tissues import named_tissues
+from fingerpad.neuron.population import Population
 
 
 @result_class
@@ -78,67 +75,15 @@ class ValidationFile:
     manifest: Manifest
 
 
-@value_class
-class ValidationRequest:
-    """Observations with all that it takes to score them.
-
-    Parameters
-    ----------
-    observations : Observations
-        From `read_observations`.
-    model : FingertipModel
-        Finger, tissues, afferent, loading.
-    folder : Path
-        Where finished indentations are stored.
-    jobs : int or Engine
-        Processes, or the engine that solves the indentations; the numbers do not depend on it.
-    """
-
-    observations: Observations
-    model: FingertipModel
-    folder: AnyPath
-    jobs: Whole | Engine = 1
-
-    def __post_init__(self) -> None:
-        engine_of(self.jobs)
-        if isinstance(self.model.conditions.tissues, str):
-            named_tissues(self.model.conditions.tissues)
-
-
-@checked
-def validate(
-    request: ValidationRequest,
-    progress: Progress | None = None,
-    command: str | None = None,
-    inputs: Mapping[str, str] | None = None,
-) -> ValidationFile:
+def validate(request: ValidationRequest, runner: Runner, command: str | None = None) -> ValidationFile:
     """Predict every row of a file of observations, and score the predictions.
 
-    Parameters
-    ----------
-    request : ValidationRequest
-        Observations, model and folder.
-    progress : Progress, optional
-        Shown each finished indentation.
-    command : str, optional
-        The command line, for the manifest.
-    inputs : mapping of str to str, optional
-        SHA-256 of the input files, by name.
-
-    Returns
-    -------
-    ValidationFile
-        Rows whose touch cannot be solved have a reason instead of a prediction.
-
-    Raises
-    ------
-    StoreError
-        If a stored indentation is damaged or the folder cannot be written.
+    Rows whose touch cannot be solved have a reason instead of a prediction.
     """
-    observations, model = request.observations, request.model
+    request.check()
+    observations = request.observed
     kind, observed = observations.kind, observations.observed
-    runner = Runner(request.folder, request.jobs, progress)
-    found = predict(observations, model, runner)
+    found = predict(request, runner)
     predicted, ranges = found.values, observed_ranges(observations.conditions, observed)
     inside = ranges.inside(predicted)
     judged = [each for row in ranges.first if (each := inside[row]) is not None]
@@ -146,10 +91,10 @@ def validate(
     scored = observed[known], predicted[known]
     gain = gain_through_origin(*scored)
     manifest = runner.manifest(
-        model.conditions,
+        request.settings,
         {kind.name: found.meshed.mesh} if found.meshed else {},
         command=command,
-        inputs=inputs,
+        inputs=request.input_hashes(),
     )
     r2_mirrored = np.nan
     if found.mirrored is not None:
@@ -157,18 +102,18 @@ def validate(
         r2_mirrored = coefficient_of_determination(observed[turned], found.mirrored[turned])
     motion = RampAndHold()
     of_rates = {
-        "afferent": asdict(model.responding),
+        "afferent": parameters_of(Population(np.zeros((1, 2)), 1.0, request.responding)),
         "ramp_ms": motion.ramp_ms,
         "hold_ms": motion.hold_ms,
-        "static_window_ms": model.static_window_ms,
+        "static_window_ms": request.static_window_ms,
         "receptor_depth_mm": fingertip.RECEPTOR_DEPTH.value,
     }
     return ValidationFile(
         kind=kind.name,
         unit=kind.unit,
-        resolution=model.conditions.resolution,
+        resolution=request.resolution,
         tissues=manifest.materials,
-        **(of_rates if kind.is_rate else {"loading": model.loading}),
+        **(of_rates if kind.is_rate else {"loading": request.loading}),
         n_rows=observed.size,
         n_predicted=int(known.sum()),
         r2=coefficient_of_determination(*scored),

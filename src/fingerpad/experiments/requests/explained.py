@@ -14,16 +14,14 @@ from pydantic import BaseModel
 from fingerpad.core.checked import other_names
 from fingerpad.core.units import unit_of
 from fingerpad.core.values import JsonSchema
-from fingerpad.experiments.descriptions.pressing import MEASURED, RAMP_AND_HOLD
-from fingerpad.experiments.descriptions.reading import parts_in
-from fingerpad.experiments.descriptions.signatures import UNKNOWN_MODEL, Made
-from fingerpad.experiments.descriptions.values import Part
+from fingerpad.experiments.requests.parts import UNKNOWN_MODEL, Made, Part, parts_in
+from fingerpad.experiments.requests.stimulus import MEASURED, RAMP_AND_HOLD
 
 
 def explained_schema(kind: type[Part]) -> JsonSchema:
     """JSON schema of a description as it is written, with the explanations beside its fields."""
     made = {"$schema": "https://json-schema.org/draft/2020-12/schema"} | kind.model_json_schema()
-    definitions = made["$defs"]
+    definitions = made.get("$defs", {})
     for name in [name for name in definitions if name.startswith(UNKNOWN_MODEL)]:
         del definitions[name]
     for part in _parts_of(kind):
@@ -31,7 +29,11 @@ def explained_schema(kind: type[Part]) -> JsonSchema:
         told: dict[str, str] = {}
         for home in reversed(part.__mro__):
             if issubclass(home, Part):
-                told |= _of_parameters(home) | _written_beside(home)
+                own = _of_parameters(home) | _written_beside(home)
+                # "As of" another class leaves the explanation to that class.
+                told |= {
+                    key: text for key, text in own.items() if not (text.startswith("As of") and key in told)
+                }
         if issubclass(part, Made) and part is not Made:
             told |= _of_other_names(part.makes) | _of_parameters(part.makes)
             told["kind"] = (part.makes.__doc__ or "").strip().partition("\n")[0]
@@ -94,7 +96,7 @@ def _tidied(schema: Any) -> Any:
     if not isinstance(schema, dict):
         return schema
     kept = {
-        key: {name: _tidied(item) for name, item in value.items()}
+        {"oneOf": "anyOf"}.get(key, key): {name: _tidied(item) for name, item in value.items()}
         if key in ("properties", "$defs")
         else _tidied(value)
         for key, value in schema.items()

@@ -1,4 +1,4 @@
-"""What a file of a sweep says: a touch, and which of its fields vary.
+"""A sweep: one request with a touch, and which of its fields vary.
 
 docs/sweeps.md explains every key.
 """
@@ -12,20 +12,26 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import islice
-from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, ClassVar
 
 import numpy as np
 from pydantic import BeforeValidator, Field, Strict
 
 from fingerpad.core.errors import InputError
-from fingerpad.core.files import path_of, read_text
-from fingerpad.core.plain_yaml import read_yaml
 from fingerpad.core.values import Count, Finite, NotNegative, Pair, Positive, Seed, Text, choice
-from fingerpad.experiments.descriptions.reading import Origin, at, part_from
-from fingerpad.experiments.descriptions.touch import DescribedTouch, described_touch
-from fingerpad.experiments.descriptions.values import Block, Content, LevelOrName, Part, as_list
-from fingerpad.experiments.discrimination.task import CODES, IDEAL, MEASURES, ExperimentSettings
+from fingerpad.experiments.discrimination.request import CODES, IDEAL, MEASURES, ExperimentSettings
+from fingerpad.experiments.requests.parts import (
+    Block,
+    Content,
+    LevelOrName,
+    Part,
+    Request,
+    as_list,
+    at,
+    part_from,
+    with_value,
+)
+from fingerpad.experiments.requests.touch import TouchRequest
 from fingerpad.psychophysics.noisy_responses import LARGEST_NOISE
 from fingerpad.skin.fields import stored_fields
 
@@ -111,27 +117,11 @@ class ObserverSettings(Part):
     experiment: ExperimentSettings = ExperimentSettings()  # Repetitions, criterion and seed.
 
 
-class SweepDescription(Part):
-    """All that a file of a sweep holds."""
-
-    title: Text = "A sweep"  # What it is, in words.
-    touch: Block  # The touch, with the keys of `TouchDescription`; what varies need not be given.
-    observer: Block | None = None
-    """An observer of the responses, with the keys of `ObserverSettings`; what varies need not be given."""
-    grid: Block = Field(default={})
-    """Values by field, such as "motion.depth_mm": each field is a dimension, and settings are all
-    combinations."""
-    zip: Block = Field(default={})  # Fields that vary together, one value of each per setting: one dimension.
-    sample: SampleSettings | None = None  # Fields that vary together over a box: one dimension.
-    where: Annotated[tuple[Text, ...], Strict(False), BeforeValidator(as_list)] = ()
-    """Constraints such as "motion.depth_mm < 0.5 * object.radius_mm": other settings are left out."""
-    fields: Annotated[
-        tuple[Annotated[str, choice([field.name for field in stored_fields()])], ...],
-        Strict(False),
-        BeforeValidator(as_list),
-    ] = ()
-    """Fields of the skin that the result holds beside force, depth and contact, by the names of
-    `fingerpad.skin.fields.FIELDS`."""
+def _as_block(value: Any) -> Any:
+    """Return the keys of a touch that is given as a request."""
+    if isinstance(value, TouchRequest):
+        return {name: getattr(value, name) for name in value.model_fields_set}
+    return value
 
 
 @dataclass(frozen=True)
@@ -160,21 +150,48 @@ class Axis:
         return kinds.pop()
 
 
-@dataclass(frozen=True)
-class Sweep:
-    """A description of a sweep with where it comes from.
+class SweepRequest(Request):
+    """A sweep, as `fingerpad.sweep` runs it and a file describes it: a touch of which some fields vary.
 
     A setting is a number from 0 to `size` - 1, in the order of a C array of `shape`; so is a press within
     `press_shape`.
+
+    Parameters
+    ----------
+    title : str
+        What it is, in words.
+    touch : mapping or TouchRequest
+        The touch, with the keys of `TouchRequest`; what varies need not be given.
+    observer : mapping, optional
+        An observer of the responses, with the keys of `ObserverSettings`; what varies need not be given.
+    grid : mapping
+        Values by field, such as "motion.depth_mm": each field is a dimension, and settings are all
+        combinations.
+    zip : mapping
+        Fields that vary together, one value of each per setting: one dimension.
+    sample : SampleSettings, optional
+        Fields that vary together over a box: one dimension.
+    where : list of str
+        Constraints such as "motion.depth_mm < 0.5 * object.radius_mm": other settings are left out.
+    fields : list of str
+        Fields of the skin that the result holds beside force, depth and contact, by the names of
+        `fingerpad.skin.fields.FIELDS`.
     """
 
-    description: SweepDescription
-    source: str = "sweep"  # File of the description: beside it files are searched; errors begin with it.
-    text: str = ""  # Content of that file, for the lines of errors.
+    word: ClassVar[str] = "sweep"
 
-    @property
-    def origin(self) -> Origin:
-        return Origin(self.source, self.text)
+    title: Text = "A sweep"
+    touch: Annotated[Block, BeforeValidator(_as_block)]
+    observer: Block | None = None
+    grid: Block = Field(default={})
+    zip: Block = Field(default={})
+    sample: SampleSettings | None = None
+    where: Annotated[tuple[Text, ...], Strict(False), BeforeValidator(as_list)] = ()
+    fields: Annotated[
+        tuple[Annotated[str, choice([field.name for field in stored_fields()])], ...],
+        Strict(False),
+        BeforeValidator(as_list),
+    ] = ()
 
     @property
     def axes(self) -> tuple[Axis, ...]:
@@ -189,7 +206,7 @@ class Sweep:
     @cached_property
     def _all_axes(self) -> tuple[Axis, ...]:
         """All dimensions; InputError if a field has no values, or is given twice."""
-        asked = self.description
+        asked = self
         found = []
         for field, values in asked.grid.items():
             with self.origin.located(), at("grid", field):
@@ -242,7 +259,7 @@ class Sweep:
     @cached_property
     def observers(self) -> tuple[ObserverSettings, ...]:
         """Observers in the order of a C array of `observer_shape`; none without a block `observer`."""
-        content = self.description.observer
+        content = self.observer
         if content is None:
             if self.observer_axes:
                 with self.origin.located():
@@ -256,7 +273,7 @@ class Sweep:
         with self.origin.located(), at(OBSERVER):
             for axis, number in zip(self.observer_axes, place, strict=True):
                 for field, values in axis.values.items():
-                    content = _with(content, field.split(".")[1:], values[number])
+                    content = with_value(content, field.split(".")[1:], values[number])
             asked = part_from(ObserverSettings, content)
             self.stimuli_axis(asked)
         return asked
@@ -297,14 +314,16 @@ class Sweep:
 
     def content(self, setting: int) -> Content:
         """Touch of a setting, as plain values."""
-        content: Content = dict(self.description.touch)
+        content: Content = dict(self.touch)
         with self.origin.located(), at("touch"):
             for field, value in self.values(setting).items():
-                content = _with(content, field.split("."), value)
+                content = with_value(content, field.split("."), value)
         return content
 
-    def described(self, setting: int) -> DescribedTouch:
-        return described_touch(self.content(setting), f"{self.source}, touch")
+    def described(self, setting: int) -> TouchRequest:
+        """Return the touch of a setting."""
+        name = f"{self.origin.name}, touch"
+        return TouchRequest.read(self.content(setting), allow_python=self._allow_python, name=name)
 
     def check(self) -> None:
         """Check all keys and values, and press nothing."""
@@ -327,7 +346,7 @@ class Sweep:
     @cached_property
     def _constraints(self) -> tuple[Constraint, ...]:
         found = []
-        for number, text in enumerate(self.description.where):
+        for number, text in enumerate(self.where):
             with self.origin.located(), at("where", number):
                 found.append(Constraint(text))
         return tuple(found)
@@ -336,8 +355,8 @@ class Sweep:
     def hashed(self) -> str:
         """All that determines the results, as text."""
         files = self.described(0).input_hashes()
-        content = self.description.model_dump(mode="json", exclude={"title"})
-        return json.dumps([content, sorted(files.values())], sort_keys=True)
+        content = self.model_dump(exclude={"title"})
+        return json.dumps([content, sorted(files.values())], sort_keys=True, default=repr)
 
 
 class Constraint:
@@ -403,18 +422,6 @@ class Constraint:
         )
 
 
-def read_sweep(source: str | Path) -> Sweep:
-    """Read the description of a sweep from a YAML file."""
-    text = read_text(path_of("source", source))
-    return sweep_of(read_yaml(text, str(source)), str(source), text)
-
-
-def sweep_of(content: Content | Any, source: str = "sweep", text: str = "") -> Sweep:
-    """Build the description of a sweep from plain values; arguments as of `Sweep`."""
-    with Origin(source, text).located():
-        return Sweep(part_from(SweepDescription, content), source, text)
-
-
 def _listed(values: Any) -> list[Any]:
     found = part_from(EvenValues, values).values if isinstance(values, Mapping) else values
     if not isinstance(found, list | tuple) or not found:
@@ -422,21 +429,6 @@ def _listed(values: Any) -> list[Any]:
             f"a field that varies must have a list of values, or start, stop and count: got {values!r}."
         )
     return list(found)
-
-
-def _with(content: Content, keys: list[str], value: Any) -> Content:
-    """Return the content with another value at a place; a text such as `sphere` is a block of that kind."""
-    first, *rest = keys
-    if not rest:
-        return {**content, first: value}
-    inner = content.get(first, {})
-    if isinstance(inner, str) and ":" not in inner:
-        inner = {"kind": inner}
-    if not isinstance(inner, Mapping):
-        raise InputError(
-            first, f"must be a mapping of keys to values, so that {rest[0]} can vary", repr(inner)
-        )
-    return {**content, first: _with(inner, rest, value)}
 
 
 def _name(node: ast.AST) -> str:

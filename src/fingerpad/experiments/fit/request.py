@@ -1,0 +1,410 @@
+"""A fit to recordings: what is asked, and its run, which presses, samples the receptor and fits."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from functools import cached_property
+from pathlib import Path
+from typing import Annotated, Any, ClassVar, Literal
+
+import numpy as np
+from pydantic import BeforeValidator, Strict
+
+from fingerpad.core.checked import result_class
+from fingerpad.core.errors import InputError
+from fingerpad.core.signals import INTERVAL
+from fingerpad.core.values import Count, Flag, IntArray, Seed, Text, Vector, Whole, choice, one_of, positive
+from fingerpad.data.observations import bar_firing_rates
+from fingerpad.experiments.conditions import Conditions
+from fingerpad.experiments.fit.fit import check_enough, fit_recordings, folds_in_turn
+from fingerpad.experiments.fit.methods import METHODS, check_offset, check_spikes
+from fingerpad.experiments.fit.results import FitResult
+from fingerpad.experiments.manifest import Manifest
+from fingerpad.experiments.recording_files import Recorded, read_recordings, recorded_of
+from fingerpad.experiments.requests.afferents import (
+    DEFAULT,
+    AfferentChoice,
+    RateWindowSettings,
+    chosen_afferent,
+    file_of,
+)
+from fingerpad.experiments.requests.parts import Request, as_list, at, object_of_python
+from fingerpad.experiments.requests.stimuli import (
+    BAR,
+    NamedStimulus,
+    ShiftedBar,
+    Stimuli,
+    along_skin,
+    read_stimuli,
+)
+from fingerpad.experiments.requests.stimulus import (
+    FINGER_OBJECTS,
+    FingerDescription,
+    MotionPart,
+    ObjectPart,
+    finger_of,
+    made_of,
+    named_files,
+    object_of,
+)
+from fingerpad.experiments.runner import Runner
+from fingerpad.geometry.grading import RESOLUTIONS
+from fingerpad.geometry.indenters import Bar
+from fingerpad.inference.afferent_methods import OFFSETS_MM
+from fingerpad.inference.identifiable import IDENTIFIABLE_NAMES
+from fingerpad.inference.recordings import RateRecordings, SpikeRecordings
+from fingerpad.inference.typed_fit import fit_afferent
+from fingerpad.neuron.afferent import AnyAfferent, type_of
+from fingerpad.neuron.spikes import Windows, common_rate_windows_ms
+from fingerpad.skin.fields import sampled_fields
+from fingerpad.skin.indentation import Touch
+from fingerpad.skin.sampling import SkinResponse
+
+QUANTITIES = tuple(sampled_fields())
+
+
+@result_class
+class FitFile:
+    """The file `fit.json`."""
+
+    format: Literal["fingerpad fit"] = "fingerpad fit"
+    format_version: Literal[2] = 2
+    fit: FitResult
+    windows_ms: tuple[tuple[float, ...], tuple[float, ...]]  # Of the dynamic and of the static rate. [ms]
+    dynamic_quantity: str
+    static_quantity: str  # Quantities of the two terms.
+    manifest: Manifest
+
+
+class FitRequest(Request, FingerDescription):
+    """A fit to recordings, as `fingerpad.fit` runs it and a file or a command describes it.
+
+    Parameters
+    ----------
+    recordings : str, Path, RateRecordings or SpikeRecordings
+        A CSV or NWB file (docs/fit.md), or recordings whose names are those of the stimuli.
+    stimuli : str, Path or Stimuli
+        "bar" (shifted along the finger), or a CSV or YAML file with stimuli.
+    stimulus_column : str, optional
+        Column of the recordings with the name of the stimulus; by default shift_mm or stimulus.
+    unit : int, optional
+        Id of the spike unit of an NWB file.
+    object, motion
+        The bar and how it is pressed, where the stimuli are the bar.
+    afferent : str or AnyAfferent
+        Type of the afferent for `free`, a file of results, numbers, or an afferent of Python.
+    free : list of str
+        Fit these numbers of the afferent alone; by default the four that spikes of an SAI determine.
+    dynamic_quantity, static_quantity : str, optional
+        What each term follows: strain energy density, "stored", as in the paper, or another quantity; by
+        default that of the tissues.
+    windows_ms : RateWindowSettings
+        Windows of the two rates; by default they follow the phases of the stimuli. [ms]
+    method : str
+        One of `METHODS`.
+    posterior, profiles, sensitivity, offset : bool
+        Whether credible intervals, profile likelihoods and Sobol indices are computed, and whether the
+        receptor's offset along the finger is fitted.
+    folds : int, optional
+        Number of interleaved folds; by default 6, or the column fold of the recordings.
+    seed : int
+        Of methods that draw.
+    resolution, finger, tissues, stiffness, grading
+        As of `FingerDescription`; "standard" by default, and those of the file of the stimuli.
+    """
+
+    word: ClassVar[str] = "fit"
+    python: ClassVar[tuple[str, ...]] = (*FINGER_OBJECTS, "object", "motion", "afferent")
+
+    recordings: Text | Path | object_of_python(RateRecordings | SpikeRecordings | Recorded)  # type: ignore[valid-type]
+    stimuli: Text | Path | object_of_python(Stimuli) = BAR  # type: ignore[valid-type]
+    stimulus_column: Text | None = None
+    unit: Whole | None = None
+    object: ObjectPart | None = None
+    motion: MotionPart | None = None
+    afferent: AfferentChoice = DEFAULT
+    free: Annotated[tuple[Text, ...], Strict(False), BeforeValidator(as_list)] = ()
+    dynamic_quantity: Annotated[str, choice(QUANTITIES)] | None = None
+    static_quantity: Annotated[str, choice(QUANTITIES)] | None = None
+    windows_ms: RateWindowSettings = RateWindowSettings()
+    method: Annotated[str, choice(METHODS)] = "least_squares"
+    posterior: Flag = False
+    profiles: Flag = False
+    sensitivity: Flag = False
+    offset: Flag = False
+    folds: Count | None = None
+    seed: Seed = 0
+    resolution: Annotated[str, choice(RESOLUTIONS)] = "standard"
+
+    def check(self) -> None:
+        """Raise `InputError` if the fit is impossible; before anything is solved."""
+        with self.origin.located():
+            self._check()
+        self.touches  # noqa: B018
+
+    def _check(self) -> None:
+        if self.free or self.afferent != DEFAULT:
+            self._check_chosen()
+        for start, end in self.used_windows_ms:
+            if not 0.0 <= start < end:
+                raise InputError(
+                    "windows_ms", "must be a start from 0 on and a later end", f"{start:g}, {end:g}"
+                )
+        end = max(end for _, end in self.used_windows_ms)
+        for name, stimulus in self.recorded.stimuli.items():
+            if stimulus.motion.end_ms < end:
+                raise InputError(
+                    "windows_ms",
+                    f"must end with the stimuli, not at {end:g} ms",
+                    remedy=f"{name} ends at {stimulus.motion.end_ms:g} ms",
+                )
+        if self.offset:
+            check_offset(self.method, [stimulus.x_mm for stimulus in self.recorded.stimuli.values()])
+        n_free = len(self.free) or len(IDENTIFIABLE_NAMES) + self.offset
+        check_enough(self.rates, self.memberships, n_free)
+        if self.method == "likelihood":
+            motions = {stimulus.motion for stimulus in self.recorded.stimuli.values()}
+            check_spikes(self.recorded.recordings, len(motions))
+
+    def _check_chosen(self) -> None:
+        """Refuse a fit of chosen numbers that names none, or asks for what only the four numbers have."""
+        afferent = self.shape_of_fit
+        numbers = tuple(getattr(afferent, "__dataclass_fields__", ()))
+        if not self.free:
+            known = f"{type_of(afferent)}, one of {', '.join(numbers)}"
+            raise InputError("free", f"must name at least one number of {known}", "none")
+        for name in self.free:
+            positive(one_of("free", name, numbers), getattr(afferent, name))
+        for option in ("posterior", "profiles", "sensitivity", "offset"):
+            if getattr(self, option):
+                raise InputError(
+                    option, "belongs to the fit of all numbers of SAI", remedy="leave it out with free"
+                )
+        if self.method != "least_squares":
+            raise InputError("free", "needs the method least_squares", str(self.method))
+
+    @cached_property
+    def presented(self) -> Stimuli:
+        """The stimuli, which say how they are pressed."""
+        if not isinstance(self.stimuli, str | Path):
+            return self.stimuli
+        if str(self.stimuli) == BAR:
+            described = {"kind": BAR} if self.object is None else self.object
+            with at("object"):
+                bar = Bar() if self.object is None else object_of(described, self.beside)
+                if not isinstance(bar, Bar):
+                    raise InputError("object", "must be a bar where the stimuli are the bar", repr(bar))
+            motion = {} if self.motion is None else {"motion": made_of(self.motion, self.beside)}
+            found: Any = ShiftedBar(bar, **motion, conditions=self.conditions(self.seed, self.beside))
+            found = replace(found, finger_files=tuple(named_files(self.finger, self.beside)))
+        else:
+            for name in ("object", "motion"):
+                if getattr(self, name) is not None:
+                    raise InputError(
+                        name, f"is that of the bar, and {self.stimuli} lists stimuli with their own",
+                        remedy="leave it out",
+                    )  # fmt: skip
+            fields = self.model_fields_set & set(FingerDescription.model_fields)
+            given = {name: getattr(self, name) for name in fields}
+            if "finger" in given:
+                with at("finger"):
+                    given["finger"] = finger_of(self.finger, self.beside)
+            found = read_stimuli(self.beside / self.stimuli, **given)
+        return found if self.stimulus_column is None else replace(found, column=self.stimulus_column)
+
+    @cached_property
+    def recorded(self) -> Recorded:
+        """Recordings with the stimuli they belong to."""
+        with self.origin.located():
+            if isinstance(self.recordings, str | Path):
+                return read_recordings(self.beside / self.recordings, self.presented, self.unit)
+            return recorded_of(self.recordings, self.presented)
+
+    @cached_property
+    def shape_of_fit(self) -> AnyAfferent:
+        """Afferent about whose numbers is searched: that of its type with the tissues pressed."""
+        chosen = "SAI" if self.afferent == DEFAULT else self.afferent
+        return chosen_afferent(chosen, self.settings.tissues, self.beside)
+
+    @cached_property
+    def measure(self) -> str:
+        """What a rate of the afferent is, "interval" or "count"."""
+        return getattr(self.shape_of_fit, "rate_measure", INTERVAL) if self.free else INTERVAL
+
+    @cached_property
+    def used_windows_ms(self) -> Windows:
+        """Windows of the two rates, the same for all stimuli. [ms]"""
+        touches = [stimulus.motion.phases for stimulus in self.recorded.stimuli.values()]
+        return common_rate_windows_ms(touches, *self.windows_ms.both, self.measure)
+
+    @cached_property
+    def rates(self) -> RateRecordings:
+        """What is fitted."""
+        given = self.recorded.recordings
+        return given if isinstance(given, RateRecordings) else given.rates(self.used_windows_ms, self.measure)
+
+    @cached_property
+    def memberships(self) -> IntArray:
+        """Fold of each stimulus."""
+        given = self.recorded.memberships
+        if given is not None and self.folds is not None:
+            raise InputError(
+                "folds", "must come from the column fold or from folds, not both", remedy="leave one out"
+            )
+        return folds_in_turn(len(self.rates.stimuli), self.folds) if given is None else given
+
+    @cached_property
+    def touches(self) -> dict[str, Touch]:
+        """One touch per stimulus."""
+        return self.presented.touches(list(self.recorded.stimuli.values()), self.settings)
+
+    @cached_property
+    def settings(self) -> Conditions:
+        """Finger, tissues, accuracy and seed."""
+        return replace(self.presented.conditions, seed=self.seed)
+
+    @property
+    def quantities(self) -> tuple[str, str]:
+        """Quantities of the dynamic and of the static term."""
+        if self.free:
+            return self.shape_of_fit.dynamic_quantity, self.shape_of_fit.static_quantity
+        default = self.settings.quantity
+        return self.dynamic_quantity or default, self.static_quantity or default
+
+    def input_hashes(self) -> dict[str, str]:
+        """SHA-256 of the request and of the files that it names."""
+        asked = (self.recordings, None if self.stimuli == BAR else self.stimuli)
+        named = [self.beside / file for file in asked if isinstance(file, str | Path)]
+        named += self.presented.finger_files
+        named += [file for stimulus in self.recorded.stimuli.values() for file in stimulus.files]
+        if file := file_of(self.afferent):
+            named.append(self.beside / file)
+        return self.origin.hashes(named)
+
+
+def run_fit(request: FitRequest, runner: Runner, command: str | None = None) -> FitFile | ChosenNumbersFile:
+    """Indent with all stimuli, fit, and record what ran."""
+    request.check()
+    skins = runner.responses({"stimuli": request.touches})["stimuli"]
+    mesh = next(iter(skins.values())).mesh
+    if request.free:
+        return _fit_chosen_numbers(request, runner, skins, command)
+    recorded = request.recorded
+    offsets_mm = OFFSETS_MM if request.offset else (0.0,)
+    x_mm, z_mm = request.settings.finger.contact_mm
+    sites = [[x_mm + offset, z_mm] for offset in offsets_mm]
+    sampled = [skin.sed(sites, *request.quantities) for skin in skins.values()]
+    beside = {
+        offset: [traces.part(slice(place, place + 1)) for traces in sampled]
+        for place, offset in enumerate(offsets_mm)
+    }
+    shifts_mm = _shifts_mm(list(recorded.stimuli.values()), along_skin(request.settings))
+    with runner.stage("fit", 1) as advance:
+        found = fit_recordings(
+            beside[0.0],
+            recorded.recordings,
+            request.memberships,
+            method=request.method,
+            windows_ms=request.used_windows_ms,
+            seed=request.seed,
+            with_posterior=request.posterior,
+            with_profiles=request.profiles,
+            with_sensitivity=request.sensitivity,
+            beside=beside if request.offset else None,
+            # Two stimuli at one place have no distance for a correlation of residuals.
+            positions_mm=shifts_mm if shifts_mm and len(set(shifts_mm)) == len(shifts_mm) else None,
+        )
+        advance()
+    return FitFile(
+        fit=replace(
+            found,
+            shift_mm=None if shifts_mm is None else np.array(shifts_mm),
+            presentations=tuple(recorded.presentations.values()),
+            spikes_after_hold=recorded.spikes_after_hold,
+        ),
+        windows_ms=request.used_windows_ms,
+        dynamic_quantity=request.quantities[0],
+        static_quantity=request.quantities[1],
+        manifest=runner.manifest(
+            request.settings, {"stimuli": mesh}, command=command, inputs=request.input_hashes()
+        ),
+    )
+
+
+@result_class
+class ChosenNumbersFile:
+    """The file `fit.json` of a fit of chosen numbers; a touch takes its afferent by `afferent: fit.json`."""
+
+    format: Literal["fingerpad fit of chosen numbers"] = "fingerpad fit of chosen numbers"
+    format_version: Literal[1] = 1
+    type: str
+    fitted: dict[str, float]  # Numbers by their names, in the units of the type.
+    stimulus: tuple[str, ...]
+    dynamic_rate_hz: Vector
+    static_rate_hz: Vector  # Rates of the fitted afferent. [spikes/s]
+    observed_dynamic_rate_hz: Vector | None
+    observed_static_rate_hz: Vector | None
+    fss_in_sample: float
+    fss_out_of_sample: float
+    windows_ms: tuple[tuple[float, ...], tuple[float, ...]]
+    manifest: Manifest
+
+    def summary(self) -> list[str]:
+        """Return what a command prints: the numbers and the scores."""
+        numbers = ", ".join(f"{name} {value:.4g}" for name, value in self.fitted.items())
+        return [
+            f"{self.type} fitted to {len(self.stimulus)} stimuli: {numbers}. FSS {self.fss_in_sample:.3f} in "
+            f"sample, {self.fss_out_of_sample:.3f} out of sample."
+        ]
+
+
+def _fit_chosen_numbers(
+    request: FitRequest, runner: Runner, skins: Mapping[str, SkinResponse], command: str | None
+) -> ChosenNumbersFile:
+    """Fit the numbers `request.free` of an afferent."""
+    site = [request.settings.finger.contact_mm]
+    traces = [skin.sed(site, *request.quantities) for skin in skins.values()]
+    rates, windows_ms = request.rates, request.used_windows_ms
+    with runner.stage("fit", 1) as advance:
+        folds = request.memberships
+        found = fit_afferent(request.shape_of_fit, request.free, traces, rates, folds, windows_ms)
+        advance()
+    return ChosenNumbersFile(
+        type=type_of(request.shape_of_fit),
+        fitted={name: float(getattr(found.afferent, name)) for name in request.free},
+        stimulus=rates.stimuli,
+        dynamic_rate_hz=found.dynamic_rate_hz,
+        static_rate_hz=found.static_rate_hz,
+        observed_dynamic_rate_hz=rates.dynamic_rate_hz,
+        observed_static_rate_hz=rates.static_rate_hz,
+        fss_in_sample=found.fss_in_sample,
+        fss_out_of_sample=found.fss_out_of_sample,
+        windows_ms=windows_ms,
+        manifest=runner.manifest(
+            request.settings,
+            {"stimuli": next(iter(skins.values())).mesh},
+            command=command,
+            inputs=request.input_hashes(),
+        ),
+    )
+
+
+def _shifts_mm(stimuli: Sequence[NamedStimulus], along: float) -> list[float] | None:
+    """Shifts along the skin, proximal positive, of stimuli that differ in nothing else; None for others."""
+    if len({replace(stimulus, x_mm=0.0, name="", level=None) for stimulus in stimuli}) > 1:
+        return None
+    return [0.0 - float(f"{stimulus.x_mm / along:.9g}") for stimulus in stimuli]
+
+
+def example_recordings() -> str:
+    """Return example recordings: the rates under the paper's bar that come with the package."""
+    observed = bar_firing_rates()
+    rows = np.column_stack([observed.shift_mm, observed.dynamic_rate_hz, observed.static_rate_hz])
+    lines = [
+        f"# One SAI afferent under a bar 3 mm wide, pressed in by 1 mm. {observed.source}",
+        "# shift: of the bar from the centre of the receptive field, proximal positive.",
+        "shift_mm,dynamic_rate_hz,static_rate_hz",
+        *(",".join(f"{value:g}" for value in row) for row in rows),
+    ]
+    return "\n".join(lines) + "\n"

@@ -1,0 +1,453 @@
+"""The afferents of a request: their type and numbers, where they end in the skin, and how they respond."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, TypeAlias, cast
+
+import numpy as np
+from pydantic import BeforeValidator, Discriminator, Field, Strict, Tag
+
+from fingerpad.core.errors import InputError, StoreError, shown
+from fingerpad.core.files import read_text
+from fingerpad.core.layouts import PATTERNS, Layout
+from fingerpad.core.random_streams import seed_of
+from fingerpad.core.signals import ResponseMap, Skin
+from fingerpad.core.values import Count, Finite, IntArray, NotNegative, Pair, Positive, Seed, Text, choice
+from fingerpad.data import psychophysics
+from fingerpad.data.afferents import TYPES
+from fingerpad.data.tissues import DEFAULT_TISSUES
+from fingerpad.experiments import schemas
+from fingerpad.experiments.requests.parts import NAMED, OBJECT, SPELLED, Part, object_of_python, with_message
+from fingerpad.geometry.fingertip import Finger, Fingertip
+from fingerpad.mechanics.materials import Tissues
+from fingerpad.neuron.afferent import PARAMETER_NAMES, Afferent, AnyAfferent, checked_afferent
+from fingerpad.neuron.afferent_types import OwnAfferent, afferent_of, afferent_types
+from fingerpad.neuron.escape_rate import EscapeRate
+from fingerpad.neuron.population import Population, sensitivities
+from fingerpad.neuron.spikes import Windows
+from fingerpad.psychophysics.encoding import neighbours_of
+from fingerpad.skin.fields import sampled_fields
+
+DEFAULT = "default"
+"""Value of `afferent` for the one that was fitted with the tissues."""
+
+GRID = "grid"
+NAIL_ROWS = "nail rows"
+LAYOUT_NAMES = (GRID, *PATTERNS, NAIL_ROWS)
+PAD = "pad"
+SHAPES = ("rectangle", "ellipse", "polygon", PAD)
+
+
+class RegionSettings(Part):
+    """Part of the skin that afferents lie in, unrolled; an area there is the same area of skin."""
+
+    shape: Annotated[str, choice(SHAPES)]
+    """Kind of shape."""
+    length_mm: Positive | None = None
+    """Extent of a rectangle or an ellipse along the finger and across. [mm]"""
+    width_mm: Positive | None = None
+    """Extent of a rectangle or an ellipse along the finger and across. [mm]"""
+    corners_mm: Annotated[tuple[Pair, ...], Strict(False)] | None = None
+    """Of a polygon: along the finger, distal positive, and across, from the middle of the pad. [mm]"""
+
+
+class PopulationSettings(Part):
+    """The afferents."""
+
+    layout: Annotated[str, choice(LAYOUT_NAMES)] = GRID
+    """"grid": the paper's rows and columns; a pattern that fills a region; or "nail rows", along the edge of
+    the nail."""
+    density_per_cm2: Positive = psychophysics.RECEPTOR_DENSITY.value
+    """Afferents per area of skin. [1/cm2]"""
+    densities_per_cm2: (
+        Annotated[
+            dict[Annotated[str, choice(TYPES)], Positive],
+            Field(min_length=1),
+            with_message(f"a density above 0 of each type, {', '.join(TYPES)}"),
+        ]
+        | None
+    ) = None
+    """Instead of one density, that of each type of a mixed population, which all have this layout. [1/cm2]"""
+    rows: Count | None = None
+    """Of a grid: along the finger and across, the paper's by default; or how many rows along the nail."""
+    columns: Count | None = None
+    """Of a grid: along the finger and across, the paper's by default; or how many rows along the nail."""
+    region: RegionSettings | None = None
+    """What any other layout fills."""
+    offset_mm: Pair = (0.0, 0.0)
+    """Middle of grid, rectangle or ellipse from the middle of the pad, along the finger and across. [mm]"""
+    jitter: NotNegative | None = None
+    """Displacement of afferents in a jittered layout: standard deviation over the pitch."""
+    separation: NotNegative | None = None
+    """Least distance in a Poisson-disc layout over 1/sqrt(density)."""
+    seed: Seed = 0
+    """Of random places and sensitivities; another one is another finger."""
+    sensitivity_spread: NotNegative = 0.0
+    """How much afferents differ in their gains, as of `fingerpad.neuron.population.sensitivities`."""
+
+
+class AfferentSettings(Part):
+    """The afferent by its numbers; what is absent is as in the afferent of the tissues."""
+
+    intercept_ma: Finite | None = None
+    """As of `fingerpad.Afferent`."""
+    dynamic_gain: Finite | None = None
+    """As of `fingerpad.Afferent`."""
+    static_gain: Finite | None = None
+    """As of `fingerpad.Afferent`."""
+    time_constant_ms: Positive | None = None
+    """As of `fingerpad.Afferent`."""
+    capacitance_mf: Positive | None = None
+    """As of `fingerpad.Afferent`."""
+    threshold_mv: Positive | None = None
+    """As of `fingerpad.Afferent`."""
+    refractory_ms: NotNegative | None = None
+    """Rest after each spike. [ms]"""
+    dynamic_quantity: Annotated[str, choice(sampled_fields())] | None = None
+    """What the two terms follow."""
+    static_quantity: Annotated[str, choice(sampled_fields())] | None = None
+    """What the two terms follow."""
+
+
+def _form_of_afferent(value: Any) -> str:
+    if isinstance(value, str):
+        return NAMED
+    return SPELLED if isinstance(value, dict | AfferentSettings) else OBJECT
+
+
+if TYPE_CHECKING:
+    AfferentChoice: TypeAlias = Any
+    OwnPopulation: TypeAlias = Any
+else:
+    OwnPopulation = object_of_python(Population)
+    AfferentChoice = Annotated[
+        Annotated[Text, Tag(NAMED)]
+        | Annotated[AfferentSettings, Tag(SPELLED)]
+        | Annotated[object_of_python(AnyAfferent), Tag(OBJECT)],
+        Discriminator(_form_of_afferent),
+    ]
+"""The default, a type of afferents by its name, a file of results, numbers, or an afferent of Python."""
+
+
+class RateWindowSettings(Part):
+    """Windows in which spikes count."""
+
+    dynamic: Pair | None = None
+    """Start and end of the windows of the two rates; without them they follow the phases. [ms]"""
+    static: Pair | None = None
+    """Start and end of the windows of the two rates; without them they follow the phases. [ms]"""
+
+    @property
+    def both(self) -> tuple[tuple[float, float] | None, tuple[float, float] | None]:
+        """The dynamic and the static window."""
+        return self.dynamic, self.static
+
+
+class AfferentsSettings(PopulationSettings):
+    """The afferents that respond."""
+
+    afferent: AfferentChoice = DEFAULT
+    """"default", the one that was fitted with the tissues; a type by its name, SAI, RA, PC or SAII; a file of
+    results (`fit.json` of `fingerpad fit`, `results.json` of `fingerpad reproduce`); or numbers."""
+    population: OwnPopulation | None = None
+    """In Python, or by module:object: a population instead of a layout and an afferent."""
+    noise: NotNegative = 0.0
+    """Width of a soft threshold over the threshold: spikes are random, drawn with `seed`. 0 is a sharp
+    threshold without randomness."""
+    windows_ms: RateWindowSettings = RateWindowSettings()
+    """When spikes count."""
+
+
+def as_settings(value: Any) -> Any:
+    """Return the block of a population, or of an afferent, that is given in the place of the block."""
+    if isinstance(value, Population):
+        return {"population": value}
+    return value if isinstance(value, dict | Part) else {"afferent": value}
+
+
+Afferents = Annotated[AfferentsSettings, BeforeValidator(as_settings)]
+"""The block `afferents` of a request, or a population, or an afferent."""
+
+
+def file_of(chosen: Any) -> str | None:
+    """Name of the file of results that an afferent is read from; None if it is from none."""
+    return chosen if isinstance(chosen, str) and chosen not in (DEFAULT, *TYPES) else None
+
+
+_OF_LAYOUT = {
+    "rows": (GRID, NAIL_ROWS),
+    "columns": (GRID,),
+    "region": PATTERNS,
+    "offset_mm": (GRID, *PATTERNS),
+    "jitter": ("jittered",),
+    "separation": ("poisson-disc",),
+}
+
+
+def chosen_afferent(chosen: Any, tissues: str | Tissues, beside: Path = Path()) -> AnyAfferent:
+    """Make the afferent of a request."""
+    fitted = Afferent.for_tissues(tissues)
+    if not isinstance(chosen, AfferentSettings | str):
+        return checked_afferent(chosen)
+    if isinstance(chosen, AfferentSettings):
+        return replace(fitted, **chosen.given)
+    if file := file_of(chosen):
+        return fitted_afferent(Path(beside) / file, tissues)
+    return fitted if chosen == DEFAULT else afferent_of(chosen, tissues)
+
+
+def population_of(
+    settings: AfferentsSettings,
+    tissues: str | Tissues,
+    beside: Path = Path(),
+    finger: Finger | None = None,
+    place: str = "afferents",
+) -> Population:
+    """Lay out the afferents of a request."""
+    if settings.population is not None:
+        for key in set(settings.given) - {"population", "noise", "windows_ms", "seed"}:
+            raise InputError((place, key), "must not be given beside a population", remedy="leave it out")
+        return cast(Population, settings.population)
+    for key, layouts in _OF_LAYOUT.items():
+        if key in settings.given and settings.layout not in layouts:
+            raise InputError(
+                f"{place}.{key} must not be given: it belongs to the layout {' or '.join(layouts)}, and "
+                f"this one is {settings.layout}."
+            )
+    afferent = chosen_afferent(settings.afferent, tissues, beside)
+    if settings.densities_per_cm2 is None:
+        return _laid(settings, afferent, place, finger)
+    chosen = settings.afferent
+    if "density_per_cm2" in settings.given or (isinstance(chosen, str) and chosen in TYPES):
+        raise InputError(
+            place,
+            "must have density_per_cm2 and the type of one afferent, or densities_per_cm2 of several",
+            "both",
+            "leave one out",
+        )
+    types = afferent_types(tissues) | (
+        {} if isinstance(chosen, str) and chosen == DEFAULT else {"SAI": afferent}
+    )
+    parts = {}
+    for number, (name, density) in enumerate(settings.densities_per_cm2.items()):
+        one = {"density_per_cm2": density, "seed": seed_of(settings.seed, number)}
+        parts[name] = _laid(settings.model_copy(update=one), types[name], place, finger)
+    return Population.mixed(parts)
+
+
+def _laid(
+    settings: PopulationSettings, afferent: AnyAfferent, place: str, finger: Finger | None
+) -> Population:
+    """Lay out the afferents of one type."""
+    if settings.layout == GRID:
+        laid = _grid(settings, afferent, finger or Fingertip())
+    else:
+        laid = _lay(settings, afferent, place, finger or Fingertip())
+    if settings.sensitivity_spread == 0.0:
+        return laid
+    return replace(laid, sensitivity=sensitivities(len(laid), settings.sensitivity_spread, settings.seed))
+
+
+def population_neighbours(settings: AfferentsSettings, population: Population) -> IntArray:
+    """Return who is whose neighbour in a population that was laid out by `settings`, (n_pairs, 2).
+
+    Afferents of a mixed population have neighbours of their own type.
+    """
+    if population.parts:
+        parts = list(population.parts.values())
+        starts = np.cumsum([0, *map(len, parts)])
+        return np.concatenate(
+            [
+                start + population_neighbours(settings, part)
+                for start, part in zip(starts, parts, strict=False)
+            ]
+        )
+    places = np.asarray(population.places_mm)
+    if settings.population is not None:  # it may have any layout
+        lattice = neighbours_of(places, population.pitch_mm, "rectangular")
+        return lattice if len(lattice) else neighbours_of(places, population.pitch_mm, "poisson-disc")
+    pattern = "rectangular" if settings.layout in (GRID, NAIL_ROWS) else settings.layout
+    return neighbours_of(places, population.pitch_mm, pattern)
+
+
+def _grid(settings: PopulationSettings, afferent: AnyAfferent, finger: Finger) -> Population:
+    """Lay the paper's rows and columns."""
+    (x, z), (along, across) = finger.contact_mm, settings.offset_mm
+    return Population.grid(
+        settings.density_per_cm2,
+        **settings.chosen("rows", "columns"),
+        centre_mm=(x + along, z + across),
+        afferent=afferent,
+    )
+
+
+_OF_SHAPE = {
+    "rectangle": ("length_mm", "width_mm"),
+    "ellipse": ("length_mm", "width_mm"),
+    "polygon": ("corners_mm",),
+    PAD: (),
+}
+
+
+def _lay(settings: PopulationSettings, afferent: AnyAfferent, place: str, finger: Finger) -> Population:
+    """Lay out afferents by any layout but the paper's grid."""
+    if not isinstance(finger, Fingertip):
+        raise InputError(
+            f"{place}.layout must be grid on a mesh, whose skin has no plane: got {settings.layout}."
+        )
+    return (_along_nail if settings.layout == NAIL_ROWS else _in_region)(settings, afferent, place, finger)
+
+
+def _along_nail(
+    settings: PopulationSettings, afferent: AnyAfferent, place: str, finger: Fingertip
+) -> Population:
+    """Lay rows along the edge of the nail."""
+    from fingerpad.skin.nail_edge import NailEdge  # only what needs them loads what unrolls the skin
+
+    nail = NailEdge(finger)
+    with placed(place):
+        rows = nail.rows(settings.rows or 1, settings.density_per_cm2)
+    return Population.of_layout(rows, nail.points, afferent)
+
+
+def _in_region(
+    settings: PopulationSettings, afferent: AnyAfferent, place: str, finger: Fingertip
+) -> Population:
+    """Fill a region of the unrolled skin."""
+    if settings.region is None:
+        raise InputError(f"{place}.region must be given for the layout {settings.layout}: it is missing.")
+    from fingerpad.skin.unrolled_skin import UnrolledSkin
+
+    skin = UnrolledSkin(finger)
+    region = _region(settings.region, settings.offset_mm, skin, place)
+    with placed(place):
+        return Population.of_layout(_layout(settings, region, skin), skin.points, afferent)
+
+
+def _region(settings: RegionSettings, offset_mm: tuple[float, ...], skin: Any, place: str) -> Any:
+    """Part of the unrolled skin that is meant."""
+    from fingerpad.core.regions import Ellipse, Polygon, Rectangle
+
+    wanted = _OF_SHAPE[settings.shape]
+    for key in wanted:
+        if key not in settings.given:
+            raise InputError(f"{place}.region.{key} must be given for a {settings.shape}: it is missing.")
+    for key in settings.given:
+        if key not in ("shape", *wanted):
+            raise InputError(
+                f"{place}.region.{key} must not be given: a {settings.shape} has "
+                f"{', '.join(wanted) or 'no size'}."
+            )
+    along, across = offset_mm
+    length, width = settings.length_mm or 0.0, settings.width_mm or 0.0
+    with placed(f"{place}.region"):
+        if settings.shape == PAD:
+            return skin.pad()
+        if settings.shape == "polygon":
+            corners = [(along + x, across + z) for x, z in settings.corners_mm or ()]
+            return Polygon(tuple(corners))
+        if settings.shape == "ellipse":
+            return Ellipse(0.5 * length, 0.5 * width, (along, across))
+        return Rectangle(length, width, (along, across))
+
+
+def _layout(settings: PopulationSettings, region: Any, skin: Any) -> Layout:
+    """Places in a region."""
+    from fingerpad.core.patterns import hexagonal, jittered, poisson_disc, rectangular, uniform
+
+    density, seed = settings.density_per_cm2, settings.seed
+    if settings.layout == "rectangular":
+        return rectangular(region, density)
+    if settings.layout == "hexagonal":
+        return hexagonal(region, density)
+    if settings.layout == "uniform":
+        return uniform(region, density, seed)
+    if settings.layout == "jittered":
+        return jittered(region, density, seed, **settings.chosen("jitter"))
+    return poisson_disc(region, density, seed, **settings.chosen("separation"), place=skin.points)
+
+
+@contextmanager
+def placed(key: str) -> Iterator[None]:
+    """Put the key in front of an `InputError` from within."""
+    try:
+        yield
+    except InputError as error:
+        raise InputError(f"{key}: {error}") from error
+
+
+CHOSEN = "fingerpad fit of chosen numbers"  # Format of a fit of some numbers of one type.
+
+
+def fitted_afferent(path: Path, tissues: str | Tissues = DEFAULT_TISSUES) -> AnyAfferent:
+    """Afferent of a file of results: `fit.json`, or `results.json` of a reproduction."""
+    try:
+        read_text(path)  # names a file that cannot be read
+        values = schemas.read(path, "fingerpad fit", CHOSEN, "fingerpad reproduction")
+    except (InputError, StoreError) as error:
+        raise InputError(f"afferent: {error}") from error
+    try:
+        if "fitted" in values:
+            return afferent_of(values["type"], tissues, **values["fitted"])
+        column = "human" if tissues == "human" else "paper"
+        fitted = values["fit"] if "fit" in values else values[column]["single_unit"]
+        named = values if "fit" in values else fitted
+        parameters = [fitted["parameters"][name] for name in PARAMETER_NAMES]
+        quantities = {name: named[name] for name in ("dynamic_quantity", "static_quantity")}
+    except (LookupError, TypeError) as error:
+        raise InputError(
+            f"afferent: {path} must hold the parameters of a fit: {shown(error.args[0])} is missing there."
+        ) from error
+    try:
+        return Afferent.from_parameters(parameters, **quantities, initial_mv=named.get("initial_mv"))
+    except InputError as error:
+        raise InputError(f"afferent: {path}: {error}") from error
+
+
+def respond_to(
+    settings: AfferentsSettings, population: Population, skin: Skin, windows_ms: Windows | None = None
+) -> ResponseMap:
+    """Responses of afferents to a skin, random if they have noise."""
+    windows = windows_ms or settings.windows_ms.both
+    if settings.noise == 0.0:
+        return population.respond(skin, *windows)
+    afferent = cast(Afferent, population.afferent)
+    membrane = EscapeRate(afferent.membrane, settings.noise)
+    noisy = OwnAfferent(
+        lambda traces: membrane.spikes(afferent.transduction.current(traces), settings.seed),
+        dynamic_quantity=afferent.dynamic_quantity,
+        static_quantity=afferent.static_quantity,
+    )
+    return replace(population, afferent=noisy).respond(skin, *windows)
+
+
+def parameters_of(population: Population) -> dict[str, float | str]:
+    """Parameters of the afferents by name, with the type in a mixed population; a function by its name."""
+    found: dict[str, float | str] = {}
+    for kind, part in population.parts.items() or [("", population)]:
+        names = list(getattr(part.afferent, "__dataclass_fields__", ()))
+        for name in names:
+            value = getattr(part.afferent, name)
+            if value is not None:
+                plain = isinstance(value, float | int | str)
+                found[f"{kind}.{name}" if kind else name] = (
+                    value if plain else getattr(value, "__qualname__", repr(value))
+                )
+    return found
+
+
+def check_noise(settings: AfferentsSettings, population: Population) -> None:
+    """Raise `InputError` if a soft threshold is asked for afferents that have none."""
+    afferent = None if population.parts else population.afferent
+    plain = isinstance(afferent, Afferent) and afferent.smoothing_ms == 0.0
+    if settings.noise > 0.0 and not plain:
+        raise InputError(
+            "afferents.noise",
+            "must be 0 for other types and mixed populations, because a soft threshold is that of "
+            "the default afferent alone",
+            f"{settings.noise:g}",
+        )

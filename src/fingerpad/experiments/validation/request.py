@@ -1,0 +1,107 @@
+"""What is asked of a validation: observations of your own, and the model whose predictions are scored."""
+
+from __future__ import annotations
+
+from functools import cached_property
+from pathlib import Path
+from typing import Annotated, ClassVar
+
+from pydantic import Field
+
+from fingerpad.core.errors import InputError
+from fingerpad.core.values import Pair, Text, choice
+from fingerpad.data import protocol
+from fingerpad.experiments.conditions import Conditions
+from fingerpad.experiments.requests.afferents import DEFAULT, AfferentChoice, chosen_afferent, file_of
+from fingerpad.experiments.requests.parts import Request, at, object_of_python
+from fingerpad.experiments.requests.stimulus import (
+    FINGER_OBJECTS,
+    FingerDescription,
+    ObjectPart,
+    named_files,
+    object_of,
+)
+from fingerpad.experiments.validation.observations import Observations, read_observations
+from fingerpad.geometry.grading import RESOLUTIONS
+from fingerpad.geometry.motion import RampAndHold
+from fingerpad.neuron.afferent import AnyAfferent
+
+RAMP_AND_HOLD, QUASI_STATIC = "ramp_and_hold", "quasi_static"
+LOADINGS = (RAMP_AND_HOLD, QUASI_STATIC)  # Read at the end of the paper's hold, or with relaxed tissues.
+
+
+class ValidationRequest(Request, FingerDescription):
+    """A validation, as `fingerpad.validate` runs it and a file or a command describes it.
+
+    Parameters
+    ----------
+    observations : str, Path or Observations
+        A CSV file (docs/validate.md), or what `read_observations` returns.
+    objects : mapping of str to object
+        Objects by the names that the column `indenter` has for them, beside `sphere:287` and the like.
+    afferent : str or AnyAfferent
+        Whose rates are predicted: "default", that of the tissues; a type; a file of results; or numbers.
+    loading : {"ramp_and_hold", "quasi_static"}
+        How a depth of force or deflection is reached: read at the end of the paper's ramp and hold, or with
+        relaxed tissues.
+    static_window_ms : (float, float)
+        Window of the rates, within the paper's ramp and hold. [ms]
+    resolution, finger, tissues, stiffness, grading
+        As of `FingerDescription`; "standard" by default.
+    """
+
+    word: ClassVar[str] = "validation"
+    python: ClassVar[tuple[str, ...]] = (*FINGER_OBJECTS, "afferent")
+
+    observations: Text | Path | object_of_python(Observations)  # type: ignore[valid-type]
+    objects: dict[str, ObjectPart] = Field(default={})
+    afferent: AfferentChoice = DEFAULT
+    loading: Annotated[str, choice(LOADINGS)] = RAMP_AND_HOLD
+    static_window_ms: Pair = (protocol.STATIC_WINDOW.value[0], protocol.STATIC_WINDOW.value[1])
+    resolution: Annotated[str, choice(RESOLUTIONS)] = "standard"
+
+    @cached_property
+    def observed(self) -> Observations:
+        """The observations."""
+        with self.origin.located():
+            if isinstance(self.observations, Observations):
+                return self.observations
+            own = {}
+            for name, part in self.objects.items():
+                with at("objects", name):
+                    own[name] = object_of(part, self.beside)
+            return read_observations(self.beside / self.observations, own)
+
+    @cached_property
+    def settings(self) -> Conditions:
+        """Finger, tissues and accuracy."""
+        with self.origin.located():
+            return self.conditions(beside=self.beside)
+
+    @cached_property
+    def responding(self) -> AnyAfferent:
+        """The afferent that responds."""
+        with self.origin.located():
+            return chosen_afferent(self.afferent, self.tissues, self.beside)
+
+    def check(self) -> None:
+        """Raise `InputError` if the validation is impossible; before anything is solved."""
+        self.observed, self.settings, self.responding  # noqa: B018
+        (start, end), end_ms = self.static_window_ms, RampAndHold().end_ms
+        if not 0.0 <= start < end <= end_ms:
+            with self.origin.located():
+                raise InputError(
+                    "static_window_ms",
+                    f"must be a start from 0 on and a later end, at most {end_ms:g} ms, where the hold ends",
+                    f"{start:g}, {end:g}",
+                )
+
+    def input_hashes(self) -> dict[str, str]:
+        """SHA-256 of the request and of the files that it names."""
+        named = [self.beside / self.observations] if isinstance(self.observations, str | Path) else []
+        named += named_files(self.finger, self.beside)
+        for part in self.objects.values():
+            named += named_files(part, self.beside)
+        if file := file_of(self.afferent):
+            named.append(self.beside / file)
+        return self.origin.hashes(named)
