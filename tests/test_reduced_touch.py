@@ -15,20 +15,17 @@ from fingerpad.cli import main
 from fingerpad.core.signals import Traces
 from fingerpad.geometry.motion import Pose
 from fingerpad.neuron.afferent_types import afferent_types
-from fingerpad.reduction.building import joint_bounds, largest_errors
-from fingerpad.reduction.interpolation import Axis, chebyshev_points, lagrange
-from fingerpad.reduction.model import AT_ONCE
-from fingerpad.reduction.relaxation import (
-    LEVELS,
-    Springs,
-    amplitudes,
-    filtered,
-    levels_mm,
-    lost,
-    slope_changes,
-)
+from fingerpad.reduction.building import filtered, joint_bounds, largest_errors
+from fingerpad.reduction.model import AT_ONCE, LEVELS, Springs, amplitudes, levels_mm, lost, slope_changes
 from fingerpad.reduction.streaming import read_local
-from fingerpad.reduction.training import ReducedRange, ReducedTraining, first_touch_mm
+from fingerpad.reduction.training import (
+    Axis,
+    ReducedRange,
+    ReducedTraining,
+    chebyshev_points,
+    first_touch_mm,
+    lagrange,
+)
 
 DEEPEST_MM = 1.0
 
