@@ -9,8 +9,8 @@ from numpy.testing import assert_allclose, assert_array_equal
 from scipy.stats import chi2, kstest
 
 from fingerpad.core.errors import InputError
-from fingerpad.core.philox import words as scrambled
 from fingerpad.core.random_streams import Purpose, normals, numbered, uniforms
+from fingerpad.core.random_streams import words as scrambled
 
 
 def test_the_scrambler_gives_the_published_answer():

@@ -7,8 +7,17 @@ from contextlib import contextmanager
 
 from fingerpad.core.errors import InputError
 from fingerpad.core.layouts import Layout
-from fingerpad.core.patterns import hexagonal, jittered, poisson_disc, rectangular, uniform
-from fingerpad.core.regions import Ellipse, Polygon, Rectangle, Region
+from fingerpad.core.regions import (
+    Ellipse,
+    Polygon,
+    Rectangle,
+    Region,
+    hexagonal,
+    jittered,
+    poisson_disc,
+    rectangular,
+    uniform,
+)
 from fingerpad.experiments.descriptions.parts import NAIL_ROWS, PAD, PopulationSettings, RegionSettings
 from fingerpad.geometry.fingertip import Finger, Fingertip
 from fingerpad.neuron.afferent import AnyAfferent
