@@ -203,8 +203,7 @@ class Population:
 
         Examples
         --------
-        >>> from fingerpad.core.regions import hexagonal
-        >>> from fingerpad.core.regions import Ellipse
+        >>> from fingerpad.core.regions import Ellipse, hexagonal
         >>> disc = Ellipse(3.0, 3.0, centre_mm=(17.37, 0.0))
         >>> len(Population.of_layout(hexagonal(disc, density_per_cm2=100.0)))
         31
