@@ -149,19 +149,13 @@ class Traces(Result):
 
     def _check_dynamic(self, dynamic: Traces) -> None:
         if dynamic.quantity == self.quantity or dynamic.dynamic is not None:
-            raise InputError(
-                "dynamic",
-                f"must hold another quantity than {self.quantity!r}, and one only",
-                repr(dynamic.quantity),
-                "leave it out where both terms follow one quantity",
-            )
+            other = f"must hold another quantity than {self.quantity!r}, and one only"
+            remedy = "leave it out where both terms follow one quantity"
+            raise InputError("dynamic", other, repr(dynamic.quantity), remedy)
         if dynamic.values.shape != self.values.shape or (dynamic.times_ms != self.times_ms).any():
-            raise InputError(
-                "dynamic",
-                "must have the times and sites of the static term",
-                f"values of shape {dynamic.values.shape} to {dynamic.times_ms[-1]:g} ms for "
-                f"{self.values.shape} to {self.times_ms[-1]:g} ms",
-            )
+            shapes = [f"{each.values.shape} to {each.times_ms[-1]:g} ms" for each in (dynamic, self)]
+            came = f"values of shape {' for '.join(shapes)}"
+            raise InputError("dynamic", "must have the times and sites of the static term", came)
 
     def _first_touch_ms(self) -> float:
         """Last time until which all values are 0; the first time if there is none, or nothing is touched."""
@@ -260,6 +254,8 @@ class Traces(Result):
         """
         if isinstance(sites, slice) and sites == slice(0, self.n_sites):
             return self
+        if not isinstance(sites, slice) and sites.size != self.n_sites:
+            raise InputError("sites", f"must have one truth value per site, {self.n_sites}", str(sites.size))
         return self.with_values(lambda values: values[:, sites])
 
     def scaled(self, factors: ArrayLike) -> Traces:
@@ -331,11 +327,8 @@ class SpikeTrains(Result):
         falls = np.diff(times) <= 0.0
         falls[offsets[(offsets > 0) & (offsets < times.size)] - 1] = False  # from one train to the next
         if falls.any():
-            raise InputError(
-                "times_ms",
-                "must increase within each afferent",
-                remedy=f"it does not at {times[1:][falls][:4]}",
-            )
+            where = f"it does not at {times[1:][falls][:4]}"
+            raise InputError("times_ms", "must increase within each afferent", remedy=where)
 
     def __repr__(self) -> str:
         return f"SpikeTrains({self.times_ms.size} spikes of {len(self)} afferents)"

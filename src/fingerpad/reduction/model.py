@@ -254,6 +254,7 @@ def origin_of(touch: Touch) -> dict[str, str]:
 FORMAT = "fingerpad reduced touch"
 VERSION = 2
 LARGEST_MB = 1000.0
+AGAIN = "make it again with `fingerpad reduce`"
 
 HEAD = ("depth_mm", "at_mm", "quantities", "origin")
 ARRAYS = tuple(name for name, hint in ReducedModel.__annotations__.items() if hint == "FloatArray")
@@ -301,20 +302,13 @@ def read_reduced(path: str | Path, touch: Touch | None = None) -> ReducedModel:
         said = str(error.strerror or error)
         raise InputError(path, "must be a file that can be read", remedy=said) from error
     except Exception as error:  # a file of unknown content may fail in any way
-        raise InputError(
-            path,
-            "must be a whole file of a reduced touch",
-            remedy="it is another file, or was cut short; make it again with `fingerpad reduce`",
-        ) from error
+        remedy = f"it is another file, or was cut short; {AGAIN}"
+        raise InputError(path, "must be a whole file of a reduced touch", remedy=remedy) from error
     if found != (FORMAT, VERSION):
-        raise InputError(
-            path,
-            f"must be a {FORMAT} of version {VERSION}",
-            f"{found[0]!r} of version {found[1]!r}",
-            "make it again with `fingerpad reduce`",
-        )
+        came = f"{found[0]!r} of version {found[1]!r}"
+        raise InputError(path, f"must be a {FORMAT} of version {VERSION}", came, AGAIN)
     if checksum != _checksum(text, arrays):
-        raise InputError(f"{path} is damaged: its checksum is wrong; make it again with `fingerpad reduce`.")
+        raise InputError(f"{path} is damaged: its checksum is wrong; {AGAIN}.")
     if touch is not None:
         for name, value in origin_of(touch).items():
             if name != "indenter" and head["origin"][name] != value:

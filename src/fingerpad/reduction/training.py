@@ -232,25 +232,18 @@ class ReducedTraining:
                 "finger", "must be a Fingertip to be reduced", f"a {type(touch.finger).__name__}"
             )
         if touch.friction > 0.0 and self.range.moves:
-            raise InputError(
-                "friction",
-                "must be 0 for a range of x_mm or z_mm, because what slides with friction depends on its "
-                "way, which a reduced touch does not know",
-                f"{touch.friction:g}",
-            )
+            why = "because what slides with friction depends on its way, which a reduced touch does not know"
+            must = f"must be 0 for a range of x_mm or z_mm, {why}"
+            raise InputError("friction", must, f"{touch.friction:g}")
         steepest = max(abs(touch.tilt_deg + tilt) for tilt in self.range.tilt_deg)
         if steepest > LARGEST_TILT_DEG:
-            raise InputError(
-                "tilt_deg", f"must keep the indenter within {LARGEST_TILT_DEG:g} degrees", f"{steepest:g}"
-            )
+            must = f"must keep the indenter within {LARGEST_TILT_DEG:g} degrees"
+            raise InputError("tilt_deg", must, f"{steepest:g}")
         parameter = self.range.parameter
         if parameter is not None and parameter not in vars(touch.indenter):
             known = ", ".join(vars(touch.indenter))
-            raise InputError(
-                "parameter",
-                f"must be one of {known}, those of {type(touch.indenter).__name__}",
-                repr(parameter),
-            )
+            must = f"must be one of {known}, those of {type(touch.indenter).__name__}"
+            raise InputError("parameter", must, repr(parameter))
 
     def poses(self) -> Iterator[TrainingPose]:
         """List all poses, the last axis the first to change.
@@ -362,8 +355,5 @@ def first_touch_mm(touch: Touch, pose: Pose) -> float:
         if distance_mm < 0.0 or depth_mm > far_mm:
             break
         before_mm, depth_mm = depth_mm, depth_mm + distance_mm
-    raise InputError(
-        "tilt_deg",
-        f"must keep {type(touch.indenter).__name__} on the skin",
-        remedy=f"at {pose.tilt_deg:g} degrees it never touches a node of the skin; take a smaller range",
-    )
+    why = f"at {pose.tilt_deg:g} degrees it never touches a node of the skin; take a smaller range"
+    raise InputError("tilt_deg", f"must keep {type(touch.indenter).__name__} on the skin", remedy=why)
