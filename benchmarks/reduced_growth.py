@@ -11,7 +11,7 @@ import numpy as np
 import fingerpad as fp
 from benchmarks.measuring import run_job
 from benchmarks.results import Report, Table
-from fingerpad.reduction.interpolation import Axis
+from fingerpad.reduction.training import Axis
 
 THREADS = 2
 DEPTH_MM, ASIDE_MM = 1.0, 1.0

@@ -5,8 +5,7 @@ from __future__ import annotations
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from fingerpad.core.patterns import poisson_disc
-from fingerpad.core.regions import Ellipse
+from fingerpad.core.regions import Ellipse, poisson_disc
 from fingerpad.core.signals import ResponseMap
 from fingerpad.data import psychophysics
 from fingerpad.geometry.fingertip import Fingertip

@@ -6,7 +6,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from scipy.spatial import cKDTree
 
 from fingerpad import Ellipse, Population, hexagonal, poisson_disc
-from fingerpad.core.patterns import jittered, rectangular, uniform
+from fingerpad.core.regions import jittered, rectangular, uniform
 from fingerpad.psychophysics.encoding import (
     delaunay_pairs,
     distance,

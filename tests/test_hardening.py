@@ -18,9 +18,8 @@ import fingerpad as fp
 from fingerpad.cli import main, run
 from fingerpad.core.errors import LONGEST_MESSAGE, FingerpadError, InputError, closest
 from fingerpad.core.files import read_text
-from fingerpad.core.patterns import poisson_disc, rectangular
 from fingerpad.core.plain_yaml import DEEPEST, LARGEST_TEXT, read_yaml
-from fingerpad.core.regions import Rectangle
+from fingerpad.core.regions import Rectangle, poisson_disc, rectangular
 from fingerpad.core.signals import Traces
 from fingerpad.core.tables import read_csv
 from fingerpad.experiments.afferent_files import fitted_afferent

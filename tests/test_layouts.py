@@ -11,7 +11,7 @@ from scipy.stats import chisquare, kstest
 
 from fingerpad import Ellipse, Polygon, Population, Rectangle, hexagonal, poisson_disc
 from fingerpad.core.layouts import PATTERNS, Layout
-from fingerpad.core.patterns import MOST_RECEPTORS, jittered, rectangular, uniform
+from fingerpad.core.regions import MOST_RECEPTORS, jittered, rectangular, uniform
 from refusals import refusals
 
 PAD = Ellipse(6.0, 5.0, (17.0, 0.5))

@@ -8,7 +8,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from scipy.spatial import cKDTree
 
 from fingerpad import Fingertip, NailEdge, Population
-from fingerpad.core.patterns import uniform
+from fingerpad.core.regions import uniform
 from fingerpad.geometry.grading import resolution_grading
 from fingerpad.geometry.mesh import finger_mesh
 from fingerpad.skin.receptor_sheet import ReceptorSheet

@@ -6,7 +6,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from scipy.stats import kstest
 
 import fingerpad as fp
-from fingerpad.core.patterns import jittered
+from fingerpad.core.regions import jittered
 from fingerpad.neuron.population import CENTRE_MM, sensitivities
 from refusals import refusals
 from sections import SED_DRIVEN, SENSITIVE

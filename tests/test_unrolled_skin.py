@@ -8,7 +8,7 @@ from scipy.spatial import cKDTree
 from scipy.stats import poisson
 
 import fingerpad as fp
-from fingerpad.core.patterns import jittered, uniform
+from fingerpad.core.regions import jittered, uniform
 from fingerpad.geometry.mesh import finger_mesh
 from fingerpad.skin.receptor_sheet import ReceptorSheet
 from fingerpad.skin.unrolled_skin import PAD_FACES_DEG, PAD_X_MM

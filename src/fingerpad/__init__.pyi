@@ -7,13 +7,13 @@ from fingerpad.core.errors import InputError as InputError
 from fingerpad.core.errors import MaterialWarning as MaterialWarning
 from fingerpad.core.errors import StoreError as StoreError
 from fingerpad.core.errors import TissuesWarning as TissuesWarning
-from fingerpad.core.patterns import hexagonal as hexagonal
-from fingerpad.core.patterns import poisson_disc as poisson_disc
 from fingerpad.core.phases import Phase as Phase
 from fingerpad.core.progress import notebook_progress as notebook_progress
 from fingerpad.core.regions import Ellipse as Ellipse
 from fingerpad.core.regions import Polygon as Polygon
 from fingerpad.core.regions import Rectangle as Rectangle
+from fingerpad.core.regions import hexagonal as hexagonal
+from fingerpad.core.regions import poisson_disc as poisson_disc
 from fingerpad.core.signals import HitRates as HitRates
 from fingerpad.core.signals import ResponseMap as ResponseMap
 from fingerpad.core.signals import SpikeTrains as SpikeTrains

@@ -262,7 +262,7 @@ def _examples() -> dict[str, tuple[str, str, Callable[[], str]]]:
     return found
 
 
-def _init(given: argparse.Namespace, _: Options) -> None:
+def _init(given: argparse.Namespace, within: Options) -> None:
     import json
 
     from fingerpad.core.files import check_new, write_atomically
@@ -270,11 +270,11 @@ def _init(given: argparse.Namespace, _: Options) -> None:
     from fingerpad.experiments.schemas import TOUCH_SCHEMA
 
     if given.list:
-        _tell(*(f"{name}: {what} ({file})" for name, (what, file, _) in _examples().items()))
+        _tell(*(f"{name}: {what} ({file})" for name, (what, file, content) in _examples().items()))
         return
     asked = Path(given.what)
     name = "touch" if asked.suffix in (".yaml", ".yml") else one_of("WHAT", given.what, tuple(_examples()))
-    _, file, content = _examples()[name]
+    what, file, content = _examples()[name]
     path = given.out / (asked if asked.suffix in (".yaml", ".yml") else file)
     check_new(path)
     make_writable(path.parent)

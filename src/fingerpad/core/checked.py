@@ -9,6 +9,7 @@ import inspect
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import MISSING, field, fields
 from functools import partial, wraps
+from inspect import Parameter, Signature
 from itertools import takewhile
 from pathlib import Path
 from types import FunctionType, MappingProxyType, NoneType, UnionType
@@ -71,25 +72,21 @@ def value_class(kind: Any = None, *, eq: bool = True) -> Any:
     A field may keep its default, whatever that is. Limits of several fields together are left to
     `__post_init__`. Each `OtherName` of the class is a keyword, too.
     """
-    from pydantic import ConfigDict
-    from pydantic.dataclasses import dataclass
-
-    def made(kind: type[_Kind]) -> type[_Kind]:
-        config = ConfigDict(arbitrary_types_allowed=True, strict=True, extra="forbid")
-        frozen: Any = dataclass(frozen=True, eq=eq, config=config)(kind)
-        return checked_class(frozen)
-
-    return made if kind is None else made(kind)
+    return partial(_frozen, strict=True, eq=eq) if kind is None else _frozen(kind, strict=True, eq=eq)
 
 
 @dataclass_transform(frozen_default=True, kw_only_default=True, field_specifiers=(field,))
 def result_class(kind: type[_Kind]) -> type[_Kind]:
     """Make a class a frozen dataclass with named fields, which `core/result_files` writes and reads."""
+    return _frozen(kind, strict=False, kw_only=True)
+
+
+def _frozen(kind: type[_Kind], strict: bool, **options: bool) -> type[_Kind]:
     from pydantic import ConfigDict
     from pydantic.dataclasses import dataclass
 
-    config = ConfigDict(arbitrary_types_allowed=True, extra="forbid")
-    made: Any = dataclass(frozen=True, kw_only=True, config=config)(kind)
+    config = ConfigDict(arbitrary_types_allowed=True, strict=strict, extra="forbid")
+    made: Any = dataclass(frozen=True, config=config, **options)(kind)  # type: ignore[call-overload]
     return checked_class(made)
 
 
@@ -130,7 +127,7 @@ def _init_of(kind: Any, init: FunctionType) -> Callable[..., None]:
     call: Callable[..., None] = init
     if "__pydantic_fields__" in vars(kind):
         parts = _parts_of(kind)
-        kind.__signature__ = inspect.Signature(parts)
+        kind.__signature__ = Signature(parts)
         init.__annotations__ = {part.name: part.annotation for part in parts}
     else:
         parts, call = list(inspect.signature(init).parameters.values()), _validated(init)
@@ -148,22 +145,20 @@ def _init_of(kind: Any, init: FunctionType) -> Callable[..., None]:
     return __init__
 
 
-def _parts_of(kind: Any) -> list[inspect.Parameter]:
+def _parts_of(kind: Any) -> list[Parameter]:
     """Parameters of a value: its fields, then its other names; what editors show."""
     parts = [
-        inspect.Parameter(
+        Parameter(
             part.name,
-            inspect.Parameter.KEYWORD_ONLY if part.kw_only else inspect.Parameter.POSITIONAL_OR_KEYWORD,
-            default=inspect.Parameter.empty
-            if part.default is part.default_factory is MISSING
-            else part.default,
+            Parameter.KEYWORD_ONLY if part.kw_only else Parameter.POSITIONAL_OR_KEYWORD,
+            default=Parameter.empty if part.default is part.default_factory is MISSING else part.default,
             annotation=part.type,
         )
         for part in fields(kind)
         if part.init
     ]
     parts += [
-        inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=None)
+        Parameter(name, Parameter.KEYWORD_ONLY, default=None)
         for name in other_names(kind)
         if name not in {part.name for part in parts}
     ]
@@ -180,17 +175,11 @@ def _validated(function: Callable[..., _Made]) -> Callable[..., _Made]:
     """Put pydantic's check of its arguments before a function."""
     from pydantic import ConfigDict, validate_call
 
-    same = FunctionType(
-        function.__code__,
-        function.__globals__,
-        function.__name__,
-        function.__defaults__,
-        function.__closure__,
-    )
+    closed, defaults = function.__closure__, function.__defaults__
+    same = FunctionType(function.__code__, function.__globals__, function.__name__, defaults, closed)
     same.__kwdefaults__, same.__qualname__ = function.__kwdefaults__, function.__qualname__
-    same.__annotations__ = {
-        name: _path_or(hint) for name, hint in hints_of(function).items() if name != "return"
-    }
+    hints = hints_of(function)
+    same.__annotations__ = {name: _path_or(hints[name]) for name in hints if name != "return"}
     return validate_call(config=ConfigDict(arbitrary_types_allowed=True, strict=True))(same)
 
 
@@ -251,7 +240,7 @@ def _path_or(hint: Any) -> Any:
 def _in_one_sentence(
     error: ValidationError,
     owner: str,
-    parts: Iterable[inspect.Parameter],
+    parts: Iterable[Parameter],
     elsewhere: Mapping[str, str] = MappingProxyType({}),
 ) -> Exception:
     """Say what pydantic refused first as an `InputError`."""
@@ -340,7 +329,7 @@ def other_names(kind: type) -> dict[str, OtherName]:
 
 
 def _by_fields(
-    spelled: Mapping[str, OtherName], given: Mapping[str, Any], before: Sequence[inspect.Parameter]
+    spelled: Mapping[str, OtherName], given: Mapping[str, Any], before: Sequence[Parameter]
 ) -> dict[str, Any]:
     """Arguments by their fields, where some were given under other names."""
     made = {name: value for name, value in given.items() if name not in spelled}

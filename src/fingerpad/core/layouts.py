@@ -1,7 +1,7 @@
 """A layout of receptors: positions in a plane, and their pitch.
 
 The pitch of a lattice is the distance of nearest neighbours. Random layouts have a nominal pitch of
-1/sqrt(density). `core.patterns` fills a region with one.
+1/sqrt(density). `core.regions` fills a region with one.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ Place = Callable[[FloatArray], FloatArray]
 """From positions in the plane (n, 2) to points of the skin (n, 3), both in mm."""
 
 PATTERNS = ("rectangular", "hexagonal", "uniform", "jittered", "poisson-disc")
-"""Names of the functions of `core.patterns`."""
+"""Names of the functions of `core.regions` that make them."""
 
 MM2_PER_CM2 = 100.0
 

@@ -9,9 +9,7 @@ from fingerpad.core.errors import InputError
 from fingerpad.core.values import Finite
 
 RAMP, HOLD = "ramp", "hold"  # Names of the phases in which the two rates of the paper are counted.
-
-RELEASE, VIBRATION = "release", "vibration"
-"""Names of phases in which an indenter goes back, and in which it goes to and fro while it touches."""
+RELEASE, VIBRATION = "release", "vibration"  # The indenter goes back; it goes to and fro while it touches.
 
 
 @value_class
@@ -69,6 +67,5 @@ def phase_named(phases: Sequence[Phase], name: str, asks: str = "phase") -> Phas
         if phase.name == name:
             return phase
     names = ", ".join(phase.name for phase in phases) or "none"
-    raise InputError(
-        asks, f"must be given where no phase is called {name!r}", remedy=f"the phases are {names}"
-    )
+    must = f"must be given where no phase is called {name!r}"
+    raise InputError(asks, must, remedy=f"the phases are {names}")

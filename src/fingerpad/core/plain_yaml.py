@@ -24,14 +24,7 @@ DEEPEST = 20  # Mappings and lists inside each other.
 
 @checked
 def read_yaml(text: str, source: str) -> Any:
-    """Plain values of a text in YAML.
-
-    Parameters
-    ----------
-    text : str
-        One document.
-    source : str
-        Name of the source, for errors.
+    """Plain values of one document in YAML; errors name the source.
 
     Examples
     --------
@@ -41,12 +34,8 @@ def read_yaml(text: str, source: str) -> Any:
     {'gain': 1e-06, 'name': 'edge', 'off': [1, 2.5]}
     """
     if len(text) > LARGEST_TEXT:
-        raise InputError(
-            source,
-            f"must have at most {LARGEST_TEXT:,} characters of YAML",
-            f"{len(text):,}",
-            "write long tables as CSV",
-        )
+        most = f"must have at most {LARGEST_TEXT:,} characters of YAML"
+        raise InputError(source, most, f"{len(text):,}", "write long tables as CSV")
     try:
         return yaml.load(text, _Loader)  # a SafeLoader: plain values only
     except yaml.YAMLError as error:

@@ -7,6 +7,7 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager
 from contextvars import ContextVar
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Protocol, runtime_checkable
 
 from fingerpad.core.checked import checked
@@ -54,57 +55,52 @@ def share_done(share: float) -> None:
         tell(share)
 
 
+@dataclass
 class _Stage:
-    """How far a stage is, told by `show` at each change and every now and then."""
+    """How far a stage is."""
 
-    def __init__(self, total: int, show: Callable[[_Stage], None]):
-        self.total, self.done, self.share, self.began = total, 0, 0.0, time.monotonic()
-        self.changed = False
-        self._show, self._lock = show, threading.Lock()
+    total: int
+    began: float  # Reading of the clock at its beginning. [s]
+    done: int = 0
+    share: float = 0.0  # Part of the present one that is done.
 
     @property
     def so_far(self) -> float:
         """Parts that are done, with the share of the present one."""
         return self.done + self.share
 
-    @property
-    def elapsed_s(self) -> float:
-        """Time since the beginning. [s]"""
-        return time.monotonic() - self.began
 
-    def advance(self) -> None:
-        """Count a part that is finished."""
-        self.done, self.share = self.done + 1, 0.0
-        self.show(changed=True)
+@contextmanager
+def _opened(
+    total: int, show: Callable[[_Stage, bool], None], look_every_s: float
+) -> Iterator[Callable[[], None]]:
+    """Open a stage: `show` it, one thread at a time, when more of it is done, and else every few seconds."""
+    stage, lock, over = _Stage(total, time.monotonic()), threading.Lock(), threading.Event()
 
-    def tell_share(self, share: float) -> None:
-        """Take over how much of the present part is done."""
-        self.share = share
-        self.show(changed=True)
+    def advance() -> None:
+        with lock:
+            stage.done, stage.share = stage.done + 1, 0.0
+            show(stage, True)
 
-    def show(self, changed: bool = False) -> None:
-        """Show the stage, one thread at a time; `changed` says whether more is done than before."""
-        with self._lock:
-            self.changed = changed
-            self._show(self)
+    def tell_share(share: float) -> None:
+        with lock:
+            stage.share = share
+            show(stage, True)
 
-    @contextmanager
-    def open(self, look_every_s: float) -> Iterator[Callable[[], None]]:
-        """Take in what a part tells, and show the stage every few seconds even if nothing is told."""
-        over, token = threading.Event(), _tell_share.set(self.tell_share)
+    def look() -> None:
+        while not over.wait(max(look_every_s, SHORTEST_WAIT_S)):
+            with lock:
+                show(stage, False)
 
-        def look() -> None:
-            while not over.wait(max(look_every_s, SHORTEST_WAIT_S)):
-                self.show()
-
-        looker = threading.Thread(target=look, name="progress", daemon=True)
-        looker.start()
-        try:
-            yield self.advance
-        finally:
-            _tell_share.reset(token)
-            over.set()
-            looker.join()
+    token = _tell_share.set(tell_share)
+    looker = threading.Thread(target=look, name="progress", daemon=True)
+    looker.start()
+    try:
+        yield advance
+    finally:
+        _tell_share.reset(token)
+        over.set()
+        looker.join()
 
 
 class NoProgress:
@@ -144,14 +140,14 @@ class Lines:
         """Tell of one stage."""
         last, lines = time.monotonic(), 0
 
-        def show(stage: _Stage) -> None:
+        def show(stage: _Stage, changed: bool) -> None:
             nonlocal last, lines
-            now, ends = time.monotonic(), stage.done == total > 0 and stage.changed
+            now, ends = time.monotonic(), stage.done == total > 0 and changed
             if now - last >= self._every_s or (ends and (self._short or lines)):
                 self._tell(f"{name}: {_line(stage)}")
                 last, lines = now, lines + 1
 
-        with _Stage(total, show).open(self._every_s) as advance:
+        with _opened(total, show, self._every_s) as advance:
             yield advance
 
 
@@ -160,9 +156,10 @@ def _line(stage: _Stage) -> str:
     where = f"{stage.done} of {stage.total}"
     if stage.share > 0.0:
         where = f"{stage.share:.0%} of number {stage.done + 1} of {stage.total}".replace("%", " %")
+    elapsed_s = time.monotonic() - stage.began
     if stage.so_far == 0.0:
-        return f"{where} after {stage.elapsed_s:.0f} s"
-    left_s = stage.elapsed_s / stage.so_far * (stage.total - stage.so_far)
+        return f"{where} after {elapsed_s:.0f} s"
+    left_s = elapsed_s / stage.so_far * (stage.total - stage.so_far)
     return f"{where}, {left_s:.0f} s left"
 
 
@@ -177,10 +174,11 @@ class Bars:
         """Show one stage with its expected time."""
         bars = _bars(name, self._console)
         task = bars.add_task(name, total=total)
-        with (
-            bars,
-            _Stage(total, lambda stage: bars.update(task, completed=stage.so_far)).open(1.0) as advance,
-        ):
+
+        def show(stage: _Stage, _: bool) -> None:
+            bars.update(task, completed=stage.so_far)
+
+        with bars, _opened(total, show, 1.0) as advance:
             yield advance
 
 
@@ -197,7 +195,7 @@ class NotebookBars:
         task, last = bars.add_task(name, total=total), 0.0
         shown: object = None
 
-        def show(stage: _Stage) -> None:
+        def show(stage: _Stage, _: bool) -> None:
             nonlocal last, shown
             bars.update(task, completed=stage.so_far)
             now = time.monotonic()
@@ -210,41 +208,27 @@ class NotebookBars:
             else:
                 shown.update(picture, raw=True)  # type: ignore[attr-defined]
 
-        with _Stage(total, show).open(self._every_s) as advance:
+        with _opened(total, show, self._every_s) as advance:
             yield advance
 
 
 def _bars(name: str, console: Console | None = None) -> rich.progress.Progress:
     """Return the bar of one stage, which is shown only if the console is a terminal."""
-    from rich.progress import (
-        BarColumn,
-        MofNCompleteColumn,
-        Progress,
-        TextColumn,
-        TimeElapsedColumn,
-        TimeRemainingColumn,
-    )
+    from rich import progress as rich
 
-    return Progress(
-        TextColumn(f"{name:<24}"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn(),
-        TextColumn("left"), TimeRemainingColumn(),
+    return rich.Progress(
+        rich.TextColumn(f"{name:<24}"), rich.BarColumn(), rich.MofNCompleteColumn(),
+        rich.TimeElapsedColumn(), rich.TextColumn("left"), rich.TimeRemainingColumn(),
         console=console, disable=console is None or not console.is_terminal,
     )  # fmt: skip
 
 
 @checked
 def notebook_progress() -> Progress:
-    """Progress in a notebook: a bar below the cell, as on a terminal.
-
-    Returns
-    -------
-    Progress
-        For `indent(..., progress=fp.notebook_progress())`, `run_sweep` and others.
-    """
+    """Progress in a notebook, a bar below the cell: `indent(..., progress=fp.notebook_progress())`."""
     try:
         from IPython.display import display
     except ImportError as error:
-        raise InputError(
-            "notebook_progress", "needs IPython, as in a notebook", remedy="it is not installed"
-        ) from error
+        needs = "needs IPython, as in a notebook"
+        raise InputError("notebook_progress", needs, remedy="it is not installed") from error
     return NotebookBars(display)

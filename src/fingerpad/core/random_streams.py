@@ -8,33 +8,29 @@ four words of 64 bits, so any number of any stream is computed directly, without
     counter = (block, 0, receptor, trial),    block = 1, 2, ...
 
 NumPy has the same generator with the same counter: its uniform numbers and `uniforms` agree to the last bit.
-The kernels of `neuron` and `psychophysics` compute the numbers of a key inside their loops (`core.philox`).
+The kernels of `neuron` and `psychophysics` compute the numbers of a key inside their loops.
 Libraries that draw take a generator of NumPy: it is made here from a key, and nowhere else.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import IntEnum
 from typing import Any
 
 import numpy as np
-from numba import njit
+from numba import njit, uint64
 
 from fingerpad.core.errors import InputError
-from fingerpad.core.philox import WORDS, four_normals, four_uniforms
 from fingerpad.core.values import FloatArray, IntArray, instance, whole
 
 Numbers = int | Sequence[int] | np.ndarray
 """Trials or receptors: their numbers, or their count, numbered from 0."""
 
-LARGEST_SEED = 2**63 - 1
-
+LARGEST_SEED = 2**63 - 1  # Seeds, trials and receptors fit into a signed 64-bit integer, as in NumPy.
 MOST_NUMBERS = 100_000_000  # Largest number of random numbers that are drawn at once: 0.8 GB.
-
-"""Seeds, trials and receptors fit into a signed 64-bit integer, as in NumPy."""
-
 
 Key = int | Sequence[int] | np.random.SeedSequence  # A seed, or a seed and numbers.
 
@@ -62,6 +58,71 @@ def independent_keys(key: Key, count: int) -> list[np.random.SeedSequence]:
 def seed_of(seed: int, number: int) -> int:
     """Return the seed of one of several parts, so that one more part leaves the others where they are."""
     return int(np.random.SeedSequence([seed, number]).generate_state(1)[0])
+
+
+WORDS = 4  # Numbers of one block.
+
+# Constants of Philox 4x64 as published: two multipliers, and the increments of the key per round.
+_MULTIPLIER_0 = np.uint64(0xD2E7470EE14C6C93)
+_MULTIPLIER_1 = np.uint64(0xCA5A826395121157)
+_ADDED_0 = np.uint64(0x9E3779B97F4A7C15)
+_ADDED_1 = np.uint64(0xBB67AE8584CAA73B)
+_ROUNDS = 10
+_HALF = np.uint64(32)
+_LOW_HALF = np.uint64(0xFFFFFFFF)
+_BEYOND_DOUBLE = np.uint64(11)
+_LAST_BIT = 2.0**-53
+
+
+@njit(cache=True, nogil=True)
+def _high_word(a: np.uint64, b: np.uint64) -> np.uint64:
+    """Upper 64 of the 128 bits of a product, from the four products of halves."""
+    a0, a1 = a & _LOW_HALF, a >> _HALF
+    b0, b1 = b & _LOW_HALF, b >> _HALF
+    middle = a1 * b0 + ((a0 * b0) >> _HALF)
+    other = a0 * b1 + (middle & _LOW_HALF)
+    return a1 * b1 + (middle >> _HALF) + (other >> _HALF)
+
+
+@njit(cache=True, nogil=True)
+def words(
+    seed: int, purpose: int, block: int, receptor: int, trial: int
+) -> tuple[np.uint64, np.uint64, np.uint64, np.uint64]:
+    """Map a key and a counter to four words (Salmon et al. 2011, section 4.3)."""
+    k0, k1 = uint64(seed), uint64(purpose)
+    c0, c1, c2, c3 = uint64(block), uint64(0), uint64(receptor), uint64(trial)
+    for _ in range(_ROUNDS):
+        high_0, low_0 = _high_word(_MULTIPLIER_0, c0), _MULTIPLIER_0 * c0
+        high_1, low_1 = _high_word(_MULTIPLIER_1, c2), _MULTIPLIER_1 * c2
+        c0, c1, c2, c3 = high_1 ^ c1 ^ k0, low_1, high_0 ^ c3 ^ k1, low_0
+        k0, k1 = k0 + _ADDED_0, k1 + _ADDED_1
+    return c0, c1, c2, c3
+
+
+@njit(cache=True, nogil=True)
+def four_uniforms(
+    seed: int, trial: int, receptor: int, purpose: int, block: int
+) -> tuple[float, float, float, float]:
+    """Return the four uniform numbers of one block, for kernels; the stream's number 0 opens block 1."""
+    w0, w1, w2, w3 = words(seed, purpose, block, receptor, trial)
+    return (
+        (w0 >> _BEYOND_DOUBLE) * _LAST_BIT, (w1 >> _BEYOND_DOUBLE) * _LAST_BIT,
+        (w2 >> _BEYOND_DOUBLE) * _LAST_BIT, (w3 >> _BEYOND_DOUBLE) * _LAST_BIT,
+    )  # fmt: skip
+
+
+@njit(cache=True, nogil=True)
+def four_normals(
+    seed: int, trial: int, receptor: int, purpose: int, block: int
+) -> tuple[float, float, float, float]:
+    """Return the four standard normal numbers of one block, for kernels, by the formula of Box and Muller.
+
+    From u0 and u1: r = sqrt(-2 ln(1 - u0)) on the circle at the angle 2 pi u1; likewise from u2 and u3.
+    """
+    u0, u1, u2, u3 = four_uniforms(seed, trial, receptor, purpose, block)
+    r0, r1 = math.sqrt(-2.0 * math.log1p(-u0)), math.sqrt(-2.0 * math.log1p(-u2))
+    angle_0, angle_1 = 2.0 * math.pi * u1, 2.0 * math.pi * u3
+    return (r0 * math.cos(angle_0), r0 * math.sin(angle_0), r1 * math.cos(angle_1), r1 * math.sin(angle_1))
 
 
 class Purpose(IntEnum):
@@ -137,38 +198,29 @@ def checked_sites(sites: IntArray, n_sites: int) -> IntArray:
 
 
 def uniforms(seed: int, trials: Numbers, receptors: Numbers, purpose: Purpose, count: int) -> FloatArray:
-    """Draw uniform numbers of many streams at once."""
-    return _of_each_pair(seed, trials, receptors, purpose, count, normal=False)
+    """Draw uniform numbers of every trial with every receptor, (n_trials, n_receptors, count)."""
+    return _drawn(seed, trials, receptors, purpose, count, normal=False)
 
 
 def normals(seed: int, trials: Numbers, receptors: Numbers, purpose: Purpose, count: int) -> FloatArray:
-    """Draw standard normal numbers of many streams at once.
-
-    Notes
-    -----
-    Box & Muller 1958. NumPy computes normal numbers of the same generator by another method.
-    """
-    return _of_each_pair(seed, trials, receptors, purpose, count, normal=True)
+    """Draw standard normal numbers, like `uniforms`; NumPy computes those of the same generator otherwise."""
+    return _drawn(seed, trials, receptors, purpose, count, normal=True)
 
 
-def _of_each_pair(
+def _drawn(
     seed: int, trials: Numbers, receptors: Numbers, purpose: Purpose, count: int, normal: bool
 ) -> FloatArray:
-    """Numbers of every trial with every receptor, (n_trials, n_receptors, count)."""
     pairs = np.meshgrid(numbered("trials", trials), numbered("receptors", receptors), indexing="ij")
-    numbers = draw_each(seed, pairs[0].ravel(), pairs[1].ravel(), purpose, count, normal)
-    return numbers.reshape(*pairs[0].shape, count)
-
-
-def draw_each(
-    seed: int, trials: IntArray, receptors: IntArray, purpose: Purpose, count: int, normal: bool
-) -> FloatArray:
-    """Draw uniform or normal numbers of the stream of each trial and receptor (n,), (n, count)."""
-    numbers = np.empty((trials.size, whole("count", count, 0, MOST_NUMBERS // max(trials.size, 1))))
-    _fill(
-        _number("seed", seed), trials, receptors, int(instance("purpose", purpose, Purpose)), normal, numbers
+    shape = *pairs[0].shape, whole("count", count, 0, MOST_NUMBERS // max(pairs[0].size, 1))
+    numbers = np.empty((pairs[0].size, shape[-1]))
+    key = (
+        _number("seed", seed),
+        pairs[0].ravel(),
+        pairs[1].ravel(),
+        int(instance("purpose", purpose, Purpose)),
     )
-    return numbers
+    _fill(*key, normal, numbers)
+    return numbers.reshape(shape)
 
 
 @njit(cache=True, nogil=True)

@@ -91,14 +91,11 @@ def _json_of_format(path: Path, versions: Mapping[str, int]) -> tuple[bytes, dic
     try:
         content = check_file(path, LARGEST_TEXT_MB).read_bytes()
         values = json.loads(content)
-    except RecursionError as error:
-        raise StoreError(
-            f"{path} cannot be read as JSON (nested too deep): run the command again."
-        ) from error
     except InputError as error:
         raise StoreError(str(error)) from error
-    except (OSError, ValueError) as error:
-        raise StoreError(f"{path} cannot be read as JSON ({error}): run the command again.") from error
+    except (OSError, ValueError, RecursionError) as error:
+        said = "nested too deep" if isinstance(error, RecursionError) else error
+        raise StoreError(f"{path} cannot be read as JSON ({said}): run the command again.") from error
     found = (values.get("format"), values.get("format_version")) if isinstance(values, dict) else (None, None)
     if found not in versions.items():
         wanted = " or ".join(f"{name}, version {version}" for name, version in versions.items())

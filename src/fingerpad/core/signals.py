@@ -149,19 +149,13 @@ class Traces(Result):
 
     def _check_dynamic(self, dynamic: Traces) -> None:
         if dynamic.quantity == self.quantity or dynamic.dynamic is not None:
-            raise InputError(
-                "dynamic",
-                f"must hold another quantity than {self.quantity!r}, and one only",
-                repr(dynamic.quantity),
-                "leave it out where both terms follow one quantity",
-            )
+            other = f"must hold another quantity than {self.quantity!r}, and one only"
+            remedy = "leave it out where both terms follow one quantity"
+            raise InputError("dynamic", other, repr(dynamic.quantity), remedy)
         if dynamic.values.shape != self.values.shape or (dynamic.times_ms != self.times_ms).any():
-            raise InputError(
-                "dynamic",
-                "must have the times and sites of the static term",
-                f"values of shape {dynamic.values.shape} to {dynamic.times_ms[-1]:g} ms for "
-                f"{self.values.shape} to {self.times_ms[-1]:g} ms",
-            )
+            shapes = [f"{each.values.shape} to {each.times_ms[-1]:g} ms" for each in (dynamic, self)]
+            came = f"values of shape {' for '.join(shapes)}"
+            raise InputError("dynamic", "must have the times and sites of the static term", came)
 
     def _first_touch_ms(self) -> float:
         """Last time until which all values are 0; the first time if there is none, or nothing is touched."""
@@ -250,19 +244,17 @@ class Traces(Result):
         dynamic = None if self.dynamic is None else self.dynamic.with_values(change)
         return replace(self, values=change(self.values), dynamic=dynamic)
 
-    def part(self, sites: slice) -> Traces:
-        """Traces of some of the sites."""
-        return self if sites == slice(0, self.n_sites) else self.with_values(lambda values: values[:, sites])
-
-    def selected(self, sites: TruthVector) -> Traces:
-        """Traces of the sites where a mask (n_sites,) is true.
+    def part(self, sites: slice | TruthVector) -> Traces:
+        """Traces of some of the sites: of a slice, or where a mask (n_sites,) is true.
 
         Examples
         --------
-        >>> Traces([0.0, 50.0], [[0.0, 0.0], [2.0, 3.0]]).selected(np.array([False, True])).n_sites
+        >>> Traces([0.0, 50.0], [[0.0, 0.0], [2.0, 3.0]]).part(np.array([False, True])).n_sites
         1
         """
-        if sites.size != self.n_sites:
+        if isinstance(sites, slice) and sites == slice(0, self.n_sites):
+            return self
+        if not isinstance(sites, slice) and sites.size != self.n_sites:
             raise InputError("sites", f"must have one truth value per site, {self.n_sites}", str(sites.size))
         return self.with_values(lambda values: values[:, sites])
 
@@ -314,13 +306,6 @@ def window_bounds(window_ms: Sequence[float]) -> tuple[float, float]:
 class SpikeTrains(Result):
     """Spike times of several afferents, one after the other in one array.
 
-    Parameters
-    ----------
-    times_ms : array (n_spikes,)
-        Spike times, afferent by afferent, increasing within each. [ms]
-    offsets : int array (n_afferents + 1,)
-        Afferent `i` has `times_ms[offsets[i]:offsets[i + 1]]`.
-
     Examples
     --------
     >>> trains = SpikeTrains.from_lists([[1.0, 2.5], [], [4.0]])
@@ -328,8 +313,8 @@ class SpikeTrains(Result):
     [[1.0, 2.5], [], [4.0]]
     """
 
-    times_ms: FiniteVector
-    offsets: Indices
+    times_ms: FiniteVector  # Afferent by afferent, increasing within each, (n_spikes,). [ms]
+    offsets: Indices  # Afferent `i` has `times_ms[offsets[i]:offsets[i + 1]]`, (n_afferents + 1,).
 
     def __post_init__(self) -> None:
         times, offsets = self.times_ms, self.offsets
@@ -342,11 +327,8 @@ class SpikeTrains(Result):
         falls = np.diff(times) <= 0.0
         falls[offsets[(offsets > 0) & (offsets < times.size)] - 1] = False  # from one train to the next
         if falls.any():
-            raise InputError(
-                "times_ms",
-                "must increase within each afferent",
-                remedy=f"it does not at {times[1:][falls][:4]}",
-            )
+            where = f"it does not at {times[1:][falls][:4]}"
+            raise InputError("times_ms", "must increase within each afferent", remedy=where)
 
     def __repr__(self) -> str:
         return f"SpikeTrains({self.times_ms.size} spikes of {len(self)} afferents)"
@@ -392,21 +374,6 @@ class SpikeTrains(Result):
         start, end = window_bounds(window_ms)
         inside = np.cumsum(np.append(0, (self.times_ms > start) & (self.times_ms <= end)))
         return MS_PER_S * np.diff(inside[self.offsets]) / (end - start)
-
-    def spread(self, sites: TruthVector) -> SpikeTrains:
-        """Trains of all sites, if these are those where a mask is true and the others are silent.
-
-        Examples
-        --------
-        >>> two = SpikeTrains.from_lists([[1.0], [2.0, 3.0]])
-        >>> [train.tolist() for train in two.spread(np.array([True, False, True]))]
-        [[1.0], [], [2.0, 3.0]]
-        """
-        if np.count_nonzero(sites) != len(self):
-            raise InputError("sites", f"must be true once per train, {len(self)}", str(sites))
-        counts = np.zeros(sites.size, dtype=np.int64)
-        counts[sites] = np.diff(self.offsets)
-        return SpikeTrains(self.times_ms, np.concatenate([[0], np.cumsum(counts)]))
 
     def __len__(self) -> int:
         return self.offsets.size - 1
@@ -592,22 +559,12 @@ class ResponseMap(Result):
 
 @value_class
 class HitRates(Result):
-    """Hit rate of each comparison with the standard.
+    """Hit rate of each comparison with the standard."""
 
-    Parameters
-    ----------
-    hit_rate : array (n_comparisons,)
-        Mean fraction of correct judgements, mu_3. [0-1]
-    hit_rate_sd : array (n_comparisons,)
-        Its standard deviation over repetitions, sigma_3. [0-1]
-    seed, session : int, optional
-        Key of the random numbers of the noise and the observer.
-    """
-
-    hit_rate: FiniteVector
-    hit_rate_sd: FiniteVector
+    hit_rate: FiniteVector  # Mean fraction of correct judgements, mu_3, (n_comparisons,). [0-1]
+    hit_rate_sd: FiniteVector  # Its standard deviation over repetitions, sigma_3, (n_comparisons,). [0-1]
     seed: Whole | None = None
-    session: Whole = 0
+    session: Whole = 0  # Key of the random numbers of the noise and the observer, with the seed.
 
     def __post_init__(self) -> None:
         mean, spread = self.hit_rate, self.hit_rate_sd

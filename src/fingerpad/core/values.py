@@ -195,11 +195,8 @@ def float_array(name: str, values: ArrayLike, ndim: int | None) -> FloatArray:
     if not np.isfinite(total) and not np.isfinite(array).all():
         bad = np.argwhere(~np.isfinite(array)) + 1
         first = " in row and column " if array.ndim == 2 else " number "
-        raise InputError(
-            name,
-            "must hold finite numbers only",
-            remedy=f"{len(bad)} are not, first{first if array.ndim else ' '}{', '.join(map(str, bad[0]))}",
-        )
+        said = f"{len(bad)} are not, first{first if array.ndim else ' '}{', '.join(map(str, bad[0]))}"
+        raise InputError(name, "must hold finite numbers only", remedy=said)
     array.setflags(write=False)
     return array
 

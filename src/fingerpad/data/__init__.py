@@ -4,8 +4,6 @@
 contains the results for comparison.
 """
 
-from types import ModuleType
-
 from fingerpad.data import afferents, fingers, fingertip, neuron, paper, protocol, psychophysics, tissues
 from fingerpad.data.afferents import TYPES
 from fingerpad.data.observations import (
@@ -38,16 +36,7 @@ __all__ = [
     "tissues",
 ]
 
-_MODULES: tuple[ModuleType, ...] = (
-    fingertip,
-    fingers,
-    tissues,
-    protocol,
-    neuron,
-    psychophysics,
-    paper,
-    afferents,
-)
+_MODULES = (fingertip, fingers, tissues, protocol, neuron, psychophysics, paper, afferents)
 
 
 def all_published() -> tuple[Published, ...]:

@@ -60,69 +60,35 @@ def _labelled(line: str) -> tuple[str, str]:
 
 @dataclass(frozen=True)
 class BarObservations:
-    """Firing rates of one SAI afferent under a bar at several lateral positions.
+    """Firing rates of one SAI afferent under a bar at several lateral positions."""
 
-    Parameters
-    ----------
-    shift_mm : array (n_shifts,)
-        Position of the bar relative to the centre of the receptive field. [mm]
-    dynamic_rate_hz, static_rate_hz : array (n_shifts,)
-        Observed rates during the ramp and the hold. [spikes/s]
-    source, status : str
-        Publication, and status of the numbers (see `STATUSES`).
-    """
-
-    shift_mm: FloatArray
+    shift_mm: FloatArray  # Position of the bar relative to the centre of the receptive field, (n,). [mm]
     dynamic_rate_hz: FloatArray
-    static_rate_hz: FloatArray
+    static_rate_hz: FloatArray  # Observed rates during the ramp and the hold, (n,). [spikes/s]
     source: str
-    status: str
+    status: str  # Publication, and status of the numbers (see `STATUSES`).
 
 
 @dataclass(frozen=True)
 class DeflectionObservations:
-    """Deflection of the skin's surface along the finger.
+    """Deflection of the skin's surface along the finger."""
 
-    Parameters
-    ----------
-    distance_mm : array (n_points,)
-        Along the finger from the axis of the indenter. [mm]
-    deflection_mm : array (n_points,)
-        Towards the bone. [mm]
-    is_artefact : bool array (n_points,)
-        Artefacts of the digitisation; leave them out of comparisons.
-    source, status : str
-        Publication, and status of the numbers (see `STATUSES`).
-    """
-
-    distance_mm: FloatArray
-    deflection_mm: FloatArray
-    is_artefact: NDArray[np.bool_]
+    distance_mm: FloatArray  # Along the finger from the axis of the indenter, (n,). [mm]
+    deflection_mm: FloatArray  # Towards the bone, (n,). [mm]
+    is_artefact: NDArray[np.bool_]  # Artefacts of the digitisation; leave them out of comparisons, (n,).
     source: str
-    status: str
+    status: str  # Publication, and status of the numbers (see `STATUSES`).
 
 
 @dataclass(frozen=True)
 class HitRateObservations:
-    """Hit rates of participants who discriminate spheres from a standard.
+    """Hit rates of participants who discriminate spheres from a standard."""
 
-    Parameters
-    ----------
-    standard_per_m : float
-        Curvature of the standard sphere. [1/m]
-    curvature_per_m : array (n_comparisons,)
-        Curvatures of the comparison spheres. [1/m]
-    hit_rate : array (n_comparisons,)
-        Fraction of correct trials. [0-1]
-    source, status : str
-        Publication, and status of the numbers (see `STATUSES`).
-    """
-
-    standard_per_m: float
-    curvature_per_m: FloatArray
-    hit_rate: FloatArray
+    standard_per_m: float  # Curvature of the standard sphere. [1/m]
+    curvature_per_m: FloatArray  # Curvatures of the comparison spheres, (n,). [1/m]
+    hit_rate: FloatArray  # Fraction of correct trials, (n,). [0-1]
     source: str
-    status: str
+    status: str  # Publication, and status of the numbers (see `STATUSES`).
 
 
 def bar_firing_rates() -> BarObservations:

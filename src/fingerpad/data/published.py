@@ -1,4 +1,8 @@
-"""One published number: value, unit, source and status."""
+"""One published number: value, unit, source and status.
+
+Modules of numbers are tables: what it is, its value and its unit in the first line of a row, then the source
+and the status. They are not formatted by the formatter, which would write one entry per line.
+"""
 
 from __future__ import annotations
 
@@ -23,30 +27,17 @@ Value = TypeVar("Value", float, tuple[float, ...])
 class Published(Generic[Value]):
     """A number, or a row of numbers, with unit, source and status.
 
-    Parameters
-    ----------
-    name : str
-        Description; unique within the package.
-    value : float or tuple of float
-        The number(s), in `unit`.
-    unit : str
-        Unit of `value`; "1" for pure numbers.
-    source : str
-        Source of the value.
-    status : {"paper", "read", "recalled", "assumed"}
-        Reliability of the value; the four words are defined in `STATUSES`.
-
     Examples
     --------
     >>> Published("time constant", 68, "ms", "Gerling et al. 2014, section 2.2.2", "paper").value
     68.0
     """
 
-    name: str
-    value: Value
-    unit: str
-    source: str
-    status: Status
+    name: str  # Description; unique within the package.
+    value: Value  # The number or numbers, in `unit`.
+    unit: str  # Unit of the value; "1" for pure numbers.
+    source: str  # Source of the value.
+    status: Status  # Reliability of the value; `STATUSES` defines the four words.
 
     def __post_init__(self) -> None:
         for field in ("name", "unit", "source"):
@@ -54,7 +45,11 @@ class Published(Generic[Value]):
             if not isinstance(text, str) or not text.strip():
                 raise InputError(f"Published needs a text as {field}: got {text!r}.")
         one_of(f"status of {self.name}", self.status, tuple(STATUSES))
-        object.__setattr__(self, "value", _numbers(self.name, self.value))
+        if self.value == ():
+            raise InputError(self.name, "must hold at least one number", "an empty tuple")
+        given = self.value if isinstance(self.value, tuple) else (self.value,)
+        numbers = tuple(finite(self.name, number) for number in given)
+        object.__setattr__(self, "value", numbers if given is self.value else numbers[0])
 
 
 @dataclass(frozen=True)
@@ -66,11 +61,3 @@ class Source:
 
     def __call__(self, name: str, value: Value, unit: str) -> Published[Value]:
         return Published(name, value, unit, self.text, self.status)
-
-
-def _numbers(name: str, value: float | tuple[float, ...]) -> float | tuple[float, ...]:
-    if not isinstance(value, tuple):
-        return finite(name, value)
-    if not value:
-        raise InputError(name, "must hold at least one number", "an empty tuple")
-    return tuple(finite(name, number) for number in value)

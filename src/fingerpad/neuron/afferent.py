@@ -392,9 +392,11 @@ def spikes_where(
     """Spikes of the sites that may fire, block by block on all threads; the others are silent."""
     if not may_fire.any():
         return SpikeTrains.from_lists([[]] * traces.n_sites)
-    some = traces.selected(may_fire)
-    trains = in_blocks(lambda sites: spikes(some.part(sites)), some.n_sites, _SITES_PER_BLOCK)
-    return SpikeTrains.joined(trains).spread(may_fire)
+    some = traces.part(may_fire)
+    blocks = in_blocks(lambda sites: spikes(some.part(sites)), some.n_sites, _SITES_PER_BLOCK)
+    fired, counts = SpikeTrains.joined(blocks), np.zeros(traces.n_sites, dtype=np.int64)
+    counts[may_fire] = fired.counts
+    return SpikeTrains(fired.times_ms, np.append(0, np.cumsum(counts)))
 
 
 def as_sai(afferent: AnyAfferent) -> Afferent:

@@ -22,8 +22,7 @@ import numpy as np
 from numba import njit
 
 from fingerpad.core.checked import value_class
-from fingerpad.core.philox import four_uniforms
-from fingerpad.core.random_streams import Presentations, Purpose, checked_sites
+from fingerpad.core.random_streams import Presentations, Purpose, checked_sites, four_uniforms
 from fingerpad.core.signals import SpikeTrains, Traces
 from fingerpad.core.threads import in_blocks
 from fingerpad.core.values import FloatArray, Positive, Whole

@@ -203,8 +203,7 @@ class Population:
 
         Examples
         --------
-        >>> from fingerpad.core.patterns import hexagonal
-        >>> from fingerpad.core.regions import Ellipse
+        >>> from fingerpad.core.regions import Ellipse, hexagonal
         >>> disc = Ellipse(3.0, 3.0, centre_mm=(17.37, 0.0))
         >>> len(Population.of_layout(hexagonal(disc, density_per_cm2=100.0)))
         31
@@ -344,7 +343,7 @@ class Population:
         160
         """
         # Files of touches load this module, and only a layout at random needs that one.
-        from fingerpad.core.patterns import poisson_disc
+        from fingerpad.core.regions import poisson_disc
 
         if not hasattr(region, "area_mm2"):
             raise InputError(

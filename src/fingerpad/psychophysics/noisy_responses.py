@@ -16,8 +16,7 @@ from numpy.typing import ArrayLike
 
 from fingerpad.core.checked import checked
 from fingerpad.core.errors import InputError
-from fingerpad.core.philox import four_normals
-from fingerpad.core.random_streams import LARGEST_SEED, Purpose, normals
+from fingerpad.core.random_streams import LARGEST_SEED, Purpose, four_normals, normals
 from fingerpad.core.threads import in_blocks
 from fingerpad.core.values import (
     Count,

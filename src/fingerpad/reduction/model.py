@@ -1,10 +1,38 @@
 """A reduced touch: fields of full presses about each pose, as modes with coefficients.
 
-At every training pose the response at once Y and what each branch relaxes D_i (see `relaxation`) are
+At every training pose the response at once Y and what each branch relaxes D_i (see below) are
 polynomials in sqrt(d / d_max) of the depth d below first touch: force and contact grow smoothly with it.
 Their coefficients follow from all samples of the presses there by least squares. Fields are sampled about the
 middle of the contact, so that they differ little from pose to pose, and are kept as the modes of their
 singular value decomposition. Files hold arrays without code, a version and a checksum.
+
+A response to a pose relaxes by one first-order filter per time constant of the tissues. Each branch i of
+the tissues' Prony series has relaxed a stress S_i away (`fingerpad.mechanics.viscoelastic`) that follows
+tau_i dS_i/dt = g_i S0 - S_i. While the deformation follows the pose p alone, any quantity that is linear in
+the stress therefore is
+
+    y(t) = Y(p(t)) - sum_i m_i(t),    tau_i dm_i/dt = D_i(p(t)) - m_i,
+
+with Y the response at once and D_i what branch i relaxes in a long hold of the pose. As in the full solver,
+D_i is linear within a step, and then the steps are exact. Two corrections matter
+(docs/decisions/reduced-touch.md):
+
+- The stored energy is quadratic. Each branch holds an energy E_i = r_i^2 of a strain r_i, so r_i is filtered,
+  and the branch has lost r_i^2 - (r_i - m_i)^2.
+- Stress that relaxed at one depth counts less when the indenter has gone deeper, and more when it has come
+  back: m_i filters s(d) D_i and counts as m_i / s(d), with s a power of the depth. At one depth s cancels.
+
+`Springs` are for contact that retreats: skin that has relaxed stays behind the indenter. On the way down,
+each ring of skin meets the indenter at a level e of the depth below first touch and follows it from then on.
+A response Y(d) to the depth d is therefore that of springs, one per level, of the ways u_e = d - e (method of
+dimensionality reduction: Popov & Hess, Method of Dimensionality Reduction in Contact Mechanics and Friction,
+2015):
+
+    Y(d) = sum_e s_e u_e,    s_e the change of the slope of Y at e.
+
+Each spring relaxes as the force does: it presses with f_e = u_e - sum_i m_ie, where branch i of the tissues
+filters g_i u_e. On the way up it follows the indenter while f_e > 0. Then it is free and recovers with f_e =
+0, until the indenter meets it again. While no spring is free this changes nothing.
 """
 
 from __future__ import annotations
@@ -13,10 +41,9 @@ import hashlib
 import io
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import cast
 
 import numpy as np
 
@@ -25,19 +52,12 @@ from fingerpad.core.errors import InputError
 from fingerpad.core.files import check_file, path_of, write_atomically
 from fingerpad.core.signals import STORED_ENERGY
 from fingerpad.core.values import Finite, FloatArray, Many, Pair
-from fingerpad.geometry.fingertip import Fingertip
-from fingerpad.reduction.interpolation import Axis, chebyshev_points, lagrange
-from fingerpad.reduction.relaxation import LEVELS, filtered, levels_mm, slope_changes
-from fingerpad.reduction.training import TrainingPose
+from fingerpad.reduction.training import Axis, chebyshev_points, lagrange
 from fingerpad.skin.indentation import Touch
-from fingerpad.skin.sampling import SkinResponse
 from fingerpad.skin.store import value_digest
 
 AT_ONCE, RELAXED = 14, 4  # Degree in sqrt(depth) of the response at once and of what relaxes.
 GRID_POINTS = 41  # Points of the local fields along and across.
-BEYOND_CONTACT_MM = 3.0  # How far the local fields extend beyond the contact. [mm]
-LOST = 1e-3  # Part of the fields that modes may leave out, relative to the largest singular value.
-FINE_PARTS = 20  # Parts of a training step in which the filters are integrated.
 
 ERROR_FLOOR = 0.05
 """Part of the largest values of the training that errors are relative to in a touch that is still light."""
@@ -52,61 +72,110 @@ def depth_basis(depth_mm: FloatArray, deepest_mm: float, degree: int) -> FloatAr
     return lagrange(chebyshev_points(degree + 1), share)[..., 1:] * (np.asarray(depth_mm) > 0.0)[..., None]
 
 
+def filter_step(step_ms: float, times_ms: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Factors a, b and gamma of m = a D + b D_before + gamma m_before, (n_branches,) each."""
+    if step_ms == 0.0:
+        return np.zeros(times_ms.size), np.zeros(times_ms.size), np.ones(times_ms.size)
+    gamma = np.exp(-step_ms / times_ms)
+    average = times_ms / step_ms * (1.0 - gamma)
+    return 1.0 - average, average - gamma, gamma
+
+
+SHALLOWEST = 0.4  # Share of the largest depth up to which what has relaxed counts alike.
+
+
+def depth_scale(depth_mm: float, deepest_mm: float, exponents: FloatArray) -> FloatArray:
+    """Scale s of what relaxes at a depth, of the shape of the exponents; 1 at the largest depth."""
+    return np.asarray(max(depth_mm / deepest_mm, SHALLOWEST) ** exponents)
+
+
+def amplitudes(values: FloatArray, squared: FloatArray) -> FloatArray:
+    """Return what relaxes linearly: values, or roots of those that are squares, (..., n_quantities, n)."""
+    found = values.copy()
+    found[..., squared, :] = np.sqrt(np.maximum(values[..., squared, :], 0.0))
+    return found
+
+
+def lost(amplitude: FloatArray, relaxed: FloatArray, squared: FloatArray) -> FloatArray:
+    """Values that are lost when amplitudes have relaxed by `relaxed`, (..., n_quantities, n)."""
+    found = relaxed.copy()
+    found[..., squared, :] *= 2.0 * amplitude[..., squared, :] - relaxed[..., squared, :]
+    return found
+
+
+LEVELS = 48
+
+
+def levels_mm(deepest_mm: float) -> FloatArray:
+    """Levels of the springs, (LEVELS,), denser where contact begins. [mm]"""
+    return np.asarray(deepest_mm * (np.arange(LEVELS) / LEVELS) ** 1.5)
+
+
+def slope_changes(levels: FloatArray, deepest_mm: float, values: FloatArray) -> FloatArray:
+    """Weights s_e of the springs, (n_levels, n), of functions with values (n_levels + 1, n).
+
+    The values are those at the levels and at the largest depth; between them the functions are linear.
+    """
+    slopes = np.diff(values, axis=0) / np.diff(np.append(levels, deepest_mm))[:, None]
+    return np.diff(slopes, axis=0, prepend=0.0)
+
+
+@dataclass(frozen=True)
+class Springs:
+    """Ways of the springs, and what their branches have relaxed."""
+
+    way_mm: FloatArray  # u, at most 0 before the first touch of a level, (n_levels,). [mm]
+    relaxed_mm: FloatArray  # m, (n_branches, n_levels). [mm]
+
+    @classmethod
+    def at_rest(cls, n_branches: int) -> Springs:
+        """Springs that nothing has touched."""
+        return cls(np.zeros(LEVELS), np.zeros((n_branches, LEVELS)))
+
+    def followed(
+        self,
+        step_ms: float,
+        followed_mm: FloatArray,
+        times_ms: FloatArray,
+        shares: FloatArray,
+        kept: float = 1.0,
+    ) -> Springs:
+        a, b, gamma = (each[:, None] for each in filter_step(step_ms, times_ms))
+        known = kept * (b * shares[:, None] * self.way_mm + gamma * self.relaxed_mm)
+        now = a * shares[:, None]
+        free_mm = known.sum(axis=0) / (1.0 - now.sum())
+        way_mm = np.maximum(followed_mm, free_mm)
+        return Springs(way_mm, now * way_mm + known)
+
+
 @value_class
 class ReducedModel:
-    """What a reduced touch is evaluated from.
+    """What a reduced touch is evaluated from, of `reduce_touch` or `read_reduced`."""
 
-    Parameters
-    ----------
-    axes : tuple of Axis
-        Axes of the range: x, z, tilt and perhaps a parameter of the indenter.
-    depth_mm : float
-        Largest depth below first touch. [mm]
-    at_mm : (float, float)
-        Place of the touch. [mm]
-    times_ms : array (n_branches,)
-        Time constants of the tissues. [ms]
-    quantities : tuple of str
-        Quantities of the fields, names of `SkinResponse.sample`.
-    first_touch_mm : array (n_poses,)
-        Depth of first touch at each pose. [mm]
-    middle_mm : array (n_poses, 2)
-        x and z of the middle of the contact. [mm]
-    totals : array (n_poses, n_terms, 2)
-        Coefficients of the force [mN] and of the contact area [mm²]: the terms are those of the response at
-        once, then those of each branch.
-    coefficients : array (n_poses, n_terms, n_modes)
-        Coefficients of the modes.
-    modes : array (n_modes, n_quantities, n_grid, n_grid)
-        Fields about the middle of the contact. [each in its unit]
-    reach_mm : array (2,)
-        Half-extent of the fields along and across. [mm]
-    largest : array (n_quantities + 1,)
-        Largest values of the quantities [each in its unit] and of the force [mN] in the training.
-    error : array (n_quantities + 1,)
-        Errors that 95 % of new touches stay within, all of them together, over `error_scale` (see
-        `building`). Infinite before that is measured.
-    exponents : array (n_quantities + 1,)
-        Powers of the depth that scale what has relaxed (see `relaxation`), of the quantities and the force.
-    origin : dict of str
-        What was pressed: for people, and to refuse another finger.
-    """
-
-    axes: Many[Axis]
-    depth_mm: Finite
-    at_mm: Pair
-    times_ms: FloatArray
-    quantities: Many[str]
-    first_touch_mm: FloatArray
-    middle_mm: FloatArray
+    axes: Many[Axis]  # Axes of the range: x, z, tilt and perhaps a parameter of the indenter.
+    depth_mm: Finite  # Largest depth below first touch. [mm]
+    at_mm: Pair  # Place of the touch. [mm]
+    times_ms: FloatArray  # Time constants of the tissues, (n_branches,). [ms]
+    quantities: Many[str]  # Quantities of the fields, names of `SkinResponse.sample`.
+    first_touch_mm: FloatArray  # Depth of first touch at each pose, (n_poses,). [mm]
+    middle_mm: FloatArray  # x and z of the middle of the contact, (n_poses, 2). [mm]
     totals: FloatArray
-    coefficients: FloatArray
+    """Coefficients of the force [mN] and of the contact area [mm²], (n_poses, n_terms, 2).
+
+    The terms are those of the response at once, then those of each branch."""
+    coefficients: FloatArray  # Coefficients of the modes, (n_poses, n_terms, n_modes).
     modes: FloatArray
-    reach_mm: FloatArray
+    """Fields about the middle of the contact, (n_modes, n_quantities, n_grid, n_grid). [each in its unit]"""
+    reach_mm: FloatArray  # Half-extent of the fields along and across, (2,). [mm]
     largest: FloatArray
+    """Largest values of the quantities [each in its unit] and of the force [mN] in the training,
+    (n_quantities + 1,)."""
     error: FloatArray
+    """Errors that 95 % of new touches stay within, all of them together, over `error_scale` (see `building`),
+    (n_quantities + 1,). Infinite before that is measured."""
     exponents: FloatArray
-    origin: Mapping[str, str]
+    """Powers of the depth that scale what has relaxed, of quantities and force, (n_quantities + 1,)."""
+    origin: Mapping[str, str]  # What was pressed: for people, and to refuse another finger.
 
     def __repr__(self) -> str:
         ranges = ", ".join(
@@ -132,8 +201,8 @@ class ReducedModel:
 
     @cached_property
     def squared(self) -> np.ndarray:
-        """Which quantities are squares of what relaxes linearly, (n_quantities,)."""
-        return squares(self.quantities)
+        """Which quantities are squares of what relaxes linearly, as energy is of strain, (n_quantities,)."""
+        return np.array([quantity == STORED_ENERGY for quantity in self.quantities])
 
     @cached_property
     def pressures(self) -> FloatArray:
@@ -161,81 +230,16 @@ class ReducedModel:
         return once, relaxed
 
     def terms(self, depth_mm: Finite, behind_mm: FloatArray) -> FloatArray:
-        """Factors of the terms of the response at once and of each branch.
-
-        Parameters
-        ----------
-        depth_mm : float
-            Depth below first touch. [mm]
-        behind_mm : array (n_levels,)
-            How far the skin of each level stays behind. [mm]
-        """
-        depth = np.array(depth_mm)
+        """Factors of the terms at a depth, at once and of each branch; skin of each level stays behind."""
         once_of, relaxed_of = self._slope_changes
-        once = depth_basis(depth, self.depth_mm, AT_ONCE) + behind_mm @ once_of
-        relaxed = depth_basis(depth, self.depth_mm, RELAXED) + behind_mm @ relaxed_of
+        depth = np.array(depth_mm)
         found = np.zeros((1 + self.times_ms.size, AT_ONCE + RELAXED * self.times_ms.size))
-        found[0, :AT_ONCE] = once
+        found[0, :AT_ONCE] = depth_basis(depth, self.depth_mm, AT_ONCE) + behind_mm @ once_of
+        relaxed = depth_basis(depth, self.depth_mm, RELAXED) + behind_mm @ relaxed_of
         for branch in range(self.times_ms.size):
             start = AT_ONCE + RELAXED * branch
             found[1 + branch, start : start + RELAXED] = relaxed
         return found
-
-
-def fitted_model(
-    axes: tuple[Axis, ...],
-    deepest_mm: float,
-    at_mm: tuple[float, float],
-    poses: Sequence[TrainingPose],
-    responses: Sequence[Sequence[SkinResponse]],
-    quantities: tuple[str, ...],
-) -> ReducedModel:
-    touch = poses[0].touches[0]
-    finger = cast(Fingertip, touch.finger)
-    constants = np.unique([time for law in touch.tissues.layers for time in law.prony.times_ms])
-    reach = _reach_mm(responses)
-    terms = [
-        _terms(skin.times_ms, skin.depth_mm - pose.meets_mm, deepest_mm, constants)
-        for pose, each in zip(poses, responses, strict=True)
-        for skin in each
-    ]
-    middles = np.array([_middle_mm(each[-1]) for each in responses])
-    totals, fields_of, peaks = [], [], []
-    for n, each in enumerate(responses):
-        linear, quadratic = (
-            np.vstack(rows) for rows in zip(*terms[n * len(each) : (n + 1) * len(each)], strict=True)
-        )
-        sites = _sites(finger, middles[n], reach)
-        known = np.vstack(
-            [np.hstack([skin.sample(quantity, sites) for quantity in quantities]) for skin in each]
-        )
-        whole = np.vstack([np.stack([skin.force_mn, skin.contact_area_mm2], axis=1) for skin in each])
-        found = np.linalg.lstsq(linear, np.hstack([whole, known]), rcond=1e-8)[0]
-        of_squares = np.concatenate([[False, False], np.repeat(squares(quantities), len(sites))])
-        found[:, of_squares] = np.linalg.lstsq(quadratic, known[:, of_squares[2:]], rcond=1e-8)[0]
-        peaks.append(known.reshape(len(known), len(quantities), -1).max(axis=(0, 2)))
-        totals.append(found[:, :2])
-        fields_of.append(found[:, 2:])
-    values = np.stack(fields_of)
-    coefficients, modes = _modes(values, len(quantities))
-    largest = np.max(peaks, axis=0)
-    return ReducedModel(
-        axes=axes,
-        depth_mm=deepest_mm,
-        at_mm=at_mm,
-        times_ms=constants,
-        quantities=quantities,
-        first_touch_mm=np.array([pose.first_touch_mm for pose in poses]),
-        middle_mm=middles,
-        totals=np.stack(totals),
-        coefficients=coefficients,
-        modes=modes,
-        reach_mm=reach,
-        largest=np.append(largest, max(skin.force_mn.max() for each in responses for skin in each)),
-        error=np.full(len(quantities) + 1, np.inf),
-        exponents=np.zeros(len(quantities) + 1),
-        origin=origin_of(touch),
-    )
 
 
 def origin_of(touch: Touch) -> dict[str, str]:
@@ -247,87 +251,14 @@ def origin_of(touch: Touch) -> dict[str, str]:
     }
 
 
-def squares(quantities: Sequence[str]) -> np.ndarray:
-    """Tell which quantities are quadratic in the strain, (n_quantities,)."""
-    return np.array([quantity == STORED_ENERGY for quantity in quantities])
-
-
-def _terms(
-    times_ms: FloatArray, depth_mm: FloatArray, deepest_mm: float, constants_ms: FloatArray
-) -> tuple[FloatArray, FloatArray]:
-    """One row per time: the response at once, less what each branch has relaxed; and the same of squares."""
-    # The strain behind a square grows with the depth here.
-    steps = np.arange(FINE_PARTS * (times_ms.size - 1) + 1) / FINE_PARTS
-    fine = np.interp(steps, np.arange(times_ms.size), times_ms)
-    depth = np.maximum(np.interp(fine, times_ms, depth_mm), 0.0)[:, None]
-    basis = depth_basis(depth[:, 0], deepest_mm, RELAXED)
-    linear = [depth_basis(depth_mm, deepest_mm, AT_ONCE)]
-    quadratic = linear.copy()
-    for constant in constants_ms.tolist():
-        relaxed = filtered(fine, np.hstack([basis, depth]), constant)
-        share = np.divide(relaxed[:, -1:], depth, out=np.zeros_like(depth), where=depth > 0.0)
-        linear.append(-relaxed[::FINE_PARTS, :-1])
-        quadratic.append(-(share * (2.0 - share) * basis)[::FINE_PARTS])
-    return np.hstack(linear), np.hstack(quadratic)
-
-
-def _middle_mm(skin: SkinResponse) -> FloatArray:
-    """X and z of the middle of the contact in the undeformed skin, weighted by the pressure. [mm]"""
-    nodes_mm = skin.mesh.nodes_mm[skin.mesh.skin_nodes]
-    weight = skin.contact_pressure_kpa.max(axis=0) * skin.mesh.skin_area_mm2
-    x, _, z = (weight @ nodes_mm) / weight.sum()
-    return np.array([x, z if skin.touch is not None and skin.touch.grading.full else 0.0])
-
-
-def _reach_mm(responses: Sequence[Sequence[SkinResponse]]) -> FloatArray:
-    """Half-extent of the largest contact and `BEYOND_CONTACT_MM`, along and across. [mm]"""
-    extents = []
-    for each in responses:
-        skin = each[-1]
-        touched = skin.mesh.nodes_mm[skin.mesh.skin_nodes][skin.contact_pressure_kpa.max(axis=0) > 0.0]
-        extents.append(np.abs(touched[:, [0, 2]] - _middle_mm(skin)).max(axis=0))
-    return np.asarray(np.max(extents, axis=0) + BEYOND_CONTACT_MM)
-
-
-def _sites(finger: Fingertip, middle_mm: FloatArray, reach_mm: FloatArray) -> FloatArray:
-    """Places of the end organs of a local field, (n_grid², 2), moved onto the pad if they lie beside it."""
-    along, across = (np.linspace(-reach, reach, GRID_POINTS) for reach in reach_mm)
-    x, z = (grid.ravel() for grid in np.meshgrid(middle_mm[0] + along, middle_mm[1] + across, indexing="ij"))
-    x = np.clip(x, 2.0, finger.length_mm - 2.0)
-    widest = ON_THE_PAD * finger.section(x)[2]
-    return np.column_stack([x, np.clip(z, -widest, widest)])
-
-
-def _modes(values: FloatArray, n_quantities: int) -> tuple[FloatArray, FloatArray]:
-    """Coefficients (n_poses, n_terms, n_modes) and modes of fields (n_poses, n_terms, n_values)."""
-    by_quantity = values.reshape(*values.shape[:2], n_quantities, -1)
-    scale = np.abs(by_quantity).max(axis=(0, 1, 3), keepdims=True)
-    flat = (by_quantity / scale).reshape(values.shape[0] * values.shape[1], -1)
-    left, size, right = np.linalg.svd(flat, full_matrices=False)
-    kept = int((size > LOST * size[0]).sum())
-    modes = right[:kept].reshape(1, kept, n_quantities, -1) * scale
-    return (
-        (left[:, :kept] * size[:kept]).reshape(*values.shape[:2], kept),
-        np.ascontiguousarray(modes.reshape(kept, n_quantities, GRID_POINTS, GRID_POINTS)),
-    )
-
-
 FORMAT = "fingerpad reduced touch"
 VERSION = 2
 LARGEST_MB = 1000.0
+AGAIN = "make it again with `fingerpad reduce`"
 
-ARRAYS = (
-    "times_ms",
-    "first_touch_mm",
-    "middle_mm",
-    "totals",
-    "coefficients",
-    "modes",
-    "reach_mm",
-    "largest",
-    "error",
-    "exponents",
-)
+HEAD = ("depth_mm", "at_mm", "quantities", "origin")
+ARRAYS = tuple(name for name, hint in ReducedModel.__annotations__.items() if hint == "FloatArray")
+"""Fields in the head of a file, beside the axes, and its arrays."""
 
 
 @checked
@@ -339,24 +270,13 @@ def write_reduced(model: ReducedModel, path: str | Path) -> None:
     StoreError
         If the file cannot be written.
     """
-    head = {
-        "format": FORMAT,
-        "version": VERSION,
-        "axes": [asdict(axis) for axis in model.axes],
-        "depth_mm": model.depth_mm,
-        "at_mm": model.at_mm,
-        "quantities": model.quantities,
-        "origin": model.origin,
-    }
+    head = {"format": FORMAT, "version": VERSION, "axes": [asdict(axis) for axis in model.axes]}
+    head |= {name: getattr(model, name) for name in HEAD}
     arrays = {name: np.ascontiguousarray(getattr(model, name), dtype=np.float64) for name in ARRAYS}
     text = json.dumps(head, sort_keys=True)
+    named = {"head": np.array(text), "checksum": np.array(_checksum(text, arrays))} | arrays
     buffer = io.BytesIO()
-    np.savez_compressed(
-        buffer,
-        head=np.array(text),
-        checksum=np.array(_checksum(text, arrays)),
-        **arrays,  # type: ignore[arg-type]
-    )
+    np.savez_compressed(buffer, **named)  # type: ignore[arg-type]
     write_atomically(path_of("path", path), buffer.getvalue())
 
 
@@ -379,36 +299,22 @@ def read_reduced(path: str | Path, touch: Touch | None = None) -> ReducedModel:
         head = json.loads(text)
         found = head["format"], head["version"]
     except OSError as error:
-        raise InputError(
-            path, "must be a file that can be read", remedy=str(error.strerror or error)
-        ) from error
+        said = str(error.strerror or error)
+        raise InputError(path, "must be a file that can be read", remedy=said) from error
     except Exception as error:  # a file of unknown content may fail in any way
-        raise InputError(
-            path,
-            "must be a whole file of a reduced touch",
-            remedy="it is another file, or was cut short; make it again with `fingerpad reduce`",
-        ) from error
+        remedy = f"it is another file, or was cut short; {AGAIN}"
+        raise InputError(path, "must be a whole file of a reduced touch", remedy=remedy) from error
     if found != (FORMAT, VERSION):
-        raise InputError(
-            path,
-            f"must be a {FORMAT} of version {VERSION}",
-            f"{found[0]!r} of version {found[1]!r}",
-            "make it again with `fingerpad reduce`",
-        )
+        came = f"{found[0]!r} of version {found[1]!r}"
+        raise InputError(path, f"must be a {FORMAT} of version {VERSION}", came, AGAIN)
     if checksum != _checksum(text, arrays):
-        raise InputError(f"{path} is damaged: its checksum is wrong; make it again with `fingerpad reduce`.")
+        raise InputError(f"{path} is damaged: its checksum is wrong; {AGAIN}.")
     if touch is not None:
         for name, value in origin_of(touch).items():
             if name != "indenter" and head["origin"][name] != value:
                 raise InputError(f"{path} was made with another {name}: make it again with this one.")
-    return ReducedModel(
-        axes=tuple(Axis(**axis) for axis in head["axes"]),
-        depth_mm=head["depth_mm"],
-        at_mm=tuple(head["at_mm"]),
-        quantities=tuple(head["quantities"]),
-        origin=head["origin"],
-        **arrays,
-    )
+    axes = tuple(Axis(**axis) for axis in head["axes"])
+    return ReducedModel(axes=axes, **{name: head[name] for name in HEAD}, **arrays)
 
 
 def _checksum(head: str, arrays: dict[str, np.ndarray]) -> str:

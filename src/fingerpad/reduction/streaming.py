@@ -1,6 +1,6 @@
 """A touch, sample by sample: pose in, fields at the receptors, force and area out.
 
-The filters of `relaxation` act where the tissue is: each receptor relaxes by what has pressed it, so that an
+The filters of `model` act where the tissue is: each receptor relaxes by what has pressed it, so that an
 indenter which slides meets skin that has not relaxed. For the force the same is true of the skin below the
 contact; its share of relaxation is read from a sheet of further places.
 """
@@ -20,9 +20,16 @@ from fingerpad.core.displayed import Result
 from fingerpad.core.errors import InputError
 from fingerpad.core.units import with_unit
 from fingerpad.core.values import Finite, FloatArray, Number, finite, float_array, not_negative
-from fingerpad.reduction.interpolation import weighted
-from fingerpad.reduction.model import GRID_POINTS, ReducedModel
-from fingerpad.reduction.relaxation import Springs, amplitudes, depth_scale, filter_step, lost
+from fingerpad.reduction.model import (
+    GRID_POINTS,
+    ReducedModel,
+    Springs,
+    amplitudes,
+    depth_scale,
+    filter_step,
+    lost,
+)
+from fingerpad.reduction.training import weighted
 
 SHEET_MM = 0.8  # Distance of the places that tell how far the skin below the contact has relaxed. [mm]
 FORGETS_MM = 2.0  # Way of sliding over which the skin below the contact is replaced. [mm]
@@ -36,33 +43,15 @@ LEAST_APART_MM = 1e-3
 
 @value_class
 class ReducedSample(Result):
-    """A touch at one time.
-
-    Parameters
-    ----------
-    time_ms : float
-        The time. [ms]
-    depth_mm : float
-        Advance since first touch at the place of the touch. [mm]
-    force_mn : float
-        Force along the direction of pressing. [mN]
-    contact_area_mm2 : float
-        Undeformed skin in contact. [mm²]
-    fields : dict of str to array (n_receptors,)
-        Quantities at the receptors. [each in its unit]
-    force_error_mn : float
-        The force of a full solution lies within it for 95 % of touches. [mN]
-    field_errors : dict of str to float
-        The same of each quantity, at all receptors. [its unit]
-    """
+    """A touch at one time."""
 
     time_ms: Number
-    depth_mm: Number
-    force_mn: Number
-    contact_area_mm2: Number
-    fields: dict[str, FloatArray]
-    force_error_mn: Number
-    field_errors: dict[str, float]
+    depth_mm: Number  # Advance since first touch at the place of the touch. [mm]
+    force_mn: Number  # Force along the direction of pressing. [mN]
+    contact_area_mm2: Number  # Undeformed skin in contact. [mm²]
+    fields: dict[str, FloatArray]  # Quantities at the receptors, (n_receptors,). [each in its unit]
+    force_error_mn: Number  # The force of a full solution lies within it for 95 % of touches. [mN]
+    field_errors: dict[str, float]  # The same of each quantity, at all receptors. [its unit]
 
     def __repr__(self) -> str:
         highest = (
@@ -200,7 +189,7 @@ class ReducedTouch:
 
 @dataclass(frozen=True)
 class _Filters:
-    """State of the filters of `relaxation` at some places: what has relaxed, and what drove it last."""
+    """State of the filters of `model` at some places: what has relaxed, and what drove it last."""
 
     relaxed: FloatArray
     before: FloatArray

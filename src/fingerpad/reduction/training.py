@@ -3,6 +3,12 @@
 At every pose the indenter is pressed from first touch to a few depths by a fast ramp, and held. Ramps give
 the response at once to many depths; holds show what each branch of the tissues relaxes. One more press goes
 deeper and back after a hold.
+
+Between the poses everything is interpolated. Along one axis a function f of s in [0, 1] is replaced by the
+polynomial through its values at the points s_j = (1 - cos(pi j / n)) / 2 (Trefethen, Approximation Theory and
+Approximation Practice, 2013):
+
+    f(s) = sum_j L_j(s) f(s_j),    L_j(s) = prod_{i != j} (s - s_i) / (s_j - s_i).
 """
 
 from __future__ import annotations
@@ -11,21 +17,23 @@ import itertools
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import cache, cached_property
 from typing import Annotated, Any, cast
 
 import numpy as np
+from numba import njit
+from numpy.typing import ArrayLike
 from scipy.optimize import brentq
 
 from fingerpad.core.checked import value_class
 from fingerpad.core.errors import InputError
-from fingerpad.core.values import Pair, Positive, choice, instance
+from fingerpad.core.values import Count, Finite, FloatArray, Pair, Positive, choice, instance
 from fingerpad.geometry.fingertip import Fingertip
 from fingerpad.geometry.grading import RESOLUTIONS
 from fingerpad.geometry.indenter_grading import grading_along
 from fingerpad.geometry.motion import STILL, Pose
 from fingerpad.geometry.trajectory import Trajectory
 from fingerpad.mechanics.press_settings import PressSettings
-from fingerpad.reduction.interpolation import Axis
 from fingerpad.skin.indentation import LARGEST_TILT_DEG, Touch, settings_of
 
 DEPTH_SHARES = (0.1, 0.25, 0.45, 0.7, 1.0)  # Depths of the presses at one pose, over the largest.
@@ -52,6 +60,79 @@ MOST_FIXED_POINTS = 30
 """Steps of the search for the skin on the line of pressing; each gains a digit or more."""
 
 FEWEST_POINTS = 3  # Least number of points along an axis that varies.
+
+
+@cache
+def chebyshev_points(count: int) -> FloatArray:
+    """Chebyshev's points of [0, 1] with both ends, (count,); the middle for one point."""
+    points = np.array([0.5])
+    if count > 1:
+        points = 0.5 - 0.5 * np.cos(np.pi * np.arange(count) / (count - 1))
+    points.setflags(write=False)
+    return points
+
+
+def lagrange(points: FloatArray, values: ArrayLike) -> FloatArray:
+    """Lagrange's polynomials of `points` (n,) at `values` (...,), (..., n)."""
+    at = np.asarray(values, dtype=float)
+    return np.asarray(_lagrange(points, at.ravel()).reshape(*at.shape, points.size))
+
+
+@njit(cache=True, nogil=True)
+def _lagrange(points, at):  # type: ignore[no-untyped-def]
+    found = np.ones((at.size, points.size))
+    for k in range(at.size):
+        for j in range(points.size):
+            for i in range(points.size):
+                if i != j:
+                    found[k, j] *= (at[k] - points[i]) / (points[j] - points[i])
+    return found
+
+
+def weighted(weights: FloatArray, values: FloatArray) -> FloatArray:
+    return np.asarray((weights @ values.reshape(weights.size, -1)).reshape(values.shape[1:]))
+
+
+@value_class
+class Axis:
+    """One quantity that varies over the range of a reduced touch."""
+
+    name: str  # "x_mm", "z_mm", "tilt_deg", or a parameter of the indenter.
+    low: Finite
+    high: Finite  # Its range; equal if it does not vary.
+    count: Count  # Number of Chebyshev's points, 1 if it does not vary.
+
+    def __post_init__(self) -> None:
+        if self.high < self.low:
+            raise InputError(f"{self.name} must range from low to high: got {self.low:g} to {self.high:g}.")
+        if (self.count == 1) != (self.low == self.high):
+            raise InputError(
+                f"{self.name} needs two points or more if it varies, and one if it does not: got "
+                f"{self.count} for {self.low:g} to {self.high:g}."
+            )
+
+    @cached_property
+    def points(self) -> FloatArray:
+        """Chebyshev's points as shares of the range."""
+        return chebyshev_points(self.count)
+
+    @property
+    def values(self) -> FloatArray:
+        """Values at Chebyshev's points."""
+        return self.low + (self.high - self.low) * self.points
+
+    def weights(self, value: Finite) -> FloatArray:
+        """Weights of the points at a value, (count,)."""
+        # Sums of positions differ in the last digits.
+        slack = 1e-9 * max(1.0, abs(self.low), abs(self.high))
+        if not self.low - slack <= value <= self.high + slack:
+            raise InputError(
+                f"{self.name} must lie within {self.low:g} to {self.high:g}, the range of this reduced "
+                f"touch: got {value:g}; solve the touch in full, or reduce it over a wider range."
+            )
+        if self.count == 1:
+            return np.ones(1)
+        return lagrange(self.points, (value - self.low) / (self.high - self.low))
 
 
 @value_class
@@ -151,25 +232,18 @@ class ReducedTraining:
                 "finger", "must be a Fingertip to be reduced", f"a {type(touch.finger).__name__}"
             )
         if touch.friction > 0.0 and self.range.moves:
-            raise InputError(
-                "friction",
-                "must be 0 for a range of x_mm or z_mm, because what slides with friction depends on its "
-                "way, which a reduced touch does not know",
-                f"{touch.friction:g}",
-            )
+            why = "because what slides with friction depends on its way, which a reduced touch does not know"
+            must = f"must be 0 for a range of x_mm or z_mm, {why}"
+            raise InputError("friction", must, f"{touch.friction:g}")
         steepest = max(abs(touch.tilt_deg + tilt) for tilt in self.range.tilt_deg)
         if steepest > LARGEST_TILT_DEG:
-            raise InputError(
-                "tilt_deg", f"must keep the indenter within {LARGEST_TILT_DEG:g} degrees", f"{steepest:g}"
-            )
+            must = f"must keep the indenter within {LARGEST_TILT_DEG:g} degrees"
+            raise InputError("tilt_deg", must, f"{steepest:g}")
         parameter = self.range.parameter
         if parameter is not None and parameter not in vars(touch.indenter):
             known = ", ".join(vars(touch.indenter))
-            raise InputError(
-                "parameter",
-                f"must be one of {known}, those of {type(touch.indenter).__name__}",
-                repr(parameter),
-            )
+            must = f"must be one of {known}, those of {type(touch.indenter).__name__}"
+            raise InputError("parameter", must, repr(parameter))
 
     def poses(self) -> Iterator[TrainingPose]:
         """List all poses, the last axis the first to change.
@@ -281,8 +355,5 @@ def first_touch_mm(touch: Touch, pose: Pose) -> float:
         if distance_mm < 0.0 or depth_mm > far_mm:
             break
         before_mm, depth_mm = depth_mm, depth_mm + distance_mm
-    raise InputError(
-        "tilt_deg",
-        f"must keep {type(touch.indenter).__name__} on the skin",
-        remedy=f"at {pose.tilt_deg:g} degrees it never touches a node of the skin; take a smaller range",
-    )
+    why = f"at {pose.tilt_deg:g} degrees it never touches a node of the skin; take a smaller range"
+    raise InputError("tilt_deg", f"must keep {type(touch.indenter).__name__} on the skin", remedy=why)

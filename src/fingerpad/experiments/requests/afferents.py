@@ -357,7 +357,7 @@ def _region(settings: RegionSettings, offset_mm: tuple[float, ...], skin: Any, p
 
 def _layout(settings: PopulationSettings, region: Any, skin: Any) -> Layout:
     """Places in a region."""
-    from fingerpad.core.patterns import hexagonal, jittered, poisson_disc, rectangular, uniform
+    from fingerpad.core.regions import hexagonal, jittered, poisson_disc, rectangular, uniform
 
     density, seed = settings.density_per_cm2, settings.seed
     if settings.layout == "rectangular":
