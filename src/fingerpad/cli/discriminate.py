@@ -41,7 +41,7 @@ def discriminate_command(
         task_text,
         title,
     )
-    from fingerpad.report.discrimination_task import task_summary, write_task_page
+    from fingerpad.report.task import task_summary, write_task_page
 
     known = example_tasks()
     if listed:

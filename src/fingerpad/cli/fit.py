@@ -141,7 +141,7 @@ def fit_command(
     from fingerpad.experiments.manifest import sha256
     from fingerpad.experiments.recording_files import read_recordings
     from fingerpad.experiments.runner import Runner
-    from fingerpad.report.recording_fit import fit_summary, write_fit_page
+    from fingerpad.report.fit import fit_summary, write_fit_page
 
     if example is not None:
         write_examples(example, example_recordings(), "--example")

@@ -42,8 +42,7 @@ def reproduce_command(
     """Reproduce Gerling et al. (2014): the paper's own system, then the set human, beside the paper."""
     from fingerpad.experiments.gerling2014 import Reproduction, reproduce
     from fingerpad.experiments.schemas import write
-    from fingerpad.report.comparison import count_sentence
-    from fingerpad.report.reproduction import write_report
+    from fingerpad.report.reproduction import count_sentence, write_report
 
     run = Reproduction(out, resolution, seed, tissues, jobs=engine(jobs, scheduler), extended=extended)
     make_writable(out)

@@ -46,7 +46,7 @@ def touch_command(
     """Press a touch that a file describes, and write figures, tables and files for other programs."""
     from fingerpad.experiments.descriptions.touch import read_touch_description
     from fingerpad.export.touch_outputs import RESULT, check_described, run_touch
-    from fingerpad.report.touch import PAGE, touch_summary
+    from fingerpad.report.skin import PAGE, touch_summary
 
     described = read_touch_description(touch)
     check_described(described)

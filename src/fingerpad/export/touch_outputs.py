@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import partial
 from pathlib import Path
 
 from fingerpad.core.checked import checked
@@ -23,16 +22,11 @@ from fingerpad.export.dataset import write_touch
 from fingerpad.export.formats import DECKS, REQUIRED, RESULTS, write_deck
 from fingerpad.export.job import job_of
 from fingerpad.export.responses import require_pynwb, write_response_csv, write_responses_nwb
-from fingerpad.report.touch import draw, write_touch_page
+from fingerpad.report.skin import write_touch_page
 
 Write = Callable[[PressedTouch, Path], object]
 
 RESULT = "touch.json"
-
-
-def _page(pressed: PressedTouch, folder: Path) -> None:
-    picture = partial(draw, pressed.skin, pressed.response, pressed.described.touch.indenter)
-    write_touch_page(pressed.result, picture, folder)
 
 
 def _result(name: str) -> Write:
@@ -59,7 +53,7 @@ def _deck(name: str) -> Write:
 
 
 WRITERS: dict[str, Write] = {
-    "figures": _page,
+    "figures": write_touch_page,
     "spikes": lambda pressed, folder: write_response_csv(folder / "spikes.csv", pressed.response),
     "nwb": lambda pressed, folder: write_responses_nwb(folder / "touch.nwb", {"touch": pressed.response}),
     **{name: _result(name) for name in RESULTS},
