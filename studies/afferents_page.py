@@ -29,7 +29,7 @@ from fingerpad.data import afferents as published
 from fingerpad.neuron.afferent import AnyAfferent
 from fingerpad.neuron.afferent_types import afferent_types
 from fingerpad.neuron.tuning import tuning_curve
-from fingerpad.report.responses import STYLES, draw_mixed_responses
+from fingerpad.report.nerve import STYLES, draw_mixed_responses
 from fingerpad.report.style import BLACK, BLUE, GREY, ORANGE, new_figure, write_png
 from fingerpad.skin.indentation import settings_of
 from studies.pages import DOCS, IMAGES, table, write_blocks

@@ -11,9 +11,9 @@ from fingerpad.data import psychophysics
 from fingerpad.geometry.fingertip import Fingertip
 from fingerpad.geometry.indenters import Sphere
 from fingerpad.neuron.population import Population
-from fingerpad.report import touch as touch_figure
-from fingerpad.report.formatting import number
+from fingerpad.report import skin as touch_figure
 from fingerpad.report.style import BLACK, BLUE, GREY, new_figure
+from fingerpad.report.tables import number
 from fingerpad.skin.indentation import CONTACT_POINT_MM, indent
 from fingerpad.skin.sampling import SkinResponse
 from studies.results_page import Percept

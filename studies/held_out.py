@@ -41,8 +41,8 @@ from fingerpad.neuron.population import Population
 from fingerpad.neuron.spikes import firing_rate_hz, modulation_index
 from fingerpad.psychophysics.encoding import neighbour_pairs
 from fingerpad.psychophysics.noise_fit import NOISE_DRAWS, expected_hit_rates, fit_noise_sigma
-from fingerpad.report.formatting import ABSENT, fixed, number
-from fingerpad.report.parts import edition
+from fingerpad.report.page import edition
+from fingerpad.report.tables import ABSENT, fixed, number
 from fingerpad.skin.indentation import Touch, touch_of
 from fingerpad.skin.sampling import SkinResponse
 from studies import held_out_facts as facts

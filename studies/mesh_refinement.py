@@ -26,7 +26,7 @@ from fingerpad.inference.fitting.cross_validation import fractional_sum_of_squar
 from fingerpad.neuron.afferent import Afferent
 from fingerpad.neuron.population import Population
 from fingerpad.neuron.spikes import firing_rate_hz
-from fingerpad.report.formatting import fixed, number
+from fingerpad.report.tables import fixed, number
 from fingerpad.skin.code_hash import code_hash
 from fingerpad.skin.indentation import Touch
 from fingerpad.skin.sampling import SkinResponse

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from fingerpad.core.errors import InputError
 from fingerpad.core.files import write_atomically
-from fingerpad.report.formatting import fixed
+from fingerpad.report.tables import fixed
 
 DOCS = Path(__file__).parents[1] / "docs"
 IMAGES = DOCS / "images"

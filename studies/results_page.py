@@ -16,8 +16,8 @@ from fingerpad.experiments.gerling2014.discrepancy import CriterionErrorBars
 from fingerpad.experiments.gerling2014.reproduction import ReproductionResult, Summaries
 from fingerpad.experiments.gerling2014.single_unit import SingleUnitResult
 from fingerpad.experiments.gerling2014.sphere_discrimination import SphereDiscrimination
-from fingerpad.report.comparison import count_sentence, side_by_side, statement_cells, statement_table
-from fingerpad.report.formatting import ABSENT, fixed, number
+from fingerpad.report.reproduction import count_sentence, side_by_side, statement_cells, statement_table
+from fingerpad.report.tables import ABSENT, fixed, number
 from studies.pages import joined, replaced, table
 
 COMMAND = "python -m studies results"

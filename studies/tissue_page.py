@@ -7,8 +7,8 @@ from itertools import groupby
 from math import isfinite
 
 from fingerpad.experiments.tissue_sets import TissueLayer, tissue_layers
-from fingerpad.report.formatting import fixed, number
-from fingerpad.report.parts import edition
+from fingerpad.report.page import edition
+from fingerpad.report.tables import fixed, number
 from studies.pages import joined, share, table
 from studies.posterior_calibration import LEVELS as COVERED
 from studies.tissue_candidates import LEVELS

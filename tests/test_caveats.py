@@ -9,7 +9,7 @@ from fingerpad import Fingertip, FlatPunch, Population, RampAndHold, Sphere, tou
 from fingerpad.experiments.manifest import StageSummary
 from fingerpad.experiments.runner import Runner
 from fingerpad.mechanics.inertia import LARGEST_SHARE
-from fingerpad.report import touch as touch_figure
+from fingerpad.report import skin as touch_figure
 from fingerpad.skin.caveats import LARGEST_SED_RATIO
 
 
@@ -54,8 +54,10 @@ def test_fast_motions_and_edges_below_the_mesh_are_caveats(skin):
 def test_figures_and_manifests_show_caveats(skin, tmp_path):
     deep = skin.with_fields(sed_kpa=skin.sed_kpa * 1e4)
     response = Population.grid(rows=1, columns=1).respond(skin)
-    drawn = [text.get_text() for text in touch_figure.draw(deep, response).texts]
-    assert not any("Not verified" in text.get_text() for text in touch_figure.draw(skin, response).texts)
+    drawn = [text.get_text() for text in touch_figure.draw_touch(deep, response).texts]
+    assert not any(
+        "Not verified" in text.get_text() for text in touch_figure.draw_touch(skin, response).texts
+    )
     assert any("Not verified: The strain energy density" in text for text in drawn)
     runner = Runner(tmp_path)
     with runner.stage("press", 1):

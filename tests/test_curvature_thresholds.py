@@ -16,8 +16,9 @@ from fingerpad.psychophysics import yes_no
 from fingerpad.psychophysics.code_efficiency import SMALLEST_SPREAD
 from fingerpad.psychophysics.encoding import gradient_sum, neighbour_pairs
 from fingerpad.psychophysics.noise_fit import expected_hit_rates
-from fingerpad.report import curvature_thresholds as page
+from fingerpad.report import percept as page
 from fingerpad.report.style import png
+from fingerpad.report.tables import filled
 from sections import SENSITIVE, SphereSkin
 
 POPULATION = Population.grid(rows=3, columns=4, centre_mm=(RECEPTOR_X_MM, 0.0), afferent=SENSITIVE)
@@ -120,7 +121,7 @@ def test_noise_that_cannot_be_fitted_is_reported_in_place_of_thresholds():
     assert np.isnan(square.noise_sigma)
     assert "No noise within" in square.without_threshold[0].why_not
     assert png(page.draw_thresholds, same)[:4] == b"\x89PNG"
-    assert page.caption_thresholds(same)
+    assert f"{same.judgements} judgements of each" in filled(page.CAPTION_THRESHOLDS, same)
 
 
 def test_weber_rows_are_judged_in_whole_per_cent(found):

@@ -33,8 +33,7 @@ from fingerpad.psychophysics.discrimination import (
     discriminate_gradient_sum,
 )
 from fingerpad.psychophysics.encoding import gradient_sum, neighbour_pairs, taking_part
-from fingerpad.report import discrimination_task as figures
-from fingerpad.report import discrimination_task as report
+from fingerpad.report import task as report
 from refusals import misused
 
 ROOT = Path(__file__).parents[1]
@@ -136,7 +135,7 @@ def test_who_is_silent_under_one_stimulus_has_no_latency_under_any():
     all_of_them = decoding(analyse(question, bumps(question)), "gradient_sum", "latency").statistic.mean
     assert (inner < all_of_them).all()  # the outer ones, which fire late, are left out
     known = [latency for row in found.responses["latency"] for latency in row if not np.isnan(latency)]
-    colours = figures.draw_task_responses(found).axes[0].collections[0]
+    colours = report.draw_task_responses(found).axes[0].collections[0]
     assert colours.get_clim() == (min(known), max(known))
 
 
@@ -211,7 +210,7 @@ def test_stimuli_without_levels_have_hit_rates_and_no_curve():
     found = analyse(question, bumps(question))
     assert found.level is None
     assert [one.curves for one in found.decodings] == [(), ()]
-    for draw in (figures.draw_task_curves, figures.draw_task_statistics, figures.draw_task_responses):
+    for draw in (report.draw_task_curves, report.draw_task_statistics, report.draw_task_responses):
         (*_, last) = draw(found).axes
         assert last.get_figure()
 
@@ -267,7 +266,7 @@ def test_curves_show_every_code_people_with_their_intervals_and_thresholds():
         code=["gradient_sum", "ideal"], measure="static", observed={"points": points, "source": "two people"}
     )
     found = analyse(question, bumps(question))
-    figure = figures.draw_task_curves(found)
+    figure = report.draw_task_curves(found)
     labels = [text.get_text() for text in figure.legends[0].get_texts()]
     assert sorted(labels) == ["Gradient Sum", "ideal observer", "observed (two people)"]
     (axes,) = figure.axes
@@ -324,7 +323,7 @@ def test_silence_under_one_stimulus_is_silence_of_that_measure_alone():
     assert static.silent == ()
     assert len(static.hit_rate) == 4
     assert "silent under 200" in report.task_tables(found)[1].note
-    assert figures.draw_task_curves(found)
+    assert report.draw_task_curves(found)
     assert report.task_summary(found)[0].startswith("Gradient Sum of static rates discriminates")
 
 

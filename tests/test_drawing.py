@@ -12,10 +12,9 @@ from fingerpad.experiments.discrimination.task_stimuli import task_population, t
 from fingerpad.experiments.fit.fit import fit_recordings
 from fingerpad.export.result_tables import TABLES
 from fingerpad.inference.spike_fit import SpikeFit
-from fingerpad.report.discrimination_task import draw_task_responses
 from fingerpad.report.drawing import DRAWINGS
-from fingerpad.report.responses import draw_responses
-from fingerpad.report.touch import draw_spikes
+from fingerpad.report.skin import draw_spikes
+from fingerpad.report.task import draw_task_responses
 from refusals import refused
 
 TASK = {
@@ -111,12 +110,12 @@ def test_rasters_begin_on_top_and_maps_have_distal_to_the_right(results):
     response = results["ResponseMap"]
     by_touch, task = Figure(), draw_task_responses(results["TaskResult"])
     draw_spikes(by_touch.add_subplot(), results["SkinResponse"], response)
-    rasters, maps = list(by_touch.axes), [*draw_responses({"pad": response}).axes[:3], task.axes[0]]
+    rasters, maps = list(by_touch.axes), [task.axes[0]]
     for kind, drawings in DRAWINGS.items():
         for what, into in (("raster", rasters), ("map", maps), ("pad", maps)):
             if what in drawings:
                 into.append(results[kind].plot(Figure().add_subplot(), what))
-    assert (len(rasters), len(maps)) == (3, 6)
+    assert (len(rasters), len(maps)) == (3, 3)
     for axes in rasters:
         bottom, top = axes.get_ylim()
         assert bottom > top

@@ -16,8 +16,8 @@ from fingerpad.inference.afferent_methods import ReceptorOffset
 from fingerpad.inference.identifiable import IDENTIFIABLE_NAMES, identifiable
 from fingerpad.inference.rate_model import AfferentModel, four_number_model
 from fingerpad.inference.rate_problem import RateProblem
-from fingerpad.report import recording_fit as report
-from fingerpad.report.single_unit import ALLOWED_LOSS
+from fingerpad.report import fit as report
+from fingerpad.report.fit import ALLOWED_LOSS
 from fingerpad.report.style import png
 
 TIMES_MS = np.array([0.0, 10.0, 20.0, 30.0, 40.0, 50.0, 80.0, 200.0, 1000.0])

@@ -40,7 +40,7 @@ from fingerpad.inference.recordings import SpikeRecordings
 from fingerpad.inference.spike_fit import soft_spikes
 from fingerpad.neuron.spikes import PAPER_WINDOWS_MS
 from fingerpad.neuron.transduction import drive
-from fingerpad.report import recording_fit as report
+from fingerpad.report import fit as report
 from refusals import misused, refusals
 from sections import sed_driven
 

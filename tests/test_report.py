@@ -29,26 +29,13 @@ from fingerpad.experiments.tissue_sets import tissue_layers
 from fingerpad.geometry.fingertip import Fingertip
 from fingerpad.geometry.grading import resolution_grading
 from fingerpad.geometry.mesh import finger_mesh
-from fingerpad.report import discrimination, reproduction, single_unit, skin_deflection, three_levels
-from fingerpad.report import formatting as words
 from fingerpad.report import mesh_picture as mesh_picture_figure
-from fingerpad.report import parts as page_module
-from fingerpad.report import responses as population
-from fingerpad.report.comparison import MEANINGS, SIGNS, TITLES
-from fingerpad.report.discrimination import draw_steps
-from fingerpad.report.parts import (
-    COLUMNS,
-    VERDICTS,
-    Chapter,
-    Drawing,
-    Page,
-    Paragraph,
-    Row,
-    Table,
-    write_html,
-)
-from fingerpad.report.reproduction import reproduction_page, write_report
+from fingerpad.report import nerve, percept, reproduction, skin, tables
+from fingerpad.report import page as page_module
+from fingerpad.report.page import SETS, VERDICTS, Chapter, Drawing, Page, write_html
+from fingerpad.report.reproduction import GROUPS, SIGNS, reproduction_page, write_report
 from fingerpad.report.style import BLUE, GREEN, ORANGE, RESOLUTION_DPI, STYLE, new_figure, png
+from fingerpad.report.tables import Column, Row, Table, filled, table
 from sections import (
     CURVATURE_PER_M,
     SHIFT_MM,
@@ -95,8 +82,8 @@ def synthetic_set(tissues: str = "paper") -> dict:
 def synthetic_results() -> dict:
     """Results of both sets."""
     numbers = dict.fromkeys(SUMMARY, 0.5) | {"hit_rate_296": (0.6, 0.6), "hit_rate_365": (0.9, 0.9)}
-    sets = {name: synthetic_set(name) for name in COLUMNS}
-    rows = [typed(SetResult, sets[name]).comparison for name in COLUMNS]
+    sets = {name: synthetic_set(name) for name in SETS}
+    rows = [typed(SetResult, sets[name]).comparison for name in SETS]
     mesh = {
         "nodes": 232000, "elements": 221000, "smallest_gauss_jacobian_mm3": 0.001,
         "smallest_scaled_jacobian": 0.55,
@@ -264,7 +251,7 @@ def test_equal_results_give_equal_bytes(report, tmp_path, monkeypatch):
 
 def test_a_figure_that_fails_leaves_the_old_page_as_it_was(tmp_path):
     def page(draw):
-        drawings = [Drawing(name, name, draw, "") for name in ("first", "second")]
+        drawings = [Drawing(name, {name: draw}, "") for name in ("first", "second")]
         return Page("Skin", "", [], [Chapter("Depth", drawings)])
 
     write_html(page(lambda: new_figure(1.0, 1.0)), tmp_path / "page.html")
@@ -278,17 +265,15 @@ def test_a_figure_that_fails_leaves_the_old_page_as_it_was(tmp_path):
 
 def _page() -> Page:
     table = Table("Depths", ("name", "depth [mm]"), [Row(("skin", "1.0"), "final")], "Half of the finger.")
-    drawing = Drawing("skin", "Skin", lambda: new_figure(1.0, 1.0), "It yields.", number=4)
-    text = Paragraph("See [the decision](decisions/skin.md), `fp.press` & others.")
+    drawing = Drawing("Skin", {"skin": lambda: new_figure(1.0, 1.0)}, "It yields.", number=4)
+    text = "See `fp.press` & others."
     chapters = [Chapter("", [text]), Chapter("Level 1: skin", [drawing, table])]
     return Page("A title", "A subtitle.", ["A summary."], chapters)
 
 
 def test_a_page_is_written_as_html(tmp_path):
     text = write_html(_page(), tmp_path / "page.html").read_text(encoding="utf-8")
-    assert (
-        '<p>See <a href="decisions/skin.md">the decision</a>, <code>fp.press</code> &amp; others.</p>' in text
-    )
+    assert "<p>See <code>fp.press</code> &amp; others.</p>" in text
     assert '<a href="#level-1-skin">' in text
     assert '<section id="level-1-skin">' in text
     assert "<figcaption><b>Figure 4. Skin.</b> It yields.</figcaption>" in text
@@ -317,7 +302,7 @@ def test_texts_are_escaped_wherever_they_stand(tmp_path, monkeypatch):
     monkeypatch.setattr(page_module, "png", lambda draw: repr(draw()).encode())
     results = synthetic_results()
     results |= poisoned({key: results[key] for key in ("statements", "inputs")})
-    for name in COLUMNS:
+    for name in SETS:
         parts = ("single_unit", "nail", "comparison")
         results[name] |= poisoned({key: results[name][key] for key in parts})
     manifest = poisoned(results["manifest"])
@@ -371,13 +356,13 @@ def test_what_does_not_exist_is_drawn_as_nothing_and_written_as_a_dash(tmp_path,
 
 def test_parts_beyond_the_paper_are_left_out_where_they_were_not_run():
     short = synthetic_results()
-    for name in COLUMNS:
+    for name in SETS:
         for key in ("single_unit_uncertainty", "curvature_thresholds"):
             short[name].pop(key)
     pages = [reproduction_page(typed(ReproductionResult, each)) for each in (synthetic_results(), short)]
     assert [[drawing.number for drawing in page.drawings][-2:] for page in pages] == [[11, 12], [9, 10]]
     (beyond,) = (chapter for chapter in pages[1].chapters if chapter.title == "Beyond the paper")
-    assert "`fingerpad reproduce --extended`" in beyond.parts[0].text
+    assert "`fingerpad reproduce --extended`" in beyond.parts[0]
 
 
 def test_a_miss_is_marked_in_words_and_by_its_cell(report):
@@ -388,7 +373,7 @@ def test_a_miss_is_marked_in_words_and_by_its_cell(report):
     assert set(cells) == {*marks, ("missed", "✗ missed (fitted)")}
     assert len(set(SIGNS.values())) == len(SIGNS) == len(Verdict)  # they differ without colour
     assert set(VERDICTS) == {SIGNS[each] for each in Verdict if each is not Verdict.NOT_APPLICABLE}
-    assert set(TITLES) == set(MEANINGS) == set(Group)
+    assert set(GROUPS) == set(Group)
 
 
 def test_the_first_screen_has_verdicts_and_the_contents_stand_beside_the_page(report):
@@ -403,14 +388,14 @@ def test_the_first_screen_has_verdicts_and_the_contents_stand_beside_the_page(re
     ]
     first = text[text.index("<main>") : text.index("<section")]
     assert (first.count("<table"), first.count("<img"), first.count("<figcaption>")) == (1, 3, 3)
-    skin, afferent, percept = (drawing.caption for drawing in page.opening)
-    assert skin == "Skin: Trial 3 is closest to the observed deflection, as in the paper."
+    deflection, afferent, hits = (drawing.caption for drawing in page.opening)
+    assert deflection == "Skin: Trial 3 is closest to the observed deflection, as in the paper."
     assert afferent == "Afferent: FSS out of sample `paper` 0.82 and `human` 0.82; the paper 0.81."
-    assert "`paper` 0.12 and `human` 0.12; the paper 0.055" in percept
+    assert "`paper` 0.12 and `human` 0.12; the paper 0.055" in hits
     results = synthetic_results()
     results["skin_deflection"]["trial1"]["cylinder"]["r2"] = 0.99
-    skin = reproduction_page(typed(ReproductionResult, results)).opening[0].caption
-    assert skin == "Skin: Trial 1 is closest to the observed deflection; in the paper Trial 3 is."
+    deflection = reproduction_page(typed(ReproductionResult, results)).opening[0].caption
+    assert deflection == "Skin: Trial 1 is closest to the observed deflection; in the paper Trial 3 is."
     contents = re.findall(r'<a href="#([^"]+)"', text[: text.index("<main>")])
     assert contents == [chapter.anchor for chapter in page.chapters]
     open_parts = re.sub(r"<details>.*?</details>", "", text, flags=re.DOTALL)
@@ -437,7 +422,7 @@ def test_inputs_are_listed_exactly_and_the_assumed_ones_are_marked():
 
 
 def test_steps_and_searches_of_the_fit_have_a_table_each():
-    made = single_unit.single_unit_tables(typed(SetResult, synthetic_set()).single_unit)
+    made = nerve.single_unit_tables(typed(SetResult, synthetic_set()).single_unit)
     steps, searches = (
         next(table for table in made if table.title.startswith(each)) for each in ("Steps", "Searches")
     )
@@ -452,7 +437,7 @@ def test_steps_and_searches_of_the_fit_have_a_table_each():
 
 def test_tables_of_discrimination_have_hit_rates_interpretations_and_readings_of_the_criterion():
     section = typed(SphereDiscrimination, discrimination_section())
-    rates, meant, read = discrimination.discrimination_tables(section)[:3]
+    rates, meant, read = percept.discrimination_tables(section)[:3]
     assert rates.columns[2:] == ("296 1/m", "305 1/m", "316 1/m", "328 1/m", "340 1/m", "365 1/m")
     assert len(rates.rows) == 20
     first = section.gradient_sum["static"]
@@ -466,10 +451,52 @@ def test_tables_of_discrimination_have_hit_rates_interpretations_and_readings_of
 
 def test_every_table_is_rectangular():
     page = reproduction_page(typed(ReproductionResult, synthetic_results()))
-    made = [table for chapter in page.chapters for table in chapter.tables]
+    parts = [part for chapter in page.chapters for part in (*chapter.parts, *chapter.folded)]
+    made = [part for part in parts if isinstance(part, Table)]
     assert len(made) > 12
-    for table in made:
-        assert {len(row.cells) for row in table.rows} == {len(table.columns)}, table.title
+    for each in made:
+        assert {len(row.cells) for row in each.rows} == {len(each.columns)}, each.title
+
+
+def test_a_column_names_its_field_with_the_unit_and_finds_it_along_a_path():
+    rows = ({"fss": 0.5, "steps": [(1, 2.0)]}, {"steps": [(3, None)]})
+    made = table("T", rows, (Column("steps.0.0", "n"), Column("fss", form=2), Column("steps.0.1", "depth")))
+    assert made.rows == [Row(("1", "0.50", "2")), Row(("3", "–", "–"))]
+    titles = {"shear_kpa": None, "a.jnd_per_m": "JND", "depth_mm": "depth [cm]", "n_mm": ""}
+    named = [Column(value, heading).title for value, heading in titles.items()]
+    assert named == ["shear [kPa]", "JND [1/m]", "depth [cm]", ""]
+    assert filled("{fss}, {fss:2}, {fss:p}, {steps:n}, {steps.0.1}", rows[0]) == "0.5, 0.50, 50 %, 1, 2"
+
+
+def test_a_figure_is_one_function_that_enters_the_list_with_its_caption_and_tables(monkeypatch):
+    monkeypatch.setattr(page_module, "FIGURES", [])
+
+    @page_module.figure(
+        "page",
+        "Skin",
+        2,
+        "depths",
+        "Depths",
+        lambda *sets: f"{len(sets)} sets.",
+        of=page_module.both("depth_mm"),
+        tables=lambda depth_mm: [table("T", [depth_mm], [Column(float, "depth [mm]", 1)])],
+    )
+    def draw(depth_mm):
+        return new_figure(depth_mm, 1.0)
+
+    class Sets:
+        paper, human = ({"depth_mm": depth_mm} for depth_mm in (1.0, 2.0))
+
+    ((chapter, (drawing, *numbers)),) = page_module.figures("page", Sets).items()
+    assert (chapter, drawing.label, drawing.caption) == ("Skin", "Figure 2. Depths", "2 sets.")
+    widths = {name: made().get_figwidth() for name, made in drawing.images.items()}
+    assert widths == {"depths_paper": 1.0, "depths_human": 2.0}
+    assert [(each.title, each.rows[0].cells) for each in numbers] == [
+        ("T, paper", ("1.0",)),
+        ("T, human", ("2.0",)),
+    ]
+    Sets.human = {}
+    assert page_module.figures("page", Sets) == {}
 
 
 def lines(axes):
@@ -479,7 +506,7 @@ def lines(axes):
 def test_figure_4_draws_the_profiles_given_and_sets_the_artefact_apart():
     section = skin_deflection_section()
     given = typed(ReproductionResult, synthetic_results()).skin_deflection
-    line, cylinder = skin_deflection.draw_skin_deflection(given).axes
+    line, cylinder = skin.draw_skin_deflection(given).axes
     for trial, name in (("trial1", "Trial 1"), ("trial2", "Trial 2"), ("trial3", "Trial 3")):
         np.testing.assert_array_equal(lines(line)[name].get_ydata(), section[trial]["line"]["deflection_mm"])
     drawn = lines(cylinder)
@@ -495,14 +522,14 @@ def test_figure_4_draws_the_profiles_given_and_sets_the_artefact_apart():
 def test_figure_5_draws_the_fitted_line_over_observed_points_and_the_papers_levels():
     section = single_unit_section()
     given = typed(SetResult, synthetic_set()).single_unit
-    for axes, phase in zip(single_unit.draw_single_unit(given).axes, ("dynamic", "static"), strict=True):
+    for axes, phase in zip(nerve.draw_single_unit(given).axes, ("dynamic", "static"), strict=True):
         drawn = lines(axes)
         np.testing.assert_array_equal(drawn["model (fitted)"].get_ydata(), section[f"{phase}_rate_hz"])
         np.testing.assert_array_equal(drawn["observed"].get_ydata(), section[f"observed_{phase}_rate_hz"])
         np.testing.assert_array_equal(drawn["observed"].get_xdata(), -SHIFT_MM)
         assert drawn["observed"].get_marker() == "o"
         assert drawn["model (fitted)"].get_marker() in ("None", "")
-    dynamic, static = single_unit.draw_single_unit(given).axes
+    dynamic, static = nerve.draw_single_unit(given).axes
     levels = {
         label: [line.get_ydata()[0] for line in dynamic.get_lines() if line.get_label() == label]
         for label in ("predicted by the paper, lowest and highest", "observed, lowest and highest")
@@ -512,8 +539,9 @@ def test_figure_5_draws_the_fitted_line_over_observed_points_and_the_papers_leve
     (difference,) = static.containers
     (low, high) = difference.lines[2][0].get_segments()[0][:, 1]
     assert (low, high - low) == (given.modulation.static.ours.minimum_hz, pytest.approx(52.0))
-    assert "54 and 212 spikes/s" in single_unit.caption_single_unit(given)
-    assert "70 and 210 spikes/s as observed" in single_unit.caption_single_unit(given)
+    caption = filled(nerve.CAPTION_SINGLE_UNIT, given)
+    assert "54 and 212 spikes/s" in caption
+    assert "70 and 210 spikes/s as observed" in caption
 
 
 def test_figure_1_draws_the_finger_in_three_dimensions_and_every_element_of_the_planes_by_its_layer():
@@ -547,11 +575,11 @@ def test_figure_1_draws_the_finger_in_three_dimensions_and_every_element_of_the_
 
 def test_figure_2_draws_skin_current_potential_and_the_spikes_of_three_afferents():
     section = typed(SetResult, synthetic_set()).levels
-    figure = three_levels.draw_levels(section)
-    skin, current, potential, train, spikes, bar = figure.axes
-    np.testing.assert_array_equal(skin.collections[0].get_array(), section.pressed_kpa.ravel())
+    figure = reproduction.draw_levels(section)
+    pressed, current, potential, train, spikes, bar = figure.axes
+    np.testing.assert_array_equal(pressed.collections[0].get_array(), section.pressed_kpa.ravel())
     assert bar.get_ylabel() == "compressive stress\n[kPa]"
-    sphere = next(patch for patch in skin.patches if isinstance(patch, Circle))
+    sphere = next(patch for patch in pressed.patches if isinstance(patch, Circle))
     assert sphere.radius == pytest.approx(1000.0 / 287.0)
     np.testing.assert_array_equal(current.get_lines()[0].get_ydata(), 1e6 * section.current_ma)
     np.testing.assert_array_equal(potential.get_lines()[0].get_ydata(), section.potential_mv)
@@ -563,9 +591,10 @@ def test_figure_2_draws_skin_current_potential_and_the_spikes_of_three_afferents
 
 
 def test_figure_3_has_the_steps_of_both_codes_as_in_the_paper_with_the_numbers_of_the_run():
-    section = typed(SetResult, synthetic_set()).discrimination
-    silent = replace(section, gradient_sum={})
-    axes = draw_steps({"paper": section, "human": silent}).axes[0]
+    result = typed(ReproductionResult, synthetic_results())
+    section = result.paper.discrimination
+    silent = replace(result.human, discrimination=replace(section, gradient_sum={}))
+    axes = percept.draw_steps(replace(result, human=silent)).axes[0]
     texts = "\n".join(text.get_text() for text in axes.texts)
     for letter in ("a", "b", "c", "d, e", "f", "g, h", "i, j", "k", *(f"{each}*" for each in "bcdefgh")):
         assert f"({letter})" in texts
@@ -580,26 +609,24 @@ def test_figure_3_has_the_steps_of_both_codes_as_in_the_paper_with_the_numbers_o
 
 def test_figure_6_leaves_silent_places_open_and_tells_the_rate_without_a_touch():
     section = typed(PopulationMaps, _population())
-    maps = [
-        axes for axes in population.draw_population(section).axes if axes.name != "3d" and axes.get_xlabel()
-    ]
+    maps = [axes for axes in nerve.draw_population(section).axes if axes.name != "3d" and axes.get_xlabel()]
     assert len(maps) == 3
-    for axes, name in zip(maps, population.QUANTITIES, strict=True):
+    for axes, name in zip(maps, nerve.QUANTITIES, strict=True):
         shown = np.ma.getmaskarray(axes.collections[0].get_array()).reshape(13, 11)
         silent = ~(getattr(section, name) > 0.0)
         assert 0 < silent.sum() < silent.size
         np.testing.assert_array_equal(shown, silent.T)
     for axes in maps:
         np.testing.assert_array_equal(axes.get_lines()[0].get_xydata(), section.receptors_mm)
-    caption = population.caption_population(section, section)
+    caption = nerve.caption_population(section, section)
     assert "The afferent of human also fires without touch, 4 spikes/s from 251 ms on" in caption
     silent = replace(section, at_rest=replace(section.at_rest, first_spike_latency_ms=np.nan))
-    assert "without touch" not in population.caption_population(silent, silent)
+    assert "without touch" not in nerve.caption_population(silent, silent)
 
 
 def test_figure_7_has_the_papers_letters_people_and_our_curves_with_bars_of_one_deviation():
     section = typed(SphereDiscrimination, discrimination_section())
-    panels = [axes for axes in discrimination.draw_observers(section).axes if axes.get_title()]
+    panels = [axes for axes in percept.draw_observers(section).axes if axes.get_title()]
     titles = [axes.get_title().replace("\n", " ") for axes in panels]
     assert titles[0] == "(a) Gradient Sum, static σ₁ = 0.12"
     assert titles[3] == "(d) Euclidean, static σ₁ = 0.12"
@@ -614,7 +641,7 @@ def test_figure_7_has_the_papers_letters_people_and_our_curves_with_bars_of_one_
         assert points.get_xydata().tolist() == [[296.0, 0.58], [365.0, 0.95]]
         ends = [sorted(bar[:, 1].round(9).tolist()) for bar in intervals.get_segments()]
         assert ends == [[0.48, 0.68], [0.89, 0.98]]
-    axes = discrimination.draw_observers(section).axes[1]
+    axes = percept.draw_observers(section).axes[1]
     rates = section.gradient_sum["dynamic"]
     ours = [bars for bars in axes.containers if bars.get_label().startswith("predicted")]
     for container, suffix, style in zip(ours, ("", "_shifted"), ("-", ":"), strict=True):
@@ -627,7 +654,7 @@ def test_figure_7_has_the_papers_letters_people_and_our_curves_with_bars_of_one_
 
 def test_figure_9_shows_each_place_from_its_own_side_with_two_scales_and_both_halves():
     section = typed(NailBorder, nail_section())
-    axes = skin_deflection.draw_nail(section).axes
+    axes = skin.draw_nail(section).axes
     below, middle, above, across, profile = axes[:5]
     half = 19 * 15
     assert [axes.collections[0].get_array().size for axes in (below, above)] == [2 * half, 2 * half]
@@ -655,7 +682,7 @@ def test_colours_of_trials_and_layers_differ_in_grey_and_lines_without_colour():
 
     trials = greys((BLUE, ORANGE, GREEN))
     assert min(abs(np.subtract.outer(trials, trials))[np.triu_indices(3, 1)]) > 0.08
-    assert len({style for _, style in skin_deflection.TRIAL_STYLES.values()}) == 3
+    assert len({style for _, style in skin.TRIAL_STYLES.values()}) == 3
     assert (np.diff(greys(mesh_picture_figure.LAYER_COLOURS)) > 0.15).all()
 
 
@@ -667,5 +694,5 @@ NUMBERS = {
 
 
 def test_numbers_read_well_at_the_ends_of_each_notation():
-    assert {value: words.number(value) for value in NUMBERS} == NUMBERS
-    assert words.number(-0.0) == "0"
+    assert {value: tables.number(value) for value in NUMBERS} == NUMBERS
+    assert tables.number(-0.0) == "0"

@@ -1,12 +1,10 @@
-"""Figures of any population show every receptor once, at its position, coloured by its response."""
+"""Figures of a population of several types: a band of spikes and marks on the map for each type."""
 
 import numpy as np
 import pytest
-from numpy.testing import assert_array_equal
 
 from fingerpad import InputError, ResponseMap, SpikeTrains
-from fingerpad.report import responses
-from fingerpad.report.responses import draw_mixed_responses
+from fingerpad.report.nerve import draw_mixed_responses
 from fingerpad.report.style import png, write_png
 
 
@@ -24,51 +22,11 @@ def response(columns: int = 2, count: int = 12, gain: float = 1.0) -> ResponseMa
     )
 
 
-def test_receptors_that_answer_have_the_colour_of_it_and_the_others_none():
-    answer = response()
-    panels = [axes for axes in responses.draw_responses({"mine": answer}).axes if axes.get_xlabel()]
-    for axes, name in ((panels[0], "dynamic_rate_hz"), (panels[2], "first_spike_latency_ms")):
-        silent, dots, *_ = axes.collections
-        values = getattr(answer, name)
-        answers = np.nan_to_num(values) > 0.0
-        assert_array_equal(silent.get_offsets(), answer.positions_mm[~answers])
-        assert_array_equal(dots.get_offsets(), answer.positions_mm[answers])
-        assert_array_equal(dots.get_array(), values[answers])
-    # Nobody fires in the hold: all hollow, and still a panel.
-    assert len(panels[1].collections[0].get_offsets()) == 12
-
-
-def test_a_column_has_one_scale():
-    weak, strong = response(), response(gain=7.0)
-    axes = responses.draw_responses({"weak": weak, "strong": strong}).axes
-    panels = [panel for panel in axes if panel.get_title().endswith("dynamic ramp")]
-    assert [panel.get_title() for panel in panels] == ["weak: dynamic ramp", "strong: dynamic ramp"]
-    assert [panel.collections[1].get_clim() for panel in panels] == [(0.0, 77.0)] * 2
-
-
-def test_receptors_in_space_are_drawn_from_below_and_dorsal_ones_are_squares():
-    answer = response(columns=3)
-    axes = responses.draw_responses({"mine": answer}).axes[0]
-    answers = answer.dynamic_rate_hz > 0.0
-    dorsal = answer.positions_mm[:, 1] > 0.0
-    sides = [answers & ~dorsal, answers & dorsal]
-    assert all(side.any() for side in sides)
-    for dots, side in zip((axes.collections[1], axes.collections[3]), sides, strict=True):
-        assert_array_equal(dots.get_offsets(), answer.positions_mm[side][:, [0, 2]])
-        assert_array_equal(dots.get_array(), answer.dynamic_rate_hz[side])
-    corners = [len(dots.get_paths()[0].to_polygons()[0]) for dots in axes.collections]
-    assert corners[2] == corners[3] == 5
-    assert corners[0] == corners[1] > 5
-
-
-def test_a_picture_is_written_as_it_is_drawn_a_silent_one_too_and_nobody_is_refused(tmp_path):
-    silent = ResponseMap([[0.0, 0.0]], 1.0, SpikeTrains.from_lists([[]]), [0.0], [0.0], [np.nan])
-    for shown in ({"mine": response()}, {"silent": silent}):
-        path = write_png(responses.draw_responses, shown, tmp_path / "deeper" / "map.png")
-        assert path.read_bytes() == png(responses.draw_responses, shown)
-        assert path.read_bytes().startswith(b"\x89PNG")
-    with pytest.raises(InputError, match="at least one population"):
-        responses.draw_responses({})
+def test_a_picture_is_written_as_it_is_drawn(tmp_path):
+    shown = {"press": {"SAI": response()}}
+    path = write_png(draw_mixed_responses, shown, tmp_path / "deeper" / "map.png")
+    assert path.read_bytes() == png(draw_mixed_responses, shown)
+    assert path.read_bytes().startswith(b"\x89PNG")
 
 
 def test_a_mixed_population_has_a_raster_and_a_map_per_touch():

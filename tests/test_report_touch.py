@@ -14,7 +14,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 import fingerpad as fp
 from fingerpad.geometry.mesh import block_mesh
 from fingerpad.geometry.motion import Pose
-from fingerpad.report import touch as touch_figure
+from fingerpad.report import skin as touch_figure
 from fingerpad.report.style import new_figure
 from fingerpad.skin.section import middle_section
 
@@ -70,7 +70,7 @@ def test_faces_have_the_colour_of_what_the_afferents_follow(skin, quantity, fiel
     afferent = fp.Afferent(dynamic_quantity=quantity, static_quantity=quantity)
     with warnings.catch_warnings(action="ignore"):
         response = fp.Population.grid(density_per_cm2=20, afferent=afferent).respond(skin)
-    figure = touch_figure.draw(skin, response)
+    figure = touch_figure.draw_touch(skin, response)
     faces, bone = (part for part in figure.axes[0].collections if isinstance(part, PolyCollection))
     assert_array_equal(faces.get_array(), np.atleast_2d(skin.fields[field])[-1][skin.section().elements])
     assert any(axes.get_ylabel() == f"{name} [kPa]" for axes in figure.axes)

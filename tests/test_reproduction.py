@@ -275,7 +275,7 @@ def test_the_page_shows_every_compared_number_and_figure_and_no_machine_path(fir
     assert str(first.folder) not in page
     assert str(Path.home()) + "/" not in page
     drawings = reproduction_page(read_results(first.folder / "results.json", ReproductionResult)).drawings
-    assert page.count("<img ") == sum(1 + (drawing.human is not None) for drawing in drawings)
+    assert page.count("<img ") == sum(len(drawing.images) for drawing in drawings)
     for path in (first.folder / "figures").iterdir():
         content = path.read_bytes()
         assert content.startswith(b"\x89PNG\r\n\x1a\n")

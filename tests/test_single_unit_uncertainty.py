@@ -12,8 +12,9 @@ from fingerpad.experiments.gerling2014 import single_unit, single_unit_uncertain
 from fingerpad.experiments.gerling2014.single_unit_uncertainty import UncertaintyResult
 from fingerpad.inference.identifiable import IDENTIFIABLE_NAMES, identifiable
 from fingerpad.inference.rate_model import AfferentModel
-from fingerpad.report import single_unit as report
+from fingerpad.report import fit as report
 from fingerpad.report.style import png
+from fingerpad.report.tables import filled
 from sections import SED_DRIVEN
 
 SHIFTS = bar_firing_rates().shift_mm
@@ -99,7 +100,7 @@ def test_the_figure_shows_bands_over_points_and_a_profile_of_each_number(section
 
 
 def test_the_words_hold_the_numbers(section: UncertaintyResult) -> None:
-    caption = report.caption_uncertainty(section)
+    caption = filled(report.CAPTION_UNCERTAINTY, section)
     assert "95 % bands" in caption
     tables = determined, residuals, _, _ = report.uncertainty_tables(section)
     assert [len(table.rows) for table in tables] == [8, 2, 4, 9]

@@ -59,8 +59,8 @@ WORDS = [
      "element 0 (dermis, about x = 0.5, y = 0.5, z = 0.5 mm)"),
     ("mechanics.tissues:name_of_tissues", (named_tissues("paper"),), "paper"),
     ("mechanics.tissues:name_of_tissues", (named_tissues("paper").scaled(1.1),), ""),
-    ("report.formatting:spelled", ("largest_contact_mm2",), "largest contact [mm²]"),
-    ("report.formatting:spelled", ("worst_scaled_jacobian",), "worst scaled jacobian"),
+    ("report.tables:spelled", ("largest_contact_mm2",), "largest contact [mm²]"),
+    ("report.tables:spelled", ("worst_scaled_jacobian",), "worst scaled jacobian"),
 ]  # fmt: skip
 
 

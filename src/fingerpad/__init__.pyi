@@ -121,7 +121,7 @@ from fingerpad.reduction.streaming import ReducedSample as ReducedSample
 from fingerpad.reduction.streaming import ReducedTouch as ReducedTouch
 from fingerpad.reduction.training import ReducedRange as ReducedRange
 from fingerpad.reduction.training import ReducedTraining as ReducedTraining
-from fingerpad.report.touch import save_figure as save_figure
+from fingerpad.report.skin import save_figure as save_figure
 from fingerpad.skin.indentation import Touch as Touch
 from fingerpad.skin.indentation import indent as indent
 from fingerpad.skin.indentation import touch_of as touch_of

@@ -15,7 +15,7 @@ from fingerpad.geometry.indenters import Sphere
 from fingerpad.geometry.mesh import finger_mesh
 from fingerpad.geometry.motion import RampAndHold
 from fingerpad.mechanics.press_settings import PressSettings
-from fingerpad.report.formatting import number
+from fingerpad.report.tables import number
 from fingerpad.skin.indentation import touch_of
 from studies import mesh_refinement
 from studies.mesh_refinement import (

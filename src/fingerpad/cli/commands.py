@@ -138,7 +138,7 @@ def _tell(*paragraphs: object) -> None:
 
 
 def _touch(given: argparse.Namespace, within: Options) -> None:
-    from fingerpad.report.touch import PAGE, touch_summary
+    from fingerpad.report.skin import PAGE, touch_summary
 
     found = _run_request("touch", given, within)
     _tell(*touch_summary(found.result), *(f"Not verified: {each.text}" for each in found.skin.caveats))
@@ -152,7 +152,7 @@ def _respond(given: argparse.Namespace, within: Options) -> None:
 
 
 def _fit(given: argparse.Namespace, within: Options) -> None:
-    from fingerpad.report.recording_fit import fit_summary
+    from fingerpad.report.fit import fit_summary
 
     found = _run_request("fit", given, within, "recordings")
     if hasattr(found, "fit"):
@@ -163,7 +163,7 @@ def _fit(given: argparse.Namespace, within: Options) -> None:
 
 
 def _discriminate(given: argparse.Namespace, within: Options) -> None:
-    from fingerpad.report.discrimination_task import task_summary
+    from fingerpad.report.task import task_summary
 
     found = _run_request("discriminate", given, within)
     _tell(
@@ -228,7 +228,7 @@ def _reduce(given: argparse.Namespace, within: Options) -> None:
 
 
 def _reproduce(given: argparse.Namespace, within: Options) -> None:
-    from fingerpad.report.comparison import count_sentence
+    from fingerpad.report.reproduction import count_sentence
 
     found = _run_request("reproduce", given, within)
     _tell(
@@ -274,7 +274,7 @@ def _init(given: argparse.Namespace, within: Options) -> None:
         return
     asked = Path(given.what)
     name = "touch" if asked.suffix in (".yaml", ".yml") else one_of("WHAT", given.what, tuple(_examples()))
-    what, file, content = _examples()[name]
+    _what, file, content = _examples()[name]
     path = given.out / (asked if asked.suffix in (".yaml", ".yml") else file)
     check_new(path)
     make_writable(path.parent)

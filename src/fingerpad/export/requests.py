@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -36,10 +35,10 @@ from fingerpad.export.formats import DECKS, REQUIRED, RESULTS, write_deck
 from fingerpad.export.job import job_of
 from fingerpad.export.responses import require_pynwb, write_response_csv, write_responses_nwb
 from fingerpad.reduction.model import ReducedModel, write_reduced
-from fingerpad.report.discrimination_task import write_task_page
-from fingerpad.report.recording_fit import write_fit_page
+from fingerpad.report.fit import write_fit_page
 from fingerpad.report.reproduction import write_report
-from fingerpad.report.touch import draw, write_touch_page
+from fingerpad.report.skin import write_touch_page
+from fingerpad.report.task import write_task_page
 from fingerpad.report.validation import write_validation_page
 from fingerpad.skin.sampling import SkinResponse
 
@@ -363,11 +362,6 @@ def _folder(out: str | Path | None) -> Iterator[Path]:
         yield Path(folder)
 
 
-def _page(pressed: TouchResult, folder: Path) -> None:
-    picture = partial(draw, pressed.skin, pressed.response, pressed.request.touch.indenter)
-    write_touch_page(pressed.result, picture, folder)
-
-
 def _result(name: str) -> Write:
     return lambda pressed, folder: RESULTS[name][1](folder / RESULTS[name][0], pressed.skin)
 
@@ -391,7 +385,7 @@ def _deck(name: str) -> Write:
 
 
 WRITERS: dict[str, Write] = {
-    "figures": _page,
+    "figures": write_touch_page,
     "spikes": lambda pressed, folder: write_response_csv(folder / "spikes.csv", pressed.response),
     "nwb": lambda pressed, folder: write_responses_nwb(folder / "touch.nwb", {"touch": pressed.response}),
     **{name: _result(name) for name in RESULTS},

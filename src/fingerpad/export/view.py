@@ -35,8 +35,8 @@ from fingerpad.core.files import path_of, write_atomically
 from fingerpad.core.progress import NoProgress, Progress
 from fingerpad.core.values import Finite, FloatArray, count_from, finite, instance, one_of
 from fingerpad.export.dataset import check_touch, library, read_touch, spike_trains, touch_dataset
+from fingerpad.report.skin import BONE, DECADES, SKIN
 from fingerpad.report.style import BLACK, BLUE, STYLE, new_figure, say_nothing_to_draw
-from fingerpad.report.touch import BONE, DECADES, SKIN
 from fingerpad.skin.sampling import SkinResponse
 
 if TYPE_CHECKING:

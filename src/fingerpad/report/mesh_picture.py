@@ -14,8 +14,9 @@ from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 
 from fingerpad.core.values import FloatArray
 from fingerpad.experiments.gerling2014.three_levels import MeshPicture, MeshPlane
-from fingerpad.report.formatting import number
-from fingerpad.report.style import BLACK, new_figure
+from fingerpad.report.page import figure
+from fingerpad.report.style import BLACK, name_panel, new_figure
+from fingerpad.report.tables import number
 
 LAYER_COLOURS = ("#2b1a3d", "#d9650a", "#f2b183", "#fbeee2")
 """From the skin inwards; the lightness increases, so that the layers differ in greyscale."""
@@ -33,31 +34,44 @@ def corners(points: np.ndarray) -> np.ndarray:
     return np.stack(around, axis=2).reshape(-1, 4, *points.shape[2:])
 
 
+def caption_mesh(section: MeshPicture) -> str:
+    return (
+        "Finite-element mesh of the fingertip that the standard sphere presses, without load: "
+        f"{number(section.nodes)} nodes and {number(section.elements)} elements"
+        f"{' in one half of the finger; the other half is its mirror image' if section.half else ''}. "
+        "Letters as in the paper. Bone and nail are rigid and have no elements. The outline is that of the "
+        "model which the authors' laboratory published later; the thicknesses of epidermis and dermis are "
+        "the paper's."
+    )
+
+
+@figure(
+    "reproduction", "The finger", 1, "figure_1_mesh", "Mesh of the finger", caption_mesh, of=("paper.mesh",)
+)
 def draw_mesh(section: MeshPicture) -> Figure:
     figure = new_figure(11.0, 6.4)
     grid = figure.add_gridspec(2, 6)
     whole = figure.add_subplot(grid[0, :3], projection="3d")
     cut = figure.add_subplot(grid[0, 3:], projection="3d")
     across, along, near = (figure.add_subplot(grid[1, first : first + 2]) for first in (0, 2, 4))
-    _draw_solid(whole, section, halves=(1.0, -1.0) if section.half else (1.0,))
-    _draw_solid(cut, section, halves=(1.0,), plane=section.along)
-    for sign in (1.0, -1.0) if section.half else (1.0,):
+    halves = (1.0, -1.0) if section.half else (1.0,)
+    _draw_solid(whole, section, halves)
+    _draw_solid(cut, section, (1.0,), section.along)
+    for sign in halves:
         _draw_plane(across, section.across, section, lines=0.15, sign=sign)
     _draw_plane(along, section.along, section, lines=0.15)
     _draw_plane(near, section.along, section, lines=0.4)
     _name_fixed_parts(across, section.across, mirrored=section.half)
     _name_fixed_parts(along, section.along, mirrored=False)
     _enlarge(near, section)
-    for axes, title in (
-        (whole, "(a) overall mesh"),
-        (across, "(b) proximal end, x = 0"),
-        (cut, "(c) cut along the middle: surface and inside"),
-        (along, "(d) inner mesh, z = 0"),
-        (near, "(e) four layers below the contact"),
+    whole.set_title("(a) overall mesh", fontsize=10.0)
+    cut.set_title("(c) cut along the middle: surface and inside", fontsize=10.0)
+    for axes, title, label in (
+        (across, "(b) proximal end, x = 0", "z, lateral [mm]"),
+        (along, "(d) inner mesh, z = 0", "x, distal [mm]"),
+        (near, "(e) four layers below the contact", "x, distal [mm]"),
     ):
-        axes.set_title(title, fontsize=10.0)
-    for axes, label in ((across, "z, lateral [mm]"), (along, "x, distal [mm]"), (near, "x, distal [mm]")):
-        axes.set(xlabel=label, ylabel="y, dorsal [mm]", aspect="equal")
+        name_panel(axes, title, label, "y, dorsal [mm]", aspect="equal")
         axes.grid(visible=False)
     named = [*zip(section.layers, LAYER_COLOURS, strict=True), ("bone", BONE), ("nail", NAIL)]
     patches = [Patch(facecolor=colour, edgecolor=BLACK, linewidth=0.5, label=name) for name, colour in named]
@@ -74,17 +88,16 @@ def _draw_solid(
     colours = np.where(nailed, to_rgb(NAIL), to_rgb(SKIN))
     solid = [corners(skin * [1.0, sign, 1.0]) for sign in halves]
     paint = [colours * _brightness(faces, sign)[:, None] for faces, sign in zip(solid, halves, strict=True)]
-    if plane is not None:
-        # A hair before the middle, so that it covers what lies behind.
-        flat = corners(np.stack([plane.right_mm, plane.up_mm], axis=-1))
-        solid.append(np.stack([flat[..., 0], np.full(flat.shape[:2], -0.01), flat[..., 1]], axis=-1))
-        layers = np.array([to_rgb(colour) for colour in LAYER_COLOURS])[section.layer]
-        paint.append(np.tile(layers, (plane.right_mm.shape[0] - 1, 1)))
     faces = list(np.concatenate(solid))
     if plane is not None:
-        bone = plane.right_mm[:, -1], np.full(len(plane.up_mm), -0.01), plane.up_mm[:, -1]
-        faces.append(np.stack(bone, axis=-1))
-        paint.append(np.array([to_rgb(BONE)]))
+        # A hair before the middle, so that it covers what lies behind.
+        def upright(flat: FloatArray) -> FloatArray:
+            return np.stack([flat[..., 0], np.full(flat.shape[:-1], -0.01), flat[..., 1]], axis=-1)
+
+        points = np.stack([plane.right_mm, plane.up_mm], axis=-1)
+        faces += [*upright(corners(points)), upright(points[:, -1])]
+        layers = np.array([to_rgb(colour) for colour in LAYER_COLOURS])[section.layer]
+        paint += [np.tile(layers, (len(points) - 1, 1)), np.array([to_rgb(BONE)])]
     drawn: Any = {"edgecolors": "#00000060", "linewidths": 0.2}
     # Polygons of unequal lengths are padded with what lies in memory, which must not set the limits.
     axes.add_collection3d(Poly3DCollection(faces, facecolors=np.concatenate(paint), **drawn), autolim=False)
@@ -154,17 +167,6 @@ def _name_fixed_parts(axes: Axes, plane: MeshPlane, mirrored: bool) -> None:
         beside: Any = {"xytext": (0.0, 6.0), "textcoords": "offset points", "ha": "center"}
         axes.annotate("nail", place, color=NAIL, **beside)
         axes.set_ylim(top=axes.get_ylim()[1] + 1.5)
-
-
-def caption_mesh(section: MeshPicture) -> str:
-    return (
-        "Finite-element mesh of the fingertip that the standard sphere presses, without load: "
-        f"{number(section.nodes)} nodes and {number(section.elements)} elements"
-        f"{' in one half of the finger; the other half is its mirror image' if section.half else ''}. "
-        "Letters as in the paper. Bone and nail are rigid and have no elements. The outline is that of the "
-        "model which the authors' laboratory published later; the thicknesses of epidermis and dermis are "
-        "the paper's."
-    )
 
 
 def _below_contact(section: MeshPicture) -> FloatArray:

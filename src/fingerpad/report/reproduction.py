@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -11,46 +10,56 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.patches import Circle
 
-from fingerpad.data import STATUSES, paper, psychophysics
+from fingerpad.core.units import MM_PER_M
+from fingerpad.data import STATUSES, paper, protocol, psychophysics
+from fingerpad.experiments.gerling2014.claim_row import ClaimRow, Group, Statement, Verdict
 from fingerpad.experiments.gerling2014.reproduction import PublishedNumber, ReproductionResult
+from fingerpad.experiments.gerling2014.three_levels import ThreeLevels
 from fingerpad.experiments.tissue_sets import TissueLayer
-from fingerpad.report import (
-    curvature_thresholds,
-    discrimination,
-    mesh_picture,
-    responses,
-    single_unit,
-    skin_deflection,
-    three_levels,
-)
-from fingerpad.report.comparison import comparison_tables, notes_table, statement_table, verdict_table
-from fingerpad.report.formatting import ABSENT, fixed, joined, number, plain
-from fingerpad.report.parts import (
-    COLUMNS,
+from fingerpad.report import fit, mesh_picture, nerve, percept, skin
+from fingerpad.report.page import (
+    SETS,
     Chapter,
     Drawing,
     Page,
-    Paragraph,
-    Part,
-    Row,
-    Table,
+    both,
     edition,
+    figure,
+    figures,
     manifest_chapter,
     write_html,
 )
-from fingerpad.report.style import BLUE, ORANGE, LineStyle, draw_observed_rates, new_figure
+from fingerpad.report.style import (
+    BLACK,
+    BLUE,
+    COLUMN_IN,
+    GREY,
+    NANOAMPERE_PER_MA,
+    ORANGE,
+    PALE,
+    draw_observed_rates,
+    new_figure,
+)
+from fingerpad.report.tables import ABSENT, Column, Row, Table, fixed, joined, listed, number, plain, table
 
-# Inputs are the record of what was used: nothing of them is rounded or left out.
-ALL_DIGITS, ALL_VALUES = 12, 1000
+LEVELS = (mesh_picture, skin, nerve, fit, percept)
+"""Modules whose figures stand on the page: to load them enters these into the list of figures."""
 
-LINES: dict[str, LineStyle] = {
+LINES: dict[str, Any] = {
     "paper": {"color": BLUE, "linestyle": "-"},
     "human": {"color": ORANGE, "linestyle": "--"},
 }
 """How the two sets are drawn on the first screen."""
 
 IN_THE_PAPER = "Trial 3"  # The trial that is closest to the observed deflection in the paper.
+BEYOND = "Beyond the paper"
+CHAPTERS = (
+    "The finger", "Three levels", "From rates to a percept", "Level 1: skin", "Level 2: afferent",
+    "Level 3: population", "Level 3: discrimination", "The border of the nail", BEYOND,
+)  # fmt: skip
+"""Order of the chapters with figures; one that a figure names beside these comes last."""
 
 
 def write_report(result: ReproductionResult, folder: Path) -> Path:
@@ -60,171 +69,77 @@ def write_report(result: ReproductionResult, folder: Path) -> Path:
 
 def reproduction_page(result: ReproductionResult) -> Page:
     """Return the page of a reproduction: `paper` in the first column of figures, `human` in the second."""
-    paper, human, deflection = result.paper, result.human, result.skin_deflection
-    sets = {name: getattr(result, name).discrimination for name in COLUMNS}
-
-    def drawn(
-        n: int, name: str, title: str, part: Any, draw: Callable[..., Figure], caption: Callable[..., str]
-    ) -> Drawing:
-        """Figure of both sets where `part` names what they have, else of one thing."""
-        both = [getattr(each, part) for each in (paper, human)] if isinstance(part, str) else [part]
-        first, *second = (partial(draw, each) for each in both)
-        return Drawing(f"figure_{n}_{name}", title, first, caption(both[0]), n, *second)
-
-    def tables(part: str, of: Callable[[Any], Sequence[Table]]) -> list[Table]:
-        return [
-            replace(table, title=f"{table.title}, {name}")
-            for name in COLUMNS
-            for table in of(getattr(getattr(result, name), part))
-        ]
-
-    mesh = drawn(
-        1, "mesh", "Mesh of the finger", paper.mesh, mesh_picture.draw_mesh, mesh_picture.caption_mesh
-    )
-    levels = drawn(
-        2, "three_levels", "One sphere on three levels", "levels",
-        three_levels.draw_levels, three_levels.caption_levels,
-    )  # fmt: skip
-    steps = drawn(
-        3, "steps", "Steps to a hit rate", sets, discrimination.draw_steps, discrimination.caption_steps
-    )
-    skin = drawn(
-        4, "skin_deflection", "Deflection of the skin", deflection,
-        skin_deflection.draw_skin_deflection, skin_deflection.caption_skin_deflection,
-    )  # fmt: skip
-    rates = drawn(
-        5, "single_unit", "Rates under a bar", "single_unit",
-        single_unit.draw_single_unit, single_unit.caption_single_unit,
-    )  # fmt: skip
-    maps = drawn(
-        6, "population", "Rates and latencies under a sphere", "population",
-        responses.draw_population, partial(responses.caption_population, human=human.population),
-    )  # fmt: skip
-    observers = drawn(
-        7, "discrimination", "Discrimination of spheres", "discrimination",
-        discrimination.draw_observers, discrimination.caption_observers,
-    )  # fmt: skip
-    criterion = drawn(
-        8, "varied_criterion", "The same with a varied criterion", "discrimination",
-        discrimination.draw_criterion, discrimination.caption_criterion,
-    )  # fmt: skip
-    border = drawn(
-        9, "nail", "Stress at the border of the nail", "nail",
-        skin_deflection.draw_nail, skin_deflection.caption_nail,
-    )  # fmt: skip
-    more: list[Part] = []
-    beyond: list[Part] = [
-        drawn(
-            10, "noise", "Amount of noise", "discrimination",
-            discrimination.draw_noise, discrimination.caption_noise,
-        )
-    ]  # fmt: skip
-    if paper.single_unit_uncertainty is None:
-        text = "uncertainty of the fit and curvature thresholds (`fingerpad reproduce --extended`)"
-        more.append(Paragraph(f"Not run: {text}."))
-    else:
-        beyond += [
-            drawn(
-                11, "uncertainty", "Uncertainty of the fit", "single_unit_uncertainty",
-                single_unit.draw_uncertainty, single_unit.caption_uncertainty,
-            ),
-            *tables("single_unit_uncertainty", single_unit.uncertainty_tables),
-            drawn(
-                12, "curvature_thresholds", "Thresholds of curvature", "curvature_thresholds",
-                curvature_thresholds.draw_thresholds, curvature_thresholds.caption_thresholds,
-            ),
-            *tables("curvature_thresholds", curvature_thresholds.threshold_tables),
-        ]  # fmt: skip
-    rows = paper.comparison, human.comparison
+    found = figures("reproduction", result)
+    found["The finger"].append(tissue_table(result.tissues))
+    chapters = []
+    for title in dict.fromkeys((*CHAPTERS, *found)):
+        drawings = [part for part in found[title] if isinstance(part, Drawing)]
+        tables = [part for part in found[title] if isinstance(part, Table)]
+        if title != BEYOND:
+            chapters.append(Chapter(title, drawings, tables))
+        elif result.paper.single_unit_uncertainty is None:
+            text = "uncertainty of the fit and curvature thresholds (`fingerpad reproduce --extended`)"
+            chapters.append(Chapter(title, [f"Not run: {text}."], found[title]))
+        else:
+            chapters.append(Chapter(title, [], found[title]))
+    rows = result.paper.comparison, result.human.comparison
     numbers = [statement_table(result.statements), notes_table(*rows), *comparison_tables(*rows)]
-    single_units = tables("single_unit", single_unit.single_unit_tables)
     return Page(
         "From a touch to a percept",
         "A finite-element fingertip, slowly adapting afferents and an observer, after Gerling et al. 2014. "
         f"{edition(result.manifest)}",
         [],
         [
-            Chapter("The finger", [mesh], [tissue_table(result.tissues)]),
-            Chapter("Three levels", [levels]),
-            Chapter("From rates to a percept", [steps]),
-            Chapter("Level 1: skin", [skin], skin_deflection.skin_deflection_tables(deflection)),
-            Chapter("Level 2: afferent", [rates], single_units),
-            Chapter("Level 3: population", [maps]),
-            Chapter(
-                "Level 3: discrimination",
-                [observers, criterion],
-                tables("discrimination", discrimination.discrimination_tables),
-            ),
-            Chapter("The border of the nail", [border]),
-            Chapter("Beyond the paper", more, beyond),
+            *chapters,
             Chapter("All numbers", [], numbers),
             Chapter("Published numbers used", [], input_tables(result.inputs)),
-            Chapter("Provenance", [], manifest_chapter(result.manifest).parts),
+            manifest_chapter(result.manifest, folded=True),
         ],
         first_screen(result),
         verdict_table(result.statements),
     )
 
 
-def input_tables(inputs: Sequence[PublishedNumber]) -> list[Table]:
-    meanings = [
-        Row.of(
-            status,
-            meaning,
-            plain(sum(entry.status == status for entry in inputs)),
-            kind="assumed" if status == "assumed" else "",
-        )
-        for status, meaning in STATUSES.items()
-    ]
-    numbers = [
-        Row.of(
-            entry.name,
-            plain(entry.value, digits=ALL_DIGITS, longest=ALL_VALUES),
-            "" if entry.unit == "1" else entry.unit,
-            entry.status,
-            entry.source,
-            kind="assumed" if entry.status == "assumed" else "",
-        )
-        for entry in inputs
-    ]
-    return [
-        Table("Status of a number", ("status", "meaning", "numbers"), meanings),
-        Table("Published numbers", ("number", "value", "unit", "status", "source"), numbers),
-    ]
-
-
 def first_screen(result: ReproductionResult) -> list[Drawing]:
     """Return a picture of each level, both sets in it, with its result as the caption."""
-    fits = [f"`{name}` {fixed(getattr(result, name).single_unit.fss_out_of_sample, 2)}" for name in COLUMNS]
-    noises = [f"`{name}` {number(getattr(result, name).discrimination.noise_sigma)}" for name in COLUMNS]
+    fits = [f"`{name}` {fixed(getattr(result, name).single_unit.fss_out_of_sample, 2)}" for name in SETS]
+    noises = [f"`{name}` {number(getattr(result, name).discrimination.noise_sigma)}" for name in SETS]
     deflection = result.skin_deflection
     r2 = [trial.cylinder.r2 for trial in (deflection.trial1, deflection.trial2, deflection.trial3)]
     best = f"Trial {1 + int(np.argmax(r2))}"
     said = ", as in the paper." if best == IN_THE_PAPER else f"; in the paper {IN_THE_PAPER} is."
-    captions = {
-        "skin": f"Skin: {best} is closest to the observed deflection{said}",
-        "afferent": f"Afferent: FSS out of sample {joined(fits)}; the paper "
-        f"{fixed(paper.FSS_OUT_OF_SAMPLE.value, 2)}.",
-        "percept": f"Percept: noise that fits people's hit rates {joined(noises)}; the paper "
-        f"{number(psychophysics.NOISE_SIGMA.value)}.",
-    }
-    drawn = zip(captions.items(), (_draw_skin, _draw_afferent, _draw_percept), strict=True)
+    fss, sigma = fixed(paper.FSS_OUT_OF_SAMPLE.value, 2), number(psychophysics.NOISE_SIGMA.value)
+    pictures: tuple[tuple[str, Callable[[Axes, ReproductionResult], None], str], ...] = (
+        ("skin", _draw_skin, f"{best} is closest to the observed deflection{said}"),
+        ("afferent", _draw_afferent, f"FSS out of sample {joined(fits)}; the paper {fss}."),
+        (
+            "percept",
+            _draw_percept,
+            f"noise that fits people's hit rates {joined(noises)}; the paper {sigma}.",
+        ),
+    )
+
+    def drawn(level: int, name: str, draw: Callable[[Axes, ReproductionResult], None]) -> Figure:
+        picture = new_figure(4.6, 3.0)
+        axes = picture.subplots()
+        draw(axes, result)
+        axes.set_title(f"Level {level}: {name}")
+        return picture
+
     return [
-        Drawing(f"level_{level}_{name}", name.capitalize(), partial(_draw_level, result, draw), caption)
-        for level, ((name, caption), draw) in enumerate(drawn, start=1)
+        Drawing(
+            name.capitalize(),
+            {f"level_{level}_{name}": partial(drawn, level, name, draw)},
+            f"{name.capitalize()}: {caption}",
+        )
+        for level, (name, draw, caption) in enumerate(pictures, start=1)
     ]
-
-
-def _draw_level(result: ReproductionResult, draw: Callable[[Axes, ReproductionResult], None]) -> Figure:
-    figure = new_figure(4.6, 3.0)
-    draw(figure.subplots(), result)
-    return figure
 
 
 def _draw_skin(axes: Axes, result: ReproductionResult) -> None:
     """Draw the deflection under the cylinder, downwards."""
-    skin_deflection.draw_profiles(axes, result.skin_deflection, skin_deflection.CYLINDER)
-    axes.set(title="Level 1: skin", xlabel="distance from the axis, distal [mm]", ylabel="deflection [mm]")
+    skin.draw_profiles(axes, result.skin_deflection, "cylinder")
+    axes.set(xlabel="distance from the axis, distal [mm]", ylabel="deflection [mm]")
     handles, labels = axes.get_legend_handles_labels()
     axes.legend(handles[:4], [label.replace(", R²", "\nR²") for label in labels[:4]], fontsize=7.0)
     axes.invert_yaxis()
@@ -236,7 +151,7 @@ def _draw_afferent(axes: Axes, result: ReproductionResult) -> None:
         unit = getattr(result, name).single_unit
         axes.plot(-unit.shift_mm, unit.dynamic_rate_hz, label=name, **style)
     draw_observed_rates(axes, -unit.shift_mm, unit.observed_dynamic_rate_hz)
-    axes.set(title="Level 2: afferent", xlabel=single_unit.ALONG, ylabel="rate in the ramp [spikes/s]")
+    axes.set(xlabel=nerve.ALONG, ylabel="rate in the ramp [spikes/s]")
     axes.set_ylim(0.0, 1.25 * axes.get_ylim()[1])
     axes.legend(loc="upper center", ncols=3, fontsize=8.0)
 
@@ -247,10 +162,96 @@ def _draw_percept(axes: Axes, result: ReproductionResult) -> None:
         section = getattr(result, name).discrimination
         rates = section.gradient_sum["static"].hit_rate
         axes.plot(section.curvature_per_m[1:], rates, marker="o", label=name, **style)
-    discrimination.draw_people(axes, section.goodwin)
-    axes.set(title="Level 3: percept", xlabel="curvature of the sphere [1/m]", ylabel="hit rate [fraction]")
+    percept.draw_people(axes, section.goodwin)
+    axes.set(xlabel="curvature of the sphere [1/m]", ylabel="hit rate [fraction]")
     axes.set_ylim(top=1.02)
     axes.legend(loc="lower right", fontsize=8.0)
+
+
+SHOWN_MM = (7.0, 4.5)  # Half the width of the skin that is shown, and height above the contact. [mm]
+
+
+def caption_levels(section: ThreeLevels, *_: object) -> str:
+    places = joined([f"{number(offset)} mm" for offset in section.offset_mm])
+    return (
+        f"One sphere of {number(section.curvature_per_m)} 1/m on the three levels of the model, pressed "
+        f"{protocol.DEPTH.value} mm deep in {number(section.ramp_ms)} ms and held. All of it is predicted. "
+        "(a) Plane of symmetry of the pressed skin, coloured on a logarithmic scale by what the afferents "
+        "follow. (b) Current through the membrane of the afferent below the sphere, its potential and "
+        f"its spikes up to {number(section.until_ms)} ms; the rheobase is the smallest constant current that "
+        f"elicits spikes. (c) Spikes of three afferents, {places} distal from the axis of the sphere, with "
+        "their rates in the ramp and in the hold. Shaded: the sphere moves."
+    )
+
+
+@figure(
+    "reproduction", "Three levels", 2, "figure_2_three_levels", "One sphere on three levels", caption_levels,
+    of=both("levels"),
+)  # fmt: skip
+def draw_levels(section: ThreeLevels) -> Figure:
+    drawn = new_figure(COLUMN_IN, 7.4)
+    grid = drawn.add_gridspec(5, 1, height_ratios=(3.2, 1.0, 1.0, 0.5, 1.5))
+    pressed, current, potential, train, spikes = (drawn.add_subplot(grid[row]) for row in range(5))
+    for axes in (current, potential):
+        axes.sharex(train)
+    _draw_pressed(pressed, section)
+    _draw_one(current, potential, train, section)
+    _draw_three(spikes, section)
+    return drawn
+
+
+def _draw_pressed(axes: Axes, section: ThreeLevels) -> None:
+    """Draw the pressed section coloured by what they follow, the sphere, and the three afferents' places."""
+    places = mesh_picture.corners(np.stack([section.x_mm, section.y_mm], axis=-1))
+    faces = skin.paint_skin(axes, places, section.pressed_kpa.ravel(), edgecolors="#00000030", linewidths=0.2)
+    radius = MM_PER_M / section.curvature_per_m
+    axes.add_patch(Circle(section.centre_mm, radius, facecolor=skin.BODY, edgecolor=BLACK, linewidth=1.0))
+    x, y = section.centre_mm
+    width, height = SHOWN_MM
+    axes.set(
+        title="(a) skin, end of the hold",
+        xlim=(x - width, x + width),
+        ylim=(y - 1.0, y + radius + height),
+        aspect="equal",
+        xlabel="x, distal [mm]",
+        ylabel="y, dorsal [mm]",
+    )
+    axes.text(x, y + 0.4, f"sphere, {number(section.curvature_per_m)} 1/m", ha="center", fontsize=9.0)
+    axes.grid(visible=False)
+    skin.label_skin(axes, faces, f"{section.pressed}\n[kPa]", 0.9)
+
+
+def _draw_one(current: Axes, potential: Axes, train: Axes, section: ThreeLevels) -> None:
+    """Draw current, potential and spikes of the afferent below the sphere."""
+    level: Any = {"color": GREY, "linestyle": (0, (4, 2)), "linewidth": 1.2}
+    current.plot(section.times_ms, NANOAMPERE_PER_MA * section.current_ma, color=BLUE)
+    current.axhline(NANOAMPERE_PER_MA * section.rheobase_ma, label="rheobase", **level)
+    current.set(title="(b) afferent below the sphere", ylabel="current\n[nA]")
+    current.set_ylim(bottom=min(0.0, current.get_ylim()[0]))
+    potential.plot(section.times_ms, section.potential_mv, color=BLUE, linewidth=1.2)
+    potential.axhline(section.threshold_mv, label="threshold", **level)
+    potential.set(ylabel="potential\n[mV]", ylim=(-0.04 * section.threshold_mv, 1.4 * section.threshold_mv))
+    train.eventplot([section.spikes_ms[0]], colors=BLACK, linewidths=1.2, linelengths=0.8)
+    train.set(xlabel="time [ms]", ylabel="spikes", yticks=[], xlim=(0.0, section.until_ms))
+    for axes in (current, potential):
+        axes.tick_params(labelbottom=False)
+        axes.legend(loc="upper right", borderaxespad=0.0)
+    for axes in (current, potential, train):
+        axes.axvspan(0.0, section.ramp_ms, color=PALE, zorder=0)
+        axes.grid(visible=False)
+
+
+def _draw_three(axes: Axes, section: ThreeLevels) -> None:
+    """Draw the spikes of three afferents, with the rates of the ramp and of the hold beside them."""
+    rows = list(range(section.offset_mm.size))[::-1]
+    axes.eventplot(list(section.spikes_ms), lineoffsets=rows, linelengths=0.7, linewidths=0.9, colors=BLACK)
+    rates = zip(section.offset_mm, section.dynamic_rate_hz, section.static_rate_hz, strict=True)
+    labels = [f"{number(offset)} mm\n{fixed(ramp, 0)} and {fixed(hold, 0)}/s" for offset, ramp, hold in rates]
+    axes.set(title="(c) three afferents", xlabel="time [ms]", ylabel="distance,\nrates")
+    axes.set_yticks(rows, labels=labels, fontsize=8.0)
+    axes.set(xlim=(0.0, section.end_ms), ylim=(-0.6, len(rows) - 0.4))
+    axes.axvspan(0.0, section.ramp_ms, color=PALE, zorder=0)
+    axes.grid(visible=False)
 
 
 TISSUE_NOTE = (
@@ -262,28 +263,177 @@ TISSUE_NOTE = (
 
 def tissue_table(layers: Sequence[TissueLayer]) -> Table:
     """Return each layer of each named set with its law, moduli, relaxation and status."""
-    rows = []
-    for layer in layers:
+
+    def relaxation(layer: TissueLayer) -> str:
         terms = zip(layer.prony_shares, layer.prony_times_s, strict=True)
-        statuses = (layer.modulus_status, layer.poisson_status, layer.prony_status)
-        rows.append(
-            Row.of(
-                layer.tissues,
-                layer.layer,
-                layer.law,
-                number(layer.shear_kpa),
-                number(layer.shear_at_once_kpa) if layer.prony_shares else ABSENT,
-                fixed(layer.poisson, 2),
-                fixed(layer.poisson_at_once, 2) if layer.prony_shares else ABSENT,
-                ", ".join(f"{number(share)} ({number(time)})" for share, time in terms) or "none",
-                " / ".join(status or ABSENT for status in statuses),
-                layer.source,
-            )
-        )
+        return ", ".join(f"{number(share)} ({number(time)})" for share, time in terms) or "none"
+
+    def statuses(layer: TissueLayer) -> str:
+        each = (layer.modulus_status, layer.poisson_status, layer.prony_status)
+        return " / ".join(status or ABSENT for status in each)
+
     columns = (
-        "set", "layer", "law", "shear modulus, long-term [kPa]", "shear modulus, at once [kPa]",
-        "nu, long-term", "nu, at once", "Prony shares (times [s])", "status: modulus / nu / Prony",
-        "source of the modulus",
-    )  # fmt: skip
-    title = "Tissues by set and layer (in place of the paper's Tables 1 and 2)"
-    return Table(title, columns, rows, TISSUE_NOTE)
+        Column("tissues", "set"),
+        Column("layer"),
+        Column("law"),
+        Column("shear_kpa", "shear modulus, long-term"),
+        Column(
+            lambda row: row.shear_at_once_kpa if row.prony_shares else None, "shear modulus, at once [kPa]"
+        ),
+        Column("poisson", "nu, long-term", 2),
+        Column(lambda row: row.poisson_at_once if row.prony_shares else None, "nu, at once", 2),
+        Column(relaxation, "Prony shares (times [s])"),
+        Column(statuses, "status: modulus / nu / Prony"),
+        Column("source", "source of the modulus"),
+    )
+    return table(
+        "Tissues by set and layer (in place of the paper's Tables 1 and 2)", layers, columns, TISSUE_NOTE
+    )
+
+
+def input_tables(inputs: Sequence[PublishedNumber]) -> list[Table]:
+    statuses = [entry.status for entry in inputs]
+    meanings = [(status, meaning, statuses.count(status)) for status, meaning in STATUSES.items()]
+    columns = (
+        Column("name", "number"),
+        # Inputs are the record of what was used: nothing of them is rounded or left out.
+        Column("value", form=partial(plain, digits=12, longest=1000)),
+        Column(lambda entry: "" if entry.unit == "1" else entry.unit, "unit"),
+        Column("status"),
+        Column("source"),
+    )
+    return [
+        table(
+            "Status of a number",
+            meanings,
+            (Column("0", "status"), Column("1", "meaning"), Column("2", "numbers")),
+            mark=lambda row: "assumed" if row[0] == "assumed" else "",
+        ),
+        table(
+            "Published numbers",
+            inputs,
+            columns,
+            mark=lambda entry: "assumed" if entry.status == "assumed" else "",
+        ),
+    ]
+
+
+SIGNS = {Verdict.MET: "✓", Verdict.MISSED: "✗", Verdict.NOT_DECIDABLE: "?", Verdict.NOT_APPLICABLE: "–"}
+"""Sign of each verdict; they differ without colour."""
+
+GROUPS = {
+    Group.STATEMENT: (
+        "Statements of the paper that can fail",
+        "Nothing was fitted to these statements themselves; the notes say what was fitted before.",
+    ),
+    Group.FITTED: (
+        "Numbers that were fitted or chosen in sample",
+        "Something was fitted to these numbers or chosen by them: a number that is met shows that the model "
+        "can have it, and is no prediction.",
+    ),
+    Group.DEFINITION: (
+        "Consequences of definitions",
+        "They follow from how hit rates and error bars are defined, and hold for nearly any model.",
+    ),
+    Group.ADDITION: (
+        "Our own additions",
+        "The paper says nothing about these that could be judged. The bounds are ours or those of other "
+        "publications.",
+    ),
+}
+"""Title and meaning of each group of rows."""
+
+SET_NOTE = (
+    "`paper` is the paper's own system: Trial 3 with a Poisson's ratio of 0.40, strain energy density in "
+    "both terms, response surfaces. `human` serves all three levels."
+)
+
+
+def side_by_side(paper: Sequence[ClaimRow], human: Sequence[ClaimRow]) -> list[tuple[ClaimRow, Row]]:
+    """Return the rows that are no statement, each with its cells for both sets."""
+    by_name = [{row.quantity: row for row in rows} for rows in (paper, human)]
+    stated = {row.quantity for row in (*paper, *human) if row.group is Group.STATEMENT}
+    names = dict.fromkeys(row.quantity for row in (*paper, *human) if row.quantity not in stated)
+    made = []
+    for pair in ([found.get(name) for found in by_name] for name in names):
+        known = [row for row in pair if row is not None]
+        cells = [known[0].quantity, known[0].paper]
+        for row in pair:
+            cells += [ABSENT, ""] if row is None else [row.ours, _marked(row.verdict, row.fitted_to)]
+        told = dict.fromkeys("; ".join(text for text in (row.fitted_to, row.note) if text) for row in known)
+        # A number that one set was fitted to is shown as fitted.
+        first = min(known, key=lambda row: row.group is not Group.FITTED)
+        made.append((first, Row((*cells, " | ".join(told)))))
+    return made
+
+
+def comparison_tables(paper: Sequence[ClaimRow], human: Sequence[ClaimRow]) -> list[Table]:
+    """Return one table per group of rows that are no statement, both sets side by side."""
+    rows = side_by_side(paper, human)
+    found = {group: [row for first, row in rows if first.group is group] for group in GROUPS}
+    columns = ("quantity", "the paper", "`paper`", "", "`human`", "", "what was fitted, and how it is judged")
+    return [Table(GROUPS[group][0], columns, each, GROUPS[group][1]) for group, each in found.items() if each]
+
+
+def notes_table(paper: Sequence[ClaimRow], human: Sequence[ClaimRow]) -> Table:
+    """Return how each statement that can fail was judged, and what was fitted before, set by set."""
+    notes: dict[str, str] = {}
+    for name, found in (("`paper`", paper), ("`human`", human)):
+        for row in found:
+            if row.group is Group.STATEMENT:
+                before = notes.get(row.quantity)
+                notes[row.quantity] = f"{before}; {name}: {row.note}" if before else f"{name}: {row.note}"
+    meaning = GROUPS[Group.STATEMENT][1]
+    return listed("How the statements are judged", notes, ("statement", "note"), meaning)
+
+
+def count_sentence(statements: Sequence[Statement], name: str) -> str:
+    """Count the statements that can fail by their verdict with one set, and list what is missed."""
+    verdicts = {each.statement: getattr(each, f"verdict_{name}") for each in statements}
+    fitted = {each.statement for each in statements if getattr(each, f"fitted_{name}")}
+    found = [verdict for statement, verdict in verdicts.items() if statement not in fitted]
+    counted = [
+        f"{found.count(verdict)} {verdict.value}"
+        for verdict in Verdict
+        if verdict in found or verdict in (Verdict.MET, Verdict.MISSED)
+    ]
+    missed = [
+        f"{statement} (fitted)" if statement in fitted else statement
+        for statement, verdict in verdicts.items()
+        if verdict is Verdict.MISSED
+    ]
+    return (
+        f"{name}: of {len(statements)} statements of the paper that can fail, {joined(counted)}"
+        + (f", {len(fitted)} fitted" if fitted else "")
+        + (f". Missed: {'; '.join(missed)}." if missed else ".")
+    )
+
+
+def statement_table(statements: Sequence[Statement]) -> Table:
+    """Return every statement that can fail with our value and verdict of both sets."""
+    columns = ("section", "statement", "the paper", "`paper`", "", "`human`", "")
+    rows = [Row((each.section, *statement_cells(each))) for each in statements]
+    return Table(GROUPS[Group.STATEMENT][0], columns, rows, SET_NOTE)
+
+
+def verdict_table(statements: Sequence[Statement]) -> Table:
+    """Return the verdict of every statement that can fail with both sets, and how many are met."""
+    rows = [Row((f"{each.section} {each.statement}", *statement_cells(each)[3::2])) for each in statements]
+    met = (sum(getattr(each, f"verdict_{name}") is Verdict.MET for each in statements) for name in SETS)
+    rows.append(Row(("met", *(f"{count} of {len(statements)}" for count in met)), "final"))
+    columns = ("section and statement of the paper", *(f"`{name}`" for name in SETS))
+    return Table("", columns, rows, SET_NOTE)
+
+
+def statement_cells(each: Statement) -> tuple[str, ...]:
+    """Return what the paper says, and our value and verdict of both sets."""
+    ours = [
+        (getattr(each, name), _marked(getattr(each, f"verdict_{name}"), getattr(each, f"fitted_{name}")))
+        for name in SETS
+    ]
+    return each.statement, each.published, *ours[0], *ours[1]
+
+
+def _marked(verdict: Verdict, fitted: str) -> str:
+    """Sign and words of a verdict, and whether something was fitted to it."""
+    return f"{SIGNS[verdict]} {verdict.value}" + (" (fitted)" if fitted else "")

@@ -5,10 +5,9 @@ from __future__ import annotations
 import io
 from collections.abc import Callable, Iterable
 from pathlib import Path
-from typing import Any, TypedDict
+from typing import Any
 
 import matplotlib
-import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
@@ -53,23 +52,17 @@ STYLE: Any = {
 }
 
 
-class LineStyle(TypedDict, total=False):
-    """How a line is drawn, as keywords of Matplotlib."""
-
-    color: str
-    linestyle: str
-    marker: str
-
-
 PEOPLE: Any = {
     "color": BLACK, "markerfacecolor": "none", "markeredgewidth": 1.6, "markersize": 7.5, "zorder": 5,
 }  # fmt: skip
 """How observations of people are drawn: open diamonds before all else."""
 
 
-def numbers(values: Any) -> FloatArray:
-    """Return nested lists of numbers as an array; None becomes NaN."""
-    return np.array(values, dtype=np.float64)
+MAP_AXES: Any = {"xlabel": "x, distal [mm]", "ylabel": "z, lateral [mm]", "aspect": "equal"}
+"""Axes of a map of the pad: distal is to the right."""
+
+CHANCE = 0.5
+NANOAMPERE_PER_MA = 1e6
 
 
 def new_figure(width_in: float, height_in: float) -> Figure:
@@ -93,39 +86,33 @@ def png(draw: Callable[..., Figure], *parts: Any) -> bytes:
 
 @checked
 def write_png(draw: Callable[[Any], Figure], section: Any, path: Path) -> Path:
-    """Write what `draw` makes of a section of the results, or of results of your own, as PNG.
-
-    Parameters
-    ----------
-    draw : callable
-        One of the report's, such as `responses.draw_responses`.
-    section : Any
-        What it draws.
-    path : Path
-        The file; folders are made as needed, and it is there whole or not at all.
-
-    Raises
-    ------
-    StoreError
-        If the file cannot be written.
-    """
+    """Write what `draw` makes of results as PNG; the file is there whole or not at all."""
     write_atomically(path_of("path", path), png(draw, section))
     return path_of("path", path)
 
 
-def draw_rates(
-    axes: Axes,
-    where: FloatArray,
-    predicted_hz: FloatArray,
-    observed_hz: FloatArray,
-    label: str = "predicted",
-    line: bool = True,
+def name_panel(axes: Axes, title: str, xlabel: str, ylabel: str, **more: Any) -> None:
+    axes.set_title(title, fontsize=10.0)
+    axes.set(xlabel=xlabel, ylabel=ylabel, **more)
+
+
+def draw_chance(axes: Axes, label: str | None = None) -> None:
+    axes.axhline(CHANCE, color=GREY, linewidth=1.0, linestyle=(0, (6, 3)), label=label)
+
+
+def fill_band(
+    axes: Axes, x: FloatArray, low: Any, high: Any, color: str, alpha: float, label: str = ""
 ) -> None:
+    axes.fill_between(x, low, high, color=color, alpha=alpha, linewidth=0.0, label=label or None)
+
+
+def draw_rates(
+    axes: Axes, where: FloatArray, predicted_hz: FloatArray, observed_hz: FloatArray, label: str,
+    line: bool = True,
+) -> None:  # fmt: skip
     """Draw predicted firing rates as a line or as dashes, and the observed ones as open circles."""
-    style: Any = (
-        {} if line else {"linestyle": "none", "marker": "_", "markersize": 12.0, "markeredgewidth": 2.0}
-    )
-    axes.plot(where, predicted_hz, color=BLUE, label=label, **style)
+    dashes: Any = {"linestyle": "none", "marker": "_", "markersize": 12.0, "markeredgewidth": 2.0}
+    axes.plot(where, predicted_hz, color=BLUE, label=label, **({} if line else dashes))
     draw_observed_rates(axes, where, observed_hz)
     axes.set_ylabel("firing rate [spikes/s]")
     axes.set_ylim(bottom=0.0)
