@@ -188,6 +188,7 @@ def _validated(function: Callable[..., _Made]) -> Callable[..., _Made]:
         function.__closure__,
     )
     same.__kwdefaults__, same.__qualname__ = function.__kwdefaults__, function.__qualname__
+    same.__dict__.update({name: value for name, value in vars(function).items() if name == "__signature__"})
     same.__annotations__ = {
         name: _path_or(hint) for name, hint in hints_of(function).items() if name != "return"
     }
