@@ -111,12 +111,13 @@ def nearest_other(leaf):
 
 
 def test_key_changes_with_the_last_bit_of_every_input():
-    paths = dict(leaves(TINY))
+    touch = replace(TINY, receptor_depths_mm=(1.2,))
+    paths = dict(leaves(touch))
     named = {path[0] for path in paths}
     assert named == {field.name for field in fields(fp.Touch) if field.compare}
     assert ("settings", "newton", "residual_tolerance") in paths
-    keys = [touch_key(changed(TINY, path, nearest_other(leaf))) for path, leaf in paths.items()]
-    assert len({touch_key(TINY), *keys}) == 1 + len(paths)
+    keys = [touch_key(changed(touch, path, nearest_other(leaf))) for path, leaf in paths.items()]
+    assert len({touch_key(TINY), touch_key(touch), *keys}) == 2 + len(paths)
 
 
 def test_indenters_of_equal_numbers_have_different_keys():

@@ -178,6 +178,7 @@ def _validated(function: Callable[..., _Made]) -> Callable[..., _Made]:
     closed, defaults = function.__closure__, function.__defaults__
     same = FunctionType(function.__code__, function.__globals__, function.__name__, defaults, closed)
     same.__kwdefaults__, same.__qualname__ = function.__kwdefaults__, function.__qualname__
+    same.__dict__.update({name: value for name, value in vars(function).items() if name == "__signature__"})
     hints = hints_of(function)
     same.__annotations__ = {name: _path_or(hints[name]) for name in hints if name != "return"}
     return validate_call(config=ConfigDict(arbitrary_types_allowed=True, strict=True))(same)

@@ -272,12 +272,30 @@ class Traces(Result):
         return self.with_values(lambda values: values * each)
 
 
-def traces_below(skin: Skin, sites: ArrayLike, dynamic_quantity: str, static_quantity: str) -> Traces:
-    """Traces of two quantities below sites of a skin."""
+def traces_below(
+    skin: Skin,
+    sites: ArrayLike,
+    dynamic_quantity: str,
+    static_quantity: str,
+    depth_mm: ArrayLike | None = None,
+) -> Traces:
+    """Traces of two quantities below sites of a skin, by default on the border of epidermis and dermis."""
     if not callable(getattr(skin, "sed", None)):
         raise InputError(
             "skin", "must have a method sed(sites), as a solved indentation has", f"{skin!r:.60}"
         )
+    if depth_mm is not None:
+        try:
+            signature(skin.sed).bind(sites, dynamic_quantity, static_quantity, depth_mm=depth_mm)
+        except TypeError as error:
+            raise InputError(
+                "skin.sed",
+                "must accept depth_mm, since end organs have a depth",
+                f"{type(skin).__name__}.sed{signature(skin.sed)}",
+                "add it, or leave out the depth",
+            ) from error
+        deep: Any = skin
+        return deep.sed(sites, dynamic_quantity, static_quantity, depth_mm=depth_mm)
     if (dynamic_quantity, static_quantity) == (STORED_ENERGY, STORED_ENERGY):
         return skin.sed(sites)
     try:

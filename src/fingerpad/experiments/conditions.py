@@ -8,7 +8,7 @@ from typing import Annotated
 import numpy as np
 
 from fingerpad.core.checked import value_class
-from fingerpad.core.values import Finite, Seed, choice
+from fingerpad.core.values import Finite, Numbers, Seed, choice
 from fingerpad.data.tissues import DEFAULT_TISSUES
 from fingerpad.geometry.fingertip import Finger, Fingertip
 from fingerpad.geometry.grading import RESOLUTIONS, Grading, resolution_grading
@@ -60,6 +60,8 @@ class Conditions:
         The finger.
     grading : Grading, optional
         Mesh instead of those that the resolution grades.
+    receptor_depths_mm : tuple of float
+        Depths at which presses keep quantities, as of `fingerpad.indent`. [mm]
     """
 
     resolution: Annotated[str, choice(RESOLUTIONS)] = "standard"
@@ -67,6 +69,7 @@ class Conditions:
     tissues: Annotated[str, choice(TISSUES)] | Tissues = DEFAULT_TISSUES
     finger: Finger = field(default_factory=Fingertip)
     grading: Grading | None = None
+    receptor_depths_mm: Numbers = ()
 
     @property
     def afferent(self) -> Afferent:

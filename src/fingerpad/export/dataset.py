@@ -167,7 +167,7 @@ def touch_dataset(
             )
     variables = dict(_fields(skin, quantities))
     coordinates = {"time": variables.pop("times_ms")}
-    values = _mesh_values(skin.mesh)
+    values = _mesh_values(skin.mesh, skin.watched_elements)
     if skin.touch is not None:
         values |= _object_values(skin.touch, skin)
     if response is not None:
@@ -323,14 +323,14 @@ def _fields(
         yield name, (dims, values if field.place is Place.PRESS else values.astype(np.float32), attributes)
 
 
-def _mesh_values(mesh: Mesh) -> dict[str, np.ndarray]:
+def _mesh_values(mesh: Mesh, watched: np.ndarray) -> dict[str, np.ndarray]:
     numbers = {
         "element_nodes": mesh.elements,
         "layer": mesh.layer,
         "skin_node": mesh.skin_nodes,
         "facet_nodes": mesh.skin_faces,
         "facet_element": mesh.skin_elements,
-        "sheet": mesh.living_epidermis.ravel(),
+        "sheet": watched,
         "bone": mesh.bone_nodes,
         "nail": mesh.nail_nodes,
     }

@@ -65,6 +65,11 @@ class FreeMesh(Mesh):
         length = np.linalg.norm(normals, axis=1, keepdims=True)
         return normals / np.where(length > 0.0, length, 1.0)
 
+    @cached_property
+    def node_depth_mm(self) -> FloatArray:
+        """Distance of each node from the skin, (n_nodes,). [mm]"""
+        return np.linalg.norm(self.nodes_mm - self.on_skin(self.nodes_mm)[0], axis=1)
+
     def on_skin(self, points_mm: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Find the closest points of the skin."""
         triangle, weights = closest_on_triangles(points_mm, self.nodes_mm[self.skin_triangles])

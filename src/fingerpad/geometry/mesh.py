@@ -87,6 +87,27 @@ class Mesh:
         return np.arange(len(self.elements)).reshape(self.shape)[:, :, 0].ravel()
 
     @cached_property
+    def node_depth_mm(self) -> FloatArray:
+        """Distance of each node from the node of the skin above it, (n_nodes,). [mm]"""
+        depth = np.zeros(len(self.nodes_mm))
+        column = self.nodes_mm[self.grid]
+        depth[self.grid] = np.linalg.norm(column - column[:, :, :1], axis=-1)
+        return depth
+
+    def elements_at(self, depth_mm: float) -> IntArray:
+        """Elements that hold a depth; a depth on a border belongs to the elements above it."""
+        corners = self._last_depth_mm[self.elements]
+        return np.flatnonzero((corners.min(axis=1) < depth_mm) & (corners.max(axis=1) >= depth_mm))
+
+    @cached_property
+    def _last_depth_mm(self) -> FloatArray:
+        """Depth up to which the elements above each node reach: a little below it, (n_nodes,). [mm]"""
+        depth = self.node_depth_mm
+        thickness = np.full(len(depth), np.inf)
+        np.minimum.at(thickness, self.elements, np.ptp(depth[self.elements], axis=1)[:, None])
+        return depth + np.where(depth > 0.0, 0.05 * thickness, 0.0)
+
+    @cached_property
     def skin_nodes(self) -> IntArray:
         """Nodes of the skin, each once, increasing."""
         return np.unique(self.skin_grid)

@@ -346,18 +346,11 @@ class _Making:
 
     def around(self, mesh: FreeMesh, depth_mm: float) -> IntArray:
         """Elements of one sheet just above the depth of the end organs, all around."""
-        nodes = np.unique(mesh.elements)
-        below = np.zeros(len(mesh.nodes_mm))
-        below[nodes] = self.depth_of(mesh, mesh.nodes_mm[nodes])
-        corners = below[mesh.elements]
-        top, bottom = np.sort(corners, axis=1)[:, [0, -1]].T
-        # End organs on a border belong to the elements above it.
-        least = depth_mm - 0.05 * (bottom - top)
-        chosen = np.flatnonzero((top < least) & (bottom >= least))
+        chosen = mesh.elements_at(depth_mm)
         if not chosen.size:
             self.wrong(
-                f"end organs {depth_mm:g} mm below the skin must lie in the mesh, which is {below.max():.3g} "
-                "mm deep: give receptor_depth_mm."
+                f"end organs {depth_mm:g} mm below the skin must lie in the mesh, which is "
+                f"{mesh.node_depth_mm.max():.3g} mm deep: give receptor_depth_mm."
             )
         return chosen
 

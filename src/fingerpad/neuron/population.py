@@ -125,6 +125,9 @@ class Population:
     centre_mm : (float, float), optional
         Middle of the pad about which the positions lie, if they follow the finger that is touched: `on` moves
         them to the middle of its pad. By default they stay. [mm]
+    depth_mm : float, optional
+        Depth of the end organs below the skin; by default the border of epidermis and dermis. Quantities of the
+        tissue other than strain energy density are kept at the depths that `indent` was given. [mm]
     parts : mapping of str to Population
         Of a mixed population, the afferents of each type, which follow each other; from `mixed`.
     """
@@ -136,6 +139,7 @@ class Population:
     places_mm: FiniteMatrix | None = None
     ends: EndOrgans | None = None
     centre_mm: Pair | None = None
+    depth_mm: Positive | None = None
     parts: Mapping[str, Population] = field(default_factory=lambda: MappingProxyType({}))
 
     def __post_init__(self) -> None:
@@ -184,6 +188,7 @@ class Population:
         afferent: AnyAfferent | None = None,
         sensitivity: ArrayLike | None = None,
         ends: EndOrgans | None = None,
+        depth_mm: Positive | None = None,
     ) -> Population:
         """Place an afferent at each position of a layout.
 
@@ -198,7 +203,7 @@ class Population:
             Default: `Afferent()`.
         sensitivity : array_like (n_receptors,), optional
             As in `Population`.
-        ends : EndOrgans, optional
+        ends, depth_mm : optional
             As in `Population`, such as `EndOrgans.scattered(layout.places_mm, ..., place=place)`.
 
         Examples
@@ -210,7 +215,8 @@ class Population:
         """
         positions = layout.places_mm if place is None else place(layout.places_mm)
         factors = None if sensitivity is None else float_array("sensitivity", sensitivity, 1)
-        return cls(positions, layout.pitch_mm, afferent or Afferent(), factors, layout.places_mm, ends)
+        responding = afferent or Afferent()
+        return cls(positions, layout.pitch_mm, responding, factors, layout.places_mm, ends, depth_mm=depth_mm)
 
     @classmethod
     @checked
@@ -222,6 +228,7 @@ class Population:
         centre_mm: Pair | None = None,
         afferent: AnyAfferent | None = None,
         finger: HasContact | None = None,
+        depth_mm: Positive | None = None,
     ) -> Population:
         """Place afferents on a square lattice that is symmetric about a point.
 
@@ -240,6 +247,8 @@ class Population:
         finger : Fingertip, optional
             The finger in whose pad they lie. Without finger and centre, the lattice lies in the middle of the
             pad of the paper's finger, and `respond` moves it to that of the finger that is touched.
+        depth_mm : float, optional
+            As in `Population`. [mm]
 
         Returns
         -------
@@ -265,7 +274,13 @@ class Population:
             )
         x, z = centre_x + pitch_mm * around_zero(rows), centre_z + pitch_mm * around_zero(columns)
         positions = np.stack(np.meshgrid(x, z, indexing="ij"), axis=-1).reshape(-1, 2)
-        return cls(positions, pitch_mm, afferent or Afferent(), centre_mm=CENTRE_MM if follows else None)
+        return cls(
+            positions,
+            pitch_mm,
+            afferent or Afferent(),
+            centre_mm=CENTRE_MM if follows else None,
+            depth_mm=depth_mm,
+        )
 
     @classmethod
     def mixed(cls, parts: Mapping[str, Population]) -> Population:
@@ -421,11 +436,13 @@ class Population:
         parts = there.parts or {"": there}
         maps: dict[str, ResponseMap] = {}
         # Afferents that follow the same quantities are sampled at once.
-        kinds = {name: (part.quantities, part.sites_mm.shape[1]) for name, part in parts.items()}
+        kinds = {
+            name: (part.quantities, part.depth_mm, part.sites_mm.shape[1]) for name, part in parts.items()
+        }
         for kind in dict.fromkeys(kinds.values()):
             some = {name: part for name, part in parts.items() if kinds[name] == kind}
             sites = np.concatenate([part.sites_mm for part in some.values()])
-            traces, start = traces_below(skin, sites, *kind[0]), 0
+            traces, start = traces_below(skin, sites, *kind[0], kind[1]), 0
             for name, part in some.items():
                 part._check_tissues(skin)
                 end = start + len(part.sites_mm)
@@ -459,6 +476,12 @@ class Population:
         if self.parts:
             return np.concatenate([part.sites_mm for part in self.parts.values()])
         return self.positions_mm if self.ends is None else self.ends.sites_mm
+
+    @property
+    def kept_depths_mm(self) -> tuple[float, ...]:
+        """Depths at which a press must keep quantities for these afferents, as of `indent`. [mm]"""
+        several = self.parts.values() or [self]
+        return tuple(sorted({part.depth_mm for part in several if part.depth_mm is not None}))
 
     @property
     def quantities(self) -> tuple[str, str]:

@@ -43,7 +43,8 @@ def strain(skin: SkinResponse) -> Caveat | None:
     """Compression of the living epidermis beyond the stretches at which the stability of laws is checked."""
     if "compressive_strain" not in skin.fields:
         return None
-    largest, limit = float(skin.fields["compressive_strain"].max()), -float(np.log(STABLE_STRETCHES[0]))
+    sheet = skin.fields["compressive_strain"][:, : skin.mesh.living_epidermis.size]
+    largest, limit = float(sheet.max()), -float(np.log(STABLE_STRETCHES[0]))
     text = (
         f"The living epidermis is compressed to a stretch of {np.exp(-largest):.2g}; that its law is stable "
         f"was checked down to {STABLE_STRETCHES[0]:g}."

@@ -7,15 +7,19 @@ the key of a touch depends on this file.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from enum import Enum
 from operator import attrgetter
 from typing import TYPE_CHECKING
 
+import numpy as np
+
+from fingerpad.core.errors import InputError
+
 # Only for types: the command line reads the names of the quantities here, without compiling anything.
 if TYPE_CHECKING:
-    from fingerpad.core.values import FloatArray
+    from fingerpad.core.values import FloatArray, IntArray
     from fingerpad.geometry.mesh import Mesh
     from fingerpad.mechanics.press import Deformation
 
@@ -27,7 +31,7 @@ class Place(Enum):
     NODE = "nodes"
     SKIN_NODE = "nodes of `mesh.skin_nodes`"
     ELEMENT = "elements"
-    WATCHED = "elements that are watched: those of `mesh.living_epidermis` when stored, all when exported"
+    WATCHED = "elements that are watched: `watched_elements` when stored, all when exported"
 
 
 class Times(Enum):
@@ -57,19 +61,19 @@ class Field:
     scalar of elements that is stored at all times and is never negative."""
     exported: str = ""  # Name in VTU files; empty if it is not exported.
 
-    def shape(self, mesh: Mesh, n_times: int) -> tuple[int, ...]:
+    def shape(self, mesh: Mesh, n_times: int, n_watched: int) -> tuple[int, ...]:
         sizes = {
             Place.PRESS: (),
             Place.NODE: (len(mesh.nodes_mm),),
             Place.SKIN_NODE: (mesh.skin_nodes.size,),
             Place.ELEMENT: (len(mesh.elements),),
-            Place.WATCHED: (mesh.living_epidermis.size,),
+            Place.WATCHED: (n_watched,),
         }
         times = (n_times,) if self.stored is Times.ALL else ()
         return (*times, *sizes[self.place], *((self.components,) if self.components > 1 else ()))
 
     def stored_values(self, deformation: Deformation, mesh: Mesh) -> FloatArray:
-        """Array to store, from a press in which the living epidermis was watched."""
+        """Array to store, from a press that watched `watched_elements`."""
         values = self.of(deformation, mesh)
         return values[-1] if self.stored is Times.LAST else values
 
@@ -190,6 +194,22 @@ FIELDS: dict[str, Field] = {
         _watched("pressure", "kPa", "mean compressive stress", "pressure_kpa"),
     )
 }  # fmt: skip
+
+
+def watched_elements(mesh: Mesh, depths_mm: Sequence[float] = ()) -> IntArray:
+    """Elements of `Place.WATCHED`: the sheet of the living epidermis, then the layers that hold depths."""
+    sheet = mesh.living_epidermis.ravel()
+    if not len(depths_mm):
+        return sheet
+    layers = [mesh.layer[mesh.elements_at(depth_mm)] for depth_mm in depths_mm]
+    if empty := [depth for depth, found in zip(depths_mm, layers, strict=True) if not found.size]:
+        raise InputError(
+            "receptor_depths_mm",
+            f"must be depths of the tissue, which is at most {mesh.node_depth_mm.max():.3g} mm thick",
+            f"{empty[0]:g} mm",
+        )
+    held = np.flatnonzero(np.isin(mesh.layer, np.concatenate(layers)))
+    return np.concatenate([sheet, np.setdiff1d(held, sheet)])
 
 
 def stored_fields() -> tuple[Field, ...]:

@@ -1,12 +1,15 @@
-"""End organs in a mesh without rows and columns, at a depth below its skin.
+"""End organs in a mesh without rows and columns, at depths below its skin.
 
 Values of the elements around the end organs are interpolated along the skin, never across the layers: by the
 smooth surface through the nearest elements that bends least, a sum of |r|³ and a plane (polyharmonic spline,
-Duchon 1977). Values that are linear along the skin are interpolated exactly.
+Duchon 1977). Values that are linear along the skin are interpolated exactly. At a depth of its own, an end
+organ reads the elements that hold this depth and, of the same layer, those next to them whose middles enclose
+it.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -15,7 +18,8 @@ from scipy.spatial import cKDTree
 
 from fingerpad.core.errors import InputError
 from fingerpad.core.values import FloatArray, IntArray
-from fingerpad.geometry.free_mesh import FreeMesh
+from fingerpad.geometry.free_mesh import FACES, FreeMesh
+from fingerpad.skin.receptor_sheet import Part
 
 _NEIGHBOURS = 25
 _OFF_THE_SKIN = 0.25  # How far beside the skin a site may lie, over the size of the element there.
@@ -23,6 +27,7 @@ _OFF_THE_SKIN = 0.25  # How far beside the skin a site may lie, over the size of
 _MOST_STEPS = 20
 _EXACT_MM = 1e-7
 _LEAST_SLOPE = 0.1
+_UPRIGHT = 0.7  # Least cosine between the depth and the way to an element above or below.
 _LEAST_PIVOT = 1e-10
 _LARGEST_WEIGHT = 1e3
 """Weight above which the places of elements do not determine a plane: they lie on a line."""
@@ -32,8 +37,12 @@ _LARGEST_WEIGHT = 1e3
 class Interpolation:
     """Elements near each site and their weights."""
 
-    elements: IntArray  # Rows of the elements around the end organs, (n_sites, n_neighbours).
-    weights: FloatArray  # Their sum is 1, (n_sites, n_neighbours).
+    elements: IntArray  # Elements near the end organs, nearest first, by rows of a sheet, (n_sites, n_near).
+    weights: FloatArray  # Their sum is 1, (n_sites, n_near).
+    points_mm: FloatArray  # Where values that are linear in space are read, (n_sites, 3). [mm]
+
+    def of(self, organs: IntArray) -> Interpolation:
+        return Interpolation(self.elements[organs], self.weights[organs], self.points_mm[organs])
 
 
 @dataclass(frozen=True)
@@ -44,6 +53,85 @@ class FreeReceptors:
 
     def below(self, sites_mm: FloatArray) -> Interpolation:
         """Find end organs below points of the skin, on any side; InputError if one is not on the skin."""
+        return self._around(*self._organs(sites_mm, self.mesh.receptor_depth_mm), self.mesh.living_epidermis)
+
+    def under(self, organs_mm: FloatArray) -> Interpolation:
+        """Find end organs by their own x and z on the volar side; InputError if there is none."""
+        return self._around(*self._organs(organs_mm, self.mesh.receptor_depth_mm), self.mesh.living_epidermis)
+
+    def at(self, sites_mm: FloatArray, depth_mm: FloatArray) -> list[Part]:
+        """Find end organs at a depth each, below points of the skin (n, 3) or by their own x and z (n, 2)."""
+        mesh = self.mesh
+        parts: list[Part] = []
+        for depth in np.unique(depth_mm):
+            sites, held = np.flatnonzero(depth_mm == depth), mesh.elements_at(depth)
+            organs, normals = self._organs(sites_mm[sites], depth)
+            corners = mesh.nodes_mm[mesh.elements[held]]
+            away, near = cKDTree(corners.mean(axis=1)).query(organs)
+            beside = away > np.linalg.norm(np.ptp(corners, axis=1), axis=1)[near] if held.size else away > 0.0
+            if beside.any():
+                place = ", ".join(f"{each:g}" for each in sites_mm[sites[np.argmax(beside)]])
+                raise InputError(
+                    "depth_mm",
+                    "must lie in the tissue, between the skin and the bone",
+                    f"{depth:g} mm at ({place}) mm",
+                )
+            for layer in np.unique(mesh.layer[held[near]]):
+                some = np.flatnonzero(mesh.layer[held[near]] == layer)
+                sheet = held[mesh.layer[held] == layer]
+                parts += self._through(sheet, sites[some], organs[some], normals[some])
+        return parts
+
+    def _through(
+        self, sheet: IntArray, sites: IntArray, organs: FloatArray, normals: FloatArray
+    ) -> Iterator[Part]:
+        """End organs between the middles of a sheet of elements and of those next to it in the same layer."""
+        here = self._around(organs, normals, sheet)
+        # How much deeper than the middles the end organs lie.
+        short = ((here.points_mm - organs) * normals).sum(axis=1)
+        for way, chosen in ((0, short < 0.0), (1, short >= 0.0)):
+            beside = self._neighbours[sheet, way]
+            following = np.unique(beside[beside >= 0])
+            share = np.zeros(len(organs))
+            some = np.flatnonzero(chosen & (beside[here.elements[:, 0]] >= 0))
+            if some.size:
+                there = self._around(organs[some], normals[some], following)
+                gap = ((here.points_mm[some] - there.points_mm) * normals[some]).sum(axis=1)
+                share[some] = np.clip(short[some] / np.where(gap == 0.0, np.inf, gap), 0.0, 1.0)
+                yield Part(following, sites[some], there, share[some])
+            here_too = np.flatnonzero(chosen)
+            yield Part(sheet, sites[here_too], here.of(here_too), 1.0 - share[here_too])
+
+    @cached_property
+    def _neighbours(self) -> IntArray:
+        """Element of the same layer above and below each element, -1 without one, (n_elements, 2)."""
+        mesh = self.mesh
+        faces = np.sort(mesh.elements[:, FACES].reshape(-1, 4), axis=1)
+        owner = np.repeat(np.arange(len(mesh.elements)), len(FACES))
+        # A triangle repeats any of its corners; an edge is no face.
+        faces[:, 1:][np.diff(faces, axis=1) == 0] = -1
+        whole = (faces >= 0).sum(axis=1) >= 3
+        _, face = np.unique(np.sort(faces[whole], axis=1), axis=0, return_inverse=True)
+        order = np.argsort(face, kind="stable")
+        shared = np.flatnonzero(np.diff(face[order]) == 0)
+        first, second = (owner[whole][order[shared + n]] for n in (0, 1))
+        middles, depth = (
+            values[mesh.elements].mean(axis=1) for values in (mesh.nodes_mm, mesh.node_depth_mm)
+        )
+        rise = depth[second] - depth[first]
+        upright = np.abs(rise) > _UPRIGHT * np.linalg.norm(middles[second] - middles[first], axis=1)
+        upright &= mesh.layer[first] == mesh.layer[second]
+        above, below = (np.where(rise > 0.0, *pair)[upright] for pair in ((first, second), (second, first)))
+        found = np.full((len(mesh.elements), 2), -1)
+        found[below, 0], found[above, 1] = above, below
+        return found
+
+    def _organs(self, sites_mm: FloatArray, depth_mm: float) -> tuple[FloatArray, FloatArray]:
+        """End organs at a depth, and the normals of the skin above them."""
+        found = self._below if sites_mm.shape[1] == 3 else self._under
+        return found(sites_mm, depth_mm)
+
+    def _below(self, sites_mm: FloatArray, depth_mm: float) -> tuple[FloatArray, FloatArray]:
         inside = self._in_mesh(sites_mm)
         feet, normals, sizes = self.mesh.on_skin(inside)
         away = np.linalg.norm(feet - inside, axis=1)
@@ -55,17 +143,16 @@ class FreeReceptors:
                 "must lie on the skin of the mesh",
                 remedy=f"(x, y, z) = ({x:g}, {y:g}, {z:g}) mm is {away[np.argmax(missed)]:.2g} mm beside it",
             )
-        return self._around(feet - self.mesh.receptor_depth_mm * normals, normals)
+        return feet - depth_mm * normals, normals
 
-    def under(self, organs_mm: FloatArray) -> Interpolation:
-        """Find end organs by their own x and z on the volar side; InputError if there is none."""
+    def _under(self, organs_mm: FloatArray, depth_mm: float) -> tuple[FloatArray, FloatArray]:
         target = self._in_mesh(organs_mm)
         feet = self._volar_mm[self._volar_tree.query(target)[1]]
         organs, normals = np.empty_like(feet), np.empty_like(feet)
         unsolved = np.arange(len(feet))
         for _ in range(_MOST_STEPS):
             feet[unsolved], normals[unsolved], _ = self.mesh.on_skin(feet[unsolved])
-            organs[unsolved] = feet[unsolved] - self.mesh.receptor_depth_mm * normals[unsolved]
+            organs[unsolved] = feet[unsolved] - depth_mm * normals[unsolved]
             step = target[unsolved] - organs[unsolved][:, [0, 2]]
             far = np.abs(step).max(axis=1) > _EXACT_MM
             unsolved, step = unsolved[far], step[far]
@@ -85,10 +172,10 @@ class FreeReceptors:
                 "must lie on the volar skin of the mesh",
                 remedy=f"(x, z) = ({x:g}, {z:g}) mm does not",
             )
-        return self._around(organs, normals)
+        return organs, normals
 
     def read(self, places: Interpolation, values: FloatArray) -> FloatArray:
-        """Interpolate values (n_times, n_sheet) of `mesh.living_epidermis`: (n_times, n_sites)."""
+        """Interpolate values (n_times, n_sheet) of a sheet of elements: (n_times, n_sites)."""
         known = np.asarray(values, dtype=np.float64)[:, places.elements]
         return np.einsum("tsk,sk->ts", known, places.weights)
 
@@ -114,18 +201,16 @@ class FreeReceptors:
         corners = self.mesh.nodes_mm[self.mesh.skin_triangles]
         return 0.02 * float(np.median(np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2)))
 
-    @cached_property
-    def _middles(self) -> tuple[FloatArray, IntArray]:
-        """Middles of the elements around the end organs, mirrored ones too, and their rows."""
-        mesh = self.mesh
-        middles = mesh.nodes_mm[mesh.elements[mesh.living_epidermis]].mean(axis=1)
+    def _middles(self, sheet: IntArray) -> tuple[FloatArray, IntArray]:
+        """Middles of elements, mirrored ones too, and their rows."""
+        middles = self.mesh.nodes_mm[self.mesh.elements[sheet]].mean(axis=1)
         rows = np.arange(len(middles))
-        if mesh.full:
+        if self.mesh.full:
             return middles, rows
         return np.concatenate([middles, middles * [1.0, 1.0, -1.0]]), np.concatenate([rows, rows])
 
-    def _around(self, organs: FloatArray, normals: FloatArray) -> Interpolation:
-        middles, rows = self._middles
+    def _around(self, organs: FloatArray, normals: FloatArray, sheet: IntArray) -> Interpolation:
+        middles, rows = self._middles(sheet)
         count = min(_NEIGHBOURS, len(middles))
         away, near = cKDTree(middles).query(organs, k=count)
         away, near = away.reshape(len(organs), count), near.reshape(len(organs), count)
@@ -145,7 +230,8 @@ class FreeReceptors:
         system[:, :count, count:], system[:, count:, :count] = plane, np.swapaxes(plane, 1, 2)
         # At the end organ u and v are 0; the system is symmetric, so its solution is the row of weights.
         wanted = np.concatenate([np.hypot(u, v) ** 3, np.tile([1.0, 0.0, 0.0], (len(organs), 1))], axis=1)
-        return Interpolation(rows[near], _solved(system, wanted)[:, :count])
+        weights = _solved(system, wanted)[:, :count]
+        return Interpolation(rows[near], weights, np.einsum("nk,nki->ni", weights, middles[near]))
 
 
 def _solved(systems: FloatArray, wanted: FloatArray) -> FloatArray:

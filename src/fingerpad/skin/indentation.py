@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import field, replace
 from functools import cached_property, lru_cache
+from inspect import signature
 from itertools import pairwise
-from typing import Annotated, Any, cast
+from typing import Annotated, Any, ParamSpec, cast
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -20,7 +21,18 @@ from fingerpad.core.errors import InputError, shown
 from fingerpad.core.phases import from_onset
 from fingerpad.core.progress import NoProgress, Progress
 from fingerpad.core.threads import compiled_threads
-from fingerpad.core.values import Finite, Flag, FloatArray, Pair, Whole, choice, instance, limits
+from fingerpad.core.values import (
+    Finite,
+    Flag,
+    FloatArray,
+    Numbers,
+    Pair,
+    Whole,
+    choice,
+    instance,
+    limits,
+    positive,
+)
 from fingerpad.data import fingertip as published
 from fingerpad.data.tissues import DEFAULT_TISSUES
 from fingerpad.geometry.fingertip import Finger, Fingertip
@@ -38,13 +50,15 @@ from fingerpad.mechanics.materials import Tissues
 from fingerpad.mechanics.press import Deformation, press
 from fingerpad.mechanics.press_settings import PressSettings
 from fingerpad.mechanics.tissues import named_tissues
-from fingerpad.skin.fields import stored_fields
+from fingerpad.skin.fields import stored_fields, watched_elements
 from fingerpad.skin.sampling import SkinResponse, places_below, receptors_of
 
 CONTACT_POINT_MM = (published.CONTACT_POINT.value[0], 0.0)
 STEPS = {"quick": (5, 5), "standard": (8, 8), "paper": (8, 8)}
 
 LARGEST_TILT_DEG = 45.0
+
+_Given = ParamSpec("_Given")
 
 LOOKS_FOR_TOUCH = 8  # Times per sample of a motion aside at which first touch is looked for.
 FEWEST_ACROSS_BODY = 3  # Least number of elements across a body that is narrow along and across the finger.
@@ -79,6 +93,9 @@ class Touch:
     spin_deg : float
         Rotation of the indenter about its direction of pressing, after the tilt. At 0 a bar lies across the
         finger, at 90 along it; a positive spin turns the indenter's x axis from distal towards +z. [degrees]
+    receptor_depths_mm : tuple of float
+        Depths of end organs at which all quantities are wanted beside the border of epidermis and dermis:
+        they are kept in the layers that hold these depths. [mm]
     whole : bool
         Whether `solve` keeps all nodes and elements over time, unless it is told. No part of the key.
     progress : Progress, optional
@@ -88,8 +105,8 @@ class Touch:
     ------
     InputError
         If the axis misses the finger, the depth reaches the bone, an axis beside the midline or a spin that
-        breaks the symmetry meets half a finger, the elements are too long for the indenter or a groove, or
-        tilt, spin or friction is asked of a wire.
+        breaks the symmetry meets half a finger, the elements are too long for the indenter or a groove,
+        tilt, spin or friction is asked of a wire, or no tissue lies as deep as an end organ.
 
     Warns
     -----
@@ -107,6 +124,7 @@ class Touch:
     tilt_deg: Annotated[float, limits(-LARGEST_TILT_DEG, LARGEST_TILT_DEG)] = 0.0
     friction: Finite = 0.0
     spin_deg: Finite = 0.0
+    receptor_depths_mm: Numbers = ()
     whole: Flag = field(default=False, compare=False, repr=False)
     progress: SkipValidation[Progress | None] = field(default=None, compare=False, repr=False)
 
@@ -144,6 +162,10 @@ class Touch:
             )
         check_path(self.finger, self.stimulus, self.at_mm)
         self.settings.steps_ms(self.stimulus)
+        depths_mm = sorted({positive("receptor_depths_mm", depth, "mm") for depth in self.receptor_depths_mm})
+        object.__setattr__(self, "receptor_depths_mm", tuple(depths_mm))
+        if depths_mm:
+            watched_elements(self.mesh, depths_mm)
         warn_of_inertia(self.stimulus, self.tissues.layers, self.layers_mm)
 
     @property
@@ -205,11 +227,11 @@ class Touch:
             If a step cannot be solved.
         """
         mesh, whole = self.mesh, self.whole if whole is None else whole
-        sheet = mesh.living_epidermis.ravel()
+        watched = watched_elements(mesh, self.receptor_depths_mm)
         with (self.progress or NoProgress()).stage("press", 1) as advance:
-            done = self._press(np.arange(len(mesh.elements)) if whole else sheet, threads)
+            done = self._press(np.arange(len(mesh.elements)) if whole else watched, threads)
             advance()
-        kept = replace(done, fields=done.fields.of(sheet)) if whole else done
+        kept = replace(done, fields=done.fields.of(watched)) if whole else done
         return self.response(
             {field.name: field.stored_values(kept, mesh) for field in stored_fields()},
             force_imbalance=done.force_imbalance,
@@ -233,6 +255,7 @@ class Touch:
             direction=rotation_of(self.tilt_deg, self.spin_deg)[:, 1].copy(),
             fields=fields,
             touch=self,
+            receptor_depths_mm=self.receptor_depths_mm,
             **solution,
         )
 
@@ -313,6 +336,7 @@ def touch_of(
     grading: Grading | None = None,
     settings: PressSettings | None = None,
     times_ms: Sequence[float] = (),
+    receptor_depths_mm: Sequence[float] = (),
     whole: Flag = False,
     progress: Progress | None = None,
 ) -> Touch:
@@ -335,29 +359,29 @@ def touch_of(
         tilt_deg=tilt_deg,
         friction=friction,
         spin_deg=spin_deg,
+        receptor_depths_mm=tuple(receptor_depths_mm),
         whole=whole,
         progress=progress,
     )
 
 
+def _with_arguments_of(
+    described: Callable[_Given, Touch],
+) -> Callable[[Callable[..., SkinResponse]], Callable[_Given, SkinResponse]]:
+    """Give a function the arguments of another one, for `help`, editors and type checkers too."""
+
+    def made(function: Callable[..., SkinResponse]) -> Callable[_Given, SkinResponse]:
+        arguments = signature(described).replace(return_annotation="SkinResponse")
+        function.__signature__ = arguments  # type: ignore[attr-defined]
+        function.__annotations__ = {**described.__annotations__, "return": "SkinResponse"}
+        return function
+
+    return made
+
+
 @checked
-def indent(
-    finger: Finger,
-    indenter: Indenter,
-    stimulus: Stimulus | None = None,
-    tissues: str | Tissues = DEFAULT_TISSUES,
-    resolution: Annotated[str, choice(RESOLUTIONS)] = "quick",
-    at_mm: Pair | None = None,
-    *,
-    tilt_deg: Finite = 0.0,
-    spin_deg: Finite = 0.0,
-    friction: Finite = 0.0,
-    grading: Grading | None = None,
-    settings: PressSettings | None = None,
-    times_ms: Sequence[float] = (),
-    whole: Flag = False,
-    progress: Progress | None = None,
-) -> SkinResponse:
+@_with_arguments_of(touch_of)
+def indent(*args: Any, **given: Any) -> SkinResponse:
     """Press an indenter into a finger and return the response of the skin.
 
     Parameters
@@ -393,6 +417,8 @@ def indent(
         steps that keep the error of SED in time below 1 % of its largest value.
     times_ms : sequence of float
         Times that the response has beside those that the motion and the settings choose. [ms]
+    receptor_depths_mm : sequence of float
+        Depths of end organs at which all quantities shall be kept, see `SkinResponse.sample`. [mm]
     whole : bool
         Whether to keep all nodes and elements over time as well, see `Touch.solve`.
     progress : Progress, optional
@@ -410,11 +436,7 @@ def indent(
     >>> print(f"{skin.surface_profile().deflection_mm.max():.1f} mm deep")
     0.3 mm deep
     """
-    return touch_of(
-        finger, indenter, stimulus, tissues, resolution, at_mm, tilt_deg=tilt_deg, spin_deg=spin_deg,
-        friction=friction, grading=grading, settings=settings, times_ms=times_ms, whole=whole,
-        progress=progress,
-    ).solve()  # fmt: skip
+    return touch_of(*args, **given).solve()
 
 
 def settings_of(resolution: str) -> PressSettings:

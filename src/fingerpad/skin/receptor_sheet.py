@@ -1,4 +1,4 @@
-"""End organs in the living epidermis, below points of the skin or by their own x and z.
+"""End organs at a depth, that of the living epidermis by default, below points of the skin or by x and z.
 
 The sheet of living epidermis is one element thick and has rows along the finger and columns around it. The
 coordinates (u, v) count them and are whole numbers at the middles of the elements. One cubic spline
@@ -11,6 +11,11 @@ that are linear in space are interpolated exactly.
   the skin meets the border, S(u, v) - t n = B(u', v').
 
 Its value is f(u, v) or f(u', v').
+
+An end organ at another depth d lies at P = S(u, v) - d n, in one layer of tissue. The line along n crosses
+the middles M_k of each sheet k of this layer at (u_k, v_k) and at the depth d_k. Its value is linear in depth
+between the two f_k(u_k, v_k) that enclose d, and that of the nearest sheet beyond the first or last one. No
+other layer is read, because SED jumps at borders; a depth on a border belongs to the layer above it.
 
 Beyond the rim of the sheet the spline is continued: by mirroring where the body is halved, around it where it
 is closed, through the pole at the tip, and otherwise along a straight line.
@@ -34,6 +39,7 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property, partial
+from typing import Any
 
 import numpy as np
 from numba import njit
@@ -160,6 +166,7 @@ _SITES_PER_BLOCK = 4096  # Sites that one thread locates at once.
 _MOST_STEPS = 60
 _LONGEST_STEP = 2.0  # elements
 _EXACT_MM = 1e-9
+_DIFFERENCE = 1e-4  # Step in u and v by which normals are differentiated.
 _BEYOND_RIM = 0.9  # elements past the last middle that are tried; the mesh's bounds decide
 _OFF_THE_SKIN = 0.25
 """How far beside the skin of the mesh a site may lie, over the size of its elements, which cut corners."""
@@ -171,6 +178,16 @@ Equations = Callable[[FloatArray, np.ndarray], tuple[FloatArray, FloatArray]]
 
 Surface = Callable[[FloatArray], FloatArray]
 """From (u, v) (n, 2) to points of a surface and their derivatives by u and by v, (3, n, 3)."""
+
+
+@dataclass(frozen=True)
+class Part:
+    """Some of the end organs, and what they read in some of the elements."""
+
+    elements: IntArray  # Elements whose values `places` read.
+    organs: IntArray | slice  # Rows of the sites.
+    places: Any  # Places in these elements, of `ReceptorSheet.below` for example.
+    weights: FloatArray | float  # Share of these elements in the value of each end organ.
 
 
 @dataclass(frozen=True)
@@ -188,6 +205,46 @@ class ReceptorSheet:
 
     def below(self, sites_mm: FloatArray) -> FloatArray:
         """Find end organs below points of the skin, on any side of the finger."""
+        return self._below(self._above(sites_mm))
+
+    def under(self, organs_mm: FloatArray) -> FloatArray:
+        """Find end organs by their own x and z, on the volar side."""
+        return self._facing_down(organs_mm, lambda uv, _: self._centre(uv))
+
+    def at(self, sites_mm: FloatArray, depth_mm: FloatArray) -> list[Part]:
+        """Find end organs at a depth each, below points of the skin (n, 3) or by their own x and z (n, 2)."""
+        if sites_mm.shape[1] == 3:
+            uv = self._above(sites_mm)
+        else:
+            uv = self._facing_down(sites_mm, lambda uv, which: self._sunk(uv, depth_mm[which]))
+        borders, layers = self._layers
+        # Layers are offset from the skin by exact distances.
+        layer = np.searchsorted(borders, depth_mm - _EXACT_MM)
+        deepest = layer == len(borders)
+        missed = deepest.copy()
+        missed[deepest] = self._crossed(self._level(-1), uv[deepest])[1] < depth_mm[deepest] - _EXACT_MM
+        parts: list[Part] = []
+        for number in np.unique(layer):
+            organs, sheets = np.flatnonzero(layer == number), layers[number]
+            crossed = [self._crossed(self._middles_of(sheet), uv[organs]) for sheet in sheets]
+            depths = np.stack([depth for _, depth, _ in crossed])
+            for sheet, (places, _, lost), weights in zip(
+                sheets, crossed, _enclosing(depths, depth_mm[organs]), strict=True
+            ):
+                some = weights > 0.0
+                missed[organs[some & lost]] = True
+                parts.append(Part(sheet.ravel(), organs[some], places[some], weights[some]))
+        if missed.any():
+            place = ", ".join(f"{each:g}" for each in sites_mm[np.argmax(missed)])
+            raise InputError(
+                "depth_mm",
+                "must lie in the tissue, between the skin and the bone",
+                f"{depth_mm[np.argmax(missed)]:g} mm at ({place}) mm",
+            )
+        return [part for part in parts if len(part.places)]
+
+    def _above(self, sites_mm: FloatArray) -> FloatArray:
+        """(u, v) of points of the skin."""
         target = self._in_mesh(sites_mm)
         start = self._middles[_nearest(self._skin(self._middles)[0], target)]
         uv, missed = self._solve(lambda uv, which: _tangential(self._skin(uv), target[which]), start)
@@ -203,14 +260,14 @@ class ReceptorSheet:
                 "must lie on the skin of the mesh",
                 remedy=f"(x, y, z) = ({x:g}, {y:g}, {z:g}) mm is {away[first]:.2g} mm beside it",
             )
-        return self._below(uv)
+        return uv
 
-    def under(self, organs_mm: FloatArray) -> FloatArray:
-        """Find end organs by their own x and z, on the volar side."""
+    def _facing_down(self, organs_mm: FloatArray, surface: Callable[..., FloatArray]) -> FloatArray:
+        """(u, v) at which a surface has some x and z, on the volar side."""
         target = self._in_mesh(organs_mm)
         volar = self._middles[self._volar.ravel()]
         start = volar[_nearest(self._centre(volar)[0][:, [0, 2]], target)]
-        uv, missed = self._solve(lambda uv, which: _projected(self._centre(uv), target[which]), start)
+        uv, missed = self._solve(lambda uv, which: _projected(surface(uv, which), target[which]), start)
         missed |= self._turn(uv) * self._volar_sign <= 0.0
         missed |= self._past_the_rim(target)
         if missed.any():
@@ -237,6 +294,34 @@ class ReceptorSheet:
         t = ((skin - self._border(uv)[0]) * normal).sum(axis=1, keepdims=True)
         target = skin - t * normal
         return self._solve(lambda uv, which: _tangential(self._border(uv), target[which]), uv)[0]
+
+    def _sunk(self, uv: FloatArray, depth_mm: FloatArray) -> FloatArray:
+        """Points at depths below the skin along its normal, and their derivatives, as of `Surface`."""
+
+        def at(uv: FloatArray) -> FloatArray:
+            return self._skin(uv)[0] - depth_mm[:, None] * self._outward(uv)
+
+        by_u, by_v = (at(uv + step) - at(uv - step) for step in 0.5 * _DIFFERENCE * np.eye(2))
+        return np.stack([at(uv), by_u / _DIFFERENCE, by_v / _DIFFERENCE])
+
+    def _crossed(self, surface: Surface, uv: FloatArray) -> tuple[FloatArray, FloatArray, np.ndarray]:
+        """Where the normals of the skin at (u, v) cross a surface, at which depth, and which do not."""
+        skin, *slopes = self._skin(uv)
+        tangents, normal = np.stack(slopes, axis=1), self._outward(uv)
+        found, missed = self._solve(
+            lambda uv, which: _tangential(surface(uv), skin[which], tangents[which]), uv
+        )
+        return found, ((skin - surface(found)[0]) * normal).sum(axis=1), missed
+
+    @cached_property
+    def _layers(self) -> tuple[FloatArray, list[list[IntArray]]]:
+        """Depths of the borders between layers, and the sheets of each layer, from the skin inwards. [mm]"""
+        mesh, n_through = self.mesh, self.mesh.shape[2]
+        numbers = np.arange(len(mesh.elements)).reshape(mesh.shape)
+        levels = np.flatnonzero(np.diff(mesh.layer[:n_through])) + 1
+        # Where the skin turns sharply, columns are inclined and longer.
+        borders = mesh.node_depth_mm[mesh.grid[:, :, levels]].min(axis=(0, 1))
+        return borders, [[numbers[:, :, k] for k in each] for each in np.split(np.arange(n_through), levels)]
 
     def _solve(self, equations: Equations, start: FloatArray) -> tuple[FloatArray, np.ndarray]:
         """(u, v) of every site by Newton's method, and whether it did not converge, bool (n,)."""
@@ -378,12 +463,19 @@ class ReceptorSheet:
 
     @cached_property
     def _skin(self) -> Surface:
-        return _surface(self._padded_points(0))
+        return self._level(0)
+
+    def _level(self, through: int) -> Surface:
+        """Points of one level of the grid's nodes."""
+        return _surface(self._padded_points(through))
 
     @cached_property
     def _centre(self) -> Surface:
-        """Points of the surface through the elements' middles."""
-        centres = self.mesh.nodes_mm[self.mesh.elements[self.mesh.living_epidermis]].mean(axis=2)
+        return self._middles_of(self.mesh.living_epidermis)
+
+    def _middles_of(self, sheet: IntArray) -> Surface:
+        """Points of the surface through the middles of a sheet of elements."""
+        centres = self.mesh.nodes_mm[self.mesh.elements[sheet]].mean(axis=2)
         pole = centres[-1].mean(axis=0) * [1.0, 1.0, float(self.mesh.full)]
         return _surface(self._control(centres, _MIRROR, pole))
 
@@ -391,7 +483,7 @@ class ReceptorSheet:
     def _border(self) -> Surface:
         """Points B of the border, where the sheet's elements begin."""
         lower = self.mesh.elements[self.mesh.living_epidermis[0, 0], 0]
-        return _surface(self._padded_points(int(np.flatnonzero(self.mesh.grid[0, 0] == lower)[0])))
+        return self._level(int(np.flatnonzero(self.mesh.grid[0, 0] == lower)[0]))
 
     def _outward(self, uv: FloatArray) -> FloatArray:
         point, by_u, by_v = self._skin(uv)
@@ -441,11 +533,28 @@ def _straight_on(values: FloatArray, inner: int, outer: int, axis: int) -> Float
     return end + np.arange(1.0, _PADDING + 1).reshape((-1, 1, 1)[: 3 - axis]) * (end - before)
 
 
-def _tangential(surface: FloatArray, target: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Distance from a target along both tangents of a surface, and its Jacobian at fixed tangents."""
+def _enclosing(depths: FloatArray, depth: FloatArray) -> FloatArray:
+    """Weights (m, n) of sheets at increasing depths (m, n): linear in between, the nearest sheet beyond."""
+    last, organs = len(depths) - 1, np.arange(depth.size)
+    upper = np.clip((depths < depth).sum(axis=0) - 1, 0, last)
+    lower = np.minimum(upper + 1, last)
+    gap = depths[lower, organs] - depths[upper, organs]
+    share = np.clip((depth - depths[upper, organs]) / np.where(gap > 0.0, gap, np.inf), 0.0, 1.0)
+    weights = np.zeros_like(depths)
+    weights[upper, organs] = 1.0 - share
+    weights[lower, organs] += share
+    return weights
+
+
+def _tangential(
+    surface: FloatArray, target: FloatArray, tangents: FloatArray | None = None
+) -> tuple[FloatArray, FloatArray]:
+    """Distance from a target along both tangents, by default those of a surface, and its Jacobian."""
+    # The Jacobian is taken at fixed tangents.
     point, *slopes = surface
     slope = np.stack(slopes, axis=1)
-    tangent = slope / np.linalg.norm(slope, axis=2, keepdims=True)
+    tangent = slope if tangents is None else tangents
+    tangent = tangent / np.linalg.norm(tangent, axis=2, keepdims=True)
     excess = (tangent * (point - target)[:, None]).sum(axis=2)
     return excess, np.einsum("nik,njk->nij", tangent, slope)
 

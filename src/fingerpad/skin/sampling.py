@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property, lru_cache
 from typing import TYPE_CHECKING, Annotated, Any, Protocol, cast, runtime_checkable
@@ -21,6 +21,7 @@ from fingerpad.core.values import (
     Check,
     FiniteVector,
     FloatArray,
+    IntArray,
     Many,
     Number,
     Numbers,
@@ -33,8 +34,8 @@ from fingerpad.geometry.mesh import Mesh
 from fingerpad.geometry.motion import STILL, Pose
 from fingerpad.mechanics.tissues import name_of_tissues
 from fingerpad.skin.caveats import Caveat, caveats_of
-from fingerpad.skin.fields import Place, sampled_fields, stored_fields
-from fingerpad.skin.receptor_sheet import ReceptorSheet
+from fingerpad.skin.fields import FIELDS, Place, sampled_fields, stored_fields, watched_elements
+from fingerpad.skin.receptor_sheet import Part, ReceptorSheet
 from fingerpad.skin.section import SURFACE_QUANTITIES, Section, SurfaceMotion, middle_section
 
 if TYPE_CHECKING:
@@ -67,8 +68,12 @@ class Receptors(Protocol):
         """Find end organs by their own x and z on the volar side, (n_sites, 2)."""
         ...
 
+    def at(self, sites_mm: FloatArray, depth_mm: FloatArray) -> list[Part]:
+        """Find end organs at a depth each, as of `below` or `under`."""
+        ...
+
     def read(self, places: Any, values: FloatArray) -> FloatArray:
-        """Interpolate values of `mesh.living_epidermis`, (n_times, n_sheet), at places found."""
+        """Interpolate values of the elements in which places were found, (n_times, n_elements)."""
         ...
 
 
@@ -143,6 +148,8 @@ class SkinResponse(Result):
         What was solved: indenter, motion, tissues.
     onset_ms : float
         Time of first touch. [ms]
+    receptor_depths_mm : tuple of float
+        Depths at which all quantities are kept beside the border of epidermis and dermis. [mm]
     """
 
     mesh: Mesh
@@ -161,15 +168,22 @@ class SkinResponse(Result):
     pose: Pose = STILL
     touch: Touch | None = None
     onset_ms: Number = 0.0
+    receptor_depths_mm: Numbers = ()
 
     def __post_init__(self) -> None:
         declared = {field.name: field for field in stored_fields()}
         for name, values in self.fields.items():
-            shape = declared[one_of("field", name, tuple(declared))].shape(self.mesh, self.times_ms.size)
+            field = declared[one_of("field", name, tuple(declared))]
+            shape = field.shape(self.mesh, self.times_ms.size, self.watched_elements.size)
             if values.shape != shape:
                 raise InputError(f"Field {name} must have the shape {shape}: got {values.shape}.")
             if not np.isfinite(values).all():
                 raise InputError(f"Field {name} must be finite everywhere: some values are not.")
+
+    @cached_property
+    def watched_elements(self) -> IntArray:
+        """Elements in which all quantities are kept: the sheet of the living epidermis first."""
+        return watched_elements(self.mesh, self.receptor_depths_mm)
 
     @cached_property
     def caveats(self) -> tuple[Caveat, ...]:
@@ -296,14 +310,20 @@ class SkinResponse(Result):
         return middle_section(self.mesh, self.displacement_mm)
 
     def sed(
-        self, sites: ArrayLike, dynamic_quantity: str = STORED_ENERGY, static_quantity: str = STORED_ENERGY
+        self,
+        sites: ArrayLike,
+        dynamic_quantity: str = STORED_ENERGY,
+        static_quantity: str = STORED_ENERGY,
+        depth_mm: ArrayLike | None = None,
     ) -> Traces:
-        """Strain energy density in the living epidermis below points of the undeformed skin.
+        """Strain energy density at end organs below points of the undeformed skin.
 
-        End organs lie on the epidermal-dermal border and move with the tissue. A pair gives an organ's own x
-        and z, a triple the point of the skin from which it lies 0.471 mm deep along the normal. The means of
-        the elements just above the border (0.371 to 0.471 mm deep) are interpolated along it by a cubic
-        spline, and never across it, where SED jumps.
+        End organs lie on the epidermal-dermal border, or `depth_mm` deep, and move with the tissue. A pair
+        gives an organ's own x and z, a triple the point of the skin from which it lies 0.471 mm or `depth_mm`
+        deep along the normal. The means of the elements just above the border (0.371 to 0.471 mm deep) are
+        interpolated along it by a cubic spline, and never across it, where SED jumps. At other depths the
+        value is linear between the middles of the elements of one layer, and constant from the last middle to
+        the border. A depth on a border belongs to the layer above it.
 
         Parameters
         ----------
@@ -311,13 +331,24 @@ class SkinResponse(Result):
             x and z of end organs on the volar side, or x, y and z of the skin above them on any side. [mm]
         dynamic_quantity, static_quantity : str, optional
             What drives the dynamic and the static response, names of `sample`. Default: SED, as in the paper.
+        depth_mm : float or array (n_sites,), optional
+            Depth of the end organs below the undeformed skin, along its normal, from the surface to the bone.
+            By default they lie on the border of epidermis and dermis. [mm]
 
         Returns
         -------
         Traces
             One column per site, with the end of the ramp as kink.
+
+        Examples
+        --------
+        >>> import fingerpad as fp
+        >>> skin = fp.indent(fp.Fingertip(), fp.Sphere(curvature_per_m=287), fp.RampAndHold(depth_mm=0.3))
+        >>> deep = skin.sed([(17.37, 0.0)], depth_mm=1.2)
+        >>> bool(deep.values[-1, 0] < skin.sed([(17.37, 0.0)]).values[-1, 0])
+        True
         """
-        static, *other = self._read(dict.fromkeys((static_quantity, dynamic_quantity)), sites)
+        static, *other = self._read(dict.fromkeys((static_quantity, dynamic_quantity)), sites, depth_mm)
         dynamic = Traces(self.times_ms, other[0], quantity=dynamic_quantity) if other else None
         return Traces(
             self.times_ms,
@@ -329,10 +360,12 @@ class SkinResponse(Result):
             self.onset_ms,
         )
 
-    def sample(self, quantity: str, sites: ArrayLike) -> FloatArray:
+    def sample(self, quantity: str, sites: ArrayLike, depth_mm: ArrayLike | None = None) -> FloatArray:
         """Sample a quantity that may drive an afferent below points of the skin, (n_times, n_sites).
 
-        The interpolation is that of `sed`; the stored energy density is one of the quantities.
+        The interpolation is that of `sed`; the stored energy density is one of the quantities. It is kept at
+        all depths. The other quantities of the tissue are kept on the border of epidermis and dermis and in
+        the layers of the depths that `receptor_depths_mm` gave to `indent`.
 
         Parameters
         ----------
@@ -344,29 +377,52 @@ class SkinResponse(Result):
             "skin_stretch" (largest tensile strain within the surface).
         sites : array (n_sites, 2) or (n_sites, 3)
             x and z of end organs on the volar side, or x, y and z of the skin above them on any side. [mm]
+        depth_mm : float or array (n_sites,), optional
+            As of `sed`. Quantities of the surface have no depth: they are those of the skin above. [mm]
         """
-        return self._read([quantity], sites)[0]
+        return self._read([quantity], sites, depth_mm)[0]
 
-    def _read(self, quantities: Iterable[str], sites: ArrayLike) -> list[FloatArray]:
+    def _read(
+        self, quantities: Iterable[str], sites: ArrayLike, depth_mm: ArrayLike | None
+    ) -> list[FloatArray]:
         """Several quantities at the same sites, (n_times, n_sites) each."""
-        known = [self._of_sheet(quantity) for quantity in quantities]
-        places = places_below(self._receptors, sites)
-        read = [self._receptors.read(places, values) for values in known]
-        for values in read:
+        held = {name: field.name for name, field in sampled_fields().items() if field.name in self.fields}
+        for quantity in quantities:
+            one_of("quantity", quantity, (*held, *SURFACE_QUANTITIES))
+            if depth_mm is not None and quantity in SURFACE_QUANTITIES:
+                raise InputError("depth_mm", f"must be left out for {quantity}, which is that of the surface")
+        parts = places_below(self._receptors, sites, depth_mm)
+        read = []
+        for quantity in quantities:
+            values = np.zeros((self.times_ms.size, len(np.asarray(sites))))
+            for part in parts:
+                known = self._in_elements(quantity, held.get(quantity, ""), part.elements, depth_mm)
+                values[:, part.organs] += part.weights * self._receptors.read(part.places, known)
             # A spline may dip below zero beside a steep front; no quantity can.
             np.maximum(values, 0.0, out=values)
             values.setflags(write=False)
+            read.append(values)
         return read
 
-    def _of_sheet(self, quantity: str) -> FloatArray:
-        """One quantity in the elements `mesh.living_epidermis` or above them, (n_times, n_sheet)."""
-        held = {name: field for name, field in sampled_fields().items() if field.name in self.fields}
-        one_of("quantity", quantity, (*held, *SURFACE_QUANTITIES))
+    def _in_elements(
+        self, quantity: str, name: str, elements: IntArray, depth_mm: ArrayLike | None
+    ) -> FloatArray:
+        """One quantity in elements, or above those of the living epidermis, (n_times, n_elements)."""
         if quantity in SURFACE_QUANTITIES:
             return self._surface.below(quantity)
-        field = held[quantity]
-        values = self.fields[field.name]
-        return values if field.place is Place.WATCHED else values[:, self.mesh.living_epidermis.ravel()]
+        if FIELDS[name].place is not Place.WATCHED:
+            return self.fields[name][:, elements]
+        row = np.full(len(self.mesh.elements), -1)
+        row[self.watched_elements] = np.arange(self.watched_elements.size)
+        if (row[elements] < 0).any():
+            lacking = ", ".join(f"{each:g}" for each in np.unique(np.asarray(depth_mm, dtype=float))[:3])
+            raise InputError(
+                "depth_mm",
+                f"must be one at which the press kept {quantity}",
+                f"{lacking} mm",
+                f"press with receptor_depths_mm=({lacking},)",
+            )
+        return self.fields[name][:, row[elements]]
 
     @cached_property
     def _surface(self) -> SurfaceMotion:
@@ -387,7 +443,7 @@ def receptors_of(mesh: Mesh) -> Receptors:
     return FreeReceptors(cast("FreeMesh", mesh))
 
 
-def places_below(receptors: Receptors, sites: ArrayLike) -> Any:
+def places_below(receptors: Receptors, sites: ArrayLike, depth_mm: ArrayLike | None = None) -> Sequence[Part]:
     """Find end organs by their x and z on the volar side, or below x, y and z of the skin."""
     points = float_array("sites", sites, None)
     if points.ndim != 2 or points.shape[1] not in (2, 3):
@@ -396,7 +452,16 @@ def places_below(receptors: Receptors, sites: ArrayLike) -> Any:
             "must be a list of places, such as [(x, z)] or [(x, y, z)], in mm",
             f"shape {points.shape}",
         )
-    return _places_of(_Sites(receptors, points))
+    if depth_mm is None:
+        return _places_of(_Sites(receptors, points))
+    depths = float_array("depth_mm", depth_mm, None)
+    if depths.shape not in ((), (len(points),)):
+        raise InputError(
+            "depth_mm", f"must be one number or one per site, {len(points)}", f"shape {depths.shape}"
+        )
+    if (depths <= 0.0).any():
+        raise InputError("depth_mm", "must be greater than 0", f"{depths.min():g} mm")
+    return _places_of(_Sites(receptors, points, np.broadcast_to(depths, len(points))))
 
 
 class _Sites:
@@ -404,9 +469,10 @@ class _Sites:
 
     # Presses of one object at several depths or stiffnesses have equal meshes.
 
-    def __init__(self, receptors: Receptors, points: FloatArray):
-        self.receptors, self.points, mesh = receptors, points, receptors.mesh
-        parts = (mesh.nodes_mm, mesh.elements, mesh.living_epidermis, mesh.symmetry_nodes, points)
+    def __init__(self, receptors: Receptors, points: FloatArray, depths: FloatArray | None = None):
+        self.receptors, self.points, self.depths, mesh = receptors, points, depths, receptors.mesh
+        parts = [mesh.nodes_mm, mesh.elements, mesh.living_epidermis, mesh.symmetry_nodes, points]
+        parts += [] if depths is None else [mesh.layer, depths]
         content = hashlib.blake2b(repr((mesh.full, [part.shape for part in parts])).encode())
         for part in parts:
             content.update(np.ascontiguousarray(part).tobytes())
@@ -420,7 +486,10 @@ class _Sites:
 
 
 @lru_cache(maxsize=_PLACES_KEPT)
-def _places_of(sites: _Sites) -> Any:
+def _places_of(sites: _Sites) -> Sequence[Part]:
     """Find the end organs, which takes longer than to read their values."""
     receptors, points = sites.receptors, sites.points
-    return receptors.under(points) if points.shape[1] == 2 else receptors.below(points)
+    if sites.depths is not None:
+        return receptors.at(points, sites.depths)
+    places = receptors.under(points) if points.shape[1] == 2 else receptors.below(points)
+    return [Part(receptors.mesh.living_epidermis.ravel(), slice(None), places, 1.0)]

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from functools import cached_property
 from importlib.resources import files
 from pathlib import Path
@@ -206,7 +207,9 @@ class DiscriminationRequest(Request, StimulusSet):
     def settings(self) -> Conditions:
         """Finger, tissues, accuracy and seed."""
         with self.origin.located():
-            return self.conditions(self.experiment.seed, self.beside)
+            found = self.conditions(self.experiment.seed, self.beside)
+            laid = population_of(self.afferents, self.tissues, self.beside, found.finger)
+            return replace(found, receptor_depths_mm=laid.kept_depths_mm)
 
     @cached_property
     def pressed(self) -> tuple[NamedStimulus, ...]:

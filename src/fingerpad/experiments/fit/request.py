@@ -94,6 +94,8 @@ class FitRequest(Request, FingerDescription):
         The bar and how it is pressed, where the stimuli are the bar.
     afferent : str or AnyAfferent
         Type of the afferent for `free`, a file of results, numbers, or an afferent of Python.
+    depth_mm : float, optional
+        Depth of the receptor below the skin; by default the border of epidermis and dermis. [mm]
     free : list of str
         Fit these numbers of the afferent alone; by default the four that spikes of an SAI determine.
     dynamic_quantity, static_quantity : str, optional
@@ -124,6 +126,7 @@ class FitRequest(Request, FingerDescription):
     object: ObjectPart | None = None
     motion: MotionPart | None = None
     afferent: AfferentChoice = DEFAULT
+    depth_mm: Positive | None = None
     free: Annotated[tuple[Text, ...], Strict(False), BeforeValidator(as_list)] = ()
     dynamic_quantity: Annotated[str, choice(QUANTITIES)] | None = None
     static_quantity: Annotated[str, choice(QUANTITIES)] | None = None
@@ -262,7 +265,8 @@ class FitRequest(Request, FingerDescription):
     @cached_property
     def settings(self) -> Conditions:
         """Finger, tissues, accuracy and seed."""
-        return replace(self.presented.conditions, seed=self.seed)
+        depths_mm = () if self.depth_mm is None else (self.depth_mm,)
+        return replace(self.presented.conditions, seed=self.seed, receptor_depths_mm=depths_mm)
 
     @property
     def quantities(self) -> tuple[str, str]:
@@ -294,7 +298,7 @@ def run_fit(request: FitRequest, runner: Runner, command: str | None = None) -> 
     offsets_mm = OFFSETS_MM if request.offset else (0.0,)
     x_mm, z_mm = request.settings.finger.contact_mm
     sites = [[x_mm + offset, z_mm] for offset in offsets_mm]
-    sampled = [skin.sed(sites, *request.quantities) for skin in skins.values()]
+    sampled = [skin.sed(sites, *request.quantities, depth_mm=request.depth_mm) for skin in skins.values()]
     beside = {
         offset: [traces.part(slice(place, place + 1)) for traces in sampled]
         for place, offset in enumerate(offsets_mm)
@@ -364,7 +368,7 @@ def _fit_chosen_numbers(
 ) -> ChosenNumbersFile:
     """Fit the numbers `request.free` of an afferent."""
     site = [request.settings.finger.contact_mm]
-    traces = [skin.sed(site, *request.quantities) for skin in skins.values()]
+    traces = [skin.sed(site, *request.quantities, depth_mm=request.depth_mm) for skin in skins.values()]
     rates, windows_ms = request.rates, request.used_windows_ms
     with runner.stage("fit", 1) as advance:
         folds = request.memberships

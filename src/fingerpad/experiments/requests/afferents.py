@@ -78,6 +78,8 @@ class PopulationSettings(Part):
     """Of a grid: along the finger and across, the paper's by default; or how many rows along the nail."""
     region: RegionSettings | None = None
     """What any other layout fills."""
+    depth_mm: Positive | None = None
+    """Depth of the end organs below the skin; the border of epidermis and dermis by default. [mm]"""
     offset_mm: Pair = (0.0, 0.0)
     """Middle of grid, rectangle or ellipse from the middle of the pad, along the finger and across. [mm]"""
     jitter: NotNegative | None = None
@@ -247,6 +249,7 @@ def _laid(
         laid = _grid(settings, afferent, finger or Fingertip())
     else:
         laid = _lay(settings, afferent, place, finger or Fingertip())
+    laid = replace(laid, depth_mm=settings.depth_mm)
     if settings.sensitivity_spread == 0.0:
         return laid
     return replace(laid, sensitivity=sensitivities(len(laid), settings.sensitivity_spread, settings.seed))

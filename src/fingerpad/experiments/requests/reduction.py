@@ -101,6 +101,11 @@ class ReductionRequest(Request, StimulusDescription, FingerDescription):
     def population(self) -> Population:
         """The afferents."""
         with self.origin.located():
+            if self.afferents.depth_mm is not None:
+                raise InputError(
+                    ("afferents", "depth_mm"),
+                    "must be left out, because a reduced touch keeps the border of epidermis and dermis alone",
+                )
             return population_of(self.afferents, self.tissues, self.beside, self.training.touch.finger)
 
     @property

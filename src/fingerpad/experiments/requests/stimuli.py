@@ -230,7 +230,8 @@ def touches_of(
 def pressed_with(stimulus: NamedStimulus, conditions: Conditions, grading: Grading | None) -> Touch:
     """Touch of one stimulus on a given mesh; `InputError` with its place in the file if it cannot be."""
     with moved(stimulus.in_file):
-        return stimulus.touch(conditions.finger, conditions.tissues, conditions.resolution, grading)
+        pressed = conditions.finger, conditions.tissues, conditions.resolution, grading
+        return stimulus.touch(*pressed, receptor_depths_mm=conditions.receptor_depths_mm)
 
 
 def _grading(

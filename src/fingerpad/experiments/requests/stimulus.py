@@ -320,6 +320,7 @@ class TactileStimulus:
         resolution: str,
         grading: Grading | None = None,
         times_ms: Sequence[float] = (),
+        receptor_depths_mm: Sequence[float] = (),
     ) -> Touch:
         """Describe the touch for the solver."""
         with about():
@@ -335,6 +336,7 @@ class TactileStimulus:
                 friction=self.friction,
                 spin_deg=self.spin_deg,
                 times_ms=times_ms,
+                receptor_depths_mm=receptor_depths_mm,
             )
 
 

@@ -109,10 +109,15 @@ class TouchRequest(Request, StimulusDescription, FingerDescription):
             )
 
     @cached_property
+    def _laid(self) -> Population:
+        with self.origin.located():
+            return population_of(self.afferents, self.tissues, self.beside, self.pressed_finger)
+
+    @cached_property
     def population(self) -> Population:
         """The afferents."""
+        laid = self._laid
         with self.origin.located():
-            laid = population_of(self.afferents, self.tissues, self.beside, self.pressed_finger)
             check_noise(self.afferents, laid)
         with self.origin.located(), at("afferents", "windows_ms"):
             for window in rate_windows_ms(self.touch.stimulus.phases, *self.afferents.windows_ms.both):

@@ -9,7 +9,7 @@ import numpy as np
 from fingerpad.core.errors import InputError
 from fingerpad.experiments.requests.touch import estimate_press
 from fingerpad.experiments.sweep.request import SweepRequest
-from fingerpad.skin.fields import Place, stored_fields
+from fingerpad.skin.fields import Place, stored_fields, watched_elements
 
 MOST_LOOKED_AT = 8  # Presses whose meshes are built for the estimate, spread evenly over the sweep.
 CORES = 2  # Cores that the time of a single press is for. On one of them it takes twice as long at most.
@@ -47,9 +47,11 @@ def estimate_sweep(sweep: SweepRequest, processes: int) -> SweepEstimate:
             found.append(estimate_press(described))
         except InputError:
             continue  # it fails at once, and its reason is in the result
+        mesh = described.touch.mesh
+        watched = watched_elements(mesh, described.touch.receptor_depths_mm)
         bytes_each.append(
             sum(
-                np.prod(field.shape(described.touch.mesh, found[-1].steps + 1), dtype=float)
+                np.prod(field.shape(mesh, found[-1].steps + 1, watched.size), dtype=float)
                 * (8 if field.place is Place.PRESS else 4)
                 for field in stored_fields()
             )

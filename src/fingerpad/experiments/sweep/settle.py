@@ -15,20 +15,19 @@ from fingerpad.core.errors import ConvergenceError, InputError
 from fingerpad.core.signals import ResponseMap
 from fingerpad.experiments.requests.touch import TouchRequest
 from fingerpad.experiments.sweep.request import SweepRequest
-from fingerpad.geometry.mesh import Mesh
 from fingerpad.skin.fields import FIELDS, Place
 from fingerpad.skin.sampling import SkinResponse
 from fingerpad.skin.store import Store
 
 TRACES = ("times_ms", "force_mn", "depth_mm", "contact_area_mm2")  # Fields that every sweep keeps.
 
-PLACES_MM: dict[Place, tuple[str, Callable[[Mesh], np.ndarray]]] = {
-    Place.NODE: ("node_mm", lambda mesh: mesh.nodes_mm),
-    Place.SKIN_NODE: ("skin_node_mm", lambda mesh: mesh.nodes_mm[mesh.skin_nodes]),
-    Place.ELEMENT: ("element_mm", lambda mesh: mesh.nodes_mm[mesh.elements].mean(axis=1)),
+PLACES_MM: dict[Place, tuple[str, Callable[[SkinResponse], np.ndarray]]] = {
+    Place.NODE: ("node_mm", lambda skin: skin.mesh.nodes_mm),
+    Place.SKIN_NODE: ("skin_node_mm", lambda skin: skin.mesh.nodes_mm[skin.mesh.skin_nodes]),
+    Place.ELEMENT: ("element_mm", lambda skin: skin.mesh.nodes_mm[skin.mesh.elements].mean(axis=1)),
     Place.WATCHED: (
         "sheet_mm",
-        lambda mesh: mesh.nodes_mm[mesh.elements[mesh.living_epidermis.ravel()]].mean(axis=1),
+        lambda skin: skin.mesh.nodes_mm[skin.mesh.elements[skin.watched_elements]].mean(axis=1),
     ),
 }
 """Where the values of fields are, undeformed: name of the positions, and the positions. [mm]"""
@@ -78,7 +77,7 @@ def settle(case: Case, threads: int | None = None) -> Settled:
     names = dict.fromkeys((*TRACES, *sweep.fields))
     kept = {name: skin.fields[name] for name in names}
     places = dict.fromkeys(FIELDS[name].place for name in names)
-    kept |= {PLACES_MM[place][0]: PLACES_MM[place][1](skin.mesh) for place in places if place in PLACES_MM}
+    kept |= {PLACES_MM[place][0]: PLACES_MM[place][1](skin) for place in places if place in PLACES_MM}
     return Settled(case.press, pressed, seconds, kept, responses, failures)
 
 

@@ -173,8 +173,9 @@ def _rate(given: Mapping[str, Value], model: ValidationRequest) -> Reading:
         return Reading(None, lambda _: _resting_rate(model))
     motion, tilt_deg = ForceRampAndHold(force_mn=MN_PER_N * force_n), conditions.skin_tilt_deg
     pressed = conditions.finger, body, motion, conditions.tissues, conditions.resolution
-    touch = touch_of(*pressed, grading=grading, tilt_deg=tilt_deg)
-    receptor = Population(np.array([site]), 1.0, model.responding)
+    depths_mm = conditions.receptor_depths_mm
+    touch = touch_of(*pressed, grading=grading, tilt_deg=tilt_deg, receptor_depths_mm=depths_mm)
+    receptor = Population(np.array([site]), 1.0, model.responding, depth_mm=model.depth_mm)
 
     def read(skin: SkinResponse | None) -> float:
         assert skin is not None

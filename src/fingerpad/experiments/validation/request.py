@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
 from typing import Annotated, ClassVar
@@ -9,7 +10,7 @@ from typing import Annotated, ClassVar
 from pydantic import Field
 
 from fingerpad.core.errors import InputError
-from fingerpad.core.values import Pair, Text, choice
+from fingerpad.core.values import Pair, Positive, Text, choice
 from fingerpad.data import protocol
 from fingerpad.experiments.conditions import Conditions
 from fingerpad.experiments.requests.afferents import DEFAULT, AfferentChoice, chosen_afferent, file_of
@@ -41,6 +42,8 @@ class ValidationRequest(Request, FingerDescription):
         Objects by the names that the column `indenter` has for them, beside `sphere:287` and the like.
     afferent : str or AnyAfferent
         Whose rates are predicted: "default", that of the tissues; a type; a file of results; or numbers.
+    depth_mm : float, optional
+        Depth of the receptor below the skin; by default the border of epidermis and dermis. [mm]
     loading : {"ramp_and_hold", "quasi_static"}
         How a depth of force or deflection is reached: read at the end of the paper's ramp and hold, or with
         relaxed tissues.
@@ -56,6 +59,7 @@ class ValidationRequest(Request, FingerDescription):
     observations: Text | Path | object_of_python(Observations)  # type: ignore[valid-type]
     objects: dict[str, ObjectPart] = Field(default={})
     afferent: AfferentChoice = DEFAULT
+    depth_mm: Positive | None = None
     loading: Annotated[str, choice(LOADINGS)] = RAMP_AND_HOLD
     static_window_ms: Pair = (protocol.STATIC_WINDOW.value[0], protocol.STATIC_WINDOW.value[1])
     resolution: Annotated[str, choice(RESOLUTIONS)] = "standard"
@@ -76,7 +80,8 @@ class ValidationRequest(Request, FingerDescription):
     def settings(self) -> Conditions:
         """Finger, tissues and accuracy."""
         with self.origin.located():
-            return self.conditions(beside=self.beside)
+            depths_mm = () if self.depth_mm is None else (self.depth_mm,)
+            return replace(self.conditions(beside=self.beside), receptor_depths_mm=depths_mm)
 
     @cached_property
     def responding(self) -> AnyAfferent:

@@ -106,7 +106,7 @@ def validate(request: ValidationRequest, runner: Runner, command: str | None = N
         "ramp_ms": motion.ramp_ms,
         "hold_ms": motion.hold_ms,
         "static_window_ms": request.static_window_ms,
-        "receptor_depth_mm": fingertip.RECEPTOR_DEPTH.value,
+        "receptor_depth_mm": request.depth_mm or fingertip.RECEPTOR_DEPTH.value,
     }
     return ValidationFile(
         kind=kind.name,
