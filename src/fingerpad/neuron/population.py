@@ -126,8 +126,8 @@ class Population:
         Middle of the pad about which the positions lie, if they follow the finger that is touched: `on` moves
         them to the middle of its pad. By default they stay. [mm]
     depth_mm : float, optional
-        Depth of the end organs below the skin; by default the border of epidermis and dermis. Quantities of the
-        tissue other than strain energy density are kept at the depths that `indent` was given. [mm]
+        Depth of the end organs below the skin; by default the border of epidermis and dermis. Quantities of
+        the tissue other than strain energy density are kept at the depths that `indent` was given. [mm]
     parts : mapping of str to Population
         Of a mixed population, the afferents of each type, which follow each other; from `mixed`.
     """

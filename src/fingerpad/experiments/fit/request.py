@@ -14,7 +14,19 @@ from pydantic import BeforeValidator, Strict
 from fingerpad.core.checked import result_class
 from fingerpad.core.errors import InputError
 from fingerpad.core.signals import INTERVAL
-from fingerpad.core.values import Count, Flag, IntArray, Seed, Text, Vector, Whole, choice, one_of, positive
+from fingerpad.core.values import (
+    Count,
+    Flag,
+    IntArray,
+    Positive,
+    Seed,
+    Text,
+    Vector,
+    Whole,
+    choice,
+    one_of,
+    positive,
+)
 from fingerpad.data.observations import bar_firing_rates
 from fingerpad.experiments.conditions import Conditions
 from fingerpad.experiments.fit.fit import check_enough, fit_recordings, folds_in_turn

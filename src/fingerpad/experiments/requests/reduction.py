@@ -104,7 +104,7 @@ class ReductionRequest(Request, StimulusDescription, FingerDescription):
             if self.afferents.depth_mm is not None:
                 raise InputError(
                     ("afferents", "depth_mm"),
-                    "must be left out, because a reduced touch keeps the border of epidermis and dermis alone",
+                    "must be left out, because a reduced touch keeps the border of the epidermis alone",
                 )
             return population_of(self.afferents, self.tissues, self.beside, self.training.touch.finger)
 

@@ -100,13 +100,9 @@ class TouchRequest(Request, StimulusDescription, FingerDescription):
         """The touch, described for the solver."""
         with self.origin.located():
             made = self.stimulus(self.beside)
-            return made.touch(
-                self.pressed_finger,
-                self.scaled_tissues,
-                self.resolution,
-                self.grading,
-                times_ms=self.times_ms,
-            )
+            pressed = self.pressed_finger, self.scaled_tissues, self.resolution
+            depths_mm = self._laid.kept_depths_mm
+            return made.touch(*pressed, self.grading, self.times_ms, receptor_depths_mm=depths_mm)
 
     @cached_property
     def _laid(self) -> Population:
