@@ -14,7 +14,7 @@ from benchmarks.results import Report, Table
 from fingerpad.core.signals import Traces
 from fingerpad.experiments.conditions import Conditions
 from fingerpad.experiments.fit.methods import FOUR_NUMBER_METHODS
-from fingerpad.experiments.gerling2014 import single_unit
+from fingerpad.experiments.gerling2014 import nerve
 from fingerpad.inference.afferent_methods import (
     bounds_of,
     four_number_problem,
@@ -46,9 +46,9 @@ def press(folder: str, traces: str) -> dict[str, Any]:
     dict
         Number of times and of shifts.
     """
-    touches, store = single_unit.bar_touches(Conditions(resolution=RESOLUTION)), Store(Path(folder))
+    touches, store = nerve.bar_touches(Conditions(resolution=RESOLUTION)), Store(Path(folder))
     solve_missing(store.missing(touches), JOBS)
-    sed = single_unit.traces_at_receptor([store.load(touch) for touch in touches])
+    sed = nerve.traces_at_receptor([store.load(touch) for touch in touches])
     np.savez(traces, times_ms=sed.times_ms, sed_kpa=sed.values, kinks_ms=sed.kinks_ms)
     return {"times": sed.times_ms.size, "shifts": sed.n_sites}
 
@@ -70,7 +70,7 @@ def fit(traces: str) -> dict[str, Any]:
         sed = Traces(stored["times_ms"], stored["sed_kpa"], stored["kinks_ms"])
     driven = drive(sed)
     model, bounds = AfferentModel.of_drive(driven), bounds_of(driven)
-    six = single_unit.rate_problem(sed)
+    six = nerve.rate_problem(sed)
     four = four_number_problem(six.model, six.recordings)
     folds = interleaved_folds(six.n_observations)
     cases: list[tuple[RateProblem, Method]] = [(six, response_surface())]

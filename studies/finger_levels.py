@@ -18,9 +18,9 @@ from fingerpad.core.units import MN_PER_N
 from fingerpad.core.values import FloatArray
 from fingerpad.data import cylinder_deflection, neuron, protocol
 from fingerpad.experiments.conditions import RECEPTOR_X_MM, Conditions
-from fingerpad.experiments.gerling2014.single_unit_uncertainty import PIECES
-from fingerpad.experiments.gerling2014.skin_deflection import PLATE_DEPTHS_MM
-from fingerpad.experiments.gerling2014.sphere_discrimination import POSITIONS_MM
+from fingerpad.experiments.gerling2014.nerve import PIECES
+from fingerpad.experiments.gerling2014.percept import POSITIONS_MM
+from fingerpad.experiments.gerling2014.skin import PLATE_DEPTHS_MM
 from fingerpad.geometry.indenters import Cylinder
 from fingerpad.inference.rates_and_hit_rates import CHANCE
 from fingerpad.neuron.exact_spikes import exact_trains

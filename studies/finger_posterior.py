@@ -21,7 +21,7 @@ from fingerpad.core.errors import ConvergenceError
 from fingerpad.core.values import FloatArray
 from fingerpad.data import bar_firing_rates, cylinder_deflection, psychophysics
 from fingerpad.data import tissues as published
-from fingerpad.experiments.gerling2014.skin_deflection import PLATE_DEPTHS_MM
+from fingerpad.experiments.gerling2014.skin import PLATE_DEPTHS_MM
 from fingerpad.inference.fitting.posterior import Chains, LogDensity, sample
 from fingerpad.inference.identifiable import LARGEST_RESTING_SHARE, identifiable
 from fingerpad.inference.rate_likelihood import CorrelatedResiduals

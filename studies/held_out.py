@@ -20,12 +20,8 @@ from fingerpad.core.values import FloatArray, Number
 from fingerpad.data import paper, protocol, psychophysics
 from fingerpad.data.published import Published
 from fingerpad.experiments.conditions import RECEPTOR_X_MM, Conditions
-from fingerpad.experiments.gerling2014.curvature_thresholds import (
-    Observer,
-    interpolated,
-    just_noticeable_difference,
-)
-from fingerpad.experiments.gerling2014.skin_deflection import PLATE_DEPTHS_MM
+from fingerpad.experiments.gerling2014.skin import PLATE_DEPTHS_MM
+from fingerpad.experiments.gerling2014.thresholds import Observer, interpolated, just_noticeable_difference
 from fingerpad.experiments.manifest import Manifest
 from fingerpad.experiments.runner import Runner
 from fingerpad.experiments.validation.observations import KINDS, Observation, Observations, read_observations

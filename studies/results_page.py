@@ -11,11 +11,10 @@ from pathlib import Path
 from fingerpad.core.checked import result_class
 from fingerpad.core.result_files import read_results
 from fingerpad.core.values import Number, Vector
-from fingerpad.experiments.gerling2014.claim_row import ClaimRow, Group, Statement
-from fingerpad.experiments.gerling2014.discrepancy import CriterionErrorBars
+from fingerpad.experiments.gerling2014.claims import ClaimRow, Group, Statement
+from fingerpad.experiments.gerling2014.nerve import SingleUnitResult
+from fingerpad.experiments.gerling2014.percept import CriterionErrorBars, SphereDiscrimination
 from fingerpad.experiments.gerling2014.reproduction import ReproductionResult, Summaries
-from fingerpad.experiments.gerling2014.single_unit import SingleUnitResult
-from fingerpad.experiments.gerling2014.sphere_discrimination import SphereDiscrimination
 from fingerpad.report.reproduction import count_sentence, side_by_side, statement_cells, statement_table
 from fingerpad.report.tables import ABSENT, fixed, number
 from studies.pages import joined, replaced, table

@@ -14,12 +14,8 @@ from fingerpad.core.errors import ConvergenceError, InputError
 from fingerpad.core.values import FloatArray, IntArray, Number
 from fingerpad.data import protocol
 from fingerpad.experiments.conditions import Conditions
-from fingerpad.experiments.gerling2014.curvature_thresholds import (
-    Observer,
-    interpolated,
-    just_noticeable_difference,
-)
-from fingerpad.experiments.gerling2014.single_unit_uncertainty import CredibleInterval, PosteriorConvergence
+from fingerpad.experiments.gerling2014.nerve import CredibleInterval, PosteriorConvergence
+from fingerpad.experiments.gerling2014.thresholds import Observer, interpolated, just_noticeable_difference
 from fingerpad.experiments.manifest import Manifest
 from fingerpad.experiments.runner import Runner
 from fingerpad.experiments.scores import coefficient_of_determination

@@ -22,13 +22,9 @@ from fingerpad.core.units import MN_PER_N
 from fingerpad.core.values import FloatArray, Matrix, Number, Vector
 from fingerpad.data import protocol, psychophysics
 from fingerpad.experiments.conditions import RECEPTOR_X_MM, Conditions, Touch
-from fingerpad.experiments.gerling2014 import single_unit
-from fingerpad.experiments.gerling2014.skin_deflection import PLATE_DEPTHS_MM, deflection_r2
-from fingerpad.experiments.gerling2014.sphere_discrimination import (
-    FITTED_SPHERES,
-    POSITIONS_MM,
-    fit_to_people,
-)
+from fingerpad.experiments.gerling2014 import nerve
+from fingerpad.experiments.gerling2014.percept import FITTED_SPHERES, POSITIONS_MM, fit_to_people
+from fingerpad.experiments.gerling2014.skin import PLATE_DEPTHS_MM, deflection_r2
 from fingerpad.experiments.manifest import Manifest
 from fingerpad.experiments.runner import Runner
 from fingerpad.experiments.validation.observations import read_observations
@@ -81,7 +77,7 @@ def touches(candidate: Candidate, conditions: Conditions) -> dict[Key, Touch]:
     for depth_mm in PLATE_DEPTHS_MM:
         pressed["plate", depth_mm, 0.0] = replace(flat, stimulus=RampAndHold(depth_mm=depth_mm))
     if candidate.finalist:
-        bars = zip(protocol.BAR_SHIFTS.value, single_unit.bar_touches(own), strict=True)
+        bars = zip(protocol.BAR_SHIFTS.value, nerve.bar_touches(own), strict=True)
         pressed |= {("bar", shift, 0.0): touch for shift, touch in bars}
     else:
         pressed[ONE_BAR] = own.touch(Bar(), RECEPTOR_X_MM, _wide_bar_grading(own), tilt_deg=own.skin_tilt_deg)
@@ -132,7 +128,7 @@ def bar_traces(
         along = float(np.cos(np.deg2rad(conditions.skin_tilt_deg)))
         sites = [(RECEPTOR_X_MM + shift * along, 0.0) for shift in protocol.BAR_SHIFTS.value]
         return [driven(responses[ONE_BAR], candidate, np.array(sites))]
-    receptor = np.array(single_unit.RECEPTOR)
+    receptor = np.array(nerve.RECEPTOR)
     return [driven(responses["bar", shift, 0.0], candidate, receptor) for shift in protocol.BAR_SHIFTS.value]
 
 
@@ -177,7 +173,7 @@ class Skins:
     @cached_property
     def problem(self) -> RateProblem:
         """Rates recorded under the bar, and the model."""
-        return RateProblem(self.model, single_unit.bar_recordings())
+        return RateProblem(self.model, nerve.bar_recordings())
 
     @cached_property
     def method(self) -> ToRatesAndHitRates:

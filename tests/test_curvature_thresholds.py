@@ -1,6 +1,7 @@
 """Curvature thresholds and efficiencies: on skins with a formula, and interpolation against a press."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -8,10 +9,9 @@ import pytest
 from fingerpad import ConvergenceError, Grading, Population, PressSettings
 from fingerpad.core.random_streams import Purpose, normals
 from fingerpad.experiments.conditions import RECEPTOR_X_MM, Conditions
-from fingerpad.experiments.gerling2014 import curvature_thresholds as study
-from fingerpad.experiments.gerling2014.claim_row import Verdict, judged
-from fingerpad.experiments.gerling2014.comparison import weber_claims
-from fingerpad.experiments.gerling2014.sphere_discrimination import CURVATURES
+from fingerpad.experiments.gerling2014 import thresholds as study
+from fingerpad.experiments.gerling2014.claims import READERS, RULES
+from fingerpad.experiments.gerling2014.percept import CURVATURES
 from fingerpad.psychophysics import yes_no
 from fingerpad.psychophysics.code_efficiency import SMALLEST_SPREAD
 from fingerpad.psychophysics.encoding import gradient_sum, neighbour_pairs
@@ -96,9 +96,9 @@ def test_a_threshold_out_of_range_is_reported_and_affects_only_its_row(found):
     reached, missed = (getattr(loud.populations[0], name) for name in ("standards", "without_threshold"))
     assert [entry.standard_per_m for entry in reached] == [144.0, 200.0]
     assert [entry.standard_per_m for entry in missed] == [287.0, 400.0]
-    rows = weber_claims(loud)
-    assert rows[0].verdict is Verdict.MISSED
-    assert "No sphere" in rows[0].note
+    _, told, *values = READERS["weber fractions, paper"](SimpleNamespace(curvature_thresholds=loud))
+    assert "No sphere" in told
+    assert not RULES["per cent within"]((0.1, 0.14), "", told, *values)
     assert png(page.draw_thresholds, loud)[:4] == b"\x89PNG"
     assert "No sphere" in page.threshold_tables(loud)[0].note
 
@@ -124,15 +124,6 @@ def test_noise_that_cannot_be_fitted_is_reported_in_place_of_thresholds():
     assert f"{same.judgements} judgements of each" in filled(page.CAPTION_THRESHOLDS, same)
 
 
-def test_weber_rows_are_judged_in_whole_per_cent(found):
-    population = found.populations[0]
-    threshold = population.standards[0]
-    for fractions, met in (([0.0951, 0.144], True), ([0.0949, 0.12], False), ([0.12, 0.146], False)):
-        standards = tuple(replace(threshold, weber_fraction=fraction) for fraction in fractions)
-        changed = replace(found, populations=(replace(population, standards=standards),))
-        assert weber_claims(changed)[0].verdict is judged(met)
-
-
 class Coarse(Conditions):
     """A mesh of few elements; on coarser ones the spheres' contact grows from node to node."""
 
@@ -146,7 +137,7 @@ def test_interpolation_agrees_with_a_press():
     A tenth of the threshold, 25 /m, is allowed for on this mesh; 0.2 /m is what elements of 0.1 mm leave.
     """
     curvatures = np.array([250.0, 287.0, 316.0, 345.0, 380.0])
-    touches = study.sphere_touches(Coarse("quick"), curvatures.tolist()).values()
+    touches = study.threshold_touches(Coarse("quick"), curvatures.tolist()).values()
     skins = [replace(touch, settings=PressSettings(4, 3)).solve(1) for touch in touches]
     table = np.array([POPULATION.respond(skin).static_rate_hz for skin in skins])
     (error,) = study.interpolation_errors(curvatures, table, PAIRS)

@@ -9,6 +9,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from fingerpad.experiments.discrimination.task import CurveSettings
+from fingerpad.experiments.discrimination.task_stimuli import (
+    example_tasks,
+    task_population,
+    task_stimuli,
+    task_touches,
+)
 from scipy.special import ndtri
 from scipy.stats import binom
 
@@ -19,13 +26,6 @@ from fingerpad.experiments.conditions import RECEPTOR_X_MM
 from fingerpad.experiments.discrimination import run as task_run
 from fingerpad.experiments.discrimination.analysis import PreparedTask, analyse, forced_choice_of
 from fingerpad.experiments.discrimination.decoding import SESSION, side_curves
-from fingerpad.experiments.discrimination.task import CurveSettings
-from fingerpad.experiments.discrimination.task_stimuli import (
-    example_tasks,
-    task_population,
-    task_stimuli,
-    task_touches,
-)
 from fingerpad.psychophysics.code_efficiency import code_efficiency, noisy_presentations
 from fingerpad.psychophysics.discrimination import (
     Experiment,

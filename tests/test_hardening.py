@@ -13,6 +13,13 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from fingerpad.experiments.afferent_files import fitted_afferent
+from fingerpad.experiments.descriptions.estimate import estimate_press
+from fingerpad.experiments.descriptions.stimulus import TactileStimulus
+from fingerpad.experiments.descriptions.touch import described_touch
+from fingerpad.experiments.discrimination.run import DiscriminationRun, discriminate
+from fingerpad.experiments.discrimination.task_stimuli import parse_task
+from fingerpad.experiments.stimuli import ShiftedBar
 
 import fingerpad as fp
 from fingerpad.cli import main, run
@@ -22,16 +29,9 @@ from fingerpad.core.plain_yaml import DEEPEST, LARGEST_TEXT, read_yaml
 from fingerpad.core.regions import Rectangle, poisson_disc, rectangular
 from fingerpad.core.signals import Traces
 from fingerpad.core.tables import read_csv
-from fingerpad.experiments.afferent_files import fitted_afferent
 from fingerpad.experiments.conditions import Conditions
-from fingerpad.experiments.descriptions.estimate import estimate_press
-from fingerpad.experiments.descriptions.stimulus import TactileStimulus
-from fingerpad.experiments.descriptions.touch import described_touch
-from fingerpad.experiments.discrimination.run import DiscriminationRun, discriminate
-from fingerpad.experiments.discrimination.task_stimuli import parse_task
 from fingerpad.experiments.fit.fit import fit_recordings
 from fingerpad.experiments.recording_files import read_recordings
-from fingerpad.experiments.stimuli import ShiftedBar
 from fingerpad.inference.rate_model import AfferentModel
 from fingerpad.inference.recordings import RateRecordings
 from fingerpad.neuron.population import sensitivities

@@ -7,23 +7,21 @@ import pytest
 from numpy.testing import assert_allclose
 from scipy.special import ndtri
 
-from fingerpad import InputError, Population
+from fingerpad import Population
 from fingerpad.core.random_streams import Purpose, normals
-from fingerpad.experiments.gerling2014 import discrimination_statistics as goodwin
-from fingerpad.experiments.gerling2014.discrepancy import (
-    discrepancy_analysis,
-    expected_of_measure,
-    rise_needed,
-)
-from fingerpad.experiments.gerling2014.discrimination_statistics import (
+from fingerpad.experiments.gerling2014 import percept as goodwin
+from fingerpad.experiments.gerling2014.percept import (
     SWEPT_NOISE,
     Estimate,
     Measured,
     Observers,
+    discrepancy_analysis,
     discrimination_statistics,
     estimate,
+    expected_of_measure,
     extreme,
     observe,
+    rise_needed,
 )
 from fingerpad.psychophysics.discrimination import (
     Experiment,
@@ -32,7 +30,7 @@ from fingerpad.psychophysics.discrimination import (
 )
 from fingerpad.psychophysics.encoding import gradient_sum, neighbour_pairs, taking_part
 from fingerpad.psychophysics.functions import binomial_interval
-from fingerpad.psychophysics.noise_fit import expected_euclidean_hit_rates
+from fingerpad.psychophysics.noise_fit import expected_euclidean_hit_rates, fit_noise_sigma
 
 CURVATURES = (287.0, 296.0, 305.0, 316.0, 328.0, 340.0, 365.0)
 GRID = Population.grid()
@@ -63,11 +61,11 @@ def test_a_binomial_interval_leaves_half_of_the_doubt_on_either_side_or_ends_at_
 
 
 def test_what_is_known_of_people_is_a_straight_line_in_z_with_intervals():
-    assert_allclose(goodwin.line_in_z(goodwin.CURVATURES), goodwin.HIT_RATES, rtol=1e-12)
+    assert_allclose(goodwin.line_in_z(goodwin.GOODWIN_CURVATURES), goodwin.HIT_RATES, rtol=1e-12)
     slopes = np.diff(ndtri(goodwin.line_in_z([290.0, 310.0, 330.0, 350.0])))
     assert_allclose(slopes, slopes[0], rtol=1e-9)
     assert slopes[0] / 20.0 == pytest.approx((ndtri(0.95) - ndtri(0.58)) / 69.0)
-    known = goodwin.goodwin_hit_rates_at(CURVATURES[1:])
+    known = goodwin.goodwin_hit_rates()
     assert (known.low < known.hit_rate).all()
     assert (known.hit_rate < known.high).all()
     assert known.line.shape == (6,)
@@ -147,7 +145,7 @@ def test_an_estimate_is_a_mean_with_its_error_and_an_extreme_is_sought_in_the_me
 
 
 def test_statistics_are_those_of_known_hit_rates():
-    found = discrimination_statistics(made_up(spread=1e-9), CURVATURES, ("static", "dynamic"))
+    found = discrimination_statistics(made_up(spread=1e-9), ("static", "dynamic"))
 
     def value(found: Estimate):
         return pytest.approx(found.value, abs=1e-6)
@@ -193,23 +191,15 @@ def test_receptors_that_are_silent_once_take_no_part_in_latencies():
     assert_allclose(
         gradient_sum(measured.responses, measured.neighbours), gradient_sum(latency_ms[:, without], fewer)
     )
-    with pytest.raises(InputError, match="so there is no hit rate"):
-        Measured(*taking_part(np.full((7, 18), np.nan), PAIRS))
+    assert not len(Measured(*taking_part(np.full((7, 18), np.nan), PAIRS)).neighbours)
 
 
 def test_one_noise_for_two_positions_is_that_of_equal_ones():
     draws = normals(0, 1, 18, Purpose.RESPONSE, 2000)[0].T
     here = Measured(bumps(steepness=0.6), PAIRS)
-    columns = [0, 5]
-
-    def fit(measures):
-        return goodwin.fit_noise_to_goodwin(
-            lambda sigma: expected_of_measure(measures, sigma, draws), CURVATURES, len(measures)
-        )
-
-    alone, both = fit([here]), fit([here, here])
+    both = goodwin.fit_noise_to_goodwin(lambda sigma: expected_of_measure([here, here], draws, sigma))
+    alone = fit_noise_sigma(lambda sigma: expected_of_measure([here], draws, sigma)[0, [0, 5]])
     assert both.noise_sigma == pytest.approx(alone.noise_sigma, rel=1e-6)
-    assert_allclose(expected_of_measure([here], alone.noise_sigma, draws)[0, columns], alone.hit_rates)
 
 
 def test_the_rise_that_a_noise_needs_has_its_closed_form():
@@ -235,15 +225,13 @@ def test_the_analysis_names_every_interpretation_and_the_noise_that_fits_it():
         "latency": [Measured(*taking_part(latency, PAIRS)) for latency in latency_ms],
     }
     draws = normals(0, 1, 18, Purpose.RESPONSE, 1000)[0].T
-    found = discrepancy_analysis(
-        measures, latency_ms, GRID.positions_mm, GRID.pitch_mm, CURVATURES, 0.06, draws, seed=1
-    )
+    found = discrepancy_analysis(measures, latency_ms, GRID, 0.06, draws, seed=1)
     named = {one.reading: one for one in found.readings}
     assert len(named) == 7
     assert named["latency of receptors that fire under every sphere (used)"].receptors.tolist() == [17, 18]
     used = named["static, eight neighbours (used)"]
     assert named["dynamic, eight neighbours (used)"].noise_sigma == used.noise_sigma
-    at_own = expected_of_measure(static, used.noise_sigma, draws)[:, [0, 5]]
+    at_own = expected_of_measure(static, draws, used.noise_sigma)[:, [0, 5]]
     assert used.misfit == pytest.approx(np.sqrt(np.square(at_own - goodwin.HIT_RATES).mean()))
     assert used.rise[0] == pytest.approx(found.rise["static"][0])
     curve = found.misfit_curve

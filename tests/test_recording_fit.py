@@ -11,6 +11,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from fingerpad.experiments.afferent_files import fitted_afferent
+from fingerpad.experiments.descriptions.stimuli import NamedStimulus
+from fingerpad.experiments.stimuli import ListedStimuli, ShiftedBar
 
 import fingerpad as fp
 from fingerpad import cli
@@ -19,18 +22,15 @@ from fingerpad.core.compilation import SHORT_NOTICE, SUBJECT
 from fingerpad.core.random_streams import Presentations
 from fingerpad.data import bar_firing_rates
 from fingerpad.experiments import runner
-from fingerpad.experiments.afferent_files import fitted_afferent
 from fingerpad.experiments.conditions import RECEPTOR_X_MM, Conditions
-from fingerpad.experiments.descriptions.stimuli import NamedStimulus
 from fingerpad.experiments.fit import fit as study
 from fingerpad.experiments.fit import rate_uncertainty as recording_posterior
 from fingerpad.experiments.fit import session
 from fingerpad.experiments.fit.methods import METHODS, check_spikes
 from fingerpad.experiments.fit.rate_uncertainty import rate_posterior
 from fingerpad.experiments.fit.results import ParameterProfile, PhaseBands, RateBand, RatePosterior
-from fingerpad.experiments.gerling2014 import single_unit
+from fingerpad.experiments.gerling2014 import nerve
 from fingerpad.experiments.manifest import sha256
-from fingerpad.experiments.stimuli import ListedStimuli, ShiftedBar
 from fingerpad.geometry.edged_indenters import INDENTERS
 from fingerpad.inference.afferent_methods import OFFSETS_MM
 from fingerpad.inference.closed_form import ClosedFormModel
@@ -264,7 +264,7 @@ def test_the_stimuli_of_the_bar_are_the_touches_of_the_reproduction(tmp_path):
     bar, conditions = ShiftedBar(), Conditions("quick")
     recorded = fp.read_recordings(path, bar)
     touches = bar.touches(list(recorded.stimuli.values()), conditions)
-    assert list(touches.values()) == single_unit.bar_touches(conditions)
+    assert list(touches.values()) == nerve.bar_touches(conditions)
     observed = bar_firing_rates()
     np.testing.assert_array_equal(recorded.recordings.dynamic_rate_hz, observed.dynamic_rate_hz)
     np.testing.assert_array_equal(recorded.recordings.static_rate_hz, observed.static_rate_hz)

@@ -14,17 +14,16 @@ from matplotlib.patches import Circle
 
 from fingerpad.core.result_files import schema_of, to_json
 from fingerpad.data import all_published
-from fingerpad.experiments.gerling2014.claim_row import Group, Verdict, paired
-from fingerpad.experiments.gerling2014.nail_border import NailBorder
+from fingerpad.experiments.gerling2014.claims import Group, Verdict, paired
+from fingerpad.experiments.gerling2014.nerve import PopulationMaps
+from fingerpad.experiments.gerling2014.percept import SphereDiscrimination
 from fingerpad.experiments.gerling2014.reproduction import (
     PublishedNumber,
     ReproductionResult,
     SetResult,
     Summary,
 )
-from fingerpad.experiments.gerling2014.skin_deflection import SkinForce
-from fingerpad.experiments.gerling2014.sphere_discrimination import SphereDiscrimination
-from fingerpad.experiments.gerling2014.three_levels import PopulationMaps, mesh_picture
+from fingerpad.experiments.gerling2014.skin import NailBorder, SkinForce, mesh_picture
 from fingerpad.experiments.tissue_sets import tissue_layers
 from fingerpad.geometry.fingertip import Fingertip
 from fingerpad.geometry.grading import resolution_grading

@@ -8,8 +8,8 @@ import pytest
 from fingerpad import RateRecordings, Traces
 from fingerpad.data import bar_firing_rates
 from fingerpad.experiments.fit import rate_uncertainty
-from fingerpad.experiments.gerling2014 import single_unit, single_unit_uncertainty
-from fingerpad.experiments.gerling2014.single_unit_uncertainty import UncertaintyResult
+from fingerpad.experiments.gerling2014 import nerve
+from fingerpad.experiments.gerling2014.nerve import UncertaintyResult
 from fingerpad.inference.identifiable import IDENTIFIABLE_NAMES, identifiable
 from fingerpad.inference.rate_model import AfferentModel
 from fingerpad.report import fit as report
@@ -33,10 +33,10 @@ def section() -> UncertaintyResult:
         np.maximum(rate + deviation * random.normal(size=SHIFTS.size), 0.0)
         for rate, deviation in zip(AfferentModel.of_traces(SED).evaluate(TRUTH), (12.0, 2.0), strict=True)
     ]
-    recordings = RateRecordings(single_unit.bar_recordings().stimuli, *rates)
+    recordings = RateRecordings(nerve.bar_recordings().stimuli, *rates)
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(single_unit, "bar_recordings", lambda: recordings)
-        return single_unit_uncertainty.uncertainty_result(SED, TRUTH, 1, quick=True)
+        patch.setattr(nerve, "bar_recordings", lambda: recordings)
+        return nerve.uncertainty_result(SED, TRUTH, 1, quick=True)
 
 
 def test_the_truth_lies_within_its_intervals_and_four_of_six_directions_are_identified(section):

@@ -26,7 +26,7 @@ NUMBERS = [
     ("core.layouts:around_zero", (3,), [-1.0, 0.0, 1.0]),
     ("core.threads:even_chunks", (300,), [(0, 128), (128, 256), (256, 300)]),
     ("core.threads:run_kernel", (lambda size, first, last: size * (last - first), 200, 10), [1280, 720]),
-    ("experiments.gerling2014.discrimination_statistics:goodwin_misfit", (np.array([0.58, 0.93]),), 0.0141),
+    ("experiments.gerling2014.percept:goodwin_misfit", (np.array([0.58, 0, 0, 0, 0, 0.93]),), 0.0141),
     ("geometry.grading:lines_across", (Grading(17.0, 0.5, 1.0, 0.2, 0.5, 0.5), 2.0), [0, 0.5, 1, 1.5, 2]),
     ("geometry.trajectory:samples_of_line", (np.arange(4.0), COURSE, 0.2), [True, False, True, True]),
     ("mechanics.fields:largest_compression", (np.array([1.0, -3.0, 0.0, 0.0, 0.0, 0.0]),), 3.0),

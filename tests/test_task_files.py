@@ -7,16 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import HealthCheck, given, settings
-from hypothesis import strategies as st
-
-import fingerpad as fp
-from fingerpad.core.plain_yaml import read_yaml
-from fingerpad.core.result_files import file_format
-from fingerpad.experiments import schemas
-from fingerpad.experiments.conditions import RECEPTOR_X_MM, Conditions
 from fingerpad.experiments.descriptions.reading import parts_in
-from fingerpad.experiments.discrimination.analysis import PreparedTask
 from fingerpad.experiments.discrimination.run import DiscriminationRun
 from fingerpad.experiments.discrimination.task import DiscriminationTask
 from fingerpad.experiments.discrimination.task_stimuli import (
@@ -27,8 +18,17 @@ from fingerpad.experiments.discrimination.task_stimuli import (
     task_touches,
 )
 from fingerpad.experiments.fit.session import FitFile
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+import fingerpad as fp
+from fingerpad.core.plain_yaml import read_yaml
+from fingerpad.core.result_files import file_format
+from fingerpad.experiments import schemas
+from fingerpad.experiments.conditions import RECEPTOR_X_MM, Conditions
+from fingerpad.experiments.discrimination.analysis import PreparedTask
+from fingerpad.experiments.gerling2014.percept import sphere_touches
 from fingerpad.experiments.gerling2014.reproduction import ReproductionResult
-from fingerpad.experiments.gerling2014.sphere_discrimination import discrimination_touches
 from fingerpad.neuron.afferent import PARAMETER_NAMES
 from tests.mutations import CHANGES, VALUES, places
 from tests.mutations import changed as mutated
@@ -124,7 +124,7 @@ def test_the_papers_spheres_are_the_very_touches_of_a_reproduction():
     ours = task_touches(fp.read_task("sphere_curvature", resolution="quick"))
     theirs = {
         f"{curvature:g}": touch
-        for (at, curvature), touch in discrimination_touches(Conditions("quick")).items()
+        for (at, curvature), touch in sphere_touches(Conditions("quick")).items()
         if at == 0.0
     }
     assert ours == theirs

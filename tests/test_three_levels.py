@@ -5,15 +5,10 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from fingerpad import Fingertip, Traces
-from fingerpad.experiments.gerling2014.three_levels import (
-    membrane_potential,
-    mesh_picture,
-    outline_elements,
-    outline_nodes,
-)
+from fingerpad.experiments.gerling2014.skin import mesh_picture, outline_elements, outline_nodes
 from fingerpad.geometry.grading import resolution_grading
 from fingerpad.geometry.mesh import finger_mesh
-from fingerpad.neuron.lif import LeakyIntegrateAndFire
+from fingerpad.neuron.lif import LeakyIntegrateAndFire, membrane_potential
 from fingerpad.report.mesh_picture import _thicknesses
 
 CONTACT_X_MM = 17.37

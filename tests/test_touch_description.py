@@ -9,15 +9,6 @@ from pathlib import Path
 import fastjsonschema
 import numpy as np
 import pytest
-from hypothesis import HealthCheck, given, settings
-from hypothesis import strategies as st
-
-import fingerpad as fp
-from fingerpad import cli
-from fingerpad.core.plain_yaml import read_yaml
-from fingerpad.core.result_files import from_json, to_json
-from fingerpad.experiments import schemas
-from fingerpad.experiments.conditions import RECEPTOR_X_MM, Conditions
 from fingerpad.experiments.descriptions.estimate import (
     BASE_MB,
     OWN_EXPONENT,
@@ -34,6 +25,15 @@ from fingerpad.experiments.descriptions.stimuli import StimulusSet, named_stimul
 from fingerpad.experiments.descriptions.touch import OUTPUTS, described_touch
 from fingerpad.experiments.discrimination.task_stimuli import task_population
 from fingerpad.export.touch_outputs import WRITERS, as_described, check_described
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+import fingerpad as fp
+from fingerpad import cli
+from fingerpad.core.plain_yaml import read_yaml
+from fingerpad.core.result_files import from_json, to_json
+from fingerpad.experiments import schemas
+from fingerpad.experiments.conditions import RECEPTOR_X_MM, Conditions
 from fingerpad.geometry import surface_files
 from fingerpad.neuron.afferent_types import afferent_types
 from tests.mutations import CHANGES, VALUES, changed, places

@@ -10,6 +10,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 import typer
+from fingerpad.experiments.indenter_text import indenter_named
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -19,8 +20,7 @@ from fingerpad.cli import options as choices
 from fingerpad.data import cylinder_deflection, protocol
 from fingerpad.experiments import scores
 from fingerpad.experiments.conditions import RECEPTOR_X_MM, Conditions
-from fingerpad.experiments.gerling2014.skin_deflection import deflection_r2, deflection_touches
-from fingerpad.experiments.indenter_text import indenter_named
+from fingerpad.experiments.gerling2014.skin import deflection_r2, deflection_touches
 from fingerpad.experiments.runner import STORE_FOLDER, Runner
 from fingerpad.experiments.schemas import read
 from fingerpad.experiments.validation import predictions

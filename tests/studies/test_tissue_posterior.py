@@ -9,7 +9,7 @@ import pytest
 from fingerpad.core.result_files import from_json, to_json
 from fingerpad.core.signals import Traces
 from fingerpad.experiments.conditions import Conditions
-from fingerpad.experiments.gerling2014.single_unit_uncertainty import PIECES
+from fingerpad.experiments.gerling2014.nerve import PIECES
 from fingerpad.experiments.runner import Runner
 from fingerpad.inference.fitting.posterior import sample
 from fingerpad.inference.rate_model import AfferentModel

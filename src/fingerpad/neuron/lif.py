@@ -8,6 +8,8 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+
 from fingerpad.core.checked import value_class
 from fingerpad.core.errors import InputError
 from fingerpad.core.signals import CURRENTS, SpikeTrains, Traces
@@ -107,3 +109,32 @@ class LeakyIntegrateAndFire:
             float(self.refractory_ms),
             math.nan if self.initial_mv is None else float(self.initial_mv),
         )
+
+
+def membrane_potential(
+    membrane: LeakyIntegrateAndFire, current: Traces, spikes_ms: FloatArray, times_ms: FloatArray
+) -> FloatArray:
+    """Potential (n_times,) of one membrane whose spike times are known, Eq. 3. [mV]"""
+    tau, capacitance = membrane.time_constant_ms, membrane.capacitance_mf
+    knots = np.unique(
+        np.concatenate([times_ms, current.times_ms, spikes_ms, spikes_ms + membrane.refractory_ms])
+    )
+    length = np.diff(knots)
+    # A repeated time is a jump of the current: the line between two knots is read inside of them.
+    quarter, three_quarters = (
+        np.interp(knots[:-1] + share * length, current.times_ms, current.values[:, 0])
+        for share in (0.25, 0.75)
+    )
+    slope = 2.0 * (three_quarters - quarter) / length
+    steady = tau / capacitance * (quarter - slope * (0.25 * length + tau))
+    decay, growth = np.exp(-length / tau), tau / capacitance * slope * length
+    last_spike = np.searchsorted(spikes_ms, knots[:-1], side="right") - 1
+    since = np.where(last_spike < 0, np.inf, knots[:-1] - np.append(spikes_ms, 0.0)[last_spike])
+    held = since < membrane.refractory_ms - 1e-9
+    potential = np.zeros(knots.size)
+    potential[:1] = membrane.initial_potentials_mv(current.values[0, :1])
+    for number, fixed in enumerate(held):
+        start = 0.0 if since[number] == 0.0 else potential[number]
+        relaxed = steady[number] + (start - steady[number]) * decay[number]
+        potential[number + 1] = 0.0 if fixed else relaxed + growth[number]
+    return potential[np.searchsorted(knots, times_ms)]

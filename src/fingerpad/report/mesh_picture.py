@@ -13,7 +13,7 @@ from matplotlib.patches import Patch
 from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 
 from fingerpad.core.values import FloatArray
-from fingerpad.experiments.gerling2014.three_levels import MeshPicture, MeshPlane
+from fingerpad.experiments.gerling2014.skin import MeshPicture, MeshPlane
 from fingerpad.report.page import figure
 from fingerpad.report.style import BLACK, name_panel, new_figure
 from fingerpad.report.tables import number

@@ -18,8 +18,7 @@ from fingerpad.core.errors import InputError
 from fingerpad.core.signals import ResponseMap
 from fingerpad.core.values import FloatArray
 from fingerpad.data import paper, protocol
-from fingerpad.experiments.gerling2014.single_unit import SingleUnitResult
-from fingerpad.experiments.gerling2014.three_levels import PopulationMaps
+from fingerpad.experiments.gerling2014.nerve import PopulationMaps, SingleUnitResult
 from fingerpad.report.page import both, figure
 from fingerpad.report.style import (
     BLACK,

@@ -13,10 +13,9 @@ from matplotlib.text import Text
 
 from fingerpad.core.values import FloatArray
 from fingerpad.data import psychophysics
-from fingerpad.experiments.gerling2014.curvature_thresholds import CurvatureThresholds, PopulationThresholds
-from fingerpad.experiments.gerling2014.discrimination_statistics import GoodwinHitRates
+from fingerpad.experiments.gerling2014.percept import GoodwinHitRates, ObserverHitRates, SphereDiscrimination
 from fingerpad.experiments.gerling2014.reproduction import ReproductionResult
-from fingerpad.experiments.gerling2014.sphere_discrimination import ObserverHitRates, SphereDiscrimination
+from fingerpad.experiments.gerling2014.thresholds import CurvatureThresholds, PopulationThresholds
 from fingerpad.report.page import SETS, both, figure
 from fingerpad.report.style import (
     BLACK,

@@ -14,9 +14,9 @@ from matplotlib.patches import Circle
 
 from fingerpad.core.units import MM_PER_M
 from fingerpad.data import STATUSES, paper, protocol, psychophysics
-from fingerpad.experiments.gerling2014.claim_row import ClaimRow, Group, Statement, Verdict
+from fingerpad.experiments.gerling2014.claims import ClaimRow, Group, Statement, Verdict
+from fingerpad.experiments.gerling2014.nerve import ThreeLevels
 from fingerpad.experiments.gerling2014.reproduction import PublishedNumber, ReproductionResult
-from fingerpad.experiments.gerling2014.three_levels import ThreeLevels
 from fingerpad.experiments.tissue_sets import TissueLayer
 from fingerpad.report import fit, mesh_picture, nerve, percept, skin
 from fingerpad.report.page import (

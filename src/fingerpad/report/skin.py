@@ -21,8 +21,7 @@ from fingerpad.core.signals import STORED_ENERGY, ResponseMap
 from fingerpad.core.units import cosine_and_sine
 from fingerpad.core.values import FloatArray, instance
 from fingerpad.data import protocol
-from fingerpad.experiments.gerling2014.nail_border import NailBorder
-from fingerpad.experiments.gerling2014.skin_deflection import CylinderDeflection, SkinDeflectionResult
+from fingerpad.experiments.gerling2014.skin import CylinderDeflection, NailBorder, SkinDeflectionResult
 from fingerpad.experiments.requests.touch import TouchFile, TouchResult
 from fingerpad.report.mesh_picture import corners
 from fingerpad.report.nerve import draw_raster_by_type, draw_trains

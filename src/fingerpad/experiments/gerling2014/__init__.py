@@ -1,4 +1,4 @@
-"""One file per claim of the paper, what is pressed and what is read from it; `reproduction` runs all."""
+"""The paper by level: what is pressed and read from it, its claims, and `reproduction`, which runs all."""
 
 from fingerpad.experiments.gerling2014.reproduction import Reproduction, reproduce
 

@@ -16,24 +16,22 @@ from fingerpad.core.values import AnyPath, Flag, Number, Whole, choice
 from fingerpad.data import all_published
 from fingerpad.data.neuron import PAPER_INITIAL
 from fingerpad.experiments.conditions import RECEPTOR_X_MM, Conditions, Touch
-from fingerpad.experiments.gerling2014 import (
-    curvature_thresholds,
-    nail_border,
-    single_unit,
-    single_unit_uncertainty,
-    skin_deflection,
-    sphere_discrimination,
-    three_levels,
+from fingerpad.experiments.gerling2014 import nerve, percept, skin
+from fingerpad.experiments.gerling2014.claims import ClaimRow, Statement, judged, paired
+from fingerpad.experiments.gerling2014.nerve import (
+    FiringCourse,
+    PopulationMaps,
+    SingleUnitResult,
+    ThreeLevels,
+    UncertaintyResult,
 )
-from fingerpad.experiments.gerling2014.claim_row import ClaimRow, Statement, paired
-from fingerpad.experiments.gerling2014.comparison import comparison
-from fingerpad.experiments.gerling2014.curvature_thresholds import CurvatureThresholds
-from fingerpad.experiments.gerling2014.nail_border import NailBorder
-from fingerpad.experiments.gerling2014.single_unit import FiringCourse, SingleUnitResult
-from fingerpad.experiments.gerling2014.single_unit_uncertainty import UncertaintyResult
-from fingerpad.experiments.gerling2014.skin_deflection import SkinDeflectionResult, SkinForce
-from fingerpad.experiments.gerling2014.sphere_discrimination import SphereDiscrimination
-from fingerpad.experiments.gerling2014.three_levels import MeshPicture, PopulationMaps, ThreeLevels
+from fingerpad.experiments.gerling2014.percept import SphereDiscrimination
+from fingerpad.experiments.gerling2014.skin import MeshPicture, NailBorder, SkinDeflectionResult, SkinForce
+from fingerpad.experiments.gerling2014.thresholds import (
+    CurvatureThresholds,
+    curvature_thresholds,
+    threshold_touches,
+)
 from fingerpad.experiments.manifest import Manifest, StageSummary
 from fingerpad.experiments.runner import Runner
 from fingerpad.experiments.tissue_sets import TissueLayer, tissue_layers
@@ -44,7 +42,7 @@ from fingerpad.mechanics.tissues import TISSUES
 from fingerpad.neuron.afferent import Afferent
 from fingerpad.skin.sampling import SkinResponse
 
-STANDARD_SPHERE = (sphere_discrimination.POSITIONS_MM[0], sphere_discrimination.CURVATURES[0])
+STANDARD_SPHERE = (percept.POSITIONS_MM[0], percept.CURVATURES[0])
 
 PAPER, HUMAN = "paper", "human"  # The paper's own system; the set that serves all three levels.
 
@@ -162,14 +160,14 @@ class ReproductionResult:
 
 def reproduce(run: Reproduction, progress: Progress | None = None) -> ReproductionResult:
     runner, columns = Runner(run.folder, run.jobs, progress), run.conditions
-    trials = {"skin deflection": skin_deflection.deflection_touches(columns[PAPER])}
+    trials = {"skin deflection": skin.deflection_touches(columns[PAPER])}
     parts = {name: set_touches(conditions, run.goes_beyond) for name, conditions in columns.items()}
     # The longest indentations first: short ones fill the end, and hardly a core waits for another.
     longest_first = [*(each["nail"] for each in parts.values()), trials["skin deflection"]]
     longest_first += [each[part] for part in parts[PAPER] for each in parts.values() if part != "nail"]
     solved = frozenset(runner.solve(touch for touches in longest_first for touch in touches.values()))
     pressed = runner.read(trials, solved)["skin deflection"]
-    deflection = skin_deflection.deflection_result(pressed)
+    deflection = skin.deflection_result(pressed)
     found: dict[str, tuple[SetResult, Summary, tuple[StageSummary, ...]]] = {}
     with runner.stage("fits and discrimination", len(columns)) as advance:
         work = partial(_set_in_process, folder=runner.folder, deflection=deflection, solved=solved, run=run)
@@ -177,26 +175,26 @@ def reproduce(run: Reproduction, progress: Progress | None = None) -> Reproducti
         for number, outcome in Processes(min(len(names), runner.jobs)).map(work, names):
             found[names[number]] = outcome()
             advance()
-    (paper, of_paper, stages), (human, of_human, more_stages) = found[PAPER], found[HUMAN]
-    runner.add_stages((*stages, *more_stages))
+    runner.add_stages(stage for name in columns for stage in found[name][2])
     sphere, bar = parts[PAPER]["spheres"][STANDARD_SPHERE], parts[PAPER]["bar, 36 shifts"][0]
     meshes = {"sphere": sphere.mesh, "bar": bar.mesh} | {
-        name: pressed["trial3", name].mesh for name in skin_deflection.INDENTERS
+        name: pressed["trial3", name].mesh for name in skin.INDENTERS
     }
     manifest = runner.manifest(columns[PAPER], meshes, half_model=not sphere.grading.full)
-    manifest = replace(manifest, materials=f"{paper.tissues} and {human.tissues}")
-    of_paper, of_human = (
-        replace(each, wall_s=manifest.wall_s, peak_memory_mb=manifest.peak_memory_mb)
-        for each in (of_paper, of_human)
-    )
+    sets = {name: found[name][0] for name in columns}
+    manifest = replace(manifest, materials=" and ".join(each.tissues for each in sets.values()))
+    wall_s, peak_mb = manifest.wall_s, manifest.peak_memory_mb
     return ReproductionResult(
         summary=Summaries(
-            paper=of_paper, human=of_human, wall_s=manifest.wall_s, peak_memory_mb=manifest.peak_memory_mb
+            paper=replace(found[PAPER][1], wall_s=wall_s, peak_memory_mb=peak_mb),
+            human=replace(found[HUMAN][1], wall_s=wall_s, peak_memory_mb=peak_mb),
+            wall_s=wall_s,
+            peak_memory_mb=peak_mb,
         ),
-        statements=paired(paper.comparison, human.comparison),
+        statements=paired(sets[PAPER].comparison, sets[HUMAN].comparison),
         skin_deflection=deflection,
-        paper=paper,
-        human=human,
+        paper=sets[PAPER],
+        human=sets[HUMAN],
         tissues=tissue_layers(),
         inputs=tuple(PublishedNumber(**asdict(number)) for number in all_published()),
         manifest=manifest,
@@ -206,13 +204,13 @@ def reproduce(run: Reproduction, progress: Progress | None = None) -> Reproducti
 def set_touches(conditions: Conditions, goes_beyond: bool = False) -> dict[str, dict[Any, Touch]]:
     """Touches of one set of tissues, by the part of the paper that they belong to."""
     touches: dict[str, dict[Any, Touch]] = {
-        "nail": {"nail": nail_border.nail_touch(conditions)},
-        "force": dict(skin_deflection.force_touches(conditions)),
-        "bar, 36 shifts": dict(enumerate(single_unit.bar_touches(conditions))),
-        "spheres": dict(sphere_discrimination.discrimination_touches(conditions)),
+        "nail": {"nail": skin.nail_touch(conditions)},
+        "force": dict(skin.force_touches(conditions)),
+        "bar, 36 shifts": dict(enumerate(nerve.bar_touches(conditions))),
+        "spheres": dict(percept.sphere_touches(conditions)),
     }
     if goes_beyond:
-        touches["spheres, other curvatures"] = dict(curvature_thresholds.threshold_touches(conditions))
+        touches["spheres, other curvatures"] = dict(threshold_touches(conditions))
     return touches
 
 
@@ -226,81 +224,61 @@ def _set_in_process(
 ) -> tuple[SetResult, Summary, tuple[StageSummary, ...]]:
     """Read the stored indentations of one column, and analyse them; also tell what was read."""
     conditions, runner = run.conditions[name], Runner(folder)
-    touches = set_touches(conditions, run.goes_beyond)
-    responses = runner.read(touches, solved)
-    made, numbers = set_result(conditions, responses, deflection)
+    responses = runner.read(set_touches(conditions, run.goes_beyond), solved)
+    made, afferent = set_result(conditions, responses, deflection)
     stages = tuple(replace(stage, name=f"{name}: {stage.name}") for stage in runner.stages)
-    return made, numbers, stages
+    return made, summary(made, afferent), stages
 
 
 def set_result(
     conditions: Conditions,
     responses: Mapping[str, Mapping[Any, SkinResponse]],
     deflection: SkinDeflectionResult,
-) -> tuple[SetResult, Summary]:
+) -> tuple[SetResult, Afferent]:
     """Fit the afferent of one set of tissues, let observers judge its spikes, and compare with the paper."""
-    bars, spheres = list(responses["bar, 36 shifts"].values()), dict(responses["spheres"])
-    quantity = conditions.quantity
-    # A membrane of the paper's own system starts at 0, as it prints, whatever its tissues.
-    initial_mv = PAPER_INITIAL.value if quantity == STORED_ENERGY else None
-    bar_traces = single_unit.traces_at_receptor(bars, quantity, quantity)
-    problem = single_unit.rate_problem(bar_traces, initial_mv)
-    method = _method(conditions, spheres)
+    bars, spheres, seed = list(responses["bar, 36 shifts"].values()), responses["spheres"], conditions.seed
+    quantity, tissues = conditions.quantity, str(conditions.tissues)
+    # The paper's own system is fitted by the paper's method; its membrane starts at 0, as the paper prints.
+    initial_mv: float | None = PAPER_INITIAL.value
+    method: Method = response_surface()
+    if quantity != STORED_ENERGY:
+        initial_mv, method = None, percept.to_rates_and_hit_rates(spheres, quantity)
+    traces = nerve.traces_at_receptor(bars, quantity, quantity)
+    problem = nerve.rate_problem(traces, initial_mv)
     # The score of `human` has many maxima, between which last digits choose: its fit is that of Afferent().
-    known = Afferent().parameters if str(conditions.tissues) == HUMAN else None
-    best, folds = single_unit.fit(problem, method=method, known=known)
+    best, folds = nerve.fit(problem, method, Afferent().parameters if tissues == HUMAN else None)
     afferent = Afferent.from_parameters(
         best.parameters, dynamic_quantity=quantity, static_quantity=quantity, initial_mv=initial_mv
     )
-    discrimination = sphere_discrimination.discriminate_spheres(spheres, afferent, conditions.seed)
-    unit = single_unit.single_unit_result(problem, best, folds, afferent, method.name)
-    energy = single_unit.traces_at_receptor(bars)
-    course = single_unit.firing_course(bar_traces, energy, afferent, responses["force"])
-    force = skin_deflection.skin_force(responses["force"])
-    nail = nail_border.nail_border(responses["nail"]["nail"])
-    uncertainty: UncertaintyResult | None = None
-    thresholds: CurvatureThresholds | None = None
-    if others := responses.get("spheres, other curvatures"):
-        uncertainty = single_unit_uncertainty.uncertainty_result(
-            bar_traces, best.parameters, conditions.seed, initial_mv=initial_mv
-        )
-        centred = {curvature: skin for (position, curvature), skin in spheres.items() if position == 0.0}
-        thresholds = curvature_thresholds.curvature_thresholds(
-            centred | dict(others), afferent, discrimination.noise_sigma, conditions.seed
-        )
-    tissues = str(conditions.tissues)
-    standard = spheres[STANDARD_SPHERE]
-    rows = comparison(tissues, deflection, force, unit, course, discrimination, nail, thresholds)
+    standard, nail = spheres[STANDARD_SPHERE], responses["nail"]["nail"]
+    unit = nerve.single_unit_result(problem, best, folds, afferent, method.name)
+    firing = nerve.firing_course(traces, nerve.traces_at_receptor(bars), afferent, responses["force"])
     made = SetResult(
         tissues=tissues,
-        mesh=three_levels.mesh_picture(standard.mesh, RECEPTOR_X_MM),
-        levels=three_levels.three_levels(standard, afferent),
-        skin_force=force,
+        mesh=skin.mesh_picture(standard.mesh, RECEPTOR_X_MM),
+        levels=nerve.three_levels(standard, afferent),
+        skin_force=skin.skin_force(responses["force"]),
         single_unit=unit,
-        firing=course,
-        discrimination=discrimination,
-        population=three_levels.population_maps(standard, afferent),
-        nail=nail,
-        single_unit_uncertainty=uncertainty,
-        curvature_thresholds=thresholds,
-        comparison=tuple(rows),
+        firing=firing,
+        discrimination=percept.discriminate_spheres(spheres, afferent, seed),
+        population=nerve.population_maps(standard, afferent),
+        nail=skin.nail_border(nail),
+        comparison=(),
     )
-    return made, summary(made, afferent)
-
-
-def _method(conditions: Conditions, spheres: dict[tuple[float, float], SkinResponse]) -> Method:
-    """Return the paper's method for a drive by SED; another drive is fitted to hit rates as well."""
-    if conditions.quantity == STORED_ENERGY:
-        return response_surface()
-    return sphere_discrimination.to_rates_and_hit_rates(spheres, conditions.quantity)
+    if others := responses.get("spheres, other curvatures"):
+        centred = {curvature: each for (position, curvature), each in spheres.items() if position == 0.0}
+        noise_sigma = made.discrimination.noise_sigma
+        uncertainty = nerve.uncertainty_result(traces, best.parameters, seed, initial_mv=initial_mv)
+        thresholds = curvature_thresholds(centred | dict(others), afferent, noise_sigma, seed)
+        made = replace(made, single_unit_uncertainty=uncertainty, curvature_thresholds=thresholds)
+    return replace(made, comparison=judged(made, deflection)), afferent
 
 
 def summary(found: SetResult, afferent: Afferent) -> Summary:
     """Collect the numbers of one set; time and memory are known when the run ends."""
     force, unit, discrimination = found.skin_force, found.single_unit, found.discrimination
     dynamic, static = unit.modulation.dynamic.ours, unit.modulation.static.ours
-    centred, shifted = (place.at_goodwin for place in discrimination.statistics.targets)
-    at_296, at_365 = ((here.value, aside.value) for here, aside in zip(centred, shifted, strict=True))
+    at_296, at_365 = zip(*(place.at_goodwin for place in discrimination.statistics.targets), strict=True)
     return Summary(
         deflection_r2=force.deflection_r2,
         force_plate_1mm_n=force.plate_1mm_n,
@@ -311,11 +289,11 @@ def summary(found: SetResult, afferent: Afferent) -> Summary:
         dynamic_flat_hz=dynamic.minimum_hz,
         dynamic_max_hz=dynamic.maximum_hz,
         static_difference_hz=static.difference_hz,
-        resting_rate_hz=three_levels.resting_response(afferent).static_rate_hz,
+        resting_rate_hz=nerve.resting_response(afferent).static_rate_hz,
         noise_sigma=discrimination.noise_sigma,
         euclidean_rms_same_noise=discrimination.statistics.misfit["euclidean"].value,
-        hit_rate_296=at_296,
-        hit_rate_365=at_365,
+        hit_rate_296=tuple(rate.value for rate in at_296),
+        hit_rate_365=tuple(rate.value for rate in at_365),
         weber_144=weber_fraction(found.curvature_thresholds, 144.0),
         weber_287=weber_fraction(found.curvature_thresholds, 287.0),
     )
@@ -323,7 +301,6 @@ def summary(found: SetResult, afferent: Afferent) -> Summary:
 
 def weber_fraction(thresholds: CurvatureThresholds | None, standard_per_m: float) -> float:
     """Weber fraction of the paper's population at one standard, NaN without one."""
-    if thresholds is None:
-        return float("nan")
-    found = {one.standard_per_m: one.weber_fraction for one in thresholds.populations[0].standards}
+    standards = thresholds.populations[0].standards if thresholds else ()
+    found = {one.standard_per_m: one.weber_fraction for one in standards}
     return found.get(standard_per_m, float("nan"))

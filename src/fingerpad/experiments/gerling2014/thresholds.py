@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from scipy.interpolate import PchipInterpolator
@@ -18,10 +19,10 @@ from scipy.optimize import brentq
 
 from fingerpad.core.checked import result_class
 from fingerpad.core.errors import ConvergenceError
-from fingerpad.core.random_streams import Purpose, normals
-from fingerpad.core.values import FloatArray, Number, Vector
+from fingerpad.core.values import FloatArray, IntArray, Number, Vector
 from fingerpad.data import psychophysics
-from fingerpad.experiments.conditions import RECEPTOR_X_MM, Conditions, Touch
+from fingerpad.experiments.conditions import Conditions, Touch
+from fingerpad.experiments.gerling2014.percept import CENTRE_MM, CURVATURES, GOODWIN_CURVATURES, draws_of
 from fingerpad.neuron.afferent import Afferent
 from fingerpad.neuron.population import Population
 from fingerpad.psychophysics import (
@@ -33,7 +34,7 @@ from fingerpad.psychophysics import (
 )
 from fingerpad.psychophysics.code_efficiency import SMALLEST_SPREAD
 from fingerpad.psychophysics.encoding import gradient_sum, neighbour_pairs
-from fingerpad.psychophysics.noise_fit import NOISE_DRAWS, expected_hit_rates, fit_noise_sigma
+from fingerpad.psychophysics.noise_fit import expected_hit_rates, fit_noise_sigma
 from fingerpad.skin.sampling import SkinResponse
 
 STANDARDS_PER_M = (144.0, 200.0, 287.0, 400.0)
@@ -128,105 +129,14 @@ class CurvatureThresholds:
     interpolation: tuple[InterpolationError, ...]  # Of the spheres in `LEFT_OUT_PER_M`.
 
 
-def threshold_touches(conditions: Conditions) -> dict[float, Touch]:
-    """Spheres that the paper does not have; keys are curvatures. [1/m]"""
-    return sphere_touches(conditions, PRESSED_PER_M)
-
-
-def sphere_touches(conditions: Conditions, curvatures_per_m: Sequence[float]) -> dict[float, Touch]:
-    """Spheres pressed like the paper's own at 0.0 mm; keys are curvatures. [1/m]"""
-    return {curvature: conditions.sphere_touch(curvature) for curvature in curvatures_per_m}
-
-
-def curvature_thresholds(
-    responses: Mapping[float, SkinResponse], afferent: Afferent, noise_sigma: float, seed: int
-) -> CurvatureThresholds:
-    curvatures = np.array(sorted(responses))
-    neighbours, static = _encoded(_population("paper", afferent), responses, curvatures)
-    return CurvatureThresholds(
-        seed=seed,
-        proportion=PROPORTION,
-        judgements=JUDGEMENTS,
-        pressed_per_m=curvatures,
-        populations=tuple(
-            _thresholds_of(
-                name, responses, curvatures, afferent, noise_sigma if name == "paper" else None, seed
-            )
-            for name in LAYOUTS
-        ),
-        literature=ThresholdsOfPeople(
-            standard_per_m=np.array(psychophysics.THRESHOLD_STANDARDS.value),
-            comparison_per_m=np.array(psychophysics.THRESHOLD_COMPARISONS.value),
-            weber_fractions=np.array(psychophysics.WEBER_FRACTIONS.value),
-        ),
-        interpolation=interpolation_errors(curvatures, static, neighbours),
-    )
-
-
-def _population(name: str, afferent: Afferent) -> Population:
-    rows, columns = LAYOUTS[name]
-    return Population.grid(rows=rows, columns=columns, centre_mm=(RECEPTOR_X_MM, 0.0), afferent=afferent)
-
-
-def _encoded(
-    population: Population, responses: Mapping[float, SkinResponse], curvatures: FloatArray
-) -> tuple[np.ndarray, FloatArray]:
-    """Pairs of neighbours, and static rates under each sphere."""
-    static = np.array([population.respond(responses[at]).static_rate_hz for at in curvatures.tolist()])
-    return neighbour_pairs(population.positions_mm, population.pitch_mm), static
-
-
-def _thresholds_of(
-    name: str,
-    responses: Mapping[float, SkinResponse],
-    curvatures: FloatArray,
-    afferent: Afferent,
-    noise_sigma: float | None,
-    seed: int,
-) -> PopulationThresholds:
-    """Thresholds of one population at every standard; its noise is fitted to people unless it is given."""
-    population = _population(name, afferent)
-    neighbours, static = _encoded(population, responses, curvatures)
-    draws = normals(seed, 1, len(population.positions_mm), Purpose.RESPONSE, NOISE_DRAWS)[0].T
-    found: list[CurvatureThreshold] = []
-    missed: list[MissingThreshold] = []
-    if noise_sigma is None:
-        spheres = (psychophysics.SPHERE_287.value, *psychophysics.GOODWIN_CURVATURES.value)
-        table = static[[int(np.flatnonzero(curvatures == sphere)[0]) for sphere in spheres]]
-        try:
-            fit = fit_noise_sigma(lambda sigma: expected_hit_rates(table, neighbours, sigma, draws))
-            noise_sigma = fit.noise_sigma
-        except ConvergenceError as error:
-            noise_sigma, missed = math.nan, [MissingThreshold(standard_per_m=None, why_not=str(error))]
-    observer = Observer(interpolated(curvatures, static), neighbours, noise_sigma, draws)
-    for standard in STANDARDS_PER_M if math.isfinite(noise_sigma) else ():
-        try:
-            found.append(threshold_at(observer, standard))
-        except ConvergenceError as error:
-            missed.append(MissingThreshold(standard_per_m=standard, why_not=str(error)))
-    return PopulationThresholds(
-        layout=name,
-        rows=LAYOUTS[name][0],
-        columns=LAYOUTS[name][1],
-        noise_sigma=noise_sigma,
-        gradient_sum=gradient_sum(static, neighbours),
-        standards=tuple(found),
-        without_threshold=tuple(missed),
-    )
-
-
-def interpolated(curvature_per_m: FloatArray, table: FloatArray) -> PchipInterpolator:
-    """Rates (n_receptors,) as a function of the logarithm of the curvature."""
-    return PchipInterpolator(np.log(curvature_per_m), table)
-
-
+@dataclass(frozen=True)
 class Observer:
     """Discriminates spheres by the Gradient Sum of interpolated rates."""
 
-    def __init__(
-        self, rates: PchipInterpolator, neighbours: np.ndarray, noise_sigma: float, draws: FloatArray
-    ):
-        self.rates, self.neighbours, self.noise_sigma, self.draws = rates, neighbours, noise_sigma, draws
+    rates: PchipInterpolator  # From `interpolated`.
+    neighbours: IntArray
+    noise_sigma: float
+    draws: FloatArray  # Common random presentations, (n_draws, n_receptors).
 
     @property
     def farthest_per_m(self) -> float:
@@ -243,6 +153,76 @@ class Observer:
     def hit_rate(self, standard_per_m: float, comparison_per_m: float) -> float:
         pair = [self.responses(standard_per_m), self.responses(comparison_per_m)]
         return float(expected_hit_rates(pair, self.neighbours, self.noise_sigma, self.draws)[0])
+
+
+def interpolated(curvature_per_m: FloatArray, table: FloatArray) -> PchipInterpolator:
+    """Rates (n_receptors,) as a function of the logarithm of the curvature."""
+    return PchipInterpolator(np.log(curvature_per_m), table)
+
+
+def threshold_touches(
+    conditions: Conditions, curvatures_per_m: Sequence[float] = PRESSED_PER_M
+) -> dict[float, Touch]:
+    """Spheres pressed like the paper's own at 0.0 mm; keys are curvatures. [1/m]"""
+    return {curvature: conditions.sphere_touch(curvature) for curvature in curvatures_per_m}
+
+
+def curvature_thresholds(
+    responses: Mapping[float, SkinResponse], afferent: Afferent, noise_sigma: float, seed: int
+) -> CurvatureThresholds:
+    """Thresholds of each layout: the paper's with a given noise, others with one that is fitted to people."""
+    curvatures, populations = np.array(sorted(responses)), []
+    errors: tuple[InterpolationError, ...] = ()
+    for name, (rows, columns) in LAYOUTS.items():
+        population = Population.grid(rows=rows, columns=columns, centre_mm=CENTRE_MM, afferent=afferent)
+        neighbours = neighbour_pairs(population.positions_mm, population.pitch_mm)
+        static = np.array([population.respond(responses[at]).static_rate_hz for at in curvatures.tolist()])
+        draws, rates = draws_of(population, seed), interpolated(curvatures, static)
+        standards: list[CurvatureThreshold] = []
+        missed: list[MissingThreshold] = []
+        sigma = noise_sigma
+        if name == "paper":
+            errors = interpolation_errors(curvatures, static, neighbours)
+        else:
+            table = static[np.searchsorted(curvatures, (CURVATURES[0], *GOODWIN_CURVATURES))]
+            try:
+                sigma = _noise_of_people(table, neighbours, draws)
+            except ConvergenceError as error:
+                sigma, missed = math.nan, [MissingThreshold(standard_per_m=None, why_not=str(error))]
+        for standard in STANDARDS_PER_M if math.isfinite(sigma) else ():
+            try:
+                standards.append(threshold_at(Observer(rates, neighbours, sigma, draws), standard))
+            except ConvergenceError as error:
+                missed.append(MissingThreshold(standard_per_m=standard, why_not=str(error)))
+        populations.append(
+            PopulationThresholds(
+                layout=name,
+                rows=rows,
+                columns=columns,
+                noise_sigma=sigma,
+                gradient_sum=gradient_sum(static, neighbours),
+                standards=tuple(standards),
+                without_threshold=tuple(missed),
+            )
+        )
+    return CurvatureThresholds(
+        seed=seed,
+        proportion=PROPORTION,
+        judgements=JUDGEMENTS,
+        pressed_per_m=curvatures,
+        populations=tuple(populations),
+        literature=ThresholdsOfPeople(
+            standard_per_m=np.array(psychophysics.THRESHOLD_STANDARDS.value),
+            comparison_per_m=np.array(psychophysics.THRESHOLD_COMPARISONS.value),
+            weber_fractions=np.array(psychophysics.WEBER_FRACTIONS.value),
+        ),
+        interpolation=errors,
+    )
+
+
+def _noise_of_people(table: FloatArray, neighbours: IntArray, draws: FloatArray) -> float:
+    fit = fit_noise_sigma(lambda sigma: expected_hit_rates(table, neighbours, sigma, draws))
+    return fit.noise_sigma
 
 
 def just_noticeable_difference(observer: Observer, standard_per_m: float) -> float:
@@ -289,8 +269,7 @@ def interpolation_errors(
 ) -> tuple[InterpolationError, ...]:
     """Predict the Gradient Sum of some pressed spheres from the others."""
     sums = gradient_sum(table, neighbours)
-    rise = np.gradient(sums, curvature_per_m)
-    found = []
+    rise, found = np.gradient(sums, curvature_per_m), []
     for row in np.flatnonzero(np.isin(curvature_per_m, LEFT_OUT_PER_M)):
         others = np.arange(curvature_per_m.size) != row
         rates = interpolated(curvature_per_m[others], table[others])(np.log(curvature_per_m[row]))

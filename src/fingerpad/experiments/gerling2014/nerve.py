@@ -1,0 +1,623 @@
+"""Level 2: afferents under a shifted bar and under a sphere (paper, 2.1, 2.2.2, 3.2, 4.4, Figures 2, 6)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from functools import partial
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.interpolate import interp1d
+
+from fingerpad.core.checked import result_class
+from fingerpad.core.signals import STORED_ENERGY, ResponseMap, Traces, traces_below
+from fingerpad.core.units import MM_PER_M, units_of
+from fingerpad.core.values import FloatArray, Matrix, Number, Vector
+from fingerpad.data import bar_firing_rates, protocol
+from fingerpad.experiments.conditions import RECEPTOR_X_MM, Conditions, Touch
+from fingerpad.experiments.fit.rate_uncertainty import LEVEL, SEEDS_OF_PROFILES, fss_sensitivity, profiles
+from fingerpad.experiments.fit.results import FssSensitivity, ParameterProfile
+from fingerpad.experiments.gerling2014.skin import (
+    DECIMALS,
+    PLATE_DEPTHS_MM,
+    outline_elements,
+    outline_nodes,
+    plate,
+)
+from fingerpad.geometry.indenters import Bar
+from fingerpad.inference.afferent_methods import response_surface, start_points
+from fingerpad.inference.afferent_posterior import afferent_posterior
+from fingerpad.inference.fitting.cross_validation import (
+    CrossValidation,
+    FoldFit,
+    cross_validate,
+    interleaved_folds,
+)
+from fingerpad.inference.fitting.methods import Fit, FitStep, Method
+from fingerpad.inference.fitting.posterior import credible_band
+from fingerpad.inference.fitting.sensitivity import identifiability
+from fingerpad.inference.identifiable import IDENTIFIABLE_NAMES, identifiable
+from fingerpad.inference.rate_likelihood import INDEPENDENT, RateLikelihood, ResidualDraws
+from fingerpad.inference.rate_model import AfferentModel, four_number_model
+from fingerpad.inference.rate_problem import RateProblem
+from fingerpad.inference.recordings import RateRecordings
+from fingerpad.neuron.afferent import PARAMETER_NAMES, Afferent, parameter_units
+from fingerpad.neuron.lif import membrane_potential
+from fingerpad.neuron.population import Population
+from fingerpad.neuron.spikes import (
+    PAPER_WINDOWS_MS,
+    first_spike_latency_ms,
+    modulation_difference,
+    modulation_index,
+)
+from fingerpad.neuron.transduction import drive
+from fingerpad.skin.sampling import SkinResponse
+
+RECEPTOR = ((RECEPTOR_X_MM, 0.0),)  # Position of the end organ: x and z on the skin. [mm]
+PHASES = ("dynamic", "static")
+
+
+@result_class
+class Modulation:
+    """Modulation of the rate at the edge of the bar (Eq. 11)."""
+
+    maximum_hz: Number
+    minimum_hz: Number  # Smallest rate with the flat face of the bar over the receptor. [spikes/s]
+    difference_hz: Number
+    index: Number  # Modulation index; NaN if there are no spikes. [1]
+
+
+@result_class
+class PhaseModulation:
+    """Modulation of the rates of one phase."""
+
+    observed: Modulation
+    ours: Modulation  # Of the recorded and of the predicted rates.
+
+
+@result_class
+class RateModulation:
+    """Modulation of both rates."""
+
+    dynamic: PhaseModulation
+    static: PhaseModulation  # During the ramp and during the hold.
+
+
+@result_class
+class SearchStep:
+    """One iteration of the response-surface method."""
+
+    iteration: int  # From 0, the start point.
+    fss: Number  # Fractional sum of squares of the training set. [1]
+    parameters: dict[str, Number]  # Six parameters, by name.
+
+
+@result_class
+class Search:
+    """Search of one fold from one start point."""
+
+    start: int  # Number of the start point, from 1.
+    fss_train: Number
+    fss_test: Number  # Fractional sum of squares of the training and of the testing set. [1]
+    runs: int  # Evaluations of the model.
+    history: tuple[SearchStep, ...]  # Steps from the start point to the end.
+
+
+@result_class
+class FoldResult:
+    """One fold of the cross-validation."""
+
+    fold: int
+    start: int  # Number of the fold and of the better start point, from 1.
+    testing_shift_mm: Vector  # Shifts left out, (n_testing,). [mm]
+    fss_start: Vector  # Fractional sum of squares of the training set at the start points, (n_starts,). [1]
+    fss_train: Number
+    fss_test: Number  # Of the better search. [1]
+    parameters: dict[str, Number]  # Six parameters of the better search, by name.
+    climbs: tuple[Search, ...]  # One per start point.
+
+
+@result_class
+class SingleUnitResult:
+    """Fit of one afferent to the rates under the bar."""
+
+    fss_in_sample: Number
+    fss_in_sample_dynamic: Number
+    fss_in_sample_static: Number  # Fractional sum of squares over all shifts, weighted and by phase. [1]
+    fss_out_of_sample: Number
+    fss_training_mean: Number  # Mean over the folds, of the testing and of the training sets. [1]
+    method: str
+    dynamic_quantity: str
+    static_quantity: str  # What the two terms of the current follow, see `SkinResponse.sample`.
+    parameters: dict[str, Number]
+    units: dict[str, str]  # Six parameters fitted to all shifts, and their units, by name.
+    shift_mm: Vector  # Shifts of the bar, proximal positive, (n_shifts,). [mm]
+    dynamic_rate_hz: Vector
+    static_rate_hz: Vector  # Predicted rates, (n_shifts,). [spikes/s]
+    observed_dynamic_rate_hz: Vector
+    observed_static_rate_hz: Vector  # Recorded rates, (n_shifts,). [spikes/s]
+    start_points: tuple[dict[str, Number], ...]  # Both start points, by name of the parameter.
+    folds: tuple[FoldResult, ...]
+    modulation: RateModulation
+    initial_mv: Number | None = None  # Potential of the membrane at the start; by default at rest. [mV]
+
+
+def bar_touches(conditions: Conditions) -> list[Touch]:
+    """36 touches of the bar, shifted along the finger.
+
+    Its flat face stays parallel to the skin at the receptor (docs/decisions.md#bar-orientation). A positive
+    shift moves the bar towards the proximal end (docs/decisions.md#bar-shift).
+    """
+    tilt, grading = conditions.skin_tilt_deg, conditions.bar_grading()
+    along = float(np.cos(np.deg2rad(tilt)))
+    return [
+        conditions.touch(Bar(), RECEPTOR_X_MM - shift * along, grading, tilt_deg=tilt)
+        for shift in protocol.BAR_SHIFTS.value
+    ]
+
+
+def traces_at_receptor(
+    responses: Sequence[SkinResponse],
+    dynamic_quantity: str = STORED_ENERGY,
+    static_quantity: str = STORED_ENERGY,
+) -> Traces:
+    """Quantities of the two terms at the one receptor, one column per shift of the bar."""
+    quantities = (dynamic_quantity, static_quantity)
+    return Traces.joined([traces_below(skin, RECEPTOR, *quantities) for skin in responses])
+
+
+def rate_problem(traces: Traces, initial_mv: float | None = None) -> RateProblem:
+    """Observed rates at all shifts, and the paper's model of the afferent driven by traces."""
+    return RateProblem(AfferentModel.of_traces(traces, initial_mv=initial_mv), bar_recordings())
+
+
+def bar_recordings() -> RateRecordings:
+    """Return the rates observed under the bar, stimuli named by their shift in mm."""
+    observed = bar_firing_rates()
+    names = tuple(f"{shift:g}" for shift in observed.shift_mm)
+    return RateRecordings(names, observed.dynamic_rate_hz, observed.static_rate_hz, observed.source)
+
+
+def fit(
+    problem: RateProblem, method: Method | None = None, known: FloatArray | None = None
+) -> tuple[Fit, CrossValidation]:
+    """Fit to all shifts, where the parameters are not known already, and cross-validate the method."""
+    method, everything = method or response_surface(), np.arange(problem.n_observations)
+    if known is None:
+        best = method.fit(problem, everything)
+    else:
+        score = problem.score(known, everything)
+        best = Fit(known, score, n_evaluations=0, seconds=0.0, history=(FitStep(known, score),))
+    return best, cross_validate(problem, method, interleaved_folds(everything.size))
+
+
+def single_unit_result(
+    problem: RateProblem, best: Fit, folds: CrossValidation, afferent: Afferent, method: str
+) -> SingleUnitResult:
+    shift_mm, recordings = bar_firing_rates().shift_mm, problem.recordings
+    observed = {phase: getattr(recordings, f"{phase}_rate_hz") for phase in PHASES}
+    ours = dict(zip(PHASES, problem.model.evaluate(best.parameters), strict=True))
+    by_phase = problem.score_by_phase(best.parameters, np.arange(problem.n_observations))
+    modulation = {
+        phase: PhaseModulation(
+            observed=edge_modulation(shift_mm, observed[phase]), ours=edge_modulation(shift_mm, ours[phase])
+        )
+        for phase in PHASES
+    }
+    return SingleUnitResult(
+        fss_in_sample=best.score,
+        fss_in_sample_dynamic=by_phase["dynamic"],
+        fss_in_sample_static=by_phase["static"],
+        fss_out_of_sample=folds.score_test,
+        fss_training_mean=folds.score_train,
+        method=method,
+        dynamic_quantity=afferent.dynamic_quantity,
+        static_quantity=afferent.static_quantity,
+        initial_mv=afferent.initial_mv,
+        parameters=_six(best.parameters),
+        units=parameter_units(afferent),
+        shift_mm=shift_mm,
+        dynamic_rate_hz=ours["dynamic"],
+        static_rate_hz=ours["static"],
+        observed_dynamic_rate_hz=observed["dynamic"],
+        observed_static_rate_hz=observed["static"],
+        start_points=tuple(map(_six, start_points())),
+        folds=tuple(_fold(problem, fold, shift_mm) for fold in folds.folds),
+        modulation=RateModulation(**modulation),
+    )
+
+
+def _fold(problem: RateProblem, fold: FoldFit, shift_mm: FloatArray) -> FoldResult:
+    """One fold: shifts left out, the better of its searches, and the steps of each."""
+    searches = [
+        Search(
+            start=number,
+            fss_train=search.score,
+            fss_test=problem.score(search.parameters, fold.testing),
+            runs=search.n_evaluations,
+            history=tuple(
+                SearchStep(iteration=iteration, fss=step.score, parameters=_six(step.parameters))
+                for iteration, step in enumerate(search.history)
+            ),
+        )
+        for number, search in enumerate(fold.fit.attempts, start=1)
+    ]
+    return FoldResult(
+        fold=fold.fold + 1,
+        start=fold.fit.start + 1,
+        testing_shift_mm=shift_mm[fold.testing],
+        fss_start=np.array([search.history[0].fss for search in searches]),
+        fss_train=fold.score_train,
+        fss_test=fold.score_test,
+        parameters=_six(fold.fit.parameters),
+        climbs=tuple(searches),
+    )
+
+
+def _six(parameters: FloatArray) -> dict[str, float]:
+    return dict(zip(PARAMETER_NAMES, parameters.tolist(), strict=True))
+
+
+def edge_modulation(shift_mm: FloatArray, rate_hz: FloatArray) -> Modulation:
+    """Compare the largest rate with the smallest under the flat face of the bar."""
+    under_flat = np.abs(shift_mm) < protocol.BAR_WIDTH.value / 2 - protocol.BAR_FILLET.value
+    largest, smallest = float(rate_hz.max()), float(rate_hz[under_flat].min())
+    return Modulation(
+        maximum_hz=largest,
+        minimum_hz=smallest,
+        difference_hz=float(modulation_difference(largest, smallest)),
+        index=float(modulation_index(largest, smallest)) if largest > 0.0 else np.nan,
+    )
+
+
+@result_class
+class FiringCourse:
+    """Course of the firing and of the current under the bar, shift by shift, and rates by depth."""
+
+    peak_ms: Vector  # End of the shortest interval, (n_shifts,); NaN with fewer than two spikes. [ms]
+    window_ms: tuple[float, float]  # The paper's window of the dynamic rate. [ms]
+    dynamic_share_ramp: Vector  # Share of the dynamic term in the charge in the ramp, (n_shifts,). [1]
+    dynamic_share_hold: Vector  # The same in the hold, (n_shifts,). [1]
+    sed_r2: Number  # R² of the line from SED in the static window to the observed static rates. [1]
+    depth_mm: Vector  # Depths of a flat plate, (n_depths,). [mm]
+    static_rate_by_depth_hz: Vector  # At these depths, mean of the population, (n_depths,). [spikes/s]
+
+    @property
+    def fires(self) -> np.ndarray:
+        """Shifts at which there are at least two spikes, (n_shifts,)."""
+        return np.isfinite(self.peak_ms)
+
+
+def firing_course(
+    drive: Traces, sed: Traces, afferent: Afferent, pressed: Mapping[str, SkinResponse]
+) -> FiringCourse:
+    dynamic_ms, static_ms = PAPER_WINDOWS_MS
+    population = Population.grid(afferent=afferent, centre_mm=RECEPTOR[0])
+    in_hold = interp1d(sed.times_ms, sed.values, axis=0)(0.5 * (static_ms[0] + static_ms[1]))
+    ramp_ms = protocol.RAMP.value
+    plates = [population.respond(pressed[plate(depth)]).static_rate_hz for depth in PLATE_DEPTHS_MM]
+    return FiringCourse(
+        peak_ms=np.array([peak_ms(train) for train in afferent.spikes(drive)]),
+        window_ms=(dynamic_ms[0], dynamic_ms[1]),
+        dynamic_share_ramp=dynamic_share(drive, afferent, 0.0, ramp_ms),
+        dynamic_share_hold=dynamic_share(drive, afferent, ramp_ms, float(drive.times_ms[-1])),
+        sed_r2=float(np.corrcoef(in_hold, bar_firing_rates().static_rate_hz)[0, 1] ** 2),
+        depth_mm=np.array(PLATE_DEPTHS_MM),
+        static_rate_by_depth_hz=np.array([rate_hz.mean() for rate_hz in plates]),
+    )
+
+
+def peak_ms(spikes_ms: FloatArray) -> float:
+    """End of the shortest interval between spikes, NaN with fewer than two spikes. [ms]"""
+    return float(spikes_ms[1 + np.diff(spikes_ms).argmin()]) if spikes_ms.size > 1 else np.nan
+
+
+def dynamic_share(drive: Traces, afferent: Afferent, start_ms: float, end_ms: float) -> FloatArray:
+    """Share of the dynamic term in the charge of both terms between two knots, (n_sites,); 0 without."""
+
+    def charge(silenced: str) -> FloatArray:
+        # Its knots include both times; where it jumps there are two at one time.
+        term = replace(afferent.transduction, intercept_ma=0.0, **{silenced: 0.0}).current(drive)
+        first = np.searchsorted(term.times_ms, start_ms, side="right") - 1
+        within = slice(first, np.searchsorted(term.times_ms, end_ms, side="left") + 1)
+        return np.asarray(np.trapezoid(term.values[within], term.times_ms[within], axis=0))
+
+    dynamic, static = charge("static_gain"), charge("dynamic_gain")
+    return np.divide(dynamic, static + dynamic, out=np.zeros_like(static), where=static + dynamic > 0.0)
+
+
+# What the rates determine
+
+PIECES = 8
+"""Linear pieces of the drive between two given times. Rates differ by less than 0.01 spikes/s on average from
+those with 32, and an evaluation takes two thirds of the time."""
+
+THOROUGH = partial(afferent_posterior, smallest_effective_size=200.0)
+"""Sampler of a result: the error of the ends of a 95 % interval is a seventh of a standard deviation."""
+
+QUICK = partial(afferent_posterior, n_walkers=100, smallest_effective_size=100.0, largest_r_hat=1.02)
+"""Sampler of a quick result: the error of the ends is a fifth of a standard deviation."""
+
+
+@result_class
+class CredibleInterval:
+    """Posterior median and ends of the credible interval of one number, in its unit."""
+
+    median: Number
+    low: Number
+    high: Number
+
+
+@result_class
+class ParameterIdentifiability:
+    """Directions of the six parameters that the rates determine."""
+
+    rank: int  # Singular values of the Jacobian of the rates that are not zero.
+    relative_singular_values: Vector  # Over the largest, (6,). [1]
+    silent_directions: tuple[dict[str, Number], ...]  # They do not change the rates; by parameter.
+
+
+@result_class
+class PosteriorConvergence:
+    """Size and convergence of the MCMC ensembles."""
+
+    ensembles: int
+    walkers: int  # Independent ensembles, and walkers of each.
+    draws: int
+    evaluations: int  # Draws kept, and evaluations of the likelihood.
+    acceptance: Number  # Share of accepted proposals. [1]
+    r_hat: Number  # Largest split R-hat. [1]
+    effective_draws: Number
+    effective_draws_of_tails: Number  # Smallest effective sample sizes.
+    draws_per_effective_draw: Number  # Largest autocorrelation time, in draws.
+
+
+@result_class
+class PhasePrediction:
+    """Posterior prediction of the rates of one phase, shift by shift."""
+
+    observed_hz: Vector
+    median_hz: Vector
+    low_hz: Vector
+    high_hz: Vector  # Observed; median and credible band of predicted rates, (n_shifts,). [spikes/s]
+    new_low_hz: Vector
+    new_high_hz: Vector  # Credible band of a new recording, (n_shifts,). [spikes/s]
+    share_within_new: Number  # Share of the observed rates within that band. [1]
+    residual_deviation_hz: CredibleInterval
+    residual_length_mm: CredibleInterval  # Of the residuals; length: of their correlation.
+    probability_of_independence: Number  # That residuals of neighbouring shifts are independent. [1]
+
+
+@result_class
+class UncertaintyResult:
+    """Uncertainty of the fit to the rates under the bar."""
+
+    level: Number  # Probability within each interval and band.
+    seed: int  # Of the random numbers.
+    names: tuple[str, ...]  # The four identifiable numbers.
+    units: dict[str, str]
+    fit: dict[str, Number]
+    capacitance_mf: Number
+    threshold_mv: Number  # Of the fit; they set the common scale of the gains in `posterior`. [mF], [mV]
+    identifiability: ParameterIdentifiability  # Of the six parameters.
+    posterior: dict[str, CredibleInterval]  # Of numbers, gains, and resting potential over threshold.
+    convergence: PosteriorConvergence
+    shift_mm: Vector  # Shifts of the bar, (n_shifts,). [mm]
+    rates: dict[str, PhasePrediction]
+    evidence_for_alike_residuals: Number  # Gain of the largest log likelihood by correlated residuals.
+    profiles: tuple[ParameterProfile, ...]  # Of the four numbers.
+    sensitivity: FssSensitivity  # Of FSS to the four numbers.
+
+
+def uncertainty_result(
+    traces: Traces, fitted: ArrayLike, seed: int, *, quick: bool = False, initial_mv: float | None = None
+) -> UncertaintyResult:
+    recordings, shift_mm = bar_recordings(), bar_firing_rates().shift_mm
+    six_model = AfferentModel.of_drive(drive(traces, pieces=PIECES), initial_mv=initial_mv)
+    model, six = four_number_model(six_model), np.asarray(fitted, dtype=np.float64)
+    four, capacitance_mf, threshold_mv = identifiable(six), float(six[4]), float(six[5])
+    alike, independent = RateLikelihood(model, recordings, shift_mm), RateLikelihood(model, recordings)
+    posterior = (QUICK if quick else THOROUGH)(alike, four, seed=seed)
+    chains, gains = posterior.chains, posterior.six(capacitance_mf, threshold_mv)[:, :3]
+    draws = dict(zip((*IDENTIFIABLE_NAMES, *PARAMETER_NAMES[:3]), (*posterior.four.T, *gains.T), strict=True))
+    draws["resting_share"] = chains.flat[:, 0]
+    some = posterior.four[np.linspace(0, len(posterior.four) - 1, SEEDS_OF_PROFILES).astype(np.int64)]
+    local = identifiability(lambda values: np.concatenate(six_model.evaluate(values)), six, PARAMETER_NAMES)
+    return UncertaintyResult(
+        level=LEVEL,
+        seed=seed,
+        names=IDENTIFIABLE_NAMES,
+        units=units_of(IDENTIFIABLE_NAMES),
+        fit=dict(zip(IDENTIFIABLE_NAMES, four.tolist(), strict=True)),
+        capacitance_mf=capacitance_mf,
+        threshold_mv=threshold_mv,
+        identifiability=ParameterIdentifiability(
+            rank=local.rank,
+            relative_singular_values=local.singular_values / local.singular_values[0],
+            silent_directions=tuple(map(_six, local.silent_directions)),
+        ),
+        posterior={name: _interval(values) for name, values in draws.items()},
+        convergence=PosteriorConvergence(
+            ensembles=chains.draws.shape[0],
+            walkers=chains.draws.shape[2],
+            draws=len(posterior.four),
+            evaluations=chains.n_evaluations,
+            acceptance=chains.acceptance,
+            r_hat=chains.r_hat.max(),
+            effective_draws=chains.effective_sizes.min(),
+            effective_draws_of_tails=chains.tail_effective_sizes.min(),
+            draws_per_effective_draw=chains.autocorrelation_steps.max(),
+        ),
+        shift_mm=shift_mm,
+        rates={
+            phase: _prediction(drawn, getattr(recordings, f"{phase}_rate_hz"))
+            for phase, drawn in posterior.rates.items()
+        },
+        evidence_for_alike_residuals=(
+            alike.log_likelihood(some).max() - independent.log_likelihood(some).max()
+        ),
+        profiles=profiles(alike, some),
+        sensitivity=fss_sensitivity(RateProblem(model, recordings), four, seed),
+    )
+
+
+def _interval(draws: FloatArray) -> CredibleInterval:
+    low, high = credible_band(draws, LEVEL)
+    return CredibleInterval(median=float(np.median(draws)), low=float(low), high=float(high))
+
+
+def _prediction(drawn: ResidualDraws, observed_hz: FloatArray) -> PhasePrediction:
+    low, high = credible_band(drawn.predicted_hz, LEVEL)
+    new_low, new_high = credible_band(drawn.new_hz, LEVEL)
+    return PhasePrediction(
+        observed_hz=observed_hz,
+        median_hz=np.median(drawn.predicted_hz, axis=0),
+        low_hz=low,
+        high_hz=high,
+        new_low_hz=new_low,
+        new_high_hz=new_high,
+        share_within_new=((new_low <= observed_hz) & (observed_hz <= new_high)).mean(),
+        residual_deviation_hz=_interval(drawn.deviation_hz),
+        residual_length_mm=_interval(drawn.length_mm),
+        probability_of_independence=(drawn.length_mm == INDEPENDENT).mean(),
+    )
+
+
+# One sphere on all levels, and afferents all over the pad
+
+OFFSETS_MM = np.array([0.0, 1.0, 2.0])  # Distances of three afferents from the sphere's axis, distal. [mm]
+SHEET_PER_CM2, SHEET_ROWS = 1600.0, 41  # A square of afferents every 0.25 mm, to 5 mm from the axis.
+
+UNTIL_MS, POTENTIAL_STEP_MS = 200.0, 0.5
+"""Current and potential are given from the onset up to this time, at this spacing and about spikes. [ms]"""
+
+
+@result_class
+class ThreeLevels:
+    """Skin, one afferent and three afferents under the standard sphere (Figure 2)."""
+
+    curvature_per_m: float  # Of the sphere. [1/m]
+    centre_mm: tuple[float, float]  # x and y of its centre at the end of the hold. [mm]
+    ramp_ms: float  # Duration of the ramp. [ms]
+    x_mm: Matrix
+    y_mm: Matrix
+    """Nodes of the plane z = 0 at the end of the hold, through from the skin to the bone, (n_outline + 1,
+    n_through + 1). [mm]"""
+    pressed: str  # Name of what the afferent follows, as it is known in all elements.
+    pressed_kpa: Matrix  # Its values in the elements beside that plane, (n_outline, n_through). [kPa]
+    end_ms: float  # End of the hold. [ms]
+    offset_mm: Vector  # Positions of the afferents relative to the contact, (3,). [mm]
+    spikes_ms: tuple[Vector, ...]  # Spike times of each afferent. [ms]
+    dynamic_rate_hz: Vector
+    static_rate_hz: Vector  # Their rates, (3,). [spikes/s]
+    times_ms: Vector
+    until_ms: float  # Times of the next two, and their end, (n_times,). [ms]
+    current_ma: Vector
+    potential_mv: Vector  # Current and potential of the first afferent, (n_times,). [mA, mV]
+    rheobase_ma: float
+    threshold_mv: float  # Smallest constant current, and potential, that elicit spikes. [mA, mV]
+
+
+def three_levels(standard: SkinResponse, afferent: Afferent) -> ThreeLevels:
+    mesh, curvature, membrane = standard.mesh, protocol.STANDARD_CURVATURE.value, afferent.membrane
+    moved = (mesh.nodes_mm + standard.displacement_mm)[outline_nodes(mesh)].round(DECIMALS)
+    pressed, values = standard.at_end(afferent.static_quantity)
+    # The sphere has advanced from the skin to its depth.
+    midline, x_mm = mesh.nodes_mm[mesh.midline_nodes], standard.axis_x_mm
+    foot = np.array([x_mm, np.interp(x_mm, midline[:, 0], midline[:, 1])])
+    centre = foot + (float(standard.depth_mm[-1]) - MM_PER_M / curvature) * standard.direction[:2]
+    sites = np.stack([RECEPTOR_X_MM + OFFSETS_MM, 0.0 * OFFSETS_MM], axis=-1)
+    sed = standard.sed(sites, afferent.dynamic_quantity, afferent.static_quantity)
+    trains, (dynamic_hz, static_hz) = tuple(afferent.spikes(sed)), afferent.rates(sed)
+    early = trains[0][trains[0] < UNTIL_MS]
+    # A reset is drawn upright.
+    reset = early + 1e-6 * membrane.refractory_ms
+    regular = np.arange(0.0, UNTIL_MS + POTENTIAL_STEP_MS, POTENTIAL_STEP_MS)
+    times = np.unique(np.concatenate([regular, early, reset, early + membrane.refractory_ms]))
+    below = afferent.transduction.current(sed.part(slice(0, 1)))
+    return ThreeLevels(
+        curvature_per_m=curvature,
+        centre_mm=(float(centre[0]), float(centre[1])),
+        ramp_ms=protocol.RAMP.value,
+        x_mm=moved[..., 0],
+        y_mm=moved[..., 1],
+        pressed=pressed,
+        pressed_kpa=values[outline_elements(mesh)],
+        end_ms=float(sed.times_ms[-1]),
+        offset_mm=OFFSETS_MM,
+        spikes_ms=trains,
+        dynamic_rate_hz=dynamic_hz,
+        static_rate_hz=static_hz,
+        times_ms=times,
+        until_ms=UNTIL_MS,
+        current_ma=np.interp(times, below.times_ms, below.values[:, 0]),
+        potential_mv=membrane_potential(membrane, below, trains[0], times),
+        rheobase_ma=membrane.capacitance_mf * membrane.threshold_mv / membrane.time_constant_ms,
+        threshold_mv=membrane.threshold_mv,
+    )
+
+
+@result_class
+class RestingResponse:
+    """Response of an afferent without any touch."""
+
+    dynamic_rate_hz: float
+    static_rate_hz: float  # Rates in the windows of the ramp and the hold. [spikes/s]
+    first_spike_latency_ms: Number  # NaN without a spike. [ms]
+
+
+@result_class
+class ResponseSheet:
+    """Responses of a sheet of afferents as tables over x (rows) and z (columns)."""
+
+    x_mm: Vector
+    z_mm: Vector  # Places of the afferents, (n_x,). [mm]
+    dynamic_rate_hz: Matrix
+    static_rate_hz: Matrix  # Rates, (n_x, n_z). [spikes/s]
+    first_spike_latency_ms: Matrix  # NaN without a spike, (n_x, n_z). [ms]
+
+
+@result_class
+class PopulationMaps(ResponseSheet):
+    """Responses of a dense sheet of afferents under the standard sphere (Figure 6)."""
+
+    curvature_per_m: float  # Of the sphere. [1/m]
+    at_rest: RestingResponse  # Of the same afferent.
+    receptors_mm: Matrix  # Places of the paper's receptors, (18, 2). [mm]
+
+
+def population_maps(standard: SkinResponse, afferent: Afferent) -> PopulationMaps:
+    """Simulate a dense sheet of afferents under the standard sphere (Figure 6)."""
+    return PopulationMaps(
+        curvature_per_m=protocol.STANDARD_CURVATURE.value,
+        at_rest=resting_response(afferent),
+        **vars(response_sheet(sheet(afferent).respond(standard))),
+        receptors_mm=Population.grid(centre_mm=RECEPTOR[0]).positions_mm,
+    )
+
+
+def resting_response(afferent: Afferent) -> RestingResponse:
+    end_ms = protocol.RAMP.value + protocol.HOLD.value
+    sed = Traces.at_rest(end_ms, afferent.dynamic_quantity, afferent.static_quantity)
+    dynamic_hz, static_hz = afferent.rates(sed, *PAPER_WINDOWS_MS)
+    latency_ms = float(first_spike_latency_ms(afferent.spikes(sed))[0])
+    return RestingResponse(
+        dynamic_rate_hz=float(dynamic_hz[0]),
+        static_rate_hz=float(static_hz[0]),
+        first_spike_latency_ms=latency_ms,
+    )
+
+
+def sheet(afferent: Afferent) -> Population:
+    """Place afferents side by side on a square about the contact point, ordered by x, then by z."""
+    return Population.grid(SHEET_PER_CM2, SHEET_ROWS, SHEET_ROWS, RECEPTOR[0], afferent)
+
+
+def response_sheet(response: ResponseMap) -> ResponseSheet:
+    x, z = (np.unique(coordinate) for coordinate in response.positions_mm.T)
+    tables = {
+        name: getattr(response, name).reshape(x.size, z.size)
+        for name in ("dynamic_rate_hz", "static_rate_hz", "first_spike_latency_ms")
+    }
+    return ResponseSheet(x_mm=x, z_mm=z, **tables)
