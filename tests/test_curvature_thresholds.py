@@ -13,9 +13,9 @@ from fingerpad.experiments.gerling2014.claim_row import Verdict, judged
 from fingerpad.experiments.gerling2014.comparison import weber_claims
 from fingerpad.experiments.gerling2014.sphere_discrimination import CURVATURES
 from fingerpad.psychophysics import yes_no
-from fingerpad.psychophysics.code_efficiency import SMALLEST_SPREAD
 from fingerpad.psychophysics.encoding import gradient_sum, neighbour_pairs
-from fingerpad.psychophysics.noise_fit import expected_hit_rates
+from fingerpad.psychophysics.ideal_observer import SMALLEST_SPREAD
+from fingerpad.psychophysics.observer import expected_hit_rates
 from fingerpad.report import percept as page
 from fingerpad.report.style import png
 from fingerpad.report.tables import filled

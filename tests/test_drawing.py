@@ -3,12 +3,12 @@
 import matplotlib
 import numpy as np
 import pytest
+from fingerpad.experiments.discrimination.task_stimuli import task_population, task_stimuli
 from matplotlib.collections import QuadMesh
 from matplotlib.figure import Figure
 
 import fingerpad as fp
 from fingerpad.experiments.discrimination.analysis import PreparedTask, analyse
-from fingerpad.experiments.discrimination.task_stimuli import task_population, task_stimuli
 from fingerpad.experiments.fit.fit import fit_recordings
 from fingerpad.export.result_tables import TABLES
 from fingerpad.inference.spike_fit import SpikeFit

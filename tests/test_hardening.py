@@ -13,6 +13,13 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from fingerpad.experiments.afferent_files import fitted_afferent
+from fingerpad.experiments.descriptions.estimate import estimate_press
+from fingerpad.experiments.descriptions.stimulus import TactileStimulus
+from fingerpad.experiments.descriptions.touch import described_touch
+from fingerpad.experiments.discrimination.run import DiscriminationRun, discriminate
+from fingerpad.experiments.discrimination.task_stimuli import parse_task
+from fingerpad.experiments.stimuli import ShiftedBar
 
 import fingerpad as fp
 from fingerpad.cli import main, run
@@ -22,23 +29,16 @@ from fingerpad.core.plain_yaml import DEEPEST, LARGEST_TEXT, read_yaml
 from fingerpad.core.regions import Rectangle, poisson_disc, rectangular
 from fingerpad.core.signals import Traces
 from fingerpad.core.tables import read_csv
-from fingerpad.experiments.afferent_files import fitted_afferent
 from fingerpad.experiments.conditions import Conditions
-from fingerpad.experiments.descriptions.estimate import estimate_press
-from fingerpad.experiments.descriptions.stimulus import TactileStimulus
-from fingerpad.experiments.descriptions.touch import described_touch
-from fingerpad.experiments.discrimination.run import DiscriminationRun, discriminate
-from fingerpad.experiments.discrimination.task_stimuli import parse_task
 from fingerpad.experiments.fit.fit import fit_recordings
 from fingerpad.experiments.recording_files import read_recordings
-from fingerpad.experiments.stimuli import ShiftedBar
 from fingerpad.inference.rate_model import AfferentModel
 from fingerpad.inference.recordings import RateRecordings
 from fingerpad.neuron.population import sensitivities
-from fingerpad.psychophysics.discrimination import Experiment, discriminate_gradient_sum
+from fingerpad.psychophysics.curve_fit import fit_psychometric
 from fingerpad.psychophysics.encoding import gradient_sum
 from fingerpad.psychophysics.ideal_observer import GaussianResponses
-from fingerpad.psychophysics.psychometric import fit_psychometric
+from fingerpad.psychophysics.observer import Experiment, GradientSum, discriminate_by
 from fingerpad.report.style import new_figure, png
 from fingerpad.skin.sampling import SurfaceProfile
 from fingerpad.skin.store import Store, touch_key
@@ -286,8 +286,8 @@ def test_sequences_become_tuples_so_that_values_hash():
         lambda: fp.Afferent(dynamic_quantity="x"),
         lambda: fp.Union([fp.Sphere()], at_mm=None),
         lambda: gradient_sum([1.0, np.nan, 2.0], PAIRS),
-        lambda: discriminate_gradient_sum([[1, 2, 3], [3, 4, 2]], PAIRS, 0.1, 1, silent_value=np.nan),
-        lambda: discriminate_gradient_sum([[1, 2, 3], [3, 4, 2]], np.empty((0, 2), int), 0.1, 1),
+        lambda: discriminate_by(GradientSum(PAIRS), [[1, 2, 3], [3, 4, 2]], 0.1, 1, silent_value=np.nan),
+        lambda: discriminate_by(GradientSum(np.empty((0, 2), int)), [[1, 2, 3], [3, 4, 2]], 0.1, 1),
         lambda: replace(fp.Population.grid().respond_to(MANY), windows_ms=((50.0, 30.0), (600.0, 950.0))),
         lambda: SurfaceProfile([2, 1], [np.nan]),
         lambda: RateRecordings("ab", [1.0, 2.0], None),

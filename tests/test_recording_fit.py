@@ -11,6 +11,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from fingerpad.experiments.afferent_files import fitted_afferent
+from fingerpad.experiments.descriptions.stimuli import NamedStimulus
+from fingerpad.experiments.stimuli import ListedStimuli, ShiftedBar
 
 import fingerpad as fp
 from fingerpad import cli
@@ -19,9 +22,7 @@ from fingerpad.core.compilation import SHORT_NOTICE, SUBJECT
 from fingerpad.core.random_streams import Presentations
 from fingerpad.data import bar_firing_rates
 from fingerpad.experiments import runner
-from fingerpad.experiments.afferent_files import fitted_afferent
 from fingerpad.experiments.conditions import RECEPTOR_X_MM, Conditions
-from fingerpad.experiments.descriptions.stimuli import NamedStimulus
 from fingerpad.experiments.fit import fit as study
 from fingerpad.experiments.fit import rate_uncertainty as recording_posterior
 from fingerpad.experiments.fit import session
@@ -30,12 +31,10 @@ from fingerpad.experiments.fit.rate_uncertainty import rate_posterior
 from fingerpad.experiments.fit.results import ParameterProfile, PhaseBands, RateBand, RatePosterior
 from fingerpad.experiments.gerling2014 import single_unit
 from fingerpad.experiments.manifest import sha256
-from fingerpad.experiments.stimuli import ListedStimuli, ShiftedBar
 from fingerpad.geometry.edged_indenters import INDENTERS
-from fingerpad.inference.afferent_methods import OFFSETS_MM
-from fingerpad.inference.closed_form import ClosedFormModel
+from fingerpad.inference.afferent_fit import OFFSETS_MM
 from fingerpad.inference.identifiable import IDENTIFIABLE_NAMES, identifiable
-from fingerpad.inference.rate_model import AfferentModel
+from fingerpad.inference.rate_model import AfferentModel, ClosedFormModel
 from fingerpad.inference.recordings import SpikeRecordings
 from fingerpad.inference.spike_fit import soft_spikes
 from fingerpad.neuron.spikes import PAPER_WINDOWS_MS
@@ -497,7 +496,7 @@ def test_the_example_prints_its_command_and_writes_recordings(call, tmp_path):
 
 
 def test_options_are_those_of_the_modules():
-    assert METHODS == choices.METHOD_CHOICES
+    assert tuple(METHODS) == choices.METHOD_CHOICES
     assert set(INDENTERS) == set(choices.INDENTER_CHOICES)
 
 

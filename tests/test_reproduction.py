@@ -15,6 +15,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from fingerpad.experiments.discrimination.task_stimuli import read_task, task_touches
 
 from fingerpad import __version__, cli
 from fingerpad.core.compilation import SHORT_NOTICE, SUBJECT
@@ -22,7 +23,6 @@ from fingerpad.core.errors import InputError
 from fingerpad.core.result_files import read_results, to_json
 from fingerpad.data import all_published
 from fingerpad.experiments import gerling2014
-from fingerpad.experiments.discrimination.task_stimuli import read_task, task_touches
 from fingerpad.experiments.gerling2014 import single_unit_uncertainty
 from fingerpad.experiments.gerling2014.reproduction import Reproduction, ReproductionResult, reproduce
 from fingerpad.experiments.runner import STORE_FOLDER

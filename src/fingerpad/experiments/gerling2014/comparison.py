@@ -26,8 +26,8 @@ from fingerpad.experiments.gerling2014.skin_deflection import (
     SkinForce,
 )
 from fingerpad.experiments.gerling2014.sphere_discrimination import SphereDiscrimination
-from fingerpad.inference.fitting.response_surface import ResponseSurface
-from fingerpad.inference.rates_and_hit_rates import ToRatesAndHitRates
+from fingerpad.inference.afferent_fit import ToRatesAndHitRates
+from fingerpad.inference.fitting.methods import ResponseSurface
 
 LEAST_R2 = 0.93  # R² that Trial 3 must reach under the cylinder: the laboratory's own later fit.
 

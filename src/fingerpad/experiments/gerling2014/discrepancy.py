@@ -26,14 +26,16 @@ from fingerpad.experiments.gerling2014.discrimination_statistics import (
     goodwin_columns,
     goodwin_misfit,
 )
-from fingerpad.psychophysics.discrimination import (
+from fingerpad.psychophysics.encoding import gradient_sum, neighbour_pairs, taking_part
+from fingerpad.psychophysics.observer import (
     CRITERION_MOVES,
     END_OF_STIMULUS_MS,
     Experiment,
-    discriminate_gradient_sum,
+    GradientSum,
+    discriminate_by,
+    expected_euclidean_hit_rates,
+    expected_hit_rates,
 )
-from fingerpad.psychophysics.encoding import gradient_sum, neighbour_pairs, taking_part
-from fingerpad.psychophysics.noise_fit import expected_euclidean_hit_rates, expected_hit_rates
 
 PATIENCE_MS = protocol.RAMP.value  # Time that an observer waits for first spikes: until the ramp ends. [ms]
 DRAWS = 1000  # Common random presentations behind each interpretation.
@@ -254,6 +256,6 @@ def _criterion(static: Measured, noise_sigma: float, seed: int) -> CriterionErro
     bars = {}
     for moves in CRITERION_MOVES:
         plans = [Experiment(criterion_sigma=sigma, criterion_moves=moves) for sigma in CRITERION_SIGMAS]
-        given = static.responses, static.neighbours, noise_sigma, seed
-        bars[moves] = np.array([discriminate_gradient_sum(*given, plan).hit_rate_sd.mean() for plan in plans])
+        given = GradientSum(static.neighbours), static.responses, noise_sigma, seed
+        bars[moves] = np.array([discriminate_by(*given, plan).hit_rate_sd.mean() for plan in plans])
     return CriterionErrorBars(criterion_sigma=np.array(CRITERION_SIGMAS), **bars)

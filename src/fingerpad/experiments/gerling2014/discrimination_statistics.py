@@ -22,16 +22,17 @@ from fingerpad.core.errors import InputError
 from fingerpad.core.signals import HitRates
 from fingerpad.core.values import Finite, FloatArray, Number, Several, Vector, Whole, WholeVector
 from fingerpad.data import psychophysics
-from fingerpad.psychophysics.discrimination import (
+from fingerpad.psychophysics.curve import binomial_interval
+from fingerpad.psychophysics.encoding import check_neighbours, noisy_gradient_sums, session_trials
+from fingerpad.psychophysics.observer import (
+    EuclideanDistance,
     Experiment,
+    NoiseFit,
     checked_responses,
-    discriminate_euclidean,
+    discriminate_by,
+    fit_noise_sigma,
     hit_rates_of_sums,
 )
-from fingerpad.psychophysics.encoding import check_neighbours
-from fingerpad.psychophysics.functions import binomial_interval
-from fingerpad.psychophysics.noise_fit import NoiseFit, fit_noise_sigma
-from fingerpad.psychophysics.noisy_responses import noisy_gradient_sums, session_trials
 
 CHANCE = 0.5
 
@@ -290,7 +291,7 @@ def _judge(
     many = sums(static, pairs, noise_sigma, plans[0])
     for plan in plans:
         rates[f"criterion_{plan.criterion_sigma:g}"] = hit_rates_of_sums(many, seed, plan, session)
-    rates["euclidean"] = discriminate_euclidean(static, noise_sigma, seed, session=session)
+    rates["euclidean"] = discriminate_by(EuclideanDistance(), static, noise_sigma, seed, session=session)
     unsteady = {
         count: _unsteadiness(by_name["static"], count, seed, session) for count in (FEW, _PAPER.hit_rates)
     }

@@ -16,7 +16,7 @@ from fingerpad.data import bar_firing_rates, protocol
 from fingerpad.experiments.conditions import RECEPTOR_X_MM, Conditions, Touch
 from fingerpad.experiments.gerling2014.skin_deflection import PLATE_DEPTHS_MM, plate
 from fingerpad.geometry.indenters import Bar
-from fingerpad.inference.afferent_methods import response_surface, start_points
+from fingerpad.inference.afferent_fit import response_surface, start_points
 from fingerpad.inference.fitting.cross_validation import (
     CrossValidation,
     FoldFit,
@@ -24,8 +24,8 @@ from fingerpad.inference.fitting.cross_validation import (
     interleaved_folds,
 )
 from fingerpad.inference.fitting.methods import Fit, FitStep, Method
+from fingerpad.inference.problem import RateProblem
 from fingerpad.inference.rate_model import AfferentModel
-from fingerpad.inference.rate_problem import RateProblem
 from fingerpad.inference.recordings import RateRecordings
 from fingerpad.neuron.afferent import PARAMETER_NAMES, Afferent, parameter_units
 from fingerpad.neuron.population import Population

@@ -15,13 +15,18 @@ from fingerpad.data import bar_firing_rates
 from fingerpad.experiments.fit.rate_uncertainty import LEVEL, SEEDS_OF_PROFILES, fss_sensitivity, profiles
 from fingerpad.experiments.fit.results import FssSensitivity, ParameterProfile
 from fingerpad.experiments.gerling2014 import single_unit
-from fingerpad.inference.afferent_posterior import AfferentPosterior, afferent_posterior
 from fingerpad.inference.fitting.posterior import credible_band
 from fingerpad.inference.fitting.sensitivity import identifiability
 from fingerpad.inference.identifiable import IDENTIFIABLE_NAMES, identifiable
-from fingerpad.inference.rate_likelihood import INDEPENDENT, RateLikelihood, ResidualDraws
+from fingerpad.inference.problem import RateProblem
 from fingerpad.inference.rate_model import AfferentModel, four_number_model
-from fingerpad.inference.rate_problem import RateProblem
+from fingerpad.inference.rate_posterior import (
+    INDEPENDENT,
+    AfferentPosterior,
+    RateLikelihood,
+    ResidualDraws,
+    afferent_posterior,
+)
 from fingerpad.neuron.afferent import PARAMETER_NAMES
 from fingerpad.neuron.transduction import drive
 

@@ -27,12 +27,13 @@ from fingerpad.experiments.gerling2014.discrimination_statistics import (
     goodwin_hit_rates_at,
     observe,
 )
+from fingerpad.inference.afferent_fit import ToRatesAndHitRates
+from fingerpad.inference.problem import SphereHitRates
 from fingerpad.inference.rate_model import AfferentModel
-from fingerpad.inference.rates_and_hit_rates import SphereHitRates, ToRatesAndHitRates
 from fingerpad.neuron.afferent import Afferent
 from fingerpad.neuron.population import Population
 from fingerpad.psychophysics.encoding import RESPONSE_MEASURES, gradient_sum, neighbour_pairs, taking_part
-from fingerpad.psychophysics.noise_fit import NOISE_DRAWS
+from fingerpad.psychophysics.observer import NOISE_DRAWS
 from fingerpad.skin.sampling import SkinResponse
 
 FIT_SEED, FIT_DRAWS = 0, 1000
