@@ -57,7 +57,7 @@ def test_traces_are_printed_plotted_and_tabulated_in_the_unit_of_their_quantity(
     shown = traces(quantity)
     assert repr(shown).endswith(said)
     assert shown.plot().get_ylabel() == label
-    assert shown.to_xarray()[quantity].attrs["units"] == attribute
+    assert shown.to_dataset()[quantity].attrs["units"] == attribute
 
 
 def test_spikes_in_seconds_are_noticed_before_anything_is_pressed(tmp_path):

@@ -39,8 +39,12 @@ def sweep_command(
     from fingerpad.experiments.sweep.description import read_sweep
     from fingerpad.experiments.sweep.estimate import estimate_sweep
     from fingerpad.export.sweep import check_sweep, run_sweep
-    from fingerpad.export.sweep_dataset import open_sweep
-    from fingerpad.export.sweep_tables import check_outputs, write_sweep_spikes, write_sweep_table
+    from fingerpad.export.sweep_results import (
+        check_outputs,
+        open_sweep,
+        write_sweep_spikes,
+        write_sweep_table,
+    )
 
     described = read_sweep(sweep)
     check_sweep(described, out, yes)

@@ -19,10 +19,9 @@ from fingerpad.experiments.descriptions.touch import (
     read_touch_description,
 )
 from fingerpad.experiments.descriptions.values import Content
-from fingerpad.export.dataset import write_touch
 from fingerpad.export.formats import DECKS, REQUIRED, RESULTS, write_deck
 from fingerpad.export.job import job_of
-from fingerpad.export.responses import require_pynwb, write_response_csv, write_responses_nwb
+from fingerpad.export.responses import require_pynwb
 from fingerpad.report.touch import draw, write_touch_page
 
 Write = Callable[[PressedTouch, Path], object]
@@ -36,13 +35,13 @@ def _page(pressed: PressedTouch, folder: Path) -> None:
 
 
 def _result(name: str) -> Write:
-    return lambda pressed, folder: RESULTS[name][1](folder / RESULTS[name][0], pressed.skin)
+    return lambda pressed, folder: pressed.skin.save(folder / RESULTS[name])
 
 
 def _dataset(name: str) -> Write:
     def write(pressed: PressedTouch, folder: Path) -> None:
         seed = pressed.described.description.afferents.seed
-        write_touch(folder / RESULTS[name][0], pressed.skin, pressed.response, seed=seed)
+        pressed.skin.save(folder / RESULTS[name], response=pressed.response, seed=seed)
 
     return write
 
@@ -60,8 +59,8 @@ def _deck(name: str) -> Write:
 
 WRITERS: dict[str, Write] = {
     "figures": _page,
-    "spikes": lambda pressed, folder: write_response_csv(folder / "spikes.csv", pressed.response),
-    "nwb": lambda pressed, folder: write_responses_nwb(folder / "touch.nwb", {"touch": pressed.response}),
+    "spikes": lambda pressed, folder: pressed.response.save(folder / "spikes.csv"),
+    "nwb": lambda pressed, folder: pressed.response.to_nwb(folder / "touch.nwb"),
     **{name: _result(name) for name in RESULTS},
     **{name: _dataset(name) for name in ("netcdf", "zarr")},
     **{name: _deck(name) for name in DECKS},

@@ -1,6 +1,6 @@
 """A touch in three dimensions and through time: finger, object, field and afferents.
 
-The picture is drawn from the labelled data set of `fingerpad.export.dataset`, in memory or from a file.
+The picture is drawn from the labelled data set of `fingerpad.skin.dataset`, in memory or from a file.
 PyVista renders it without a window, in parallel projection, so that lengths can be measured; Matplotlib adds
 the colour bar, three arrows of known length, afferents, motion and spikes. A field of elements is shown on
 the plane of symmetry, one of the skin from below, through the object. The extra `fingerpad[view]` is needed.
@@ -34,7 +34,8 @@ from fingerpad.core.errors import InputError
 from fingerpad.core.files import path_of, write_atomically
 from fingerpad.core.progress import NoProgress, Progress
 from fingerpad.core.values import Finite, FloatArray, count_from, finite, instance, one_of
-from fingerpad.export.dataset import check_touch, library, read_touch, spike_trains, touch_dataset
+from fingerpad.export.results import library
+from fingerpad.export.touch_file import check_touch, read_touch, spike_trains
 from fingerpad.report.style import BLACK, BLUE, STYLE, new_figure, say_nothing_to_draw
 from fingerpad.report.touch import BONE, DECADES, SKIN
 from fingerpad.skin.sampling import SkinResponse
@@ -85,7 +86,7 @@ def save_view(
     path : str or Path
         The file: .png, .gif, or .mp4, which the program ffmpeg has to be installed for.
     touch : xarray.Dataset, SkinResponse, str or Path
-        From `touch_dataset`, what `write_touch` wrote, or a response of the skin, drawn without afferents.
+        From `SkinResponse.to_dataset`, a file of it, or a response of the skin, drawn without afferents.
     field : str
         "sed", "displacement" (on the plane of symmetry), "pressure", "shear", "slip" (on the skin), or the
         name of another variable at nodes or elements. Of a vector its length is shown.
@@ -107,7 +108,7 @@ def save_view(
     >>> from tempfile import mkdtemp
     >>> import fingerpad as fp
     >>> skin = fp.indent(fp.Fingertip(), fp.Sphere(), fp.RampAndHold(depth_mm=0.5), whole=True)
-    >>> (picture,) = save_view(Path(mkdtemp()) / "touch.png", fp.touch_dataset(skin), time_ms=50.0)
+    >>> (picture,) = save_view(Path(mkdtemp()) / "touch.png", skin, time_ms=50.0)
     >>> picture.name
     'touch.png'
     """
@@ -122,7 +123,7 @@ def save_view(
     if isinstance(touch, str | Path):
         data = read_touch(touch)
     elif isinstance(touch, SkinResponse):
-        data = touch_dataset(touch)
+        data = touch.to_dataset()
     else:
         data = instance("touch", touch, library("xarray").Dataset)
         check_touch("touch", data)

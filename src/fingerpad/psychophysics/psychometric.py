@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from fingerpad.core.checked import checked, value_class
-from fingerpad.core.displayed import Result
+from fingerpad.core.displayed import Columns, Result
 from fingerpad.core.errors import ConvergenceError, InputError
 from fingerpad.core.values import Finite, FloatArray, Number, choice, finite
 from fingerpad.psychophysics.functions import (
@@ -66,6 +66,17 @@ class PsychometricFit(Result):
             f"PsychometricFit({self.function.sigmoid}, threshold {self.threshold_label}, "
             f"{int(self.counts.n_trials.sum())} judgements of {self.counts.levels.size} levels)"
         )
+
+    def columns(self) -> Columns:
+        """Judgements, and the proportion that was observed and fitted, by level."""
+        counts = self.counts
+        return {
+            "level": counts.levels,
+            "n_correct": counts.n_correct,
+            "n_trials": counts.n_trials,
+            "observed": counts.proportion,
+            "fitted": self.predict(counts.levels),
+        }
 
     @property
     def free(self) -> tuple[str, ...]:

@@ -17,34 +17,22 @@ from __future__ import annotations
 
 import json
 import warnings
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
-from fingerpad.core.checked import checked
-from fingerpad.core.errors import InputError, StoreError, shown
+from fingerpad.core.displayed import Variable, udunits
+from fingerpad.core.errors import InputError, StoreError
 from fingerpad.core.files import path_of
-from fingerpad.core.signals import SpikeTrains
 from fingerpad.core.units import unit_of
-from fingerpad.experiments.descriptions.values import Content
-from fingerpad.experiments.sweep.description import OBSERVER, Sweep, sweep_of
-from fingerpad.experiments.sweep.observers import MEASURED, observe
-from fingerpad.experiments.sweep.settle import PLACES_MM, Settled
-from fingerpad.export.dataset import (
-    RESPONSE_PARTS,
-    field_dimensions,
-    first_line,
-    library,
-    response_values,
-    udunits,
-)
-from fingerpad.skin.fields import FIELDS, Place
-
-if TYPE_CHECKING:
-    import xarray
+from fingerpad.experiments.sweep.description import Sweep
+from fingerpad.experiments.sweep.observers import MEASURED
+from fingerpad.experiments.sweep.settle import Settled
+from fingerpad.export.results import first_line, library
+from fingerpad.skin.dataset import field_variable
+from fingerpad.skin.fields import FIELDS
 
 FORMAT, FORMAT_VERSION = "fingerpad sweep", 1
 
@@ -60,35 +48,6 @@ _PLACES_IN_CHUNK = 4096
 _NAMES = {"times_ms": "time_ms"}
 
 
-@dataclass(frozen=True)
-class Variable:
-    """One variable of the data set."""
-
-    dims: tuple[str, ...]  # Dimensions after those of the sweep.
-    unit: str
-    long_name: str
-    of_press: bool = False  # Whether it has the dimensions that change the skin alone.
-    dtype: str = "f8"
-
-
-def variables(fields: Sequence[str] = ()) -> dict[str, Variable]:
-    """Variables of a sweep that keeps some fields of the skin, by name."""
-    found = {}
-    for name in dict.fromkeys(("times_ms", "force_mn", "depth_mm", "contact_area_mm2", *fields)):
-        field = FIELDS[name]
-        dtype = "f8" if field.place is Place.PRESS else "f4"
-        found[_NAMES.get(name, name)] = Variable(
-            field_dimensions(field), udunits(field.unit), field.long_name, True, dtype
-        )
-        if field.place in PLACES_MM:
-            of = PLACES_MM[field.place][0]
-            found[of] = Variable((of.removesuffix("_mm"), "axis"), "mm", "undeformed position", True)
-    for name, part in RESPONSE_PARTS.items():
-        dtype = "i4" if name == "spike_count" else "f8"
-        found[name] = Variable(part.dims, part.unit, part.long_name, False, dtype)
-    return found
-
-
 class SweepFile:
     """The data set of a sweep, opened for writing."""
 
@@ -96,11 +55,10 @@ class SweepFile:
         zarr = library("zarr")
         self.path, self.sweep = path_of("path", path), sweep
         self._dims = tuple(axis.name for axis in sweep.axes)
-        self._variables = variables(sweep.description.fields)
         self._rows: dict[tuple[str, tuple[int, ...], int], dict[int, np.ndarray]] = {}
         with _written(self.path):
             if self.path.exists() and any(self.path.iterdir()):
-                opened = _opened(self.path)
+                opened = opened_group(self.path)
                 check_same(self.path, opened.attrs.asdict(), attributes)
                 self._group = opened
             else:
@@ -155,17 +113,17 @@ class SweepFile:
 
     def add(self, settled: Settled) -> None:
         """Add what became of a press; it is written with `flush`."""
-        place = self._place(settled.press, self.sweep.press_shape)
+        sweep = self.sweep
         for name, values in settled.skin.items():
-            self._put(_NAMES.get(name, name), place, values)
+            self._put(_NAMES.get(name, name), settled.press, sweep.press_shape, _of_press(name, values))
         for setting, response in settled.responses.items():
-            for name, values in response_values(response).items():
-                self._put(name, self._place(setting, self.sweep.shape), values)
+            for name, variable in response.contents()[0].items():
+                if name != "type":  # texts; the sweep describes the population
+                    self._put(name, setting, sweep.shape, variable)
         outcomes = {**dict.fromkeys(settled.responses, ""), **settled.failures}
         for setting, reason in outcomes.items():
-            place = self._place(setting, self.sweep.shape)
-            self._put("reason", place, np.array(reason, dtype=object))
-            self._put("status", place, np.array(FAILED if reason else DONE))
+            self._put("reason", setting, sweep.shape, ((), np.array(reason, dtype=object), {}))
+            self._put("status", setting, sweep.shape, ((), np.array(FAILED if reason else DONE), {}))
 
     def flush(self) -> None:
         """Write what was added: the status last."""
@@ -233,12 +191,24 @@ class SweepFile:
             values[row - first] = _padded(given, shape, array.fill_value)
         array[place] = values
 
-    def _put(self, name: str, place: tuple[int, ...], values: np.ndarray) -> None:
+    def _put(self, name: str, number: int, outer: tuple[int, ...], variable: Variable) -> None:
+        """Keep the variable of a setting or a press; the first of a name makes its array."""
+        place = tuple(int(index) for index in np.unravel_index(number, outer)) if outer else ()
+        dims, values, attributes = variable
         if name not in self._arrays:
-            self._create(name, values.shape)
+            whole = values.dtype.kind == "i"
+            with _written(self.path):
+                self._arrays[name] = self._group.create_array(
+                    name,
+                    shape=(*outer, *values.shape),
+                    chunks=self._chunks(outer, dims, values.shape),
+                    dtype=values.dtype,
+                    fill_value=0 if whole else np.nan,
+                    dimension_names=(*self._dims[: len(outer)], *dims),
+                    attributes=attributes,
+                )
         array = self._arrays[name]
-        dims = array.metadata.dimension_names[len(place) :]
-        for dim, size in zip(dims, values.shape, strict=True):
+        for dim, size in zip(array.metadata.dimension_names[len(place) :], values.shape, strict=True):
             self._sizes[dim] = max(size, self._sizes.get(dim, 0))
         if place:
             *before, last = place
@@ -246,21 +216,6 @@ class SweepFile:
         else:
             key, last = (name, (), -1), 0
         self._rows.setdefault(key, {})[last] = values
-
-    def _create(self, name: str, shape: tuple[int, ...]) -> None:
-        known = self._variables[name]
-        outer = self.sweep.press_shape if known.of_press else self.sweep.shape
-        dims = (*self._dims[: len(outer)], *known.dims)
-        with _written(self.path):
-            self._arrays[name] = self._group.create_array(
-                name,
-                shape=(*outer, *shape),
-                chunks=self._chunks(outer, known.dims, shape),
-                dtype=known.dtype,
-                fill_value=0 if known.dtype == "i4" else np.nan,
-                dimension_names=dims,
-                attributes={"long_name": known.long_name, "units": known.unit},
-            )
 
     def _chunks(
         self, outer: tuple[int, ...], dims: tuple[str, ...], shape: tuple[int, ...] = ()
@@ -272,108 +227,12 @@ class SweepFile:
         together = [1 if of_places else min(_SETTINGS_IN_CHUNK, last) for last in outer[-1:]]
         return (*(1 for _ in outer[:-1]), *together, *own)
 
-    @staticmethod
-    def _place(number: int, shape: tuple[int, ...]) -> tuple[int, ...]:
-        return tuple(int(index) for index in np.unravel_index(number, shape)) if shape else ()
 
-
-@checked
-def open_sweep(path: str | Path) -> xarray.Dataset:
-    """Open the data set that `run_sweep` wrote; numbers are read when they are used.
-
-    Returns
-    -------
-    xarray.Dataset
-        With dimensions named by the fields that vary; `status` is 1 where a setting is done.
-    """
-    xarray, _ = library("xarray"), library("zarr")
-    check_format(path, _opened(path_of("path", path)).attrs.asdict())
-    data = xarray.open_zarr(path, chunks=None, consolidated=False, decode_times=False)
-    return data.set_coords([name for name in ("time_ms", "receptor_mm") if name in data])
-
-
-def check_sweep_data(data: xarray.Dataset) -> None:
-    if not isinstance(data, library("xarray").Dataset) or "sweep" not in data.attrs or "status" not in data:
-        raise InputError("data", "must be a data set from open_sweep", shown(data))
-
-
-@checked
-def observe_sweep(data: xarray.Dataset, observer: Content, grid: Content | None = None) -> xarray.DataArray:
-    """Hit rates of other observers than those of the sweep; nothing is pressed and no afferent responds.
-
-    Parameters
-    ----------
-    data : xarray.Dataset
-        From `open_sweep`.
-    observer : mapping
-        As the block `observer` of a sweep (docs/sweeps.md).
-    grid : mapping of str to list, optional
-        Fields of the observer that vary, such as {"noise": [0.01, 0.02]}: each is a dimension.
-
-    Returns
-    -------
-    xarray.DataArray
-        With the dimensions of the sweep, then those of the observer; NaN for the standard. [0-1]
-    """
-    check_sweep_data(data)
-    content = json.loads(data.attrs["sweep"])
-    varied = {f"{OBSERVER}.{field}": values for field, values in (grid or {}).items()}
-    own = {
-        field: values
-        for field, values in content.get("grid", {}).items()
-        if field.partition(".")[0] != OBSERVER
-    }
-    sweep = sweep_of({**content, OBSERVER: dict(observer), "grid": own | varied}, "observe_sweep")
-    kept = [name for name in data.dims if name in {axis.name for axis in sweep.axes}]
-    responses = {name: data[name].values for name in MEASURED.values() if name in data}
-    values = observe(sweep, responses, data["status"].values == DONE, lambda: None)
-    coords: dict[str, Any] = {name: data[name] for name in kept if name in data.coords}
-    coords |= {axis.name: next(iter(axis.values.values())) for axis in sweep.observer_axes}
-    dims = [axis.name for axis in (*sweep.axes, *sweep.observer_axes)]
-    return library("xarray").DataArray(values, dims=dims, coords=coords, name=HIT_RATE)
-
-
-def sweep_settings(data: xarray.Dataset) -> Sweep:
-    check_sweep_data(data)
-    return sweep_of(json.loads(data.attrs["sweep"]), data.attrs.get("source", "sweep"))
-
-
-@checked
-def setting_touch(data: xarray.Dataset, **where: int) -> Content:
-    """Touch of one setting, by its index along each dimension, in the words of a file for `run_touch`."""
-    sweep = sweep_settings(data)
-    return sweep.content(setting_number(sweep, where))
-
-
-def setting_number(sweep: Sweep, where: Mapping[str, int]) -> int:
-    """Return the number of the setting with an index along each dimension, or raise `InputError`."""
-    names = [axis.name for axis in sweep.axes]
-    if set(where) != set(names):
-        raise InputError(f"an index must be given for each of {', '.join(names)}: got {', '.join(where)}.")
-    index = [where[name] for name in names]
-    for name, given, size in zip(names, index, sweep.shape, strict=True):
-        if not 0 <= given < size:
-            raise InputError(f"The index along {name} must be within 0 ... {size - 1}: got {given}.")
-    return int(np.ravel_multi_index(index, sweep.shape))
-
-
-@checked
-def setting_spikes(data: xarray.Dataset) -> SpikeTrains:
-    """Spike trains of the receptors of one setting.
-
-    Parameters
-    ----------
-    data : xarray.Dataset
-        From `open_sweep`, with one setting chosen, as by `data.isel(motion_depth_mm=0)`.
-    """
-    check_sweep_data(data)
-    counts = data["spike_count"].values
-    if counts.ndim != 1:
-        raise InputError(
-            f"one setting must be chosen, as with isel: got dimensions {data['spike_count'].dims}."
-        )
-    offsets = np.concatenate([[0], np.cumsum(counts)])
-    return SpikeTrains(data["spike_time_ms"].values[: offsets[-1]], offsets)
+def _of_press(name: str, values: np.ndarray) -> Variable:
+    """Variable of a field, or of the places of fields."""
+    if name in FIELDS:
+        return field_variable(FIELDS[name], values)
+    return (name.removesuffix("_mm"), "axis"), values, {"long_name": "undeformed position", "units": "mm"}
 
 
 def check_format(path: str | Path, attributes: Mapping[str, Any]) -> None:
@@ -404,7 +263,7 @@ def check_same(path: Path, found: Mapping[str, Any], expected: Mapping[str, Any]
         )
 
 
-def _opened(path: Path) -> Any:
+def opened_group(path: Path) -> Any:
     """Open a Zarr group for reading and writing."""
     zarr = library("zarr")
     try:
