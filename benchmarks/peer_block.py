@@ -134,7 +134,7 @@ def press_block(block: str, found: str) -> dict[str, Any]:
 def write_deck(block: str, deck: str) -> dict[str, Any]:
     """Write the press as an input file of CalculiX."""
     job = read_job(Path(block))
-    Path(deck).write_text(calculix_deck(job, element="C3D8I"))
+    Path(deck).write_text(calculix_deck(job))
     return {"sets": list(job.layer_names.values()), "elements": len(job.mesh.elements)}
 
 

@@ -455,7 +455,7 @@ def test_what_is_no_path_is_refused(read):
 @pytest.mark.parametrize(
     "use",
     [
-        fp.setting_touch, fp.setting_response, fp.setting_spikes,
+        fp.setting_touch, fp.setting_response,
         lambda data: fp.observe_sweep(data, {"along": "motion.depth_mm"}),
         lambda data: fp.write_sweep_table(data, "rates.csv"),
         lambda data: fp.write_sweep_spikes(data, "spikes.nwb"),

@@ -191,15 +191,13 @@ def test_a_setting_has_the_numbers_and_the_response_of_its_touch(folder):
     one, found = data.isel(where), fp.setting_response(data, **where)
     assert one.force_mn.values.tolist() == pressed.skin.force_mn.tolist()
     assert one.time_ms.values.tolist() == pressed.skin.times_ms.tolist()
-    trains = fp.setting_spikes(one)
+    trains = found.spikes
     assert [train.tolist() for train in trains] == [train.tolist() for train in pressed.response.spikes]
     assert sum(map(len, trains)) > 0
     for name in ("positions_mm", "static_rate_hz", "first_spike_latency_ms"):
         np.testing.assert_array_equal(getattr(found, name), getattr(pressed.response, name))
     assert (found.pitch_mm, found.phases) == (pressed.response.pitch_mm, pressed.response.phases)
     assert found.duration_ms == pressed.response.duration_ms
-    with pytest.raises(InputError, match="one setting must be chosen"):
-        fp.setting_spikes(data)
     with pytest.raises(InputError, match="an index must be given for each of motion_depth_mm"):
         fp.setting_touch(data, motion_depth_mm=0)
 

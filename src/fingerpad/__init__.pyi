@@ -31,7 +31,6 @@ from fingerpad.export.sweep import run_sweep as run_sweep
 from fingerpad.export.sweep_results import observe_sweep as observe_sweep
 from fingerpad.export.sweep_results import open_sweep as open_sweep
 from fingerpad.export.sweep_results import setting_response as setting_response
-from fingerpad.export.sweep_results import setting_spikes as setting_spikes
 from fingerpad.export.sweep_results import setting_touch as setting_touch
 from fingerpad.export.sweep_results import write_sweep_spikes as write_sweep_spikes
 from fingerpad.export.sweep_results import write_sweep_table as write_sweep_table

@@ -90,10 +90,7 @@ def calculix_block() -> list[Row]:
     element = job().mesh.layer
     with tempfile.TemporaryDirectory() as folder:
         found = calculix.run(
-            calculix_deck(job(), element="C3D8I"),
-            Path(folder),
-            len(element),
-            tuple(job().layer_names.values()),
+            calculix_deck(job()), Path(folder), len(element), tuple(job().layer_names.values())
         )
     np.testing.assert_allclose(found.times_ms, job().times_ms[1:])
     return compared(2.0 * found.force_mn @ job().placement.axis, found.sed_kpa[-1], OTHER_ELEMENT)

@@ -61,30 +61,22 @@ def supports(job: Job) -> list[str]:
     """Cards that hold the bone and nail, the plane of symmetry, and skin that a wire grips."""
     return [
         "*BOUNDARY",
-        *(f"{support.name}, {support.axes[0]}, {support.axes[1]}" for support in job.supports()),
+        *(f"{support.name}, {support.axes[0]}, {support.axes[1]}" for support in job.supports),
     ]
 
 
-def support_sets(job: Job, fixed: IntArray | None = None, symmetric: IntArray | None = None) -> list[str]:
-    """Cards of the sets that `supports` names; those of the mesh unless nodes are given."""
-    return [line for each in job.supports(fixed, symmetric) for line in node_set(each.name, each.nodes + 1)]
+def support_sets(job: Job) -> list[str]:
+    """Cards of the sets that `supports` names."""
+    return [line for each in job.supports for line in node_set(each.name, each.nodes + 1)]
 
 
-def body_elements(
-    job: Job, layer: int, brick: str, wedge: str, corners: tuple[IntArray, IntArray] | None = None
-) -> list[str]:
-    """Cards of one layer's elements, a set of the layer's name, numbered as in the mesh from 1.
-
-    `corners` are nodes of bricks and wedges, one row per element of the mesh, if not those of the mesh.
-    """
-    kinds, all_corners = (brick, wedge), corners or (job.mesh.elements, job.wedges)
-    return [
-        line
-        for wedges, numbers in job.parts(layer)
-        for line in elements(
-            kinds[wedges], job.layer_names[layer], numbers + 1, all_corners[wedges][numbers] + 1
-        )
-    ]
+def body_elements(job: Job, layer: int, brick: str, wedge: str) -> list[str]:
+    """Cards of one layer's elements, a set of the layer's name, numbered as in the mesh from 1."""
+    lines = []
+    for wedges, numbers in job.parts(layer):
+        kind, corners = (wedge, job.wedges) if wedges else (brick, job.mesh.elements)
+        lines += elements(kind, job.layer_names[layer], numbers + 1, corners[numbers] + 1)
+    return lines
 
 
 def law(material: Material, factor: float, moduli: str = "") -> list[str]:

@@ -13,7 +13,7 @@ import numpy as np
 from fingerpad.core.checked import checked
 from fingerpad.core.errors import InputError, shown
 from fingerpad.core.files import path_of, write_atomically
-from fingerpad.core.signals import PLACES, RECEPTOR_COLUMNS, ResponseMap, SpikeTrains
+from fingerpad.core.signals import PLACES, RECEPTOR_COLUMNS, ResponseMap
 from fingerpad.experiments.descriptions.values import Content
 from fingerpad.experiments.sweep.description import OBSERVER, Sweep, sweep_of
 from fingerpad.experiments.sweep.observers import MEASURED, observe
@@ -112,24 +112,6 @@ def setting_number(sweep: Sweep, where: Mapping[str, int]) -> int:
 
 
 @checked
-def setting_spikes(data: xarray.Dataset) -> SpikeTrains:
-    """Spike trains of the receptors of one setting.
-
-    Parameters
-    ----------
-    data : xarray.Dataset
-        From `open_sweep`, with one setting chosen, as by `data.isel(motion_depth_mm=0)`.
-    """
-    check_sweep_data(data)
-    counts = data["spike_count"].values
-    if counts.ndim != 1:
-        raise InputError(
-            f"one setting must be chosen, as with isel: got dimensions {data['spike_count'].dims}."
-        )
-    return spike_trains(data)
-
-
-@checked
 def write_sweep_table(data: xarray.Dataset, path: str | Path) -> Path:
     """Write rates, latencies and numbers of spikes as a table, one row per setting and receptor.
 
@@ -192,7 +174,7 @@ def setting_response(data: xarray.Dataset, **where: int) -> ResponseMap:
     return ResponseMap(
         positions_mm=one["receptor_mm"].values[:count],
         pitch_mm=described.population.pitch_mm,
-        spikes=setting_spikes(one.isel(receptor=slice(count))),
+        spikes=spike_trains(one.isel(receptor=slice(count))),
         duration_ms=float(np.nanmax(one["time_ms"].values)),
         phases=phases,
         windows_ms=rate_windows_ms(phases, asked.dynamic, asked.static),
