@@ -23,7 +23,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import matplotlib
 import numpy as np
 from matplotlib.cm import ScalarMappable
-from matplotlib.colors import Colormap, LogNorm, Normalize
+from matplotlib.colors import LogNorm, Normalize
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from PIL import Image
@@ -201,19 +201,16 @@ class _View:
     @cached_property
     def norm(self) -> Normalize:
         """Scale of the field, one for all times; energies span orders of magnitude."""
-        values = self.data[self.variable]
-        vector = "axis" in values.dims
-        largest = float((np.linalg.norm(values, axis=-1) if vector else np.abs(values)).max())
+        largest = float(np.abs(self._lengths(self.data[self.variable].values)).max())
         if largest <= 0.0:
             return Normalize(0.0, 1.0)
         if self.variable.startswith("sed"):
             return LogNorm(largest / 10.0**DECADES, largest)
         return Normalize(0.0, largest)
 
-    @property
-    def colours(self) -> Colormap:
-        """Colours, from pale to dark."""
-        return SKIN
+    def _lengths(self, values: FloatArray) -> FloatArray:
+        """Values of the field as they are shown: of a vector its length."""
+        return np.linalg.norm(values, axis=-1) if "axis" in self.data[self.variable].dims else values
 
     def at(self, name: str, time_ms: float) -> FloatArray:
         """Values of a variable at a time, linear between those that were solved."""
@@ -278,11 +275,9 @@ class _View:
     def _add_finger(self, plotter: Any, time_ms: float) -> None:
         pyvista = _pyvista()
         data, points = self.data, self.data["node_mm"].values.copy()
-        shades = {"cmap": self.colours, "clim": (self.norm.vmin, self.norm.vmax), "show_scalar_bar": False,
+        shades = {"cmap": SKIN, "clim": (self.norm.vmin, self.norm.vmax), "show_scalar_bar": False,
                   "log_scale": isinstance(self.norm, LogNorm), "ambient": 0.35, "diffuse": 0.7}  # fmt: skip
-        values = self.at(self.variable, time_ms)
-        values = np.linalg.norm(values, axis=-1) if "axis" in data[self.variable].dims else values
-        values = np.clip(values, self.norm.vmin, self.norm.vmax)
+        values = np.clip(self._lengths(self.at(self.variable, time_ms)), self.norm.vmin, self.norm.vmax)
         if self.on_skin:
             skin_nodes = data["skin_node"].values
             points[skin_nodes] += self.at("skin_displacement_mm", time_ms)
@@ -344,16 +339,10 @@ class _View:
         floor = float(front.max()) - THICKNESS_MM
         top = np.maximum(front, floor)
         heights = np.stack([np.full_like(top, floor), top], axis=-1)
-        grid = np.stack(
-            [
-                np.broadcast_to(x[:, None, None], heights.shape),
-                heights,
-                np.broadcast_to(z[None, :, None], heights.shape),
-            ],
-            axis=-1,
+        wide = np.broadcast_arrays(x[:, None, None], heights, z[None, :, None])
+        placed = np.stack(wide, axis=-1) @ self.at("object_axes", time_ms).T + self.at(
+            "object_tip_mm", time_ms
         )
-        axes = self.at("object_axes", time_ms)
-        placed = grid @ axes.T + self.at("object_tip_mm", time_ms)
         solid = _pyvista().StructuredGrid(*np.moveaxis(placed, -1, 0))
         high = np.maximum.reduce([top[:-1, :-1], top[1:, :-1], top[:-1, 1:], top[1:, 1:]]) > floor
         solid = solid.extract_cells(np.flatnonzero(high.ravel(order="F")))
@@ -420,7 +409,7 @@ class _View:
         values = self.data[self.variable]
         vector = " (length)" if "axis" in values.dims else ""
         bar = figure.colorbar(
-            ScalarMappable(self.norm, self.colours), ax=scene, orientation="horizontal", shrink=0.6,
+            ScalarMappable(self.norm, SKIN), ax=scene, orientation="horizontal", shrink=0.6,
             aspect=30, pad=0.01, extend="min" if isinstance(self.norm, LogNorm) else "neither",
         )  # fmt: skip
         unit = "-" if values.units == "1" else values.units
