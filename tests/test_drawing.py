@@ -313,6 +313,8 @@ def test_every_column_of_a_response_is_in_every_table_and_file(results, mixed, t
         assert np.array_equal(response.to_dataset()[name], values, equal_nan=True)
         assert np.array_equal(np.array([row[0] for row in units[name]]), values, equal_nan=True)
         assert name in header
+        shown = response.plot(Figure().add_subplot(), "map", quantity=name) if not mixed else None
+        assert mixed or np.array_equal(shown.collections[0].get_array(), values, equal_nan=True)
 
 
 def test_spikes_go_to_pynapple_and_neo_with_what_is_known_of_each_afferent(results):
