@@ -16,7 +16,7 @@ from scipy.optimize import brentq
 from threadpoolctl import threadpool_limits
 
 from fingerpad.core.units import MM_PER_M
-from fingerpad.export.calculix import calculix_deck
+from fingerpad.export.decks import calculix_deck
 from fingerpad.export.job import Job
 from fingerpad.geometry.indenters import Sphere
 from fingerpad.geometry.mesh import Mesh, block_mesh

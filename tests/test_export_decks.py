@@ -11,9 +11,7 @@ import numpy as np
 import pytest
 
 import fingerpad as fp
-from fingerpad.export.abaqus import abaqus_deck
-from fingerpad.export.calculix import calculix_deck
-from fingerpad.export.febio import febio_deck
+from fingerpad.export.decks import abaqus_deck, calculix_deck, febio_deck
 from fingerpad.export.job import Job, job_of
 from fingerpad.export.outline import face_mesh, outline_of, rigid_mesh
 from fingerpad.geometry.mesh import block_mesh, finger_mesh

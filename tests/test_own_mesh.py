@@ -9,7 +9,7 @@ import fingerpad as fp
 from fingerpad.experiments.descriptions.touch import described_touch
 from fingerpad.experiments.discrimination.run import DiscriminationRun
 from fingerpad.experiments.discrimination.task_stimuli import input_hashes, task_text
-from fingerpad.export.abaqus import abaqus_deck
+from fingerpad.export.decks import abaqus_deck
 from fingerpad.export.job import job_of
 from fingerpad.geometry.free_mesh import FACES, FreeMesh, closest_on_triangles
 from fingerpad.geometry.mesh import LAYERS

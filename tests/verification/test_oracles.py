@@ -12,7 +12,7 @@ import re
 import numpy as np
 import pytest
 
-from fingerpad.export.calculix import calculix_deck
+from fingerpad.export.decks import calculix_deck
 from fingerpad.mechanics.newton import NewtonSettings
 from fingerpad.mechanics.press import press
 from fingerpad.mechanics.press_settings import PressSettings

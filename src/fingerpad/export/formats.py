@@ -2,27 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
 
 from fingerpad.core.checked import checked
 from fingerpad.core.errors import InputError
 from fingerpad.core.files import path_of, write_atomically
 from fingerpad.core.values import one_of
-from fingerpad.export.abaqus import abaqus_deck
-from fingerpad.export.calculix import calculix_deck
-from fingerpad.export.febio import febio_deck
+from fingerpad.export.decks import DECKS, calculix_deck
 from fingerpad.export.job import Job, job_of
 from fingerpad.export.results import library
 from fingerpad.export.vtu import require_vtk
 from fingerpad.skin.indentation import Touch
-
-DECKS: dict[str, tuple[str, Callable[[Job], str]]] = {
-    "abaqus": ("touch.inp", abaqus_deck),
-    "calculix": ("touch.inp", calculix_deck),
-    "febio": ("touch.feb", febio_deck),
-}
-"""Name of the input file of each solver, and the function that returns its text."""
 
 RESULTS: dict[str, str] = {
     "vtu": "touch.pvd",
