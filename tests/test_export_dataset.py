@@ -137,6 +137,12 @@ def test_no_place_to_write_and_no_known_ending_are_refused(skin, tmp_path):
         skin.save(tmp_path / "touch.h5")
 
 
+def test_a_file_that_was_written_before_a_column_was_added_is_read(skin, tmp_path, written):
+    older = written.drop_vars("recruitment_rank")
+    older.to_netcdf(tmp_path / "touch.nc", engine="h5netcdf")
+    assert set(fp.read_touch(tmp_path).variables) == set(older.variables)
+
+
 def _changed(change):
     """Return the touch with one change in the data set, as a file would hold it."""
     return lambda path, data: change(data)

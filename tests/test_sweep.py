@@ -246,6 +246,8 @@ def test_a_table_of_rates_is_read_back_bit_by_bit(folder, tmp_path, ending):
     places = ["motion_depth_mm", "afferents_columns", "receptor", "x_mm", "z_mm"]
     assert list(table.columns) == [*places, *RECEPTOR_COLUMNS]
     assert len(table) == 2 + 3 + 3
+    older = fp.write_sweep_table(data.drop_vars("recruitment_rank"), tmp_path / "older.csv")
+    assert older.read_text().splitlines()[1] == ",".join([*places, *list(RECEPTOR_COLUMNS)[:-1]])
     some = table[(table.motion_depth_mm == 0.5) & (table.afferents_columns == 3)]
     one = data.isel(motion_depth_mm=1, afferents_columns=1)
     for name in ("dynamic_rate_hz", "static_rate_hz", "first_spike_latency_ms", "spike_count"):

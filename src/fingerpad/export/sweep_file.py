@@ -17,7 +17,8 @@ from __future__ import annotations
 
 import json
 import warnings
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -79,26 +80,35 @@ class SweepFile:
                 name = axis.name if len(axis.values) == 1 else field.replace(".", "_")
                 text = not all(isinstance(value, int | float) for value in values)
                 spelled = [value if isinstance(value, str) else json.dumps(value) for value in values]
-                array = self._group.create_array(
-                    name,
-                    shape=(len(values),),
-                    dtype=str if text else "f8",
-                    dimension_names=[axis.name],
-                    attributes={"long_name": field, "units": "1" if text else udunits(unit_of(field))},
-                )
-                array[:] = np.array(spelled, dtype=object) if text else np.array(values, dtype=float)
-        flags = {"flag_values": [PENDING, DONE, FAILED, LEFT_OUT], "flag_meanings": MEANINGS}
-        said = {"status": ("i1", "what became of each setting", flags), "reason": (str, "why it failed", {})}
-        for name, (dtype, words, more) in said.items():
-            self._group.create_array(
-                name,
-                shape=self.sweep.shape,
-                chunks=self._chunks(self.sweep.shape, ()),
-                dtype=dtype,
-                fill_value="" if dtype is str else PENDING,
-                dimension_names=self._dims,
-                attributes={"long_name": words, **more},
-            )
+                written = np.array(spelled, dtype=object) if text else np.array(values, dtype=float)
+                about = {"long_name": field, "units": "1" if text else udunits(unit_of(field))}
+                self._create(name, (axis.name,), written.shape, str if text else "f8", about)[:] = written
+        flags: dict[str, Any] = {"flag_values": [PENDING, DONE, FAILED, LEFT_OUT], "flag_meanings": MEANINGS}
+        flags["long_name"] = "what became of each setting"
+        chunks = self._chunks(self.sweep.shape, ())
+        self._create("status", self._dims, self.sweep.shape, "i1", flags, chunks)
+        self._create("reason", self._dims, self.sweep.shape, str, {"long_name": "why it failed"}, chunks)
+
+    def _create(
+        self,
+        name: str,
+        dims: tuple[str, ...],
+        shape: tuple[int, ...],
+        dtype: Any,
+        attributes: Mapping[str, Any],
+        chunks: Any = "auto",
+    ) -> Any:
+        """Make an array that is filled with NaN, 0 or an empty text, in the place of one of this name."""
+        return self._group.create_array(
+            name,
+            shape=shape,
+            chunks=chunks,
+            dtype=dtype,
+            fill_value="" if dtype is str else np.nan if np.dtype(dtype).kind == "f" else 0,
+            dimension_names=dims,
+            attributes=dict(attributes),
+            overwrite=True,
+        )
 
     def status(self) -> np.ndarray:
         """Status of every setting, (size,)."""
@@ -157,18 +167,11 @@ class SweepFile:
 
     def write_hit_rates(self, values: np.ndarray) -> None:
         """Write the hit rates of all observers, (*shape, *observer_shape)."""
-        shape = self.sweep.observer_shape
+        dims = (*self._dims, *(axis.name for axis in self.sweep.observer_axes))
+        about = {"long_name": "share of trials in which the standard is told apart", "units": "1"}
+        chunks = (*self._chunks(self.sweep.shape, ()), *self.sweep.observer_shape)
         with _written(self.path):
-            self._arrays[HIT_RATE] = self._group.create_array(
-                HIT_RATE,
-                shape=values.shape,
-                chunks=(*self._chunks(self.sweep.shape, ()), *shape),
-                dtype="f8",
-                fill_value=np.nan,
-                dimension_names=(*self._dims, *(axis.name for axis in self.sweep.observer_axes)),
-                attributes={"long_name": "share of trials in which the standard is told apart", "units": "1"},
-                overwrite=True,
-            )
+            self._arrays[HIT_RATE] = self._create(HIT_RATE, dims, values.shape, "f8", about, chunks)
             self._arrays[HIT_RATE][...] = values
 
     def _write(self, name: str, before: tuple[int, ...], block: int, rows: dict[int, np.ndarray]) -> None:
@@ -196,17 +199,10 @@ class SweepFile:
         place = tuple(int(index) for index in np.unravel_index(number, outer)) if outer else ()
         dims, values, attributes = variable
         if name not in self._arrays:
-            whole = values.dtype.kind == "i"
+            shape, chunks = (*outer, *values.shape), self._chunks(outer, dims, values.shape)
+            dims = (*self._dims[: len(outer)], *dims)
             with _written(self.path):
-                self._arrays[name] = self._group.create_array(
-                    name,
-                    shape=(*outer, *values.shape),
-                    chunks=self._chunks(outer, dims, values.shape),
-                    dtype=values.dtype,
-                    fill_value=0 if whole else np.nan,
-                    dimension_names=(*self._dims[: len(outer)], *dims),
-                    attributes=attributes,
-                )
+                self._arrays[name] = self._create(name, dims, shape, values.dtype, attributes, chunks)
         array = self._arrays[name]
         for dim, size in zip(array.metadata.dimension_names[len(place) :], values.shape, strict=True):
             self._sizes[dim] = max(size, self._sizes.get(dim, 0))
@@ -274,21 +270,16 @@ def opened_group(path: Path) -> Any:
         ) from error
 
 
-class _written:
+@contextmanager
+def _written(path: Path) -> Iterator[None]:
     """Tell of a disk that is full, or a folder that cannot be written, in one sentence."""
-
-    def __init__(self, path: Path):
-        self._path = path
-
-    def __enter__(self) -> None:
-        return None
-
-    def __exit__(self, kind: type | None, error: BaseException | None, _: object) -> None:
-        if isinstance(error, OSError):
-            raise StoreError(
-                f"{self._path} cannot be written ({error.strerror or error}): make space or choose another, "
-                "and run again; what is finished is kept."
-            ) from error
+    try:
+        yield
+    except OSError as error:
+        raise StoreError(
+            f"{path} cannot be written ({error.strerror or error}): make space or choose another, "
+            "and run again; what is finished is kept."
+        ) from error
 
 
 def _padded(values: np.ndarray, shape: tuple[int, ...], fill: Any) -> np.ndarray:
