@@ -16,7 +16,7 @@ from scipy.optimize import brentq
 from threadpoolctl import threadpool_limits
 
 from fingerpad.core.units import MM_PER_M
-from fingerpad.export.calculix import calculix_deck
+from fingerpad.export.decks import calculix_deck
 from fingerpad.export.job import Job
 from fingerpad.geometry.indenters import Sphere
 from fingerpad.geometry.mesh import Mesh, block_mesh
@@ -134,7 +134,7 @@ def press_block(block: str, found: str) -> dict[str, Any]:
 def write_deck(block: str, deck: str) -> dict[str, Any]:
     """Write the press as an input file of CalculiX."""
     job = read_job(Path(block))
-    Path(deck).write_text(calculix_deck(job, element="C3D8I"))
+    Path(deck).write_text(calculix_deck(job))
     return {"sets": list(job.layer_names.values()), "elements": len(job.mesh.elements)}
 
 

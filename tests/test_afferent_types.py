@@ -123,10 +123,10 @@ def test_afferents_that_fire_once_in_a_ramp_have_a_rate_and_sai_keeps_that_of_th
     assert_allclose(found.dynamic_rate_hz, 20.0 * np.array(in_ramp))
     assert_array_equal(found.dynamic_count_hz, found.dynamic_rate_hz)
     assert_array_equal(found.spike_count, [train.size for train in found.spikes])
-    columns = found.to_pandas()
+    columns = found.to_frame()
     for name in ("dynamic_rate_hz", "dynamic_count_hz", "static_count_hz"):
         assert_array_equal(columns[name], getattr(found, name))
-        assert_array_equal(found.to_xarray()[name], getattr(found, name))
+        assert_array_equal(found.to_dataset()[name], getattr(found, name))
     sai = fp.Population(places, 1.0).respond(FINGER)
     assert_array_equal(sai.dynamic_rate_hz, firing_rate_hz(sai.spikes, (30.0, 50.0)))
     counts = [np.count_nonzero((train > 30.0) & (train <= 50.0)) for train in sai.spikes]

@@ -1,16 +1,22 @@
 """Results draw themselves, show a picture in notebooks, and say in one line what they are."""
 
+import json
+import warnings
+
 import matplotlib
 import numpy as np
+import pandas
 import pytest
-from fingerpad.experiments.discrimination.task_stimuli import task_population, task_stimuli
+import xarray
 from matplotlib.collections import QuadMesh
 from matplotlib.figure import Figure
+from pynwb import NWBHDF5IO
 
 import fingerpad as fp
+from fingerpad.core.displayed import Result
+from fingerpad.core.signals import RECEPTOR_COLUMNS
 from fingerpad.experiments.discrimination.analysis import PreparedTask, analyse
 from fingerpad.experiments.fit.fit import fit_recordings
-from fingerpad.export.result_tables import TABLES
 from fingerpad.inference.spike_fit import SpikeFit
 from fingerpad.report.drawing import DRAWINGS
 from fingerpad.report.skin import draw_spikes
@@ -155,7 +161,7 @@ def test_few_sites_have_a_key_and_many_have_none(results):
     assert few.lines[0].get_ydata().tolist() == pytest.approx([0.0, 20.0])
     one = fp.Traces([0.0, 50.0, 50.0, 90.0], [[0.0], [2e-3], [1e-3], [1e-3]], quantity="current")
     assert one.plot(Figure().add_subplot()).get_legend() is None
-    assert one.to_xarray().current.units == "mA"
+    assert one.to_dataset().current.units == "mA"
     axes = fp.SpikeTrains.from_lists([[], []]).plot(Figure().add_subplot())
     assert "no afferent fires" in axes.texts[0].get_text()
     axes = Figure().add_subplot()
@@ -179,8 +185,8 @@ def test_a_notebook_shows_a_small_picture_and_one_line(results, kind):
     assert len(html) < 150_000
     assert "\n" not in line
     assert 20 < len(line) < 160
-    if kind in TABLES:
-        table, data = results[kind].to_pandas(), results[kind].to_xarray()
+    if isinstance(results[kind], Result):
+        table, data = results[kind].to_frame(), results[kind].to_dataset()
         assert len(table) > 0
         assert table.index.name
         numbers = [values for values in data.data_vars.values() if values.dtype.kind == "f"]
@@ -210,24 +216,120 @@ def test_progress_that_has_no_stages_is_refused():
 
 def test_tables_hold_the_numbers_of_the_result(results):
     skin, response, traces = results["SkinResponse"], results["ResponseMap"], results["Traces"]
-    table = response.to_pandas()
+    table = response.to_frame()
     assert table.static_rate_hz.tolist() == response.static_rate_hz.tolist()
-    assert table.spikes.sum() == response.spikes.times_ms.size
-    assert skin.to_pandas().force_mn.tolist() == skin.force_mn.tolist()
-    assert np.array_equal(skin.to_xarray(response).force_mn.values, skin.force_mn)
-    assert np.array_equal(traces.to_pandas().values, traces.values)
-    assert np.array_equal(traces.to_xarray().stored.values, traces.values)
-    spikes = response.spikes.to_pandas()
+    assert table.spike_count.sum() == response.spikes.times_ms.size
+    assert skin.to_frame().force_mn.tolist() == skin.force_mn.tolist()
+    assert np.array_equal(skin.to_dataset(response).force_mn.values, skin.force_mn)
+    assert np.array_equal(traces.to_frame().values, traces.values)
+    assert np.array_equal(traces.to_dataset().stored.values, traces.values)
+    spikes = response.spikes.to_frame()
     for number, train in enumerate(response.spikes):
         assert spikes.time_ms[spikes.index == number].tolist() == train.tolist()
-    assert response.to_xarray().spike_time_ms.units == "ms"
-    mixed = fp.ResponseMap.joined({"SAI": results["ResponseMap"], "RA": results["ResponseMap"]}).to_pandas()
+    assert response.to_dataset().spike_time_ms.units == "ms"
+    mixed = fp.ResponseMap.joined({"SAI": response, "RA": response}).to_frame()
     assert mixed.type.value_counts().to_dict() == {"SAI": len(response.spikes), "RA": len(response.spikes)}
     fit = results["FitResult"]
-    static = fit.to_pandas().query("phase == 'static'")
+    static = fit.to_frame().query("phase == 'static'")
     assert static.observed_hz.tolist() == fit.phases["static"].observed_hz.tolist()
     task = results["TaskResult"]
-    decoded = task.to_pandas().query("measure == 'static'")
+    decoded = task.to_frame().query("measure == 'static'")
     assert decoded.hit_rate.tolist() == task.decodings[0].hit_rate.tolist()
     spike_fit = results["SpikeFit"]
-    assert spike_fit.to_pandas().standard_error.tolist() == spike_fit.standard_errors.tolist()
+    assert spike_fit.to_frame().standard_error.tolist() == spike_fit.standard_errors.tolist()
+
+
+@pytest.mark.parametrize(
+    "kind", ["ResponseMap", "Traces", "SkinResponse", "HitRates", "FitResult", "TaskResult"]
+)
+def test_a_result_is_saved_by_the_ending_of_the_name_and_read_back(results, kind, tmp_path):
+    result = results[kind]
+    table, data = result.to_frame(), result.to_dataset()
+    read = pandas.read_csv(result.save(tmp_path / "deeper" / "a.csv"), dtype=str)
+    for name, values in table.reset_index().items():
+        held = read[str(name)].to_numpy(values.dtype if values.dtype.kind in "fi" else str)
+        assert np.array_equal(held, values, equal_nan=values.dtype.kind == "f"), name
+    parquet = pandas.read_parquet(result.save(tmp_path / "a.parquet"))
+    assert np.array_equal(parquet.iloc[:, -1], table.iloc[:, -1], equal_nan=True)
+    with xarray.open_dataset(result.save(tmp_path / "a.nc"), decode_times=False) as written:
+        xarray.testing.assert_equal(written, data)
+    options = {"consolidated": False, "decode_times": False}
+    with xarray.open_zarr(result.save(tmp_path / "a.zarr"), **options) as written:
+        xarray.testing.assert_equal(written, data)
+    with np.load(result.save(tmp_path / "a.npz")) as arrays:
+        for name, values in data.variables.items():
+            assert np.array_equal(arrays[name], values, equal_nan=values.dtype.kind == "f"), name
+    content = json.loads(result.save(tmp_path / "a.json").read_text())
+    if result.whole_as_json:
+        assert content["stimulus"] == list(result.stimulus)
+    else:
+        back = xarray.Dataset.from_dict(content)
+        assert set(back.variables) == set(data.variables)
+        for name, values in data.variables.items():
+            if values.dtype.kind == "f":
+                assert np.array_equal(back[name].astype(float), values, equal_nan=True), name
+    for ending, head in (("png", b"\x89PNG"), ("pdf", b"%PDF"), ("svg", b"<?xml")):
+        assert result.save(tmp_path / f"a.{ending}").read_bytes().startswith(head)
+    assert {path.name for path in tmp_path.iterdir()} == {
+        "deeper", *(f"a.{ending}" for ending in ("parquet", "nc", "zarr", "npz", "json", "png", "pdf", "svg"))
+    }  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("kind", "name", "options", "said"),
+    [
+        ("HitRates", "a.xyz", {}, r"A HitRates is saved as \.csv, .*: got a\.xyz"),
+        ("HitRates", "a.nwb", {}, r"saved as .*: got a\.nwb"),
+        ("HitRates", "a.csv", {"sep": ";"}, r"A file \.csv has no options: got sep"),
+        ("SkinResponse", "a.nc", {"seeds": 3}, "seeds"),
+        ("SkinResponse", "a.pvd", {}, r"solve the touch with whole=True"),
+        ("SpikeTrains", "a.nwb", {}, "A session needs the places of the afferents"),
+        ("ResponseMap", "a.png", {"what": "heat"}, "what must be one of raster, map"),
+    ],
+)
+def test_what_a_result_cannot_be_saved_as_is_refused(results, tmp_path, kind, name, options, said):
+    with pytest.raises(fp.InputError, match=said):
+        results[kind].save(tmp_path / name, **options)
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("mixed", [False, True])
+def test_every_column_of_a_response_is_in_every_table_and_file(results, mixed, tmp_path):
+    """The columns are those that are annotated in `ResponseMap`: no list of them is kept elsewhere."""
+    one = results["ResponseMap"]
+    response = fp.ResponseMap.joined({"SAI": one, "RA": one}) if mixed else one
+    path = response.to_nwb(tmp_path / "a.nwb", duration_ms=5000.0)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        with NWBHDF5IO(str(path), "r") as file:
+            units = file.read().units.to_dataframe()
+    header = response.save(tmp_path / "a.csv").read_text().splitlines()[0].split(",")
+    assert len(RECEPTOR_COLUMNS) >= 7
+    for name in RECEPTOR_COLUMNS:
+        values = getattr(response, name)
+        assert np.array_equal(response.to_frame()[name], values, equal_nan=True)
+        assert np.array_equal(response.to_dataset()[name], values, equal_nan=True)
+        assert np.array_equal(np.array([row[0] for row in units[name]]), values, equal_nan=True)
+        assert name in header
+        shown = response.plot(Figure().add_subplot(), "map", quantity=name) if not mixed else None
+        assert mixed or np.array_equal(shown.collections[0].get_array(), values, equal_nan=True)
+
+
+def test_spikes_go_to_pynapple_and_neo_with_what_is_known_of_each_afferent(results):
+    one = results["ResponseMap"]
+    response = fp.ResponseMap.joined({"SAI": one, "RA": one})
+    group, block = response.to_pynapple(), response.to_neo()
+    trains = block.segments[0].spiketrains
+    assert len(group) == len(trains) == len(response.spikes)
+    for number, train in enumerate(response.spikes):
+        np.testing.assert_allclose(group[number].times("ms"), train, rtol=0, atol=1e-6)
+        np.testing.assert_array_equal(trains[number].magnitude, train)
+    assert group["type"].tolist() == [train.annotations["type"] for train in trains] == list(response.types)
+    assert group["x_mm"].tolist() == response.positions_mm[:, 0].tolist()
+    assert str(trains[0].units.dimensionality) == "ms"
+    assert group.time_support.end.tolist() == [one.duration_ms / 1000.0]
+    (epoch,) = block.segments[0].epochs
+    assert epoch.labels.tolist() == [phase.name for phase in one.phases]
+    assert (epoch.times + epoch.durations).magnitude.tolist() == [phase.end_ms for phase in one.phases]
+    assert results["SpikeTrains"].to_pynapple()[3].times("ms").size == one.spikes[3].size
+    assert len(results["SpikeTrains"].to_neo().segments[0].spiketrains) == len(one.spikes)

@@ -12,8 +12,8 @@ import pytest
 import xarray
 
 import fingerpad as fp
-from fingerpad.export import dataset
-from fingerpad.export.dataset import PARTS, check_touch, spike_trains
+from fingerpad.export import results
+from fingerpad.export.touch_file import PARTS, check_touch, spike_trains
 from fingerpad.skin.fields import Place, stored_fields
 from sections import SMALL_TOUCH as TOUCH
 
@@ -34,7 +34,7 @@ def skin():
 
 @pytest.fixture(scope="module")
 def file(skin, tmp_path_factory):
-    return fp.write_touch(tmp_path_factory.mktemp("touch") / "touch.nc", skin, RESPONSE, seed=7)[0]
+    return skin.save(tmp_path_factory.mktemp("touch") / "touch.nc", response=RESPONSE, seed=7)
 
 
 @pytest.fixture(scope="module")
@@ -44,9 +44,9 @@ def written(file):
 
 @pytest.mark.parametrize("file_name", ["touch.nc", "touch.zarr"])
 def test_what_is_written_is_read_back(skin, tmp_path, file_name):
-    written = fp.touch_dataset(skin, RESPONSE, quantities=("stress",))
-    files = fp.write_touch(tmp_path / file_name, skin, RESPONSE, quantities=("stress",))
-    assert files == (tmp_path / file_name,)
+    written = skin.to_dataset(RESPONSE, quantities=("stress",))
+    path = skin.save(tmp_path / file_name, response=RESPONSE, quantities=("stress",))
+    assert path == tmp_path / file_name
     again = fp.read_touch(tmp_path)
     xarray.testing.assert_equal(written, again)
     assert written.sizes == again.sizes
@@ -54,7 +54,7 @@ def test_what_is_written_is_read_back(skin, tmp_path, file_name):
     for name, variable in again.variables.items():
         assert variable.attrs["long_name"], name
         assert ("units" in variable.attrs) != (name in PARTS and PARTS[name].unit == ""), name
-    fp.write_touch(tmp_path / file_name, skin)  # an older file is replaced as a whole
+    skin.save(tmp_path / file_name)  # an older file is replaced as a whole
     assert "spike_count" not in fp.read_touch(tmp_path)
     assert [path.name for path in tmp_path.iterdir()] == [file_name]
 
@@ -104,16 +104,16 @@ def test_the_object_lies_where_the_press_had_it(skin, file):
 
 def test_without_the_deformation_the_last_displacement_is_there(skin, monkeypatch):
     without = replace(skin, deformation=None)
-    data = fp.touch_dataset(without)
+    data = without.to_dataset()
     assert data.displacement_mm.dims == ("node", "axis")
     assert data.displacement_mm.at_time_ms == 1000.0
     with pytest.raises(fp.InputError, match=r"quantity stress needs .* whole=True"):
-        fp.touch_dataset(without, quantities=("stress",))
+        without.to_dataset(quantities=("stress",))
     with pytest.raises(fp.InputError, match="quantity must be one of"):
-        fp.touch_dataset(skin, quantities=("stres",))
+        skin.to_dataset(quantities=("stres",))
     monkeypatch.setitem(sys.modules, "xarray", None)
     with pytest.raises(fp.InputError, match=r"needs xarray: .*fingerpad\[netcdf\]"):
-        fp.touch_dataset(skin)
+        skin.to_dataset()
 
 
 @pytest.mark.parametrize("name", ["touch.nc", "touch.zarr"])
@@ -121,10 +121,10 @@ def test_a_killed_write_leaves_nothing(skin, tmp_path, name, monkeypatch):
     def fails(*args, **options):
         raise OSError("no space")
 
-    monkeypatch.setattr(dataset, "write_atomically", fails)
+    monkeypatch.setattr(results, "write_atomically", fails)
     monkeypatch.setattr(Path, "rename", fails)
     with pytest.raises((OSError, fp.StoreError), match="no space"):
-        fp.write_touch(tmp_path / name, skin)
+        skin.save(tmp_path / name)
     assert list(tmp_path.iterdir()) == []
 
 
@@ -132,9 +132,15 @@ def test_no_place_to_write_and_no_known_ending_are_refused(skin, tmp_path):
     (tmp_path / "file").write_text("")
     for name in ("touch.nc", "touch.zarr"):
         with pytest.raises(fp.StoreError, match="cannot be written"):
-            fp.write_touch(tmp_path / "file" / name, skin)
-    with pytest.raises(fp.InputError, match=r"as .nc or .zarr: got touch.h5"):
-        fp.write_touch(tmp_path / "touch.h5", skin)
+            skin.save(tmp_path / "file" / name)
+    with pytest.raises(fp.InputError, match=r"A SkinResponse is saved as .csv, .*\.zarr, .*: got touch.h5"):
+        skin.save(tmp_path / "touch.h5")
+
+
+def test_a_file_that_was_written_before_a_column_was_added_is_read(skin, tmp_path, written):
+    older = written.drop_vars("recruitment_rank")
+    older.to_netcdf(tmp_path / "touch.nc", engine="h5netcdf")
+    assert set(fp.read_touch(tmp_path).variables) == set(older.variables)
 
 
 def _changed(change):

@@ -14,7 +14,6 @@ import fingerpad as fp
 from fingerpad.core.phases import ramp_and_hold_phases
 from fingerpad.export.responses import read_response_csv, read_responses_nwb
 from fingerpad.neuron.response_maps import recruitment_rank
-from refusals import refused
 from sections import SMALL_TOUCH as TOUCH
 
 
@@ -35,7 +34,7 @@ def random_response(columns):
 @pytest.mark.parametrize(("columns", "places"), [(2, ["x_mm", "z_mm"]), (3, ["x_mm", "y_mm", "z_mm"])])
 def test_every_number_comes_back_to_the_last_bit(tmp_path, columns, places):
     response = random_response(columns)
-    with open(fp.write_response_csv(tmp_path / "deeper" / "map.csv", response), encoding="utf-8") as file:
+    with open(response.save(tmp_path / "deeper" / "map.csv"), encoding="utf-8") as file:
         rows = list(csv.DictReader(file))
     assert [int(row["receptor"]) for row in rows] == list(range(40))
 
@@ -71,7 +70,7 @@ def alike(read, written, within_ms):
 
 def test_mixed_responses_come_back_with_the_type_of_every_unit(tmp_path):
     written = mixed_response()
-    alike(read_response_csv(fp.write_response_csv(tmp_path / "mixed.csv", written)), written, 0.0)
+    alike(read_response_csv(written.save(tmp_path / "mixed.csv")), written, 0.0)
     touches = {"edge": written, "flat": fp.ResponseMap.joined({"RA": written["RA"], "own": written["own"]})}
     read = read_responses_nwb(fp.write_responses_nwb(tmp_path / "mixed.nwb", touches, pause_ms=250.0))
     assert list(read) == ["edge", "flat"]
@@ -79,7 +78,7 @@ def test_mixed_responses_come_back_with_the_type_of_every_unit(tmp_path):
         alike(response, touches[name], 1e-6)
         assert response["own"].phases == written["own"].phases
         assert response["RA"].duration_ms == pytest.approx(1000.0, rel=1e-12)
-    one = read_response_csv(fp.write_response_csv(tmp_path / "one.csv", written["RA"]))
+    one = read_response_csv(written["RA"].save(tmp_path / "one.csv"))
     assert not one.types
     assert one.pitch_mm == 1.0
 
@@ -91,10 +90,8 @@ def test_a_table_that_is_no_response_is_refused(tmp_path):
     (tmp_path / "other.nwb").write_text("no session", encoding="utf-8")
     with pytest.raises(fp.InputError, match="must be a session of write_responses_nwb"):
         read_responses_nwb(tmp_path / "other.nwb")
-    with refused("response"):
-        fp.write_response_csv(tmp_path / "map.csv", [1.0])
     with pytest.raises(fp.StoreError, match=r"other\.csv"):
-        fp.write_response_csv(tmp_path / "other.csv" / "map.csv", random_response(2))
+        random_response(2).save(tmp_path / "other.csv" / "map.csv")
 
 
 def responses_to_two_touches():

@@ -439,9 +439,9 @@ def test_an_empty_word_is_no_folder(run_program, is_refused, words):
 @pytest.mark.parametrize(
     "read",
     [
-        fp.read_trajectory, fp.read_touch_description, fp.read_touch, fp.open_sweep, fp.read_sweep_table,
-        fp.read_vtu_series, fp.read_surface, fp.read_finger, lambda path: fp.read_height_map(path, 0.1),
-        lambda path: fp.write_sweep_table(None, path), lambda path: fp.write_touch(path, None),
+        fp.read_trajectory, fp.read_touch_description, fp.read_touch, fp.open_sweep,
+        fp.read_surface, fp.read_finger, lambda path: fp.read_height_map(path, 0.1),
+        lambda path: fp.write_sweep_table(None, path),
     ],
     ids=lambda read: getattr(read, "__name__", ""),
 )  # fmt: skip
@@ -454,7 +454,7 @@ def test_what_is_no_path_is_refused(read):
 @pytest.mark.parametrize(
     "use",
     [
-        fp.setting_touch, fp.setting_response, fp.setting_spikes,
+        fp.setting_touch, fp.setting_response,
         lambda data: fp.observe_sweep(data, {"along": "motion.depth_mm"}),
         lambda data: fp.write_sweep_table(data, "rates.csv"),
         lambda data: fp.write_sweep_spikes(data, "spikes.nwb"),

@@ -4,14 +4,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-
-import fingerpad as fp
 from fingerpad.experiments.descriptions.touch import described_touch
 from fingerpad.experiments.discrimination.run import DiscriminationRun
 from fingerpad.experiments.discrimination.task_stimuli import input_hashes, task_text
-from fingerpad.export.abaqus import abaqus_deck
+
+import fingerpad as fp
+from fingerpad.export.decks import abaqus_deck
 from fingerpad.export.job import job_of
-from fingerpad.export.vtu import write_vtu_series
 from fingerpad.geometry.free_mesh import FACES, FreeMesh, closest_on_triangles
 from fingerpad.geometry.mesh import LAYERS
 from fingerpad.geometry.mesh_checks import jacobian_at_gauss
@@ -33,7 +32,7 @@ def sent(tmp_path_factory):
     folder = tmp_path_factory.mktemp("sent")
     touch = fp.touch_of(fp.Fingertip(), BALL, MOTION, grading=COARSE, settings=STEPS)
     skin = touch.solve(whole=True)
-    write_vtu_series(folder / "finger.pvd", skin)
+    skin.save(folder / "finger.pvd")
     (folder / "finger.inp").write_text(abaqus_deck(job_of(touch)))
     return folder, skin
 

@@ -19,7 +19,6 @@ import fingerpad as fp
 from cluster import wait_until
 from fingerpad.cli import main
 from fingerpad.core.units import QUANTITY_UNITS
-from fingerpad.export.vtu import write_vtu_series
 from fingerpad.mechanics.newton import NewtonSettings
 from fingerpad.skin import code_hash
 from fingerpad.skin.code_hash import MECHANICAL_SOURCES
@@ -269,11 +268,11 @@ def test_one_declaration_is_stored_loaded_sampled_and_exported(tmp_path, monkeyp
     assert sampled[-1].max() > 0.5 * pressure[-1].max() > 0.0
     assert back.sed(under, dynamic_quantity="pore_pressure").dynamic_quantity == "pore_pressure"
     reader = vtkXMLUnstructuredGridReader()
-    reader.SetFileName(str(write_vtu_series(tmp_path / "press.pvd", skin)[-1]))
+    reader.SetFileName(str(skin.save(tmp_path / "press.vtu")))
     reader.Update()
     written = vtk_to_numpy(reader.GetOutput().GetCellData().GetArray("pore_pressure_kpa"))
     np.testing.assert_array_equal(written, skin.deformation.fields.pressure_kpa[-1].astype(np.float32))
-    np.testing.assert_array_equal(fp.touch_dataset(back)["pore_pressure"], pressure)
+    np.testing.assert_array_equal(back.to_dataset()["pore_pressure"], pressure)
 
 
 def test_fields_that_are_not_declared_or_have_another_shape_are_refused(skin):

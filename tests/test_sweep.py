@@ -7,6 +7,7 @@ import warnings
 from types import SimpleNamespace
 
 import numpy as np
+import pandas
 import pytest
 import xarray
 import zarr
@@ -16,10 +17,12 @@ from fingerpad.experiments.sweep.description import Constraint, read_sweep, swee
 import fingerpad as fp
 from fingerpad.cli import main
 from fingerpad.core.errors import InputError, StoreError
+from fingerpad.core.signals import RECEPTOR_COLUMNS
 from fingerpad.experiments.discrimination.decoding import SESSION
 from fingerpad.experiments.manifest import software
 from fingerpad.experiments.sweep.observers import observe
-from fingerpad.export.sweep_dataset import DONE, FAILED, LEFT_OUT, SweepFile, open_sweep
+from fingerpad.export.sweep_file import DONE, FAILED, LEFT_OUT, SweepFile
+from fingerpad.export.sweep_results import open_sweep
 from fingerpad.psychophysics.observer import ENCODERS, Experiment, discriminate_by
 
 MOTION = {"ramp_ms": 50, "hold_ms": 60}
@@ -188,15 +191,13 @@ def test_a_setting_has_the_numbers_and_the_response_of_its_touch(folder):
     one, found = data.isel(where), fp.setting_response(data, **where)
     assert one.force_mn.values.tolist() == pressed.skin.force_mn.tolist()
     assert one.time_ms.values.tolist() == pressed.skin.times_ms.tolist()
-    trains = fp.setting_spikes(one)
+    trains = found.spikes
     assert [train.tolist() for train in trains] == [train.tolist() for train in pressed.response.spikes]
     assert sum(map(len, trains)) > 0
     for name in ("positions_mm", "static_rate_hz", "first_spike_latency_ms"):
         np.testing.assert_array_equal(getattr(found, name), getattr(pressed.response, name))
     assert (found.pitch_mm, found.phases) == (pressed.response.pitch_mm, pressed.response.phases)
     assert found.duration_ms == pressed.response.duration_ms
-    with pytest.raises(InputError, match="one setting must be chosen"):
-        fp.setting_spikes(data)
     with pytest.raises(InputError, match="an index must be given for each of motion_depth_mm"):
         fp.setting_touch(data, motion_depth_mm=0)
 
@@ -232,14 +233,21 @@ def test_stiffer_tissues_take_more_force(folder):
 @pytest.mark.parametrize("ending", ["csv", "parquet"])
 def test_a_table_of_rates_is_read_back_bit_by_bit(folder, tmp_path, ending):
     data = open_sweep(folder / "study.zarr")
-    table = fp.read_sweep_table(fp.write_sweep_table(data, tmp_path / f"rates.{ending}"))
-    assert table.attrs["inputs_sha256"] == data.attrs["inputs_sha256"]
-    assert list(table.columns) == [
-        "motion_depth_mm", "afferents_columns", "receptor", "x_mm", "z_mm",
-        "dynamic_rate_hz", "static_rate_hz", "dynamic_count_hz", "static_count_hz",
-        "first_spike_latency_ms", "spike_count",
-    ]  # fmt: skip
+    path = fp.write_sweep_table(data, tmp_path / f"rates.{ending}")
+    if ending == "csv":
+        # Before 3.1, pandas rounds unless it is asked not to; from then on it need not be asked.
+        rounds = tuple(int(part) for part in pandas.__version__.split(".")[:2]) < (3, 1)
+        table = pandas.read_csv(path, comment="#", **({"float_precision": "round_trip"} if rounds else {}))
+        about = json.loads(path.read_text().splitlines()[0].removeprefix("# "))
+    else:
+        table = pandas.read_parquet(path)
+        about = table.attrs
+    assert about["inputs_sha256"] == data.attrs["inputs_sha256"]
+    places = ["motion_depth_mm", "afferents_columns", "receptor", "x_mm", "z_mm"]
+    assert list(table.columns) == [*places, *RECEPTOR_COLUMNS]
     assert len(table) == 2 + 3 + 3
+    older = fp.write_sweep_table(data.drop_vars("recruitment_rank"), tmp_path / "older.csv")
+    assert older.read_text().splitlines()[1] == ",".join([*places, *list(RECEPTOR_COLUMNS)[:-1]])
     some = table[(table.motion_depth_mm == 0.5) & (table.afferents_columns == 3)]
     one = data.isel(motion_depth_mm=1, afferents_columns=1)
     for name in ("dynamic_rate_hz", "static_rate_hz", "first_spike_latency_ms", "spike_count"):
@@ -247,18 +255,8 @@ def test_a_table_of_rates_is_read_back_bit_by_bit(folder, tmp_path, ending):
     np.testing.assert_array_equal(some[["x_mm", "z_mm"]], one.receptor_mm)
 
 
-def test_a_foreign_table_is_refused(folder, tmp_path):
+def test_a_table_that_cannot_be_written_is_refused(folder, tmp_path):
     data, path = open_sweep(folder / "study.zarr"), tmp_path / "rates.csv"
-    fp.write_sweep_table(data, path)
-    text = path.read_text()
-    for changed, said in [
-        (text.replace('"format_version": 1', '"format_version": 2'), "must have format_version 1: got 2"),
-        (text.replace("fingerpad sweep table", "other"), "must be a table of a sweep that fingerpad wrote"),
-        ("a,b\n1,2\n", "must be a table of a sweep: it cannot be read"),
-    ]:
-        path.write_text(changed)
-        with pytest.raises(InputError, match=said):
-            fp.read_sweep_table(path)
     with pytest.raises(InputError, match=r"is written as \.csv or \.parquet: got rates.xls"):
         fp.write_sweep_table(data, tmp_path / "rates.xls")
     with pytest.raises(InputError, match="A setting must be done for a table of rates"):

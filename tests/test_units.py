@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from fingerpad.experiments.stimuli import ShiftedBar
 
 import fingerpad as fp
 from fingerpad.core.units import (
@@ -12,7 +13,6 @@ from fingerpad.core.units import (
     name_and_unit,
     units_of,
 )
-from fingerpad.experiments.stimuli import ShiftedBar
 from fingerpad.experiments.validation.observations import read_observations
 from fingerpad.inference.identifiable import SPIKE_PARAMETER_NAMES
 from fingerpad.skin.fields import sampled_fields
@@ -57,7 +57,7 @@ def test_traces_are_printed_plotted_and_tabulated_in_the_unit_of_their_quantity(
     shown = traces(quantity)
     assert repr(shown).endswith(said)
     assert shown.plot().get_ylabel() == label
-    assert shown.to_xarray()[quantity].attrs["units"] == attribute
+    assert shown.to_dataset()[quantity].attrs["units"] == attribute
 
 
 def test_spikes_in_seconds_are_noticed_before_anything_is_pressed(tmp_path):

@@ -30,12 +30,12 @@ RESPONSE = fp.ResponseMap(
 
 @pytest.fixture(scope="module")
 def data():
-    return fp.touch_dataset(TOUCH.solve(whole=True), RESPONSE)
+    return TOUCH.solve(whole=True).to_dataset(RESPONSE)
 
 
 @pytest.fixture(scope="module")
 def file(tmp_path_factory):
-    return fp.write_touch(tmp_path_factory.mktemp("touch") / "touch.nc", TOUCH.solve(), RESPONSE)[0]
+    return TOUCH.solve().save(tmp_path_factory.mktemp("touch") / "touch.nc", response=RESPONSE)
 
 
 def test_points_are_marked_where_the_scene_shows_them(data):
@@ -77,7 +77,7 @@ def test_a_whole_finger_and_a_turned_body_are_cut_at_the_middle():
     whole = replace(
         TOUCH, indenter=fp.Bar(3.0, 0.3), grading=replace(TOUCH.grading, full=True), spin_deg=30.0
     )
-    data = fp.touch_dataset(whole.solve(whole=True))
+    data = whole.solve(whole=True).to_dataset()
     drawn = view._View(data, "sed_kpa")
     assert drawn._object(50.0).bounds.z_max <= 1e-9
     assert view._View(data, "contact_pressure_kpa")._object(50.0).bounds.z_max > 3.0
@@ -133,7 +133,7 @@ def test_a_response_without_afferents_and_object_is_drawn(tmp_path):
     skin = TOUCH.solve()
     (picture,) = fp.save_view(tmp_path / "a.png", skin, field="pressure")
     assert picture.stat().st_size > 10_000
-    bare = fp.touch_dataset(replace(skin, touch=None))
+    bare = replace(skin, touch=None).to_dataset()
     assert "object_front_mm" not in bare
     assert fp.save_view(tmp_path / "bare.png", bare, time_ms=1000.0)
 

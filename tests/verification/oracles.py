@@ -12,8 +12,8 @@ from pathlib import Path
 
 import numpy as np
 
-from fingerpad.export import cards
-from fingerpad.export.calculix import calculix_deck
+from fingerpad.export import decks
+from fingerpad.export.decks import calculix_deck
 from fingerpad.export.job import Job, job_of
 from fingerpad.geometry.edged_indenters import Edge, Gap
 from fingerpad.geometry.embossed import Embossed
@@ -90,10 +90,7 @@ def calculix_block() -> list[Row]:
     element = job().mesh.layer
     with tempfile.TemporaryDirectory() as folder:
         found = calculix.run(
-            calculix_deck(job(), element="C3D8I"),
-            Path(folder),
-            len(element),
-            tuple(job().layer_names.values()),
+            calculix_deck(job()), Path(folder), len(element), tuple(job().layer_names.values())
         )
     np.testing.assert_allclose(found.times_ms, job().times_ms[1:])
     return compared(2.0 * found.force_mn @ job().placement.axis, found.sed_kpa[-1], OTHER_ELEMENT)
@@ -263,17 +260,17 @@ def cube_energies() -> np.ndarray:
     names = [f"LAW{n}" for n in range(len(LAWS))]
     for n, (name, material) in enumerate(zip([*names, "FREE"], [*LAWS.values(), None], strict=True)):
         first = 1 + 8 * n
-        lines += cards.nodes(CORNERS + np.array([3.0 * n, 0.0, 0.0]), first, f"N{name}")
-        lines += cards.elements("C3D8", name, np.array([n + 1]), first + np.arange(8)[None])
+        lines.append(decks.nodes(CORNERS + np.array([3.0 * n, 0.0, 0.0]), first, f"N{name}"))
+        lines.append(decks.elements("C3D8", name, np.array([n + 1]), first + np.arange(8)[None]))
         law = law_card(material) if material else ["*ELASTIC", "1, 0.3"]
         lines += [f"*MATERIAL, NAME={name}", *law, f"*SOLID SECTION, ELSET={name}, MATERIAL={name}"]
         if material:
             moves += [
-                f"{first + node}, {axis + 1}, {axis + 1}, {cards.digits(value)}"
+                f"{first + node}, {axis + 1}, {axis + 1}, {decks.digits(value)}"
                 for (node, axis), value in np.ndenumerate(displacement)
             ]
     lines += [
-        f"*NSET, NSET={cards.INDENTER}",
+        f"*NSET, NSET={decks.INDENTER}",
         f"{first}",
         "*BOUNDARY",
         f"{first}, 1, 3",
@@ -281,9 +278,9 @@ def cube_energies() -> np.ndarray:
     ]
     lines += [f"{first + 2}, 1, 3", f"{first + 3}, 1, 3"]
     lines += [f"*STEP, NLGEOM, INC={2 * INCREMENTS}", "*STATIC, DIRECT", f"{1 / INCREMENTS}, 1.", *moves]
-    lines += [f"*NODE PRINT, NSET={cards.INDENTER}, TOTALS=ONLY", "RF"]
+    lines += [f"*NODE PRINT, NSET={decks.INDENTER}, TOTALS=ONLY", "RF"]
     for name in names:
         lines += [f"*EL PRINT, ELSET={name}", "ENER"]
     with tempfile.TemporaryDirectory() as folder:
-        found = calculix.run(cards.text([*lines, "*END STEP"]), Path(folder), len(names), tuple(names))
+        found = calculix.run("\n".join([*lines, "*END STEP", ""]), Path(folder), len(names), tuple(names))
     return found.sed_kpa[-1]

@@ -12,7 +12,7 @@ import re
 import numpy as np
 import pytest
 
-from fingerpad.export.calculix import calculix_deck
+from fingerpad.export.decks import calculix_deck
 from fingerpad.mechanics.newton import NewtonSettings
 from fingerpad.mechanics.press import press
 from fingerpad.mechanics.press_settings import PressSettings
@@ -70,7 +70,7 @@ def test_felupe_agrees_on_a_coarse_block(motion, end_ms):
 
 def test_the_deck_that_calculix_runs_is_the_job():
     """Fixed and moving nodes, steps and materials of the oracle's deck, since agreement rests on them."""
-    deck = calculix_deck(job(), element="C3D8I")
+    deck = calculix_deck(job())
     assert deck.count("*STEP") == 1
     assert re.search(r"^5, 40, ", deck, re.M)
     assert len(re.findall(r"^\*HYPERELASTIC, NEO HOOKE$", deck, re.M)) == 4

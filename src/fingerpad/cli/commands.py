@@ -187,7 +187,7 @@ def _validate(given: argparse.Namespace, within: Options) -> int:
 
 def _sweep(given: argparse.Namespace, within: Options) -> int:
     from fingerpad.export.sweep import check_sweep
-    from fingerpad.export.sweep_tables import check_outputs
+    from fingerpad.export.sweep_results import check_outputs
 
     source, keys = _asked("sweep", given, within)
     request = fp.SweepRequest.read(source, keys, given.allow_python)

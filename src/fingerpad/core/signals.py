@@ -16,10 +16,19 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from fingerpad.core.checked import value_class
-from fingerpad.core.displayed import Result
+from fingerpad.core.displayed import (
+    Column,
+    Columns,
+    Contents,
+    Result,
+    SpikingResult,
+    Variable,
+    columns_of,
+    udunits,
+)
 from fingerpad.core.errors import InputError
 from fingerpad.core.phases import Phase, from_onset, ramp_and_hold_phases
-from fingerpad.core.units import MS_PER_S, QUANTITY_UNITS, with_unit
+from fingerpad.core.units import MS_PER_S, QUANTITY_UNITS, unit_of, with_unit
 from fingerpad.core.values import (
     Finite,
     FiniteMatrix,
@@ -51,6 +60,10 @@ CURRENT, RELATIVE_CURRENT = "current", "relative_current"
 """What charges a membrane: the current, or the current over that which just reaches the threshold."""
 
 CURRENTS = (CURRENT, RELATIVE_CURRENT)  # Quantities that may jump and may be negative.
+
+
+PLACES = {2: ("x_mm", "z_mm"), 3: ("x_mm", "y_mm", "z_mm")}
+"""Columns of a position by the number of its coordinates."""
 
 
 @runtime_checkable
@@ -208,6 +221,18 @@ class Traces(Result):
             + ")"
         )
 
+    def columns(self) -> Columns:
+        """Values, a column per site, by time; a time is repeated where a current jumps."""
+        return {"time_ms": self.times_ms} | dict(enumerate(self.values.T))
+
+    def contents(self) -> Contents:
+        """Each quantity by time and site; a time is repeated where a current jumps."""
+        terms = {
+            each.quantity: (("time", "site"), each.values, {"units": udunits(each.unit)})
+            for each in (self, self.dynamic_term)
+        }
+        return {"time": (("time",), self.times_ms, {"units": "ms"}), **terms}, {}
+
     @property
     def unit(self) -> str:
         """Unit of the values; empty for a strain and for a relative current."""
@@ -321,7 +346,7 @@ def window_bounds(window_ms: Sequence[float]) -> tuple[float, float]:
 
 
 @value_class
-class SpikeTrains(Result):
+class SpikeTrains(SpikingResult):
     """Spike times of several afferents, one after the other in one array.
 
     Examples
@@ -374,6 +399,10 @@ class SpikeTrains(Result):
         offsets = np.concatenate([[0], np.cumsum(np.concatenate(counts))]) if parts else np.zeros(1, int)
         return cls(np.concatenate([part.times_ms for part in parts]) if parts else np.empty(0), offsets)
 
+    def columns(self) -> Columns:
+        """Spikes, by afferent."""
+        return {"afferent": np.repeat(np.arange(len(self)), self.counts), "time_ms": self.times_ms}
+
     @property
     def counts(self) -> np.ndarray:
         """Number of spikes of each afferent, (n_afferents,)."""
@@ -406,7 +435,7 @@ class SpikeTrains(Result):
 
 
 @value_class
-class ResponseMap(Result):
+class ResponseMap(SpikingResult):
     """Response of a population of afferents to one touch.
 
     Parameters
@@ -440,9 +469,9 @@ class ResponseMap(Result):
     positions_mm: FiniteMatrix
     pitch_mm: Positive
     spikes: SpikeTrains
-    dynamic_rate_hz: FiniteVector
-    static_rate_hz: FiniteVector
-    first_spike_latency_ms: Vector
+    dynamic_rate_hz: Annotated[FiniteVector, Column("firing rate in the ramp")]
+    static_rate_hz: Annotated[FiniteVector, Column("firing rate in the hold")]
+    first_spike_latency_ms: Annotated[Vector, Column("time from first touch to the first spike", holes=True)]
     duration_ms: Positive | None = None
     phases: Many[Phase] = ()
     windows_ms: tuple[Numbers, Numbers] | None = None
@@ -537,20 +566,52 @@ class ResponseMap(Result):
             f"{self.static_rate_hz.max(initial=0.0):.3g} spikes/s in the hold)"
         )
 
+    def columns(self) -> Columns:
+        """Place, type, and each `Column` of this class, by receptor."""
+        return {
+            "receptor": np.arange(len(self.spikes)),
+            **({"type": np.array(self.types, dtype=object)} if self.types else {}),
+            **dict(zip(PLACES[self.positions_mm.shape[1]], self.positions_mm.T, strict=True)),
+            "pitch_mm": self.pitches_mm,
+            **{name: getattr(self, name) for name in RECEPTOR_COLUMNS},
+        }
+
+    def contents(self) -> Contents:
+        """Receptors, and spikes as a contiguous ragged array of the CF conventions."""
+        place = {"long_name": "place of each end organ", "units": "mm"}
+        found: dict[str, Variable] = {"receptor_mm": (("receptor", "coordinate"), self.positions_mm, place)}
+        if self.types:
+            words = {"long_name": "type of each afferent"}
+            found["type"] = (("receptor",), np.array(self.types, dtype=object), words)
+        for name, column in RECEPTOR_COLUMNS.items():
+            values = getattr(self, name)
+            words = {"long_name": column.long_name, "units": udunits(unit_of(name))}
+            found[name] = (("receptor",), values.astype("i4" if values.dtype.kind == "i" else "f8"), words)
+        found["spike_count"][2]["sample_dimension"] = "spike"
+        words = {"long_name": "spike times, receptor by receptor", "units": "ms"}
+        return {**found, "spike_time_ms": (("spike",), self.spikes.times_ms, words)}, {}
+
     @property
-    def spike_count(self) -> np.ndarray:
+    def spike_count(self) -> Annotated[np.ndarray, Column("number of spikes of each receptor")]:
         """Spikes of each afferent in the whole touch, (n_receptors,)."""
         return self.spikes.counts
 
     @property
-    def dynamic_count_hz(self) -> FloatArray:
+    def dynamic_count_hz(self) -> Annotated[FloatArray, Column("spikes in the ramp over its window", True)]:
         """Spikes in the dynamic window over its length, (n_receptors,); NaN if it is not known. [spikes/s]"""
         return self._counted_hz(0)
 
     @property
-    def static_count_hz(self) -> FloatArray:
+    def static_count_hz(self) -> Annotated[FloatArray, Column("spikes in the hold over its window", True)]:
         """Spikes in the static window over its length, (n_receptors,); NaN if it is not known. [spikes/s]"""
         return self._counted_hz(1)
+
+    @property
+    def recruitment_rank(self) -> Annotated[FloatArray, Column("rank in the order of first spikes", True)]:
+        """Rank in the order of first spikes, from 1, (n_receptors,); NaN without a spike."""
+        from scipy.stats import rankdata  # loads for a second
+
+        return np.asarray(rankdata(self.first_spike_latency_ms, nan_policy="omit"))
 
     def _counted_hz(self, number: int) -> FloatArray:
         if self.windows_ms is None:
@@ -575,6 +636,10 @@ class ResponseMap(Result):
                 raise InputError(f"ResponseMap needs one entry of {name} per receptor: got {size} for {n}.")
 
 
+RECEPTOR_COLUMNS = columns_of(ResponseMap)
+"""What a response says of each receptor beside its place, type and spikes, by the name of the attribute."""
+
+
 @value_class
 class HitRates(Result):
     """Hit rate of each comparison with the standard."""
@@ -590,6 +655,11 @@ class HitRates(Result):
             raise InputError(f"hit_rate and hit_rate_sd must match: got {mean.shape} and {spread.shape}.")
         if ((mean < 0) | (mean > 1)).any() or (spread < 0).any():
             raise InputError("hit_rate", "must lie within 0 ... 1 and hit_rate_sd must not be negative")
+
+    def columns(self) -> Columns:
+        """Hit rate and its standard deviation, by comparison."""
+        comparison = np.arange(1, self.hit_rate.size + 1)
+        return {"comparison": comparison, "hit_rate": self.hit_rate, "hit_rate_sd": self.hit_rate_sd}
 
     def __repr__(self) -> str:
         rates = ", ".join(f"{rate:.2f}" for rate in self.hit_rate[:MOST_SHOWN])

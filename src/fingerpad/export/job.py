@@ -30,6 +30,8 @@ BESIDE_INDENTER_MM = 2.0
 BESIDE_FACETS_MM = 0.1
 """Extent of the facets of an indenter beyond the undeformed skin that it passes through. [mm]"""
 
+NO_NODES: IntArray = np.empty(0, dtype=np.int64)
+
 
 @dataclass(frozen=True)
 class Phase:
@@ -184,24 +186,16 @@ class Job:
         return np.setdiff1d(self.mesh.elements[self.touching_elements, 4:], self.mesh.fixed_nodes)
 
     @property
-    def gripped_nodes(self) -> IntArray:
-        """Nodes that the indenter does not let slide along x."""
-        return self.touching_nodes if self.indenter.grips else np.empty(0, dtype=np.int64)
+    def supports(self) -> tuple[Support, ...]:
+        """Sets of nodes that are held: bone and nail, plane of symmetry, skin that a wire grips.
 
-    def supports(
-        self, fixed: IntArray | None = None, symmetric: IntArray | None = None
-    ) -> tuple[Support, ...]:
-        """List the sets of nodes that are held: bone and nail, plane of symmetry, skin that a wire grips.
-
-        `fixed` and `symmetric` replace the nodes of the mesh where a deck has more. No node is in the first
-        two sets at once: Abaqus would refuse that as an overconstraint.
+        No node is in the first two sets at once: Abaqus would refuse that as an overconstraint.
         """
-        fixed = self.mesh.fixed_nodes if fixed is None else fixed
-        symmetric = self.mesh.symmetry_nodes if symmetric is None else symmetric
+        fixed, gripped = self.mesh.fixed_nodes, self.touching_nodes if self.indenter.grips else NO_NODES
         sets = (
             Support("FIXED", fixed, (1, 3)),
-            Support("SYMMETRY", np.setdiff1d(symmetric, fixed), (3, 3)),
-            Support("GRIPPED", self.gripped_nodes, (1, 1)),
+            Support("SYMMETRY", np.setdiff1d(self.mesh.symmetry_nodes, fixed), (3, 3)),
+            Support("GRIPPED", gripped, (1, 1)),
         )
         return tuple(each for each in sets if each.nodes.size)
 

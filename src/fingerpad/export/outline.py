@@ -159,6 +159,11 @@ class RigidMesh:
     quads: IntArray  # Outer nodes, counter-clockwise seen from the skin, (n_quads, 4).
     triangles: IntArray  # The same about the axis of a body of revolution, (n_triangles, 3).
 
+    @property
+    def outer_mm(self) -> FloatArray:
+        """The outer nodes. [mm]"""
+        return self.nodes_mm[: len(self.nodes_mm) // 2]
+
     def solids(self, faces: IntArray) -> IntArray:
         """Bricks or wedges behind `faces`, their first nodes those of the outer face.
 

@@ -30,10 +30,9 @@ from fingerpad.experiments.requests.touch import RespondRequest, TouchRequest, T
 from fingerpad.experiments.run import ReproductionRequest, run
 from fingerpad.experiments.validation.request import ValidationRequest
 from fingerpad.experiments.validation.validation import ValidationFile
-from fingerpad.export.dataset import write_touch
 from fingerpad.export.formats import DECKS, REQUIRED, RESULTS, write_deck
 from fingerpad.export.job import job_of
-from fingerpad.export.responses import require_pynwb, write_response_csv, write_responses_nwb
+from fingerpad.export.responses import require_pynwb
 from fingerpad.reduction.model import ReducedModel, write_reduced
 from fingerpad.report.fit import write_fit_page
 from fingerpad.report.reproduction import write_report
@@ -142,7 +141,7 @@ def respond(
     asked = RespondRequest.read(request, given, allow_python)
     response: ResponseMap = _run(asked, out, jobs, progress, command)
     if out is not None:
-        write_response_csv(Path(out) / "spikes.csv", response)
+        response.save(Path(out) / "spikes.csv")
     return response
 
 
@@ -363,13 +362,13 @@ def _folder(out: str | Path | None) -> Iterator[Path]:
 
 
 def _result(name: str) -> Write:
-    return lambda pressed, folder: RESULTS[name][1](folder / RESULTS[name][0], pressed.skin)
+    return lambda pressed, folder: pressed.skin.save(folder / RESULTS[name])
 
 
 def _dataset(name: str) -> Write:
     def write(pressed: TouchResult, folder: Path) -> None:
         seed = pressed.request.afferents.seed
-        write_touch(folder / RESULTS[name][0], pressed.skin, pressed.response, seed=seed)
+        pressed.skin.save(folder / RESULTS[name], response=pressed.response, seed=seed)
 
     return write
 
@@ -386,8 +385,8 @@ def _deck(name: str) -> Write:
 
 WRITERS: dict[str, Write] = {
     "figures": write_touch_page,
-    "spikes": lambda pressed, folder: write_response_csv(folder / "spikes.csv", pressed.response),
-    "nwb": lambda pressed, folder: write_responses_nwb(folder / "touch.nwb", {"touch": pressed.response}),
+    "spikes": lambda pressed, folder: pressed.response.save(folder / "spikes.csv"),
+    "nwb": lambda pressed, folder: pressed.response.to_nwb(folder / "touch.nwb"),
     **{name: _result(name) for name in RESULTS},
     **{name: _dataset(name) for name in ("netcdf", "zarr")},
     **{name: _deck(name) for name in DECKS},

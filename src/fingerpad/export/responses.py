@@ -1,12 +1,12 @@
-"""Responses of a population as a CSV table, or of several touches as a session of NWB."""
+"""Responses as sessions of NWB, and read back from these and from tables; spikes for pynapple and neo."""
 
 from __future__ import annotations
 
 import csv
 import io
 import warnings
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import replace
+from collections.abc import Mapping, Sequence
+from dataclasses import fields, replace
 from datetime import UTC, datetime
 from importlib.metadata import version
 from pathlib import Path
@@ -19,140 +19,121 @@ from fingerpad.core.checked import checked
 from fingerpad.core.errors import InputError
 from fingerpad.core.files import path_of, read_text, write_atomically
 from fingerpad.core.phases import Phase
-from fingerpad.core.signals import ResponseMap, SpikeTrains
+from fingerpad.core.signals import PLACES, RECEPTOR_COLUMNS, ResponseMap, SpikeTrains
 from fingerpad.core.units import MS_PER_S
 from fingerpad.core.values import Finite, FloatArray, NotNegative, instance, positive
 from fingerpad.experiments.recording_files import SUFFIXES_OF_NWB
-from fingerpad.export.dataset import library
+from fingerpad.export.results import library
 from fingerpad.neuron.afferent_types import afferent_types
-from fingerpad.neuron.response_maps import recruitment_rank
 
-PLACES = {2: ("x_mm", "z_mm"), 3: ("x_mm", "y_mm", "z_mm")}
-"""Columns of a position by the number of its coordinates."""
-
-ANSWERS = (
-    "dynamic_rate_hz", "static_rate_hz", "dynamic_count_hz", "static_count_hz", "spike_count",
-    "first_spike_latency_ms", "recruitment_rank", "spike_times_ms",
-)  # fmt: skip
-"""Columns of the response of a receptor."""
-
-TYPE, PITCH, SPIKES = "type", "pitch_mm", "spike_times_ms"
-"""Columns of the type of an afferent, of the distance between neighbours of this type, and of spikes."""
-
-MEASURED = ("dynamic_rate_hz", "static_rate_hz", "first_spike_latency_ms")
-"""Columns from which a response is read back, beside its places and spikes."""
+MEASURED = tuple(part.name for part in fields(ResponseMap) if part.name in RECEPTOR_COLUMNS)
+"""Columns from which a response is read back, beside its places and spikes; the others follow from it."""
 
 
-@checked
-def write_response_csv(path: Path, response: ResponseMap) -> Path:
-    """Write one row per receptor: position, rates, latency of the first spike, and all spike times.
-
-    Spike times are one entry, separated by spaces, as `fingerpad fit` reads them. A value that does not
-    exist, such as the latency of a silent receptor, is an empty entry. Numbers have all their digits
-    and are read back without rounding. Receptors of a mixed population have a column with their type.
-
-    Parameters
-    ----------
-    path : Path
-        The file, in UTF-8, written as a whole; folders are created if needed.
-    response : ResponseMap
-        Responses of a population to one indentation.
-
-    Raises
-    ------
-    StoreError
-        If the file cannot be written.
-
-    Examples
-    --------
-    >>> from tempfile import TemporaryDirectory
-    >>> trains = SpikeTrains.from_lists([[12.5, 40.0], []])
-    >>> response = ResponseMap([[17.0, 0.5], [17.0, 1.5]], 1.0, trains, [36.4, 0], [0, 0], [12.5, np.nan])
-    >>> with TemporaryDirectory() as folder:
-    ...     print(write_response_csv(Path(folder) / "response.csv", response).read_text(encoding="utf-8"))
-    receptor,x_mm,z_mm,pitch_mm,dynamic_rate_hz,static_rate_hz,dynamic_count_hz,static_count_hz,spike_count,...
-    0,17.0,0.5,1.0,36.4,0.0,,,2,12.5,1.0,12.5 40.0
-    1,17.0,1.5,1.0,0.0,0.0,,,0,,,
-    """
-    text = io.StringIO()
-    table = csv.writer(text, lineterminator="\n")
-    kind = (TYPE,) if response.types else ()
-    places = PLACES[response.positions_mm.shape[1]]
-    table.writerow(("receptor", *kind, *places, PITCH, *ANSWERS))
-    table.writerows(_rows(response))
-    write_atomically(path_of("path", path), text.getvalue().encode())
-    return path_of("path", path)
-
-
-def by_type(response: ResponseMap, types: Sequence[str], pitches_mm: FloatArray) -> ResponseMap:
-    """Part what was read by the types of the afferents, whose rates are measured as those of each type."""
-    parted = response.of_types(types, pitches_mm)
-    if not parted.parts:
-        return parted
-    known = afferent_types()
-    return ResponseMap.joined(
-        {
-            name: replace(
-                part,
-                rate_measure=getattr(known.get(name), "rate_measure", part.rate_measure),
-                quantity=getattr(known.get(name), "static_quantity", part.quantity),
-            )
-            for name, part in parted.parts.items()
-        }
-    )
-
-
-def _rows(response: ResponseMap) -> Iterator[list[object]]:
-    ranked = {"recruitment_rank": recruitment_rank(response.first_spike_latency_ms)}
-    columns = [response.pitches_mm]
-    columns += [ranked[name] if name in ranked else getattr(response, name) for name in ANSWERS[:-1]]
-    places = zip(response.positions_mm.tolist(), *(column.tolist() for column in columns), strict=True)
-    for receptor, (place, *row) in enumerate(places):
-        times = " ".join(map(repr, response.spikes[receptor].tolist()))
-        kind = response.types[receptor : receptor + 1]
-        yield [receptor, *kind, *("" if np.isnan(number) else number for number in (*place, *row)), times]
+def response_of(columns: Mapping[str, Any], spikes: Sequence[FloatArray], **known: Any) -> ResponseMap:
+    """Make a response of its columns, as `ResponseMap.columns` has them, and its spike trains. [ms]"""
+    measured: Any = {name: np.asarray(columns[name]) for name in MEASURED}
+    pitches = np.asarray(columns["pitch_mm"])
+    response = ResponseMap(
+        positions_mm=np.column_stack([columns[place] for place in PLACES[3 if "y_mm" in columns else 2]]),
+        pitch_mm=float(pitches.min()),
+        spikes=SpikeTrains.from_lists(spikes),
+        **measured,
+        **known,
+    ).of_types(list(columns.get("type", ())), pitches)
+    if not response.parts:
+        return response
+    types = afferent_types()  # say how the rates of each type are measured
+    parts = {
+        name: replace(
+            part,
+            rate_measure=getattr(types.get(name), "rate_measure", part.rate_measure),
+            quantity=getattr(types.get(name), "static_quantity", part.quantity),
+        )
+        for name, part in response.parts.items()
+    }
+    return ResponseMap.joined(parts)
 
 
 @checked
 def read_response_csv(path: Path) -> ResponseMap:
-    """Read what `write_response_csv` wrote."""
+    """Read what `ResponseMap.save` wrote as .csv."""
     rows = list(csv.DictReader(io.StringIO(read_text(path_of("path", path)))))
     have = list(rows[0]) if rows else []
-    for column in ("x_mm", "z_mm", PITCH, *MEASURED, SPIKES):
+    for column in ("x_mm", "z_mm", "pitch_mm", *MEASURED, "spike_times_ms"):
         if column not in have:
             raise InputError(
                 path,
-                f"must have the column {column}, as write_response_csv writes it",
+                f"must have the column {column}, as a response is saved",
                 str(", ".join(have) or "no row"),
             )
-
-    def numbers(column: str) -> FloatArray:
-        try:
-            return np.array([float(row[column] or "nan") for row in rows])
-        except (TypeError, ValueError) as error:
-            raise InputError(f"{path}: {column} must hold numbers: {error}.") from error
-
-    places, pitches = PLACES[3 if "y_mm" in have else 2], numbers(PITCH)
+    columns: dict[str, Any] = {"type": [row["type"] for row in rows]} if "type" in have else {}
+    for column in ("pitch_mm", *PLACES[3], *MEASURED):
+        if column in have:
+            try:
+                columns[column] = [float(row[column] or "nan") for row in rows]
+            except (TypeError, ValueError) as error:
+                raise InputError(f"{path}: {column} must hold numbers: {error}.") from error
     try:
-        spikes = SpikeTrains.from_lists([[float(time) for time in row[SPIKES].split()] for row in rows])
+        trains = [np.array(row["spike_times_ms"].split(), dtype=float) for row in rows]
     except (AttributeError, ValueError) as error:
-        raise InputError(f"{path}: {SPIKES} must hold times that spaces separate: {error}.") from error
-    measured: dict[str, Any] = {column: numbers(column) for column in MEASURED}
-    response = ResponseMap(
-        positions_mm=np.column_stack([numbers(column) for column in places]),
-        pitch_mm=float(pitches.min()),
-        spikes=spikes,
-        **measured,
-    )
-    return by_type(response, [row[TYPE] for row in rows] if TYPE in have else (), pitches)
+        raise InputError(f"{path}: spike_times_ms must hold times that spaces separate: {error}.") from error
+    return response_of(columns, trains)
+
+
+def spikes_and_columns(result: Any) -> tuple[SpikeTrains, dict[str, Any]]:
+    """Spike trains of a result, and what is known of each afferent, by name."""
+    if isinstance(result, SpikeTrains):
+        return result, {}
+    columns = result.columns()
+    del columns["receptor"]
+    return result.spikes, columns
+
+
+def to_pynapple(result: Any) -> Any:
+    """Return spike trains as a group; see `SpikingResult.to_pynapple`."""
+    pynapple = library("pynapple", "Groups of spike trains need pynapple", "spikes")
+    spikes, columns = spikes_and_columns(result)
+    whole = pynapple.IntervalSet(0.0, _end_ms(result, spikes), time_units="ms")
+    trains = {number: pynapple.Ts(train, "ms", time_support=whole) for number, train in enumerate(spikes)}
+    return pynapple.TsGroup(trains, time_support=whole, metadata=columns or None)
+
+
+def to_neo(result: Any) -> Any:
+    """Return spike trains as a block; see `SpikingResult.to_neo`."""
+    neo = library("neo", "Blocks of spike trains need neo", "spikes")
+    spikes, columns = spikes_and_columns(result)
+    segment, end_ms = neo.Segment(), _end_ms(result, spikes)
+    for number, train in enumerate(spikes):
+        known = {name: np.asarray(values).tolist()[number] for name, values in columns.items()}
+        segment.spiketrains.append(neo.SpikeTrain(train, units="ms", t_stop=end_ms, id=number, **known))
+    if phases := getattr(result, "phases", ()):
+        windows = np.array([phase.window_ms for phase in phases])
+        names = [phase.name for phase in phases]
+        segment.epochs.append(neo.Epoch(windows[:, 0], np.diff(windows)[:, 0], names, units="ms"))
+    block = neo.Block()
+    block.segments.append(segment)
+    return block
+
+
+def _end_ms(result: Any, spikes: SpikeTrains) -> float:
+    """End of a touch, or the last spike where that is not known; not 0, which both refuse. [ms]"""
+    return float(getattr(result, "duration_ms", None) or spikes.times_ms.max(initial=0.0) or 1.0)
 
 
 _RESOLUTION_S = 1e-9  # Spike times are roots of a closed form; those of two processors differ by less. [s]
 
+_UNIT_COLUMNS = {
+    **{f"{axis}_mm": f"{axis} of the receptor on the undeformed skin, in mm" for axis in "xyz"},
+    "pitch_mm": "distance between neighbours of the same type, in mm",
+    "type": "type of the afferent",
+}
+"""What is known of each unit beside its spikes, by the name of the column."""
+
 
 @checked
 def write_responses_nwb(
-    path: Path,
+    path: str | Path,
     responses: Mapping[str, ResponseMap],
     duration_ms: Finite | None = None,
     pause_ms: NotNegative = 1000.0,
@@ -199,9 +180,8 @@ def write_responses_nwb(
     began = started or datetime.now(UTC)
     if began.tzinfo is None:
         raise InputError("started", "must have a time zone, such as datetime.UTC", str(began.isoformat()))
-    touches = dict(responses)
-    positions_mm, durations_ms = _places(touches), _durations(touches, duration_ms)
-    first = next(iter(touches.values()))
+    _same_receptors(responses)
+    durations_ms = _durations(responses, duration_ms)
     onsets_ms = np.cumsum(durations_ms + pause_ms) - durations_ms - pause_ms
     # Warnings of the library do not concern the content of the file.
     with warnings.catch_warnings(), TemporaryDirectory() as folder:
@@ -223,7 +203,9 @@ def write_responses_nwb(
             ),
         )
         session.add_trial_column("stimulus", "name of the touch")
-        for (name, answer), onset_ms, lasts_ms in zip(touches.items(), onsets_ms, durations_ms, strict=True):
+        for (name, answer), onset_ms, lasts_ms in zip(
+            responses.items(), onsets_ms, durations_ms, strict=True
+        ):
             session.add_trial(onset_ms / MS_PER_S, (onset_ms + lasts_ms) / MS_PER_S, stimulus=name)
             for phase in answer.phases:
                 start, end = ((onset_ms + time_ms) / MS_PER_S for time_ms in phase.window_ms)
@@ -231,37 +213,37 @@ def write_responses_nwb(
         session.units = pynwb.misc.Units(
             name="units", description="One unit per receptor.", resolution=_RESOLUTION_S
         )
-        columns = PLACES[positions_mm.shape[1]]
-        for column in columns:
-            session.add_unit_column(column, f"{column[0]} of the receptor on the undeformed skin, in mm")
-        session.add_unit_column(PITCH, "distance between neighbours of the same type, in mm")
-        if first.types:
-            session.add_unit_column(TYPE, "type of the afferent")
-        for name in first.measures:
-            session.add_unit_column(
-                name, "in each trial, in the unit at the end of the name; NaN if there is none"
+        tables = [response.columns() for response in responses.values()]
+        known = [name for name in tables[0] if name not in ("receptor", *RECEPTOR_COLUMNS)]
+        for name in known:
+            session.add_unit_column(name, _UNIT_COLUMNS[name])
+        for name, column in RECEPTOR_COLUMNS.items():
+            words = (
+                f"{column.long_name}, in each trial, in the unit at the end of the name; NaN if there is none"
             )
-        pitches = next(iter(responses.values())).pitches_mm
-        for receptor, place in enumerate(positions_mm.tolist()):
-            trains = [answer.spikes[receptor] for answer in touches.values()]
+            session.add_unit_column(name, words)
+        for receptor in range(len(tables[0]["receptor"])):
+            trains = [answer.spikes[receptor] for answer in responses.values()]
             times_ms = [onset + train for onset, train in zip(onsets_ms, trains, strict=True)]
             session.add_unit(
                 id=receptor,
                 spike_times=np.concatenate(times_ms) / MS_PER_S,
                 obs_intervals=[[0.0, (onsets_ms[-1] + durations_ms[-1]) / MS_PER_S]],
-                pitch_mm=float(pitches[receptor]),
-                **dict(zip(columns, place, strict=True)),
-                **({TYPE: first.types[receptor]} if first.types else {}),
-                **{
-                    name: [answer.measures[name][receptor] for answer in touches.values()]
-                    for name in first.measures
-                },
+                **{name: tables[0][name][receptor] for name in known},
+                **{name: [float(table[name][receptor]) for table in tables] for name in RECEPTOR_COLUMNS},
             )
         unfinished = Path(folder) / "session.nwb"
         with pynwb.NWBHDF5IO(str(unfinished), mode="w") as opened:
             opened.write(session)
         write_atomically(file, unfinished.read_bytes())
     return file
+
+
+def to_nwb(result: Any, path: str | Path, touch: str, **options: Any) -> Path:
+    """Write one response as a session; see `SpikingResult.to_nwb`."""
+    if isinstance(result, SpikeTrains):
+        raise InputError("A session needs the places of the afferents: save the ResponseMap of these trains.")
+    return write_responses_nwb(path, {touch: result}, **options)
 
 
 @checked
@@ -284,9 +266,9 @@ def read_responses_nwb(path: Path) -> dict[str, ResponseMap]:
 
 def _responses(session: Any) -> dict[str, ResponseMap]:
     units, trials = session.units, session.trials
-    places = PLACES[3 if "y_mm" in units.colnames else 2]
-    known = {"spike_times", "obs_intervals", TYPE, PITCH, *places}
-    measured = {name: np.asarray(units[name][:]) for name in units.colnames if name not in known}
+    columns = {
+        name: np.asarray(units[name][:]) for name in (*_UNIT_COLUMNS, *MEASURED) if name in units.colnames
+    }
     trains_s = [np.asarray(units["spike_times"][row]) for row in range(len(units))]
     epochs = [] if session.epochs is None else session.epochs[:].itertuples(index=False)
     phases: dict[str, list[Phase]] = {}
@@ -296,27 +278,19 @@ def _responses(session: Any) -> dict[str, ResponseMap]:
         window = [round(MS_PER_S * (at - onsets_s[touch]), 6) for at in (epoch.start_time, epoch.stop_time)]
         phases.setdefault(touch, []).append(Phase(phase, *window))
     found = {}
-    for number, (name, start, stop) in enumerate(
-        zip(*(trials[key][:] for key in ("stimulus", "start_time", "stop_time")), strict=True)
-    ):
-        measures: dict[str, Any] = {key: values[:, number] for key, values in measured.items()}
-        response = ResponseMap(
-            positions_mm=np.column_stack([units[place][:] for place in places]),
-            pitch_mm=float(units[PITCH][:].min()),
-            spikes=SpikeTrains.from_lists(
-                [MS_PER_S * (train[(train >= start) & (train <= stop)] - start) for train in trains_s]
-            ),
+    for number, (name, start) in enumerate(onsets_s.items()):
+        stop = trials["stop_time"][number]
+        found[str(name)] = response_of(
+            columns | {key: columns[key][:, number] for key in MEASURED},
+            [MS_PER_S * (train[(train >= start) & (train <= stop)] - start) for train in trains_s],
             duration_ms=MS_PER_S * (stop - start),
             phases=tuple(phases.get(name, ())),
-            **measures,
         )
-        types = list(units[TYPE][:]) if TYPE in units.colnames else ()
-        found[str(name)] = by_type(response, types, np.asarray(units[PITCH][:]))
     return found
 
 
-def _places(responses: Mapping[str, ResponseMap]) -> np.ndarray:
-    """Places of the receptors, after a check that all touches have the same ones. [mm]"""
+def _same_receptors(responses: Mapping[str, ResponseMap]) -> None:
+    """Raise `InputError` unless all touches have the same receptors."""
     if not responses:
         raise InputError("responses", "must hold at least one touch", remedy="it is empty")
     first = next(iter(responses.values()))
@@ -326,7 +300,6 @@ def _places(responses: Mapping[str, ResponseMap]) -> np.ndarray:
             raise InputError(
                 "responses", "must come from the same receptors", remedy=f"those of {name!r} lie elsewhere"
             )
-    return first.positions_mm
 
 
 def _durations(responses: Mapping[str, ResponseMap], duration_ms: float | None) -> np.ndarray:

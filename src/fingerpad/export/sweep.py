@@ -24,7 +24,7 @@ from fingerpad.experiments.runner import STORE_FOLDER
 from fingerpad.experiments.sweep.observers import observe
 from fingerpad.experiments.sweep.request import SweepRequest
 from fingerpad.experiments.sweep.settle import Case, settle, unsettled
-from fingerpad.export.sweep_dataset import DONE, FAILED, LEFT_OUT, PENDING, SweepFile
+from fingerpad.export.sweep_file import DONE, FAILED, LEFT_OUT, PENDING, SweepFile
 from fingerpad.mechanics.kernels import KERNELS
 
 MOST_SETTINGS = 10_000  # Larger sweeps need the consent of who runs them.

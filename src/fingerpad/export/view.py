@@ -1,6 +1,6 @@
 """A touch in three dimensions and through time: finger, object, field and afferents.
 
-The picture is drawn from the labelled data set of `fingerpad.export.dataset`, in memory or from a file.
+The picture is drawn from the labelled data set of `fingerpad.skin.dataset`, in memory or from a file.
 PyVista renders it without a window, in parallel projection, so that lengths can be measured; Matplotlib adds
 the colour bar, three arrows of known length, afferents, motion and spikes. A field of elements is shown on
 the plane of symmetry, one of the skin from below, through the object. The extra `fingerpad[view]` is needed.
@@ -23,7 +23,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import matplotlib
 import numpy as np
 from matplotlib.cm import ScalarMappable
-from matplotlib.colors import Colormap, LogNorm, Normalize
+from matplotlib.colors import LogNorm, Normalize
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from PIL import Image
@@ -34,7 +34,8 @@ from fingerpad.core.errors import InputError
 from fingerpad.core.files import path_of, write_atomically
 from fingerpad.core.progress import NoProgress, Progress
 from fingerpad.core.values import Finite, FloatArray, count_from, finite, instance, one_of
-from fingerpad.export.dataset import check_touch, library, read_touch, spike_trains, touch_dataset
+from fingerpad.export.results import library
+from fingerpad.export.touch_file import check_touch, read_touch, spike_trains
 from fingerpad.report.skin import BONE, DECADES, SKIN
 from fingerpad.report.style import BLACK, BLUE, STYLE, new_figure, say_nothing_to_draw
 from fingerpad.skin.sampling import SkinResponse
@@ -85,7 +86,7 @@ def save_view(
     path : str or Path
         The file: .png, .gif, or .mp4, which the program ffmpeg has to be installed for.
     touch : xarray.Dataset, SkinResponse, str or Path
-        From `touch_dataset`, what `write_touch` wrote, or a response of the skin, drawn without afferents.
+        From `SkinResponse.to_dataset`, a file of it, or a response of the skin, drawn without afferents.
     field : str
         "sed", "displacement" (on the plane of symmetry), "pressure", "shear", "slip" (on the skin), or the
         name of another variable at nodes or elements. Of a vector its length is shown.
@@ -107,7 +108,7 @@ def save_view(
     >>> from tempfile import mkdtemp
     >>> import fingerpad as fp
     >>> skin = fp.indent(fp.Fingertip(), fp.Sphere(), fp.RampAndHold(depth_mm=0.5), whole=True)
-    >>> (picture,) = save_view(Path(mkdtemp()) / "touch.png", fp.touch_dataset(skin), time_ms=50.0)
+    >>> (picture,) = save_view(Path(mkdtemp()) / "touch.png", skin, time_ms=50.0)
     >>> picture.name
     'touch.png'
     """
@@ -122,7 +123,7 @@ def save_view(
     if isinstance(touch, str | Path):
         data = read_touch(touch)
     elif isinstance(touch, SkinResponse):
-        data = touch_dataset(touch)
+        data = touch.to_dataset()
     else:
         data = instance("touch", touch, library("xarray").Dataset)
         check_touch("touch", data)
@@ -200,19 +201,16 @@ class _View:
     @cached_property
     def norm(self) -> Normalize:
         """Scale of the field, one for all times; energies span orders of magnitude."""
-        values = self.data[self.variable]
-        vector = "axis" in values.dims
-        largest = float((np.linalg.norm(values, axis=-1) if vector else np.abs(values)).max())
+        largest = float(np.abs(self._lengths(self.data[self.variable].values)).max())
         if largest <= 0.0:
             return Normalize(0.0, 1.0)
         if self.variable.startswith("sed"):
             return LogNorm(largest / 10.0**DECADES, largest)
         return Normalize(0.0, largest)
 
-    @property
-    def colours(self) -> Colormap:
-        """Colours, from pale to dark."""
-        return SKIN
+    def _lengths(self, values: FloatArray) -> FloatArray:
+        """Values of the field as they are shown: of a vector its length."""
+        return np.linalg.norm(values, axis=-1) if "axis" in self.data[self.variable].dims else values
 
     def at(self, name: str, time_ms: float) -> FloatArray:
         """Values of a variable at a time, linear between those that were solved."""
@@ -277,11 +275,9 @@ class _View:
     def _add_finger(self, plotter: Any, time_ms: float) -> None:
         pyvista = _pyvista()
         data, points = self.data, self.data["node_mm"].values.copy()
-        shades = {"cmap": self.colours, "clim": (self.norm.vmin, self.norm.vmax), "show_scalar_bar": False,
+        shades = {"cmap": SKIN, "clim": (self.norm.vmin, self.norm.vmax), "show_scalar_bar": False,
                   "log_scale": isinstance(self.norm, LogNorm), "ambient": 0.35, "diffuse": 0.7}  # fmt: skip
-        values = self.at(self.variable, time_ms)
-        values = np.linalg.norm(values, axis=-1) if "axis" in data[self.variable].dims else values
-        values = np.clip(values, self.norm.vmin, self.norm.vmax)
+        values = np.clip(self._lengths(self.at(self.variable, time_ms)), self.norm.vmin, self.norm.vmax)
         if self.on_skin:
             skin_nodes = data["skin_node"].values
             points[skin_nodes] += self.at("skin_displacement_mm", time_ms)
@@ -343,16 +339,10 @@ class _View:
         floor = float(front.max()) - THICKNESS_MM
         top = np.maximum(front, floor)
         heights = np.stack([np.full_like(top, floor), top], axis=-1)
-        grid = np.stack(
-            [
-                np.broadcast_to(x[:, None, None], heights.shape),
-                heights,
-                np.broadcast_to(z[None, :, None], heights.shape),
-            ],
-            axis=-1,
+        wide = np.broadcast_arrays(x[:, None, None], heights, z[None, :, None])
+        placed = np.stack(wide, axis=-1) @ self.at("object_axes", time_ms).T + self.at(
+            "object_tip_mm", time_ms
         )
-        axes = self.at("object_axes", time_ms)
-        placed = grid @ axes.T + self.at("object_tip_mm", time_ms)
         solid = _pyvista().StructuredGrid(*np.moveaxis(placed, -1, 0))
         high = np.maximum.reduce([top[:-1, :-1], top[1:, :-1], top[:-1, 1:], top[1:, 1:]]) > floor
         solid = solid.extract_cells(np.flatnonzero(high.ravel(order="F")))
@@ -419,7 +409,7 @@ class _View:
         values = self.data[self.variable]
         vector = " (length)" if "axis" in values.dims else ""
         bar = figure.colorbar(
-            ScalarMappable(self.norm, self.colours), ax=scene, orientation="horizontal", shrink=0.6,
+            ScalarMappable(self.norm, SKIN), ax=scene, orientation="horizontal", shrink=0.6,
             aspect=30, pad=0.01, extend="min" if isinstance(self.norm, LogNorm) else "neither",
         )  # fmt: skip
         unit = "-" if values.units == "1" else values.units

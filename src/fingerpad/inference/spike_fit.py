@@ -13,10 +13,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from fingerpad.core.checked import checked, value_class
-from fingerpad.core.displayed import Result
+from fingerpad.core.displayed import Columns, Result
 from fingerpad.core.errors import ConvergenceError, InputError
 from fingerpad.core.random_streams import Presentations
 from fingerpad.core.signals import SpikeTrains, Traces
+from fingerpad.core.units import units_of
 from fingerpad.core.values import Count, FloatArray, Number, Numbers, Whole
 from fingerpad.inference.identifiable import (
     N_PARAMETERS,
@@ -71,6 +72,15 @@ class SpikeFit(Result):
             f"SpikeFit({self.n_spikes} spikes, log L = {self.log_likelihood:.4g}, time constant "
             f"{memory_ms:.3g} ± {memory_error:.1g} ms, threshold width {width:.2g} ± {width_error:.1g})"
         )
+
+    def columns(self) -> Columns:
+        """Value, standard error and unit, by parameter."""
+        return {
+            "parameter": self.names,
+            "value": self.parameters,
+            "standard_error": self.standard_errors,
+            "unit": list(units_of(self.names).values()),
+        }
 
     @property
     def names(self) -> tuple[str, ...]:

@@ -21,7 +21,7 @@ from numpy.typing import ArrayLike
 from scipy.special import digamma
 
 from fingerpad.core.checked import checked, value_class
-from fingerpad.core.displayed import Result
+from fingerpad.core.displayed import Columns, Result
 from fingerpad.core.errors import ConvergenceError, InputError
 from fingerpad.core.values import Finite, FloatArray, Number, choice, finite
 from fingerpad.psychophysics.curve import (
@@ -254,6 +254,17 @@ class PsychometricFit(Result):
             f"PsychometricFit({self.function.sigmoid}, threshold {self.threshold_label}, "
             f"{int(self.counts.n_trials.sum())} judgements of {self.counts.levels.size} levels)"
         )
+
+    def columns(self) -> Columns:
+        """Judgements, and the proportion that was observed and fitted, by level."""
+        counts = self.counts
+        return {
+            "level": counts.levels,
+            "n_correct": counts.n_correct,
+            "n_trials": counts.n_trials,
+            "observed": counts.proportion,
+            "fitted": self.predict(counts.levels),
+        }
 
     @property
     def free(self) -> tuple[str, ...]:

@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike
 from scipy.optimize import brentq
 
 from fingerpad.core.checked import checked_class, value_class
-from fingerpad.core.displayed import Result
+from fingerpad.core.displayed import Columns, Result
 from fingerpad.core.errors import InputError
 from fingerpad.core.units import with_unit
 from fingerpad.core.values import Finite, FloatArray, Number, finite, float_array, not_negative
@@ -52,6 +52,12 @@ class ReducedSample(Result):
     fields: dict[str, FloatArray]  # Quantities at the receptors, (n_receptors,). [each in its unit]
     force_error_mn: Number  # The force of a full solution lies within it for 95 % of touches. [mN]
     field_errors: dict[str, float]  # The same of each quantity, at all receptors. [its unit]
+
+    def columns(self) -> Columns:
+        """Each quantity, and the error within which that of a full solution lies, by receptor."""
+        n_receptors = len(next(iter(self.fields.values())))
+        errors = {f"{name}_error": np.full(n_receptors, error) for name, error in self.field_errors.items()}
+        return {"receptor": np.arange(n_receptors), **self.fields, **errors}
 
     def __repr__(self) -> str:
         highest = (

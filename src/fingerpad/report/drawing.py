@@ -15,8 +15,16 @@ from matplotlib.figure import Figure
 
 from fingerpad.core.displayed import Displayed
 from fingerpad.core.errors import InputError
-from fingerpad.core.signals import COUNT, CURRENT, HitRates, ResponseMap, SpikeTrains, Traces
-from fingerpad.core.units import with_unit
+from fingerpad.core.signals import (
+    COUNT,
+    CURRENT,
+    RECEPTOR_COLUMNS,
+    HitRates,
+    ResponseMap,
+    SpikeTrains,
+    Traces,
+)
+from fingerpad.core.units import unit_of, with_unit
 from fingerpad.core.values import one_of
 from fingerpad.experiments.discrimination.analysis import TaskResult
 from fingerpad.experiments.fit.results import FitResult
@@ -142,7 +150,11 @@ def draw_map(axes: Axes, response: ResponseMap, quantity: str | None = None) -> 
         axes.legend(**BESIDE)
         return
     quantity = quantity or ("spike_count" if response.rate_measure == COUNT else "static_rate_hz")
-    mapped = {**QUANTITIES, "spike_count": ("whole touch", "spikes", "viridis", Normalize)}
+    mapped = {
+        name: (column.long_name, unit_of(name) or "number", "viridis", Normalize)
+        for name, column in RECEPTOR_COLUMNS.items()
+    }
+    mapped |= {**QUANTITIES, "spike_count": ("whole touch", "spikes", "viridis", Normalize)}
     phase, label, colours, _ = mapped[one_of("quantity", quantity, tuple(mapped))]
     dots: Any = {"cmap": colours, "s": 60.0, "edgecolors": GREY, "clip_on": False}
     x, z = response.positions_mm[:, [0, -1]].T

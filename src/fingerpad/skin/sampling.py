@@ -11,9 +11,8 @@ from typing import TYPE_CHECKING, Annotated, Any, Protocol, cast, runtime_checka
 import numpy as np
 from numpy.typing import ArrayLike
 
-import fingerpad
 from fingerpad.core.checked import value_class
-from fingerpad.core.displayed import Result
+from fingerpad.core.displayed import Columns, Contents, Result, dataset_of
 from fingerpad.core.errors import InputError
 from fingerpad.core.phases import Phase
 from fingerpad.core.signals import STORED_ENERGY, ResponseMap, Traces
@@ -34,6 +33,7 @@ from fingerpad.geometry.mesh import Mesh
 from fingerpad.geometry.motion import STILL, Pose
 from fingerpad.mechanics.tissues import name_of_tissues
 from fingerpad.skin.caveats import Caveat, caveats_of
+from fingerpad.skin.dataset import attributes, variables
 from fingerpad.skin.fields import FIELDS, Place, sampled_fields, stored_fields, watched_elements
 from fingerpad.skin.receptor_sheet import Part, ReceptorSheet
 from fingerpad.skin.section import SURFACE_QUANTITIES, Section, SurfaceMotion, middle_section
@@ -197,9 +197,58 @@ class SkinResponse(Result):
             f"{self.depth_mm.max():.3g} mm and {self.force_mn.max():.3g} mN)"
         )
 
-    def to_xarray(self, response: ResponseMap | None = None) -> xarray.Dataset:
-        """Return this result, and the response of a population to it, as one labelled data set."""
-        return fingerpad.touch_dataset(self, response)
+    def columns(self) -> Columns:
+        """Every quantity of the whole press by time; a vector has one column per axis."""
+        found: Columns = {}
+        for field in stored_fields():
+            if field.place is Place.PRESS and field.name in self.fields:
+                axes = ("",) if field.components == 1 else ("_x", "_y", "_z")
+                values = self.fields[field.name].reshape(self.times_ms.size, -1)
+                found |= {field.name + axis: column for axis, column in zip(axes, values.T, strict=True)}
+        return found
+
+    def contents(
+        self, response: ResponseMap | None = None, quantities: Sequence[str] = (), seed: Whole | None = None
+    ) -> Contents:
+        """Fields of the press, mesh, object and afferents, and what was pressed; see `to_dataset`."""
+        return variables(self, response, quantities), attributes(self, response, seed)
+
+    def to_dataset(
+        self,
+        response: ResponseMap | None = None,
+        *,
+        quantities: Sequence[str] = (),
+        seed: Whole | None = None,
+    ) -> xarray.Dataset:
+        """Return this result, and the response of a population to it, as one labelled data set.
+
+        Parameters
+        ----------
+        response : ResponseMap, optional
+            Response of a population to it.
+        quantities : sequence of str
+            Further fields of `skin.fields.FIELDS`, such as "stress", in all elements; they need the
+            deformation (`whole=True`).
+        seed : int, optional
+            Seed behind the population, if it had one; kept as an attribute.
+
+        Returns
+        -------
+        xarray.Dataset
+            What is at nodes and elements is in single precision, all else in double. With the deformation
+            the displacement of all nodes is there at all times, else at the last; that of the skin always is.
+
+        Examples
+        --------
+        >>> import fingerpad as fp
+        >>> skin = fp.indent(fp.Fingertip(), fp.Sphere(curvature_per_m=287), fp.RampAndHold(depth_mm=0.3))
+        >>> touch = skin.to_dataset()
+        >>> touch.contact_pressure_kpa.dims, touch.contact_pressure_kpa.units
+        (('time', 'skin_node'), 'kPa')
+        >>> f"{touch.depth_mm[-1].item():g} {touch.depth_mm.units}"
+        '0.3 mm'
+        """
+        return dataset_of(self.contents(response, quantities, seed))
 
     def with_fields(self, **fields: FloatArray) -> SkinResponse:
         """Return the same response with other values of some fields."""

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import Literal
+from typing import ClassVar, Literal
 
 import numpy as np
 from scipy.special import ndtr, ndtri
 
 from fingerpad.core.checked import checked, result_class
-from fingerpad.core.displayed import Result
+from fingerpad.core.displayed import Columns, Result
 from fingerpad.core.errors import InputError
 from fingerpad.core.signals import Skin
 from fingerpad.core.values import FloatArray, IntArray, Matrix, Vector
@@ -163,6 +163,7 @@ class TaskResult(Result):
         Hit rates of people.
     """
 
+    whole_as_json: ClassVar[bool] = True
     question: str
     axis: str
     stimulus: tuple[str, ...]
@@ -172,6 +173,22 @@ class TaskResult(Result):
     responses: dict[str, Matrix]
     decodings: tuple[Decoding, ...]
     observed: TaskObservations | None
+
+    def columns(self) -> Columns:
+        """Return what each decoding makes of each comparison; NaN where it has no answer."""
+        n_comparisons, decodings = len(self.stimulus) - 1, self.decodings
+        unknown = np.full(n_comparisons, np.nan)
+        level = unknown if self.level is None else self.level[1:]
+        found: Columns = {
+            "comparison": np.tile(self.stimulus[1:], len(decodings)),
+            "level": np.tile(level, len(decodings)),
+            "code": np.repeat([decoding.code for decoding in decodings], n_comparisons),
+            "measure": np.repeat([decoding.measure for decoding in decodings], n_comparisons),
+        }
+        for name in ("hit_rate", "hit_rate_sd", "d_prime", "efficiency"):
+            given = (getattr(decoding, name) for decoding in decodings)
+            found[name] = np.concatenate([unknown if values is None else values for values in given])
+        return found
 
     def __repr__(self) -> str:
         return (

@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+from typing import ClassVar
+
+import numpy as np
+
 from fingerpad.core.checked import result_class
-from fingerpad.core.displayed import Result
+from fingerpad.core.displayed import Columns, Result
 from fingerpad.core.values import Matrix, Number, Vector, WholeVector
 
 
@@ -169,6 +173,7 @@ class FitResult(Result):
         Spikes that were left out because they came after the hold.
     """
 
+    whole_as_json: ClassVar[bool] = True
     method: str
     source: str
     n_evaluations: int
@@ -194,6 +199,21 @@ class FitResult(Result):
     shift_mm: Vector | None = None
     presentations: tuple[int, ...] = ()
     spikes_after_hold: int = 0
+
+    def columns(self) -> Columns:
+        """Rates that were observed, fitted and predicted out of the fold, by stimulus and phase."""
+        n_phases, n_stimuli = len(self.phases), len(self.stimulus)
+        unknown = np.full(n_stimuli, np.nan)
+        parts = self.phases.values()
+        observed = [unknown if part.observed_hz is None else part.observed_hz for part in parts]
+        return {
+            "stimulus": np.tile(self.stimulus, n_phases),
+            "phase": np.repeat(list(self.phases), n_stimuli),
+            "fold": np.tile(self.fold, n_phases),
+            "observed_hz": np.concatenate(observed),
+            "fitted_hz": np.concatenate([part.fitted_hz for part in parts]),
+            "out_of_sample_hz": np.concatenate([part.out_of_sample_hz for part in parts]),
+        }
 
     def __repr__(self) -> str:
         return (

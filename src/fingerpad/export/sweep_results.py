@@ -1,4 +1,4 @@
-"""Results of a sweep for other programs: rates as a table, spikes as a session of NWB."""
+"""Results of a sweep, as its data set holds them: settings, other observers, a table, a session of NWB."""
 
 from __future__ import annotations
 
@@ -10,33 +10,106 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from fingerpad import __version__
 from fingerpad.core.checked import checked
-from fingerpad.core.errors import InputError
+from fingerpad.core.errors import InputError, shown
 from fingerpad.core.files import path_of, write_atomically
-from fingerpad.core.signals import ResponseMap
-from fingerpad.export.dataset import first_line, library
-from fingerpad.export.responses import PLACES, require_pynwb, write_responses_nwb
-from fingerpad.export.sweep_dataset import (
-    DONE,
-    check_sweep_data,
-    setting_number,
-    setting_spikes,
-    sweep_settings,
-)
+from fingerpad.core.signals import PLACES, RECEPTOR_COLUMNS, ResponseMap
+from fingerpad.experiments.requests.parts import Content
+from fingerpad.experiments.sweep.observers import MEASURED, observe
+from fingerpad.experiments.sweep.request import OBSERVER, SweepRequest
+from fingerpad.export.responses import MEASURED as MEASURED_COLUMNS
+from fingerpad.export.responses import require_pynwb, write_responses_nwb
+from fingerpad.export.results import library, table_csv
+from fingerpad.export.sweep_file import DONE, HIT_RATE, check_format, opened_group
+from fingerpad.export.touch_file import spike_trains
 from fingerpad.neuron.spikes import rate_windows_ms
 
 if TYPE_CHECKING:
-    import pandas
     import xarray
 
 TABLE, TABLE_VERSION = "fingerpad sweep table", 1
 """What the header of a table says: `format` and `format_version`."""
 
-_RATES = (
-    "dynamic_rate_hz", "static_rate_hz", "dynamic_count_hz", "static_count_hz", "first_spike_latency_ms",
-    "spike_count",
-)  # fmt: skip
+
+@checked
+def open_sweep(path: str | Path) -> xarray.Dataset:
+    """Open the data set that `run_sweep` wrote; numbers are read when they are used.
+
+    Returns
+    -------
+    xarray.Dataset
+        With dimensions named by the fields that vary; `status` is 1 where a setting is done.
+    """
+    xarray, _ = library("xarray"), library("zarr")
+    check_format(path, opened_group(path_of("path", path)).attrs.asdict())
+    data = xarray.open_zarr(path, chunks=None, consolidated=False, decode_times=False)
+    return data.set_coords([name for name in ("time_ms", "receptor_mm") if name in data])
+
+
+def check_sweep_data(data: xarray.Dataset) -> None:
+    if not isinstance(data, library("xarray").Dataset) or "sweep" not in data.attrs or "status" not in data:
+        raise InputError("data", "must be a data set from open_sweep", shown(data))
+
+
+@checked
+def observe_sweep(data: xarray.Dataset, observer: Content, grid: Content | None = None) -> xarray.DataArray:
+    """Hit rates of other observers than those of the sweep; nothing is pressed and no afferent responds.
+
+    Parameters
+    ----------
+    data : xarray.Dataset
+        From `open_sweep`.
+    observer : mapping
+        As the block `observer` of a sweep (docs/sweeps.md).
+    grid : mapping of str to list, optional
+        Fields of the observer that vary, such as {"noise": [0.01, 0.02]}: each is a dimension.
+
+    Returns
+    -------
+    xarray.DataArray
+        With the dimensions of the sweep, then those of the observer; NaN for the standard. [0-1]
+    """
+    check_sweep_data(data)
+    content = json.loads(data.attrs["sweep"])
+    varied = {f"{OBSERVER}.{field}": values for field, values in (grid or {}).items()}
+    own = {
+        field: values
+        for field, values in content.get("grid", {}).items()
+        if field.partition(".")[0] != OBSERVER
+    }
+    asked = {**content, OBSERVER: dict(observer), "grid": own | varied}
+    sweep = SweepRequest.read(asked, name="observe_sweep")
+    kept = [name for name in data.dims if name in {axis.name for axis in sweep.axes}]
+    responses = {name: data[name].values for name in MEASURED.values() if name in data}
+    values = observe(sweep, responses, data["status"].values == DONE, lambda: None)
+    coords: dict[str, Any] = {name: data[name] for name in kept if name in data.coords}
+    coords |= {axis.name: next(iter(axis.values.values())) for axis in sweep.observer_axes}
+    dims = [axis.name for axis in (*sweep.axes, *sweep.observer_axes)]
+    return library("xarray").DataArray(values, dims=dims, coords=coords, name=HIT_RATE)
+
+
+def sweep_settings(data: xarray.Dataset) -> SweepRequest:
+    check_sweep_data(data)
+    return SweepRequest.read(json.loads(data.attrs["sweep"]), name=data.attrs.get("source", "sweep"))
+
+
+@checked
+def setting_touch(data: xarray.Dataset, **where: int) -> Content:
+    """Touch of one setting, by its index along each dimension, in the words of a file for `run_touch`."""
+    sweep = sweep_settings(data)
+    return sweep.content(setting_number(sweep, where))
+
+
+def setting_number(sweep: SweepRequest, where: Mapping[str, int]) -> int:
+    """Return the number of the setting with an index along each dimension, or raise `InputError`."""
+    names = [axis.name for axis in sweep.axes]
+    if set(where) != set(names):
+        raise InputError(f"an index must be given for each of {', '.join(names)}: got {', '.join(where)}.")
+    index = [where[name] for name in names]
+    for name, given, size in zip(names, index, sweep.shape, strict=True):
+        if not 0 <= given < size:
+            raise InputError(f"The index along {name} must be within 0 ... {size - 1}: got {given}.")
+    return int(np.ravel_multi_index(index, sweep.shape))
 
 
 @checked
@@ -44,7 +117,8 @@ def write_sweep_table(data: xarray.Dataset, path: str | Path) -> Path:
     """Write rates, latencies and numbers of spikes as a table, one row per setting and receptor.
 
     Columns are the fields that vary, the number and the position of the receptor, and the responses, with
-    units in their names. Settings without a result have no rows.
+    units in their names. Settings without a result have no rows. `pandas.read_csv(path, comment="#")` and
+    `pandas.read_parquet` read it; the first line of a CSV file has the title and the hash of the inputs.
 
     Parameters
     ----------
@@ -67,7 +141,7 @@ def write_sweep_table(data: xarray.Dataset, path: str | Path) -> Path:
         **{name: data.attrs[name] for name in ("title", "inputs_sha256", "version") if name in data.attrs},
     }
     if path.suffix == ".csv":
-        content = f"# {json.dumps(about)}\n{table.to_csv(index=False, lineterminator=chr(10))}".encode()
+        content = f"# {json.dumps(about)}\n".encode() + table_csv(dict(table.items()))
     else:
         _needs_parquet(path)
         table.attrs.update(about)
@@ -76,45 +150,6 @@ def write_sweep_table(data: xarray.Dataset, path: str | Path) -> Path:
         content = file.getvalue()
     write_atomically(path, content)
     return path
-
-
-@checked
-def read_sweep_table(path: str | Path) -> pandas.DataFrame:
-    """Read a table that `write_sweep_table` wrote.
-
-    Returns
-    -------
-    pandas.DataFrame
-        With title, hash of the inputs and version of the program in its `attrs`.
-    """
-    path, pandas = path_of("path", path), library("pandas")
-    try:
-        if path.suffix == ".csv":
-            with path.open(encoding="utf-8") as file:
-                about = json.loads(file.readline().removeprefix("# "))
-                # Before 3.1, pandas rounds unless it is asked not to; from then on it need not be asked.
-                rounds = tuple(int(part) for part in pandas.__version__.split(".")[:2]) < (3, 1)
-                table = pandas.read_csv(file, **({"float_precision": "round_trip"} if rounds else {}))
-            table.attrs.update(about)
-        else:
-            _needs_parquet(path)
-            table = pandas.read_parquet(path)
-    except (OSError, ValueError, AttributeError) as error:
-        raise InputError(
-            path, "must be a table of a sweep", remedy=f"it cannot be read ({first_line(error)})"
-        ) from error
-    if table.attrs.get("format") != TABLE:
-        raise InputError(
-            path, "must be a table of a sweep that fingerpad wrote", remedy="it has another content"
-        )
-    if table.attrs.get("format_version") != TABLE_VERSION:
-        raise InputError(
-            path,
-            f"must have format_version {TABLE_VERSION}",
-            str(table.attrs.get("format_version")),
-            f"read it with the version of fingerpad that wrote it, this is {__version__}",
-        )
-    return table
 
 
 @checked
@@ -136,16 +171,15 @@ def setting_response(data: xarray.Dataset, **where: int) -> ResponseMap:
     described = sweep.described(setting)
     phases, asked = described.touch.stimulus.phases, described.afferents.windows_ms
     count = len(described.population)
+    measured: Any = {name: one[name].values[:count] for name in MEASURED_COLUMNS}
     return ResponseMap(
         positions_mm=one["receptor_mm"].values[:count],
         pitch_mm=described.population.pitch_mm,
-        spikes=setting_spikes(one.isel(receptor=slice(count))),
-        dynamic_rate_hz=one["dynamic_rate_hz"].values[:count],
-        static_rate_hz=one["static_rate_hz"].values[:count],
-        first_spike_latency_ms=one["first_spike_latency_ms"].values[:count],
+        spikes=spike_trains(one.isel(receptor=slice(count))),
         duration_ms=float(np.nanmax(one["time_ms"].values)),
         phases=phases,
         windows_ms=rate_windows_ms(phases, *asked.both),
+        **measured,
     ).of_types(described.population.types)
 
 
@@ -205,9 +239,10 @@ def _table(data: xarray.Dataset) -> Any:
         name: positions.isel(coordinate=number).variable
         for number, name in enumerate(PLACES[positions.sizes["coordinate"]])
     }
-    wanted = data[list(_RATES)].drop_vars(["receptor_mm", "time_ms"], errors="ignore").assign(columns)
+    rates = [name for name in RECEPTOR_COLUMNS if name in data]
+    wanted = data[rates].drop_vars(["receptor_mm", "time_ms"], errors="ignore").assign(columns)
     frame = wanted.to_dataframe().reset_index()
-    order = [name for name in frame.columns if name not in (*columns, *_RATES)] + [*columns, *_RATES]
+    order = [name for name in frame.columns if name not in (*columns, *rates)] + [*columns, *rates]
     # The place of a receptor is NaN behind the last one of a setting, and where a setting failed.
     return frame.loc[frame["x_mm"].notna(), order].reset_index(drop=True)
 

@@ -1,0 +1,214 @@
+"""Results as tables of pandas, as labelled data sets of xarray, and as files by the ending of their names.
+
+The extra `fingerpad[netcdf]` brings pandas and xarray; CSV, JSON, NPZ and pictures need nothing.
+"""
+
+from __future__ import annotations
+
+import csv
+import inspect
+import io
+import json
+import shutil
+from collections.abc import Callable
+from dataclasses import dataclass
+from importlib import import_module
+from pathlib import Path
+from secrets import token_hex
+from tempfile import TemporaryDirectory
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from fingerpad.core.displayed import Contents, Result
+from fingerpad.core.errors import InputError, StoreError
+from fingerpad.core.files import path_of, write_atomically
+from fingerpad.core.result_files import to_json
+
+if TYPE_CHECKING:
+    import pandas
+    import xarray
+
+DRAWN_IN = (6.4, 4.0)  # Size of the picture of a result. [in]
+
+
+def library(name: str, needed: str = "", extra: str = "netcdf") -> Any:
+    """Import a library of an extra, or raise an `InputError` that says how to install it."""
+    try:
+        return import_module(name)
+    except ImportError as error:
+        raise InputError(
+            f"{needed or f'A labelled data set needs {name}'}: install the extra, pip install "
+            f"'fingerpad[{extra}]'."
+        ) from error
+
+
+def first_line(error: Exception) -> str:
+    return (str(error).strip().splitlines() or [type(error).__name__])[0].strip().rstrip(".")[:200]
+
+
+def frame(result: Result) -> pandas.DataFrame:
+    """Return a result as a table; see `Result.to_frame`."""
+    columns = result.columns()
+    made: pandas.DataFrame = library("pandas", "A table needs pandas").DataFrame(columns)
+    return made.set_index(next(iter(columns)))
+
+
+def dataset(contents: Contents) -> xarray.Dataset:
+    """Make a data set; a variable that is named as its dimension is a coordinate."""
+    variables, attributes = contents
+    made: xarray.Dataset = library("xarray").Dataset(variables, attrs=attributes)
+    return made
+
+
+def save(result: Result, path: str | Path, **options: Any) -> Path:
+    """Write a result by the ending of the name; see `Result.save`."""
+    path = path_of("path", path)
+    known = {ending: writer for ending, writer in WRITERS.items() if hasattr(result, writer.needs)}
+    if path.suffix not in known:
+        raise InputError(f"A {type(result).__name__} is saved as {', '.join(known)}: got {path.name}.")
+    write = known[path.suffix].write
+    taken = inspect.signature(write).parameters
+    if options and not any(each.kind is inspect.Parameter.VAR_KEYWORD for each in taken.values()):
+        raise InputError(f"A file {path.suffix} has no options: got {', '.join(options)}.")
+    write(result, path, **options)
+    return path
+
+
+def table_csv(columns: dict[Any, Any]) -> bytes:
+    """Write a table with all digits of its numbers, and nothing where there is none."""
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(columns)
+    rows = zip(*(np.asarray(values).tolist() for values in columns.values()), strict=True)
+    writer.writerows([["" if value != value else value for value in row] for row in rows])
+    return text.getvalue().encode()
+
+
+def _csv(result: Any, path: Path) -> None:
+    """Write the table; a response has its spike times as one entry, separated by spaces."""
+    columns = result.columns()
+    if hasattr(result, "positions_mm"):
+        columns["spike_times_ms"] = [" ".join(map(repr, train.tolist())) for train in result.spikes]
+    write_atomically(path, table_csv(columns))
+
+
+def _parquet(result: Result, path: Path) -> None:
+    library("pyarrow", "Parquet needs pyarrow", "tables")
+    content = io.BytesIO()
+    made = frame(result)
+    made.columns = made.columns.astype(str)
+    made.to_parquet(content)
+    write_atomically(path, content.getvalue())
+
+
+def _json(result: Result, path: Path, **options: Any) -> None:
+    """Write all fields, or the data set as `xarray.Dataset.from_dict` reads it; null for NaN."""
+    if result.whole_as_json:
+        write_atomically(path, to_json(result) + b"\n")
+        return
+    variables, attributes = result.contents(**options)
+    content: dict[str, Any] = {"coords": {}, "attrs": attributes, "dims": {}, "data_vars": {}}
+    for name, (dims, values, about) in variables.items():
+        content["dims"] |= dict(zip(dims, values.shape, strict=True))
+        held = values.astype(object)
+        held[values != values] = None
+        content["data_vars"][name] = {"dims": dims, "attrs": about, "data": held.tolist()}
+    write_atomically(path, (json.dumps(content, default=np.ndarray.tolist) + "\n").encode())
+
+
+def _npz(result: Result, path: Path, **options: Any) -> None:
+    """Write every variable of the data set by its name, and in `units` the unit of each as JSON."""
+    variables, attributes = result.contents(**options)
+    arrays: Any = {name: values.astype(str) if values.dtype == object else values
+              for name, (_, values, _) in variables.items()}  # fmt: skip
+    units = {name: about["units"] for name, (_, _, about) in variables.items() if "units" in about}
+    content = io.BytesIO()
+    said: Any = {"units": np.array(json.dumps(units)), "attributes": np.array(json.dumps(attributes))}
+    np.savez_compressed(content, **arrays, **said)
+    write_atomically(path, content.getvalue())
+
+
+def _netcdf(result: Result, path: Path, **options: Any) -> None:
+    library("h5netcdf")
+    data = dataset(result.contents(**options))
+    packed = {
+        name: {"zlib": True, "complevel": 4}
+        for name, values in data.variables.items()
+        if values.ndim and values.dtype != object
+    }
+    with TemporaryDirectory() as folder:
+        unfinished = Path(folder) / "data.nc"
+        data.to_netcdf(unfinished, engine="h5netcdf", encoding=packed)
+        write_atomically(path, unfinished.read_bytes())
+
+
+def _zarr(result: Result, path: Path, **options: Any) -> None:
+    """Write a Zarr store beside its place and rename it: what was there is replaced at once."""
+    library("zarr")
+    data = dataset(result.contents(**options))
+    beside = [path.with_name(f".{path.name}.{token_hex(8)}.{what}") for what in ("part", "old")]
+    unfinished, replaced = beside
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        data.to_zarr(unfinished, mode="w", consolidated=False)
+        if path.exists():
+            path.rename(replaced)
+        unfinished.rename(path)
+    except OSError as error:
+        raise StoreError(
+            f"{path} cannot be written ({error.strerror or error}): free it or choose another."
+        ) from error
+    finally:
+        if replaced.exists() and not path.exists():
+            replaced.rename(path)
+        for leftover in beside:
+            shutil.rmtree(leftover, ignore_errors=True)
+
+
+def _nwb(result: Any, path: Path, **options: Any) -> None:
+    result.to_nwb(path, **options)
+
+
+def _vtu(result: Any, path: Path) -> None:
+    from fingerpad.export.vtu import write_vtu
+
+    write_vtu(path, result)
+
+
+def _picture(result: Result, path: Path, **options: Any) -> None:
+    import matplotlib
+
+    from fingerpad.report.style import STYLE, new_figure
+
+    content = io.BytesIO()
+    with matplotlib.rc_context(STYLE):
+        figure = new_figure(*DRAWN_IN)
+        result.plot(figure.add_subplot(), **options)
+        figure.savefig(content, format=path.suffix[1:])
+    write_atomically(path, content.getvalue())
+
+
+@dataclass(frozen=True)
+class Writer:
+    """How a result becomes a file."""
+
+    write: Callable[..., None]
+    needs: str = "columns"  # Attribute of the results that it writes.
+
+
+WRITERS: dict[str, Writer] = {
+    ".csv": Writer(_csv),
+    ".parquet": Writer(_parquet),
+    ".json": Writer(_json),
+    ".npz": Writer(_npz),
+    ".nc": Writer(_netcdf),
+    ".zarr": Writer(_zarr),
+    ".nwb": Writer(_nwb, "to_nwb"),
+    ".vtu": Writer(_vtu, "deformation"),
+    ".pvd": Writer(_vtu, "deformation"),
+    ".png": Writer(_picture),
+    ".pdf": Writer(_picture),
+    ".svg": Writer(_picture),
+}
+"""Writers of results by the ending of the file."""
