@@ -15,16 +15,11 @@ from fingerpad.core.signals import Traces
 from fingerpad.experiments.conditions import Conditions
 from fingerpad.experiments.fit.methods import FOUR_NUMBER_METHODS
 from fingerpad.experiments.gerling2014 import nerve
-from fingerpad.inference.afferent_methods import (
-    bounds_of,
-    four_number_problem,
-    response_surface,
-    start_points,
-)
+from fingerpad.inference.afferent_fit import bounds_of, four_number_problem, response_surface, start_points
 from fingerpad.inference.fitting.cross_validation import cross_validate, interleaved_folds
 from fingerpad.inference.fitting.methods import Method
+from fingerpad.inference.problem import RateProblem
 from fingerpad.inference.rate_model import AfferentModel
-from fingerpad.inference.rate_problem import RateProblem
 from fingerpad.neuron.transduction import drive
 from fingerpad.skin.store import Store, solve_missing
 

@@ -14,12 +14,8 @@ from fingerpad.data import psychophysics
 from fingerpad.neuron.afferent import Afferent
 from fingerpad.neuron.population import Population
 from fingerpad.neuron.transduction import drive
-from fingerpad.psychophysics.discrimination import (
-    Experiment,
-    discriminate_euclidean,
-    discriminate_gradient_sum,
-)
 from fingerpad.psychophysics.encoding import neighbour_pairs
+from fingerpad.psychophysics.observer import EuclideanDistance, Experiment, GradientSum, discriminate_by
 
 AFFERENTS = 100_000
 THREADS, REPEATS = (1, 2), 3
@@ -80,12 +76,12 @@ def observe() -> dict[str, Any]:
     responses = np.random.default_rng(0).uniform(*RESPONSES_HZ, (spheres, len(population.positions_mm)))
     sigma = psychophysics.NOISE_SIGMA.value
     few = Experiment(presentations=2, distributions=2, hit_rates=2)
-    discriminate_gradient_sum(responses, neighbours, sigma, 1, few)  # loads compiled kernels
-    discriminate_euclidean(responses, sigma, 1, few)
+    discriminate_by(GradientSum(neighbours), responses, sigma, 1, few)  # loads compiled kernels
+    discriminate_by(EuclideanDistance(), responses, sigma, 1, few)
     started = perf_counter()
-    discriminate_gradient_sum(responses, neighbours, sigma, 1)
+    discriminate_by(GradientSum(neighbours), responses, sigma, 1)
     between = perf_counter()
-    discriminate_euclidean(responses, sigma, 1)
+    discriminate_by(EuclideanDistance(), responses, sigma, 1)
     return {"gradient_sum_s": between - started, "euclidean_s": perf_counter() - between}
 
 

@@ -22,13 +22,13 @@ from fingerpad.experiments.gerling2014.nerve import PIECES
 from fingerpad.experiments.gerling2014.percept import POSITIONS_MM
 from fingerpad.experiments.gerling2014.skin import PLATE_DEPTHS_MM
 from fingerpad.geometry.indenters import Cylinder
-from fingerpad.inference.rates_and_hit_rates import CHANCE
+from fingerpad.inference.problem import CHANCE
 from fingerpad.neuron.exact_spikes import exact_trains
 from fingerpad.neuron.population import Population
 from fingerpad.neuron.spikes import PAPER_WINDOWS_MS, window_rates_hz
 from fingerpad.neuron.transduction import Drive, drive
 from fingerpad.psychophysics.encoding import neighbour_pairs
-from fingerpad.psychophysics.noise_fit import expected_euclidean_hit_rates, expected_hit_rates
+from fingerpad.psychophysics.observer import expected_euclidean_hit_rates, expected_hit_rates
 from fingerpad.skin.sampling import SkinResponse
 from studies.tissue_candidates import Candidate
 from studies.tissue_design import REFERENCE_KPA

@@ -24,7 +24,7 @@ from fingerpad.data import tissues as published
 from fingerpad.experiments.gerling2014.skin import PLATE_DEPTHS_MM
 from fingerpad.inference.fitting.posterior import Chains, LogDensity, sample
 from fingerpad.inference.identifiable import LARGEST_RESTING_SHARE, identifiable
-from fingerpad.inference.rate_likelihood import CorrelatedResiduals
+from fingerpad.inference.rate_posterior import CorrelatedResiduals
 from fingerpad.neuron.afferent import Afferent
 from studies.finger_levels import (
     Afferents,

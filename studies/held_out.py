@@ -36,7 +36,7 @@ from fingerpad.neuron.afferent import Afferent
 from fingerpad.neuron.population import Population
 from fingerpad.neuron.spikes import firing_rate_hz, modulation_index
 from fingerpad.psychophysics.encoding import neighbour_pairs
-from fingerpad.psychophysics.noise_fit import NOISE_DRAWS, expected_hit_rates, fit_noise_sigma
+from fingerpad.psychophysics.observer import NOISE_DRAWS, expected_hit_rates, fit_noise_sigma
 from fingerpad.report.page import edition
 from fingerpad.report.tables import ABSENT, fixed, number
 from fingerpad.skin.indentation import Touch, touch_of

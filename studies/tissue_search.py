@@ -31,14 +31,14 @@ from fingerpad.experiments.validation.observations import read_observations
 from fingerpad.geometry.grading import Grading
 from fingerpad.geometry.indenters import Bar, Cylinder, Plate
 from fingerpad.geometry.motion import RampAndHold
+from fingerpad.inference.afferent_fit import ToRatesAndHitRates
 from fingerpad.inference.fitting.cross_validation import cross_validate, interleaved_folds
+from fingerpad.inference.problem import CHANCE, RateProblem
 from fingerpad.inference.rate_model import AfferentModel
-from fingerpad.inference.rate_problem import RateProblem
-from fingerpad.inference.rates_and_hit_rates import CHANCE, ToRatesAndHitRates
 from fingerpad.neuron.afferent import PARAMETER_NAMES
 from fingerpad.neuron.population import Population
 from fingerpad.psychophysics.encoding import neighbour_pairs
-from fingerpad.psychophysics.noise_fit import (
+from fingerpad.psychophysics.observer import (
     NOISE_DRAWS,
     expected_euclidean_hit_rates,
     expected_hit_rates,

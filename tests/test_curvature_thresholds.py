@@ -13,9 +13,9 @@ from fingerpad.experiments.gerling2014 import thresholds as study
 from fingerpad.experiments.gerling2014.claims import READERS, RULES
 from fingerpad.experiments.gerling2014.percept import CURVATURES
 from fingerpad.psychophysics import yes_no
-from fingerpad.psychophysics.code_efficiency import SMALLEST_SPREAD
 from fingerpad.psychophysics.encoding import gradient_sum, neighbour_pairs
-from fingerpad.psychophysics.noise_fit import expected_hit_rates
+from fingerpad.psychophysics.ideal_observer import SMALLEST_SPREAD
+from fingerpad.psychophysics.observer import expected_hit_rates
 from fingerpad.report import percept as page
 from fingerpad.report.style import png
 from fingerpad.report.tables import filled

@@ -12,22 +12,25 @@ from scipy.stats import norm
 
 from fingerpad import ConvergenceError, InputError, Population
 from fingerpad.core.random_streams import Purpose, normals, uniforms
-from fingerpad.psychophysics.discrimination import (
-    END_OF_STIMULUS_MS,
-    Experiment,
-    discriminate_euclidean,
-    discriminate_gradient_sum,
-    likelihood_point,
-)
-from fingerpad.psychophysics.encoding import gradient_sum, neighbour_pairs
-from fingerpad.psychophysics.noise_fit import expected_hit_rates, fit_noise_sigma
-from fingerpad.psychophysics.noisy_responses import (
+from fingerpad.psychophysics.encoding import (
     LARGEST_SESSION,
     TRIALS_PER_SESSION,
+    gradient_sum,
+    neighbour_pairs,
     noisy_gradient_sums,
     noisy_responses,
     session_trials,
     shared_noise_gradient_sums,
+)
+from fingerpad.psychophysics.observer import (
+    END_OF_STIMULUS_MS,
+    EuclideanDistance,
+    Experiment,
+    GradientSum,
+    discriminate_by,
+    expected_hit_rates,
+    fit_noise_sigma,
+    likelihood_point,
 )
 from refusals import refusals
 
@@ -94,7 +97,7 @@ def test_gradient_sum_follows_the_printed_steps(session):
             mean, sd = fitted[picks[2 * judgement + 1]][comparison]
             rates.append(normal_beyond(0.5 * (standard_mean + mean), mean, sd, side))  # (h)
         expected.append(mean_and_sd(rates))  # (k)
-    rates = discriminate_gradient_sum(values, PAIRS, sigma, seed, plan, session=session)
+    rates = discriminate_by(GradientSum(PAIRS), values, sigma, seed, plan, session=session)
     assert (rates.seed, rates.session) == (seed, session)
     assert pooled[2] != pooled[0]
     assert_allclose(rates.hit_rate, [mean for mean, _ in expected], rtol=1e-11)
@@ -127,7 +130,7 @@ def test_the_varied_criterion_follows_the_printed_steps(moves):
 
                 point = brentq(excess, standard_mean - 9.0 * common, mean + 9.0 * common, xtol=1e-12)
             hits[comparison].append(normal_beyond(point, mean, sd, math.copysign(1.0, mean - standard_mean)))
-    rates = discriminate_gradient_sum(values, PAIRS, sigma, seed, plan)
+    rates = discriminate_by(GradientSum(PAIRS), values, sigma, seed, plan)
     assert_allclose(rates.hit_rate, [mean_and_sd(rate)[0] for rate in hits], rtol=1e-11)
     assert_allclose(rates.hit_rate_sd, [mean_and_sd(rate)[1] for rate in hits], rtol=1e-9)
 
@@ -164,7 +167,7 @@ def test_euclidean_distance_follows_the_printed_steps(norm, plan):
             above = pooled[comparison] > pooled[0]
             judged = [(one > point) == above for one in sums[comparison]]  # (h*)
             hits[comparison - 1].append(sum(judged) / plan.pairs)
-    rates = discriminate_euclidean(values, sigma, seed, plan, norm=norm)
+    rates = discriminate_by(EuclideanDistance(norm), values, sigma, seed, plan)
     assert_allclose(rates.hit_rate, [mean_and_sd(rate)[0] for rate in hits], rtol=1e-12)
     assert_allclose(rates.hit_rate_sd, [mean_and_sd(rate)[1] for rate in hits], rtol=1e-9, atol=1e-15)
 
@@ -195,7 +198,7 @@ def test_the_number_of_threads_changes_no_bit():
     """Threads share the trials; the same numbers come from a process that has only one."""
     program = (
         "import numpy as np\n"
-        "from fingerpad.psychophysics.noisy_responses import noisy_gradient_sums, session_trials\n"
+        "from fingerpad.psychophysics.encoding import noisy_gradient_sums, session_trials\n"
         "values = np.arange(1.0, 15.0).reshape(2, 7)\n"
         "pairs = np.stack([np.arange(6), np.arange(1, 7)], axis=1)\n"
         "sums = noisy_gradient_sums(values, pairs, 0.1, 3, session_trials(0, 2, 100), 10)\n"
@@ -228,7 +231,7 @@ def test_gradient_sum_of_two_receptors_is_normal_and_its_hit_rate_the_closed_for
     draws = standard_normals(1, (200_000, 2))
     assert_allclose(expected_hit_rates(values, TWO, sigma, draws), closed, atol=2e-3)
     plan = Experiment(presentations=1000, distributions=300, hit_rates=3000)
-    sampled = discriminate_gradient_sum(values, TWO, sigma, 2, plan)
+    sampled = discriminate_by(GradientSum(TWO), values, sigma, 2, plan)
     assert_allclose(sampled.hit_rate, closed, atol=4e-3)
     # Error propagation through z = (mu_c - mu_s) / (2 sigma_c): two means and one standard deviation vary.
     z = separation / (2.0 * spread)
@@ -247,7 +250,7 @@ def test_the_criterion_moves_the_decision_point_of_rising_and_falling_measures(s
     draws = standard_normals(1, (200_000, 2))
     assert_allclose(expected_hit_rates(values, TWO, sigma, draws, criterion), ndtr(margin), atol=2e-3)
     plan = Experiment(presentations=1000, criterion=criterion)
-    sampled = discriminate_gradient_sum(values, TWO, sigma, 2, plan)
+    sampled = discriminate_by(GradientSum(TWO), values, sigma, 2, plan)
     assert_allclose(sampled.hit_rate, ndtr(margin), atol=0.01)
 
 
@@ -264,9 +267,9 @@ def test_without_noise_hit_rates_are_1_or_at_chance_for_equal_stimuli():
     values = bumps([287.0, 287.0, 288.0])
     whole = [[50.0, 60.0], [50.0, 60.0], [50.0, 61.0]]  # of which the standard deviation is exactly 0
     for rates in (
-        discriminate_gradient_sum(values, PAIRS, 0.0, 0, SMALL),
-        discriminate_euclidean(values, 0.0, 0, SMALL),
-        discriminate_gradient_sum(whole, TWO, 0.0, 0, SMALL),
+        discriminate_by(GradientSum(PAIRS), values, 0.0, 0, SMALL),
+        discriminate_by(EuclideanDistance(), values, 0.0, 0, SMALL),
+        discriminate_by(GradientSum(TWO), whole, 0.0, 0, SMALL),
     ):
         assert_array_equal(rates.hit_rate, [0.5, 1.0])
         assert_array_equal(rates.hit_rate_sd, [0.0, 0.0])
@@ -276,7 +279,7 @@ def test_without_noise_hit_rates_are_1_or_at_chance_for_equal_stimuli():
 def test_the_noise_behind_synthetic_hit_rates_is_recovered():
     truth = 0.073
     plan = Experiment(presentations=2000, distributions=100, hit_rates=4000)
-    observed = discriminate_gradient_sum(bumps()[[0, 1, 6]], PAIRS, truth, 13, plan).hit_rate
+    observed = discriminate_by(GradientSum(PAIRS), bumps()[[0, 1, 6]], truth, 13, plan).hit_rate
     draws = standard_normals(14, (10_000, 18))
     fit = fit_noise_sigma(lambda sigma: expected_hit_rates(bumps()[[0, 1, 6]], PAIRS, sigma, draws), observed)
     assert fit.noise_sigma == pytest.approx(truth, rel=0.03)
@@ -292,27 +295,29 @@ def test_the_noise_behind_synthetic_hit_rates_is_recovered():
 def test_silent_receptors_need_a_rule():
     latencies = np.where(bumps() > 8.0, 60.0 - bumps(), np.nan)
     with pytest.raises(InputError, match="silent_value"):
-        discriminate_gradient_sum(latencies, PAIRS, 0.05, 0, SMALL)
-    filled = discriminate_gradient_sum(np.nan_to_num(latencies, nan=1000.0), PAIRS, 0.05, 0, SMALL)
-    found = discriminate_gradient_sum(latencies, PAIRS, 0.05, 0, SMALL, silent_value=END_OF_STIMULUS_MS)
+        discriminate_by(GradientSum(PAIRS), latencies, 0.05, 0, SMALL)
+    filled = discriminate_by(GradientSum(PAIRS), np.nan_to_num(latencies, nan=1000.0), 0.05, 0, SMALL)
+    found = discriminate_by(GradientSum(PAIRS), latencies, 0.05, 0, SMALL, silent_value=END_OF_STIMULUS_MS)
     assert_array_equal(found.hit_rate, filled.hit_rate)
     assert np.isnan(latencies).any()
 
+
+VARIED = Experiment(criterion_sigma=0.1)
 
 test_what_cannot_be_used_is_refused = refusals(
     (lambda: Experiment(presentations=1), ("presentations",)),
     (lambda: Experiment(criterion=math.nan), ("criterion",)),
     (lambda: Experiment(criterion_sigma=-0.1), "criterion_sigma must not be negative"),
     (lambda: Experiment(criterion_moves="beta"), ("criterion_moves",)),
-    (lambda: discriminate_gradient_sum(0.0 * bumps(), PAIRS, 0.1, 0), "stays silent"),
-    (lambda: discriminate_euclidean(bumps() * np.nan, 0.1, 0, silent_value=1.0), "stays silent"),
-    (lambda: discriminate_gradient_sum(bumps(), PAIRS, 0.1, 0, session=-1), ("session",)),
-    (lambda: discriminate_gradient_sum(bumps()[:1], PAIRS, 0.1, 0), "at least one comparison"),
-    (lambda: discriminate_gradient_sum(bumps(), PAIRS, -0.1, 0), ("noise_sigma",)),
-    (lambda: discriminate_gradient_sum(bumps(), PAIRS + 1, 0.1, 0), ("neighbours",)),
-    (lambda: discriminate_gradient_sum([["a"]], PAIRS, 0.1, 0), "responses must be numbers"),
-    (lambda: discriminate_euclidean(bumps(), 0.1, 0, norm="maximum"), ("norm",)),
-    (lambda: discriminate_euclidean(bumps(), 0.1, 0, Experiment(criterion_sigma=0.1)), "criterion_sigma"),
+    (lambda: discriminate_by(GradientSum(PAIRS), 0.0 * bumps(), 0.1, 0), "stays silent"),
+    (lambda: discriminate_by(EuclideanDistance(), bumps() * np.nan, 0.1, 0, None, 1.0), "stays silent"),
+    (lambda: discriminate_by(GradientSum(PAIRS), bumps(), 0.1, 0, session=-1), ("session",)),
+    (lambda: discriminate_by(GradientSum(PAIRS), bumps()[:1], 0.1, 0), "at least one comparison"),
+    (lambda: discriminate_by(GradientSum(PAIRS), bumps(), -0.1, 0), ("noise_sigma",)),
+    (lambda: discriminate_by(GradientSum(PAIRS + 1), bumps(), 0.1, 0), ("neighbours",)),
+    (lambda: discriminate_by(GradientSum(PAIRS), [["a"]], 0.1, 0), "responses must be numbers"),
+    (lambda: discriminate_by(EuclideanDistance("maximum"), bumps(), 0.1, 0), ("norm",)),
+    (lambda: discriminate_by(EuclideanDistance(), bumps(), 0.1, 0, VARIED), "criterion_sigma"),
     (lambda: expected_hit_rates(bumps(), PAIRS, 0.1, np.ones((9, 17))), ("standard_normals",)),
     (lambda: fit_noise_sigma(lambda sigma: [0.5]), "must give 2 hit rates: got 1"),
     (lambda: fit_noise_sigma(lambda sigma: [0.5, 0.5], bounds=(0.2, 0.1)), ("bounds",)),

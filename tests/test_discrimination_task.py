@@ -26,13 +26,9 @@ from fingerpad.experiments.conditions import RECEPTOR_X_MM
 from fingerpad.experiments.discrimination import run as task_run
 from fingerpad.experiments.discrimination.analysis import PreparedTask, analyse, forced_choice_of
 from fingerpad.experiments.discrimination.decoding import SESSION, side_curves
-from fingerpad.psychophysics.code_efficiency import code_efficiency, noisy_presentations
-from fingerpad.psychophysics.discrimination import (
-    Experiment,
-    discriminate_euclidean,
-    discriminate_gradient_sum,
-)
 from fingerpad.psychophysics.encoding import gradient_sum, neighbour_pairs, taking_part
+from fingerpad.psychophysics.ideal_observer import code_efficiency, noisy_presentations
+from fingerpad.psychophysics.observer import EuclideanDistance, Experiment, GradientSum, discriminate_by
 from fingerpad.report import task as report
 from refusals import misused
 
@@ -103,8 +99,8 @@ def test_hit_rates_are_those_of_the_observers_with_the_questions_own_numbers(ans
     np.testing.assert_array_equal(static, alone)
     plan = Experiment(distributions=20, hit_rates=50)
     neighbours = neighbour_pairs(question.population.positions_mm, 1.0)
-    sums = discriminate_gradient_sum(static, neighbours, 0.1, 5, plan, session=SESSION)
-    distances = discriminate_euclidean(static, 0.1, 5, plan, session=SESSION)
+    sums = discriminate_by(GradientSum(neighbours), static, 0.1, 5, plan, session=SESSION)
+    distances = discriminate_by(EuclideanDistance(), static, 0.1, 5, plan, session=SESSION)
     for code, expected in (("gradient_sum", sums), ("euclidean", distances)):
         found = decoding(answered, code, "static")
         np.testing.assert_array_equal(found.hit_rate, expected.hit_rate)

@@ -10,16 +10,17 @@ import pytest
 from scipy.stats import binom, chi2, multivariate_t, norm
 
 from fingerpad import ConvergenceError, RateRecordings, Traces
-from fingerpad.inference.afferent_posterior import (
+from fingerpad.inference.fitting.posterior import credible_band
+from fingerpad.inference.rate_model import AfferentModel, four_number_model
+from fingerpad.inference.rate_posterior import (
+    LENGTHS_MM,
     AfferentPrior,
+    RateLikelihood,
     afferent_posterior,
     from_coordinates,
     log_posterior,
     to_coordinates,
 )
-from fingerpad.inference.fitting.posterior import credible_band
-from fingerpad.inference.rate_likelihood import LENGTHS_MM, RateLikelihood
-from fingerpad.inference.rate_model import AfferentModel, four_number_model
 from fingerpad.neuron.transduction import drive
 from refusals import refusals
 

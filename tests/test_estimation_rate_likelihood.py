@@ -6,8 +6,8 @@ from scipy.integrate import quad
 from scipy.special import gammaln, logsumexp
 
 from fingerpad import RateRecordings
-from fingerpad.inference.rate_likelihood import RateLikelihood
 from fingerpad.inference.rate_model import evaluate_rows
+from fingerpad.inference.rate_posterior import RateLikelihood
 from refusals import refusals
 
 PLACES = np.array([-1.0, -0.4, 0.0, 0.6, 1.5])

@@ -4,10 +4,9 @@ import numpy as np
 import pytest
 
 from fingerpad import Traces
-from fingerpad.inference.afferent_methods import ReceptorOffset
-from fingerpad.inference.closed_form import ClosedFormModel
+from fingerpad.inference.afferent_fit import ReceptorOffset
 from fingerpad.inference.identifiable import identifiable
-from fingerpad.inference.rate_model import AfferentModel, evaluate_rows, four_number_model
+from fingerpad.inference.rate_model import AfferentModel, ClosedFormModel, evaluate_rows, four_number_model
 from refusals import refusals
 from sections import SED_DRIVEN, sed_driven
 

@@ -6,21 +6,18 @@ import numpy as np
 import pytest
 
 from fingerpad import InputError, RateRecordings, Traces
-from fingerpad.inference.afferent_methods import (
-    ReceptorOffset,
-    along_slopes,
-    bounds_of,
-    fitted_four,
-    fitted_six,
-    four_number_problem,
-)
-from fingerpad.inference.closed_form import ClosedFormModel, constant_drive_rate
+from fingerpad.inference import afferent_fit
+from fingerpad.inference.afferent_fit import ReceptorOffset, fitted_four, fitted_six
 from fingerpad.inference.fitting.cross_validation import fractional_sum_of_squares
-from fingerpad.inference.fitting.least_squares import LeastSquares
-from fingerpad.inference.fitting.methods import Bounds
+from fingerpad.inference.fitting.methods import Bounds, LeastSquares
 from fingerpad.inference.identifiable import identifiable, six_parameters
-from fingerpad.inference.rate_model import AfferentModel, four_number_model
-from fingerpad.inference.rate_problem import RateProblem
+from fingerpad.inference.problem import RateProblem
+from fingerpad.inference.rate_model import (
+    AfferentModel,
+    ClosedFormModel,
+    constant_drive_rate,
+    four_number_model,
+)
 from fingerpad.neuron.lif import LeakyIntegrateAndFire
 from fingerpad.neuron.spikes import PAPER_WINDOWS_MS, firing_rate_hz
 from fingerpad.neuron.transduction import drive
@@ -157,12 +154,12 @@ def test_places_that_were_not_sampled_are_refused():
 
 def test_slopes_along_the_numbers_of_a_fit_are_the_limits_of_differences(four_numbers):
     model = ClosedFormModel(AfferentModel.of_traces(traces()))
-    fitted = four_number_problem(AfferentModel.of_traces(traces()), four_numbers.recordings)
+    search = afferent_fit.four_numbers(AfferentModel.of_traces(traces()), four_numbers.recordings)
+    fitted, bounds = search.problem, search.bounds
     numbers = np.array([FOUR[0] * FOUR[3], *FOUR[1:]])
     residuals = fitted.residuals(numbers, EVERYTHING)
     np.testing.assert_allclose(residuals, four_numbers.residuals(FOUR, EVERYTHING))
-    bounds = bounds_of(*fitted.model.model.drives)
-    method = along_slopes(model, fitted, bounds)
+    method = search.along_slopes()
     smooth = RateProblem(model, four_numbers.recordings)
     found = method.jacobian(numbers, EVERYTHING)
     for slope, step in zip(found.T, np.diag(1e-4 * numbers), strict=True):

@@ -11,7 +11,7 @@ from fingerpad.inference.fitting.cross_validation import (
     fractional_sum_of_squares,
     interleaved_folds,
 )
-from fingerpad.inference.fitting.response_surface import ResponseSurface, coding_increments, maximise
+from fingerpad.inference.fitting.methods import ResponseSurface, coding_increments, maximise
 from refusals import refusals
 
 SHIFTS = np.linspace(-3.5, 3.5, 36)

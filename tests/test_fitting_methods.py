@@ -5,9 +5,14 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 import pytest
 
-from fingerpad.inference.fitting.covariance_adaptation import CovarianceAdaptation
-from fingerpad.inference.fitting.least_squares import LeastSquares
-from fingerpad.inference.fitting.methods import Bounds, Fit, FitStep, best_of
+from fingerpad.inference.fitting.methods import (
+    Bounds,
+    CovarianceAdaptation,
+    Fit,
+    FitStep,
+    LeastSquares,
+    best_of,
+)
 from refusals import refusals
 
 TIMES = np.linspace(0.0, 4.0, 24)

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from fingerpad.core.errors import ConvergenceError, InputError
-from fingerpad.inference.fitting.response_surface import (
+from fingerpad.inference.fitting.methods import (
     coding_increments,
     factorial_design,
     maximise,

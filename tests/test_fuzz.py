@@ -15,6 +15,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from fingerpad.experiments.afferent_files import fitted_afferent
+from fingerpad.experiments.descriptions.example import EXAMPLE
+from fingerpad.experiments.descriptions.reduction import read_reduction
+from fingerpad.experiments.descriptions.stimulus import TactileStimulus
+from fingerpad.experiments.discrimination.task_stimuli import example_tasks
+from fingerpad.experiments.stimuli import ShiftedBar
+from fingerpad.experiments.sweep.description import read_sweep
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
@@ -22,23 +29,16 @@ import fingerpad as fp
 from fingerpad.cli import main
 from fingerpad.core.layouts import Layout
 from fingerpad.core.plain_yaml import read_yaml
-from fingerpad.experiments.afferent_files import fitted_afferent
 from fingerpad.experiments.conditions import Conditions
-from fingerpad.experiments.descriptions.example import EXAMPLE
-from fingerpad.experiments.descriptions.reduction import read_reduction
-from fingerpad.experiments.descriptions.stimulus import TactileStimulus
-from fingerpad.experiments.discrimination.task_stimuli import example_tasks
 from fingerpad.experiments.runner import Runner
-from fingerpad.experiments.stimuli import ShiftedBar
-from fingerpad.experiments.sweep.description import read_sweep
 from fingerpad.experiments.validation.observations import read_observations
 from fingerpad.mechanics.newton import NewtonSettings
 from fingerpad.neuron.band_pass import BandPass
 from fingerpad.neuron.lif import LeakyIntegrateAndFire
 from fingerpad.neuron.transduction import Transduction
-from fingerpad.psychophysics.discrimination import Experiment
-from fingerpad.psychophysics.functions import JudgementCounts, PsychometricFunction
+from fingerpad.psychophysics.curve import JudgementCounts, PsychometricFunction
 from fingerpad.psychophysics.ideal_observer import GaussianResponses
+from fingerpad.psychophysics.observer import Experiment
 
 LONGEST = 2600
 """Characters of an error."""

@@ -35,10 +35,10 @@ from fingerpad.experiments.recording_files import read_recordings
 from fingerpad.inference.rate_model import AfferentModel
 from fingerpad.inference.recordings import RateRecordings
 from fingerpad.neuron.population import sensitivities
-from fingerpad.psychophysics.discrimination import Experiment, discriminate_gradient_sum
+from fingerpad.psychophysics.curve_fit import fit_psychometric
 from fingerpad.psychophysics.encoding import gradient_sum
 from fingerpad.psychophysics.ideal_observer import GaussianResponses
-from fingerpad.psychophysics.psychometric import fit_psychometric
+from fingerpad.psychophysics.observer import Experiment, GradientSum, discriminate_by
 from fingerpad.report.style import new_figure, png
 from fingerpad.skin.sampling import SurfaceProfile
 from fingerpad.skin.store import Store, touch_key
@@ -286,8 +286,8 @@ def test_sequences_become_tuples_so_that_values_hash():
         lambda: fp.Afferent(dynamic_quantity="x"),
         lambda: fp.Union([fp.Sphere()], at_mm=None),
         lambda: gradient_sum([1.0, np.nan, 2.0], PAIRS),
-        lambda: discriminate_gradient_sum([[1, 2, 3], [3, 4, 2]], PAIRS, 0.1, 1, silent_value=np.nan),
-        lambda: discriminate_gradient_sum([[1, 2, 3], [3, 4, 2]], np.empty((0, 2), int), 0.1, 1),
+        lambda: discriminate_by(GradientSum(PAIRS), [[1, 2, 3], [3, 4, 2]], 0.1, 1, silent_value=np.nan),
+        lambda: discriminate_by(GradientSum(np.empty((0, 2), int)), [[1, 2, 3], [3, 4, 2]], 0.1, 1),
         lambda: replace(fp.Population.grid().respond_to(MANY), windows_ms=((50.0, 30.0), (600.0, 950.0))),
         lambda: SurfaceProfile([2, 1], [np.nan]),
         lambda: RateRecordings("ab", [1.0, 2.0], None),

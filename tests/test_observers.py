@@ -23,12 +23,8 @@ from fingerpad.psychophysics import (
     sensitivity,
     yes_no,
 )
-from fingerpad.psychophysics.code_efficiency import (
-    SMALLEST_SPREAD,
-    code_efficiency,
-    code_statistic,
-    noisy_presentations,
-)
+from fingerpad.psychophysics.ideal_observer import SMALLEST_SPREAD, code_efficiency, noisy_presentations
+from fingerpad.psychophysics.observer import GradientSum
 from fingerpad.psychophysics.sensitivity import best_difference
 
 LOOKS = 400_000
@@ -178,7 +174,7 @@ def test_no_efficiency_is_reported_where_the_ideal_observer_guesses_or_a_floor_b
     table = np.array([[30.0, 20.0, 0.0], [30.0, 20.0, 0.0], [33.0, 21.0, 1.0]])
     pairs = np.array([[0, 1], [1, 2]])
     standard = multiplied_responses(table[0], 0.1, SMALLEST_SPREAD)
-    by_gradient = code_statistic("gradient_sum", standard, pairs, seed=4)
+    by_gradient = GradientSum(pairs).statistic(standard, 4, 0)
     same, other = (code_efficiency(shown, by_gradient) for shown in noisy_presentations(table, 0.1, seed=4))
     assert math.isnan(same.efficiency)
     assert other.efficiency == efficiency(other.code, other.ideal)[0]
@@ -191,8 +187,6 @@ def test_no_efficiency_is_reported_where_the_ideal_observer_guesses_or_a_floor_b
 def test_bad_models_are_refused():
     with pytest.raises(InputError, match="1 of them zero"):
         gaussian_information([0.0, 1.0], [0.1, 0.1], 0.5)
-    with pytest.raises(InputError, match="code must be one of"):
-        code_statistic("sum", GaussianResponses([1.0], np.eye(1)), np.array([[0, 0]]), seed=1)
     with pytest.raises(InputError, match="1 of 2 receptors are silent"):
         multiplied_responses([0.0, 10.0], 0.1)
     assert multiplied_responses([0.0, 10.0], 0.1, smallest_spread=1.0).covariance[0, 0] == 1.0

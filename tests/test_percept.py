@@ -23,14 +23,16 @@ from fingerpad.experiments.gerling2014.percept import (
     observe,
     rise_needed,
 )
-from fingerpad.psychophysics.discrimination import (
-    Experiment,
-    discriminate_euclidean,
-    discriminate_gradient_sum,
-)
+from fingerpad.psychophysics.curve import binomial_interval
 from fingerpad.psychophysics.encoding import gradient_sum, neighbour_pairs, taking_part
-from fingerpad.psychophysics.functions import binomial_interval
-from fingerpad.psychophysics.noise_fit import expected_euclidean_hit_rates, fit_noise_sigma
+from fingerpad.psychophysics.observer import (
+    EuclideanDistance,
+    Experiment,
+    GradientSum,
+    discriminate_by,
+    expected_euclidean_hit_rates,
+    fit_noise_sigma,
+)
 
 CURVATURES = (287.0, 296.0, 305.0, 316.0, 328.0, 340.0, 365.0)
 GRID = Population.grid()
@@ -99,10 +101,10 @@ def test_every_observer_of_a_session_is_the_one_who_is_asked_alone(sessions):
         static, dynamic = (measures[name][position].responses for name in ("static", "dynamic"))
 
         def asked(rates, noise_sigma=0.06, experiment=Experiment(), session=session):  # noqa: B008
-            return discriminate_gradient_sum(rates, PAIRS, noise_sigma, 4, experiment, session=session)
+            return discriminate_by(GradientSum(PAIRS), rates, noise_sigma, 4, experiment, session=session)
 
         alone = {name: asked(static, **other) for name, other in others.items()}
-        alone["euclidean"] = discriminate_euclidean(static, 0.06, 4, session=session)
+        alone["euclidean"] = discriminate_by(EuclideanDistance(), static, 0.06, 4, session=session)
         alone["dynamic"] = asked(dynamic)
         for name, rates in alone.items():
             assert_allclose(observers.mean[name][repeat, position], rates.hit_rate, rtol=1e-12)
@@ -176,7 +178,7 @@ def test_statistics_are_those_of_known_hit_rates():
 def test_few_receptors_give_a_skewed_distance_that_the_closed_form_knows(sigma):
     """Twelve receptors, as respond to a sphere: without the skewness rates near chance are 0.02 too high."""
     values = np.linspace(10.0, 55.0, 12) * np.array([[1.0], [1.03], [1.06], [1.2]])
-    sampled = discriminate_euclidean(values, sigma, 3, Experiment(hit_rates=4000)).hit_rate
+    sampled = discriminate_by(EuclideanDistance(), values, sigma, 3, Experiment(hit_rates=4000)).hit_rate
     assert_allclose(sampled, expected_euclidean_hit_rates(values, sigma), atol=0.005)
 
 

@@ -11,8 +11,8 @@ from scipy.optimize import differential_evolution
 
 from fingerpad import ConvergenceError, fit_psychometric
 from fingerpad.psychophysics import FunctionCloud, PsychometricFunction, bootstrap, goodness_of_fit, posterior
-from fingerpad.psychophysics.functions import SIGMOIDS, log_probability
-from fingerpad.psychophysics.uncertainty import STEEPEST, weighted_quantiles
+from fingerpad.psychophysics.curve import SIGMOIDS, log_probability
+from fingerpad.psychophysics.curve_uncertainty import STEEPEST, weighted_quantiles
 from refusals import refusals
 
 LEVELS = np.array([2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0])

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from fingerpad.experiments.discrimination.task_stimuli import parse_task, task_population, task_stimuli
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -10,11 +11,10 @@ from fingerpad.core.phases import Phase, phase_named
 from fingerpad.core.signals import Traces
 from fingerpad.data import protocol
 from fingerpad.experiments.discrimination.analysis import PreparedTask
-from fingerpad.experiments.discrimination.task_stimuli import parse_task, task_population, task_stimuli
 from fingerpad.geometry.motion import ForceRampAndHold, RampAndHold
 from fingerpad.geometry.motions import repeated, sine
 from fingerpad.geometry.trajectory import Trajectory
-from fingerpad.inference.afferent_methods import ReceptorOffset
+from fingerpad.inference.afferent_fit import ReceptorOffset
 from fingerpad.inference.rate_model import AfferentModel
 from fingerpad.neuron.population import Population
 from fingerpad.neuron.spikes import PAPER_WINDOWS_MS, common_rate_windows_ms, rate_windows_ms

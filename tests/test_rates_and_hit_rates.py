@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 
 from fingerpad import InputError, RateRecordings, Traces
+from fingerpad.inference.afferent_fit import ToRatesAndHitRates
 from fingerpad.inference.fitting.cross_validation import cross_validate
 from fingerpad.inference.identifiable import LARGEST_RESTING_SHARE, identifiable
+from fingerpad.inference.problem import RateProblem, RatesAndHitRates, SphereHitRates
 from fingerpad.inference.rate_model import AfferentModel, four_number_model
-from fingerpad.inference.rate_problem import RateProblem
-from fingerpad.inference.rates_and_hit_rates import RatesAndHitRates, SphereHitRates, ToRatesAndHitRates
 from fingerpad.psychophysics.encoding import neighbour_pairs
-from fingerpad.psychophysics.noise_fit import expected_euclidean_hit_rates, expected_hit_rates
+from fingerpad.psychophysics.observer import expected_euclidean_hit_rates, expected_hit_rates
 from refusals import refused
 
 SIX = np.array([2e-7, 1.2e-4, 9e-7, 60.0, 1e-6, 50.0])

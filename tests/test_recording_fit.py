@@ -32,10 +32,9 @@ from fingerpad.experiments.fit.results import ParameterProfile, PhaseBands, Rate
 from fingerpad.experiments.gerling2014 import nerve
 from fingerpad.experiments.manifest import sha256
 from fingerpad.geometry.edged_indenters import INDENTERS
-from fingerpad.inference.afferent_methods import OFFSETS_MM
-from fingerpad.inference.closed_form import ClosedFormModel
+from fingerpad.inference.afferent_fit import OFFSETS_MM
 from fingerpad.inference.identifiable import IDENTIFIABLE_NAMES, identifiable
-from fingerpad.inference.rate_model import AfferentModel
+from fingerpad.inference.rate_model import AfferentModel, ClosedFormModel
 from fingerpad.inference.recordings import SpikeRecordings
 from fingerpad.inference.spike_fit import soft_spikes
 from fingerpad.neuron.spikes import PAPER_WINDOWS_MS
@@ -497,7 +496,7 @@ def test_the_example_prints_its_command_and_writes_recordings(call, tmp_path):
 
 
 def test_options_are_those_of_the_modules():
-    assert METHODS == choices.METHOD_CHOICES
+    assert tuple(METHODS) == choices.METHOD_CHOICES
     assert set(INDENTERS) == set(choices.INDENTER_CHOICES)
 
 

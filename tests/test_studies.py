@@ -26,7 +26,7 @@ from fingerpad.geometry.grading import Grading
 from fingerpad.geometry.indenters import Bar, Cylinder, Line, Sphere
 from fingerpad.geometry.mesh import finger_mesh
 from fingerpad.geometry.motion import RampAndHold
-from fingerpad.inference.afferent_methods import increments, printed_starts, start_points
+from fingerpad.inference.afferent_fit import increments, printed_starts, start_points
 from fingerpad.mechanics.press_settings import PressSettings
 from fingerpad.mechanics.tissues import named_tissues
 from fingerpad.neuron.afferent import Afferent

@@ -10,17 +10,17 @@ import numpy as np
 import pytest
 import xarray
 import zarr
+from fingerpad.experiments.descriptions.pressed import press_described
+from fingerpad.experiments.sweep.description import Constraint, read_sweep, sweep_of
 
 import fingerpad as fp
 from fingerpad.cli import main
 from fingerpad.core.errors import InputError, StoreError
-from fingerpad.experiments.descriptions.pressed import press_described
-from fingerpad.experiments.discrimination.decoding import code_hit_rates
+from fingerpad.experiments.discrimination.decoding import SESSION
 from fingerpad.experiments.manifest import software
-from fingerpad.experiments.sweep.description import Constraint, read_sweep, sweep_of
 from fingerpad.experiments.sweep.observers import observe
 from fingerpad.export.sweep_dataset import DONE, FAILED, LEFT_OUT, SweepFile, open_sweep
-from fingerpad.psychophysics.discrimination import Experiment
+from fingerpad.psychophysics.observer import ENCODERS, Experiment, discriminate_by
 
 MOTION = {"ramp_ms": 50, "hold_ms": 60}
 TOUCH = {"object": "cylinder", "motion": MOTION, "afferents": {"rows": 1, "columns": 2}}
@@ -440,7 +440,9 @@ def test_hit_rates_are_those_of_each_observer_alone(responses, code):
         count = 2 + receptors
         table, pairs = rates[[1, 0, 2], receptors, :count], np.array([[0, 1], [1, 2]][: count - 1])
         observer = Experiment(criterion=[0.4, 0.6][criterion])
-        expected = code_hit_rates(code, table, pairs, [0.05, 0.2][noise], 0, observer)
+        expected = discriminate_by(
+            ENCODERS[code](pairs), table, [0.05, 0.2][noise], 0, observer, session=SESSION
+        )
         got = found[:, receptors, noise, criterion]
         assert got[[0, 2]].tolist() == expected.hit_rate.tolist()
         assert np.isnan(got[1])

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import fingerpad as fp
-from fingerpad.inference.typed_fit import TypedModel
+from fingerpad.inference.afferent_fit import TypedModel
 from fingerpad.neuron.lif import LeakyIntegrateAndFire
 from refusals import refusals
 

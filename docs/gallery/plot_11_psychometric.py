@@ -9,8 +9,8 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 import fingerpad as fp
-from fingerpad.psychophysics.discrimination import discriminate_gradient_sum
 from fingerpad.psychophysics.encoding import neighbour_pairs
+from fingerpad.psychophysics.observer import GradientSum, discriminate_by
 
 curvatures = np.array([287.0, 300.0, 320.0, 360.0])
 motion = fp.RampAndHold(depth_mm=0.8, hold_ms=200)
@@ -22,7 +22,7 @@ rates = [
     for curvature in curvatures
 ]
 pairs = neighbour_pairs(population.positions_mm, population.pitch_mm)
-hits = discriminate_gradient_sum(rates, pairs, 0.1, seed=1).hit_rate
+hits = discriminate_by(GradientSum(pairs), rates, 0.1, seed=1).hit_rate
 differences, trials = curvatures[1:] - curvatures[0], np.full(3, 100)
 fit = fp.fit_psychometric(differences, np.round(hits * trials), trials)
 

@@ -89,8 +89,8 @@ from fingerpad.geometry.trajectory import Trajectory as Trajectory
 from fingerpad.geometry.trajectory_files import read_trajectory as read_trajectory
 from fingerpad.geometry.trajectory_files import reduced as reduced
 from fingerpad.geometry.trajectory_files import sampled as sampled
+from fingerpad.inference.afferent_fit import fit_afferent as fit_afferent
 from fingerpad.inference.recordings import RateRecordings as RateRecordings
-from fingerpad.inference.typed_fit import fit_afferent as fit_afferent
 from fingerpad.mechanics.materials import Energy as Energy
 from fingerpad.mechanics.materials import Hencky as Hencky
 from fingerpad.mechanics.materials import Hyperfoam as Hyperfoam
@@ -112,7 +112,7 @@ from fingerpad.neuron.afferent_types import afferent_of as afferent_of
 from fingerpad.neuron.end_organs import EndOrgans as EndOrgans
 from fingerpad.neuron.population import Population as Population
 from fingerpad.neuron.tuning import tuning_curve as tuning_curve
-from fingerpad.psychophysics.psychometric import fit_psychometric as fit_psychometric
+from fingerpad.psychophysics.curve_fit import fit_psychometric as fit_psychometric
 from fingerpad.reduction.building import reduce_touch as reduce_touch
 from fingerpad.reduction.model import ReducedModel as ReducedModel
 from fingerpad.reduction.model import read_reduced as read_reduced

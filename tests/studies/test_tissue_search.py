@@ -11,7 +11,7 @@ from fingerpad.core.signals import Traces
 from fingerpad.data import protocol
 from fingerpad.experiments.conditions import RECEPTOR_X_MM, Conditions
 from fingerpad.experiments.runner import Runner
-from fingerpad.inference import rates_and_hit_rates
+from fingerpad.inference import afferent_fit
 from presses import Coarse
 from studies import tissue_search
 from studies.pages import DOCS
@@ -118,7 +118,7 @@ TRUTH = np.array([2e-7, 1.2e-4, 1.4e-6, 50.0, 1e-6, 50.0])
 
 @pytest.fixture
 def short_fits(monkeypatch):
-    monkeypatch.setattr(rates_and_hit_rates, "MOST_EVALUATIONS", 24)
+    monkeypatch.setattr(afferent_fit, "MOST_EVALUATIONS", 24)
 
 
 def test_the_fit_finds_an_afferent_that_responds_like_the_true_one(short_fits):
@@ -172,7 +172,7 @@ def few(patch):
     human = replace(HUMAN, finalist=False)
     doubled = replace(human, name="doubled", factor=2.0)
     patch.setattr(tissue_search, "candidates", lambda: (human, doubled))
-    patch.setattr(rates_and_hit_rates, "MOST_EVALUATIONS", 8)
+    patch.setattr(afferent_fit, "MOST_EVALUATIONS", 8)
 
 
 @pytest.fixture(scope="module")

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from fingerpad.experiments.discrimination.analysis import TaskResult
     from fingerpad.experiments.fit.results import FitResult
     from fingerpad.inference.spike_fit import SpikeFit
-    from fingerpad.psychophysics.psychometric import PsychometricFit
+    from fingerpad.psychophysics.curve_fit import PsychometricFit
     from fingerpad.reduction.streaming import ReducedSample
     from fingerpad.skin.sampling import SkinResponse, SurfaceProfile
 

@@ -1,25 +1,29 @@
 """From responses and judgements to thresholds: codes, observers, ideal observer, psychometric functions."""
 
-from fingerpad.psychophysics.code_efficiency import (
-    CodeEfficiency,
-    code_efficiency,
-    code_statistic,
-    noisy_presentations,
+from fingerpad.psychophysics.curve import JudgementCounts, PsychometricFunction
+from fingerpad.psychophysics.curve_fit import PsychometricFit, fit_psychometric
+from fingerpad.psychophysics.curve_uncertainty import (
+    FunctionCloud,
+    GoodnessOfFit,
+    bootstrap,
+    goodness_of_fit,
+    posterior,
 )
-from fingerpad.psychophysics.functions import JudgementCounts, PsychometricFunction
 from fingerpad.psychophysics.ideal_observer import (
+    CodeEfficiency,
     Discriminability,
     GaussianResponses,
     Presentation,
     ResponseModel,
     Statistic,
+    code_efficiency,
     discriminability,
     efficiency,
     gaussian_information,
     multiplied_responses,
+    noisy_presentations,
     present,
 )
-from fingerpad.psychophysics.psychometric import PsychometricFit, fit_psychometric
 from fingerpad.psychophysics.sensitivity import (
     TASKS,
     Sensitivity,
@@ -30,18 +34,11 @@ from fingerpad.psychophysics.sensitivity import (
     sensitivity,
     yes_no,
 )
-from fingerpad.psychophysics.uncertainty import (
-    FunctionCloud,
-    GoodnessOfFit,
-    bootstrap,
-    goodness_of_fit,
-    posterior,
-)
 
 __all__ = [
     "TASKS", "CodeEfficiency", "Discriminability", "FunctionCloud", "GaussianResponses", "GoodnessOfFit",
     "JudgementCounts", "Presentation", "PsychometricFit", "PsychometricFunction", "ResponseModel",
-    "Sensitivity", "Statistic", "bootstrap", "code_efficiency", "code_statistic", "d_prime_of_proportion",
+    "Sensitivity", "Statistic", "bootstrap", "code_efficiency", "d_prime_of_proportion",
     "discriminability", "efficiency", "fit_psychometric", "forced_choice", "gaussian_information",
     "goodness_of_fit", "multiplied_responses", "noisy_presentations", "posterior", "present",
     "same_different_by_difference", "same_different_by_looks", "sensitivity", "yes_no",

@@ -17,6 +17,12 @@ The ideal observer knows the distribution of the responses:
 
 The paper's noise multiplies each response by Normal(1, sigma_1): a Gaussian with the standard deviation
 sigma_1 mu_i, which depends on the stimulus as well.
+A noise floor s is added to it where codes are compared with the ideal observer:
+
+    r ~ Normal(mu, (sigma_1 mu)^2 + s^2)
+
+Without the floor a receptor that responds weakly or not at all has hardly any noise, and one that begins to
+respond identifies the stimulus with certainty (docs/decisions.md#ideal-observer).
 """
 
 from __future__ import annotations
@@ -41,13 +47,14 @@ from fingerpad.core.values import (
     FiniteVector,
     FloatArray,
     IntArray,
+    Matrix,
     NotNegative,
     Several,
     Whole,
     float_array,
     vector,
 )
-from fingerpad.psychophysics.noisy_responses import checked_noise, session_trials
+from fingerpad.psychophysics.encoding import checked_noise, session_trials
 
 
 @runtime_checkable
@@ -385,3 +392,70 @@ def gaussian_information(
         )
     variance = np.square(sigma * values) + smallest_spread**2
     return float((np.square(rises) / variance + 2.0 * np.square(sigma**2 * values * rises / variance)).sum())
+
+
+SMALLEST_SPREAD = 1.0  # Noise floor s. [spikes/s or ms]
+EFFICIENCY_TRIALS = 4000  # Presentations of either stimulus behind one efficiency.
+
+LEAST_KNOWN = 10.0
+"""Ratio of the ideal observer's d' to its standard error from which on an efficiency is reported."""
+
+
+@dataclass(frozen=True)
+class CodeEfficiency:
+    """A code and the ideal observer of the same responses.
+
+    Parameters
+    ----------
+    code, ideal : Discriminability
+        Of either.
+    efficiency, efficiency_error : float
+        Squared ratio of d' and its standard error. NaN where the ideal observer is always correct, or its d'
+        is below `LEAST_KNOWN` standard errors.
+    """
+
+    code: Discriminability
+    ideal: Discriminability
+    efficiency: float
+    efficiency_error: float
+
+
+@checked
+def noisy_presentations(
+    table: Matrix, noise_sigma: Finite, seed: Whole, session: Whole = 0
+) -> list[Presentation]:
+    """Draw responses to the standard and to each comparison.
+
+    Parameters
+    ----------
+    table : array (n_stimuli, n_receptors)
+        One measure of every receptor without noise, the standard first. [spikes/s or ms]
+    noise_sigma : float
+        Standard deviation sigma_1 of the multiplicative noise, above 0.
+    seed, session : int
+        Of the random numbers.
+    """
+    standard, *comparisons = (multiplied_responses(row, noise_sigma, SMALLEST_SPREAD) for row in table)
+    return [present(standard, comparison, seed, EFFICIENCY_TRIALS, session) for comparison in comparisons]
+
+
+@checked
+def code_efficiency(shown: Presentation, statistic: Statistic) -> CodeEfficiency:
+    """Compare a code, by the statistic of an `Encoder`, with the ideal observer of the same presentations.
+
+    Examples
+    --------
+    Of two afferents one changes its rate. The Gradient Sum also contains the noise of the other:
+
+    >>> import numpy as np
+    >>> table = np.array([[50.0, 50.0], [50.0, 53.0]])
+    >>> (shown,) = noisy_presentations(table, 0.1, seed=1)
+    >>> found = code_efficiency(shown, lambda responses: np.abs(responses[:, 1] - responses[:, 0]))
+    >>> bool(found.efficiency < 0.6)
+    True
+    """
+    code, ideal = shown.of(statistic), shown.ideal()
+    # Equal stimuli have a d' of 0 without any error.
+    known = 0.0 < ideal.d_prime < math.inf and ideal.d_prime >= LEAST_KNOWN * ideal.d_prime_error
+    share, error = efficiency(code, ideal) if known else (math.nan, math.nan)
+    return CodeEfficiency(code, ideal, share, error)

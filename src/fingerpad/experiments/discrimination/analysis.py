@@ -14,10 +14,10 @@ from fingerpad.core.displayed import Result
 from fingerpad.core.errors import InputError
 from fingerpad.core.signals import Skin
 from fingerpad.core.values import FloatArray, IntArray, Matrix, Vector
+from fingerpad.experiments.discrimination.decoding import SESSION as TASK_SESSION
 from fingerpad.experiments.discrimination.decoding import (
     SideCurve,
     TaskStatistic,
-    code_hit_rates,
     fit_task_noise,
     response_table,
     side_curves,
@@ -30,16 +30,17 @@ from fingerpad.experiments.requests.afferents import parameters_of
 from fingerpad.experiments.requests.parts import at
 from fingerpad.experiments.requests.stimuli import NamedStimulus
 from fingerpad.experiments.runner import Runner
-from fingerpad.psychophysics.code_efficiency import (
+from fingerpad.psychophysics.curve import binomial_interval
+from fingerpad.psychophysics.encoding import taking_part
+from fingerpad.psychophysics.ideal_observer import (
     EFFICIENCY_TRIALS,
     SMALLEST_SPREAD,
+    Presentation,
     code_efficiency,
-    code_statistic,
+    multiplied_responses,
     noisy_presentations,
 )
-from fingerpad.psychophysics.encoding import taking_part
-from fingerpad.psychophysics.functions import binomial_interval
-from fingerpad.psychophysics.ideal_observer import Presentation, multiplied_responses
+from fingerpad.psychophysics.observer import ENCODERS, discriminate_by
 
 SESSION = 2  # Session of the random numbers of efficiencies; that of the hit rates is another.
 Encoded = tuple[FloatArray, np.ndarray]  # A measure (n_stimuli, n_receptors), and pairs of neighbours.
@@ -252,7 +253,9 @@ def _noise(
             f"{_named(task.pressed, silent[measure])}; give a number, or another measure first."
         )
     rows, observed = [row - 1 for row in points], list(points.values())
-    fit = fit_task_noise(code, *encoded[measure], rows, observed, task.experiment.seed, task.experiment.plan)
+    table, neighbours = encoded[measure]
+    encoder, settings = ENCODERS[code](neighbours), task.experiment
+    fit = fit_task_noise(encoder, table, rows, observed, settings.seed, settings.plan)
     return TaskNoise(
         sigma=fit.noise_sigma,
         fitted_to=FittedNoise(
@@ -297,17 +300,18 @@ def _decoding(
             d_prime=np.array([presentation.ideal().d_prime for presentation in shown]),
         )
     else:
-        rates = code_hit_rates(code, table, neighbours, sigma, settings.seed, task.experiment.plan)
+        encoder = ENCODERS[code](neighbours)
+        rates = discriminate_by(encoder, table, sigma, settings.seed, settings.plan, session=TASK_SESSION)
         decoding = Decoding(
             code=code,
             measure=measure,
             hit_rate=rates.hit_rate,
             hit_rate_sd=rates.hit_rate_sd,
-            statistic=task_statistic(code, table, neighbours, sigma, settings.seed),
+            statistic=task_statistic(encoder, table, sigma, settings.seed),
         )
         if shown:
             standard = multiplied_responses(table[0], sigma, SMALLEST_SPREAD)
-            statistic = code_statistic(code, standard, neighbours, settings.seed, SESSION)
+            statistic = encoder.statistic(standard, settings.seed, SESSION)
             compared = [code_efficiency(presentation, statistic) for presentation in shown]
             decoding = replace(
                 decoding,

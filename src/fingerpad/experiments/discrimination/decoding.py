@@ -9,20 +9,13 @@ import numpy as np
 
 from fingerpad.core.checked import result_class
 from fingerpad.core.errors import ConvergenceError, InputError
-from fingerpad.core.random_streams import Purpose, normals
-from fingerpad.core.signals import HitRates, ResponseMap
+from fingerpad.core.signals import ResponseMap
 from fingerpad.core.values import FloatArray, IntArray, Number, Vector
 from fingerpad.experiments.discrimination.request import CurveSettings
-from fingerpad.psychophysics.discrimination import (
-    Experiment,
-    discriminate_euclidean,
-    discriminate_gradient_sum,
-)
-from fingerpad.psychophysics.encoding import RESPONSE_MEASURES, distance
-from fingerpad.psychophysics.noise_fit import NOISE_DRAWS, NoiseFit, expected_hit_rates, fit_noise_sigma
-from fingerpad.psychophysics.noisy_responses import noisy_gradient_sums, noisy_responses, session_trials
-from fingerpad.psychophysics.psychometric import fit_psychometric
-from fingerpad.psychophysics.uncertainty import bootstrap, posterior
+from fingerpad.psychophysics.curve_fit import fit_psychometric
+from fingerpad.psychophysics.curve_uncertainty import bootstrap, posterior
+from fingerpad.psychophysics.encoding import RESPONSE_MEASURES
+from fingerpad.psychophysics.observer import Encoder, Experiment, NoiseFit, fit_noise_sigma
 
 SESSION = 1  # Session of the random numbers: that of the reproduction's spheres at 0.0 mm.
 SHOWN_PRESENTATIONS = 1000  # Presentations behind the mean and spread of a statistic that a figure shows.
@@ -101,50 +94,20 @@ def silent_stimuli(table: FloatArray, measure: str, latest_ms: float | None = No
     return np.flatnonzero(missing.sum(axis=1) == missing.sum(axis=1).max())
 
 
-def code_hit_rates(
-    code: str, table: FloatArray, neighbours: np.ndarray, noise_sigma: float, seed: int, plan: Experiment
-) -> HitRates:
-    if code == "euclidean":
-        return discriminate_euclidean(table, noise_sigma, seed, plan, session=SESSION)
-    return discriminate_gradient_sum(table, neighbours, noise_sigma, seed, plan, session=SESSION)
-
-
 def fit_task_noise(
-    code: str,
+    encoder: Encoder,
     table: FloatArray,
-    neighbours: np.ndarray,
     comparisons: Sequence[int],
     observed: Sequence[float],
     seed: int,
     plan: Experiment,
 ) -> NoiseFit:
-    chosen = list(comparisons)
-
-    def by_distance(sigma: float) -> FloatArray:
-        return code_hit_rates(code, table, neighbours, sigma, seed, plan).hit_rate[chosen]
-
-    draws = normals(seed, 1, table.shape[1], Purpose.RESPONSE, NOISE_DRAWS)[0].T
-
-    def by_gradient(sigma: float) -> FloatArray:
-        return expected_hit_rates(table, neighbours, sigma, draws, plan.criterion)[chosen]
-
-    return fit_noise_sigma(by_distance if code == "euclidean" else by_gradient, observed)
+    chosen, predict = list(comparisons), encoder.predictor(table, seed, plan, SESSION)
+    return fit_noise_sigma(lambda sigma: predict(sigma)[chosen], observed)
 
 
-def task_statistic(
-    code: str, table: FloatArray, neighbours: np.ndarray, noise_sigma: float, seed: int
-) -> TaskStatistic:
-    n_stimuli = len(table)
-    if code == "euclidean":
-        sets = noisy_responses(
-            table, noise_sigma, seed, session_trials(SESSION, n_stimuli), 2 * SHOWN_PRESENTATIONS
-        )
-        # The standard is compared with other presentations of itself.
-        values = distance(sets[:1, :SHOWN_PRESENTATIONS], sets[:, SHOWN_PRESENTATIONS:])
-    else:
-        trials = session_trials(SESSION, n_stimuli, 1)
-        sums = noisy_gradient_sums(table, neighbours, noise_sigma, seed, trials, SHOWN_PRESENTATIONS)
-        values = sums[:, 0]
+def task_statistic(encoder: Encoder, table: FloatArray, noise_sigma: float, seed: int) -> TaskStatistic:
+    values = encoder.of_noisy(table, noise_sigma, seed, SESSION, SHOWN_PRESENTATIONS)
     return TaskStatistic(mean=values.mean(axis=1), sd=values.std(axis=1, ddof=1))
 
 

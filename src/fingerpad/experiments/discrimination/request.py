@@ -56,9 +56,9 @@ from fingerpad.experiments.requests.stimuli import (
 from fingerpad.experiments.requests.stimulus import FINGER_OBJECTS, named_files
 from fingerpad.neuron.population import Population
 from fingerpad.neuron.spikes import Windows, rate_windows_ms
-from fingerpad.psychophysics.discrimination import CRITERION_MOVES, Experiment
-from fingerpad.psychophysics.functions import SIGMOIDS
-from fingerpad.psychophysics.noisy_responses import LARGEST_NOISE
+from fingerpad.psychophysics.curve import SIGMOIDS
+from fingerpad.psychophysics.encoding import LARGEST_NOISE
+from fingerpad.psychophysics.observer import CRITERION_MOVES, Experiment
 from fingerpad.skin.indentation import Touch
 
 IDEAL = "ideal"
@@ -81,7 +81,7 @@ class ExperimentSettings(Part):
     presentations: Several = _REPETITIONS
     distributions: Several = _REPETITIONS
     pairs: Several = _REPETITIONS
-    hit_rates: Several = _REPETITIONS  # As of `fingerpad.psychophysics.discrimination.Experiment`.
+    hit_rates: Several = _REPETITIONS  # As of `fingerpad.psychophysics.observer.Experiment`.
     presentations_varied: Several = int(psychophysics.REPETITIONS_VARIED_CRITERION.value)
     """Presentations of each stimulus when the criterion varies."""
     trials: Count = _REPETITIONS

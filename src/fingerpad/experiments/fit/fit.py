@@ -11,19 +11,18 @@ from fingerpad.core.checked import checked
 from fingerpad.core.errors import InputError
 from fingerpad.core.signals import Traces
 from fingerpad.core.units import units_of
-from fingerpad.core.values import Flag, FloatArray, IntArray, Whole, whole
-from fingerpad.data import protocol
+from fingerpad.core.values import Flag, FloatArray, IntArray, Whole
 from fingerpad.experiments.fit.methods import Beside, Prepared, check_beside, fit_offset, prepare
 from fingerpad.experiments.fit.results import FitResult, FittedFold, PhaseRates
+from fingerpad.inference.afferent_fit import validated
 from fingerpad.inference.fitting.cross_validation import (
     CrossValidation,
-    cross_validate,
     fractional_sum_of_squares,
     interleaved_folds,
 )
 from fingerpad.inference.identifiable import IDENTIFIABLE_NAMES, identifiable
+from fingerpad.inference.problem import RateProblem
 from fingerpad.inference.rate_model import AfferentModel, four_number_model
-from fingerpad.inference.rate_problem import RateProblem
 from fingerpad.inference.recordings import PHASES, RateRecordings, SpikeRecordings
 from fingerpad.neuron.afferent import PARAMETER_NAMES, parameter_units
 from fingerpad.neuron.spikes import Windows
@@ -97,11 +96,10 @@ def fit_recordings(
     rates = recordings if isinstance(recordings, RateRecordings) else recordings.rates(counted)
     if beside is not None:
         check_beside(beside)
-    folds = folds_in_turn(len(rates.stimuli)) if memberships is None else np.asarray(memberships)
+    folds = interleaved_folds(len(rates.stimuli)) if memberships is None else np.asarray(memberships)
     check_enough(rates, folds, len(IDENTIFIABLE_NAMES) + (beside is not None))
     prepared = prepare(method, model, recordings, rates, seed)
-    best = prepared.method.fit(prepared.problem, np.arange(len(rates.stimuli)))
-    validation = cross_validate(prepared.problem, prepared.method, folds)
+    best, validation = validated(prepared.problem, prepared.method, folds)
     six = prepared.six(best.parameters)
     four = identifiable(six)
     covariance = prepared.covariance(best, validation)
@@ -138,14 +136,6 @@ def fit_recordings(
         sensitivity=sensitivity,
         offset=None if beside is None else fit_offset(beside, rates, folds, method, windows_ms, seed),
     )
-
-
-def folds_in_turn(n_stimuli: int, n_folds: int | None = None) -> IntArray:
-    """Fold of each stimulus, assigned in turn: six folds, or one per stimulus where there are fewer."""
-    whole("stimuli", n_stimuli, at_least=2)
-    if n_folds is None:
-        n_folds = min(int(protocol.FOLDS.value), n_stimuli)
-    return interleaved_folds(n_stimuli, n_folds)
 
 
 def check_enough(rates: RateRecordings, memberships: IntArray, n_free: int = len(IDENTIFIABLE_NAMES)) -> None:

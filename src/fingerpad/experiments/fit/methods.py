@@ -1,4 +1,4 @@
-"""Methods of fitting recordings: each a problem, a method, and the meaning of its parameters; the offset."""
+"""The table of methods of fitting recordings; the receptor's offset."""
 
 from __future__ import annotations
 
@@ -14,31 +14,25 @@ from fingerpad.core.signals import Traces
 from fingerpad.core.values import FloatArray, IntArray, Whole, choice
 from fingerpad.data import neuron
 from fingerpad.experiments.fit.results import HeldOffset, OffsetFit, SpikeFitSummary
-from fingerpad.inference.afferent_methods import (
+from fingerpad.inference.afferent_fit import (
     ReceptorOffset,
-    along_slopes,
-    and_offset,
-    bounds_of,
-    by_differences,
+    Search,
     fitted_four,
     fitted_six,
-    five_number_problem,
-    four_number_problem,
+    four_numbers,
+    four_numbers_and_offset,
     response_surface,
-    search_from,
+    validated,
 )
-from fingerpad.inference.closed_form import ClosedFormModel
-from fingerpad.inference.fitting.cross_validation import CrossValidation, cross_validate, jackknife_covariance
-from fingerpad.inference.fitting.least_squares import LeastSquares
-from fingerpad.inference.fitting.methods import Bounds, Continued, Fit, Method
+from fingerpad.inference.fitting.cross_validation import CrossValidation, jackknife_covariance
+from fingerpad.inference.fitting.methods import Continued, Fit, LeastSquares, Method
 from fingerpad.inference.identifiable import IDENTIFIABLE_NAMES, SPIKE_PARAMETER_NAMES, identifiable
+from fingerpad.inference.problem import RateProblem
 from fingerpad.inference.rate_model import AfferentModel
-from fingerpad.inference.rate_problem import RateProblem
 from fingerpad.inference.recordings import RateRecordings, SpikeRecordings
 from fingerpad.neuron.spikes import Windows
 
 Recordings = RateRecordings | SpikeRecordings
-MethodOf = Callable[[AfferentModel, RateProblem, Bounds, int], Method]
 
 
 @dataclass(frozen=True)
@@ -56,6 +50,82 @@ class Prepared:
     def spikes(self, fit: Fit, folds: CrossValidation) -> SpikeFitSummary | None:
         """Summary of a fit to spikes; None for a fit to rates."""
         return None
+
+
+@dataclass(frozen=True)
+class FitMethod:
+    """One row of the table of methods."""
+
+    prepare: Callable[[AfferentModel, Recordings, RateRecordings, int], Prepared]
+    """From the model, the recordings, their rates and a seed to the problem and its method."""
+    needs_spikes: bool = False
+    in_place: str = ""  # Where an offset can be fitted: the method that first fits a receptor in its place,
+    moving: Callable[[Search, FloatArray, FloatArray, int], Method] | None = None
+    """and the method that lets it move, from the search, the result in place, the offsets and a seed."""
+
+
+def _of_four(method: Callable[[Search, int], Method]) -> Callable[..., Prepared]:
+    """Return what prepares a method that fits the four numbers."""
+
+    def prepare(model: AfferentModel, recordings: Recordings, rates: RateRecordings, seed: int) -> Prepared:
+        search = four_numbers(model, rates)
+        return Prepared(search.problem, method(search, seed), fitted_six)
+
+    return prepare
+
+
+def _surface(model: AfferentModel, recordings: Recordings, rates: RateRecordings, seed: int) -> Prepared:
+    return Prepared(RateProblem(model, rates), response_surface(), lambda six: six)
+
+
+def _spikes(model: AfferentModel, recordings: Recordings, rates: RateRecordings, seed: int) -> Prepared:
+    # Only this method loads the module and its kernels.
+    from fingerpad.experiments.fit.spike_method import prepare_spikes
+
+    return prepare_spikes(model, recordings, rates, seed)
+
+
+def _evolution(search: Search, seed: int) -> Method:
+    """CMA-ES from where the slopes in closed form lead."""
+    return Continued(search.along_slopes(), lambda begun: search.by_evolution(begun, seed), name="CMA-ES")
+
+
+def _from_all_offsets(search: Search, begun: FloatArray, offsets_mm: FloatArray, seed: int) -> Method:
+    within = np.clip(begun, search.bounds.low[:4], search.bounds.high[:4])  # round-off at a bound
+    starts = [np.append(within, offset) for offset in sorted({0.0, *offsets_mm[1:-1].tolist()})]
+    return LeastSquares(starts, search.bounds, n_refined=2)
+
+
+def _evolution_from_0(search: Search, begun: FloatArray, offsets_mm: FloatArray, seed: int) -> Method:
+    return search.by_evolution(np.append(begun, 0.0), seed)
+
+
+METHODS = {
+    "least_squares": FitMethod(
+        _of_four(lambda search, seed: search.by_differences()),
+        in_place="least_squares",
+        moving=_from_all_offsets,
+    ),
+    "response_surface": FitMethod(_surface),
+    "closed_form": FitMethod(_of_four(lambda search, seed: search.along_slopes())),
+    "cma_es": FitMethod(_of_four(_evolution), in_place="closed_form", moving=_evolution_from_0),
+    "likelihood": FitMethod(_spikes, needs_spikes=True),
+}
+"""Methods that fit recordings, by the names that the command line gives."""
+
+OFFSET_METHODS = tuple(name for name, method in METHODS.items() if method.moving)
+"""Methods that an offset can be added to."""
+
+
+@checked
+def prepare(
+    method: Annotated[str, choice(METHODS)],
+    model: AfferentModel,
+    recordings: Recordings,
+    rates: RateRecordings,
+    seed: Whole,
+) -> Prepared:
+    return METHODS[method].prepare(model, recordings, rates, seed)
 
 
 def check_spikes(recordings: Recordings, n_motions: int) -> SpikeRecordings:
@@ -86,46 +156,6 @@ def check_spikes(recordings: Recordings, n_motions: int) -> SpikeRecordings:
                 remedy=f"{name} has two that are {closest:.3g} ms apart; sort the unit again, or fit rates",
             )
     return recordings
-
-
-def _evolution(model: AfferentModel, problem: RateProblem, bounds: Bounds, seed: int) -> Method:
-    """CMA-ES from where the slopes in closed form lead."""
-    return Continued(
-        along_slopes(ClosedFormModel(model), problem, bounds),
-        lambda begun: search_from(begun, bounds, seed),
-        name="CMA-ES",
-    )
-
-
-FOUR_NUMBER_METHODS: dict[str, MethodOf] = {
-    "least_squares": lambda model, problem, bounds, seed: by_differences(bounds),
-    "closed_form": lambda model, problem, bounds, seed: along_slopes(ClosedFormModel(model), problem, bounds),
-    "cma_es": _evolution,
-}
-"""Methods that fit four numbers, by name."""
-
-METHODS = ("least_squares", "response_surface", "closed_form", "cma_es", "likelihood")
-"""Methods that fit recordings, by the names that the command line gives."""
-
-
-@checked
-def prepare(
-    method: Annotated[str, choice(METHODS)],
-    model: AfferentModel,
-    recordings: Recordings,
-    rates: RateRecordings,
-    seed: Whole,
-) -> Prepared:
-    if method == "likelihood":
-        # Only this method loads the module and its kernels.
-        from fingerpad.experiments.fit.spike_method import prepare_spikes
-
-        return prepare_spikes(model, recordings, rates, seed)
-    if method == "response_surface":
-        return Prepared(RateProblem(model, rates), response_surface(), lambda six: six)
-    problem = four_number_problem(model, rates)
-    fitting = FOUR_NUMBER_METHODS[method](model, problem, bounds_of(*model.drives), seed)
-    return Prepared(problem, fitting, fitted_six)
 
 
 Beside = Mapping[float, Traces | Sequence[Traces]]
@@ -165,15 +195,21 @@ def fit_offset(
     windows_ms: Windows | None,
     seed: Whole = 0,
 ) -> OffsetFit:
+    """Fit a receptor in its place, then let it move from the best fit, which it can only improve."""
     beside_mm = check_beside(beside)
     roving = ReceptorOffset.of_traces({offset: beside[offset] for offset in beside_mm}, windows_ms)
-    problem, everything = five_number_problem(roving, rates), np.arange(roving.n_stimuli)
-    searching = _continued(roving, rates, method, seed)
-    best = searching.fit(problem, everything)
-    crossed = cross_validate(problem, searching, memberships)
+    search, row = four_numbers_and_offset(roving, rates), METHODS[method]
+    problem, moving = search.problem, row.moving
+    assert moving is not None
+    first = prepare(row.in_place, roving.at(0.0), rates, rates, seed)
+    searching = Continued(
+        first.method, lambda begun: moving(search, begun, roving.offsets_mm, seed), first.problem
+    )
+    best, crossed = validated(problem, searching, memberships)
     four, offset_mm = fitted_four(best.parameters[:4]).tolist(), float(best.parameters[-1])
     folds_mm = [float(fold.fit.parameters[-1]) for fold in crossed.folds]
     error = jackknife_covariance(np.reshape(folds_mm, (-1, 1)))
+    everything = np.arange(roving.n_stimuli)
     held = [prepare(method, place, rates, rates, seed) for place in roving.models]
     return OffsetFit(
         offset_mm=offset_mm,
@@ -190,25 +226,3 @@ def fit_offset(
             fss_in_sample=np.array([one.method.fit(one.problem, everything).score for one in held]),
         ),
     )
-
-
-def _continued(roving: ReceptorOffset, rates: RateRecordings, method: str, seed: int) -> Continued:
-    """Fit a receptor in its place, then let it move from the best fit, which it can only improve."""
-    centre = roving.at(0.0)
-    problem, of_four = four_number_problem(centre, rates), bounds_of(*centre.drives)
-    low_mm, *inner_mm, high_mm = roving.offsets_mm.tolist()
-    bounds = and_offset(of_four, low_mm, high_mm)
-
-    def moving(begun: FloatArray) -> Method:
-        if method == "cma_es":
-            return search_from(np.append(begun, 0.0), bounds, seed)
-        within = np.clip(begun, of_four.low, of_four.high)  # round-off at a bound
-        starts = [np.append(within, offset) for offset in sorted({0.0, *inner_mm})]
-        return LeastSquares(starts, bounds, n_refined=2)
-
-    in_place = FOUR_NUMBER_METHODS[OFFSET_METHODS[method]](centre, problem, of_four, seed)
-    return Continued(in_place, moving, problem)
-
-
-OFFSET_METHODS = {"least_squares": "least_squares", "cma_es": "closed_form"}
-"""Methods that an offset can be added to, each with the method that first fits a receptor in its place."""

@@ -16,16 +16,20 @@ from fingerpad.experiments.fit.results import (
     RateBand,
     RatePosterior,
 )
-from fingerpad.inference.afferent_methods import start_points
-from fingerpad.inference.afferent_posterior import afferent_posterior, from_coordinates, to_coordinates
+from fingerpad.inference.afferent_fit import start_points
 from fingerpad.inference.fitting.methods import halton
 from fingerpad.inference.fitting.posterior import credible_band
 from fingerpad.inference.fitting.profile_likelihood import ProfileLikelihood, profile_likelihoods
 from fingerpad.inference.fitting.sensitivity import sobol_indices
 from fingerpad.inference.identifiable import IDENTIFIABLE_NAMES, identifiable
-from fingerpad.inference.rate_likelihood import RateLikelihood
+from fingerpad.inference.problem import RateProblem
 from fingerpad.inference.rate_model import AfferentModel, four_number_model
-from fingerpad.inference.rate_problem import RateProblem
+from fingerpad.inference.rate_posterior import (
+    RateLikelihood,
+    afferent_posterior,
+    from_coordinates,
+    to_coordinates,
+)
 from fingerpad.inference.recordings import RateRecordings
 
 LEVEL = 0.95  # Probability within every interval and band.

@@ -29,7 +29,7 @@ from fingerpad.core.values import (
 )
 from fingerpad.data.observations import bar_firing_rates
 from fingerpad.experiments.conditions import Conditions
-from fingerpad.experiments.fit.fit import check_enough, fit_recordings, folds_in_turn
+from fingerpad.experiments.fit.fit import check_enough, fit_recordings
 from fingerpad.experiments.fit.methods import METHODS, check_offset, check_spikes
 from fingerpad.experiments.fit.results import FitResult
 from fingerpad.experiments.manifest import Manifest
@@ -63,10 +63,10 @@ from fingerpad.experiments.requests.stimulus import (
 from fingerpad.experiments.runner import Runner
 from fingerpad.geometry.grading import RESOLUTIONS
 from fingerpad.geometry.indenters import Bar
-from fingerpad.inference.afferent_methods import OFFSETS_MM
+from fingerpad.inference.afferent_fit import OFFSETS_MM, fit_afferent
+from fingerpad.inference.fitting.cross_validation import interleaved_folds
 from fingerpad.inference.identifiable import IDENTIFIABLE_NAMES
 from fingerpad.inference.recordings import RateRecordings, SpikeRecordings
-from fingerpad.inference.typed_fit import fit_afferent
 from fingerpad.neuron.afferent import AnyAfferent, type_of
 from fingerpad.neuron.spikes import Windows, common_rate_windows_ms
 from fingerpad.skin.fields import sampled_fields
@@ -178,7 +178,7 @@ class FitRequest(Request, FingerDescription):
             check_offset(self.method, [stimulus.x_mm for stimulus in self.recorded.stimuli.values()])
         n_free = len(self.free) or len(IDENTIFIABLE_NAMES) + self.offset
         check_enough(self.rates, self.memberships, n_free)
-        if self.method == "likelihood":
+        if METHODS[self.method].needs_spikes:
             motions = {stimulus.motion for stimulus in self.recorded.stimuli.values()}
             check_spikes(self.recorded.recordings, len(motions))
 
@@ -267,7 +267,7 @@ class FitRequest(Request, FingerDescription):
             raise InputError(
                 "folds", "must come from the column fold or from folds, not both", remedy="leave one out"
             )
-        return folds_in_turn(len(self.rates.stimuli), self.folds) if given is None else given
+        return interleaved_folds(len(self.rates.stimuli), self.folds) if given is None else given
 
     @cached_property
     def touches(self) -> dict[str, Touch]:

@@ -23,7 +23,7 @@ from fingerpad.core.checked import result_class
 from fingerpad.experiments.gerling2014.percept import USED, Estimate, difference
 from fingerpad.experiments.gerling2014.skin import SkinDeflectionResult
 from fingerpad.experiments.gerling2014.thresholds import LAYOUTS
-from fingerpad.inference.fitting.response_surface import ResponseSurface
+from fingerpad.inference.fitting.methods import ResponseSurface
 
 if TYPE_CHECKING:
     from fingerpad.experiments.gerling2014.nerve import Search

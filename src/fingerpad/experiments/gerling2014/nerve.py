@@ -26,8 +26,7 @@ from fingerpad.experiments.gerling2014.skin import (
     plate,
 )
 from fingerpad.geometry.indenters import Bar
-from fingerpad.inference.afferent_methods import response_surface, start_points
-from fingerpad.inference.afferent_posterior import afferent_posterior
+from fingerpad.inference.afferent_fit import response_surface, start_points
 from fingerpad.inference.fitting.cross_validation import (
     CrossValidation,
     FoldFit,
@@ -38,9 +37,9 @@ from fingerpad.inference.fitting.methods import Fit, FitStep, Method
 from fingerpad.inference.fitting.posterior import credible_band
 from fingerpad.inference.fitting.sensitivity import identifiability
 from fingerpad.inference.identifiable import IDENTIFIABLE_NAMES, identifiable
-from fingerpad.inference.rate_likelihood import INDEPENDENT, RateLikelihood, ResidualDraws
+from fingerpad.inference.problem import RateProblem
 from fingerpad.inference.rate_model import AfferentModel, four_number_model
-from fingerpad.inference.rate_problem import RateProblem
+from fingerpad.inference.rate_posterior import INDEPENDENT, RateLikelihood, ResidualDraws, afferent_posterior
 from fingerpad.inference.recordings import RateRecordings
 from fingerpad.neuron.afferent import PARAMETER_NAMES, Afferent, parameter_units
 from fingerpad.neuron.lif import membrane_potential

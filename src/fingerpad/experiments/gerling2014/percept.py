@@ -28,29 +28,34 @@ from fingerpad.core.signals import HitRates, Traces
 from fingerpad.core.values import FloatArray, IntArray, Matrix, Number, Vector, WholeVector
 from fingerpad.data import protocol, psychophysics
 from fingerpad.experiments.conditions import RECEPTOR_X_MM, Conditions, Touch
+from fingerpad.inference.afferent_fit import ToRatesAndHitRates
+from fingerpad.inference.problem import SphereHitRates
 from fingerpad.inference.rate_model import AfferentModel
-from fingerpad.inference.rates_and_hit_rates import SphereHitRates, ToRatesAndHitRates
 from fingerpad.neuron.afferent import Afferent
 from fingerpad.neuron.population import Population
-from fingerpad.psychophysics.discrimination import (
+from fingerpad.psychophysics.curve import binomial_interval
+from fingerpad.psychophysics.encoding import (
+    RESPONSE_MEASURES,
+    gradient_sum,
+    neighbour_pairs,
+    noisy_gradient_sums,
+    session_trials,
+    taking_part,
+)
+from fingerpad.psychophysics.observer import (
     CRITERION_MOVES,
     END_OF_STIMULUS_MS,
-    Experiment,
-    compare_gradient_sum_observers,
-    discriminate_euclidean,
-    discriminate_gradient_sum,
-    hit_rates_of_sums,
-)
-from fingerpad.psychophysics.encoding import RESPONSE_MEASURES, gradient_sum, neighbour_pairs, taking_part
-from fingerpad.psychophysics.functions import binomial_interval
-from fingerpad.psychophysics.noise_fit import (
     NOISE_DRAWS,
+    EuclideanDistance,
+    Experiment,
     NoiseFit,
+    compare_gradient_sum_observers,
+    discriminate_by,
     expected_euclidean_hit_rates,
     expected_hit_rates,
     fit_noise_sigma,
+    hit_rates_of_sums,
 )
-from fingerpad.psychophysics.noisy_responses import noisy_gradient_sums, session_trials
 from fingerpad.skin.sampling import SkinResponse
 
 CURVATURES = psychophysics.SPHERE_CURVATURES.value
@@ -463,7 +468,7 @@ def _judge(
     for sigma in CRITERION_SIGMAS:
         observers[f"criterion_{sigma:g}"] = noise_sigma, Experiment(criterion_sigma=sigma)
     rates = {
-        name: discriminate_gradient_sum(*one, noise_sigma, seed, session=session)
+        name: TODO_discriminate_gradient_sum(*one, noise_sigma, seed, session=session)
         for name, one in measures.items()
         if name != "static"
     }
@@ -471,7 +476,9 @@ def _judge(
     found = compare_gradient_sum_observers(*measures["static"], plans, seed, session=session)
     rates |= dict(zip(observers, found, strict=True))
     responses = measures["static"].responses
-    return rates | {"euclidean": discriminate_euclidean(responses, noise_sigma, seed, session=session)}
+    return rates | {
+        "euclidean": discriminate_by(EuclideanDistance(), responses, noise_sigma, seed, session=session)
+    }
 
 
 def _unsteady(
@@ -607,7 +614,10 @@ def discrepancy_analysis(
     }
     bars = {
         moves: np.array(
-            [discriminate_gradient_sum(*static, noise_sigma, seed, plan).hit_rate_sd.mean() for plan in those]
+            [
+                TODO_discriminate_gradient_sum(*static, noise_sigma, seed, plan).hit_rate_sd.mean()
+                for plan in those
+            ]
         )
         for moves, those in plans.items()
     }

@@ -36,7 +36,7 @@ from fingerpad.experiments.manifest import Manifest, StageSummary
 from fingerpad.experiments.runner import Runner
 from fingerpad.experiments.tissue_sets import TissueLayer, tissue_layers
 from fingerpad.geometry.fingertip import Finger, Fingertip
-from fingerpad.inference.afferent_methods import response_surface
+from fingerpad.inference.afferent_fit import response_surface
 from fingerpad.inference.fitting.methods import Method
 from fingerpad.mechanics.tissues import TISSUES
 from fingerpad.neuron.afferent import Afferent

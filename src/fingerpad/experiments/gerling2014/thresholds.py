@@ -32,9 +32,9 @@ from fingerpad.psychophysics import (
     posterior,
     yes_no,
 )
-from fingerpad.psychophysics.code_efficiency import SMALLEST_SPREAD
 from fingerpad.psychophysics.encoding import gradient_sum, neighbour_pairs
-from fingerpad.psychophysics.noise_fit import expected_hit_rates, fit_noise_sigma
+from fingerpad.psychophysics.ideal_observer import SMALLEST_SPREAD
+from fingerpad.psychophysics.observer import expected_hit_rates, fit_noise_sigma
 from fingerpad.skin.sampling import SkinResponse
 
 STANDARDS_PER_M = (144.0, 200.0, 287.0, 400.0)

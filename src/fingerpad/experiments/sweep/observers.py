@@ -6,13 +6,12 @@ from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
-from fingerpad.core.signals import HitRates
 from fingerpad.core.values import FloatArray, IntArray
 from fingerpad.experiments.discrimination.decoding import SESSION, silent_stimuli
 from fingerpad.experiments.requests.afferents import population_neighbours
 from fingerpad.experiments.sweep.request import ObserverSettings, SweepRequest
-from fingerpad.psychophysics.discrimination import compare_euclidean_observers, compare_gradient_sum_observers
 from fingerpad.psychophysics.encoding import taking_part
+from fingerpad.psychophysics.observer import ENCODERS, compare_observers
 
 MEASURED = {"static": "static_rate_hz", "dynamic": "dynamic_rate_hz", "latency": "first_spike_latency_ms"}
 """Where a data set has each measure."""
@@ -75,16 +74,9 @@ def _group(
         if silent_stimuli(table, measure, latest_ms).size:
             continue
         order = np.concatenate([[standard], np.delete(np.arange(n_stimuli), standard)])
-        hits = _hit_rates(code, *taking_part(table[order], pairs), seed, [observers[n] for n in numbers])
+        encoded, neighbours = taking_part(table[order], pairs)
+        plans = [(observers[n].noise, observers[n].experiment.plan) for n in numbers]
+        hits = compare_observers(ENCODERS[code](neighbours), encoded, plans, seed, session=SESSION)
         for number, each in zip(numbers, hits, strict=True):
             found[order[1:], number] = each.hit_rate
     return found
-
-
-def _hit_rates(
-    code: str, table: FloatArray, pairs: np.ndarray, seed: int, observers: Sequence[ObserverSettings]
-) -> list[HitRates]:
-    plans = [(one.noise, one.experiment.plan) for one in observers]
-    if code == "euclidean":
-        return compare_euclidean_observers(table, plans, seed, session=SESSION)
-    return compare_gradient_sum_observers(table, pairs, plans, seed, session=SESSION)

@@ -32,7 +32,7 @@ from fingerpad.experiments.requests.parts import (
     with_value,
 )
 from fingerpad.experiments.requests.touch import TouchRequest
-from fingerpad.psychophysics.noisy_responses import LARGEST_NOISE
+from fingerpad.psychophysics.encoding import LARGEST_NOISE
 from fingerpad.skin.fields import stored_fields
 
 AFFERENTS = "afferents"  # Block of a touch whose fields do not change the skin.

@@ -68,11 +68,12 @@ class CrossValidation:
 
 
 @checked
-def interleaved_folds(n_observations: Several, n_folds: Several = int(protocol.FOLDS.value)) -> IntArray:
-    """Assign observations to folds in turn: index modulo the number of folds."""
-    if n_folds > n_observations:
-        raise InputError("n_folds", f"must be at most the number of stimuli, {n_observations}", str(n_folds))
-    return np.arange(n_observations, dtype=np.int64) % n_folds
+def interleaved_folds(n_observations: Several, n_folds: Several | None = None) -> IntArray:
+    """Assign observations to folds in turn; by default to six, or one each where there are fewer."""
+    folds = min(int(protocol.FOLDS.value), n_observations) if n_folds is None else n_folds
+    if folds > n_observations:
+        raise InputError("n_folds", f"must be at most the number of stimuli, {n_observations}", str(folds))
+    return np.arange(n_observations, dtype=np.int64) % folds
 
 
 def cross_validate(problem: Problem, method: Method, memberships: ArrayLike) -> CrossValidation:

@@ -5,16 +5,32 @@ A method has its settings as fields and returns a `Fit`.
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import ArrayLike
+from scipy.optimize import least_squares
 from scipy.stats import qmc
 
-from fingerpad.core.errors import InputError
-from fingerpad.core.values import FloatArray, IntArray, float_array
+from fingerpad.core.checked import checked, value_class
+from fingerpad.core.errors import ConvergenceError, InputError
+from fingerpad.core.random_streams import published_generator
+from fingerpad.core.values import (
+    Count,
+    Finite,
+    FloatArray,
+    IntArray,
+    NotNegative,
+    NotNegativeWhole,
+    Numbers,
+    Positive,
+    finite,
+    float_array,
+    positive,
+)
 
 
 @dataclass(frozen=True)
@@ -154,3 +170,334 @@ class Continued:
             n_evaluations=begun.n_evaluations + ended.n_evaluations,
             seconds=begun.seconds + ended.seconds,
         )
+
+
+Jacobian = Callable[[FloatArray, IntArray], FloatArray]
+
+
+@value_class
+class LeastSquares:
+    """Trust-region least squares from the most promising of several starts.
+
+    The method of `scipy.optimize.least_squares`, "trf" (Branch, Coleman & Li 1999); the result is the best of
+    all evaluated points. The method is deterministic.
+    """
+
+    starts: ArrayLike  # Start points; all are scored, (n_starts, n_parameters).
+    bounds: Bounds  # Limits of the parameters, and the scales in which steps are taken.
+    n_refined: Count = 4  # Number of starts, the best ones, from which a fit is made.
+    difference_steps: Numbers = (0.1, 0.03, 0.01)
+    """Half widths of the central differences, round by round, in units of the scales."""
+    jacobian: Jacobian | None = None
+    """`jacobian(parameters, chosen)`: derivatives of the residuals, instead of differences."""
+    most_iterations: Count = 50  # Iterations of each round.
+    name: str = "least squares"
+
+    def __post_init__(self) -> None:
+        starts = self.bounds.rows("starts", self.starts)
+        outside = np.flatnonzero(((starts < self.bounds.low) | (starts > self.bounds.high)).any(axis=1))
+        if outside.size:
+            row = int(outside[0])
+            raise InputError(
+                "starts", "must lie between the bounds", remedy=f"row {row} is {starts[row].tolist()}"
+            )
+        object.__setattr__(self, "starts", starts)
+        for step in self.difference_steps:
+            positive("difference_steps", step)
+
+    def fit(self, problem: Problem, chosen: IntArray) -> Fit:
+        """Score all starts, fit from the best of them, and keep the best fit."""
+        clock, starts = time.perf_counter(), np.asarray(self.starts)
+        scores = np.array([problem.score(start, chosen) for start in starts])
+        scored = Fit(starts[0], -np.inf, len(starts), time.perf_counter() - clock, ())
+        order = np.argsort(-scores, kind="stable")[: self.n_refined]
+        return best_of((*(self._refined(problem, chosen, starts[row]) for row in order), scored))
+
+    def _refined(self, problem: Problem, chosen: IntArray, start: FloatArray) -> Fit:
+        clock, scales = time.perf_counter(), self.bounds.scales
+        low, high = self.bounds.low / scales, self.bounds.high / scales
+        visited = _Visited(problem, chosen, scales)
+        visited.residuals(start / scales)
+        steps = [visited.best]
+        for difference in self.difference_steps if self.jacobian is None else self.difference_steps[:1]:
+            least_squares(
+                visited.residuals,
+                np.clip(visited.best.parameters / scales, low, high),  # round-off at a bound
+                self._slopes(visited, difference),
+                bounds=(low, high),
+                max_nfev=self.most_iterations,
+            )
+            steps.append(visited.best)
+        seconds = time.perf_counter() - clock
+        return Fit(steps[-1].parameters, steps[-1].score, visited.n_evaluations, seconds, tuple(steps))
+
+    def _slopes(self, visited: _Visited, difference: float) -> Callable[[FloatArray], FloatArray]:
+        """Return the derivatives of the residuals as a function of a point, in units of the scales."""
+        scales = self.bounds.scales
+        if self.jacobian is not None:
+            jacobian = self.jacobian
+            return lambda place: jacobian(place * scales, visited.chosen) * scales
+        low, high = self.bounds.low / scales, self.bounds.high / scales
+
+        def central(place: FloatArray) -> FloatArray:
+            before = np.maximum(place - difference, low)
+            after = np.minimum(place + difference, high)
+            columns = []
+            for number in range(place.size):
+                ends = [place.copy(), place.copy()]
+                ends[0][number], ends[1][number] = before[number], after[number]
+                rise = visited.residuals(ends[1]) - visited.residuals(ends[0])
+                columns.append(rise / (after[number] - before[number]))
+            return np.column_stack(columns)
+
+        return central
+
+
+class _Visited:
+    """Residuals of a problem in scaled parameters, with a count and the best point so far."""
+
+    def __init__(self, problem: Problem, chosen: IntArray, scales: FloatArray):
+        self.problem, self.chosen, self.scales = problem, chosen, scales
+        self.n_evaluations = 0
+        self.best = FitStep(np.full(scales.size, np.nan), -np.inf)
+
+    def residuals(self, place: FloatArray) -> FloatArray:
+        parameters = place * self.scales
+        residuals = self.problem.residuals(parameters, self.chosen)
+        self.n_evaluations += 1
+        score = 1.0 - float(residuals @ residuals)
+        if score > self.best.score:
+            self.best = FitStep(parameters, score)
+        return residuals
+
+
+@value_class
+class CovarianceAdaptation:
+    """CMA-ES from one start, with the package `cma`.
+
+    Hansen & Ostermeier 2001.
+    """
+
+    start: ArrayLike  # Mean of the first generation, (n_parameters,).
+    bounds: Bounds  # Limits of the parameters, and the scales that set their units in the search.
+    first_spread: Positive = 0.5  # Standard deviation of the first generation, in units of the scales.
+    most_evaluations: Count = 2000
+    """The search ends with the generation that reaches this number, or when it has converged."""
+    seed: NotNegativeWhole = 0  # Seed of the random numbers; the same seed gives the same bits.
+    name: str = "CMA-ES"
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "start", self.bounds.rows("start", np.atleast_2d(self.start))[0])
+
+    def fit(self, problem: Problem, chosen: IntArray) -> Fit:
+        """Search until convergence; the result is the best of all evaluated points."""
+        from cma import CMAEvolutionStrategy  # takes a second to load
+
+        clock, scales = time.perf_counter(), self.bounds.scales
+        generator = published_generator(self.seed)
+        search = CMAEvolutionStrategy(
+            np.asarray(self.start) / scales,
+            self.first_spread,
+            {
+                "bounds": [list(side / scales) for side in (self.bounds.low, self.bounds.high)],
+                "maxfevals": self.most_evaluations,
+                # By default cma draws from NumPy's global state.
+                "seed": np.nan,
+                "randn": lambda *shape: generator.standard_normal(shape),
+                "verbose": -9,
+            },
+        )
+        best = FitStep(np.asarray(self.start), problem.score(np.asarray(self.start), chosen))
+        steps = [best]
+        while not search.stop():
+            places = search.ask()
+            scores = [problem.score(place * scales, chosen) for place in places]
+            search.tell(places, [-score for score in scores])
+            top = int(np.argmax(scores))
+            if scores[top] > best.score:
+                best = FitStep(places[top] * scales, float(scores[top]))
+                steps.append(best)
+        seconds = time.perf_counter() - clock
+        return Fit(best.parameters, best.score, search.countevals + 1, seconds, tuple(steps))
+
+
+Objective = Callable[[FloatArray], float]
+Restriction = Callable[[FloatArray], FloatArray]
+
+_MOST_PARAMETERS = 12
+_MOST_STEPS = 200
+
+
+@checked
+def factorial_design(n_parameters: Count) -> FloatArray:
+    """Two-level full factorial design with centre point, in coded units."""
+    if n_parameters > _MOST_PARAMETERS:
+        raise InputError(
+            "n_parameters", f"must be at most {_MOST_PARAMETERS}", f"{n_parameters}, too many corners"
+        )
+    corners = np.indices((2,) * n_parameters).reshape(n_parameters, -1).T * 2.0 - 1.0
+    return np.vstack([corners, np.zeros(n_parameters)])
+
+
+def regression_slopes(design: FloatArray, values: FloatArray) -> FloatArray:
+    """Slopes of the least-squares plane through the runs of a factorial design.
+
+    The columns of the design are orthogonal to each other and to the constant, so each slope is a projection.
+    """
+    return (design.T @ values) / (design**2).sum(axis=0)
+
+
+@checked
+def coding_increments(base: ArrayLike, share: Finite, where_zero: ArrayLike | None = None) -> FloatArray:
+    """Increments as a share of the base; a parameter whose base is zero needs an increment of its own."""
+    start = float_array("base", base, 1)
+    increments = share * np.abs(start)
+    if where_zero is not None:
+        increments = np.where(start == 0.0, float_array("where_zero", where_zero, 1), increments)
+    return _checked_increments(increments, start)
+
+
+@checked
+def maximise(
+    objective: Objective,
+    start: ArrayLike,
+    increments: ArrayLike,
+    lower_bounds: ArrayLike | None = None,
+    smallest_gain: NotNegative = 1.0e-4,
+    most_iterations: Count = 200,
+    restrict: Restriction | None = None,
+) -> Fit:
+    """Maximise `objective` from `start` by the response surface method.
+
+    Gerling et al. 2014, section 2.2.2; Box & Wilson 1951 for the method. Steps along the ascent are one coded
+    unit at first, double after each gain and halve after each loss; the ascent ends when a step of one unit
+    has no gain.
+    """
+    base = float_array("start", start, 1)
+    units = _checked_increments(increments, base)
+    floor = _floor(lower_bounds, base, units)
+
+    def allowed(point: FloatArray) -> FloatArray:
+        above = np.maximum(point, floor)
+        return above if restrict is None else restrict(above)
+
+    clock, design = time.perf_counter(), factorial_design(base.size)
+    history: list[FitStep] = []
+    n_evaluations = 0
+    for _ in range(most_iterations):
+        values = np.array([_value(objective, base + coded * units) for coded in design])
+        at_base = float(values[-1])
+        if not history:
+            history.append(FitStep(base, at_base))
+        best, highest, n_trials = _ascend(
+            objective, base, at_base, regression_slopes(design, values), units, allowed
+        )
+        n_evaluations += len(design) + n_trials
+        if highest - at_base <= smallest_gain:
+            return Fit(base, at_base, n_evaluations, time.perf_counter() - clock, tuple(history))
+        base = best
+        base.setflags(write=False)
+        history.append(FitStep(base, highest))
+    raise ConvergenceError(
+        f"maximise has not converged after {most_iterations} iterations: give more, "
+        f"most_iterations={10 * most_iterations}, or larger increments=.",
+        tuple(f"iteration {number}: {step.score:.6g}" for number, step in enumerate(history)),
+    )
+
+
+@dataclass(frozen=True)
+class ResponseSurface:
+    """The paper's method: response surfaces and steepest ascent from each start; the best result is taken.
+
+    Gerling et al. 2014, section 2.2.2; see `maximise`. The method is deterministic.
+    """
+
+    starts: ArrayLike  # Start points, (n_starts, n_parameters).
+    increments: ArrayLike
+    """One coded unit of each parameter, for all start points or for each, (n_parameters,)."""
+    lower_bounds: ArrayLike | None = None  # Lower limits of all evaluations; -inf for none, (n_parameters,).
+    smallest_gain: float = 1.0e-4  # A gain of at most this much ends a fit.
+    most_iterations: int = 200  # Largest number of iterations.
+    name: str = "response surface"
+    restrict: Restriction | None = None  # As of `maximise`.
+
+    def __post_init__(self) -> None:
+        starts = float_array("starts", self.starts, 2)
+        units = np.array(self.increments, dtype=np.float64)
+        if units.shape not in (starts.shape, starts.shape[1:]):
+            raise InputError(
+                "increments", f"must match starts {starts.shape} or one row of it", str(units.shape)
+            )
+        object.__setattr__(self, "starts", starts)
+        object.__setattr__(self, "increments", np.broadcast_to(units, starts.shape))
+
+    def fit(self, problem: Problem, chosen: IntArray) -> Fit:
+        """Fit from every start."""
+
+        def score(parameters: FloatArray) -> float:
+            return problem.score(parameters, chosen)
+
+        limits = (self.lower_bounds, self.smallest_gain, self.most_iterations, self.restrict)
+        pairs = zip(np.asarray(self.starts), np.asarray(self.increments), strict=True)
+        return best_of(tuple(maximise(score, start, units, *limits) for start, units in pairs))
+
+
+def _ascend(
+    objective: Objective,
+    base: FloatArray,
+    value_at_base: float,
+    slopes: FloatArray,
+    units: FloatArray,
+    allowed: Restriction,
+) -> tuple[FloatArray, float, int]:
+    """Best point on the path of steepest ascent, its value, and the steps that were tried."""
+    best, best_value = base, value_at_base
+    steepness = float(np.linalg.norm(slopes))
+    if steepness == 0.0:
+        return best, best_value, 0
+    direction = slopes / steepness * units
+    step = 1.0
+    for n_trials in range(1, _MOST_STEPS + 1):
+        trial = allowed(best + step * direction)
+        value = _value(objective, trial)
+        if value > best_value:
+            best, best_value = trial, value
+            step *= 2.0
+        elif step > 1.0:
+            step /= 2.0
+        else:
+            return best, best_value, n_trials
+    raise ConvergenceError(
+        f"The ascent has not ended after {_MOST_STEPS} steps: the objective must have a maximum.",
+        (f"last point {best.tolist()}: {best_value:.6g}",),
+    )
+
+
+def _value(objective: Objective, parameters: FloatArray) -> float:
+    return finite(f"objective at {parameters.tolist()}", objective(parameters))
+
+
+def _checked_increments(increments: ArrayLike, base: FloatArray) -> FloatArray:
+    units = float_array("increments", increments, 1)
+    if units.shape != base.shape:
+        raise InputError("increments", "needs one entry per parameter", f"{units.size} for {base.size}")
+    if (units <= 0.0).any():
+        raise InputError("increments", "must be greater than 0", str(units.tolist()))
+    return units
+
+
+def _floor(lower_bounds: ArrayLike | None, base: FloatArray, units: FloatArray) -> FloatArray:
+    """Lowest base whose corners all lie within the bounds."""
+    if lower_bounds is None:
+        return np.full(base.size, -np.inf)
+    bounds = np.array(lower_bounds, dtype=np.float64)
+    if bounds.shape != base.shape or np.isnan(bounds).any():
+        raise InputError("lower_bounds", "needs one number or -inf per parameter", repr(lower_bounds))
+    floor = bounds + units
+    if (base < floor).any():
+        raise InputError(
+            "start",
+            "must lie at least one increment above lower_bounds",
+            f"{base.tolist()} for {bounds.tolist()}",
+        )
+    return floor

@@ -28,7 +28,7 @@ from fingerpad.core.checked import checked
 from fingerpad.core.errors import ConvergenceError, InputError
 from fingerpad.core.random_streams import Purpose, uniforms
 from fingerpad.core.values import Count, FloatArray, Whole, finite, float_array, one_of
-from fingerpad.psychophysics.functions import (
+from fingerpad.psychophysics.curve import (
     SIGMOIDS,
     Sigmoid,
     checked_levels,
@@ -36,7 +36,7 @@ from fingerpad.psychophysics.functions import (
     log_probability,
     proportion,
 )
-from fingerpad.psychophysics.maximum_likelihood import (
+from fingerpad.psychophysics.curve_fit import (
     GUESS,
     LAPSE,
     OVERDISPERSION,
@@ -44,9 +44,9 @@ from fingerpad.psychophysics.maximum_likelihood import (
     THRESHOLD,
     WIDTH,
     Model,
+    PsychometricFit,
     maximise_likelihood,
 )
-from fingerpad.psychophysics.psychometric import PsychometricFit
 
 COARSE_POINTS = 21
 FINE_POINTS = {1: (401,), 2: (81, 81), 3: (81, 35, 13), 4: (31, 27, 13, 13), 5: (21, 19, 9, 9, 9)}
@@ -171,7 +171,7 @@ def bootstrap(fit: PsychometricFit, seed: Whole, n_replicates: Whole = 1000) -> 
 
     Examples
     --------
-    >>> from fingerpad.psychophysics.psychometric import fit_psychometric
+    >>> from fingerpad.psychophysics.curve_fit import fit_psychometric
     >>> fit = fit_psychometric([296, 305, 316, 340, 365], [57, 64, 72, 88, 97], [100] * 5, lapse=0.0)
     >>> lower, upper = bootstrap(fit, seed=1, n_replicates=200).threshold_interval(0.75)
     >>> bool(lower < fit.threshold(0.75) < upper)
@@ -206,7 +206,7 @@ def posterior(fit: PsychometricFit) -> FunctionCloud:
 
     Examples
     --------
-    >>> from fingerpad.psychophysics.psychometric import fit_psychometric
+    >>> from fingerpad.psychophysics.curve_fit import fit_psychometric
     >>> fit = fit_psychometric([296, 305, 316, 340, 365], [57, 64, 72, 88, 97], [100] * 5, lapse=0.0)
     >>> [round(end) for end in posterior(fit).threshold_interval(0.75)]
     [315, 328]
@@ -322,7 +322,7 @@ def goodness_of_fit(fit: PsychometricFit, seed: int, n_replicates: int = 1000) -
 
     Examples
     --------
-    >>> from fingerpad.psychophysics.psychometric import fit_psychometric
+    >>> from fingerpad.psychophysics.curve_fit import fit_psychometric
     >>> good = fit_psychometric([1, 2, 3, 4, 5], [52, 60, 76, 91, 98], [100] * 5, lapse=0.0)
     >>> bad = fit_psychometric([1, 2, 3, 4, 5], [52, 90, 60, 99, 80], [100] * 5, lapse=0.0)
     >>> goodness_of_fit(good, 1, 200).p_value > 0.05 > goodness_of_fit(bad, 1, 200).p_value
