@@ -13,9 +13,9 @@ from benchmarks.measuring import Spread, run_job
 from benchmarks.results import Report, Table
 from fingerpad.core.signals import Traces
 from fingerpad.experiments.conditions import Conditions
-from fingerpad.experiments.fit.methods import FOUR_NUMBER_METHODS
+from fingerpad.experiments.fit.methods import prepare
 from fingerpad.experiments.gerling2014 import nerve
-from fingerpad.inference.afferent_fit import bounds_of, four_number_problem, response_surface, start_points
+from fingerpad.inference.afferent_fit import response_surface, start_points
 from fingerpad.inference.fitting.cross_validation import cross_validate, interleaved_folds
 from fingerpad.inference.fitting.methods import Method
 from fingerpad.inference.problem import RateProblem
@@ -64,12 +64,13 @@ def fit(traces: str) -> dict[str, Any]:
     with np.load(traces) as stored:
         sed = Traces(stored["times_ms"], stored["sed_kpa"], stored["kinks_ms"])
     driven = drive(sed)
-    model, bounds = AfferentModel.of_drive(driven), bounds_of(driven)
+    model = AfferentModel.of_drive(driven)
     six = nerve.rate_problem(sed)
-    four = four_number_problem(six.model, six.recordings)
     folds = interleaved_folds(six.n_observations)
     cases: list[tuple[RateProblem, Method]] = [(six, response_surface())]
-    cases += [(four, method(model, four, bounds, 0)) for method in FOUR_NUMBER_METHODS.values()]
+    for name in ("least_squares", "closed_form", "cma_es"):
+        prepared = prepare(name, model, six.recordings, six.recordings, 0)
+        cases.append((prepared.problem, prepared.method))
     start = start_points()[0]
     six.score(start, np.arange(six.n_observations))  # loads compiled kernels
     found: dict[str, Any] = {}

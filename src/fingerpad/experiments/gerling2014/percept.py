@@ -48,8 +48,9 @@ from fingerpad.psychophysics.observer import (
     NOISE_DRAWS,
     EuclideanDistance,
     Experiment,
+    GradientSum,
     NoiseFit,
-    compare_gradient_sum_observers,
+    compare_observers,
     discriminate_by,
     expected_euclidean_hit_rates,
     expected_hit_rates,
@@ -468,14 +469,14 @@ def _judge(
     for sigma in CRITERION_SIGMAS:
         observers[f"criterion_{sigma:g}"] = noise_sigma, Experiment(criterion_sigma=sigma)
     rates = {
-        name: TODO_discriminate_gradient_sum(*one, noise_sigma, seed, session=session)
+        name: discriminate_by(GradientSum(one.neighbours), one.responses, noise_sigma, seed, session=session)
         for name, one in measures.items()
         if name != "static"
     }
     plans = list(observers.values())
-    found = compare_gradient_sum_observers(*measures["static"], plans, seed, session=session)
+    responses, neighbours = measures["static"]
+    found = compare_observers(GradientSum(neighbours), responses, plans, seed, session=session)
     rates |= dict(zip(observers, found, strict=True))
-    responses = measures["static"].responses
     return rates | {
         "euclidean": discriminate_by(EuclideanDistance(), responses, noise_sigma, seed, session=session)
     }
@@ -607,6 +608,7 @@ def discrepancy_analysis(
         sigma, misfit = own.noise_sigma, own.root_mean_square_error
         euclidean = EuclideanFit(noise_sigma=sigma, misfit=misfit, hit_rate=apart(sigma))
     static, paper_noise = measures["static"][0], psychophysics.NOISE_SIGMA.value
+    code = GradientSum(static.neighbours)
     # The mean error bar for each quantity that the criterion may multiply.
     plans = {
         moves: [Experiment(criterion_sigma=sigma, criterion_moves=moves) for sigma in CRITERION_SIGMAS]
@@ -615,7 +617,7 @@ def discrepancy_analysis(
     bars = {
         moves: np.array(
             [
-                TODO_discriminate_gradient_sum(*static, noise_sigma, seed, plan).hit_rate_sd.mean()
+                discriminate_by(code, static.responses, noise_sigma, seed, plan).hit_rate_sd.mean()
                 for plan in those
             ]
         )
