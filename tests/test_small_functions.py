@@ -38,7 +38,7 @@ NUMBERS = [
     ("mechanics.press_settings:steps_of_slide", (0.1, Bar(fillet_mm=0.3)), 2),
     ("mechanics.press_settings:steps_of_slide", (0.1, Bar(fillet_mm=0.0)), 12),
     ("mechanics.press_settings:steps_of_slide", (0.1, Sphere()), 1),
-    ("psychophysics.discrimination:checked_responses", (SILENT, 50.0), [[20, 50], [30, 40]]),
+    ("psychophysics.observer:checked_responses", (SILENT, 50.0), [[20, 50], [30, 40]]),
     ("reduction.model:filter_step", (100.0, np.array([100.0])), [[0.3679], [0.2642], [0.3679]]),
 ]  # fmt: skip
 
