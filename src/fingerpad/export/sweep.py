@@ -192,7 +192,7 @@ def _attributes(sweep: SweepRequest, command: str) -> Mapping[str, object]:
     sample = sweep.sample
     return {
         "title": sweep.title,
-        "sweep": json.dumps(sweep.model_dump(), default=repr),
+        "sweep": json.dumps(sweep.written()),
         "source": sweep.origin.name,
         "inputs_sha256": hashlib.sha256(sweep.hashed.encode()).hexdigest(),
         "version": found["version"],

@@ -122,7 +122,8 @@ class Laboratory:
 
     def path(self, state: LabState) -> Path:
         """File of the reduced touch of a state, by what it depends on."""
-        text = repr(self.described(state).model_dump()) + code_hash()
+        asked = self.described(state)
+        text = repr((asked.model_dump(exclude={"afferents", "quantities"}), asked.kept)) + code_hash()
         return self.folder / f"{state.object}-{hashlib.sha256(text.encode()).hexdigest()[:16]}.npz"
 
     def model(self, state: LabState) -> ReducedModel | None:

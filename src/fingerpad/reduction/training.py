@@ -29,7 +29,7 @@ from fingerpad.core.checked import value_class
 from fingerpad.core.errors import InputError
 from fingerpad.core.values import Count, Finite, FloatArray, Pair, Positive, choice, instance
 from fingerpad.geometry.fingertip import Fingertip
-from fingerpad.geometry.grading import RESOLUTIONS
+from fingerpad.geometry.grading import RESOLUTIONS, Grading
 from fingerpad.geometry.indenter_grading import grading_along
 from fingerpad.geometry.motion import STILL, Pose
 from fingerpad.geometry.trajectory import Trajectory
@@ -214,16 +214,19 @@ class ReducedTraining:
     Parameters
     ----------
     touch : Touch
-        What is reduced: its finger, indenter, tissues, place, direction and friction, not motion and mesh.
+        What is reduced: its finger, indenter, tissues, place, direction and friction, not its motion.
     range : ReducedRange
         The poses.
     resolution : {"quick", "standard", "paper"}
         How fine the mesh is.
+    grading : Grading, optional
+        Mesh instead of that which the resolution grades over the range.
     """
 
     touch: Touch
     range: ReducedRange
     resolution: Annotated[str, choice(RESOLUTIONS)] = "quick"
+    grading: Grading | None = None
 
     def __post_init__(self) -> None:
         touch = instance("touch", self.touch, Touch)
@@ -290,7 +293,7 @@ class ReducedTraining:
             body = replace(cast(Any, body), **{range_.parameter: shape[0]})
         corners = itertools.product(*(getattr(range_, name) for name in SPACING))
         poses = [Pose(), *(Pose(*corner) for corner in corners)]
-        grading = grading_along(
+        grading = self.grading or grading_along(
             base.finger, body, self.resolution, base.at_mm, poses, base.tilt_deg, base.spin_deg
         )
         steps = settings_of(self.resolution)

@@ -211,7 +211,8 @@ def population_of(
 ) -> Population:
     """Lay out the afferents of a request."""
     if settings.population is not None:
-        for key in set(settings.given) - {"population", "noise", "windows_ms", "seed"}:
+        of_layout = set(AfferentsSettings.model_fields) - {"population", "noise", "windows_ms", "seed"}
+        for key in sorted(of_layout & set(settings.given)):
             raise InputError((place, key), "must not be given beside a population", remedy="leave it out")
         return cast(Population, settings.population)
     for key, layouts in _OF_LAYOUT.items():

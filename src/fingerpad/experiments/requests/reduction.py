@@ -70,7 +70,9 @@ class ReductionRequest(Request, StimulusDescription, FingerDescription):
     """
 
     word: ClassVar[str] = "range"
-    python: ClassVar[tuple[str, ...]] = (*FINGER_OBJECTS, "object", "afferents", "afferents.afferent")
+    python: ClassVar[tuple[str, ...]] = (
+        *FINGER_OBJECTS, "object", "afferents", "afferents.afferent", "afferents.population",
+    )  # fmt: skip
 
     range: RangeSettings
     afferents: Afferents = AfferentsSettings()
@@ -92,7 +94,9 @@ class ReductionRequest(Request, StimulusDescription, FingerDescription):
             made = self.stimulus(self.beside)
             touch = made.touch(finger, self.scaled_tissues, self.resolution, self.grading)
             with at("range"):
-                training = ReducedTraining(touch, ReducedRange(**dict(self.range)), self.resolution)
+                training = ReducedTraining(
+                    touch, ReducedRange(**dict(self.range)), self.resolution, self.grading
+                )
                 # All poses are described, and so checked, before anything is pressed.
                 list(training.poses())
         return training

@@ -8,7 +8,7 @@ from __future__ import annotations
 import ast
 import json
 from collections import Counter
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import islice
@@ -355,8 +355,17 @@ class SweepRequest(Request):
     def hashed(self) -> str:
         """All that determines the results, as text."""
         files = self.described(0).input_hashes()
-        content = self.model_dump(exclude={"title"})
-        return json.dumps([content, sorted(files.values())], sort_keys=True, default=repr)
+        return json.dumps([self.written(without=("title",)), sorted(files.values())], sort_keys=True)
+
+    def written(self, without: Sequence[str] = ()) -> dict[str, Any]:
+        """Return the keys that are given as plain values; an object of Python as it is shown."""
+        given = {name: getattr(self, name) for name in self.model_fields_set if name not in without}
+        plain: dict[str, Any] = json.loads(json.dumps(given, default=_plain))
+        return plain
+
+
+def _plain(value: Any) -> Any:
+    return value.model_dump(mode="json") if isinstance(value, Part) else repr(value)
 
 
 class Constraint:
