@@ -112,6 +112,10 @@ def _run_request(name: str, given: argparse.Namespace, within: Options, main: st
     source, keys = _asked(name, given, within, main)
     request = kind.read(source, keys, given.allow_python)
     request.check()
+    if name == "touch":
+        from fingerpad.export.requests import check_outputs
+
+        check_outputs(request)
     by = engine(given.jobs, given.scheduler)
     make_writable(given.out.parent if given.out.suffix in (".npz", ".zarr") else given.out)
     return function(

@@ -79,7 +79,7 @@ def processes(jobs: int | None) -> int:
 def engine(jobs: int | None, scheduler: str | None) -> int | Engine:
     """Return the workers of `--scheduler` once it answers, or the number of processes here."""
     if scheduler is None:
-        return processes(jobs)
+        return whole("jobs", processes(jobs), at_least=1)
     if jobs is not None:
         raise InputError(
             f"--jobs is the number of processes here, and --scheduler {scheduler} has workers: leave one out."

@@ -19,7 +19,7 @@ from functools import cached_property
 from importlib import import_module
 from pathlib import Path
 from types import MappingProxyType
-from typing import Annotated, Any, ClassVar, Literal, TypeVar, Union, get_args
+from typing import Annotated, Any, ClassVar, Literal, TypeVar, Union, cast, get_args
 
 from pydantic import (
     BaseModel,
@@ -388,6 +388,10 @@ class Request(Part):
     """What an error calls a request that is from no file."""
     python: ClassVar[tuple[str, ...]] = ()
     """Keys at which a file may name an object of Python."""
+
+    def __eq__(self, other: object) -> bool:
+        """Requests of the same values are equal, wherever they come from."""
+        return type(self) is type(other) and dict(self) == dict(cast(Request, other))
 
     @property
     def origin(self) -> Origin:
