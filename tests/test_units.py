@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from fingerpad.experiments.stimuli import ShiftedBar
 
 import fingerpad as fp
 from fingerpad.core.units import (

@@ -47,7 +47,7 @@ def _option(
     if kind is bool:
         parser.add_argument(name, action="store_true", help=words)
         return
-    read = partial({int: _whole, float: _number}[kind], name) if kind in (int, float) else kind
+    read = {int: _whole, float: _number}.get(kind, kind)
     metavar = (
         {int: "N", float: "NUMBER", Path: "PATH"}.get(kind, "NAME") if name.startswith("-") else name.upper()
     )
@@ -76,23 +76,23 @@ def _add_request(name: str, parser: argparse.ArgumentParser, out: str, of_out: s
         group.add_argument(*names, dest=f"key:{key}", metavar="VALUE", help=words)
 
 
-def _whole(option: str, text: str) -> int:
+def _whole(text: str) -> int:
     try:
         return int(text)
     except ValueError as error:
-        raise InputError(option, "must be a whole number", repr(text)) from error
+        raise argparse.ArgumentTypeError(f"must be a whole number: got {text!r}") from error
 
 
-def _number(option: str, text: str) -> float:
+def _number(text: str) -> float:
     try:
         return float(text)
     except ValueError as error:
-        raise InputError(option, "must be a number", repr(text)) from error
+        raise argparse.ArgumentTypeError(f"must be a number: got {text!r}") from error
 
 
 def _asked(name: str, given: argparse.Namespace, within: Options, main: str = "") -> tuple[Any, Options]:
     """Source of a request, and the keys that replace some of it."""
-    schema = request_schema(name)["properties"]
+    schema, required = (request_schema(name).get(part) for part in ("properties", "required"))
     keys = {
         key.removeprefix("key:"): value if isinstance(value, bool) else plain(value, key, schema[key[4:]])
         for key, value in vars(given).items()
@@ -101,7 +101,7 @@ def _asked(name: str, given: argparse.Namespace, within: Options, main: str = ""
     source = given.request
     if main and source is not None and Path(source).suffix not in (".yaml", ".yml"):
         source, keys = None, {main: source} | keys
-    if source is None and not keys and not within:
+    if required and source is None and not keys and not within:
         raise InputError(name, f"needs a file{f', {main}' if main else ''} or options", remedy="see --help")
     return source, keys | within
 

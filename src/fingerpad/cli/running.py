@@ -79,7 +79,9 @@ def processes(jobs: int | None) -> int:
 def engine(jobs: int | None, scheduler: str | None) -> int | Engine:
     """Return the workers of `--scheduler` once it answers, or the number of processes here."""
     if scheduler is None:
-        return whole("jobs", processes(jobs), at_least=1)
+        if jobs is not None and jobs < 1:
+            raise InputError("jobs", "must be a whole number of at least 1", str(jobs))
+        return processes(jobs)
     if jobs is not None:
         raise InputError(
             f"--jobs is the number of processes here, and --scheduler {scheduler} has workers: leave one out."

@@ -19,7 +19,7 @@ from functools import cached_property
 from importlib import import_module
 from pathlib import Path
 from types import MappingProxyType
-from typing import Annotated, Any, ClassVar, Literal, TypeVar, Union, cast, get_args
+from typing import Annotated, Any, ClassVar, Literal, TypeVar, Union, get_args
 
 from pydantic import (
     BaseModel,
@@ -391,7 +391,8 @@ class Request(Part):
 
     def __eq__(self, other: object) -> bool:
         """Requests of the same values are equal, wherever they come from."""
-        return type(self) is type(other) and dict(self) == dict(cast(Request, other))
+        fields = type(self).model_fields
+        return type(self) is type(other) and all(getattr(self, key) == getattr(other, key) for key in fields)
 
     @property
     def origin(self) -> Origin:
