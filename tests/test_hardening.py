@@ -351,7 +351,7 @@ def test_an_error_of_the_system_is_one_sentence(run_program, monkeypatch):
 @pytest.mark.skipif(sys.platform != "linux", reason="it needs /dev/full")
 def test_a_full_output_is_one_sentence():
     with open("/dev/full", "w") as full:
-        command = [sys.executable, "-m", "fingerpad", "touch", "--help"]
+        command = [sys.executable, "-m", "fingerpad", "init", "--list"]
         done = subprocess.run(command, stdout=full, stderr=subprocess.PIPE, text=True)
     assert done.returncode == 2
     assert done.stderr == "fingerpad: The output cannot be used (No space left on device).\n"

@@ -92,7 +92,7 @@ def _number(text: str) -> float:
 
 def _asked(name: str, given: argparse.Namespace, within: Options, main: str = "") -> tuple[Any, Options]:
     """Source of a request, and the keys that replace some of it."""
-    schema, required = (request_schema(name).get(part) for part in ("properties", "required"))
+    schema = request_schema(name)["properties"]
     keys = {
         key.removeprefix("key:"): value if isinstance(value, bool) else plain(value, key, schema[key[4:]])
         for key, value in vars(given).items()
@@ -101,7 +101,7 @@ def _asked(name: str, given: argparse.Namespace, within: Options, main: str = ""
     source = given.request
     if main and source is not None and Path(source).suffix not in (".yaml", ".yml"):
         source, keys = None, {main: source} | keys
-    if required and source is None and not keys and not within:
+    if request_schema(name).get("required") and source is None and not keys and not within:
         raise InputError(name, f"needs a file{f', {main}' if main else ''} or options", remedy="see --help")
     return source, keys | within
 

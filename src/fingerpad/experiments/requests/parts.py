@@ -390,7 +390,7 @@ class Request(Part):
     """Keys at which a file may name an object of Python."""
 
     def __eq__(self, other: object) -> bool:
-        """Requests of the same values are equal, wherever they come from."""
+        """Compare values alone: where a request comes from does not matter."""
         fields = type(self).model_fields
         return type(self) is type(other) and all(getattr(self, key) == getattr(other, key) for key in fields)
 
