@@ -50,7 +50,9 @@ LONGEST = (
 
 HERE = Path(__file__).parent
 
-SLOW = re.compile(r"\.solve\(|\b(press|press_into|pressed|indent)\(|run_touch|run_sweep|Notebook|subprocess")
+SLOW = re.compile(
+    r"\.solve\(|\b(press|press_into|pressed|indent)\(|fp\.(touch|sweep|fit|discriminate|validate)\(|Notebook|subprocess"
+)
 """What a file holds that presses bodies or starts programs: it is marked `slow`, and so are the longest."""
 
 PERTURBED = int(os.environ.get("PERTURBED", "0"))

@@ -1,118 +1,135 @@
 """The command line: output, errors and exit status."""
 
 import inspect
+import json
 import re
 import subprocess
 import sys
 from functools import partial
+from pathlib import Path
 
 import pytest
-import typer
 
 import fingerpad as fp
 from fingerpad import __version__, cli
-from fingerpad.cli import options as choices
+from fingerpad.cli import commands
 from fingerpad.data.tissues import DEFAULT_TISSUES
-from fingerpad.experiments import gerling2014
+from fingerpad.experiments import run as runs
 from fingerpad.experiments.conditions import Conditions
-from fingerpad.experiments.descriptions.stimulus import FingerDescription
-from fingerpad.export import formats
+from fingerpad.experiments.requests.stimulus import FingerDescription
+from fingerpad.experiments.runner import Runner
+from fingerpad.experiments.schemas import request_schema
 from fingerpad.geometry.edged_indenters import INDENTERS
-from fingerpad.geometry.fingertip import FINGERS
-from fingerpad.geometry.grading import RESOLUTIONS
-from fingerpad.mechanics.tissues import TISSUES
 
-COMMAND = [sys.executable, "-W", "error", "-m", "fingerpad"]
+BALL = ["touch", "--object", "sphere"]
 
 
 @pytest.fixture
 def call(monkeypatch, run_program):
-    """Run the command line in this process, in an empty folder; a reproduction fails the test."""
-    monkeypatch.setattr(gerling2014, "reproduce", pytest.fail)
+    """Run the command line in this process, in an empty folder; a press or a reproduction fails the test."""
+    monkeypatch.setattr(runs, "reproduce", pytest.fail)
+    monkeypatch.setattr(Runner, "solve", pytest.fail)
     return partial(run_program, cli.main, "fingerpad")
 
 
-def test_the_help_names_every_option_with_its_unit(call):
+def test_the_help_of_each_command_names_every_option_with_its_unit(call):
     assert call("--version") == (0, f"fingerpad {__version__}\n", "")
     status, summary, errors = call()
     assert (status, errors) == (2, "")
-    for name, command in typer.main.get_command(cli.app).commands.items():
+    assert call("--help") == (0, summary, "")
+    for name, (what, _, _) in commands.COMMANDS.items():
+        assert f"  {name} " in summary
+        assert what in summary
         status, said, errors = call(name, "--help")
         assert (status, errors) == (0, "")
-        said = " ".join(said.split())
-        units = [unit for each in command.params for unit in re.findall(r"\[\S+\]", each.help or "")]
-        assert all(said.count(unit) >= units.count(unit) for unit in units), name
-        assert " ".join(command.help.partition("\n\n")[0].split()) in " ".join(summary.split())
-    assert {"--resolution", "--out", "--jobs", "--seed"} <= set(call("reproduce", "--help")[1].split())
+        words = " ".join(said.split())
+        assert what in words
+        assert {"--quiet", "--verbose"} <= set(words.split())
+        for key, schema in request_schema(name)["properties"].items() if name in commands.KINDS else ():
+            assert f"--{key} " in words
+            assert " ".join(schema["description"].split()) in words, (name, key)
+            unit = re.search(r"_(mm|ms|kpa|mn|deg)$", key)
+            assert not unit or "[" in schema["description"] or key == "windows_ms", (name, key)
 
 
-def test_the_help_names_what_the_modules_know():
-    assert choices.RESOLUTION_CHOICES == RESOLUTIONS
-    assert tuple(TISSUES) == choices.TISSUES_CHOICES
-    assert tuple(formats.FORMATS) == choices.FORMAT_CHOICES
-    assert tuple(INDENTERS) == choices.INDENTER_CHOICES
-    assert tuple(FINGERS) == choices.FINGER_CHOICES
-    assert all(getattr(fp, body.__name__) is body for body in INDENTERS.values())
+def test_help_is_quick_because_it_loads_no_library_of_numbers():
+    for words in ("['--help']", "['touch', '--help']", "['discriminate', '--help']", "['--version']"):
+        code = f"import sys, fingerpad.cli\ntry: fingerpad.cli.main({words})\nexcept SystemExit: pass\n"
+        code += "print({'numpy', 'scipy', 'pydantic', 'yaml'} & set(sys.modules))"
+        done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+        assert done.stdout.endswith("set()\n"), done.stdout
 
 
 def test_one_set_of_tissues_is_the_default_everywhere():
-    commands = typer.main.get_command(cli.app).commands
-    options = [(name, each) for name, command in commands.items() for each in command.params]
-    pressed = {name: each.default for name, each in options if each.name == "tissues"}
-    assert set(pressed) == {"reproduce", "fit", "validate", "export"}
-    assert pressed.pop("reproduce") == "paper"  # the first column; the default tissues are the second
-    assert pressed.pop("fit") is None  # those of the file of stimuli, which are the default tissues
+    defaults = {
+        name: request_schema(name)["properties"]["tissues"].get("default")
+        for name in commands.KINDS
+        if "tissues" in request_schema(name)["properties"]
+    }
+    assert defaults.pop("reproduce") == "paper"  # the first column; the default tissues are the second
+    assert set(defaults) == {"touch", "fit", "discriminate", "validate", "reduce"}
     functions = [inspect.signature(function).parameters["tissues"] for function in (fp.indent, fp.touch_of)]
-    found = {*pressed.values(), *(each.default for each in functions), Conditions().tissues}
-    assert found | {FingerDescription().tissues, choices.DEFAULT_TISSUES} == {DEFAULT_TISSUES}
+    found = {*defaults.values(), *(each.default for each in functions), Conditions().tissues}
+    assert found | {FingerDescription().tissues} == {DEFAULT_TISSUES}
     assert Conditions().afferent == fp.Afferent() == fp.Population.grid().afferent
+    assert all(getattr(fp, body.__name__) is body for body in INDENTERS.values())
 
 
 @pytest.mark.parametrize(
     ("arguments", "named", "came"),
     [
-        (["reproduce", "--depth", "1"], "No such option", "--depth"),
-        (["reproduce", "--resolution", "qick"], "resolution must be one of quick, standard, paper", "'qick'"),
-        (["reproduce", "--tissues", "humann"], "tissues must be one of paper, trial1", "'humann'"),
-        (["reproduce", "--jobs", "0"], "jobs must be a whole number of at least 1", "0"),
-        (["reproduce", "--jobs", "1.5"], "'--jobs': must be a whole number", "'1.5'"),
+        ([*BALL, "--depth_mm", "1"], "No such option: --depth_mm", ""),
+        ([*BALL, "--frictoin", "1"], "No such option: --frictoin; write --friction", ""),
+        ([*BALL, "--materials=a"], "No such option: --materials; write --tissues", ""),
+        ([*BALL, "--resolution", "qick"], "resolution must be one of quick, standard, paper", "'qick'"),
+        ([*BALL, "--tissues", "humann"], "tissues must be one of human, paper, trial1", "'humann'"),
+        ([*BALL, "--jobs", "0"], "jobs must be a whole number of at least 1", "0"),
+        ([*BALL, "--jobs", "1.5"], "--jobs: must be a whole number", "'1.5'"),
+        ([*BALL, "--jobs", "2", "--scheduler", "tcp://none:1"], "leave one out", "--scheduler tcp://none:1"),
+        ([*BALL, "--friction"], "--friction: expected one argument", ""),
+        ([*BALL, "--friction", "--jobs", "1"], "'--friction' requires an argument", "'--jobs'"),
+        ([*BALL, "--friction", "rough"], "friction must be", "'rough'"),
+        ([*BALL, "--motion.depth_mm"], "'--motion.depth_mm' requires an argument", ""),
+        ([*BALL, "--motion.depth_mm", "-1"], "motion.depth_mm must lie within 0.001 to 20 mm", "-1"),
+        ([*BALL, "--motion.dept_mm", "1"], "motion.dept_mm is unknown: did you mean depth_mm?", ""),
+        ([*BALL, "--friction.depth_mm", "1"], "friction", "depth_mm"),
+        ([*BALL, "--object.kind.deep", "1"], "object.kind must be one of sphere", "deep"),
+        ([*BALL, "--object.curvature_per_m", "round"], "curvature_per_m must be a finite number", "'round'"),
+        ([*BALL, "--outputs", "csv,stl"], "outputs[2] must be one of figures, csv", "'stl'"),
+        ([*BALL, "--outputs", "febio", "--motion", "{kind: stroke, depth_mm: 1, speed_mm_per_s: 9, x_mm: 2}"],
+         "febio decks move the indenter only along its axis", "febio"),
+        ([*BALL, "--quiet", "--verbose"], "exclude each other", "--verbose"),
+        (["touch", "--object", "cone"], "must be one of sphere, cylinder, bar", "'cone'"),
+        (["touch", "--object", "punch:wide"], "diameter_mm must be a finite number", "'wide'"),
+        (["touch"], "touch needs a file or options", "--help"),
+        (["touch", "gone.yaml"], "gone.yaml must be a file", "No such file"),
+        (["touch", "a.yaml", "b.yaml"], "unexpected extra argument", "b.yaml"),
+        (["fit", "rates.csv", "--out", ""], "--out must not be empty", ""),
+        (["fit", ""], "must not be empty", ""),
         (["reproduce", "--seed", "-1"], "seed must be a whole number of at least 0", "-1"),
-        (["reproduce", "--seed", "abc"], "'--seed': must be a whole number", "'abc'"),
-        (["reproduce", "--seed"], "--seed", "requires an argument"),
-        (["fit", "--example", "--resolution", "quick"], "'--example' requires an argument", "'--resolution'"),
-        (["reproduce", "--quick"], "No such option: --quick; write --resolution quick", "quick"),
-        (["export", "out", "--materials", "a"], "No such option: --materials; write --tissues", ""),
-        (["export"], "Missing argument", "'FOLDER'"),
-        (["store"], "store needs a command: list, verify, prune", "list"),
+        (["reproduce", "--seed", "abc"], "seed must be a whole number", "'abc'"),
+        (["store"], "required: ACTION, FOLDER", ""),
         (["store", "verify", "."], "FOLDER must hold stored indentations: . has none", "."),
-        (["export", "out", "--elastic-moduli", "long_term"], "elastic_moduli is for calculix", "vtu"),
-        (["export", "out", "--indenter", "cone"], "indenter must be one of sphere, cylinder, bar", "'cone'"),
-        (["export", "out", "--indenter", "bar", "--curvature", "2"], "--curvature is that of", "bar"),
-        (["export", "out", "--indenter", "sphere:3", "--curvature", "287"], "without a size", "sphere:3"),
-        (["export", "out", "--indenter", "punch:wide"], "diameter_mm must be a finite number", "'wide'"),
-        (["export", "out", "--curvature", "round"], "'--curvature': must be a number", "'round'"),
-        (["export", "out", "--depth", "-1"], "depth_mm must lie within 0.001 to 20 mm", "-1"),
-        (["export", "out", "--depth", "1", "--trajectory", "a.csv"], "--depth is that of a hold", "a.csv"),
-        (["export", "out", "--tolerance", "0.02"], "--tolerance is that of a --trajectory", "give both"),
-        (["export", "out", "--trajectory", "gone.csv"], "gone.csv must be a file", "No such file"),
-        (["export", "out", "--touch", "gone.yaml"], "gone.yaml must be a file", "No such file"),
-        (["export", "out", "--touch", "a.yaml", "--depth", "1"], "leave the other options", "a.yaml"),
-        (["export", "out", "--format", "stl"], "format must be one of vtu", "'stl'"),
-        (["reproduce", "twice"], "unexpected extra argument", "twice"),
-        (["reproduse"], "No such command", "'reproduse'"),
-        (["--resolution", "quick"], "No such option", "--resolution"),
+        (["init", "tuch"], "WHAT must be one of touch", "'tuch'"),
+        (["reproduse"], "No such command: 'reproduse'; did you mean reproduce", ""),
+        (["--resolution", "quick"], "No such option: --resolution", ""),
     ],
     ids=lambda value: " ".join(value) if isinstance(value, list) else "",
-)
-def test_misuse_is_one_sentence_and_status_2_and_nothing_is_written(call, is_refused, arguments, named, came):
-    is_refused(call(*arguments), "fingerpad", named, came)
+)  # fmt: skip
+def test_misuse_is_one_sentence_and_status_2_and_nothing_is_written(call, tmp_path, arguments, named, came):
+    status, said, errors = call(*arguments)
+    assert (status, said) == (2, "")
+    assert re.fullmatch(r"fingerpad: [^\n]*[^.][.?]\n", errors), errors
+    assert named in errors
+    assert came in errors
+    assert list(tmp_path.iterdir()) == []
 
 
 @pytest.mark.parametrize(
     ("words", "package", "extra"),
     [
-        (["export", "out"], "vtkmodules.vtkIOXML", "vtk"),
-        (["export", "out", "--format", "netcdf"], "xarray", "netcdf"),
+        ([*BALL, "--outputs", "vtu"], "vtkmodules.vtkIOXML", "vtk"),
+        ([*BALL, "--outputs", "netcdf"], "xarray", "netcdf"),
         (["lab", "--folder", "out"], "panel.custom", "lab"),
     ],
 )
@@ -144,66 +161,116 @@ def test_a_failed_run_is_reported_without_a_traceback(call, monkeypatch, tmp_pat
     def fail(*_):
         raise failure
 
-    monkeypatch.setattr(gerling2014, "reproduce", fail)
+    monkeypatch.setattr(runs, "reproduce", fail)
     found, printed, errors = call("reproduce", "--out", "run")
     assert (found, printed) == (status, "")
     assert errors.splitlines()[-1].startswith(f"fingerpad: {said}")
     assert list((tmp_path / "run").iterdir()) == []
 
 
-def test_options_reach_the_run(call, monkeypatch, tmp_path):
-    runs = []
+@pytest.fixture
+def asked(call, monkeypatch):
+    """Run a command up to its function: the request, and how it is run."""
+    found = []
 
-    def note(run, progress):
-        runs.append(run)
+    def note(request, **how):
+        found.append((request, how))
         raise fp.FingerpadError("Enough.")
 
-    monkeypatch.setattr(gerling2014, "reproduce", note)
-    call("reproduce", "--resolution", "paper", "--out", "a/b", "--jobs", "3", "--seed", "7")
-    call("reproduce")
-    given, default = runs
-    assert (given.resolution, given.seed, given.jobs) == ("paper", 7, 3)
-    assert given.folder.resolve() == tmp_path / "a" / "b"
-    assert (default.resolution, default.seed, default.tissues) == ("standard", 0, "paper")
-    assert default.jobs >= 1
-    assert default.folder.resolve() == tmp_path / "reproduction"
+    def run(*words):
+        for name in commands.KINDS:
+            monkeypatch.setattr(fp, name, note, raising=False)
+        status, said, errors = call(*words)
+        assert (status, said, errors) == (2, "", "fingerpad: Enough.\n")
+        return found.pop()
+
+    return run
 
 
-def test_options_reach_the_export(call, monkeypatch, tmp_path):
-    exported = []
+def test_options_reach_the_run(asked, tmp_path):
+    given, how = asked("reproduce", "--resolution", "paper", "--out", "a/b", "--jobs", "3", "--seed", "7")
+    assert (given.resolution, given.seed, how["jobs"]) == ("paper", 7, 3)
+    assert how["out"].resolve() == tmp_path / "a" / "b"
+    given, how = asked("--quiet", "reproduce")
+    assert given == fp.ReproductionRequest.read({})
+    assert how["jobs"] >= 1
+    assert how["out"].resolve() == tmp_path / "reproduction"
 
-    def note(folder, touch, format_name, elastic_moduli):
-        exported.append((touch, folder, format_name, elastic_moduli))
-        return (folder / "touch.pvd",)
 
-    monkeypatch.setattr(formats, "export_touch", note)
-    given = ("--curvature", "340", "--depth", "0.5", "--tissues", "trial1", "--resolution", "standard")
-    assert call("export", "a/b", *given) == (0, "Open: a/b/touch.pvd\n", "")
-    assert call("export", "c", "--indenter", "plate", "--format", "vtu")[0] == 0
-    assert call("export", "d", "--format", "calculix", "--elastic-moduli", "long_term")[0] == 0
-    (tmp_path / "press.csv").write_text("time_ms,depth_mm\n0,0\n50,0.5\n100,0\n", encoding="utf-8")
-    assert call("export", "e", "--trajectory", "press.csv")[0] == 0
-    (tmp_path / "bent.csv").write_text("time_ms,depth_mm\n0,0\n25,0.26\n50,0.5\n", encoding="utf-8")
-    assert call("export", "e", "--trajectory", "bent.csv")[0] == 0
-    assert call("export", "e", "--trajectory", "bent.csv", "--tolerance", "0.05")[0] == 0
-    (tmp_path / "touch.yaml").write_text("object: plate\nplace: {tilt_deg: 0}\n", encoding="utf-8")
-    assert call("export", "f", "--touch", "touch.yaml")[0] == 0
-    (touch, folder, format_name, _), (default, _, _, relaxing), (*_, elastic), *rest = exported
-    (played, *_), (bent, *_), (straight, *_), (same, *_) = rest
-    assert (len(bent.stimulus.times_ms), len(straight.stimulus.times_ms)) == (3, 2)
-    assert same == default
-    assert played.stimulus == fp.Trajectory((0.0, 50.0, 100.0), (0.0, 0.5, 0.0))
-    assert (relaxing, elastic) == (None, "long_term")
-    ball, motion = fp.Sphere(curvature_per_m=340), fp.RampAndHold(depth_mm=0.5)
-    assert touch == fp.touch_of(fp.Fingertip(), ball, motion, "trial1", "standard")
-    assert (folder.resolve(), format_name) == (tmp_path / "a" / "b", "vtu")
-    assert default == fp.touch_of(fp.Fingertip(), fp.Plate(), fp.RampAndHold(depth_mm=1.0), "human", "quick")
+def test_options_replace_keys_of_the_file_and_go_into_blocks(asked):
+    Path("touch.yaml").write_text("object: plate\nmotion: {depth_mm: 0.4, hold_ms: 200}\ntissues: trial1\n")
+    given, _ = asked(
+        "touch", "touch.yaml", "--motion.depth_mm", "0.5", "--tissues=human", "--times-ms", "30,50",
+        "--afferents.rows", "2", "--outputs", "csv,spikes", "--elastic_moduli", "instantaneous",
+    )  # fmt: skip
+    motion = {"depth_mm": 0.5, "hold_ms": 200}
+    assert given == fp.TouchRequest.read(
+        {
+            "object": "plate", "motion": motion, "tissues": "human", "times_ms": [30, 50],
+            "afferents": {"rows": 2}, "outputs": ["csv", "spikes"], "elastic_moduli": "instantaneous",
+        }
+    )  # fmt: skip
+    Path("bars.csv").write_text("shift_mm,static_rate_hz\n" + "".join(f"{n},{9 * n}\n" for n in range(8)))
+    given, _ = asked(
+        "fit", "bars.csv", "--object", "bar", "--object.width_mm", "2", "--motion.depth_mm", "0.6",
+        "--windows_ms.static", "600,950", "--no-posterior", "--folds", "4",
+    )  # fmt: skip
+    assert (given.recordings, given.folds, given.posterior) == ("bars.csv", 4, False)
+    assert given.windows_ms.static == (600.0, 950.0)
+    stimulus = given.presented.named("1")
+    assert (stimulus.indenter, stimulus.motion.depth_mm) == (fp.Bar(width_mm=2.0), 0.6)
+
+
+def test_a_file_names_objects_of_python_only_where_this_is_allowed(call, asked):
+    Path("own_parts_of_cli.py").write_text("import fingerpad as fp\nball = fp.Sphere(radius_mm=4)\n")
+    Path("own.yaml").write_text("object: own_parts_of_cli:ball\n")
+    given, _ = asked("touch", "own.yaml", "--allow-python")
+    assert given.touch.indenter == fp.Sphere(radius_mm=4)
+
+
+def test_without_leave_no_python_is_run(call, tmp_path):
+    Path("own_parts_unread.py").write_text("raise SystemExit('run')\n")
+    Path("own.yaml").write_text("object: own_parts_unread:ball\n")
+    for command in ("check", "touch"):
+        status, said, errors = call(command, "own.yaml")
+        assert (status, said) == (2, "")
+        assert "own.yaml, line 1, object names an object of own_parts_unread.py" in errors
+        assert "--allow-python" in errors
+    assert {path.name for path in tmp_path.iterdir()} == {"own.yaml", "own_parts_unread.py"}
+
+
+def test_every_example_can_be_written_and_is_possible(call):
+    status, said, _ = call("init", "--list")
+    assert status == 0
+    names = [line.partition(":")[0] for line in said.splitlines()]
+    assert {"touch", "recordings", "force", "sphere_curvature"} <= set(names)
+    for name in names:
+        status, said, errors = call("init", name, "--out", name)
+        assert (status, errors) == (0, ""), name
+        _, command, path = said.removeprefix("Try: ").split()
+        assert Path(path).is_file()
+        if command == "check":
+            assert call(command, path)[::2] == (0, ""), name
+        else:
+            fp_request = getattr(fp, commands.KINDS[command])
+            fp_request.read({{"fit": "recordings", "validate": "observations"}[command]: path}).check()
+
+
+def test_the_exit_status_says_what_is_incomplete(call, monkeypatch):
+    found = type("Found", (), {"n_rows": 3, "n_predicted": 2, "lines": ("so",), "failed": 4, "done": False})()
+    monkeypatch.setattr(commands, "_run_request", lambda *_, **__: found)
+    monkeypatch.setattr("fingerpad.report.validation.validation_summary", lambda _: ("so",))
+    assert call("validate", "force.csv")[0] == commands.INCOMPLETE == 3
+    content = {"touch": {"object": "sphere"}, "grid": {"motion.depth_mm": [0.2, 0.3]}}
+    Path("sweep.yaml").write_text(json.dumps(content))
+    assert call("sweep", "sweep.yaml")[0] == 14
+    found.failed = 500
+    assert call("sweep", "sweep.yaml")[0] == 99
 
 
 def test_a_subprocess_has_the_same_output_and_no_warning(tmp_path):
-    done = subprocess.run(
-        [*COMMAND, "reproduce", "--seed", "abc"], cwd=tmp_path, capture_output=True, text=True, check=False
-    )
-    expected = "fingerpad: Invalid value for '--seed': must be a whole number: got 'abc'.\n"
+    command = [sys.executable, "-W", "error", "-m", "fingerpad", "reproduce", "--jobs", "abc"]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
+    expected = "fingerpad: Argument --jobs: must be a whole number: got 'abc'.\n"
     assert (done.returncode, done.stdout, done.stderr) == (2, "", expected)
     assert list(tmp_path.iterdir()) == []

@@ -9,23 +9,18 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from fingerpad.experiments.discrimination.task import CurveSettings
-from fingerpad.experiments.discrimination.task_stimuli import (
-    example_tasks,
-    task_population,
-    task_stimuli,
-    task_touches,
-)
 from scipy.special import ndtri
 from scipy.stats import binom
 
-from fingerpad import InputError, Traces, cli, parse_task
+import fingerpad as fp
+from fingerpad import InputError, Traces, cli
 from fingerpad.core.result_files import to_json
 from fingerpad.experiments import runner
 from fingerpad.experiments.conditions import RECEPTOR_X_MM
-from fingerpad.experiments.discrimination import run as task_run
-from fingerpad.experiments.discrimination.analysis import PreparedTask, analyse, forced_choice_of
+from fingerpad.experiments.discrimination import analysis
+from fingerpad.experiments.discrimination.analysis import analyse, forced_choice_of
 from fingerpad.experiments.discrimination.decoding import SESSION, side_curves
+from fingerpad.experiments.discrimination.request import CurveSettings, example_tasks
 from fingerpad.psychophysics.encoding import gradient_sum, neighbour_pairs, taking_part
 from fingerpad.psychophysics.ideal_observer import code_efficiency, noisy_presentations
 from fingerpad.psychophysics.observer import EuclideanDistance, Experiment, GradientSum, discriminate_by
@@ -33,13 +28,14 @@ from fingerpad.report import task as report
 from refusals import misused
 
 ROOT = Path(__file__).parents[1]
+read = fp.DiscriminationRequest.read
 QUESTION = {
     "question": "Which bumps?",
     "tissues": "trial3",  # whose afferent follows energy density
     "object": {"kind": "sphere"},
     "stimuli": {"vary": "object.curvature_per_m", "values": [200, 220, 240, 280, 320]},
     "standard": 200,
-    "population": {"rows": 4, "columns": 4},
+    "afferents": {"rows": 4, "columns": 4},
     "code": ["gradient_sum", "euclidean"],
     "measure": ["static", "dynamic", "latency"],
     "noise": 0.1,
@@ -71,12 +67,11 @@ class NearOnly(Bump):
 
 
 def asked(**parts):
-    question = parse_task(QUESTION | parts)
-    return PreparedTask(question, task_stimuli(question), task_population(question))
+    return read(QUESTION | parts)
 
 
 def bumps(question, **more):
-    return {stimulus.name: Bump(stimulus.indenter.curvature_per_m, **more) for stimulus in question.stimuli}
+    return {stimulus.name: Bump(stimulus.indenter.curvature_per_m, **more) for stimulus in question.pressed}
 
 
 @pytest.fixture(scope="module")
@@ -111,7 +106,7 @@ def test_hit_rates_are_those_of_the_observers_with_the_questions_own_numbers(ans
 
 def test_spikes_after_the_waiting_time_count_as_the_waiting_time():
     def latest_ms(patience_ms):
-        question = asked(measure="latency", code="gradient_sum", windows_ms={"latency": patience_ms})
+        question = asked(measure="latency", code="gradient_sum", latest_ms=patience_ms)
         return np.max(analyse(question, bumps(question, peak_kpa=0.3)).responses["latency"])
 
     assert latest_ms(40) == 40.0
@@ -119,7 +114,7 @@ def test_spikes_after_the_waiting_time_count_as_the_waiting_time():
 
 
 def test_who_is_silent_under_one_stimulus_has_no_latency_under_any():
-    question = asked(measure="latency", windows_ms={"static": [600, 950]})
+    question = asked(measure="latency")
     skins = bumps(question)
     distance_mm = np.linalg.norm(question.population.positions_mm - [RECEPTOR_X_MM, 0.0], axis=1)
     near = distance_mm < 2.0
@@ -220,7 +215,7 @@ def test_two_stimuli_give_a_forced_choice_and_no_missing_threshold():
         assert decoding.curves == ()
         choice = decoding.forced_choice
         proportion, low, high = choice.proportions[:, 0]
-        trials = question.task.experiment.trials
+        trials = question.experiment.trials
         assert choice.trials == trials
         assert 0.5 < low < proportion < high < 1.0
         # As many correct answers as observed, or more, have a probability of 2.5 % at the lower end.
@@ -230,7 +225,7 @@ def test_two_stimuli_give_a_forced_choice_and_no_missing_threshold():
         np.testing.assert_allclose(choice.d_primes[:, 0], np.sqrt(2.0) * ndtri([proportion, low, high]))
         assert choice.d_primes[0] == pytest.approx(decoding.d_prime)
     table, neighbours = taking_part(found.responses["static"], question.neighbours)
-    (presented,) = noisy_presentations(table, 0.1, question.task.experiment.seed, session=2)
+    (presented,) = noisy_presentations(table, 0.1, question.experiment.seed, session=2)
     sums = [gradient_sum(each, neighbours) for each in (presented.standard, presented.comparison)]
     greater = (sums[1][:, None] > sums[0]).mean()
     proportion = found.decodings[0].forced_choice.proportions[0, 0]
@@ -361,9 +356,9 @@ def test_an_answer_is_a_page_figures_and_numbers_with_their_origin(call, tmp_pat
     assert manifest["inputs"] == {"mine.yaml": hashlib.sha256(MINE.encode()).hexdigest()}
     assert (manifest["seed"], manifest["resolution"], manifest["materials"]) == (5, "quick", "trial3")
     assert results["task"]["stimuli"]["values"] == [200.0, 220.0, 240.0, 280.0, 320.0]
-    again = parse_task(results["task"])  # what was asked can be asked again
-    assert again == parse_task(json.loads(MINE))
-    assert task_touches(again) == task_touches(parse_task(json.loads(MINE)))
+    again = read(results["task"])  # what was asked can be asked again
+    assert again == read("mine.yaml")
+    assert again.touches == read("mine.yaml").touches
     page = (tmp_path / "discriminate" / "discriminate.html").read_text()
     assert "<h1>Which bumps?</h1>" in page
     assert page.count("data:image/png;base64,") == 3
@@ -386,18 +381,12 @@ def test_the_same_seed_gives_the_same_numbers_and_another_others():
 
 
 def test_an_example_task_runs_by_name_or_as_a_file_of_ones_own(call, tmp_path, answered, monkeypatch):
-    def known(prepared, skins):
-        return replace(answered, question=prepared.task.question, axis=", ".join(skins))
+    def known(task, skins):
+        return replace(answered, question=task.question, axis=", ".join(skins))
 
-    monkeypatch.setattr(task_run, "analyse", known)
-    status, said, _ = call("--list")
-    assert status == 0
-    assert [line.split(":")[0] for line in said.splitlines()] == list(example_tasks())
-    status, said, _ = call("--example", "sphere_curvature")
-    assert (status, said) == (0, example_tasks()["sphere_curvature"])
-    assert list(tmp_path.iterdir()) == []
+    monkeypatch.setattr(analysis, "analyse", known)
     assert call("sphere_curvature", "--resolution", "quick", "--out", "named")[0] == 0
-    (tmp_path / "mine.yaml").write_text(said)
+    (tmp_path / "mine.yaml").write_text(example_tasks()["sphere_curvature"])
     assert call("mine.yaml", "--resolution", "quick", "--out", "own")[0] == 0
     named, own = (json.loads((tmp_path / one / "discriminate.json").read_text()) for one in ("named", "own"))
     assert named["discrimination"] == own["discrimination"]
@@ -409,15 +398,14 @@ def test_an_example_task_runs_by_name_or_as_a_file_of_ones_own(call, tmp_path, a
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [
-        ([], "discriminate needs a task, a YAML file or one of"),
+        ([], "discriminate needs a file or options"),
         (["none.yaml"], "none.yaml must be a file that can be read"),
         (["bumps"], "bumps must be a YAML file or one of the example tasks"),
         (["bad.yaml"], "bad.yaml, line 1, standard must be one of the stimuli"),
         (["broken.yaml"], "broken.yaml cannot be read as YAML"),
-        (["empty.yaml"], "empty.yaml, the file must be a mapping"),
+        (["empty.yaml"], "empty.yaml, the file is empty"),
         (["mine.yaml", "--jobs", "0"], "jobs must be a whole number of at least 1"),
         (["mine.yaml", "--resolution", "high"], "resolution must be one of quick"),
-        (["--example", "bumps"], "--example must be one of"),
         (["mine.yaml", "--out", "mine.yaml"], "--out must be a writable folder"),
     ],
     ids=lambda value: " ".join(value) if isinstance(value, list) else "",

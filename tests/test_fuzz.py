@@ -15,13 +15,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from fingerpad.experiments.afferent_files import fitted_afferent
-from fingerpad.experiments.descriptions.example import EXAMPLE
-from fingerpad.experiments.descriptions.reduction import read_reduction
-from fingerpad.experiments.descriptions.stimulus import TactileStimulus
-from fingerpad.experiments.discrimination.task_stimuli import example_tasks
-from fingerpad.experiments.stimuli import ShiftedBar
-from fingerpad.experiments.sweep.description import read_sweep
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
@@ -30,6 +23,11 @@ from fingerpad.cli import main
 from fingerpad.core.layouts import Layout
 from fingerpad.core.plain_yaml import read_yaml
 from fingerpad.experiments.conditions import Conditions
+from fingerpad.experiments.discrimination.request import example_tasks
+from fingerpad.experiments.requests.afferents import fitted_afferent
+from fingerpad.experiments.requests.stimuli import ShiftedBar
+from fingerpad.experiments.requests.stimulus import TactileStimulus
+from fingerpad.experiments.requests.touch import EXAMPLE
 from fingerpad.experiments.runner import Runner
 from fingerpad.experiments.validation.observations import read_observations
 from fingerpad.mechanics.newton import NewtonSettings
@@ -193,10 +191,13 @@ def _picture():
 
 
 FILES = {
-    "task.yaml": (example_tasks()["sphere_curvature"].encode(), lambda path: fp.read_task(str(path))),
-    "touch.yaml": (EXAMPLE.encode(), fp.read_touch_description),
-    "sweep.yaml": (b"touch:\n  object: {kind: sphere}\ngrid:\n  object.radius_mm: [2, 3]\n", read_sweep),
-    "reduction.yaml": (b"touch:\n  object: {kind: sphere}\nrange: {depth_mm: 1}\n", read_reduction),
+    "task.yaml": (example_tasks()["sphere_curvature"].encode(), fp.DiscriminationRequest.read),
+    "touch.yaml": (EXAMPLE.encode(), fp.TouchRequest.read),
+    "sweep.yaml": (
+        b"touch:\n  object: {kind: sphere}\ngrid:\n  object.radius_mm: [2, 3]\n",
+        fp.SweepRequest.read,
+    ),
+    "reduction.yaml": (b"object: {kind: sphere}\nrange: {depth_mm: 1}\n", fp.ReductionRequest.read),
     "any.yaml": (b"a: [1, 2.5, {b: 'c'}]\n", lambda path: read_yaml(path.read_text(errors="ignore"), "any")),
     "stimuli.csv": (b"name,object,object.diameter_mm\nprobe,punch,1.0\nwide,punch,4\n", fp.read_stimuli),
     "stimuli.yaml": (b"stimuli:\n- {name: a, object: {kind: sphere, radius_mm: 3}}\n", fp.read_stimuli),
@@ -258,14 +259,15 @@ def test_a_damaged_file_is_read_or_refused_in_one_sentence(tmp_path_factory, nam
 # -- the command line ----------------------------------------------------------------------------------------
 
 COMMANDS = [
-    "touch", "init", "check", "sweep", "reproduce", "fit", "discriminate", "validate", "export", "view",
+    "touch", "respond", "init", "check", "sweep", "reproduce", "fit", "discriminate", "validate", "view",
     "reduce", "store",
 ]  # fmt: skip
 OPTIONS = [
-    "--out", "--resolution", "--tissues", "--jobs", "--seed", "--stimulus", "--depth", "--width", "--fillet",
-    "--folds", "--method", "--unit", "--static-window", "--finger", "--list", "--example", "--format",
-    "--touch", "--extended", "--dry-run", "--help", "--version", "--scheduler", "--posterior", "list",
-    "verify", "prune",
+    "--out", "--resolution", "--tissues", "--jobs", "--seed", "--stimuli", "--object", "--motion",
+    "--motion.depth_mm", "--object.kind", "--afferents.rows=2", "--times_ms", "--outputs", "--folds",
+    "--method", "--unit", "--windows_ms.static", "--finger", "--list", "--noise", "--touch", "--extended",
+    "--allow-python", "--quiet", "--help", "--version", "--scheduler", "--posterior", "list", "verify",
+    "prune",
 ]  # fmt: skip
 WORDS = [
     "", "-1", "0", "1", "nan", "inf", "1e400", "9" * 400, "quick", "human", "bar", "x", "none.yaml",

@@ -13,16 +13,9 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from fingerpad.experiments.afferent_files import fitted_afferent
-from fingerpad.experiments.descriptions.estimate import estimate_press
-from fingerpad.experiments.descriptions.stimulus import TactileStimulus
-from fingerpad.experiments.descriptions.touch import described_touch
-from fingerpad.experiments.discrimination.run import DiscriminationRun, discriminate
-from fingerpad.experiments.discrimination.task_stimuli import parse_task
-from fingerpad.experiments.stimuli import ShiftedBar
 
 import fingerpad as fp
-from fingerpad.cli import main, run
+from fingerpad.cli import commands, main
 from fingerpad.core.errors import LONGEST_MESSAGE, FingerpadError, InputError, closest
 from fingerpad.core.files import read_text
 from fingerpad.core.plain_yaml import DEEPEST, LARGEST_TEXT, read_yaml
@@ -32,6 +25,10 @@ from fingerpad.core.tables import read_csv
 from fingerpad.experiments.conditions import Conditions
 from fingerpad.experiments.fit.fit import fit_recordings
 from fingerpad.experiments.recording_files import read_recordings
+from fingerpad.experiments.requests.afferents import fitted_afferent
+from fingerpad.experiments.requests.stimuli import ShiftedBar
+from fingerpad.experiments.requests.stimulus import TactileStimulus
+from fingerpad.experiments.requests.touch import estimate_press
 from fingerpad.inference.rate_model import AfferentModel
 from fingerpad.inference.recordings import RateRecordings
 from fingerpad.neuron.population import sensitivities
@@ -59,8 +56,8 @@ resolution: quick
 """
 
 
-def task_run(tmp_path, more):
-    return DiscriminationRun(parse_task(read_yaml(TASK + more, "task")), tmp_path, source="task", text=TASK)
+def task(more):
+    return fp.DiscriminationRequest.read(read_yaml(TASK + more, "task"))
 
 
 @pytest.mark.parametrize(
@@ -79,7 +76,7 @@ def test_a_body_between_the_nodes_is_refused_before_it_is_pressed(body):
         lambda: rectangular(Rectangle(1e9, 1e-6), 100.0),
         lambda: fp.Population.grid(rows=10**6, columns=10**6),
         lambda: Experiment(presentations=10**5, distributions=10**5),
-        lambda: parse_task(read_yaml(TASK + "experiment: {trials: 1000000000000}", "task")),
+        lambda: task("experiment: {trials: 1000000000000}"),
     ],
 )
 def test_sizes_without_memory_or_end_are_refused_at_once(make):
@@ -108,21 +105,21 @@ def test_windows_of_rates_lie_in_what_was_recorded(window):
     [
         ("code: [gradient_sum, gradient_sum]", "code must name each once"),
         ("measure: [static, static]", "measure must name each once"),
-        ("population: {offset_mm: [99, 0]}", "population.*must lie on the volar skin"),
-        ("population: {density_per_cm2: 1.0e-6}", "population.*must lie on the volar skin"),
+        ("afferents: {offset_mm: [99, 0]}", "afferents.*must lie on the volar skin"),
+        ("afferents: {density_per_cm2: 1.0e-6}", "afferents.*must lie on the volar skin"),
     ],
 )
-def test_an_impossible_task_is_refused_before_anything_is_pressed(tmp_path, monkeypatch, more, said):
+def test_an_impossible_task_is_refused_before_anything_is_pressed(monkeypatch, more, said):
     monkeypatch.setattr("fingerpad.experiments.runner.Runner.solve", pytest.fail)
     with pytest.raises(InputError, match=said):
-        discriminate(task_run(tmp_path, more))
+        fp.discriminate(task(more))
 
 
 def test_seeds_fit_into_63_bits_where_they_enter():
     for make in (
         lambda: Conditions(seed=2**63),
         lambda: sensitivities(3, 0.1, 2**64),
-        lambda: parse_task(read_yaml(TASK + "experiment: {seed: 9223372036854775808}", "task")),
+        lambda: task("experiment: {seed: 9223372036854775808}"),
     ):
         with pytest.raises(InputError, match="seed must"):
             make()
@@ -342,20 +339,19 @@ def test_a_pipe_in_the_place_of_an_archive_does_not_hang(tmp_path):
     assert store.missing([touch])
 
 
-def test_an_error_of_the_system_is_one_sentence(capsys):
-    def without_rights(**options):
+def test_an_error_of_the_system_is_one_sentence(run_program, monkeypatch):
+    def without_rights(*_):
         raise PermissionError(13, "Permission denied", "indentations")
 
-    with pytest.raises(SystemExit) as ended:
-        run(without_rights, "fingerpad")
-    assert ended.value.code == 2
-    assert capsys.readouterr().err == "fingerpad: indentations cannot be used (Permission denied).\n"
+    monkeypatch.setitem(commands.COMMANDS, "init", (*commands.COMMANDS["init"][:2], without_rights))
+    said = "fingerpad: indentations cannot be used (Permission denied).\n"
+    assert run_program(main, "fingerpad", "init") == (2, "", said)
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="it needs /dev/full")
 def test_a_full_output_is_one_sentence():
     with open("/dev/full", "w") as full:
-        command = [sys.executable, "-m", "fingerpad", "discriminate", "--example", "gap_detection"]
+        command = [sys.executable, "-m", "fingerpad", "init", "--list"]
         done = subprocess.run(command, stdout=full, stderr=subprocess.PIPE, text=True)
     assert done.returncode == 2
     assert done.stderr == "fingerpad: The output cannot be used (No space left on device).\n"
@@ -370,14 +366,14 @@ def test_a_full_output_is_one_sentence():
 )  # fmt: skip
 def test_a_file_that_holds_no_afferent_is_named(tmp_path, text):
     (tmp_path / "fit.json").write_text(text)
-    with pytest.raises(InputError, match=r"afferent: .*fit\.json"):
+    with pytest.raises(InputError, match=r"fit\.json"):
         fitted_afferent(tmp_path / "fit.json")
 
 
-def test_a_number_of_folds_is_named_as_the_option(run_program):
+def test_a_number_of_folds_is_named_as_its_key(run_program):
     with open("r.csv", "w") as file:
         file.write("shift_mm,static_rate_hz\n" + "".join(f"{shift},{10 * shift}\n" for shift in range(8)))
-    status, _, errors = run_program(main, "fingerpad", "fit", "r.csv", "--stimulus", "bar", "--folds", "99")
+    status, _, errors = run_program(main, "fingerpad", "fit", "r.csv", "--stimuli", "bar", "--folds", "99")
     assert status == 2
     assert "folds must be at most the number of stimuli, 8" in errors
 
@@ -389,8 +385,8 @@ def test_no_message_has_a_value_at_full_length(tmp_path):
         lambda: fp.Energy(long),
         lambda: fp.Grading(17.0, 1.0, 1.0, 0.5, 0.5, dermis=long),
         lambda: Conditions(resolution=long),
-        lambda: parse_task(read_yaml(f"question: {long}\nnonsense: {long}", "task")),
-        lambda: fp.read_touch_description(tmp_path / long[:200]),
+        lambda: fp.DiscriminationRequest.read({"question": long, "nonsense": long}),
+        lambda: fp.TouchRequest.read(tmp_path / long[:200]),
         lambda: ShiftedBar().named(long),
     ):
         with pytest.raises(FingerpadError) as error:
@@ -427,7 +423,7 @@ def test_times_and_levels_beyond_use_are_refused():
 
 
 @pytest.mark.parametrize(
-    "words", [("discriminate", "x", "--out", ""), ("export", ""), ("fit", "--example", "")]
+    "words", [("discriminate", "x", "--out", ""), ("check", ""), ("fit", "--method", "")]
 )
 def test_an_empty_word_is_no_folder(run_program, is_refused, words):
     is_refused(run_program(main, "fingerpad", *words), "fingerpad", "must not be empty", "")
@@ -439,7 +435,7 @@ def test_an_empty_word_is_no_folder(run_program, is_refused, words):
 @pytest.mark.parametrize(
     "read",
     [
-        fp.read_trajectory, fp.read_touch_description, fp.read_touch, fp.open_sweep,
+        fp.read_trajectory, fp.read_touch, fp.open_sweep,
         fp.read_surface, fp.read_finger, lambda path: fp.read_height_map(path, 0.1),
         lambda path: fp.write_sweep_table(None, path),
     ],
@@ -472,8 +468,8 @@ def test_what_is_no_data_set_of_a_sweep_is_refused(use):
 
 def test_an_estimate_counts_the_cycles_that_are_solved():
     motion = {"kind": "sine", "depth_mm": 0.3, "amplitude_mm": 0.02, "frequency_hz": 20, "cycles": 100}
-    many = estimate_press(described_touch({"object": "sphere", "motion": motion}))
-    ten = estimate_press(described_touch({"object": "sphere", "motion": motion | {"cycles": 10}}))
+    many = estimate_press(fp.TouchRequest.read({"object": "sphere", "motion": motion}))
+    ten = estimate_press(fp.TouchRequest.read({"object": "sphere", "motion": motion | {"cycles": 10}}))
     assert many.steps == ten.steps
     assert closest("depth", ["time_ms", "depth_mm", "depth_um"]) == "depth_mm"
 

@@ -15,8 +15,8 @@ from docs.site.reference import public_names
 from fingerpad.core.checked import OtherName, other_names, value_class
 from fingerpad.core.displayed import Result
 from fingerpad.core.units import unit_of
-from fingerpad.experiments.indenter_text import indenter_named
-from fingerpad.experiments.stimuli import read_stimuli
+from fingerpad.experiments.requests.stimuli import read_stimuli
+from fingerpad.experiments.requests.stimulus import indenter_named
 from fingerpad.geometry.edged_indenters import INDENTERS, sizes_of
 from fingerpad.skin.store import touch_key
 

@@ -64,7 +64,7 @@ def test_import_chooses_no_plotting_backend_and_warns_of_nothing() -> None:
 
 
 HEAVY = (
-    "numpy", "scipy", "numba", "llvmlite", "matplotlib", "jinja2", "typer", "rich", "threadpoolctl",
+    "numpy", "scipy", "numba", "llvmlite", "matplotlib", "jinja2", "pydantic", "rich", "threadpoolctl",
     "vtkmodules",
 )  # fmt: skip
 """Libraries that take from a tenth to several tenths of a second to load."""
@@ -74,8 +74,8 @@ HEAVY = (
     ("code", "needed"),
     [
         ("import fingerpad; fingerpad.InputError, fingerpad.__version__, dir(fingerpad)", set()),
-        ("import fingerpad.cli", {"typer"}),
-        ("from fingerpad import Fingertip, Traces", {"numpy", "scipy"}),
+        ("import fingerpad.cli", set()),
+        ("from fingerpad import Fingertip, Traces", {"numpy", "scipy", "pydantic"}),
     ],
     ids=["package", "command line", "values"],
 )
@@ -88,7 +88,7 @@ def test_the_module_has_its_public_names_and_nothing_that_it_imports_itself():
     done = python("import fingerpad; print(*(name for name in vars(fingerpad) if not name.startswith('_')))")
     assert done.stdout.split() == []
     assert set(dir(fingerpad)) == {*fingerpad.__all__, "__version__"}
-    daily = {"Store", "UnrolledSkin", "hexagonal", "parse_task", "write_responses_nwb"}
+    daily = {"Store", "UnrolledSkin", "hexagonal", "touch", "write_responses_nwb"}
     assert daily <= set(fingerpad.__all__)
     packages = {path.name for path in Path(fingerpad.__file__).parent.iterdir()}
     assert not packages & set(fingerpad.__all__)  # no package hides a public name

@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from fingerpad.experiments.discrimination.task_stimuli import parse_task, task_population, task_stimuli
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -10,7 +9,7 @@ from fingerpad.core.errors import InputError
 from fingerpad.core.phases import Phase, phase_named
 from fingerpad.core.signals import Traces
 from fingerpad.data import protocol
-from fingerpad.experiments.discrimination.analysis import PreparedTask
+from fingerpad.experiments.discrimination.request import DiscriminationRequest
 from fingerpad.geometry.motion import ForceRampAndHold, RampAndHold
 from fingerpad.geometry.motions import repeated, sine
 from fingerpad.geometry.trajectory import Trajectory
@@ -92,12 +91,8 @@ def test_stimuli_of_a_fit_share_their_windows():
 
 def test_each_stimulus_of_a_task_has_its_own_windows():
     ramps = {"vary": "motion.ramp_ms", "values": [50, 1500]}
-    given_task = {"question": "Which ramp?", "object": "sphere", "motion": {"hold_ms": 950}}
-    given_task |= {"stimuli": ramps, "standard": 50, "noise": 0.1}
-
-    def prepared(**more):
-        task = parse_task(given_task | more)
-        return PreparedTask(task, task_stimuli(task), task_population(task))
+    ramp = {"object": "sphere", "motion": {"hold_ms": 950}, "stimuli": ramps, "standard": 50, "noise": 0.1}
+    task = DiscriminationRequest.read(ramp)
 
     class Pressed:
         def __init__(self, motion):
@@ -110,12 +105,11 @@ def test_each_stimulus_of_a_task_has_its_own_windows():
             height = 50.0 * ones * np.array([[0.0], [1.0], [1.0]])
             return Traces(times, height, kinks, quantity=quantity)
 
-    ready = prepared()
-    quick, slow = ready.responses({each.name: Pressed(each.motion) for each in ready.stimuli})
+    quick, slow = task.responses({each.name: Pressed(each.motion) for each in task.pressed})
     assert (quick.dynamic_rate_hz > slow.dynamic_rate_hz).all()
     assert (slow.dynamic_rate_hz > 0.0).all()
     with pytest.raises(InputError, match=r"windows_ms\.static must end with the stimuli, not at 2000 ms"):
-        prepared(windows_ms={"static": [600, 2000]})
+        DiscriminationRequest.read(ramp, {"afferents.windows_ms.static": [600, 2000]}).check()
 
 
 def test_phases_of_a_trajectory_are_named_by_its_course():

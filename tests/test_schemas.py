@@ -1,4 +1,4 @@
-"""Schemas of the files of results: those in the package are the ones that the types give."""
+"""Schemas of results and requests: those in the package are the ones that the types give."""
 
 import json
 
@@ -6,8 +6,8 @@ import fastjsonschema
 import pytest
 
 from fingerpad.core.result_files import file_format
-from fingerpad.experiments.schemas import TOUCH_SCHEMA, file_name, schema, touch_schema
-from fingerpad.experiments.schemas.__main__ import RESULT_FILES, write_schemas
+from fingerpad.experiments.schemas import file_name, request_schema, schema
+from fingerpad.experiments.schemas.__main__ import REQUESTS, RESULT_FILES, write_schemas
 
 
 @pytest.mark.parametrize("results", RESULT_FILES)
@@ -23,10 +23,12 @@ def test_a_docstring_is_no_part_of_a_format(monkeypatch, tmp_path):
     assert "description" not in json.dumps(schema(file_format(RESULT_FILES[0])[0]))
 
 
-def test_every_file_of_results_has_its_own_format_and_a_described_touch_the_one_of_its_parts(tmp_path):
+def test_every_request_has_the_schema_in_the_package_that_its_fields_give(tmp_path):
     write_schemas(tmp_path)
-    assert len(list(tmp_path.iterdir())) == len(RESULT_FILES) + 1
-    assert json.loads((tmp_path / TOUCH_SCHEMA).read_text(encoding="utf-8")) == touch_schema()
+    assert len(list(tmp_path.iterdir())) == len(RESULT_FILES) + len(REQUESTS)
+    for name in REQUESTS:
+        written = (tmp_path / f"fingerpad-{name}-request.schema.json").read_text(encoding="utf-8")
+        assert json.loads(written) == request_schema(name)
 
 
 @pytest.mark.parametrize("results", RESULT_FILES)

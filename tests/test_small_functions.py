@@ -51,8 +51,8 @@ def test_numbers(dotted, arguments, expected):
 WORDS = [
     ("core.units:with_unit", ("displacement", "deep_displacement"), "displacement [mm]"),
     ("core.units:with_unit", ("0.1", "skin_stretch", " {}"), "0.1"),
-    ("experiments.descriptions.reading:merged", ("bar", {"width_mm": 3}), {"kind": "bar", "width_mm": 3}),
-    ("experiments.descriptions.reading:merged", ({"kind": "bar"}, {"kind": "sphere"}), {"kind": "sphere"}),
+    ("experiments.requests.parts:merged", ("bar", {"width_mm": 3}), {"kind": "bar", "width_mm": 3}),
+    ("experiments.requests.parts:merged", ({"kind": "bar"}, {"kind": "sphere"}), {"kind": "sphere"}),
     ("export.dataset:udunits", ("spikes/s",), "s-1"),
     ("geometry.mesh_parts:plain_name", ("LIVING-EPIDERMIS",), "living epidermis"),
     ("geometry.mesh_checks:element_place", (block_mesh([0, 1], [0, 1], [0, 1], layers=[2]), 0),

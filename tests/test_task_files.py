@@ -7,33 +7,25 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from fingerpad.experiments.descriptions.reading import parts_in
-from fingerpad.experiments.discrimination.run import DiscriminationRun
-from fingerpad.experiments.discrimination.task import DiscriminationTask
-from fingerpad.experiments.discrimination.task_stimuli import (
-    example_tasks,
-    input_hashes,
-    task_population,
-    task_stimuli,
-    task_touches,
-)
-from fingerpad.experiments.fit.session import FitFile
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 import fingerpad as fp
+from fingerpad.core import result_files
 from fingerpad.core.plain_yaml import read_yaml
 from fingerpad.core.result_files import file_format
-from fingerpad.experiments import schemas
 from fingerpad.experiments.conditions import RECEPTOR_X_MM, Conditions
-from fingerpad.experiments.discrimination.analysis import PreparedTask
+from fingerpad.experiments.discrimination.request import example_tasks
+from fingerpad.experiments.fit.request import FitFile
 from fingerpad.experiments.gerling2014.percept import sphere_touches
 from fingerpad.experiments.gerling2014.reproduction import ReproductionResult
+from fingerpad.experiments.requests.parts import parts_in
 from fingerpad.neuron.afferent import PARAMETER_NAMES
 from tests.mutations import CHANGES, VALUES, places
 from tests.mutations import changed as mutated
 
 ROOT = Path(__file__).parents[1]
+read = fp.DiscriminationRequest.read
 SPHERES = {
     "question": "Which spheres?",
     "object": {"kind": "sphere"},
@@ -62,13 +54,13 @@ def changed(content, **parts):
 
 
 def asked(content):
-    question = fp.parse_task(content)
-    task_touches(question)
-    return PreparedTask(question, task_stimuli(question), task_population(question))
+    task = read(content)
+    task.check()
+    return task
 
 
 def test_what_varies_makes_one_stimulus_per_value_and_the_standard_comes_first():
-    stimuli = task_stimuli(fp.parse_task(changed(SPHERES, standard=296)))
+    stimuli = read(changed(SPHERES, standard=296)).pressed
     assert [stimulus.name for stimulus in stimuli] == ["296", "287", "365"]
     assert [stimulus.level for stimulus in stimuli] == [296.0, 287.0, 365.0]
     spheres = [fp.Sphere(curvature_per_m=stimulus.level) for stimulus in stimuli]
@@ -79,11 +71,11 @@ def test_what_varies_makes_one_stimulus_per_value_and_the_standard_comes_first()
         ("motion.ramp_ms", fp.RampAndHold(ramp_ms=50.0), fp.RampAndHold(ramp_ms=80.0)),
     ):
         task = changed(SPHERES, stimuli={"vary": varied, "values": [50, 80]}, standard=50)
-        assert [stimulus.motion for stimulus in task_stimuli(fp.parse_task(task))] == [first, second]
+        assert [stimulus.motion for stimulus in read(task).pressed] == [first, second]
 
 
 def test_listed_stimuli_have_parameters_of_their_own():
-    wide, narrow, deep = task_stimuli(fp.parse_task(BARS))
+    wide, narrow, deep = read(BARS).pressed
     assert (wide.name, wide.level, wide.indenter) == ("wide", None, fp.Bar(4.0, 0.2))
     assert (wide.motion, wide.x_mm) == (fp.ForceRampAndHold(150.0), 0.5)
     assert (narrow.indenter, narrow.x_mm, narrow.tilt_deg) == (fp.Bar(2.0, 0.2), 0.0, None)
@@ -91,10 +83,9 @@ def test_listed_stimuli_have_parameters_of_their_own():
     assert (deep.motion, deep.tilt_deg, deep.friction) == (fp.RampAndHold(0.8), 0.0, 0.3)
 
 
-def test_any_object_and_any_motion_may_be_discriminated(tmp_path):
-    (tmp_path / "press.csv").write_text(
-        "time_ms,depth_mm,x_mm\n0,0,0\n50,0.6,0\n500,0.6,1\n", encoding="utf-8"
-    )
+def test_any_object_and_any_motion_may_be_discriminated(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    Path("press.csv").write_text("time_ms,depth_mm,x_mm\n0,0,0\n50,0.6,0\n500,0.6,1\n", encoding="utf-8")
     letters = changed(
         SPHERES,
         resolution="quick",
@@ -104,7 +95,7 @@ def test_any_object_and_any_motion_may_be_discriminated(tmp_path):
         stimuli={"vary": "object.text", "values": ["a", "b"]},
         standard="a",
     )
-    found = task_touches(fp.parse_task(letters), tmp_path)
+    found = read(letters).touches
     assert {name: touch.indenter for name, touch in found.items()} == {
         name: fp.braille(name) for name in "ab"
     }
@@ -114,14 +105,12 @@ def test_any_object_and_any_motion_may_be_discriminated(tmp_path):
     stroke = {"kind": "stroke", "depth_mm": 0.4, "speed_mm_per_s": 20, "x_mm": 1}
     bump = {"name": "pressed", "object": {"kind": "sphere", "radius_mm": 3}}
     mixed = [bump, {"name": "slid", "object": "plate", "motion": stroke}]
-    pressed = task_touches(
-        fp.parse_task(changed(SPHERES, resolution="quick", stimuli=mixed, standard="slid"))
-    )
+    pressed = read(changed(SPHERES, resolution="quick", stimuli=mixed, standard="slid")).touches
     assert [touch.stimulus.stays for touch in pressed.values()] == [False, True]
 
 
 def test_the_papers_spheres_are_the_very_touches_of_a_reproduction():
-    ours = task_touches(fp.read_task("sphere_curvature", resolution="quick"))
+    ours = read("sphere_curvature", {"resolution": "quick"}).touches
     theirs = {
         f"{curvature:g}": touch
         for (at, curvature), touch in sphere_touches(Conditions("quick")).items()
@@ -131,7 +120,7 @@ def test_the_papers_spheres_are_the_very_touches_of_a_reproduction():
 
 
 def test_all_stimuli_meet_one_mesh_that_is_fine_below_each_of_them():
-    pressed = task_touches(fp.parse_task(changed(BARS, resolution="quick")))
+    pressed = read(changed(BARS, resolution="quick")).touches
     (grading,) = {touch.grading for touch in pressed.values()}
     for touch in pressed.values():
         reach = touch.indenter.half_width_mm + abs(touch.at_mm[0] - grading.centre_mm)
@@ -139,16 +128,16 @@ def test_all_stimuli_meet_one_mesh_that_is_fine_below_each_of_them():
     assert pressed["wide"].at_mm == (RECEPTOR_X_MM + 0.5, 0.0)
     assert pressed["deep"].tilt_deg == 0.0
     assert pressed["narrow"].tilt_deg == Conditions("quick").skin_tilt_deg
-    beside = task_touches(fp.parse_task(changed(SPHERES, place={"z_mm": 1.0}, resolution="quick")))
+    beside = read(changed(SPHERES, place={"z_mm": 1.0}, resolution="quick")).touches
     assert all(touch.grading.full and touch.at_mm[1] == 1.0 for touch in beside.values())
 
 
 def test_a_population_without_further_words_is_the_papers():
-    population = task_population(fp.parse_task(SPHERES))
+    population = read(SPHERES).population
     np.testing.assert_array_equal(population.positions_mm, fp.Population.grid().positions_mm)
     assert (population.afferent, population.sensitivity) == (fp.Afferent(), None)
     first, other = (
-        task_population(fp.parse_task(changed(SPHERES, population={"sensitivity_spread": 0.4, "seed": seed})))
+        read(changed(SPHERES, afferents={"sensitivity_spread": 0.4, "seed": seed})).population
         for seed in (0, 1)
     )
     assert first.sensitivity.shape == other.sensitivity.shape == (18,)
@@ -159,7 +148,7 @@ def test_a_population_without_further_words_is_the_papers():
 def test_any_layout_fills_its_region_at_its_density(layout):
     region = {"shape": "rectangle", "length_mm": 8.0, "width_mm": 6.0}
     words = {"layout": layout, "density_per_cm2": 150, "region": region, "offset_mm": [1.0, 0.0], "seed": 3}
-    population, again = (task_population(fp.parse_task(changed(SPHERES, population=words))) for _ in range(2))
+    population, again = (read(changed(SPHERES, afferents=words)).population for _ in range(2))
     assert abs(len(population) - 0.48 * 150) <= 8
     x, z = population.positions_mm[:, 0], population.positions_mm[:, -1]
     assert abs(x.mean() - RECEPTOR_X_MM - 1.0) < 1.0
@@ -170,52 +159,51 @@ def test_any_layout_fills_its_region_at_its_density(layout):
 
 def test_afferents_fill_the_pad_at_the_density_of_its_skin_or_line_the_nail():
     pad = {"layout": "poisson-disc", "density_per_cm2": 70, "region": {"shape": "pad"}}
-    population = task_population(fp.parse_task(changed(SPHERES, population=pad)))
+    population = read(changed(SPHERES, afferents=pad)).population
     assert len(population) == round(0.7 * fp.UnrolledSkin().pad().area_mm2)
-    rows = task_population(fp.parse_task(changed(SPHERES, population={"layout": "nail rows", "rows": 2})))
+    task = read(changed(SPHERES, afferents={"layout": "nail rows", "rows": 2}))
+    rows = task.population
     np.testing.assert_array_equal(
         rows.positions_mm, fp.NailEdge().points(fp.NailEdge().rows(2, density_per_cm2=100.0).places_mm)
     )
-    assert len(
-        PreparedTask(fp.parse_task(SPHERES), task_stimuli(fp.parse_task(SPHERES)), rows).neighbours
-    ) > 2 * len(rows)
+    assert len(task.neighbours) > 2 * len(rows)
 
 
 def test_an_afferent_is_ours_or_ones_own_numbers_or_of_a_file_of_results(tmp_path, monkeypatch):
-    assert task_population(fp.parse_task(SPHERES)).afferent == fp.Afferent()
-    own = fp.parse_task(changed(SPHERES, afferent={"static_gain": 1.1e-6, "dynamic_quantity": "von_mises"}))
-    assert task_population(own).afferent == fp.Afferent(static_gain=1.1e-6, dynamic_quantity="von_mises")
+    assert read(SPHERES).population.afferent == fp.Afferent()
+    numbers = {"static_gain": 1.1e-6, "dynamic_quantity": "von_mises"}
+    own = read(changed(SPHERES, afferents={"afferent": numbers}))
+    assert own.population.afferent == fp.Afferent(static_gain=1.1e-6, dynamic_quantity="von_mises")
     six = dict(zip(PARAMETER_NAMES, [2e-7, 1e-4, 9e-7, 60.0, 1e-6, 50.0], strict=True))
     expected = fp.Afferent.from_parameters(list(six.values()))
     # The parts of a file that an afferent needs; the rest is left to the schemas' own tests.
-    monkeypatch.setattr(schemas, "check_schema", lambda *_: None)
+    monkeypatch.setattr(result_files, "check_schema", lambda *_: None)
+    monkeypatch.chdir(tmp_path)
     quantities = {"dynamic_quantity": "stored", "static_quantity": "work"}
     for name, kind, results in (
         ("fit.json", FitFile, {"fit": {"parameters": six}, **quantities}),
         ("results.json", ReproductionResult, {"human": {"single_unit": {"parameters": six, **quantities}}}),
     ):
         named, version = file_format(kind)
-        (tmp_path / name).write_text(json.dumps(results | {"format": named, "format_version": version}))
-        found = task_population(fp.parse_task(changed(SPHERES, afferent=name)), tmp_path).afferent
+        Path(name).write_text(json.dumps(results | {"format": named, "format_version": version}))
+        found = read(changed(SPHERES, afferents=name)).population.afferent
         assert found == replace(expected, **quantities)
 
 
 @pytest.mark.parametrize("name", example_tasks())
 def test_ready_made_questions_can_be_asked(name):
-    question = fp.read_task(name, resolution="quick")
-    found = PreparedTask(question, task_stimuli(question), task_population(question))
-    assert found.stimuli[0].level == question.standard or found.stimuli[0].name == question.standard
-    assert all(
-        touch.grading == task_touches(question)[found.stimuli[0].name].grading
-        for touch in task_touches(question).values()
-    )
+    task = read(name, {"resolution": "quick"})
+    task.check()
+    first = task.pressed[0]
+    assert task.standard in (first.level, first.name)
+    assert {touch.grading for touch in task.touches.values()} == {task.touches[first.name].grading}
 
 
 def test_a_folder_named_like_an_example_task_is_not_taken_for_a_file(tmp_path, monkeypatch):
     (tmp_path / "sphere_curvature").mkdir()
-    before = input_hashes("sphere_curvature", fp.read_task("sphere_curvature"), ())
+    before = read("sphere_curvature").input_hashes()
     monkeypatch.chdir(tmp_path)
-    assert input_hashes("sphere_curvature", fp.read_task("sphere_curvature"), ()) == before
+    assert read("sphere_curvature").input_hashes() == before
 
 
 def refused(content):
@@ -230,7 +218,9 @@ def refused(content):
 
 # What description files have in common with touches is tried in test_touch_description.py.
 REFUSALS = """
-question: null => question must be given: it is missing.
+standard: null => standard must be given: it is missing.
+population: {rows: 2} => population is written as afferents since version 2 of tasks: move it there.
+windows_ms: {static: [600, 950]} => windows_ms is written as windows_ms within afferents
 noise: 1e300 => noise must be a number from 0 to 1000, or fitted: got 1e+300.
 noise: much => noise must be a number from 0 to 1000, or fitted: got 'much'.
 {noise: 0, code: [gradient_sum, ideal]} => noise must be greater than 0 where code has ideal: got 0.
@@ -274,33 +264,34 @@ place: {x_mm: 90} => place must lie on the finger
 finger: giant => finger.like must
 reach_mm: 0 => reach_mm must be greater than 0 [mm]: got 0.
 skin: {materials: human} => skin is unknown
-population: {density_per_cm2: 0} => population.density_per_cm2 must be greater than 0 [1/cm²]: got 0.
-population: {layout: hexagonal, rows: 3, region: {shape: rectangle, length_mm: 3, width_mm: 6}} =>
-    population.rows must not be given: it belongs to the layout grid
-population: {region: {shape: rectangle, length_mm: 3, width_mm: 6}} =>
-    population.region must not be given: it belongs to the layout rectangular or hexagonal
-population: {layout: uniform, region: {shape: rectangle, length_mm: 0, width_mm: 6.0}} =>
-    population.region.length_mm must be greater than 0 [mm]: got 0.
-population: {layout: uniform, region: {shape: rectangle, length_mm: 1}} =>
-    population.region.width_mm must be given for a rectangle
-population: {layout: uniform, region: {shape: rectangle, length_mm: 3, width_mm: 6, corners_mm: []}} =>
-    population.region.corners_mm must not be given: a rectangle has length_mm, width_mm.
-population: {layout: uniform, region: {shape: polygon, corners_mm: [[0, 0], [1, 1], [2, 2]]}} =>
-    population.region: corners_mm must enclose an area
-population: {layout: uniform, density_per_cm2: 0.1, region: {shape: rectangle, length_mm: 3, width_mm: 6}}
+afferents: {density_per_cm2: 0} => afferents.density_per_cm2 must be greater than 0 [1/cm²]: got 0.
+afferents: {layout: hexagonal, rows: 3, region: {shape: rectangle, length_mm: 3, width_mm: 6}} =>
+    afferents.rows must not be given: it belongs to the layout grid
+afferents: {region: {shape: rectangle, length_mm: 3, width_mm: 6}} =>
+    afferents.region must not be given: it belongs to the layout rectangular or hexagonal
+afferents: {layout: uniform, region: {shape: rectangle, length_mm: 0, width_mm: 6.0}} =>
+    afferents.region.length_mm must be greater than 0 [mm]: got 0.
+afferents: {layout: uniform, region: {shape: rectangle, length_mm: 1}} =>
+    afferents.region.width_mm must be given for a rectangle
+afferents: {layout: uniform, region: {shape: rectangle, length_mm: 3, width_mm: 6, corners_mm: []}} =>
+    afferents.region.corners_mm must not be given: a rectangle has length_mm, width_mm.
+afferents: {layout: uniform, region: {shape: polygon, corners_mm: [[0, 0], [1, 1], [2, 2]]}} =>
+    afferents.region: corners_mm must enclose an area
+afferents: {layout: uniform, density_per_cm2: 0.1, region: {shape: rectangle, length_mm: 3, width_mm: 6}}
     =>
-    population: A density of
-population: {layout: uniform, density_per_cm2: 1.0e+9, region: {shape: rectangle, length_mm: 3, width_mm: 6}}
+    afferents: A density of
+afferents: {layout: uniform, density_per_cm2: 1.0e+9, region: {shape: rectangle, length_mm: 3, width_mm: 6}}
     =>
-    population: A layout may have
-population: {seed: -1} => population.seed must be a whole number of at least 0: got -1.
-population: {sensitivity_spread: -1} => population.sensitivity_spread must not be negative: got -1.
-afferent: {time_constant_ms: 0} => afferent.time_constant_ms must be greater than 0 [ms]: got 0.
-afferent: none.json => afferent: none.json must be a file that can be read
+    afferents: A layout may have
+afferents: {seed: -1} => afferents.seed must be a whole number of at least 0: got -1.
+afferents: {sensitivity_spread: -1} => afferents.sensitivity_spread must not be negative: got -1.
+afferents: {afferent: {time_constant_ms: 0}} =>
+    afferents.afferent.time_constant_ms must be greater than 0 [ms]: got 0.
+afferents: none.json => afferents.afferent: none.json must be a file that can be read
 code: guess => code[1] must be one of gradient_sum, euclidean
 measure: pressure => measure[1] must be one of static, dynamic, latency: got 'pressure'.
-windows_ms: {static: [600, 1200]} =>
-    windows_ms.static must end with the stimuli, not at 1200 ms: '287' ends at 1000 ms.
+afferents: {windows_ms: {static: [600, 1200]}} =>
+    afferents.windows_ms.static must end with the stimuli, not at 1200 ms: '287' ends at 1000 ms.
 experiment: {hit_rates: 1} => experiment.hit_rates must be a whole number of at least 2: got 1.
 experiment: {criterion: 2} => experiment.criterion must lie within 0 to 1: got 2.
 experiment: {trials: 0} => experiment.trials must be a whole number of at least 1: got 0.
@@ -333,16 +324,16 @@ def test_invalid_values_are_refused_in_one_sentence_with_their_position(parts, s
         "no json",
     ],
 )
-def test_a_file_without_fitted_parameters_is_refused(tmp_path, content):
-    (tmp_path / "fit.json").write_text(content)
-    question = fp.parse_task(changed(SPHERES, afferent="fit.json"))
-    with pytest.raises(fp.InputError, match=r"^afferent.*fit\.json"):
-        task_population(question, tmp_path)
+def test_a_file_without_fitted_parameters_is_refused(tmp_path, monkeypatch, content):
+    monkeypatch.chdir(tmp_path)
+    Path("fit.json").write_text(content)
+    with pytest.raises(fp.InputError, match=r"^task, afferents\.afferent.*fit\.json"):
+        read(changed(SPHERES, afferents="fit.json")).check()
 
 
 def test_null_is_as_good_as_nothing():
     empty = {"layout": "nail rows", "jitter": None, "rows": None}
-    with_null = changed(SPHERES, population=empty, motion={"force_mn": None, "depth_mm": 1.0})
+    with_null = changed(SPHERES, afferents=empty, motion={"force_mn": None, "depth_mm": 1.0})
     assert len(asked(with_null).population) == len(fp.NailEdge().rows(1, 100.0))
 
 
@@ -354,7 +345,7 @@ def test_null_is_as_good_as_nothing():
 )
 def test_what_the_guide_shows_can_be_asked(block):
     part = read_yaml(block, "the guide")
-    assert asked(part if "question" in part else changed(SPHERES, **part))
+    assert asked(part if "standard" in part else changed(SPHERES, **part))
 
 
 def test_the_guide_and_the_page_of_populations_name_every_key():
@@ -368,17 +359,17 @@ def test_the_guide_and_the_page_of_populations_name_every_key():
 
     pages = ("discriminate.md", "populations.md")
     guide = "".join((ROOT / "docs" / page).read_text(encoding="utf-8") for page in pages)
-    assert [key for key in dict.fromkeys(keys(DiscriminationTask)) if f"`{key}`" not in guide] == []
+    assert [key for key in dict.fromkeys(keys(fp.DiscriminationRequest)) if f"`{key}`" not in guide] == []
 
 
 def test_a_task_on_a_child_presses_and_samples_the_child_s_pad():
-    task = DiscriminationTask.model_validate(SPHERES | {"finger": "child", "resolution": "quick"})
+    task = read(SPHERES, {"finger": "child", "resolution": "quick"})
     child = fp.Fingertip.of("child")
-    touches = task_touches(task)
+    touches = task.touches
     assert {touch.finger for touch in touches.values()} == {child}
     assert {touch.at_mm for touch in touches.values()} == {child.contact_mm}
     assert next(iter(touches.values())).grading.size_x_mm < 0.45
-    middle = task_population(task).positions_mm.mean(axis=0)
+    middle = task.population.positions_mm.mean(axis=0)
     assert middle == pytest.approx(child.contact_mm, abs=1e-9)
 
 
@@ -396,10 +387,14 @@ LETTERS = {
         {"name": "ball", "level": 3.0, "object": {"kind": "sphere", "radius_mm": 3.0}, "friction": 0.0},
     ],
     "standard": "a",
-    "population": {"layout": "hexagonal", "density_per_cm2": 70.0, "region": {"shape": "pad"}},
+    "afferents": {
+        "layout": "hexagonal",
+        "density_per_cm2": 70.0,
+        "region": {"shape": "pad"},
+        "windows_ms": {"dynamic": [0.0, 50.0]},
+    },
     "code": ["euclidean"],
     "measure": ["static", "dynamic"],
-    "windows_ms": {"dynamic": [0.0, 50.0]},
     "noise": 0.1,
     "experiment": {"seed": 3, "trials": 50},
     "curve": {"sigmoid": "logistic", "lapse": 0.02},
@@ -418,9 +413,7 @@ def test_any_change_of_a_task_is_possible_or_refused_in_one_sentence(where, valu
     task, place = where
     said = "mine.yaml, possible."
     try:
-        DiscriminationRun(
-            fp.parse_task(mutated(task, place, value, change), "mine.yaml"), Path(), 1, "mine.yaml"
-        )
+        read(mutated(task, place, value, change), name="mine.yaml").check()
     except fp.InputError as error:
         said = str(error)
     assert said.startswith("mine.yaml, ")

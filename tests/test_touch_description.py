@@ -1,4 +1,4 @@
-"""Descriptions of a touch: what they mean, what is refused, and what their commands write."""
+"""Requests of a touch: what they mean, what is refused, and what their commands write."""
 
 import hashlib
 import json
@@ -9,22 +9,6 @@ from pathlib import Path
 import fastjsonschema
 import numpy as np
 import pytest
-from fingerpad.experiments.descriptions.estimate import (
-    BASE_MB,
-    OWN_EXPONENT,
-    OWN_NODE_MB,
-    OWN_NODES,
-    estimate_press,
-)
-from fingerpad.experiments.descriptions.example import EXAMPLE
-from fingerpad.experiments.descriptions.population import population_neighbours
-from fingerpad.experiments.descriptions.pressed import TouchFile, respond
-from fingerpad.experiments.descriptions.pressing import MOTIONS, OBJECTS
-from fingerpad.experiments.descriptions.reading import part_from
-from fingerpad.experiments.descriptions.stimuli import StimulusSet, named_stimuli
-from fingerpad.experiments.descriptions.touch import OUTPUTS, described_touch
-from fingerpad.experiments.discrimination.task_stimuli import task_population
-from fingerpad.export.touch_outputs import WRITERS, as_described, check_described
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
@@ -34,11 +18,26 @@ from fingerpad.core.plain_yaml import read_yaml
 from fingerpad.core.result_files import from_json, to_json
 from fingerpad.experiments import schemas
 from fingerpad.experiments.conditions import RECEPTOR_X_MM, Conditions
+from fingerpad.experiments.requests.parts import part_from
+from fingerpad.experiments.requests.stimuli import StimulusSet, named_stimuli
+from fingerpad.experiments.requests.stimulus import MOTIONS, OBJECTS
+from fingerpad.experiments.requests.touch import (
+    BASE_MB,
+    EXAMPLE,
+    OUTPUTS,
+    OWN_EXPONENT,
+    OWN_NODE_MB,
+    OWN_NODES,
+    TouchFile,
+    estimate_press,
+)
+from fingerpad.export.requests import WRITERS, check_outputs
 from fingerpad.geometry import surface_files
 from fingerpad.neuron.afferent_types import afferent_types
 from tests.mutations import CHANGES, VALUES, changed, places
 
 ROOT = Path(__file__).parents[1]
+read = fp.TouchRequest.read
 FULL = {
     "title": "A ball",
     "resolution": "quick",
@@ -60,14 +59,14 @@ def call(run_program):
 
 
 def test_a_description_is_the_touch_that_python_makes_and_its_defaults_are_the_papers():
-    assert described_touch(FULL).touch == fp.touch_of(
+    assert read(FULL).touch == fp.touch_of(
         fp.Fingertip(stratum_corneum_mm=0.5), fp.Sphere(radius_mm=4.0), fp.RampAndHold(0.5), "human", "quick",
         (RECEPTOR_X_MM + 0.5, 0.0), tilt_deg=3.0, friction=0.1, spin_deg=10.0, times_ms=(20.0, 400.0),
     )  # fmt: skip
-    touch = described_touch({"object": "sphere"}).touch
+    touch = read({"object": "sphere"}).touch
     assert (touch.indenter, touch.stimulus, touch.friction) == (fp.Sphere(), fp.RampAndHold(), 0.0)
     assert touch.tilt_deg == Conditions().skin_tilt_deg
-    assert described_touch({"object": "line"}).touch.tilt_deg == 0.0
+    assert read({"object": "line"}).touch.tilt_deg == 0.0
 
 
 @pytest.mark.parametrize(
@@ -87,7 +86,7 @@ def test_a_description_is_the_touch_that_python_makes_and_its_defaults_are_the_p
     ],
 )  # fmt: skip
 def test_an_object_is_what_its_class_makes(content, body):
-    assert described_touch({"object": content, "motion": {"depth_mm": 0.4}}).touch.indenter == body
+    assert read({"object": content, "motion": {"depth_mm": 0.4}}).touch.indenter == body
 
 
 @pytest.mark.parametrize(
@@ -109,7 +108,7 @@ def test_an_object_is_what_its_class_makes(content, body):
     ids=lambda value: value.get("kind", "") if isinstance(value, dict) else "",
 )  # fmt: skip
 def test_a_motion_is_what_its_function_makes(content, motion):
-    assert described_touch({"object": "sphere", "motion": content}).touch.stimulus == motion
+    assert read({"object": "sphere", "motion": content}).touch.stimulus == motion
 
 
 def test_a_recorded_motion_is_named_from_the_folder_of_the_description(tmp_path):
@@ -117,7 +116,7 @@ def test_a_recorded_motion_is_named_from_the_folder_of_the_description(tmp_path)
     (tmp_path / "deep" / "press.csv").write_text("time_ms,depth_mm\n0,0\n50,0.6\n500,0.6\n", encoding="utf-8")
     path = tmp_path / "touch.yaml"
     path.write_text("object: plate\nmotion: {kind: recorded, file: deep/press.csv}\n", encoding="utf-8")
-    assert fp.read_touch_description(path).touch.stimulus.depth_mm == (0.0, 0.6, 0.6)
+    assert read(path).touch.stimulus.depth_mm == (0.0, 0.6, 0.6)
 
 
 def test_hashes_name_every_file_of_a_description(tmp_path):
@@ -129,18 +128,18 @@ def test_hashes_name_every_file_of_a_description(tmp_path):
         "finger: {kind: mesh, path: own.inp}\nobject: {kind: surface, path: body.stl, unit: mm}\n"
         "motion: {kind: recorded, file: press.csv}\nafferents: {afferent: fit.json}\n"
     )
-    found = fp.read_touch_description(path).input_hashes()
+    found = read(path).input_hashes()
     assert set(found) == {str(tmp_path / name) for name in ("touch.yaml", *names)}
     assert found[str(tmp_path / "own.inp")] == hashlib.sha256(b"own.inp").hexdigest()
     path.write_text("finger: own.inp\nobject: sphere\n")
-    assert set(fp.read_touch_description(path).input_hashes()) == {str(path), str(tmp_path / "own.inp")}
+    assert set(read(path).input_hashes()) == {str(path), str(tmp_path / "own.inp")}
 
 
 def test_a_surface_of_several_stimuli_is_read_once(tmp_path, monkeypatch):
     np.savetxt(tmp_path / "map.csv", np.eye(4), delimiter=",")
-    read = []
+    made_of = []
     original = surface_files.height_surface
-    monkeypatch.setattr(surface_files, "height_surface", lambda *sizes: read.append(1) or original(*sizes))
+    monkeypatch.setattr(surface_files, "height_surface", lambda *sizes: made_of.append(1) or original(*sizes))
     asked = part_from(
         StimulusSet,
         {
@@ -149,11 +148,11 @@ def test_a_surface_of_several_stimuli_is_read_once(tmp_path, monkeypatch):
         },
     )
     made = named_stimuli(asked, tmp_path)
-    assert len({id(stimulus.indenter) for stimulus in made}) == 1 == len(read)
+    assert len({id(stimulus.indenter) for stimulus in made}) == 1 == len(made_of)
 
 
 def test_afferents_are_those_of_a_task_with_the_same_words():
-    described = described_touch(
+    described = read(
         FULL | {"afferents": {"layout": "nail rows", "rows": 2, "afferent": {"static_gain": 1e-6}}}
     )
     assert len(described.population) > 10
@@ -169,22 +168,22 @@ def test_the_page_and_the_example_know_every_word_and_the_pages_files_are_possib
     blocks = re.findall(r"```yaml\n(.*?)```", page, re.S)
     assert blocks
     for block in blocks:
-        described = described_touch(read_yaml(block, "page"), "page", block)
-        check_described(described)
+        described = read(read_yaml(block, "page"))
+        check_outputs(described)
         assert len(described.population)
 
 
 def test_a_description_is_frozen_compares_and_survives_json():
-    described = described_touch(FULL).description
-    assert from_json(fp.TouchDescription, to_json(described)) == described
-    assert json.loads(to_json(described)) == FULL
-    assert as_described(described).touch == as_described(FULL).touch
+    request = read(FULL)
+    assert from_json(fp.TouchRequest, to_json(request)) == request == read(request)
+    assert json.loads(to_json(request)) == FULL
+    assert read(request, {"motion.depth_mm": 0.4}).touch.stimulus == fp.RampAndHold(0.4)
     with pytest.raises(ValueError, match="frozen"):
-        described.friction = 0.3
+        request.friction = 0.3
 
 
 def test_the_schema_accepts_what_is_accepted_and_explains_every_key():
-    schema = schemas.touch_schema()
+    schema = schemas.request_schema("touch")
     check = fastjsonschema.compile(schema)
     check(FULL)
     check(read_yaml(EXAMPLE, "example"))
@@ -322,7 +321,7 @@ def test_files_that_are_no_text_are_refused(call):
 @given(st.sampled_from([place for place in places(FULL) if place]), VALUES, CHANGES)  # fmt: skip
 def test_any_change_of_a_description_is_possible_or_refused_in_one_sentence(place, value, change):
     try:
-        check_described(described_touch(changed(FULL, place, value, change)))
+        check_outputs(read(changed(FULL, place, value, change)))
     except fp.InputError as error:
         said = str(error)
     else:
@@ -336,9 +335,9 @@ def test_the_example_runs_as_it_is_and_is_never_overwritten(call):
     assert call("init", "mine/touch.yaml") == (0, "Try: fingerpad check mine/touch.yaml\n", "")
     first = Path("mine/touch.yaml").read_text(encoding="utf-8")
     assert first.startswith(f"# yaml-language-server: $schema={schemas.TOUCH_SCHEMA}\n")
-    assert (
-        json.loads(Path("mine", schemas.TOUCH_SCHEMA).read_text(encoding="utf-8")) == schemas.touch_schema()
-    )
+    assert json.loads(
+        Path("mine", schemas.TOUCH_SCHEMA).read_text(encoding="utf-8")
+    ) == schemas.request_schema("touch")
     status, printed, error = call("init", "mine/touch.yaml")
     assert (status, printed) == (2, "")
     assert "mine/touch.yaml exists and is not overwritten" in error
@@ -370,20 +369,20 @@ def test_a_touch_is_pressed_once_and_its_outputs_are_what_python_computes(call, 
         "calculix/touch.inp", "febio/touch.feb",
     } <= written  # fmt: skip
     result = from_json(TouchFile, Path("out/touch.json").read_bytes())
-    described = fp.read_touch_description("touch.yaml")
-    assert result.touch == described.description
-    skin = described.touch.solve()
+    request = read("touch.yaml")
+    assert result.touch == request
+    skin = request.touch.solve()
     np.testing.assert_allclose(result.summary.largest_force_mn, skin.force_mn.max(), rtol=1e-12)
     assert result.manifest.inputs.keys() == {"touch.yaml"}
     # The indentation is stored: the same touch with other afferents is not pressed again.
     monkeypatch.setattr(fp.Touch, "solve", pytest.fail)
-    again = fp.run_touch(content | {"afferents": {"density_per_cm2": 200}, "outputs": ["spikes"]}, "out")
+    again = fp.touch(content | {"afferents": {"density_per_cm2": 200}, "outputs": ["spikes"]}, out="out")
     assert again.summary.largest_force_mn == result.summary.largest_force_mn
     assert len(Path("out/spikes.csv").read_text(encoding="utf-8").splitlines()) == 19
     # Noise makes spikes random, and a seed repeats them.
-    noisy = described_touch(content)
-    first, second = respond(noisy, again.skin), respond(noisy, again.skin)
-    other = respond(described_touch(content | {"afferents": {"noise": 0.1, "seed": 4}}), again.skin)
+    noisy = read(content)
+    first, second = noisy.respond(again.skin), noisy.respond(again.skin)
+    other = read(content | {"afferents": {"noise": 0.1, "seed": 4}}).respond(again.skin)
     assert first.spikes.times_ms.tolist() == second.spikes.times_ms.tolist()
     assert first.spikes.times_ms.tolist() != other.spikes.times_ms.tolist()
 
@@ -392,8 +391,8 @@ def test_the_estimate_of_a_mesh_of_ones_own_counts_its_nodes_and_its_elimination
     coarse = fp.Grading(17.37, 2.0, 2.0, 0.8, 0.8, 3.0, stratum_corneum=1, dermis=2, subcutis=2)
     touch = fp.touch_of(fp.Fingertip(), fp.Sphere(), fp.RampAndHold(0.5), grading=coarse)
     path = fp.export_touch(tmp_path, touch, "abaqus")[0]
-    own = estimate_press(described_touch({"object": "sphere", "finger": str(path)}))
-    ours = estimate_press(described_touch({"object": "sphere"}))
+    own = estimate_press(read({"object": "sphere", "finger": str(path)}))
+    ours = estimate_press(read({"object": "sphere"}))
     assert own.nodes == len(touch.mesh.nodes_mm) > OWN_NODES
     assert own.time_s / own.nodes == pytest.approx(ours.time_s / ours.nodes * own.nodes / OWN_NODES)
     assert own.memory_mb > BASE_MB + OWN_NODE_MB * own.nodes**OWN_EXPONENT
@@ -401,34 +400,34 @@ def test_the_estimate_of_a_mesh_of_ones_own_counts_its_nodes_and_its_elimination
 
 def test_the_estimate_grows_with_mesh_steps_force_and_friction():
     ball = {"object": "sphere"}
-    base = estimate_press(described_touch(ball))
+    base = estimate_press(read(ball))
     thrice = {"kind": "repeated", "depth_mm": 1, "touches": 3, "ramp_ms": 50, "hold_ms": 99, "pause_ms": 9}
     changes = (
         {"resolution": "standard"}, {"motion": {"force_mn": 100}}, {"friction": 0.3}, {"motion": thrice},
     )  # fmt: skip
-    more = [estimate_press(described_touch(ball | change)) for change in changes]
+    more = [estimate_press(read(ball | change)) for change in changes]
     assert all(other.time_s > 1.5 * base.time_s for other in more)
     assert more[0].memory_mb > base.memory_mb
 
 
 def test_afferent_types_by_name_and_mixed_in_files():
     """One type by its name, several by their densities, and the same names in a task."""
-    one = described_touch({"object": "sphere", "afferents": {"afferent": "RA"}}).population
+    one = read({"object": "sphere", "afferents": {"afferent": "RA"}}).population
     assert one.afferent == fp.RA()
     densities = {"SAI": 70, "RA": 140, "PC": 21, "SAII": 9}
     asked = {"layout": "poisson-disc", "region": {"shape": "pad"}, "densities_per_cm2": densities}
-    mixed = described_touch({"object": "sphere", "afferents": asked}).population
+    mixed = read({"object": "sphere", "afferents": asked}).population
     assert {name: part.afferent for name, part in mixed.parts.items()} == afferent_types()
     counts = np.array([len(part) for part in mixed.parts.values()])
     assert counts / counts[0] == pytest.approx([1.0, 2.0, 0.3, 9.0 / 70.0], rel=0.1)
     spheres = {"vary": "object.curvature_per_m", "values": [287, 340]}
-    task = fp.parse_task(
-        {"question": "Which?", "stimuli": spheres, "standard": 287, "noise": 0.1, "population": asked}
+    task = fp.DiscriminationRequest.read(
+        {"object": "sphere", "stimuli": spheres, "standard": 287, "noise": 0.1, "afferents": asked}
     )
-    laid = task_population(task)
+    laid = task.population
     np.testing.assert_array_equal(laid.positions_mm, mixed.positions_mm)
     of_type = np.array(laid.types)
-    pairs = population_neighbours(task.population, laid)
+    pairs = task.neighbours
     assert (of_type[pairs[:, 0]] == of_type[pairs[:, 1]]).all()
     assert set(of_type[pairs[:, 0]]) == set(densities)
     for wrong, said in (
@@ -437,4 +436,4 @@ def test_afferent_types_by_name_and_mixed_in_files():
         ({"densities_per_cm2": {"RB": 1.0}}, "a density above 0 of each type, SAI, RA, PC, SAII"),
     ):
         with pytest.raises(fp.InputError, match=said):
-            check_described(described_touch({"object": "sphere", "afferents": wrong}))
+            check_outputs(read({"object": "sphere", "afferents": wrong}))

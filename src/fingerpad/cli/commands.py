@@ -47,7 +47,7 @@ def _option(
     if kind is bool:
         parser.add_argument(name, action="store_true", help=words)
         return
-    read = partial({int: _whole, float: _number}[kind], name) if kind in (int, float) else kind
+    read = {int: _whole, float: _number}.get(kind, kind)
     metavar = (
         {int: "N", float: "NUMBER", Path: "PATH"}.get(kind, "NAME") if name.startswith("-") else name.upper()
     )
@@ -76,18 +76,18 @@ def _add_request(name: str, parser: argparse.ArgumentParser, out: str, of_out: s
         group.add_argument(*names, dest=f"key:{key}", metavar="VALUE", help=words)
 
 
-def _whole(option: str, text: str) -> int:
+def _whole(text: str) -> int:
     try:
         return int(text)
     except ValueError as error:
-        raise InputError(option, "must be a whole number", repr(text)) from error
+        raise argparse.ArgumentTypeError(f"must be a whole number: got {text!r}") from error
 
 
-def _number(option: str, text: str) -> float:
+def _number(text: str) -> float:
     try:
         return float(text)
     except ValueError as error:
-        raise InputError(option, "must be a number", repr(text)) from error
+        raise argparse.ArgumentTypeError(f"must be a number: got {text!r}") from error
 
 
 def _asked(name: str, given: argparse.Namespace, within: Options, main: str = "") -> tuple[Any, Options]:
@@ -101,7 +101,7 @@ def _asked(name: str, given: argparse.Namespace, within: Options, main: str = ""
     source = given.request
     if main and source is not None and Path(source).suffix not in (".yaml", ".yml"):
         source, keys = None, {main: source} | keys
-    if source is None and not keys and not within:
+    if request_schema(name).get("required") and source is None and not keys and not within:
         raise InputError(name, f"needs a file{f', {main}' if main else ''} or options", remedy="see --help")
     return source, keys | within
 
@@ -112,6 +112,10 @@ def _run_request(name: str, given: argparse.Namespace, within: Options, main: st
     source, keys = _asked(name, given, within, main)
     request = kind.read(source, keys, given.allow_python)
     request.check()
+    if name == "touch":
+        from fingerpad.export.requests import check_outputs
+
+        check_outputs(request)
     by = engine(given.jobs, given.scheduler)
     make_writable(given.out.parent if given.out.suffix in (".npz", ".zarr") else given.out)
     return function(

@@ -79,6 +79,8 @@ def processes(jobs: int | None) -> int:
 def engine(jobs: int | None, scheduler: str | None) -> int | Engine:
     """Return the workers of `--scheduler` once it answers, or the number of processes here."""
     if scheduler is None:
+        if jobs is not None and jobs < 1:
+            raise InputError("jobs", "must be a whole number of at least 1", str(jobs))
         return processes(jobs)
     if jobs is not None:
         raise InputError(

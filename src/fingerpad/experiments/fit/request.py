@@ -240,7 +240,8 @@ class FitRequest(Request, FingerDescription):
     def shape_of_fit(self) -> AnyAfferent:
         """Afferent about whose numbers is searched: that of its type with the tissues pressed."""
         chosen = "SAI" if self.afferent == DEFAULT else self.afferent
-        return chosen_afferent(chosen, self.settings.tissues, self.beside)
+        with self.origin.located(), at("afferent"):
+            return chosen_afferent(chosen, self.settings.tissues, self.beside)
 
     @cached_property
     def measure(self) -> str:

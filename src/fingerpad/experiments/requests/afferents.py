@@ -21,7 +21,15 @@ from fingerpad.data import psychophysics
 from fingerpad.data.afferents import TYPES
 from fingerpad.data.tissues import DEFAULT_TISSUES
 from fingerpad.experiments import schemas
-from fingerpad.experiments.requests.parts import NAMED, OBJECT, SPELLED, Part, object_of_python, with_message
+from fingerpad.experiments.requests.parts import (
+    NAMED,
+    OBJECT,
+    SPELLED,
+    Part,
+    at,
+    object_of_python,
+    with_message,
+)
 from fingerpad.geometry.fingertip import Finger, Fingertip
 from fingerpad.mechanics.materials import Tissues
 from fingerpad.neuron.afferent import PARAMETER_NAMES, Afferent, AnyAfferent, checked_afferent
@@ -221,7 +229,8 @@ def population_of(
                 f"{place}.{key} must not be given: it belongs to the layout {' or '.join(layouts)}, and "
                 f"this one is {settings.layout}."
             )
-    afferent = chosen_afferent(settings.afferent, tissues, beside)
+    with at(*filter(None, [place]), "afferent"):
+        afferent = chosen_afferent(settings.afferent, tissues, beside)
     if settings.densities_per_cm2 is None:
         return _laid(settings, afferent, place, finger)
     chosen = settings.afferent
@@ -392,8 +401,8 @@ def fitted_afferent(path: Path, tissues: str | Tissues = DEFAULT_TISSUES) -> Any
     try:
         read_text(path)  # names a file that cannot be read
         values = schemas.read(path, "fingerpad fit", CHOSEN, "fingerpad reproduction")
-    except (InputError, StoreError) as error:
-        raise InputError(f"afferent: {error}") from error
+    except StoreError as error:
+        raise InputError(str(error)) from error
     try:
         if "fitted" in values:
             return afferent_of(values["type"], tissues, **values["fitted"])
@@ -404,12 +413,12 @@ def fitted_afferent(path: Path, tissues: str | Tissues = DEFAULT_TISSUES) -> Any
         quantities = {name: named[name] for name in ("dynamic_quantity", "static_quantity")}
     except (LookupError, TypeError) as error:
         raise InputError(
-            f"afferent: {path} must hold the parameters of a fit: {shown(error.args[0])} is missing there."
+            f"{path} must hold the parameters of a fit: {shown(error.args[0])} is missing there."
         ) from error
     try:
         return Afferent.from_parameters(parameters, **quantities, initial_mv=named.get("initial_mv"))
     except InputError as error:
-        raise InputError(f"afferent: {path}: {error}") from error
+        raise InputError(f"{path}: {error}") from error
 
 
 def respond_to(

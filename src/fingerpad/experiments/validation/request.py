@@ -86,7 +86,7 @@ class ValidationRequest(Request, FingerDescription):
     @cached_property
     def responding(self) -> AnyAfferent:
         """The afferent that responds."""
-        with self.origin.located():
+        with self.origin.located(), at("afferent"):
             return chosen_afferent(self.afferent, self.tissues, self.beside)
 
     def check(self) -> None:
