@@ -8,6 +8,7 @@ from functools import partial
 
 import pytest
 import typer
+from fingerpad.experiments.descriptions.stimulus import FingerDescription
 
 import fingerpad as fp
 from fingerpad import __version__, cli
@@ -15,7 +16,6 @@ from fingerpad.cli import options as choices
 from fingerpad.data.tissues import DEFAULT_TISSUES
 from fingerpad.experiments import gerling2014
 from fingerpad.experiments.conditions import Conditions
-from fingerpad.experiments.descriptions.stimulus import FingerDescription
 from fingerpad.export import formats
 from fingerpad.geometry.edged_indenters import INDENTERS
 from fingerpad.geometry.fingertip import FINGERS

@@ -4,10 +4,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from fingerpad.experiments.descriptions.touch import described_touch
 
 import fingerpad as fp
 from fingerpad.experiments.conditions import Conditions
-from fingerpad.experiments.descriptions.touch import described_touch
 from fingerpad.geometry.fingertip import FINGERS, Fingertip
 from fingerpad.geometry.grading import resolution_grading
 from fingerpad.geometry.indenter_grading import grading_about

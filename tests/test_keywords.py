@@ -8,6 +8,8 @@ from dataclasses import fields, replace
 
 import numpy as np
 import pytest
+from fingerpad.experiments.indenter_text import indenter_named
+from fingerpad.experiments.stimuli import read_stimuli
 from pydantic import BaseModel
 
 import fingerpad as fp
@@ -15,8 +17,6 @@ from docs.site.reference import public_names
 from fingerpad.core.checked import OtherName, other_names, value_class
 from fingerpad.core.displayed import Result
 from fingerpad.core.units import unit_of
-from fingerpad.experiments.indenter_text import indenter_named
-from fingerpad.experiments.stimuli import read_stimuli
 from fingerpad.geometry.edged_indenters import INDENTERS, sizes_of
 from fingerpad.skin.store import touch_key
 

@@ -4,11 +4,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-
-import fingerpad as fp
 from fingerpad.experiments.descriptions.touch import described_touch
 from fingerpad.experiments.discrimination.run import DiscriminationRun
 from fingerpad.experiments.discrimination.task_stimuli import input_hashes, task_text
+
+import fingerpad as fp
 from fingerpad.export.abaqus import abaqus_deck
 from fingerpad.export.job import job_of
 from fingerpad.export.vtu import write_vtu_series

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from fingerpad.experiments.stimuli import ShiftedBar
 
 import fingerpad as fp
 from fingerpad.core.units import (
@@ -12,7 +13,6 @@ from fingerpad.core.units import (
     name_and_unit,
     units_of,
 )
-from fingerpad.experiments.stimuli import ShiftedBar
 from fingerpad.experiments.validation.observations import read_observations
 from fingerpad.inference.identifiable import SPIKE_PARAMETER_NAMES
 from fingerpad.skin.fields import sampled_fields
