@@ -3,12 +3,11 @@
 import matplotlib
 import numpy as np
 import pytest
-from fingerpad.experiments.discrimination.task_stimuli import task_population, task_stimuli
 from matplotlib.collections import QuadMesh
 from matplotlib.figure import Figure
 
 import fingerpad as fp
-from fingerpad.experiments.discrimination.analysis import PreparedTask, analyse
+from fingerpad.experiments.discrimination.analysis import analyse
 from fingerpad.experiments.fit.fit import fit_recordings
 from fingerpad.export.result_tables import TABLES
 from fingerpad.inference.spike_fit import SpikeFit
@@ -23,7 +22,7 @@ TASK = {
     "object": {"kind": "sphere"},
     "stimuli": {"vary": "object.curvature_per_m", "values": [200, 220, 240]},
     "standard": 200,
-    "population": {"rows": 3, "columns": 3},
+    "afferents": {"rows": 3, "columns": 3},
     "code": ["gradient_sum"],
     "measure": ["static", "latency"],
     "noise": 0.1,
@@ -46,10 +45,8 @@ class Strength:
 
 
 def discriminated():
-    task = fp.parse_task(TASK)
-    prepared = PreparedTask(task, task_stimuli(task), task_population(task))
-    skins = {each.name: Strength(each.indenter.curvature_per_m) for each in prepared.stimuli}
-    return analyse(prepared, skins)
+    task = fp.DiscriminationRequest.read(TASK)
+    return analyse(task, {each.name: Strength(each.indenter.curvature_per_m) for each in task.pressed})
 
 
 def fitted():

@@ -7,12 +7,11 @@ from datetime import UTC, datetime
 
 import numpy as np
 import pytest
-from fingerpad.experiments.descriptions.stimuli import NamedStimulus
-from fingerpad.experiments.stimuli import ListedStimuli, ShiftedBar, along_skin
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 import fingerpad as fp
+from fingerpad.experiments.requests.stimuli import ListedStimuli, NamedStimulus, ShiftedBar, along_skin
 from fingerpad.inference.recordings import SpikeRecordings
 from tests.mutations import CHANGES, VALUES, changed, places
 

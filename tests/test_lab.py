@@ -76,7 +76,7 @@ def waited(laboratory, state, exact=False):
         ({"object": "ball", "x_mm": 1e9}, "x_mm must lie within -20 to 20 mm"),
         ({"object": "ball", "x_mm": [1]}, "x_mm must be a finite number"),
         ({"object": "ball", "hold_ms": True}, "hold_ms must be a finite number"),
-        ({"object": "ball", "afferent": "PC"}, "afferent must be one of SAI, RA: got 'PC'"),
+        ({"object": "ball", "afferent": "RB"}, "afferent must be one of SAI, RA, PC, SAII, range: got 'RB'"),
     ],
 )
 def test_a_wrong_state_is_one_sentence(asked, said):
@@ -145,7 +145,9 @@ def test_the_full_solution_stands_beside_the_reduced_one(laboratory):
 
 def test_the_full_solution_is_shown_until_there_is_a_reduced_touch(laboratory, monkeypatch):
     exact, model, go_on = laboratory.answer(PRESS, exact=True), laboratory.model(PRESS), threading.Event()
-    monkeypatch.setattr("fingerpad.lab.laboratory.run_reduction", lambda *_: go_on.wait(60.0) and model)
+    monkeypatch.setattr(
+        "fingerpad.lab.laboratory.ReductionRequest.run", lambda *_: go_on.wait(60.0) and model
+    )
     source = laboratory.source(PRESS).with_name("first.yaml")
     source.write_text(RANGE % 287.0, encoding="utf-8")
     begun, state = Laboratory(laboratory.folder, [source]), replace(PRESS, object="first")
@@ -183,7 +185,7 @@ def test_the_python_lines_reproduce_the_view(laboratory):
 
 def test_what_was_made_is_not_pressed_again(laboratory, monkeypatch):
     again = Laboratory(laboratory.folder, [laboratory.source(LabState(name)) for name in laboratory.names])
-    monkeypatch.setattr("fingerpad.lab.laboratory.run_reduction", None)
+    monkeypatch.setattr("fingerpad.lab.laboratory.ReductionRequest.run", None)
     kept, known = again.answer(PRESS), laboratory.answer(PRESS)
     assert isinstance(kept, Answer)
     assert (kept.force_mn == known.force_mn).all()
@@ -196,14 +198,14 @@ def test_errors_are_measured_while_the_answer_is_there(laboratory, monkeypatch, 
     asked = []
 
     def run(described, runner):
-        asked.append(described.description.calibration)
+        asked.append(described.calibration)
         return model if asked[-1] == 0 else replace(model, error=np.full(3, 0.02))
 
     model = laboratory.model(PRESS)
     assert model is not None
     source = laboratory.source(PRESS).with_name("measured.yaml")
     source.write_text((RANGE % 287.0).replace("calibration: 0", "calibration: 20"), encoding="utf-8")
-    monkeypatch.setattr("fingerpad.lab.laboratory.run_reduction", run)
+    monkeypatch.setattr("fingerpad.lab.laboratory.ReductionRequest.run", run)
     measuring = Laboratory(laboratory.folder, [source])
     state = replace(PRESS, object="measured")
     measuring.path(state).unlink(missing_ok=True)

@@ -11,9 +11,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from fingerpad.experiments.afferent_files import fitted_afferent
-from fingerpad.experiments.descriptions.stimuli import NamedStimulus
-from fingerpad.experiments.stimuli import ListedStimuli, ShiftedBar
 
 import fingerpad as fp
 from fingerpad import cli
@@ -31,6 +28,8 @@ from fingerpad.experiments.fit.rate_uncertainty import rate_posterior
 from fingerpad.experiments.fit.results import ParameterProfile, PhaseBands, RateBand, RatePosterior
 from fingerpad.experiments.gerling2014 import nerve
 from fingerpad.experiments.manifest import sha256
+from fingerpad.experiments.requests.afferents import fitted_afferent
+from fingerpad.experiments.requests.stimuli import ListedStimuli, NamedStimulus, ShiftedBar
 from fingerpad.geometry.edged_indenters import INDENTERS
 from fingerpad.inference.afferent_fit import OFFSETS_MM
 from fingerpad.inference.identifiable import IDENTIFIABLE_NAMES, identifiable
