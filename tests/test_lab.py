@@ -25,6 +25,7 @@ from tornado.httpclient import HTTPRequest
 from tornado.websocket import websocket_connect
 
 import fingerpad as fp
+from fingerpad.experiments.requests.reduction import ReductionRequest
 from fingerpad.lab.answer import Answer, compared
 from fingerpad.lab.laboratory import Laboratory, Making, shipped
 from fingerpad.lab.server import HOST, reply_to, serve, spec_of
@@ -145,9 +146,7 @@ def test_the_full_solution_stands_beside_the_reduced_one(laboratory):
 
 def test_the_full_solution_is_shown_until_there_is_a_reduced_touch(laboratory, monkeypatch):
     exact, model, go_on = laboratory.answer(PRESS, exact=True), laboratory.model(PRESS), threading.Event()
-    monkeypatch.setattr(
-        "fingerpad.lab.laboratory.ReductionRequest.run", lambda *_: go_on.wait(60.0) and model
-    )
+    monkeypatch.setattr(ReductionRequest, "run", lambda *_: go_on.wait(60.0) and model)
     source = laboratory.source(PRESS).with_name("first.yaml")
     source.write_text(RANGE % 287.0, encoding="utf-8")
     begun, state = Laboratory(laboratory.folder, [source]), replace(PRESS, object="first")
@@ -185,7 +184,7 @@ def test_the_python_lines_reproduce_the_view(laboratory):
 
 def test_what_was_made_is_not_pressed_again(laboratory, monkeypatch):
     again = Laboratory(laboratory.folder, [laboratory.source(LabState(name)) for name in laboratory.names])
-    monkeypatch.setattr("fingerpad.lab.laboratory.ReductionRequest.run", None)
+    monkeypatch.setattr(ReductionRequest, "run", None)
     kept, known = again.answer(PRESS), laboratory.answer(PRESS)
     assert isinstance(kept, Answer)
     assert (kept.force_mn == known.force_mn).all()
@@ -205,7 +204,7 @@ def test_errors_are_measured_while_the_answer_is_there(laboratory, monkeypatch, 
     assert model is not None
     source = laboratory.source(PRESS).with_name("measured.yaml")
     source.write_text((RANGE % 287.0).replace("calibration: 0", "calibration: 20"), encoding="utf-8")
-    monkeypatch.setattr("fingerpad.lab.laboratory.ReductionRequest.run", run)
+    monkeypatch.setattr(ReductionRequest, "run", run)
     measuring = Laboratory(laboratory.folder, [source])
     state = replace(PRESS, object="measured")
     measuring.path(state).unlink(missing_ok=True)
