@@ -111,7 +111,7 @@ def test_a_description_takes_a_preset_measures_or_an_outline():
     by_measures = fp.TouchRequest.read(ball | {"finger": {"like": "aged", "width_mm": 18}})
     assert by_measures.touch.finger == Fingertip.of("aged", width_mm=18.0)
     outline = fp.TouchRequest.read(ball | {"finger": {"kind": "outline", "nail_half_width_mm": 5.5}})
-    assert outline.finger == Fingertip(nail_half_width_mm=5.5)
+    assert outline.pressed_finger == Fingertip(nail_half_width_mm=5.5)
     child = fp.TouchRequest.read(ball | {"finger": "child", "place": {"x_mm": 1}})
     assert child.touch.at_mm == (CHILD.contact_mm[0] + 1.0, 0.0)
     laid = ball | {"finger": "child", "afferents": {"layout": "hexagonal", "region": {"shape": "pad"}}}
