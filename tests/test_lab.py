@@ -198,7 +198,7 @@ def test_errors_are_measured_while_the_answer_is_there(laboratory, monkeypatch, 
 
     def run(described, runner):
         asked.append(described.calibration)
-        return model if asked[-1] == 0 else replace(model, error=np.full(3, 0.02))
+        return model if asked[-1] == 0 else replace(model, error=np.full_like(model.error, 0.02))
 
     model = laboratory.model(PRESS)
     assert model is not None
@@ -454,3 +454,63 @@ def test_the_static_page_works_from_a_file(browser, laboratory, tmp_path):
     assert watched.wrong == []
     assert all(url.startswith(("file:", "data:", "blob:")) for url in watched.asked)
     page.close()
+
+
+OWN = """
+from dataclasses import dataclass
+
+import numpy as np
+
+import fingerpad as fp
+
+
+@dataclass(frozen=True)
+class Onset:
+    threshold_kpa: float = 0.5
+    dynamic_quantity: str = "stored"
+    static_quantity: str = "compressive_stress"
+    rate_measure: str = "count"
+
+    def spikes(self, sed):
+        above = [np.flatnonzero(course > self.threshold_kpa)[:1] for course in sed.values.T]
+        return fp.SpikeTrains.from_lists([sed.times_ms[first] for first in above])
+
+
+own = Onset()
+"""
+
+
+def test_all_types_a_mixed_range_and_an_own_afferent_respond(laboratory):
+    """Each is streamed from one reduced touch, which depends on what afferents follow alone."""
+    for name in ("PC", "SAII"):
+        found = laboratory.answer(replace(PRESS, afferent=name, depth_mm=0.5)).response
+        assert found.dynamic_rate_hz.shape == (len(found.positions_mm),)
+        assert np.isfinite(found.first_spike_latency_ms).any(), name
+    folder = laboratory.source(PRESS).parent
+    (folder / "mine_in_lab.py").write_text(OWN, encoding="utf-8")
+    for name, afferents in (
+        ("mixed", "densities_per_cm2: {RA: 100, PC: 20, SAII: 30}"),
+        ("own", "afferent: 'mine_in_lab:own'"),
+    ):
+        text = RANGE % 287.0 + f"afferents: {{{afferents}}}\n"
+        (folder / f"{name}.yaml").write_text(text, encoding="utf-8")
+    state = LabState("mixed", depth_mm=0.4, afferent="range")
+    with pytest.raises(fp.InputError, match="allow it by --allow-python"):
+        Laboratory(laboratory.folder, [folder / "own.yaml"])
+    several = Laboratory(laboratory.folder, [folder / "mixed.yaml", folder / "own.yaml"], allow_python=True)
+    model = laboratory.model(PRESS)
+    fp.write_reduced(model, several.path(state))
+    fp.write_reduced(model, several.path(replace(state, object="own")))
+    mixed = several.answer(state).response
+    assert list(mixed.parts) == ["RA", "PC", "SAII"]
+    assert (
+        sum(map(len, mixed["RA"].spikes))
+        == laboratory.answer(replace(PRESS, afferent="RA")).response.spike_count.sum()
+    )
+    view, printed, names = waited(several, replace(state, object="own")), io.StringIO(), {}
+    with contextlib.redirect_stdout(printed):
+        exec(view.python, names)
+    assert [train.tolist() for train in names["spikes"]] == [
+        pytest.approx(each, abs=0.01) for each in view.answer.spikes
+    ]
+    assert {len(train) for train in view.answer.spikes} == {0, 1}

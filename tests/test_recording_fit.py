@@ -30,6 +30,7 @@ from fingerpad.experiments.manifest import sha256
 from fingerpad.experiments.requests.afferents import fitted_afferent
 from fingerpad.experiments.requests.stimuli import ListedStimuli, NamedStimulus, ShiftedBar
 from fingerpad.inference.afferent_fit import OFFSETS_MM
+from fingerpad.inference.fitting.cross_validation import interleaved_folds
 from fingerpad.inference.identifiable import IDENTIFIABLE_NAMES, identifiable
 from fingerpad.inference.rate_model import AfferentModel, ClosedFormModel
 from fingerpad.inference.recordings import SpikeRecordings
@@ -191,8 +192,8 @@ def test_standard_errors_are_the_scatter_of_the_folds(call, tmp_path):
 
 
 def test_six_folds_are_dealt_out_by_default_and_one_per_stimulus_where_there_are_fewer():
-    assert study.folds_in_turn(14).tolist() == [0, 1, 2, 3, 4, 5, 0, 1, 2, 3, 4, 5, 0, 1]
-    assert study.folds_in_turn(4).tolist() == [0, 1, 2, 3]
+    assert interleaved_folds(14).tolist() == [0, 1, 2, 3, 4, 5, 0, 1, 2, 3, 4, 5, 0, 1]
+    assert interleaved_folds(4).tolist() == [0, 1, 2, 3]
 
 
 def test_stimuli_that_move_in_their_own_time_are_answered_each_in_theirs():
