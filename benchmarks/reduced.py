@@ -13,7 +13,6 @@ import numpy as np
 import fingerpad as fp
 from benchmarks.measuring import run_job
 from benchmarks.results import Report, Table
-from fingerpad.experiments.descriptions.reduction import described_reduction, run_reduction
 from fingerpad.experiments.runner import Runner
 from fingerpad.reduction.building import draw_touch, streamed
 from fingerpad.reduction.training import ReducedTraining
@@ -31,7 +30,7 @@ STRESS_CHANGES = (1e-4, 1e-3)
 
 def answer(resolution: str) -> dict[str, Any]:
     """Make the reduced touch, time its steps, and compare it with full touches that it does not know."""
-    described = described_reduction(
+    request = fp.ReductionRequest.read(
         {
             "object": {"kind": "sphere", "curvature_per_m": 287.0},
             "resolution": resolution,
@@ -41,13 +40,13 @@ def answer(resolution: str) -> dict[str, Any]:
     with TemporaryDirectory() as folder:
         runner = Runner(Path(folder), JOBS)
         started = perf_counter()
-        model = run_reduction(described, runner)
+        model = request.run(runner)
         built_s = perf_counter() - started
         fp.write_reduced(model, Path(folder) / "model.npz")
         size_mb = (Path(folder) / "model.npz").stat().st_size / 1e6
         random = np.random.default_rng(SEED)
-        drawn = [draw_touch(described.training, model, random) for _ in range(HELD_OUT)]
-        held = [_held(described.training, random) for _ in range(RATES)]
+        drawn = [draw_touch(request.training, model, random) for _ in range(HELD_OUT)]
+        held = [_held(request.training, random) for _ in range(RATES)]
         touches = {"held out": [touch for _, touch in drawn], "rates": held}
         found = runner.responses({stage: dict(enumerate(each)) for stage, each in touches.items()})
     compared = [streamed(model, found["held out"][n], shape) for n, (shape, _) in enumerate(drawn)]

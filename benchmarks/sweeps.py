@@ -11,7 +11,6 @@ import numpy as np
 import fingerpad as fp
 from benchmarks.results import Report, Table
 from fingerpad.experiments.manifest import peak_memory_mb
-from fingerpad.experiments.sweep.description import sweep_of
 from fingerpad.skin.store import Store
 
 TOUCH = {"object": "cylinder", "motion": {"depth_mm": 0.5, "ramp_ms": 50, "hold_ms": 300}}
@@ -27,9 +26,8 @@ def measure() -> Report:
     with TemporaryDirectory() as name:
         folder = Path(name)
         depths = np.linspace(0.3, 0.6, PRESSES).tolist()
-        pressed = {"touch": TOUCH, "grid": {"motion.depth_mm": depths}}
-        fp.run_sweep(pressed | {"grid": {"motion.depth_mm": depths[:1]}}, folder / "first.zarr")  # compiles
-        run = fp.run_sweep(pressed, folder / "presses.zarr")
+        fp.sweep(touch=TOUCH, grid={"motion.depth_mm": depths[:1]}, out=folder / "first.zarr")  # compiles
+        run = fp.sweep(touch=TOUCH, grid={"motion.depth_mm": depths}, out=folder / "presses.zarr")
         overhead = (run.wall_s - run.press_s) / run.press_s
         growth = [_growth(folder, count) for count in SIZES]
         receptors_s = _receptors(folder, depths)
@@ -69,17 +67,15 @@ def _growth(folder: Path, count: int) -> list[float]:
     """Vary the seed of the afferents: time, memory and disk of so many settings of one stored press."""
     touch = TOUCH | {"motion": TOUCH["motion"] | {"depth_mm": 0.3}}  # type: ignore[operator]
     path = folder / f"{count}.zarr"
-    run = fp.run_sweep({"touch": touch, "grid": {"afferents.seed": list(range(count))}}, path)
+    run = fp.sweep(touch=touch, grid={"afferents.seed": list(range(count))}, out=path)
     size = sum(file.stat().st_size for file in path.rglob("*") if file.is_file())
     return [count, run.wall_s, 1e3 * run.wall_s / count, peak_memory_mb(), size / 1e3 / count]
 
 
 def _receptors(folder: Path, depths: list[float]) -> float:
     """Let many receptors respond to every stored press; time for `STORED` of them. [s]"""
-    store, sweep = (
-        Store(folder / "indentations"),
-        sweep_of({"touch": TOUCH, "grid": {"motion.depth_mm": depths}}),
-    )
+    store = Store(folder / "indentations")
+    sweep = fp.SweepRequest.read({"touch": TOUCH, "grid": {"motion.depth_mm": depths}})
     population = fp.Population.grid(40_000.0, *RECEPTORS)
     began = time.perf_counter()
     for number in range(STORED):

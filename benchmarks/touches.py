@@ -62,7 +62,7 @@ def _pressed(folder: Path, count: int) -> list[float]:
     depths = np.linspace(*DEPTHS_MM, count).tolist()
     clock = Clock(folder / "clock.json", count)
     sweep = {"touch": TOUCH, "grid": {"motion.depth_mm": depths}}
-    run = fp.run_sweep(sweep, folder / "study.zarr", available_threads(), progress=clock)
+    run = fp.sweep(sweep, out=folder / "study.zarr", jobs=available_threads(), progress=clock)
     assert run.done == count
     after = {int(done): memory_mb for done, memory_mb in clock.memory_mb.items()}
     early = min(after, key=lambda done: abs(done - 0.1 * count))

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import typer
-
-from fingerpad.cli import run
-from fingerpad.cli.options import Command
+import fingerpad.cli
+from fingerpad.cli import Program
 from studies import held_out, mesh_refinement, tissue_page, tissue_posterior, tissue_search
-from studies.results_command import results_command
+from studies.results_command import RESULTS
 from studies.study import Study, command_of
 
 STUDIES = (
@@ -42,20 +40,16 @@ STUDIES = (
     ),
 )
 
-app = typer.Typer(
-    help="Research on the model itself.",
-    add_completion=False,
-    pretty_exceptions_enable=False,
-    rich_markup_mode=None,
+PROGRAM = Program(
+    "studies",
+    "Research on the model itself.",
+    {"results": RESULTS, **{study.name: command_of(study) for study in STUDIES}},
 )
-app.command("results", cls=Command)(results_command)
-for study in STUDIES:
-    app.command(study.name, cls=Command)(command_of(study))
 
 
 def main() -> None:
     """Run one study."""
-    run(app, "studies")
+    fingerpad.cli.main(program=PROGRAM)
 
 
 if __name__ == "__main__":

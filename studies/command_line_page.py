@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-from typing import Any
+import argparse
 
-import typer
-
-from fingerpad.cli import app
+from fingerpad.cli import FINGERPAD, parser_of
 from studies.pages import table
 
 INTRODUCTION = """# Command line
@@ -20,13 +18,13 @@ With every command, as in `fingerpad touch touch.yaml --quiet`, `--quiet` leaves
 
 GUIDES = {
     "touch": "Format and outputs: [touch.md](touch.md).",
+    "respond": "Keys: those of the block [afferents](touch.md) of a touch.",
     "init": "What it holds: [touch.md](touch.md).",
     "check": "How good the estimate is: [touch.md](touch.md#before-a-press).",
     "sweep": "Format and results: [sweeps.md](sweeps.md).",
     "fit": "Formats and results: [fit.md](fit.md).",
     "discriminate": "Format and results: [discriminate.md](discriminate.md).",
     "validate": "Format and scores: [validate.md](validate.md).",
-    "export": "What is exported: [mechanics.md](mechanics.md#export).",
     "view": "Pictures and films: [view.md](view.md).",
     "store": "What a store holds: [stored presses](sweeps.md#stored-presses).",
     "reduce": "Format and use: [reduced.md](reduced.md).",
@@ -38,31 +36,14 @@ GUIDES = {
 
 def command_line_page() -> str:
     """Return the page."""
-    group: Any = typer.main.get_command(app)
     parts = [INTRODUCTION.rstrip("\n")]
-    commands = [
-        (f"{name} {inner}", each)
-        for name, command in group.commands.items()
-        for inner, each in getattr(command, "commands", {"": command}).items()
-    ]
-    for name, command in ((name.strip(), command) for name, command in commands):
-        parts += [
-            f"## fingerpad {name}",
-            " ".join([" ".join(command.help.split()), GUIDES[name.split()[0]]]),
-            table(("option", "default", "meaning"), [_row(parameter) for parameter in command.params]),
-        ]
+    for name, (what, _, _) in FINGERPAD.commands.items():
+        options = parser_of(FINGERPAD, name)._actions
+        rows = [_row(each) for each in options if each.dest not in ("help", "quiet", "verbose")]
+        parts += [f"## fingerpad {name}", f"{what} {GUIDES[name]}", table(("option", "meaning"), rows)]
     return "\n\n".join(parts) + "\n"
 
 
-def _row(parameter: Any) -> tuple[str, str, str]:
-    named = [name for name in (*parameter.opts, *parameter.secondary_opts) if name.startswith("--")]
-    name = " / ".join(named) or parameter.metavar or parameter.name.upper()
-    return f"`{name}`", _default(parameter.default), parameter.help.replace("|", "\\|")
-
-
-def _default(value: Any) -> str:
-    if value is None or value is False:
-        return ""
-    if isinstance(value, tuple):
-        return f"`{' '.join(f'{each:g}' for each in value)}`"
-    return f"`{value:g}`" if isinstance(value, float) else f"`{value}`"
+def _row(option: argparse.Action) -> tuple[str, str]:
+    name = option.option_strings[0] if option.option_strings else option.metavar
+    return f"`{name}`", str(option.help).replace("%%", "%").replace("|", "\\|")

@@ -25,8 +25,9 @@ from fingerpad.experiments.gerling2014.thresholds import Observer, interpolated,
 from fingerpad.experiments.manifest import Manifest
 from fingerpad.experiments.runner import Runner
 from fingerpad.experiments.validation.observations import KINDS, Observation, Observations, read_observations
-from fingerpad.experiments.validation.predictions import LOADINGS, Condition, FingertipModel, predict
-from fingerpad.experiments.validation.validation import ValidationRequest, validate
+from fingerpad.experiments.validation.predictions import Condition, predict
+from fingerpad.experiments.validation.request import LOADINGS, RAMP_AND_HOLD, ValidationRequest
+from fingerpad.experiments.validation.validation import validate
 from fingerpad.geometry.edged_indenters import Grating
 from fingerpad.geometry.indenters import FlatPunch, Indenter, Plate
 from fingerpad.geometry.mesh_checks import jacobian_at_gauss
@@ -145,29 +146,25 @@ def run(runner: Runner, conditions: Conditions) -> HeldOut:
     StoreError
         If a stored press is damaged or the folder cannot be written.
     """
-    model = FingertipModel(conditions)
     return HeldOut(
         checks=(
-            *force_checks(plate_forces(model, runner)),
-            *sphere_checks(*sphere_rates(model, runner)),
-            *grating_checks(grating_rates(model, runner), forced_indices(model, runner)),
-            *adaptation_checks(declines(model, runner)),
+            *force_checks(plate_forces(conditions, runner)),
+            *sphere_checks(*sphere_rates(conditions, runner)),
+            *grating_checks(grating_rates(conditions, runner), forced_indices(conditions, runner)),
+            *adaptation_checks(declines(conditions, runner)),
             *volume_checks(volume_decreases(conditions, runner)),
-            *threshold_checks(weber_fractions(model, runner)),
+            *threshold_checks(weber_fractions(conditions, runner)),
         ),
-        scores=tuple(scores(model, runner)),
+        scores=tuple(scores(conditions, runner)),
         manifest=runner.manifest(conditions),
     )
 
 
-def scores(model: FingertipModel, runner: Runner) -> Iterable[Score]:
+def scores(conditions: Conditions, runner: Runner) -> Iterable[Score]:
     """Score every file of observations, by both ways to reach a depth."""
     for path in sorted(OBSERVATIONS.glob("*.csv")):
         for loading in LOADINGS:
-            request = ValidationRequest(
-                read_observations(path), replace(model, loading=loading), runner.folder, runner.jobs
-            )
-            found = validate(request)
+            found = validate(_asked(read_observations(path), conditions, loading), runner)
             yield Score(
                 file=path.stem,
                 role=ROLES.get(path.stem, PREDICTED),
@@ -180,12 +177,23 @@ def scores(model: FingertipModel, runner: Runner) -> Iterable[Score]:
             )
 
 
+def _asked(observed: Observations, conditions: Conditions, loading: str) -> ValidationRequest:
+    return ValidationRequest(
+        observations=observed, resolution=conditions.resolution, tissues=conditions.tissues, loading=loading
+    )
+
+
 def predicted(
-    kind: str, conditions: Sequence[Condition], model: FingertipModel, runner: Runner
+    kind: str,
+    wanted: Sequence[Condition],
+    conditions: Conditions,
+    runner: Runner,
+    loading: str = RAMP_AND_HOLD,
 ) -> FloatArray:
     """Predict conditions of a kind of `KINDS` without observations; NaN where a press is impossible."""
-    rows = tuple(Observation(line, condition, np.nan) for line, condition in enumerate(conditions))
-    return predict(Observations(KINDS[kind], rows, "predictions"), model, runner).values
+    rows = tuple(Observation(line, condition, np.nan) for line, condition in enumerate(wanted))
+    observed = Observations(KINDS[kind], rows, "predictions")
+    return predict(_asked(observed, conditions, loading), runner).values
 
 
 def _check(
@@ -218,12 +226,10 @@ def _smallest_step(values: FloatArray, axis: int) -> float:
 # Force
 
 
-def plate_forces(model: FingertipModel, runner: Runner) -> dict[str, FloatArray]:
+def plate_forces(conditions: Conditions, runner: Runner) -> dict[str, FloatArray]:
     """Force of the plate at `FORCE_DEPTHS_MM`, by the way to reach a depth. [N]"""
     wanted = [("plate", depth) for depth in FORCE_DEPTHS_MM]
-    return {
-        loading: predicted("force", wanted, replace(model, loading=loading), runner) for loading in LOADINGS
-    }
+    return {loading: predicted("force", wanted, conditions, runner, loading) for loading in LOADINGS}
 
 
 def force_checks(force_n: Mapping[str, FloatArray]) -> Iterable[Check]:
@@ -251,7 +257,7 @@ def force_checks(force_n: Mapping[str, FloatArray]) -> Iterable[Check]:
 # Spheres
 
 
-def sphere_rates(model: FingertipModel, runner: Runner) -> tuple[FloatArray, FloatArray]:
+def sphere_rates(conditions: Conditions, runner: Runner) -> tuple[FloatArray, FloatArray]:
     """Predict static rates under spheres that a force presses. [spikes/s]
 
     Returns
@@ -267,8 +273,8 @@ def sphere_rates(model: FingertipModel, runner: Runner) -> tuple[FloatArray, Flo
         (PROFILE_FORCE_N, curvature, place) for curvature in PROFILES_PER_M for place in POSITIONS_MM.tolist()
     ]
     return (
-        predicted("rate_curvature", middle, model, runner).reshape(len(SPHERE_FORCES_N), -1),
-        predicted("rate_position", beside, model, runner).reshape(len(PROFILES_PER_M), -1),
+        predicted("rate_curvature", middle, conditions, runner).reshape(len(SPHERE_FORCES_N), -1),
+        predicted("rate_position", beside, conditions, runner).reshape(len(PROFILES_PER_M), -1),
     )
 
 
@@ -336,26 +342,25 @@ def grating_touch(conditions: Conditions, ridge_mm: float, spin_deg: float = 0.0
     )
 
 
-def grating_rates(model: FingertipModel, runner: Runner) -> dict[tuple[float, float], FloatArray]:
+def grating_rates(conditions: Conditions, runner: Runner) -> dict[tuple[float, float], FloatArray]:
     """Predict static rates over one period of gratings, by ridge and spin. [spikes/s]"""
-    conditions = model.conditions
     gratings = [(ridge, 0.0) for ridge in RIDGES_MM] + [(ridge, 90.0) for ridge in TURNED_MM]
     touches = {grating: grating_touch(conditions, *grating) for grating in gratings}
     skins = runner.responses({"gratings": touches})["gratings"]
     return {
-        grating: period_rates_hz(skins[grating], model.responding, *grating, conditions.skin_tilt_deg)
+        grating: period_rates_hz(skins[grating], conditions.afferent, *grating, conditions.skin_tilt_deg)
         for grating in gratings
     }
 
 
-def forced_indices(model: FingertipModel, runner: Runner) -> FloatArray:
+def forced_indices(conditions: Conditions, runner: Runner) -> FloatArray:
     """Modulation index of one grating by force, (n_forces,)."""
     wanted = [
         (force, FORCED_MM, FORCED_MM, place)
         for force in GRATING_FORCES_N
         for place in _places_mm(FORCED_MM).tolist()
     ]
-    return _index(predicted("grating", wanted, model, runner).reshape(len(GRATING_FORCES_N), -1))
+    return _index(predicted("grating", wanted, conditions, runner).reshape(len(GRATING_FORCES_N), -1))
 
 
 def _places_mm(ridge_mm: float) -> FloatArray:
@@ -430,11 +435,11 @@ def steady(conditions: Conditions, depth_mm: float) -> tuple[Touch, list[tuple[f
     return touch, [(ramp_ms, ramp_ms + MS_PER_S), (end_ms - MS_PER_S, end_ms)]
 
 
-def declines(model: FingertipModel, runner: Runner) -> list[float]:
+def declines(conditions: Conditions, runner: Runner) -> list[float]:
     """Share by which the rate falls from the first to the last second of a hold, by depth."""
-    named = {depth: steady(model.conditions, depth) for depth in facts.DECLINE_DEPTHS.value}
+    named = {depth: steady(conditions, depth) for depth in facts.DECLINE_DEPTHS.value}
     skins = runner.responses({"adaptation": {depth: touch for depth, (touch, _) in named.items()}})
-    middle = Population(np.array([(RECEPTOR_X_MM, 0.0)]), 1.0, model.responding)
+    middle = Population(np.array([(RECEPTOR_X_MM, 0.0)]), 1.0, conditions.afferent)
     return [decline(middle, skins["adaptation"][depth], windows) for depth, (_, windows) in named.items()]
 
 
@@ -499,12 +504,11 @@ def volume_checks(decrease: FloatArray) -> Iterable[Check]:
 # Percept
 
 
-def weber_fractions(model: FingertipModel, runner: Runner) -> list[float]:
+def weber_fractions(conditions: Conditions, runner: Runner) -> list[float]:
     """Weber fraction at each of `STANDARDS_PER_M`, the noise fitted to people's hit rates at 287 /m."""
-    conditions = model.conditions
     touches = {curvature: conditions.sphere_touch(curvature) for curvature in PRESSED_PER_M}
     skins = runner.responses({"spheres": touches})["spheres"]
-    grid = Population.grid(centre_mm=(RECEPTOR_X_MM, 0.0), afferent=model.responding)
+    grid = Population.grid(centre_mm=(RECEPTOR_X_MM, 0.0), afferent=conditions.afferent)
     static_hz = np.array([grid.respond(skins[curvature]).static_rate_hz for curvature in PRESSED_PER_M])
     return weber_fractions_of(grid, static_hz, conditions.seed)
 

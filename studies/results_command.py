@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
+import argparse
 from pathlib import Path
-from typing import Annotated
 
-import typer
-
+from fingerpad.cli.commands import Command, option
 from fingerpad.core.files import write_atomically
 from fingerpad.core.result_files import from_json, to_json
 from fingerpad.report.style import write_png
@@ -17,15 +16,13 @@ from studies.pages import DOCS, IMAGES, write_blocks
 README, NUMBERS, PICTURE = DOCS.parent / "README.md", DOCS / "results.json", IMAGES / "chain.png"
 
 
-def results_command(
-    results: Annotated[
-        Path | None,
-        typer.Argument(help="results.json of `fingerpad reproduce --extended`. Default: docs/results.json."),
-    ] = None,
-    picture: Annotated[
-        bool, typer.Option(help="Also press the standard sphere and draw the README's picture.")
-    ] = True,
-) -> None:
+def _add(parser: argparse.ArgumentParser) -> None:
+    of_results = "results.json of `fingerpad reproduce --extended`. Default: docs/results.json."
+    parser.add_argument("results", nargs="?", type=Path, metavar="RESULTS", help=of_results)
+    option(parser, "--no-picture", "Do not press the standard sphere for the README's picture.", bool)
+
+
+def write_pages(results: Path | None = None, picture: bool = True) -> None:
     """Write results, paper, command-line and tissues of docs, and table and picture of the README."""
     shown = (
         from_json(results_page.Excerpt, NUMBERS.read_bytes())
@@ -48,4 +45,11 @@ def results_command(
         write_png(lambda parts: chain_picture.draw(*parts), (skin, response, percept), PICTURE)
         written.append(PICTURE)
     for path in written:
-        typer.echo(f"Written: {path.relative_to(DOCS.parent)}")
+        print(f"Written: {path.relative_to(DOCS.parent)}")
+
+
+RESULTS: Command = (
+    "Write the pages that show the numbers of a reproduction.",
+    _add,
+    lambda given, _: write_pages(given.results, not given.no_picture),
+)

@@ -2,23 +2,19 @@
 
 from __future__ import annotations
 
+import argparse
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Any
 
-import typer
-
-from fingerpad.cli.options import Jobs, Resolution, Tissues, to_whole
-from fingerpad.cli.running import interruptible, make_writable, processes, progress
+from fingerpad.cli.commands import Command, option
+from fingerpad.cli.running import make_writable, processes, progress
 from fingerpad.core.files import write_atomically
 from fingerpad.core.result_files import to_json
 from fingerpad.experiments.conditions import Conditions
 from fingerpad.experiments.runner import Runner
 from studies.pages import DOCS, joined, write_blocks
-
-Seed = Annotated[int, typer.Option(parser=to_whole, metavar="INTEGER", help="Seed of all random numbers.")]
-Out = Annotated[Path, typer.Option(help="Folder for page, numbers and stored indentations.")]
 
 
 @dataclass(frozen=True)
@@ -67,30 +63,24 @@ def run_study(study: Study, runner: Runner, conditions: Conditions) -> tuple[Pat
     return write_blocks(DOCS / study.page, blocks, page), numbers
 
 
-def command_of(study: Study) -> Callable[..., None]:
-    """Return the command line of a study."""
+def command_of(study: Study) -> Command:
+    """Return the command of a study."""
 
-    def command(
-        resolution: Resolution = "quick",
-        out: Out = Path(study.name),
-        jobs: Jobs = None,
-        seed: Seed = 0,
-        tissues: Tissues = "human",
-    ) -> None:
-        execute(study, Conditions(resolution, seed, tissues), out, jobs)
+    def add(parser: argparse.ArgumentParser) -> None:
+        option(parser, "--out", "Folder for page, numbers and stored indentations.", Path, Path(study.name))
+        option(parser, "--jobs", "Number of processes. Default: one per core.", int)
+        if study.has_conditions:
+            option(parser, "--resolution", "quick, standard or paper.", str, "quick")
+            option(parser, "--seed", "Seed of all random numbers.", int, 0)
+            option(parser, "--tissues", "A set of tissues.", str, "human")
 
-    def without_conditions(out: Out = Path(study.name), jobs: Jobs = None) -> None:
-        execute(study, Conditions(), out, jobs)
-
-    chosen = command if study.has_conditions else without_conditions
-    chosen.__doc__ = study.help
-    return chosen
+    return study.help, add, lambda given, _: execute(study, given)
 
 
-def execute(study: Study, conditions: Conditions, out: Path, jobs: int | None) -> None:
+def execute(study: Study, given: argparse.Namespace) -> None:
     """Run a study from the command line, with bars on a terminal, and print the paths of its files."""
-    runner = Runner(out, processes(jobs), progress())
-    make_writable(out)
-    with interruptible():
-        page, numbers = run_study(study, runner, conditions)
-    typer.echo(f"Page: {page}\nResults: {numbers}")
+    asked = (given.resolution, given.seed, given.tissues) if study.has_conditions else ()
+    conditions, runner = Conditions(*asked), Runner(given.out, processes(given.jobs), progress())
+    make_writable(given.out)
+    page, numbers = run_study(study, runner, conditions)
+    print(f"Page: {page}\nResults: {numbers}")

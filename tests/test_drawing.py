@@ -15,7 +15,7 @@ from pynwb import NWBHDF5IO
 import fingerpad as fp
 from fingerpad.core.displayed import Result
 from fingerpad.core.signals import RECEPTOR_COLUMNS
-from fingerpad.experiments.discrimination.analysis import PreparedTask, analyse
+from fingerpad.experiments.discrimination.analysis import analyse
 from fingerpad.experiments.fit.fit import fit_recordings
 from fingerpad.inference.spike_fit import SpikeFit
 from fingerpad.report.drawing import DRAWINGS
@@ -29,7 +29,7 @@ TASK = {
     "object": {"kind": "sphere"},
     "stimuli": {"vary": "object.curvature_per_m", "values": [200, 220, 240]},
     "standard": 200,
-    "population": {"rows": 3, "columns": 3},
+    "afferents": {"rows": 3, "columns": 3},
     "code": ["gradient_sum"],
     "measure": ["static", "latency"],
     "noise": 0.1,
@@ -52,10 +52,8 @@ class Strength:
 
 
 def discriminated():
-    task = fp.parse_task(TASK)
-    prepared = PreparedTask(task, task_stimuli(task), task_population(task))
-    skins = {each.name: Strength(each.indenter.curvature_per_m) for each in prepared.stimuli}
-    return analyse(prepared, skins)
+    task = fp.DiscriminationRequest.read(TASK)
+    return analyse(task, {each.name: Strength(each.indenter.curvature_per_m) for each in task.pressed})
 
 
 def fitted():

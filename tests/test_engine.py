@@ -127,11 +127,11 @@ def test_a_sweep_on_a_cluster_has_the_bits_of_one_process_and_presses_nothing_tw
     touch = {"object": "cylinder", "motion": {"ramp_ms": 50, "hold_ms": 60}}
     sweep = {"touch": touch, "grid": {"motion.depth_mm": [0.2, 0.3], "afferents.columns": [2, 3]}}
     here, there = tmp_path / "here", tmp_path / "there"
-    assert fp.run_sweep(sweep, here / "study.zarr").pressed == 2
+    assert fp.sweep(sweep, out=here / "study.zarr").pressed == 2
     (there / "indentations").mkdir(parents=True)
     kept = sorted((here / "indentations").iterdir())[0]
     shutil.copy2(kept, there / "indentations" / kept.name)
-    done = fp.run_sweep(sweep, there / "study.zarr", fp.Cluster(running.address))
+    done = fp.sweep(sweep, out=there / "study.zarr", jobs=fp.Cluster(running.address))
     assert (done.done, done.pressed, done.loaded) == (4, 1, 1)
     for kind in ("study.zarr/*/c/**/*", "indentations/*"):
         written = {path.relative_to(here): path.read_bytes() for path in here.glob(kind) if path.is_file()}
@@ -154,7 +154,7 @@ def test_a_client_that_is_killed_goes_on_with_what_is_stored(running, tmp_path):
     client.wait()
     written = {path: path.stat().st_mtime_ns for path in stored.glob("*.npz")}
     assert 2 <= len(written) < len(depths)
-    done = fp.run_sweep(tmp_path / "sweep.yaml", tmp_path / "study.zarr", fp.Cluster(running.address))
+    done = fp.sweep(tmp_path / "sweep.yaml", out=tmp_path / "study.zarr", jobs=fp.Cluster(running.address))
     assert (done.done, done.failed) == (6, 0)
     assert done.pressed <= len(depths) - len(written)
     assert written.items() <= {path: path.stat().st_mtime_ns for path in stored.glob("*.npz")}.items()

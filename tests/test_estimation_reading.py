@@ -11,8 +11,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 import fingerpad as fp
-from fingerpad.experiments.descriptions.stimuli import NamedStimulus
-from fingerpad.experiments.stimuli import ListedStimuli, ShiftedBar, along_skin
+from fingerpad.experiments.requests.stimuli import ListedStimuli, NamedStimulus, ShiftedBar, along_skin
 from fingerpad.inference.recordings import SpikeRecordings
 from tests.mutations import CHANGES, VALUES, changed, places
 

@@ -7,7 +7,6 @@ import pytest
 
 import fingerpad as fp
 from fingerpad.experiments.conditions import Conditions
-from fingerpad.experiments.descriptions.touch import described_touch
 from fingerpad.geometry.fingertip import FINGERS, Fingertip
 from fingerpad.geometry.grading import resolution_grading
 from fingerpad.geometry.indenter_grading import grading_about
@@ -106,20 +105,20 @@ def test_place_population_and_pad_follow_the_finger():
 
 def test_a_description_takes_a_preset_measures_or_an_outline():
     ball = {"object": "sphere"}
-    assert described_touch(ball | {"finger": "child"}).touch.finger == CHILD
-    child = described_touch(ball | {"finger": "child:dermis_mm=1"})
-    assert child.finger == Fingertip.of("child", dermis_mm=1.0)
-    by_measures = described_touch(ball | {"finger": {"like": "aged", "width_mm": 18}})
+    assert fp.TouchRequest.read(ball | {"finger": "child"}).touch.finger == CHILD
+    child = fp.TouchRequest.read(ball | {"finger": "child:dermis_mm=1"})
+    assert child.pressed_finger == Fingertip.of("child", dermis_mm=1.0)
+    by_measures = fp.TouchRequest.read(ball | {"finger": {"like": "aged", "width_mm": 18}})
     assert by_measures.touch.finger == Fingertip.of("aged", width_mm=18.0)
-    outline = described_touch(ball | {"finger": {"kind": "outline", "nail_half_width_mm": 5.5}})
-    assert outline.finger == Fingertip(nail_half_width_mm=5.5)
-    child = described_touch(ball | {"finger": "child", "place": {"x_mm": 1}})
+    outline = fp.TouchRequest.read(ball | {"finger": {"kind": "outline", "nail_half_width_mm": 5.5}})
+    assert outline.pressed_finger == Fingertip(nail_half_width_mm=5.5)
+    child = fp.TouchRequest.read(ball | {"finger": "child", "place": {"x_mm": 1}})
     assert child.touch.at_mm == (CHILD.contact_mm[0] + 1.0, 0.0)
     laid = ball | {"finger": "child", "afferents": {"layout": "hexagonal", "region": {"shape": "pad"}}}
-    points = described_touch(laid).population.positions_mm
+    points = fp.TouchRequest.read(laid).population.positions_mm
     assert np.abs(CHILD.level(points)).max() < 1e-9
     nail = ball | {"finger": "child", "afferents": {"layout": "nail rows"}}
-    assert np.abs(CHILD.level(described_touch(nail).population.positions_mm)).max() < 1e-9
+    assert np.abs(CHILD.level(fp.TouchRequest.read(nail).population.positions_mm)).max() < 1e-9
 
 
 test_impossible_fingers_are_refused_in_one_sentence = refusals(
@@ -129,10 +128,10 @@ test_impossible_fingers_are_refused_in_one_sentence = refusals(
     (lambda: Fingertip.of("baby"), ("like",)),
     (lambda: Fingertip.of(widht_mm=16.0), "did you mean width_mm"),
     (lambda: Fingertip.of(height_mm=4.0), "Bone and skin layers of 1.624 mm must fit"),
-    (lambda: described_touch({"object": "sphere", "finger": "giant"}).touch, "like must be one of"),
-    (lambda: described_touch({"object": "sphere", "finger": "adult:18"}).touch, "as adult:width_mm=18"),
-    (lambda: described_touch({"object": "sphere", "finger": "adult:width_mm=x"}).touch, "width_mm must"),
-    (lambda: described_touch({"object": "sphere", "finger": {"kind": "toe"}}), ("finger", "kind")),
+    (lambda: fp.TouchRequest.read({"object": "sphere", "finger": "giant"}).touch, "like must be one of"),
+    (lambda: fp.TouchRequest.read({"object": "sphere", "finger": "adult:18"}).touch, "as adult:width_mm=18"),
+    (lambda: fp.TouchRequest.read({"object": "sphere", "finger": "adult:width_mm=x"}).touch, "width_mm must"),
+    (lambda: fp.TouchRequest.read({"object": "sphere", "finger": {"kind": "toe"}}), ("finger", "kind")),
 )  # fmt: skip
 
 

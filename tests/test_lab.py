@@ -25,6 +25,7 @@ from tornado.httpclient import HTTPRequest
 from tornado.websocket import websocket_connect
 
 import fingerpad as fp
+from fingerpad.experiments.requests.reduction import ReductionRequest
 from fingerpad.lab.answer import Answer, compared
 from fingerpad.lab.laboratory import Laboratory, Making, shipped
 from fingerpad.lab.server import HOST, reply_to, serve, spec_of
@@ -76,7 +77,7 @@ def waited(laboratory, state, exact=False):
         ({"object": "ball", "x_mm": 1e9}, "x_mm must lie within -20 to 20 mm"),
         ({"object": "ball", "x_mm": [1]}, "x_mm must be a finite number"),
         ({"object": "ball", "hold_ms": True}, "hold_ms must be a finite number"),
-        ({"object": "ball", "afferent": "PC"}, "afferent must be one of SAI, RA: got 'PC'"),
+        ({"object": "ball", "afferent": "RB"}, "afferent must be one of SAI, RA, PC, SAII, range: got 'RB'"),
     ],
 )
 def test_a_wrong_state_is_one_sentence(asked, said):
@@ -145,7 +146,7 @@ def test_the_full_solution_stands_beside_the_reduced_one(laboratory):
 
 def test_the_full_solution_is_shown_until_there_is_a_reduced_touch(laboratory, monkeypatch):
     exact, model, go_on = laboratory.answer(PRESS, exact=True), laboratory.model(PRESS), threading.Event()
-    monkeypatch.setattr("fingerpad.lab.laboratory.run_reduction", lambda *_: go_on.wait(60.0) and model)
+    monkeypatch.setattr(ReductionRequest, "run", lambda *_: go_on.wait(60.0) and model)
     source = laboratory.source(PRESS).with_name("first.yaml")
     source.write_text(RANGE % 287.0, encoding="utf-8")
     begun, state = Laboratory(laboratory.folder, [source]), replace(PRESS, object="first")
@@ -183,7 +184,7 @@ def test_the_python_lines_reproduce_the_view(laboratory):
 
 def test_what_was_made_is_not_pressed_again(laboratory, monkeypatch):
     again = Laboratory(laboratory.folder, [laboratory.source(LabState(name)) for name in laboratory.names])
-    monkeypatch.setattr("fingerpad.lab.laboratory.run_reduction", None)
+    monkeypatch.setattr(ReductionRequest, "run", None)
     kept, known = again.answer(PRESS), laboratory.answer(PRESS)
     assert isinstance(kept, Answer)
     assert (kept.force_mn == known.force_mn).all()
@@ -196,14 +197,14 @@ def test_errors_are_measured_while_the_answer_is_there(laboratory, monkeypatch, 
     asked = []
 
     def run(described, runner):
-        asked.append(described.description.calibration)
-        return model if asked[-1] == 0 else replace(model, error=np.full(3, 0.02))
+        asked.append(described.calibration)
+        return model if asked[-1] == 0 else replace(model, error=np.full_like(model.error, 0.02))
 
     model = laboratory.model(PRESS)
     assert model is not None
     source = laboratory.source(PRESS).with_name("measured.yaml")
     source.write_text((RANGE % 287.0).replace("calibration: 0", "calibration: 20"), encoding="utf-8")
-    monkeypatch.setattr("fingerpad.lab.laboratory.run_reduction", run)
+    monkeypatch.setattr(ReductionRequest, "run", run)
     measuring = Laboratory(laboratory.folder, [source])
     state = replace(PRESS, object="measured")
     measuring.path(state).unlink(missing_ok=True)
@@ -453,3 +454,63 @@ def test_the_static_page_works_from_a_file(browser, laboratory, tmp_path):
     assert watched.wrong == []
     assert all(url.startswith(("file:", "data:", "blob:")) for url in watched.asked)
     page.close()
+
+
+OWN = """
+from dataclasses import dataclass
+
+import numpy as np
+
+import fingerpad as fp
+
+
+@dataclass(frozen=True)
+class Onset:
+    threshold_kpa: float = 0.5
+    dynamic_quantity: str = "stored"
+    static_quantity: str = "compressive_stress"
+    rate_measure: str = "count"
+
+    def spikes(self, sed):
+        above = [np.flatnonzero(course > self.threshold_kpa)[:1] for course in sed.values.T]
+        return fp.SpikeTrains.from_lists([sed.times_ms[first] for first in above])
+
+
+own = Onset()
+"""
+
+
+def test_all_types_a_mixed_range_and_an_own_afferent_respond(laboratory):
+    """Each is streamed from one reduced touch, which depends on what afferents follow alone."""
+    for name in ("PC", "SAII"):
+        found = laboratory.answer(replace(PRESS, afferent=name, depth_mm=0.5)).response
+        assert found.dynamic_rate_hz.shape == (len(found.positions_mm),)
+        assert np.isfinite(found.first_spike_latency_ms).any(), name
+    folder = laboratory.source(PRESS).parent
+    (folder / "mine_in_lab.py").write_text(OWN, encoding="utf-8")
+    for name, afferents in (
+        ("mixed", "densities_per_cm2: {RA: 100, PC: 20, SAII: 30}"),
+        ("own", "afferent: 'mine_in_lab:own'"),
+    ):
+        text = RANGE % 287.0 + f"afferents: {{{afferents}}}\n"
+        (folder / f"{name}.yaml").write_text(text, encoding="utf-8")
+    state = LabState("mixed", depth_mm=0.4, afferent="range")
+    with pytest.raises(fp.InputError, match="allow it by --allow-python"):
+        Laboratory(laboratory.folder, [folder / "own.yaml"])
+    several = Laboratory(laboratory.folder, [folder / "mixed.yaml", folder / "own.yaml"], allow_python=True)
+    model = laboratory.model(PRESS)
+    fp.write_reduced(model, several.path(state))
+    fp.write_reduced(model, several.path(replace(state, object="own")))
+    mixed = several.answer(state).response
+    assert list(mixed.parts) == ["RA", "PC", "SAII"]
+    assert (
+        sum(map(len, mixed["RA"].spikes))
+        == laboratory.answer(replace(PRESS, afferent="RA")).response.spike_count.sum()
+    )
+    view, printed, names = waited(several, replace(state, object="own")), io.StringIO(), {}
+    with contextlib.redirect_stdout(printed):
+        exec(view.python, names)
+    assert [train.tolist() for train in names["spikes"]] == [
+        pytest.approx(each, abs=0.01) for each in view.answer.spikes
+    ]
+    assert {len(train) for train in view.answer.spikes} == {0, 1}

@@ -4,9 +4,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from fingerpad.experiments.descriptions.touch import described_touch
-from fingerpad.experiments.discrimination.run import DiscriminationRun
-from fingerpad.experiments.discrimination.task_stimuli import input_hashes, task_text
 
 import fingerpad as fp
 from fingerpad.export.decks import abaqus_deck
@@ -237,7 +234,7 @@ def test_exports_take_a_mesh_of_one_s_own(parts, tmp_path):
 
 
 def test_a_population_and_a_file_of_a_touch_use_it(made, tmp_path):
-    described = described_touch(
+    described = fp.TouchRequest.read(
         {
             "finger": {"kind": "mesh", "path": str(made), "receptor_depth_mm": 0.5},
             "object": {"kind": "sphere", "radius_mm": 4},
@@ -247,20 +244,22 @@ def test_a_population_and_a_file_of_a_touch_use_it(made, tmp_path):
         }
     )
     assert described.touch.finger == fp.read_finger(made, receptor_depth_mm=0.5)
-    assert described_touch({"finger": str(made), "object": "sphere"}).finger == fp.read_finger(made)
+    assert fp.TouchRequest.read({"finger": str(made), "object": "sphere"}).pressed_finger == fp.read_finger(
+        made
+    )
     assert described.population.positions_mm.mean(axis=0) == pytest.approx(
-        described.finger.contact_mm, abs=1e-9
+        described.pressed_finger.contact_mm, abs=1e-9
     )
     assert touch_key(described.touch) != touch_key(replace(described.touch, finger=fp.read_finger(made)))
-    pressed = fp.run_touch(described, tmp_path / "touch")
+    pressed = fp.touch(described, out=tmp_path / "touch")
     assert pressed.summary.largest_force_mn > 5.0
     assert (tmp_path / "touch" / "figures" / "touch.png").exists()
     laid = {"layout": "hexagonal", "region": {"shape": "pad"}}
-    elsewhere = described_touch({"finger": str(made), "object": "sphere", "afferents": laid})
+    elsewhere = fp.TouchRequest.read({"finger": str(made), "object": "sphere", "afferents": laid})
     with pytest.raises(fp.InputError, match="layout must be grid on a mesh"):
         _ = elsewhere.population
     with pytest.raises(fp.InputError, match="finger must be of type Fingertip: got FingerMesh"):
-        fp.UnrolledSkin(described.finger)
+        fp.UnrolledSkin(described.pressed_finger)
 
 
 def without(parts, *sets):
@@ -431,18 +430,18 @@ noise: 0.05
 """
 
 
-def test_a_task_presses_all_stimuli_into_the_mesh(sent, tmp_path):
+def test_a_task_presses_all_stimuli_into_the_mesh(sent):
     folder, skin = sent
     path = folder / "task.yaml"
     path.write_text(BALLS)
-    run = DiscriminationRun(fp.read_task(path), tmp_path, 1, str(path), task_text(path))
-    meshes = [touch.mesh for touch in run.touches.values()]
+    task = fp.DiscriminationRequest.read(path)
+    meshes = [touch.mesh for touch in task.touches.values()]
     assert meshes[0] is meshes[1]
     assert len(meshes[0].nodes_mm) == len(skin.mesh.nodes_mm)
-    assert str(folder / "finger.inp") in input_hashes(path, run.task, run.prepared.stimuli)
+    assert str(folder / "finger.inp") in task.input_hashes()
     path.write_text(BALLS + "reach_mm: 3\n")
     with pytest.raises(fp.InputError, match="reach_mm must not be given: the finger has a mesh of its own"):
-        DiscriminationRun(fp.read_task(path), tmp_path, 1, str(path), task_text(path))
+        fp.DiscriminationRequest.read(path).check()
 
 
 def test_stimuli_of_a_fit_are_pressed_into_the_mesh(sent):

@@ -4,7 +4,6 @@ import re
 from pathlib import Path
 
 import pytest
-
 from fingerpad.cli.reproduce import EXPECTED_TIME
 
 ROOT = Path(__file__).parents[1]

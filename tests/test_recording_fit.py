@@ -11,13 +11,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from fingerpad.experiments.afferent_files import fitted_afferent
-from fingerpad.experiments.descriptions.stimuli import NamedStimulus
-from fingerpad.experiments.stimuli import ListedStimuli, ShiftedBar
 
 import fingerpad as fp
 from fingerpad import cli
-from fingerpad.cli import options as choices
 from fingerpad.core.compilation import SHORT_NOTICE, SUBJECT
 from fingerpad.core.random_streams import Presentations
 from fingerpad.data import bar_firing_rates
@@ -25,18 +21,21 @@ from fingerpad.experiments import runner
 from fingerpad.experiments.conditions import RECEPTOR_X_MM, Conditions
 from fingerpad.experiments.fit import fit as study
 from fingerpad.experiments.fit import rate_uncertainty as recording_posterior
-from fingerpad.experiments.fit import session
-from fingerpad.experiments.fit.methods import METHODS, check_spikes
+from fingerpad.experiments.fit import request
+from fingerpad.experiments.fit.methods import check_spikes
 from fingerpad.experiments.fit.rate_uncertainty import rate_posterior
 from fingerpad.experiments.fit.results import ParameterProfile, PhaseBands, RateBand, RatePosterior
 from fingerpad.experiments.gerling2014 import nerve
 from fingerpad.experiments.manifest import sha256
-from fingerpad.geometry.edged_indenters import INDENTERS
+from fingerpad.experiments.requests.afferents import fitted_afferent
+from fingerpad.experiments.requests.stimuli import ListedStimuli, NamedStimulus, ShiftedBar
 from fingerpad.inference.afferent_fit import OFFSETS_MM
+from fingerpad.inference.fitting.cross_validation import interleaved_folds
 from fingerpad.inference.identifiable import IDENTIFIABLE_NAMES, identifiable
 from fingerpad.inference.rate_model import AfferentModel, ClosedFormModel
 from fingerpad.inference.recordings import SpikeRecordings
 from fingerpad.inference.spike_fit import soft_spikes
+from fingerpad.neuron.afferent import type_of
 from fingerpad.neuron.spikes import PAPER_WINDOWS_MS
 from fingerpad.neuron.transduction import drive
 from fingerpad.report import fit as report
@@ -183,7 +182,7 @@ def test_every_stimulus_is_predicted_without_its_fold(recovered):
 
 def test_standard_errors_are_the_scatter_of_the_folds(call, tmp_path):
     (tmp_path / "mine.csv").write_text(ROWS)
-    assert call("mine.csv", "--stimulus", "bar", "--folds", "5")[0] == 0
+    assert call("mine.csv", "--stimuli", "bar", "--folds", "5")[0] == 0
     fit = json.loads((tmp_path / "fit" / "fit.json").read_text())["fit"]
     fours = np.array([list(fold["identifiable"].values()) for fold in fit["folds"]])
     expected = 4 / 5 * sum(np.outer(apart, apart) for apart in fours - fours.mean(axis=0))
@@ -193,8 +192,8 @@ def test_standard_errors_are_the_scatter_of_the_folds(call, tmp_path):
 
 
 def test_six_folds_are_dealt_out_by_default_and_one_per_stimulus_where_there_are_fewer():
-    assert study.folds_in_turn(14).tolist() == [0, 1, 2, 3, 4, 5, 0, 1, 2, 3, 4, 5, 0, 1]
-    assert study.folds_in_turn(4).tolist() == [0, 1, 2, 3]
+    assert interleaved_folds(14).tolist() == [0, 1, 2, 3, 4, 5, 0, 1, 2, 3, 4, 5, 0, 1]
+    assert interleaved_folds(4).tolist() == [0, 1, 2, 3]
 
 
 def test_stimuli_that_move_in_their_own_time_are_answered_each_in_theirs():
@@ -258,8 +257,8 @@ def touches(*stimuli):
 
 
 def test_the_stimuli_of_the_bar_are_the_touches_of_the_reproduction(tmp_path):
-    path = tmp_path / session.EXAMPLE
-    path.write_bytes(session.example_recordings()[session.EXAMPLE])
+    path = tmp_path / "bar.csv"
+    path.write_text(request.example_recordings())
     bar, conditions = ShiftedBar(), Conditions("quick")
     recorded = fp.read_recordings(path, bar)
     touches = bar.touches(list(recorded.stimuli.values()), conditions)
@@ -300,7 +299,7 @@ class Pressed:
     def height(self, offset_mm):
         return 3.0 * np.exp(-((np.abs(self.shift_mm - offset_mm) - 1.5) ** 2)) * self.depth_mm
 
-    def sed(self, sites, dynamic_quantity, static_quantity):
+    def sed(self, sites, dynamic_quantity, static_quantity, depth_mm=None):
         offsets = np.array(sites)[:, 0] - RECEPTOR_X_MM
         assert [offset for offset, (_, across) in zip(offsets, sites, strict=True) if across == 0.0].count(
             0.0
@@ -324,7 +323,7 @@ ROWS = "shift_mm,dynamic_rate_hz,static_rate_hz\n" + "".join(
 
 def test_a_fit_writes_page_figures_numbers_and_their_origin(call, tmp_path):
     (tmp_path / "mine.csv").write_text(ROWS)
-    arguments = ("mine.csv", "--stimulus", "bar", "--folds", "2", "--resolution", "quick", "--seed", "3")
+    arguments = ("mine.csv", "--stimuli", "bar", "--folds", "2", "--resolution", "quick", "--seed", "3")
     status, said, errors = call(*arguments)
     assert (status, errors) == (0, "")
     results = json.loads((tmp_path / "fit" / "fit.json").read_text())
@@ -356,14 +355,14 @@ def test_spikes_seed_and_what_else_is_asked_for_reach_the_fit(call, tmp_path, mo
         asked.append((recordings, settings))
         return study.fit_recordings(sed, recordings, memberships)
 
-    monkeypatch.setattr(session, "fit_recordings", note)
+    monkeypatch.setattr(request, "fit_recordings", note)
     spikes = "1 5 9 20 33 41 48 700"
     (tmp_path / "mine.csv").write_text(
         "shift_mm,spike_times_ms\n" + "".join(f"{shift},{spikes}\n" for shift in SHIFTS_MM)
     )
     asked_for = ("--posterior", "--profiles", "--sensitivity")
     options = ("--method", "likelihood", *asked_for, "--seed", "7", "--folds", "2")
-    assert call("mine.csv", "--stimulus", "bar", *options)[0] == 0
+    assert call("mine.csv", "--stimuli", "bar", *options)[0] == 0
     ((recordings, settings),) = asked
     assert isinstance(recordings, SpikeRecordings)
     assert recordings.trains.times_ms.size == 8 * len(SHIFTS_MM)
@@ -379,7 +378,7 @@ def test_what_is_asked_for_beside_the_fit_is_on_its_page(call, tmp_path, monkeyp
     typed = tuple(ParameterProfile(**each) for each in four)
     monkeypatch.setattr(recording_posterior, "profiled", lambda *given: typed)
     options = ("--profiles", "--sensitivity", "--offset", "--folds", "2")
-    status, _, errors = call("mine.csv", "--stimulus", "bar", *options)
+    status, _, errors = call("mine.csv", "--stimuli", "bar", *options)
     assert (status, errors) == (0, "")
     fit = json.loads((tmp_path / "fit" / "fit.json").read_text())["fit"]
     assert fit["profiles"] == four
@@ -396,12 +395,12 @@ def test_chosen_numbers_of_another_type_are_fitted_and_read_by_a_touch(call, tmp
     (tmp_path / "mine.csv").write_text(
         "shift_mm,dynamic_rate_hz\n" + "".join(f"{shift},{100 + 20 * shift}\n" for shift in SHIFTS_MM)
     )
-    status, said, errors = call("mine.csv", "--stimulus", "bar", "--afferent", "RA", "--free", "threshold")
+    status, said, errors = call("mine.csv", "--stimuli", "bar", "--afferent", "RA", "--free", "threshold")
     assert (status, errors) == (0, "")
     assert said.startswith("RA fitted to 6 stimuli: threshold ")
     results = json.loads((tmp_path / "fit" / "fit.json").read_text())
     afferent = fitted_afferent(tmp_path / "fit" / "fit.json")
-    assert isinstance(afferent, fp.RA)
+    assert type_of(afferent) == "RA"
     assert results["fitted"] == {"threshold": afferent.threshold}
     assert results["windows_ms"][0] == [0.0, 50.0]  # RA are counted in all of the ramp
 
@@ -415,8 +414,8 @@ def test_listed_stimuli_folds_of_the_file_and_options_reach_the_fit(call, tmp_pa
         "what,static_rate_hz,fold\n"
         + "".join(f"bar {row},{60 - 9 * row},{row + 1}\n" for row in (0, 2, 1, 3, 4))
     )
-    call_with = ("mine.csv", "--stimulus", "list.csv", "--stimulus-column", "what", "--out", "there")
-    status, _, errors = call(*call_with, "--static-window", "500", "900", "--tissues", "trial1")
+    call_with = ("mine.csv", "--stimuli", "list.csv", "--stimulus-column", "what", "--out", "there")
+    status, _, errors = call(*call_with, "--windows_ms.static", "500,900", "--tissues", "trial1")
     assert (status, errors) == (0, "")
     results = json.loads((tmp_path / "there" / "fit.json").read_text())
     fit, manifest = results["fit"], results["manifest"]
@@ -426,8 +425,8 @@ def test_listed_stimuli_folds_of_the_file_and_options_reach_the_fit(call, tmp_pa
     assert (results["windows_ms"][1], manifest["materials"]) == ([500.0, 900.0], "trial1")
 
 
-BAR = ["mine.csv", "--stimulus", "bar"]
-LIST = ["mine.csv", "--stimulus", "list.csv"]
+BAR = ["mine.csv", "--stimuli", "bar"]
+LIST = ["mine.csv", "--stimuli", "list.csv"]
 
 
 def static_rates(column, rows):
@@ -437,17 +436,16 @@ def static_rates(column, rows):
 @pytest.mark.parametrize(
     ("arguments", "content", "said"),
     [
-        ([*BAR, "--afferent", "RA"], ROWS, "--free must name at least one number of RA"),
-        ([*BAR, "--free", "x"], ROWS, "--free must be one of"),
-        ([], ROWS, "fit needs recordings and --stimulus, or --example"),
-        (["mine.csv"], ROWS, "--stimulus is missing: write --stimulus bar"),
-        (["none.csv", "--stimulus", "bar"], ROWS, "none.csv must be a file that can be read"),
-        (["mine.csv", "--stimulus", "none.csv"], ROWS, "none.csv must be a file that can be read"),
+        ([*BAR, "--afferent", "RA"], ROWS, "free must name at least one number of RA"),
+        ([*BAR, "--free", "x"], ROWS, "free must be one of"),
+        ([], ROWS, "fit needs a file, recordings or options: see --help"),
+        (["none.csv", "--stimuli", "bar"], ROWS, "none.csv must be a file that can be read"),
+        (["mine.csv", "--stimuli", "none.csv"], ROWS, "none.csv must be a file that can be read"),
         (BAR, ROWS + "2,1,nan\n", "mine.csv, line 8: static_rate_hz must be a"),
         (BAR, static_rates("shift_mm", (0, 1)), "at least 4 rates"),
         (BAR, ROWS + "90,1,3\n", "Stimulus 90 cannot be used: place must lie"),
-        ([*BAR, "--depth", "9"], ROWS, "Stimulus -2 cannot be used: motion.depth_mm"),
-        ([*BAR, "--width", "0"], ROWS, "width_mm must lie within"),
+        ([*BAR, "--motion.depth_mm", "9"], ROWS, "Stimulus -2 cannot be used: motion.depth_mm"),
+        ([*BAR, "--object", "bar:0"], ROWS, "width_mm must lie within"),
         ([*BAR, "--folds", "7"], ROWS, "n_folds must be at most the number of stimuli"),
         ([*BAR, "--unit", "1"], ROWS, "unit belongs to NWB files"),
         ([*BAR, "--method", "guess"], ROWS, "method must be one of least_squares"),
@@ -458,18 +456,18 @@ def static_rates(column, rows):
          "offset needs stimuli at several places along the finger"),
         ([*BAR, "--offset", "--folds", "2"], static_rates("shift_mm", range(8)),
          "recordings must leave at least 5 rates"),
-        ([*BAR, "--finger", "chid"], ROWS, "--finger.like must be one of adult"),
-        ([*LIST, "--finger", "a.inp"], ROWS, "--finger: a.inp must be a file"),
+        ([*BAR, "--finger", "chid"], ROWS, "finger.like must be one of adult"),
+        ([*LIST, "--finger", "a.inp"], ROWS, "finger: a.inp must be a file"),
         ([*BAR, "--dynamic-quantity", "heat"], ROWS, "dynamic_quantity must be one"),
-        ([*BAR, "--static-window", "600", "1100"], ROWS, "not at 1100 ms"),
-        ([*BAR, "--static-window", "600", "500"], ROWS, "a later end: got 600, 500"),
-        ([*LIST, "--width", "2"], ROWS, "--width is that of the bar"),
+        ([*BAR, "--windows_ms.static", "600,1100"], ROWS, "not at 1100 ms"),
+        ([*BAR, "--windows_ms.static", "600,500"], ROWS, "a later end: got 600, 500"),
+        ([*LIST, "--object", "bar:2"], ROWS, "object is that of the bar, and list.csv lists stimuli"),
         (LIST, ROWS, "mine.csv, line 1: column 'shift_mm' is unknown"),
         (LIST, static_rates("stimulus", ("edge", "side")),
          "mine.csv, line 3: stimulus must be one of list.csv, edge"),
         ([*BAR, "--folds", "2"],
          "shift_mm,static_rate_hz,fold\n" + "".join(f"{row},9,{row + 1}\n" for row in range(6)),
-         "from the column fold or from --folds, not both"),
+         "from the column fold or from folds, not both"),
         (BAR, "shift_mm,spike_times_ms,duration_ms\n0,1 2,900\n1,3,900\n2,5,900\n",
          "windows_ms must end within the recordings of 900 ms"),
     ],
@@ -484,20 +482,10 @@ def test_bad_input_is_one_sentence_and_status_2_and_nothing_is_written(
     assert sorted(path.name for path in tmp_path.iterdir()) == ["list.csv", "mine.csv"]
 
 
-def test_the_example_prints_its_command_and_writes_recordings(call, tmp_path):
-    status, said, errors = call("--example", "try")
-    assert (status, errors) == (0, "")
-    assert said == "Try: fingerpad fit try/bar.csv --stimulus bar --resolution quick --out try/fit\n"
-    tried = said.split()[3:]
-    assert fp.read_recordings(tmp_path / tried[0], ShiftedBar()).recordings.n_rates == 72
-    assert call("--example", "try") == (
-        2, "", "fingerpad: try/bar.csv exists and is not overwritten: choose another folder.\n"
-    )  # fmt: skip
-
-
-def test_options_are_those_of_the_modules():
-    assert tuple(METHODS) == choices.METHOD_CHOICES
-    assert set(INDENTERS) == set(choices.INDENTER_CHOICES)
+def test_the_example_prints_its_command_and_writes_recordings(run_program, tmp_path):
+    status, said, errors = run_program(cli.main, "fingerpad", "init", "recordings", "--out", "try")
+    assert (status, said, errors) == (0, "Try: fingerpad fit try/bar.csv\n", "")
+    assert fp.read_recordings(tmp_path / "try/bar.csv", ShiftedBar()).recordings.n_rates == 72
 
 
 def test_figures_show_what_was_recorded_and_nothing_else(recovered):
@@ -521,7 +509,7 @@ def test_a_fit_from_nothing_recovers_a_known_afferent(call, monkeypatch, tmp_pat
     """Presses included, in a process whose warnings are errors; then the same stimuli with other rates."""
     listed, known = ["-1.5", "1.3", "1.5"], fp.Afferent()
     (tmp_path / "mine.csv").write_text(ROWS.splitlines()[0] + "".join(f"\n{name},100,30" for name in listed))
-    options = ("mine.csv", "--stimulus", "bar", "--resolution", "quick", "--jobs", "1")
+    options = ("mine.csv", "--stimuli", "bar", "--resolution", "quick", "--jobs", "1")
     shell = subprocess.run(
         [sys.executable, "-W", "error", "-m", "fingerpad", "fit", *options],
         cwd=tmp_path, capture_output=True, text=True, check=False,

@@ -15,8 +15,8 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from fingerpad.experiments.discrimination.task_stimuli import read_task, task_touches
 
+import fingerpad as fp
 from fingerpad import __version__, cli
 from fingerpad.core.compilation import SHORT_NOTICE, SUBJECT
 from fingerpad.core.errors import InputError
@@ -357,9 +357,8 @@ def test_the_papers_question_asked_as_ones_own_has_the_papers_hit_rates_also_if_
         rates = theirs["gradient_sum"][decoding["measure"]]
         assert [decoding[name] for name in HIT_RATES[:2]] == [rates[name] for name in HIT_RATES[:2]]
 
-    spheres = [
-        Store(tmp_path / STORE_FOLDER).path(touch) for touch in task_touches(read_task(question)).values()
-    ]
+    touches = fp.DiscriminationRequest.read(question).touches.values()
+    spheres = [Store(tmp_path / STORE_FOLDER).path(touch) for touch in touches]
     stored = {path: path.read_bytes() for path in spheres}
     for path in spheres[:3]:
         path.unlink()

@@ -1,13 +1,12 @@
 """`python -m studies NAME`: options that reach a study, files that it writes, and refused options."""
 
 import json
-import sys
 from functools import partial
 
 import pytest
-import typer
 
 import studies
+from fingerpad import cli
 from fingerpad.core.checked import result_class
 from fingerpad.experiments import runner
 from studies import __main__ as command
@@ -49,12 +48,11 @@ def test_a_study_is_run_with_what_was_asked_and_writes_page_and_numbers(
         return {"rates": f"{found.rate_hz:g} spikes/s"}
 
     written = Study("rates", "Fire.", run, blocks, "rates.md", has_conditions)
-    app = typer.Typer()
-    app.callback()(lambda: None)  # otherwise the only command has no name
-    app.command("rates")(command_of(written))
+    program = cli.Program("studies", "Research.", {"rates": command_of(written)})
     out = tmp_path / "found"
-    monkeypatch.setattr(sys, "argv", ["studies", "rates", "--out", str(out), "--jobs", "2", *chosen])
-    app(standalone_mode=False)
+    with pytest.raises(SystemExit) as ended:
+        cli.main(["rates", "--out", str(out), "--jobs", "2", *chosen], program)
+    assert not ended.value.code
     assert asked == [(*conditions, out, 2)]
     assert capsys.readouterr().out == f"Page: {out / 'rates.md'}\nResults: {out / 'rates.json'}\n"
     page = "# Rates\n\n<!-- begin rates -->\n63 spikes/s\n<!-- end rates -->\n"
@@ -63,9 +61,7 @@ def test_a_study_is_run_with_what_was_asked_and_writes_page_and_numbers(
 
 
 def test_every_study_has_a_command_and_a_line_of_help(call):
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("COLUMNS", "200")
-        _, said, _ = call("--help")
+    _, said, _ = call("--help")
     names = [study.name for study in command.STUDIES]
     assert len(names) == len(set(names)) == 4
     assert all(f" {name} " in said for name in (*names, "results"))

@@ -11,8 +11,6 @@ import pandas
 import pytest
 import xarray
 import zarr
-from fingerpad.experiments.descriptions.pressed import press_described
-from fingerpad.experiments.sweep.description import Constraint, read_sweep, sweep_of
 
 import fingerpad as fp
 from fingerpad.cli import main
@@ -20,7 +18,9 @@ from fingerpad.core.errors import InputError, StoreError
 from fingerpad.core.signals import RECEPTOR_COLUMNS
 from fingerpad.experiments.discrimination.decoding import SESSION
 from fingerpad.experiments.manifest import software
+from fingerpad.experiments.runner import Runner
 from fingerpad.experiments.sweep.observers import observe
+from fingerpad.experiments.sweep.request import Constraint
 from fingerpad.export.sweep_file import DONE, FAILED, LEFT_OUT, SweepFile
 from fingerpad.export.sweep_results import open_sweep
 from fingerpad.psychophysics.observer import ENCODERS, Experiment, discriminate_by
@@ -39,7 +39,7 @@ STUDY = {
 def folder(tmp_path_factory):
     """Folder with a finished study, and the indentations that all tests share."""
     found = tmp_path_factory.mktemp("sweep")
-    fp.run_sweep(STUDY, found / "study.zarr")
+    fp.sweep(STUDY, out=found / "study.zarr")
     return found
 
 
@@ -49,7 +49,7 @@ def run(folder, tmp_path, monkeypatch):
 
     def run(sweep, name="study.zarr", **options):
         monkeypatch.setattr(fp.Touch, "solve", pytest.fail)
-        return fp.run_sweep(sweep, tmp_path / name, store=folder / "indentations", **options)
+        return fp.sweep(sweep, out=tmp_path / name, store=folder / "indentations", **options)
 
     return run
 
@@ -63,12 +63,12 @@ def files(folder):
 
 
 def points(**sweep):
-    found = sweep_of({"touch": {"object": "sphere"}, **sweep})
+    found = fp.SweepRequest.read({"touch": {"object": "sphere"}, **sweep})
     return [found.values(setting) for setting in range(found.size)]
 
 
 def test_a_grid_has_all_combinations_and_fields_of_the_skin_come_first():
-    sweep = sweep_of(
+    sweep = fp.SweepRequest.read(
         {
             "touch": {"object": "sphere"},
             "grid": {
@@ -147,7 +147,7 @@ def test_a_constraint_compares_fields():
 )  # fmt: skip
 def test_a_bad_sweep_is_refused_in_one_sentence(sweep, said, tmp_path):
     with pytest.raises(InputError) as refusal:
-        fp.run_sweep({"touch": {"object": "sphere"}, **sweep}, tmp_path / "study.zarr")
+        fp.sweep({"touch": {"object": "sphere"}, **sweep}, out=tmp_path / "study.zarr")
     assert said in str(refusal.value)
     assert str(refusal.value).startswith("sweep, ")
     assert list(tmp_path.iterdir()) == []
@@ -156,10 +156,10 @@ def test_a_bad_sweep_is_refused_in_one_sentence(sweep, said, tmp_path):
 def test_a_file_is_refused_with_its_line_and_a_large_sweep_needs_consent(tmp_path):
     (tmp_path / "sweep.yaml").write_text("touch: {object: sphere}\ngrid:\n  motion.depth_mm: []\n")
     with pytest.raises(InputError, match=r"sweep.yaml, line \d, grid.motion.depth_mm: a field that varies"):
-        read_sweep(tmp_path / "sweep.yaml").check()
+        fp.SweepRequest.read(tmp_path / "sweep.yaml").check()
     many = {"touch": TOUCH, "grid": {"motion.depth_mm": {"start": 0.1, "stop": 1, "count": 10_001}}}
     with pytest.raises(InputError, match=r"at most 10000 settings, or --yes be given: it has 10001"):
-        fp.run_sweep(many, tmp_path / "study.zarr")
+        fp.sweep(many, out=tmp_path / "study.zarr")
 
 
 def test_the_data_set_has_the_fields_that_vary_as_dimensions(folder):
@@ -187,7 +187,7 @@ def test_a_setting_has_the_numbers_and_the_response_of_its_touch(folder):
     where = {"motion_depth_mm": 0, "afferents_columns": 1}
     touch = fp.setting_touch(data, **where)
     assert touch["motion"] == {"ramp_ms": 50, "hold_ms": 60, "depth_mm": 0.3}
-    pressed = press_described(sweep_of(STUDY).described(1), folder)
+    pressed = fp.SweepRequest.read(STUDY).described(1).run(Runner(folder))
     one, found = data.isel(where), fp.setting_response(data, **where)
     assert one.force_mn.values.tolist() == pressed.skin.force_mn.tolist()
     assert one.time_ms.values.tolist() == pressed.skin.times_ms.tolist()
@@ -220,8 +220,8 @@ def test_afferents_alone_press_nothing_and_fields_are_kept_on_request(run, tmp_p
 
 def test_stiffer_tissues_take_more_force(folder):
     soft, stiff = (
-        fp.run_sweep(
-            {"touch": TOUCH, "grid": {"motion.depth_mm": [0.3], "stiffness": [factor]}}, folder / name
+        fp.sweep(
+            {"touch": TOUCH, "grid": {"motion.depth_mm": [0.3], "stiffness": [factor]}}, out=folder / name
         )
         for factor, name in ((1.0, "soft.zarr"), (2.0, "stiff.zarr"))
     )
@@ -350,10 +350,10 @@ def test_what_is_no_sweep_is_refused(tmp_path, there):
     with pytest.raises(InputError, match="must be a sweep that fingerpad wrote: it cannot be read"):
         open_sweep(path)
     with pytest.raises(InputError, match=r"written as \.zarr"):
-        fp.run_sweep(STUDY, tmp_path / "study.nc")
+        fp.sweep(STUDY, out=tmp_path / "study.nc")
     if there:
         with pytest.raises(InputError, match="must be a sweep that fingerpad wrote: it cannot be read"):
-            fp.run_sweep(STUDY, path)
+            fp.sweep(STUDY, out=path)
 
 
 def test_a_notebook_shows_one_bar_that_changes(run, monkeypatch):
@@ -374,7 +374,7 @@ def test_a_notebook_shows_one_bar_that_changes(run, monkeypatch):
 def test_the_command_estimates_runs_and_tells_how_many_failed(run_program, folder, tmp_path):
     (tmp_path / "sweep.yaml").write_text(json.dumps(STUDY))
     words = ("fingerpad", "sweep", "sweep.yaml", "--store", folder / "indentations", "--jobs", 1)
-    status, said, errors = run_program(main, *words, "--dry-run")
+    status, said, errors = run_program(main, "fingerpad", "check", "sweep.yaml")
     assert (status, errors) == (0, "")
     assert said.startswith("4 settings, 3 presses.\nIf none is stored: about ")
     assert os.listdir(tmp_path) == ["sweep.yaml"]
@@ -422,7 +422,7 @@ def responses():
 
 
 def observed(responses, done=None, **observer):
-    sweep = sweep_of(asked(**observer))
+    sweep = fp.SweepRequest.read(asked(**observer))
     done = np.ones(sweep.shape, dtype=bool) if done is None else done
     return observe(sweep, responses, done, lambda: None)
 
@@ -493,5 +493,5 @@ def test_observers_of_a_run_are_in_the_data_set_and_others_are_asked_later(run, 
 )  # fmt: skip
 def test_a_bad_observer_is_refused_before_anything_is_pressed(sweep, said, tmp_path):
     with pytest.raises(InputError, match=said):
-        fp.run_sweep(sweep, tmp_path / "study.zarr")
+        fp.sweep(sweep, out=tmp_path / "study.zarr")
     assert not list(tmp_path.iterdir())

@@ -3,36 +3,33 @@
 import json
 import re
 import shutil
-from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
-import typer
-from fingerpad.experiments.indenter_text import indenter_named
 from hypothesis import given
 from hypothesis import strategies as st
 
 import fingerpad as fp
 from fingerpad import cli
-from fingerpad.cli import options as choices
 from fingerpad.data import cylinder_deflection, protocol
 from fingerpad.experiments import scores
 from fingerpad.experiments.conditions import RECEPTOR_X_MM, Conditions
 from fingerpad.experiments.gerling2014.skin import deflection_r2, deflection_touches
+from fingerpad.experiments.requests.stimulus import indenter_named
+from fingerpad.experiments.run import run
 from fingerpad.experiments.runner import STORE_FOLDER, Runner
 from fingerpad.experiments.schemas import read
 from fingerpad.experiments.validation import predictions
 from fingerpad.experiments.validation.observations import COLUMNS, KINDS, example_file, read_observations
-from fingerpad.experiments.validation.predictions import LOADINGS, FingertipModel, predict
-from fingerpad.experiments.validation.validation import ValidationRequest, validate
+from fingerpad.experiments.validation.predictions import predict
 from fingerpad.report.validation import draw_validation, validation_summary
 from refusals import misused
 
 ROOT = Path(__file__).parents[1]
 PUBLISHED = sorted((ROOT / "studies" / "observations").glob("*.csv"))
-QUICK = FingertipModel(Conditions(resolution="quick"))
+QUICK = Conditions(resolution="quick")
 FORCE = "indenter,depth_mm,force_n\n"
 RATE = "force_n,curvature_per_m,rate_hz\n"
 
@@ -156,9 +153,13 @@ def folder(tmp_path_factory):
     return tmp_path_factory.mktemp("validation")
 
 
-def result_of(folder, content, model=QUICK, name="mine.csv"):
-    found = read_observations(written(folder, content, name))
-    return validate(ValidationRequest(found, model, folder))
+def request_of(folder, content, **keys):
+    """Request of a validation at quick resolution."""
+    return fp.ValidationRequest.read(keys | {"observations": written(folder, content), "resolution": "quick"})
+
+
+def result_of(folder, content, **keys):
+    return run(request_of(folder, content, **keys), folder)
 
 
 def test_force_at_depth_0_is_0_and_grows_with_depth(folder):
@@ -177,13 +178,10 @@ def test_force_at_depth_0_is_0_and_grows_with_depth(folder):
 
 def test_quasi_static_force_is_that_of_relaxed_tissues(folder):
     """Tissues whose Prony series is left out have the long-term moduli at all times."""
-    tissues = QUICK.conditions.tissues
-    relaxed = fp.Tissues(*(layer.with_prony(fp.Prony()) for layer in fp.named_tissues(tissues).layers))
-    elastic = FingertipModel(Conditions(resolution="quick", tissues=relaxed))
-    slow = replace(QUICK, loading="quasi_static")
+    relaxed = fp.Tissues(*(layer.with_prony(fp.Prony()) for layer in fp.named_tissues("human").layers))
     of_fast, of_elastic, of_slow = (
-        result_of(folder, FORCE + "plate,0.4,0.1\n", model).predictions[0].predicted
-        for model in (QUICK, elastic, slow)
+        result_of(folder, FORCE + "plate,0.4,0.1\n", **keys).predictions[0].predicted
+        for keys in ({}, {"tissues": relaxed}, {"loading": "quasi_static"})
     )
     assert of_slow == pytest.approx(of_elastic, rel=1e-5)
     assert of_fast > 1.3 * of_slow
@@ -231,7 +229,7 @@ def pressed(monkeypatch):
         return {name: dict.fromkeys(group, "skin") for name, group in groups.items()}
 
     class Receptor:
-        def __init__(self, positions, pitch, afferent):
+        def __init__(self, positions, pitch, afferent, depth_mm):
             sites.append(positions[0])
 
         def respond(self, skin, static_window_ms):
@@ -244,23 +242,23 @@ def pressed(monkeypatch):
 
 def test_curvature_0_is_a_plate_on_the_mesh_of_all_spheres(pressed, tmp_path):
     touches, sites = pressed
-    found = read_observations(written(tmp_path, RATE + "0.2,0,3\n0.2,900,3\n0.8,80,3\n0.2,900,4\n"))
-    predict(found, QUICK, Runner(tmp_path))
+    rows = RATE + "0.2,0,3\n0.2,900,3\n0.8,80,3\n0.2,900,4\n"
+    predict(request_of(tmp_path, rows), Runner(tmp_path))
     spheres = [fp.Sphere(curvature_per_m=curvature) for curvature in (900.0, 80.0)]
     assert [touch.indenter for touch in touches] == [fp.Plate(), *spheres]
     assert [touch.stimulus.force_mn for touch in touches] == [200.0, 200.0, 800.0]
     assert len({touch.grading for touch in touches}) == 1
-    assert {touch.tilt_deg for touch in touches} == {QUICK.conditions.skin_tilt_deg}
+    assert {touch.tilt_deg for touch in touches} == {QUICK.skin_tilt_deg}
     assert np.array(sites) == pytest.approx(np.array([[RECEPTOR_X_MM, 0.0]] * 3))
 
 
 def test_positions_on_a_grating_repeat_with_its_period(pressed, tmp_path):
     touches, sites = pressed
     header = "force_n,ridge_mm,groove_mm,position_mm,rate_hz\n"
-    found = read_observations(written(tmp_path, header + "0.2,1,2,0.5,3\n0.2,1,2,-2.5,3\n0.2,0.3,2,0,3\n"))
-    assert predict(found, QUICK, Runner(tmp_path)).values.tolist() == [7.0, 7.0, 7.0]
+    asked = request_of(tmp_path, header + "0.2,1,2,0.5,3\n0.2,1,2,-2.5,3\n0.2,0.3,2,0,3\n")
+    assert predict(asked, Runner(tmp_path)).values.tolist() == [7.0, 7.0, 7.0]
     assert [touch.indenter for touch in touches] == [fp.Grating(1.0, 2.0), fp.Grating(0.3, 2.0, 0.15)]
-    along = np.cos(np.deg2rad(QUICK.conditions.skin_tilt_deg))
+    along = np.cos(np.deg2rad(QUICK.skin_tilt_deg))
     assert np.array(sites)[:3] == pytest.approx(
         np.array([[RECEPTOR_X_MM - 0.5 * along, 0.0]] * 2 + [[RECEPTOR_X_MM, 0.0]])
     )
@@ -306,7 +304,8 @@ def test_the_published_deflection_scores_as_in_the_reproduction(folder):
     assert found.observed.tolist() == table.deflection_mm[~table.is_artefact].tolist()
     assert [row.condition[2] for row in found.rows] == table.distance_mm[~table.is_artefact].tolist()
     third = Conditions(resolution="quick", tissues="trial3")
-    scored = validate(ValidationRequest(found, FingertipModel(third), folder))
+    keys = {"resolution": third.resolution, "tissues": third.tissues}
+    scored = run(fp.ValidationRequest.read({"observations": found} | keys), folder)
     touch = deflection_touches(third)["trial3", "cylinder"]
     profile = fp.Store(folder / STORE_FOLDER).load(touch).surface_profile()
     assert scored.r2 == pytest.approx(deflection_r2(profile), abs=1e-12)
@@ -373,20 +372,17 @@ def test_an_interrupted_run_keeps_what_is_finished_and_goes_on(call, folder, tmp
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_an_example_can_be_tried_as_it_says(call, tmp_path, kind):
-    status, said, errors = call("--example", kind, "--out", "try")
+def test_an_example_can_be_tried_as_it_says(run_program, tmp_path, kind):
+    status, said, errors = run_program(cli.main, "fingerpad", "init", kind, "--out", "try")
     assert (status, errors) == (0, "")
-    assert said == f"Try: fingerpad validate try/{kind}.csv --resolution quick --out try/{kind}\n"
+    assert said == f"Try: fingerpad validate try/{kind}.csv\n"
     assert read_observations(tmp_path / "try" / f"{kind}.csv").kind.name == kind
-    assert call("--example", kind, "--out", "try") == (
-        2, "", f"fingerpad: try/{kind}.csv exists and is not overwritten: choose another folder.\n"
-    )  # fmt: skip
 
 
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [
-        ([], "validate needs a file of observations, or --example KIND"),
+        ([], "validate needs a file, observations or options: see --help"),
         (["none.csv"], "none.csv must be a file that can be read"),
         (["."], ". must be a file that can be read"),
         (["mine.csv", "--loading", "slow"], "loading must be one of ramp_and_hold, quasi_static: got 'slow'"),
@@ -394,9 +390,8 @@ def test_an_example_can_be_tried_as_it_says(call, tmp_path, kind):
         (["mine.csv", "--resolution", "high"], "resolution must be one of"),
         (["mine.csv", "--jobs", "0"], "jobs must be a whole number of at least 1"),
         (["mine.csv", "--afferent", "fit.json"], "afferent: fit.json must be a file that can be read"),
-        (["mine.csv", "--static-window", "600", "500"], "static_window must be a start"),
+        (["mine.csv", "--static-window-ms", "600,500"], "static_window_ms must be a start"),
         (["mine.csv"], "mine.csv, line 2: depth_mm must not be negative"),
-        (["--example", "noise"], "--example must be one of force, deflection"),
     ],
     ids=" ".join,
 )
@@ -413,17 +408,14 @@ def test_misuse_is_one_sentence_and_status_2_and_nothing_is_written(call, tmp_pa
     ids=lambda each: str(each)[:6],
 )
 def test_the_afferent_is_that_of_the_tissues_unless_one_is_given(tissues):
-    conditions, own = Conditions(tissues=tissues), fp.Afferent(static_gain=1e-6)
-    assert FingertipModel(conditions).responding == fp.Afferent.for_tissues(tissues)
-    assert FingertipModel(conditions, own).responding == own
+    own = fp.Afferent(static_gain=1e-6)
+    for chosen, expected in (("default", fp.Afferent.for_tissues(tissues)), (own, own)):
+        asked = {"observations": "any.csv", "tissues": tissues, "afferent": chosen}
+        assert fp.ValidationRequest.read(asked).responding == expected
 
 
-def test_the_page_of_the_format_names_every_option_and_kind_and_shows_commands_that_parse():
-    assert (tuple(KINDS), LOADINGS) == (choices.KIND_CHOICES, choices.LOADING_CHOICES)
-    command = typer.main.get_command(cli.app).commands["validate"]
-    defaults = {option.name: option.default for option in command.params}
-    assert defaults["loading"] == FingertipModel(Conditions()).loading
-    assert defaults["static_window"] == protocol.STATIC_WINDOW.value
+def test_the_page_of_the_format_names_every_kind_and_the_window_is_the_paper_s():
+    assert fp.ValidationRequest.model_fields["static_window_ms"].default == protocol.STATIC_WINDOW.value
     page = (ROOT / "docs" / "validate.md").read_text(encoding="utf-8")
     for kind in KINDS.values():
         assert f"| `{kind.name}` | `{','.join(kind.columns)}` |" in page

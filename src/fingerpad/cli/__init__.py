@@ -11,8 +11,9 @@ import logging
 import os
 import sys
 import warnings
-from collections.abc import Callable, Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import suppress
+from dataclasses import dataclass
 from typing import Any, NoReturn
 
 from fingerpad import __version__
@@ -34,39 +35,55 @@ class Parser(argparse.ArgumentParser):
         raise InputError(f"{message[:1].upper()}{message[1:].rstrip('.')}.")
 
 
-def _command(name: str) -> tuple[Parser, Callable[[argparse.Namespace, dict[str, Any]], int | None]]:
+@dataclass(frozen=True)
+class Program:
+    """A program of several commands."""
+
+    name: str
+    what: str  # In one sentence.
+    commands: Mapping[str, commands.Command]
+
+
+FINGERPAD = Program(
+    "fingerpad",
+    "Simulate touch: a finite-element fingertip, the spikes of afferents, discrimination.",
+    commands.COMMANDS,
+)
+
+
+def parser_of(program: Program, name: str) -> Parser:
     """Make the parser of a command."""
-    what, add, run = commands.COMMANDS[name]
-    parser = Parser(prog=f"fingerpad {name}", description=what)
+    what, add, _ = program.commands[name]
+    parser = Parser(prog=f"{program.name} {name}", description=what)
     add(parser)
     for option, words in zip(GENERAL, ("Show only results and errors.", "Show each step."), strict=True):
         parser.add_argument(option, action="store_true", help=words)
-    return parser, run
+    return parser
 
 
-def main(words: Sequence[str] | None = None) -> NoReturn:
+def main(words: Sequence[str] | None = None, program: Program = FINGERPAD) -> NoReturn:
     """Run a command line; an error is one sentence on standard error and exit status 2."""
     try:
         with signals_raise(), warnings.catch_warnings():
             warnings.showwarning = _show_warning
-            status = _run([*(sys.argv[1:] if words is None else words)])
+            status = _run(program, [*(sys.argv[1:] if words is None else words)])
             sys.stdout.flush()
         sys.exit(status)
     except KeyboardInterrupt as stop:
         forget_interrupt()
-        print(f"fingerpad: stopped. {commands.ENDING}", file=sys.stderr)
+        print(f"{program.name}: stopped. {commands.ENDING}", file=sys.stderr)
         sys.exit(TERMINATED if isinstance(stop, Terminated) else INTERRUPTED)
     except FingerpadError as error:
-        print(f"fingerpad: {error}", file=sys.stderr)
+        print(f"{program.name}: {error}", file=sys.stderr)
         sys.exit(2)
     except OSError as error:  # a folder without rights, a full disk, a closed pipe
         _give_up_output()
         what = error.filename or "The output"
-        print(f"fingerpad: {what} cannot be used ({error.strerror or error}).", file=sys.stderr)
+        print(f"{program.name}: {what} cannot be used ({error.strerror or error}).", file=sys.stderr)
         sys.exit(2)
 
 
-def _run(words: list[str]) -> int | None:
+def _run(program: Program, words: list[str]) -> int | None:
     end = words.index("--") if "--" in words else len(words)
     general = [word for word in words[:end] if word in GENERAL]
     words = [word for word in words if word not in general]
@@ -76,18 +93,18 @@ def _run(words: list[str]) -> int | None:
         print(f"fingerpad {__version__}")
         return 0
     if not words or words[0] in ("--help", "-h"):
-        print(_help())
+        print(_help(program))
         return 0 if words else 2
     name, *rest = words
-    if name not in commands.COMMANDS:
+    if name not in program.commands:
         if name.startswith("-"):
             raise InputError(f"No such option: {name}; the name of a command comes first.")
-        near = closest(name, commands.COMMANDS)
+        near = closest(name, program.commands)
         raise InputError(f"No such command: {name!r}" + (f"; did you mean {near}?" if near else "."))
     LOGGER.setLevel(logging.ERROR if "--quiet" in general else logging.DEBUG if general else logging.NOTSET)
     if "--verbose" in general:
         logging.basicConfig(format="%(asctime)s %(name)s: %(message)s", datefmt="%H:%M:%S")
-    parser, run = _command(name)
+    parser, run = parser_of(program, name), program.commands[name][2]
     _check_words(parser, rest)
     rest, within = _within_blocks(parser, rest)
     given, unknown = parser.parse_known_args(rest)
@@ -134,19 +151,19 @@ def _within_blocks(parser: Parser, words: Sequence[str]) -> tuple[list[str], dic
     return left, found
 
 
-def _help() -> str:
+def _help(program: Program) -> str:
     """Return the list of commands."""
-    width = max(map(len, commands.COMMANDS)) + 2
+    width = max(map(len, program.commands)) + 2
     return "\n".join(
         [
-            "usage: fingerpad [--version] [--help] COMMAND ...",
+            f"usage: {program.name} [--version] [--help] COMMAND ...",
             "",
-            "Simulate touch: a finite-element fingertip, the spikes of afferents, discrimination.",
+            program.what,
             "",
             "commands:",
-            *(f"  {name:{width}}{what}" for name, (what, _, _) in commands.COMMANDS.items()),
+            *(f"  {name:{width}}{what}" for name, (what, _, _) in program.commands.items()),
             "",
-            "`fingerpad COMMAND --help` explains its options. All take --quiet and --verbose.",
+            f"`{program.name} COMMAND --help` explains its options. All take --quiet and --verbose.",
         ]
     )
 

@@ -39,7 +39,7 @@ def plain(text: str, option: str = "an option", schema: Any = MappingProxyType({
     return read_yaml(text, option)
 
 
-def _option(
+def option(
     parser: argparse.ArgumentParser, name: str, words: str, kind: Any = Path, default: Any = None
 ) -> None:
     """Add an option, or an argument if its name has no dashes."""
@@ -58,10 +58,10 @@ def _add_request(name: str, parser: argparse.ArgumentParser, out: str, of_out: s
     """Add the options of a request: its fields, and where and how it runs."""
     what = f"YAML file of the request, or {main}." if main else "YAML file of the request."
     parser.add_argument("request", nargs="?", metavar="FILE", help=what)
-    _option(parser, "--out", of_out, Path, Path(out))
-    _option(parser, "--jobs", "Number of processes. Default: one per core.", int)
-    _option(parser, "--scheduler", "Press on the workers of this Dask scheduler, tcp://HOST:PORT.", str)
-    _option(parser, "--allow-python", "Let the file name objects of Python as module:object.", bool)
+    option(parser, "--out", of_out, Path, Path(out))
+    option(parser, "--jobs", "Number of processes. Default: one per core.", int)
+    option(parser, "--scheduler", "Press on the workers of this Dask scheduler, tcp://HOST:PORT.", str)
+    option(parser, "--allow-python", "Let the file name objects of Python as module:object.", bool)
     group: Any = parser.add_argument_group("keys of the request, which replace those of the file")
     for key, schema in request_schema(name)["properties"].items():
         words = schema.get("description", "").replace("%", "%%")
@@ -210,11 +210,11 @@ def _sweep(given: argparse.Namespace, within: Options) -> int:
 
 def _add_sweep(parser: argparse.ArgumentParser) -> None:
     _add_request("sweep", parser, "sweep.zarr", "The data set, a folder that ends in .zarr.")
-    _option(parser, "--store", "Folder of stored indentations. Default: indentations, beside --out.")
-    _option(parser, "--table", "Also write rates as a table, a .csv or .parquet file.")
-    _option(parser, "--spikes", "Also write the spikes of all settings as a session, a .nwb file.")
-    _option(parser, "--retry-failed", "Try settings again that failed before.", bool)
-    _option(parser, "--yes", "Run a sweep of any size.", bool)
+    option(parser, "--store", "Folder of stored indentations. Default: indentations, beside --out.")
+    option(parser, "--table", "Also write rates as a table, a .csv or .parquet file.")
+    option(parser, "--spikes", "Also write the spikes of all settings as a session, a .nwb file.")
+    option(parser, "--retry-failed", "Try settings again that failed before.", bool)
+    option(parser, "--yes", "Run a sweep of any size.", bool)
 
 
 def _reduce(given: argparse.Namespace, within: Options) -> None:
@@ -244,8 +244,8 @@ def _reproduce(given: argparse.Namespace, within: Options) -> None:
 
 def _add_init(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("what", nargs="?", default="touch", metavar="WHAT", help="What it is an example of.")
-    _option(parser, "--out", "Folder of the file.", Path, Path())
-    _option(parser, "--list", "List the examples, and exit.", bool)
+    option(parser, "--out", "Folder of the file.", Path, Path())
+    option(parser, "--list", "List the examples, and exit.", bool)
 
 
 @cache
@@ -290,8 +290,8 @@ def _init(given: argparse.Namespace, within: Options) -> None:
 
 
 def _add_file(parser: argparse.ArgumentParser) -> None:
-    _option(parser, "file", "YAML file of a request.")
-    _option(parser, "--allow-python", "Let the file name objects of Python as module:object.", bool)
+    option(parser, "file", "YAML file of a request.")
+    option(parser, "--allow-python", "Let the file name objects of Python as module:object.", bool)
 
 
 def _check(given: argparse.Namespace, _: Options) -> None:
@@ -321,12 +321,12 @@ def _check(given: argparse.Namespace, _: Options) -> None:
 
 
 def _add_view(parser: argparse.ArgumentParser) -> None:
-    _option(parser, "result", "Touch as .nc or .zarr, or the folder that holds touch.nc or touch.zarr.")
-    _option(parser, "--out", "File: .png, .gif, or .mp4 with the program ffmpeg.", Path, Path("view.png"))
+    option(parser, "result", "Touch as .nc or .zarr, or the folder that holds touch.nc or touch.zarr.")
+    option(parser, "--out", "File: .png, .gif, or .mp4 with the program ffmpeg.", Path, Path("view.png"))
     fields = "sed, displacement, pressure, shear, slip, or another variable of RESULT."
-    _option(parser, "--field", fields, str, "sed")
-    _option(parser, "--time", "Time of a picture. Default: that of the largest depth. [ms]", float)
-    _option(parser, "--frames", "Number of pictures of a film.", int, 40)
+    option(parser, "--field", fields, str, "sed")
+    option(parser, "--time", "Time of a picture. Default: that of the largest depth. [ms]", float)
+    option(parser, "--frames", "Number of pictures of a film.", int, 40)
 
 
 def _view(given: argparse.Namespace, _: Options) -> None:
@@ -342,11 +342,11 @@ def _view(given: argparse.Namespace, _: Options) -> None:
 def _add_lab(parser: argparse.ArgumentParser) -> None:
     ranges = "YAML files of `fingerpad reduce`, each an object. Default: a ball, a cylinder and a plate."
     parser.add_argument("ranges", nargs="*", type=Path, metavar="RANGE", help=ranges)
-    _option(parser, "--folder", "Where presses and reduced touches are kept.", Path, Path("lab"))
-    _option(parser, "--port", "Port of the page. Default: one that is free.", int)
-    _option(parser, "--static", "Write a page that needs no server into this folder.")
-    _option(parser, "--jobs", "Number of processes. Default: one per core.", int)
-    _option(parser, "--allow-python", "Let files name objects of Python as module:object.", bool)
+    option(parser, "--folder", "Where presses and reduced touches are kept.", Path, Path("lab"))
+    option(parser, "--port", "Port of the page. Default: one that is free.", int)
+    option(parser, "--static", "Write a page that needs no server into this folder.")
+    option(parser, "--jobs", "Number of processes. Default: one per core.", int)
+    option(parser, "--allow-python", "Let files name objects of Python as module:object.", bool)
 
 
 def _lab(given: argparse.Namespace, _: Options) -> None:
@@ -369,10 +369,10 @@ def _lab(given: argparse.Namespace, _: Options) -> None:
 def _add_store(parser: argparse.ArgumentParser) -> None:
     actions = "list, verify (exit status 1 if a file is damaged) or prune."
     parser.add_argument("action", choices=("list", "verify", "prune"), metavar="ACTION", help=actions)
-    _option(parser, "folder", "Folder of a run, or its folder `indentations`.")
-    _option(parser, "--days", "Prune what is older. [days]", float)
-    _option(parser, "--size", "Prune the oldest until the rest is at most so large. [MB]", float)
-    _option(parser, "--yes", "Delete; without it, only say what would be.", bool)
+    option(parser, "folder", "Folder of a run, or its folder `indentations`.")
+    option(parser, "--days", "Prune what is older. [days]", float)
+    option(parser, "--size", "Prune the oldest until the rest is at most so large. [MB]", float)
+    option(parser, "--yes", "Delete; without it, only say what would be.", bool)
 
 
 def _store(given: argparse.Namespace, _: Options) -> int:

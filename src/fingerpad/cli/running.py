@@ -73,7 +73,9 @@ def forget_interrupt() -> None:
 def processes(jobs: int | None) -> int:
     """Return what `--jobs` says, or one process per core that this process may use."""
     cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-    return cores if jobs is None else jobs
+    from fingerpad.core.values import whole  # loads NumPy, which help and version do without
+
+    return cores if jobs is None else whole("jobs", jobs, at_least=1)
 
 
 def engine(jobs: int | None, scheduler: str | None) -> int | Engine:

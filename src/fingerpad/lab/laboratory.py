@@ -76,7 +76,7 @@ class Laboratory:
         allow_python: Flag = False,
     ):
         self.folder, self._engine = path_of("folder", folder), jobs
-        self._allow_python = allow_python
+        self.allow_python = allow_python
         self._files = {path.stem: path for path in ranges or shipped()}
         if len(self._files) < len(ranges):
             raise InputError("The files of ranges must have different names, by which objects are chosen.")
@@ -113,17 +113,23 @@ class Laboratory:
         key = state.object, state.finger, state.tissues
         with self._lock:
             if key not in self._described:
-                given = {name: getattr(state, name) or None for name in ("finger", "tissues")}
                 source = self._files[state.object]
-                request: ReductionRequest = ReductionRequest.read(source, given, self._allow_python)
+                request: ReductionRequest = ReductionRequest.read(
+                    source, self.replaced(state), self.allow_python
+                )
                 request.check()
                 self._described[key] = request.changed(quantities=(*request.quantities, *FOLLOWED))
             return self._described[key]
 
+    @staticmethod
+    def replaced(state: LabState) -> dict[str, str]:
+        """Keys of the range that a state replaces."""
+        return {name: getattr(state, name) for name in ("finger", "tissues") if getattr(state, name)}
+
     def path(self, state: LabState) -> Path:
-        """File of the reduced touch of a state, by what it depends on."""
-        asked = self.described(state)
-        text = repr((asked.model_dump(exclude={"afferents", "quantities"}), asked.kept)) + code_hash()
+        """File of the reduced touch of a state, by what it depends on: of the afferents, what they follow."""
+        described = self.described(state)
+        text = repr((described.model_dump(exclude={"afferents"}), described.kept)) + code_hash()
         return self.folder / f"{state.object}-{hashlib.sha256(text.encode()).hexdigest()[:16]}.npz"
 
     def model(self, state: LabState) -> ReducedModel | None:

@@ -188,7 +188,7 @@ TEMPLATE = """import numpy as np
 import fingerpad as fp
 
 # {title}
-request = fp.ReductionRequest.read({content}, name={source!r})
+request = fp.ReductionRequest.read({asked})
 training, shape = request.training, {shape}
 model = fp.read_reduced({path!r}, training.touch)
 motion = fp.Trajectory(
@@ -212,16 +212,18 @@ for time in times_ms:
     pose, depth_mm = motion.pose_at(time), float(motion.prescribed_at(time))
     samples.append(stream.step(time, depth_mm, None, pose.x_mm, pose.z_mm, pose.tilt_deg))
 force_mn = np.array([sample.force_mn for sample in samples])
-spikes = 0
+
+
+def course(quantity, dynamic=None):
+    values = np.array([sample.fields[quantity] for sample in samples])
+    return fp.Traces(times_ms, values, motion.times_ms[1:-1], quantity=quantity, dynamic=dynamic)
+
+
+spikes = []
 for afferent in afferents:
-    traces = fp.Traces(
-        times_ms,
-        np.array([sample.fields[afferent.static_quantity] for sample in samples]),
-        kinks_ms=motion.times_ms[1:-1],
-        quantity=afferent.static_quantity,
-    )
-    spikes += sum(len(train) for train in afferent.spikes(traces))
-print(f"{{force_mn.max():.1f}} mN, {{spikes}} spikes")
+    dynamic, static = afferent.dynamic_quantity, afferent.static_quantity
+    spikes += afferent.spikes(course(static, None if dynamic == static else course(dynamic)))
+print(f"{{force_mn.max():.1f}} mN, {{sum(map(len, spikes))}} spikes")
 
 # The full solution of the same touch; it takes seconds to a minute.
 exact = training.touch_with(shape, motion)
@@ -241,10 +243,13 @@ def python_lines(laboratory: Laboratory, state: LabState, path: str = "") -> str
     """Write the lines; they read the file of the reduced touch, or `path`."""
     described = laboratory.described(state)
     motion, shape = motion_of(described, laboratory.model(state), state)
+    source = laboratory.source(state).name if path else str(laboratory.source(state).resolve())
+    asked = f"{described.model_dump(exclude_unset=True)}, name={source!r}"
+    if laboratory.allow_python:  # objects of Python cannot be written here
+        asked = f"{source!r}, {laboratory.replaced(state)}, allow_python=True"
     return TEMPLATE.format(
         title=str(state),
-        content=described.model_dump(exclude_unset=True),
-        source=laboratory.source(state).name if path else str(laboratory.source(state).resolve()),
+        asked=asked,
         shape=shape,
         rows=ROWS,
         columns=COLUMNS,

@@ -255,9 +255,9 @@ class Origin:
         return Path(self.name).parent
 
     def hashes(self, files: Sequence[Path]) -> dict[str, str]:
-        """SHA-256 of the content and of the files that it names, by name."""
-        own = hashlib.sha256(self.text.encode()).hexdigest()
-        return {self.name: own} | {str(path): sha256(path) for path in files}
+        """SHA-256 of the file, if the request is from one, and of the files that it names, by name."""
+        own = {self.name: hashlib.sha256(self.text.encode()).hexdigest()} if self.text else {}
+        return own | {str(path): sha256(path) for path in files}
 
     @contextmanager
     def located(self) -> Iterator[None]:
