@@ -37,7 +37,6 @@ FURTHER = {
     "experiments.discrimination.analysis": ("TaskResult",),
     "experiments.fit.fit": ("fit_recordings",),
     "experiments.fit.results": ("FitResult",),
-    "experiments.descriptions.pressing": ("ramp_and_hold",),
     "geometry.trajectory_files": ("recorded",),
     "inference.rate_model": ("AfferentModel",),
     "inference.recordings": ("SpikeRecordings",),
