@@ -31,6 +31,7 @@ from fingerpad.experiments.fit.rate_uncertainty import rate_posterior
 from fingerpad.experiments.fit.results import ParameterProfile, PhaseBands, RateBand, RatePosterior
 from fingerpad.experiments.gerling2014 import nerve
 from fingerpad.experiments.manifest import sha256
+from fingerpad.experiments.recording_files import read_recordings
 from fingerpad.geometry.edged_indenters import INDENTERS
 from fingerpad.inference.afferent_fit import OFFSETS_MM
 from fingerpad.inference.identifiable import IDENTIFIABLE_NAMES, identifiable
@@ -261,7 +262,7 @@ def test_the_stimuli_of_the_bar_are_the_touches_of_the_reproduction(tmp_path):
     path = tmp_path / session.EXAMPLE
     path.write_bytes(session.example_recordings()[session.EXAMPLE])
     bar, conditions = ShiftedBar(), Conditions("quick")
-    recorded = fp.read_recordings(path, bar)
+    recorded = read_recordings(path, bar)
     touches = bar.touches(list(recorded.stimuli.values()), conditions)
     assert list(touches.values()) == nerve.bar_touches(conditions)
     observed = bar_firing_rates()
@@ -489,7 +490,7 @@ def test_the_example_prints_its_command_and_writes_recordings(call, tmp_path):
     assert (status, errors) == (0, "")
     assert said == "Try: fingerpad fit try/bar.csv --stimulus bar --resolution quick --out try/fit\n"
     tried = said.split()[3:]
-    assert fp.read_recordings(tmp_path / tried[0], ShiftedBar()).recordings.n_rates == 72
+    assert read_recordings(tmp_path / tried[0], ShiftedBar()).recordings.n_rates == 72
     assert call("--example", "try") == (
         2, "", "fingerpad: try/bar.csv exists and is not overwritten: choose another folder.\n"
     )  # fmt: skip

@@ -30,6 +30,7 @@ from fingerpad.experiments.discrimination.analysis import PreparedTask
 from fingerpad.experiments.gerling2014.percept import sphere_touches
 from fingerpad.experiments.gerling2014.reproduction import ReproductionResult
 from fingerpad.neuron.afferent import PARAMETER_NAMES
+from fingerpad.skin.nail_edge import NailEdge
 from tests.mutations import CHANGES, VALUES, places
 from tests.mutations import changed as mutated
 
@@ -174,7 +175,7 @@ def test_afferents_fill_the_pad_at_the_density_of_its_skin_or_line_the_nail():
     assert len(population) == round(0.7 * fp.UnrolledSkin().pad().area_mm2)
     rows = task_population(fp.parse_task(changed(SPHERES, population={"layout": "nail rows", "rows": 2})))
     np.testing.assert_array_equal(
-        rows.positions_mm, fp.NailEdge().points(fp.NailEdge().rows(2, density_per_cm2=100.0).places_mm)
+        rows.positions_mm, NailEdge().points(NailEdge().rows(2, density_per_cm2=100.0).places_mm)
     )
     assert len(
         PreparedTask(fp.parse_task(SPHERES), task_stimuli(fp.parse_task(SPHERES)), rows).neighbours
@@ -343,7 +344,7 @@ def test_a_file_without_fitted_parameters_is_refused(tmp_path, content):
 def test_null_is_as_good_as_nothing():
     empty = {"layout": "nail rows", "jitter": None, "rows": None}
     with_null = changed(SPHERES, population=empty, motion={"force_mn": None, "depth_mm": 1.0})
-    assert len(asked(with_null).population) == len(fp.NailEdge().rows(1, 100.0))
+    assert len(asked(with_null).population) == len(NailEdge().rows(1, 100.0))
 
 
 @pytest.mark.parametrize(
