@@ -15,7 +15,10 @@ from benchmarks.measuring import run_job
 from benchmarks.results import Report, Table
 from fingerpad.experiments.runner import Runner
 from fingerpad.reduction.building import draw_touch, streamed
+from fingerpad.reduction.model import ReducedModel, write_reduced
 from fingerpad.reduction.training import ReducedTraining
+from fingerpad.skin.indentation import Touch
+from fingerpad.skin.sampling import SkinResponse
 
 JOBS, HELD_OUT, RATES, SEED = 2, 20, 6, 7
 RESOLUTION, DEEPEST_MM, ASIDE_MM = "standard", 1.5, 2.0
@@ -42,7 +45,7 @@ def answer(resolution: str) -> dict[str, Any]:
         started = perf_counter()
         model = request.run(runner)
         built_s = perf_counter() - started
-        fp.write_reduced(model, Path(folder) / "model.npz")
+        write_reduced(model, Path(folder) / "model.npz")
         size_mb = (Path(folder) / "model.npz").stat().st_size / 1e6
         random = np.random.default_rng(SEED)
         drawn = [draw_touch(request.training, model, random) for _ in range(HELD_OUT)]
@@ -70,7 +73,7 @@ def _places() -> np.ndarray:
     return np.stack(np.meshgrid(x + line, z + line), axis=-1).reshape(-1, 2)[:AFFERENTS]
 
 
-def _step_times(model: fp.ReducedModel) -> dict[str, float]:
+def _step_times(model: ReducedModel) -> dict[str, float]:
     """Seconds of a touch of 1 s, and milliseconds of a step of the skin and of the afferents."""
     sites, afferent, times_ms = _places(), fp.Afferent(), np.arange(STEP_MS, DURATION_MS + STEP_MS, STEP_MS)
     took: dict[str, list[float]] = {}
@@ -98,20 +101,20 @@ def _step_times(model: fp.ReducedModel) -> dict[str, float]:
     return {"touch_s": touch_s, **percentiles}
 
 
-def _held(training: ReducedTraining, random: np.random.Generator) -> fp.Touch:
+def _held(training: ReducedTraining, random: np.random.Generator) -> Touch:
     """Draw a ramp and hold."""
     depth_mm, ramp_ms = random.uniform(0.5, 1.4), random.uniform(40.0, 120.0)
     motion = fp.Trajectory((0.0, ramp_ms, 1000.0), depth_mm=(0.0, depth_mm, depth_mm))
     return replace(training.touch_with((), motion), settings=fp.PressSettings(12, 12))
 
 
-def _rate_errors(model: fp.ReducedModel, skin: fp.SkinResponse) -> list[list[float]]:
+def _rate_errors(model: ReducedModel, skin: SkinResponse) -> list[list[float]]:
     """Errors of dynamic and static rates of a ramp and hold: the largest, and the share within limits.
 
     First those of the reduced touch, then those of the full touch with its stress changed.
     """
     sites, afferent = _places(), fp.Afferent()
-    quantity, motion = afferent.static_quantity, cast(fp.Touch, skin.touch).stimulus
+    quantity, motion = afferent.static_quantity, cast(Touch, skin.touch).stimulus
     stream = fp.ReducedTouch(model, sites)
     values = [stream.step(float(t), float(motion.prescribed_at(t))).fields[quantity] for t in skin.times_ms]
     full = skin.sed(sites, quantity, quantity)

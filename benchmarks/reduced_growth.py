@@ -11,7 +11,9 @@ import numpy as np
 import fingerpad as fp
 from benchmarks.measuring import run_job
 from benchmarks.results import Report, Table
-from fingerpad.reduction.training import Axis
+from fingerpad.reduction.building import reduce_touch
+from fingerpad.reduction.model import ReducedModel
+from fingerpad.reduction.training import Axis, ReducedRange, ReducedTraining
 
 THREADS = 2
 DEPTH_MM, ASIDE_MM = 1.0, 1.0
@@ -25,8 +27,8 @@ WARMING, STEPS, STEP_MS = 50, 400, 1.0
 def answer(deepest_mm: float) -> dict[str, Any]:
     """Make a reduced touch, and time steps while one of the sizes changes."""
     touch = fp.touch_of(fp.Fingertip(), fp.Sphere(curvature_per_m=287.0))
-    model = fp.reduce_touch(
-        fp.ReducedTraining(touch, fp.ReducedRange(deepest_mm, x_mm=(-ASIDE_MM, ASIDE_MM))), calibration=0
+    model = reduce_touch(
+        ReducedTraining(touch, ReducedRange(deepest_mm, x_mm=(-ASIDE_MM, ASIDE_MM))), calibration=0
     )
     middle = RECEPTORS[1]
     return {
@@ -38,13 +40,13 @@ def answer(deepest_mm: float) -> dict[str, Any]:
     }
 
 
-def _with_modes(model: fp.ReducedModel, n_modes: int) -> fp.ReducedModel:
+def _with_modes(model: ReducedModel, n_modes: int) -> ReducedModel:
     """Model with the first of its modes, or with some of them twice."""
     chosen = np.arange(n_modes) % len(model.modes)
     return replace(model, modes=model.modes[chosen], coefficients=model.coefficients[..., chosen])
 
 
-def _across(model: fp.ReducedModel, n_poses: int) -> fp.ReducedModel:
+def _across(model: ReducedModel, n_poses: int) -> ReducedModel:
     """Model that has its poses also across the finger, all alike."""
     along, _, *others = model.axes
     arrays: dict[str, Any] = {
@@ -54,7 +56,7 @@ def _across(model: fp.ReducedModel, n_poses: int) -> fp.ReducedModel:
     return replace(model, axes=(along, Axis("z_mm", -ASIDE_MM, ASIDE_MM, n_poses), *others), **arrays)
 
 
-def _step_ms(model: fp.ReducedModel, n_receptors: int) -> float:
+def _step_ms(model: ReducedModel, n_receptors: int) -> float:
     """Median time of a step. [ms]"""
     aside_mm = np.random.default_rng(1).uniform(-5.0, 5.0, (n_receptors, 2))
     stream = fp.ReducedTouch(model, np.array(fp.Fingertip().contact_mm) + aside_mm)

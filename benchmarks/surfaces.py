@@ -13,6 +13,7 @@ import numpy as np
 import fingerpad as fp
 from benchmarks.measuring import run_job
 from benchmarks.results import Report, Table
+from fingerpad.geometry.surface import Surface
 
 HEIGHTS, HALF_MM, THREADS, DEPTH_MM = 708, 3.0, 2, 1.0
 BALL = fp.Sphere(curvature_per_m=287.0)
@@ -45,7 +46,7 @@ def answer(from_file: bool) -> dict[str, Any]:
     return {
         "read_s": read_s,
         "press_s": perf_counter() - started,
-        "triangles": len(body.faces) if isinstance(body, fp.Surface) else 0,
+        "triangles": len(body.faces) if isinstance(body, Surface) else 0,
         "newton_steps": skin.newton_steps,
         "force_mn": float(skin.force_mn.max()),
     }

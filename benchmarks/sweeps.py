@@ -11,6 +11,7 @@ import numpy as np
 import fingerpad as fp
 from benchmarks.results import Report, Table
 from fingerpad.experiments.manifest import peak_memory_mb
+from fingerpad.export.sweep_results import observe_sweep
 from fingerpad.skin.store import Store
 
 TOUCH = {"object": "cylinder", "motion": {"depth_mm": 0.5, "ramp_ms": 50, "hold_ms": 300}}
@@ -92,7 +93,7 @@ def _observers(folder: Path) -> float:
         "noise": np.linspace(0.01, 0.2, NOISES).tolist(),
         "experiment.criterion": np.linspace(0.3, 0.7, CRITERIA).tolist(),
     }
-    fp.observe_sweep(data, observer | {"noise": 0.1})  # loads kernels
+    observe_sweep(data, observer | {"noise": 0.1})  # loads kernels
     began = time.perf_counter()
-    fp.observe_sweep(data, observer, grid)
+    observe_sweep(data, observer, grid)
     return 60.0 * NOISES * CRITERIA / (time.perf_counter() - began)

@@ -26,12 +26,15 @@ from fingerpad.core.errors import InertiaWarning
 from fingerpad.core.regions import Ellipse
 from fingerpad.core.values import FloatArray
 from fingerpad.data import afferents as published
+from fingerpad.geometry.motion import Cycles
 from fingerpad.neuron.afferent import AnyAfferent
 from fingerpad.neuron.afferent_types import afferent_types
+from fingerpad.neuron.end_organs import EndOrgans
 from fingerpad.neuron.tuning import tuning_curve
 from fingerpad.report.nerve import STYLES, draw_mixed_responses
 from fingerpad.report.style import BLACK, BLUE, GREY, ORANGE, new_figure, write_png
 from fingerpad.skin.indentation import settings_of
+from fingerpad.skin.sampling import SkinResponse
 from studies.pages import DOCS, IMAGES, table, write_blocks
 
 PAGE = DOCS / "afferents.md"
@@ -68,7 +71,7 @@ BRANCHES = {"SAI": (6, 1.0), "RA": (14, 1.2)}
 """End organs per afferent and the radius of the disc in which they are scattered. [mm]"""
 
 
-def indented(indenter: fp.Indenter, motion: Any, tissues: str = "human", **more: Any) -> fp.SkinResponse:
+def indented(indenter: fp.Indenter, motion: Any, tissues: str = "human", **more: Any) -> SkinResponse:
     """Press at quick resolution, without the warning of inertia, about which the page speaks."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", InertiaWarning)
@@ -86,14 +89,14 @@ def mixed() -> None:
 
 
 @cache
-def step_on_hold() -> fp.SkinResponse:
+def step_on_hold() -> SkinResponse:
     """Press the probe 0.5 mm deep, and after 550 ms 10 µm more and less within 1 ms each."""
     motion = fp.Trajectory((0, 50, 600, 601, 602, 603), (0, 0.5, 0.5, 0.51, 0.5, 0.49))
     return indented(PROBE, motion)
 
 
 @cache
-def slow_ramp() -> fp.SkinResponse:
+def slow_ramp() -> SkinResponse:
     """Press the probe at 4 mm/s, and hold it."""
     end_ms = 1e3 * DEEPEST_MM / SLOW_MM_PER_S
     times_ms = np.round(np.geomspace(2.5, end_ms, 28), 3)
@@ -205,7 +208,7 @@ def branched_area_mm2(name: str, times: float, seed: int) -> float:
     """
     afferent = afferent_types()[name]
     count, reach_mm = BRANCHES[name]
-    ends = fp.EndOrgans.scattered(np.zeros((seed + 1, 2)), count, reach_mm, seed=17).positions_mm[seed]
+    ends = EndOrgans.scattered(np.zeros((seed + 1, 2)), count, reach_mm, seed=17).positions_mm[seed]
     grid = np.arange(-4.0, 4.01, 0.25)
     places = np.array(list(product(grid, grid)))
     away = np.linalg.norm(places[:, None] - ends, axis=2)
@@ -334,8 +337,8 @@ def _write_table(name: str, head: Sequence[str], rows: Iterable[Sequence[str]], 
 class Vibrated:
     """One vibration and how it was solved."""
 
-    cycles: fp.Cycles
-    skin: fp.SkinResponse
+    cycles: Cycles
+    skin: SkinResponse
     seconds: float
 
 

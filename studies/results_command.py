@@ -10,7 +10,6 @@ from fingerpad.core.files import write_atomically
 from fingerpad.core.result_files import from_json, to_json
 from fingerpad.report.style import write_png
 from studies import chain_picture, results_page, tissue_page
-from studies.command_line_page import command_line_page
 from studies.pages import DOCS, IMAGES, write_blocks
 
 README, NUMBERS, PICTURE = DOCS.parent / "README.md", DOCS / "results.json", IMAGES / "chain.png"
@@ -23,7 +22,7 @@ def _add(parser: argparse.ArgumentParser) -> None:
 
 
 def write_pages(results: Path | None = None, picture: bool = True) -> None:
-    """Write results, paper, command-line and tissues of docs, and table and picture of the README."""
+    """Write results, paper and tissues of docs, and table and picture of the README."""
     shown = (
         from_json(results_page.Excerpt, NUMBERS.read_bytes())
         if results is None
@@ -33,7 +32,6 @@ def write_pages(results: Path | None = None, picture: bool = True) -> None:
         README: results_page.with_table(README.read_text(encoding="utf-8"), shown),
         DOCS / "results.md": results_page.results_page(shown),
         DOCS / "paper.md": results_page.paper_page(shown),
-        DOCS / "command-line.md": command_line_page(),
     }
     write_atomically(NUMBERS, to_json(shown) + b"\n")
     for path, text in pages.items():

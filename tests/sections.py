@@ -12,8 +12,9 @@ from fingerpad.core.result_files import from_json
 from fingerpad.core.signals import STORED_ENERGY, Traces
 from fingerpad.geometry.mesh import block_mesh
 from fingerpad.neuron.afferent import Afferent
+from fingerpad.skin.indentation import Touch
 
-SMALL_TOUCH = fp.Touch(
+SMALL_TOUCH = Touch(
     finger=fp.Fingertip(),
     indenter=fp.Sphere(curvature_per_m=287),
     stimulus=fp.RampAndHold(depth_mm=0.3),

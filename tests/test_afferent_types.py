@@ -7,14 +7,16 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 import fingerpad as fp
+from fingerpad.core.regions import Rectangle
 from fingerpad.data import afferents as published
 from fingerpad.neuron.band_pass import BandPass
+from fingerpad.neuron.end_organs import EndOrgans
 from fingerpad.neuron.escape_rate import EscapeRate
 from fingerpad.neuron.lif import LeakyIntegrateAndFire
 from fingerpad.neuron.population import sensitivities
 from fingerpad.neuron.spikes import firing_rate_hz
 from fingerpad.neuron.transduction import drive
-from fingerpad.neuron.tuning import impulses_per_cycle, vibration
+from fingerpad.neuron.tuning import impulses_per_cycle, tuning_curve, vibration
 from refusals import refusals
 from sections import SED_DRIVEN
 
@@ -135,7 +137,7 @@ def test_afferents_that_fire_once_in_a_ramp_have_a_rate_and_sai_keeps_that_of_th
 
 ENDS = np.array([[[0.0, 0.0], [1.0, 0.0]]])
 FINGER = Pressed({"compressive_stress": 15.0, "deep_displacement": 1.0, "skin_stretch": 0.1, "stored": 2.0})
-SQUARE = fp.Rectangle(10.0, 10.0, centre_mm=(17.0, 0.0))
+SQUARE = Rectangle(10.0, 10.0, centre_mm=(17.0, 0.0))
 
 
 @pytest.mark.parametrize(("rise", "fall"), [(1, 1), (2, 2), (3, 1)])
@@ -173,7 +175,7 @@ def test_the_band_pass_of_a_step_of_speed_is_the_closed_form():
 def test_tuning_curves_lie_within_a_factor_of_two_of_the_published_ones(
     afferent, first_hz, observed_um, per_um, hold
 ):
-    found = fp.tuning_curve(afferent, FREQUENCIES_HZ[first_hz:][: len(observed_um.value)], per_um, hold)
+    found = tuning_curve(afferent, FREQUENCIES_HZ[first_hz:][: len(observed_um.value)], per_um, hold)
     ratio = found / np.array(observed_um.value)
     assert ratio.min() > 0.5
     assert ratio.max() < 2.0
@@ -181,14 +183,14 @@ def test_tuning_curves_lie_within_a_factor_of_two_of_the_published_ones(
 
 def test_the_best_frequencies_are_those_of_the_recordings():
     low, high, pacinian = published.BEST_FREQUENCIES.value
-    ra = fp.tuning_curve(fp.RA(), FREQUENCIES_HZ, PUNCH_KPA_PER_UM, PUNCH_HOLD_KPA)
-    pc = fp.tuning_curve(fp.PC(), FREQUENCIES_HZ[3:], PC_PER_UM, PC_HOLD_MM)
+    ra = tuning_curve(fp.RA(), FREQUENCIES_HZ, PUNCH_KPA_PER_UM, PUNCH_HOLD_KPA)
+    pc = tuning_curve(fp.PC(), FREQUENCIES_HZ[3:], PC_PER_UM, PC_HOLD_MM)
     assert low <= FREQUENCIES_HZ[np.argmin(ra)] <= high
     assert FREQUENCIES_HZ[3:][np.argmin(pc)] > pacinian
     assert pc[FREQUENCIES_HZ[3:] == 200.0] < 0.1 * ra[FREQUENCIES_HZ == 200.0]
     assert pc[FREQUENCIES_HZ[3:] == 10.0] > 2.0 * ra[FREQUENCIES_HZ == 10.0]
     # A threshold separates silence from entrainment.
-    (threshold_um,) = fp.tuning_curve(fp.RA(), [40.0], PUNCH_KPA_PER_UM, PUNCH_HOLD_KPA)
+    (threshold_um,) = tuning_curve(fp.RA(), [40.0], PUNCH_KPA_PER_UM, PUNCH_HOLD_KPA)
     amplitudes_um = threshold_um * np.array([0.98, 1.0])
     beside = vibration(40.0, amplitudes_um, PUNCH_KPA_PER_UM, PUNCH_HOLD_KPA, "compressive_stress")
     below, above = impulses_per_cycle(fp.RA(), beside)
@@ -231,10 +233,10 @@ def test_an_own_afferent_returns_current_or_spikes():
 def test_one_end_organ_is_the_afferent_itself_and_two_are_their_weighted_sum():
     layout = fp.Population.grid(rows=2, columns=3).positions_mm
     alone = fp.Population(layout, 1.0, fp.RA()).respond(FINGER)
-    single = fp.Population(layout, 1.0, fp.RA(), ends=fp.EndOrgans(layout[:, None])).respond(FINGER)
+    single = fp.Population(layout, 1.0, fp.RA(), ends=EndOrgans(layout[:, None])).respond(FINGER)
     assert_array_equal(alone.spikes.times_ms, single.spikes.times_ms)
     far = np.stack([layout, layout + np.array([100.0, 0.0])], axis=1)
-    halved = fp.Population(layout, 1.0, fp.RA(), ends=fp.EndOrgans(far, [0.5, 0.5])).respond(FINGER)
+    halved = fp.Population(layout, 1.0, fp.RA(), ends=EndOrgans(far, [0.5, 0.5])).respond(FINGER)
     half = fp.Population(layout, 1.0, fp.RA(), sensitivity=np.full(6, 0.5)).respond(FINGER)
     assert_allclose(halved.spikes.times_ms, half.spikes.times_ms, rtol=1e-12)
 
@@ -268,20 +270,20 @@ def test_no_input_gives_more_than_the_largest_share_of_its_range(rise, fall):
 
 def test_the_strongest_end_organ_leads_if_asked_for():
     sed = traces("stored", [0.0, 50.0], [[0.0, 0.0], [2.0, 3.0]])
-    largest = fp.EndOrgans(ENDS, [0.8, 0.2], combine="largest").combined(sed)
+    largest = EndOrgans(ENDS, [0.8, 0.2], combine="largest").combined(sed)
     assert largest.values.tolist() == [[0.0], [2.0]]
-    equal = fp.EndOrgans(ENDS, combine="largest").combined(sed)
+    equal = EndOrgans(ENDS, combine="largest").combined(sed)
     assert equal.values.tolist() == [[0.0], [3.0]]
 
 
 def test_scattered_end_organs_lie_within_reach_and_depend_on_seed_and_number_only():
     places = np.zeros((400, 2))
-    ends = fp.EndOrgans.scattered(places, count=6, reach_mm=1.5, seed=3)
+    ends = EndOrgans.scattered(places, count=6, reach_mm=1.5, seed=3)
     away = np.linalg.norm(ends.positions_mm, axis=2)
     assert away.max() < 1.5
     assert (away > 1.5 / np.sqrt(2.0)).mean() == pytest.approx(0.5, abs=0.03)
-    assert_array_equal(ends.positions_mm[:5], fp.EndOrgans.scattered(places[:5], 6, 1.5, 3).positions_mm)
-    lifted = fp.EndOrgans.scattered(places[:2], 6, 1.5, 3, place=lambda flat: np.insert(flat, 1, 7.0, axis=1))
+    assert_array_equal(ends.positions_mm[:5], EndOrgans.scattered(places[:5], 6, 1.5, 3).positions_mm)
+    lifted = EndOrgans.scattered(places[:2], 6, 1.5, 3, place=lambda flat: np.insert(flat, 1, 7.0, axis=1))
     assert_array_equal(lifted.positions_mm[..., [0, 2]], ends.positions_mm[:2])
 
 
@@ -321,12 +323,12 @@ test_bad_input_is_refused_in_one_sentence = refusals(
     (lambda: own(lambda sed: sed), "respond must return .* got Traces"),
     (lambda: own(lambda sed: fp.SpikeTrains.from_lists([])), "respond must return .* 1 in all: got 0 trains"),
     (lambda: own(lambda sed: fp.Traces(sed.times_ms, sed.values, quantity="current")), "needs a membrane"),
-    (lambda: fp.EndOrgans(ENDS, [0.5, 0.6]), "must sum to 1: got 1.1"),
-    (lambda: fp.EndOrgans(ENDS, [1.5, -0.5]), "must not be negative: the smallest is -0.5"),
-    (lambda: fp.EndOrgans(ENDS, combine="mean"), "combine must be one of sum, largest: got 'mean'"),
-    (lambda: fp.EndOrgans(np.zeros((1, 0, 2))), "afferents by end organs"),
-    (lambda: fp.EndOrgans.scattered([[0.0, 0.0]], 0, 1.0, 1), ("count",)),
-    (lambda: fp.Population([[17.0, 0.0]], 1.0, ends=fp.EndOrgans(np.zeros((2, 1, 2)))), "one row per"),
+    (lambda: EndOrgans(ENDS, [0.5, 0.6]), "must sum to 1: got 1.1"),
+    (lambda: EndOrgans(ENDS, [1.5, -0.5]), "must not be negative: the smallest is -0.5"),
+    (lambda: EndOrgans(ENDS, combine="mean"), "combine must be one of sum, largest: got 'mean'"),
+    (lambda: EndOrgans(np.zeros((1, 0, 2))), "afferents by end organs"),
+    (lambda: EndOrgans.scattered([[0.0, 0.0]], 0, 1.0, 1), ("count",)),
+    (lambda: fp.Population([[17.0, 0.0]], 1.0, ends=EndOrgans(np.zeros((2, 1, 2)))), "one row per"),
     (lambda: fp.Population([[17.0, 0.0]], 1.0, fp.RA), "afferent must be one such as"),
     (lambda: fp.Population.grid().respond(None), "skin must be like Skin, with sed: got None"),
     (lambda: fp.Population.grid(centre_mm=17.0), r"centre_mm must be a pair \[mm\]: got 17.0"),
@@ -342,6 +344,6 @@ test_bad_input_is_refused_in_one_sentence = refusals(
     (lambda: SPARSE(SQUARE, afferents=[fp.RA()]), "afferents must be a mapping"),
     (lambda: SPARSE("pad"), ("region",)),
     (lambda: SPARSE(SQUARE).respond("skin"), "skin must be like Skin, with sed: got 'skin'"),
-    (lambda: fp.tuning_curve(fp.RA(), [0.0], 0.02), ("frequency_hz",)),
-    (lambda: fp.tuning_curve(fp.Afferent(static_quantity="stored"), [1.0], 0.02), "follows one quantity"),
+    (lambda: tuning_curve(fp.RA(), [0.0], 0.02), ("frequency_hz",)),
+    (lambda: tuning_curve(fp.Afferent(static_quantity="stored"), [1.0], 0.02), "follows one quantity"),
 )  # fmt: skip

@@ -13,6 +13,7 @@ import pytest
 import fingerpad as fp
 from fingerpad import __version__, cli
 from fingerpad.cli import commands
+from fingerpad.core.errors import StoreError
 from fingerpad.data.tissues import DEFAULT_TISSUES
 from fingerpad.experiments import run as runs
 from fingerpad.experiments.conditions import Conditions
@@ -151,7 +152,7 @@ def test_a_folder_that_cannot_be_is_named_and_what_is_there_stays(call, tmp_path
 @pytest.mark.parametrize(
     ("failure", "status", "said"),
     [
-        (fp.StoreError("x.npz cannot be read: delete it."), 2, "x.npz cannot be read: delete it."),
+        (StoreError("x.npz cannot be read: delete it."), 2, "x.npz cannot be read: delete it."),
         (fp.ConvergenceError("No equilibrium at 3 ms.", ("at 3 ms: 40 steps",)), 2,
          "No equilibrium at 3 ms."),
         (KeyboardInterrupt(), 130, "stopped. The same command continues after the last"),

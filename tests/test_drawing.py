@@ -14,10 +14,12 @@ from pynwb import NWBHDF5IO
 
 import fingerpad as fp
 from fingerpad.core.displayed import Result
-from fingerpad.core.signals import RECEPTOR_COLUMNS
+from fingerpad.core.signals import RECEPTOR_COLUMNS, HitRates
 from fingerpad.experiments.discrimination.analysis import analyse
 from fingerpad.experiments.fit.fit import fit_recordings
 from fingerpad.inference.spike_fit import SpikeFit
+from fingerpad.psychophysics.curve_fit import fit_psychometric
+from fingerpad.reduction.streaming import ReducedSample
 from fingerpad.report.drawing import DRAWINGS
 from fingerpad.report.skin import draw_spikes
 from fingerpad.report.task import draw_task_responses
@@ -77,7 +79,7 @@ def results():
         "SpikeTrains": response.spikes,
         "Traces": skin.sed([(17.37, 0.0), (19.0, 0.0)]),
         "SurfaceProfile": skin.surface_profile(),
-        "HitRates": fp.HitRates([0.6, 0.9], [0.05, 0.02], seed=1),
+        "HitRates": HitRates([0.6, 0.9], [0.05, 0.02], seed=1),
         "FitResult": fitted(),
         "SpikeFit": SpikeFit(
             np.array([0.01, 4.0, 0.02, 40.0, 0.5]),
@@ -87,7 +89,7 @@ def results():
             (-120.0,),
         ),
         "TaskResult": discriminated(),
-        "ReducedSample": fp.ReducedSample(
+        "ReducedSample": ReducedSample(
             12.0,
             0.4,
             25.0,
@@ -96,7 +98,7 @@ def results():
             force_error_mn=0.2,
             field_errors={"stored": 0.02},
         ),
-        "PsychometricFit": fp.fit_psychometric([10.0, 20.0, 40.0], [55, 70, 95], [100] * 3),
+        "PsychometricFit": fit_psychometric([10.0, 20.0, 40.0], [55, 70, 95], [100] * 3),
         "Fingertip": finger,
     }
 

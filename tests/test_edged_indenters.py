@@ -7,6 +7,7 @@ from hypothesis import strategies as st
 
 import fingerpad as fp
 from fingerpad.export.outline import outline_of
+from fingerpad.skin.indentation import Touch
 from refusals import refusals
 
 EDGE, GAP, GRATING = fp.Edge(0.3), fp.Gap(1.0, 6.0, 0.4, 0.2), fp.Grating(0.9, 0.7, 0.2)
@@ -122,7 +123,7 @@ def pressed(body):
         core_half_length_mm=1.2, core_size_mm=0.25,
     )  # fmt: skip
     tissues, motion = fp.named_tissues("trial3"), fp.RampAndHold(depth_mm=0.4)
-    return fp.Touch(
+    return Touch(
         fp.Fingertip(), body, motion, tissues, grading, fp.PressSettings(2, 1), tilt_deg=LEVEL_DEG
     ).solve()
 

@@ -6,8 +6,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from fingerpad import Bar, Embossed, Fingertip, FlatPunch, Grading, embossed_text, touch_of
-from fingerpad.geometry.embossed import MOST_CORNERS, joined_outlines
+from fingerpad import Bar, Fingertip, FlatPunch, Grading, embossed_text, touch_of
+from fingerpad.geometry.embossed import MOST_CORNERS, Embossed, joined_outlines
 from fingerpad.geometry.probing import check_gap
 from fingerpad.skin.store import touch_key
 from refusals import refusals, refused

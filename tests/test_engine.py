@@ -19,6 +19,7 @@ import fingerpad as fp
 from cluster import real_cluster, slow, wait_until
 from fingerpad.cli import main
 from fingerpad.core.engine import Processes, _signals_later, engine_of
+from fingerpad.core.errors import StoreError
 from fingerpad.experiments import cluster as module
 
 pytestmark = pytest.mark.filterwarnings("default")
@@ -80,7 +81,7 @@ def test_a_signal_waits_until_a_process_has_started(number):
 
 
 def test_a_lost_process_is_told_in_a_sentence():
-    with pytest.raises(fp.StoreError, match="ended from outside"):
+    with pytest.raises(StoreError, match="ended from outside"):
         done(Processes(2), end_this_process, [1, 2])
 
 

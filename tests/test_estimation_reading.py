@@ -11,7 +11,14 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 import fingerpad as fp
-from fingerpad.experiments.requests.stimuli import ListedStimuli, NamedStimulus, ShiftedBar, along_skin
+from fingerpad.experiments.recording_files import read_recordings
+from fingerpad.experiments.requests.stimuli import (
+    ListedStimuli,
+    NamedStimulus,
+    ShiftedBar,
+    along_skin,
+    read_stimuli,
+)
 from fingerpad.inference.recordings import SpikeRecordings
 from tests.mutations import CHANGES, VALUES, changed, places
 
@@ -40,7 +47,7 @@ def test_rates_are_means_over_presentations_wherever_their_columns_stand(written
         '\ufeff# a comment, with a "\n\nfold, static_rate_hz,stimulus\n1,60,edge\n'
         "2,10,flat\n# more\n1,62,edge\n",
     )
-    recorded = fp.read_recordings(path, TWO)
+    recorded = read_recordings(path, TWO)
     assert isinstance(recorded.recordings, fp.RateRecordings)
     assert recorded.recordings.stimuli == ("edge", "flat")
     assert recorded.recordings.static_rate_hz.tolist() == [61.0, 10.0]
@@ -53,7 +60,7 @@ def test_rates_are_means_over_presentations_wherever_their_columns_stand(written
 def test_shifts_that_are_equal_are_one_stimulus_however_they_are_written(written):
     path = written("rates.csv", "shift_mm,dynamic_rate_hz\n-0,1\n0.0,3\n1e-1,5\n")
     bar = ShiftedBar(fp.Bar(2.0), fp.RampAndHold(0.5))
-    recorded = fp.read_recordings(path, bar)
+    recorded = read_recordings(path, bar)
     assert recorded.recordings.stimuli == ("0", "0.1")
     assert recorded.recordings.dynamic_rate_hz.tolist() == [2.0, 5.0]
     assert recorded.stimuli["0.1"] == NamedStimulus(
@@ -63,7 +70,7 @@ def test_shifts_that_are_equal_are_one_stimulus_however_they_are_written(written
 
 def test_spikes_end_with_the_motion_or_with_their_recording(written):
     rows = "stimulus,spike_times_ms,duration_ms\nedge,1.5 40 1001,\nflat,,900\nedge,3,900\n"
-    recorded = fp.read_recordings(written("spikes.csv", rows), TWO)
+    recorded = read_recordings(written("spikes.csv", rows), TWO)
     assert isinstance(recorded.recordings, SpikeRecordings)
     assert [train.tolist() for train in recorded.recordings.trains] == [[1.5, 40.0], [], [3.0]]
     assert recorded.recordings.duration_ms.tolist() == [1000.0, 900.0, 900.0]
@@ -104,20 +111,20 @@ RATE_ROWS = "stimulus,static_rate_hz,fold\nedge,60,1\n"
 def test_recordings_that_cannot_be_are_named_by_line_and_column(written, content, said):
     path = written("mine.csv", content)
     with pytest.raises(fp.InputError) as refused:
-        fp.read_recordings(path, TWO)
+        read_recordings(path, TWO)
     assert said in str(refused.value)
     assert str(refused.value)[-1] in ".?"
 
 
 def test_a_file_that_is_not_there_or_has_no_shift_or_unit_is_named(written, tmp_path):
     with pytest.raises(fp.InputError, match=r"mine.csv, line 2: shift_mm must be a finite number \[mm\]"):
-        fp.read_recordings(written("mine.csv", "shift_mm,static_rate_hz\nleft,1\n"), ShiftedBar())
+        read_recordings(written("mine.csv", "shift_mm,static_rate_hz\nleft,1\n"), ShiftedBar())
     with pytest.raises(fp.InputError, match="unit belongs to NWB files"):
-        fp.read_recordings(written("mine.csv", "stimulus,static_rate_hz\nedge,1\n"), TWO, unit=1)
+        read_recordings(written("mine.csv", "stimulus,static_rate_hz\nedge,1\n"), TWO, unit=1)
     with pytest.raises(fp.InputError, match=r"none\.csv must be a file that can be read: No such file"):
-        fp.read_recordings(tmp_path / "none.csv", TWO)
+        read_recordings(tmp_path / "none.csv", TWO)
     with pytest.raises(fp.InputError, match=r"none\.nwb must be a file that can be read"):
-        fp.read_recordings(tmp_path / "none.nwb", TWO)
+        read_recordings(tmp_path / "none.nwb", TWO)
 
 
 CSV = """# mine
@@ -142,7 +149,7 @@ stimuli:
 @pytest.mark.parametrize(("name", "content"), [("mine.csv", CSV), ("mine.yaml", YAML), ("mine.yml", YAML)])
 def test_stimuli_are_the_same_from_csv_and_yaml(written, name, content):
     written("course.csv", "time_ms,depth_mm\n0,0\n50,0.4\n900,0.4\n")
-    listed = fp.read_stimuli(written(name, content))
+    listed = read_stimuli(written(name, content))
     *others, moved = listed.stimuli.values()
     assert others == [
         NamedStimulus(fp.Sphere(curvature_per_m=340.0), fp.RampAndHold(0.5), -0.5, 1.0, 0.0, name="ball"),
@@ -161,7 +168,7 @@ def test_stimuli_name_finger_tissues_and_resolution_and_options_replace_them(wri
         "finger: child\ntissues: trial3\nresolution: quick\nreach_mm: 2.0\nmotion: {depth_mm: 0.5}\n"
         "stimuli: {vary: object.text, values: [a, b]}\nobject: {kind: braille}\n",
     )
-    listed = fp.read_stimuli(path, tissues="paper", finger=None)
+    listed = read_stimuli(path, tissues="paper", finger=None)
     asked = listed.conditions
     assert (asked.resolution, asked.tissues, asked.finger) == ("quick", "paper", fp.Fingertip.of("child"))
     touches = listed.touches(list(listed.stimuli.values()), asked)
@@ -203,7 +210,7 @@ def test_stimuli_name_finger_tissues_and_resolution_and_options_replace_them(wri
 def test_stimuli_that_cannot_be_are_named_by_line_and_column(written, name, content, said):
     path = written(name, content)
     with pytest.raises(fp.InputError) as refused:
-        fp.read_stimuli(path)
+        read_stimuli(path)
     assert said in str(refused.value)
     assert str(refused.value).count("\n") == 0
 
@@ -238,7 +245,7 @@ ENTRIES = st.one_of(st.text(max_size=8), st.floats().map(str), ODD)
 def possible(path):
     """What is said of a file of stimuli, and of their touches."""
     try:
-        listed = fp.read_stimuli(path)
+        listed = read_stimuli(path)
         listed.touches(list(listed.stimuli.values()), listed.conditions)
     except fp.InputError as error:
         said = str(error)
@@ -305,7 +312,7 @@ def test_nwb_units_become_trains_that_count_from_the_onset_of_their_trial(nwb):
     trials = [(10.0, 11.5, "flat", 2), (20.0, 20.9, "edge", 1)]
     units = {3: [1.0, 10.04, 10.25, 11.4, 20.5, 21.0], 4: [10.1]}
     path = nwb("good", trials, units, ("stimulus", "fold"))
-    recorded = fp.read_recordings(path, TWO, unit=3)
+    recorded = read_recordings(path, TWO, unit=3)
     trains = recorded.recordings.trains
     np.testing.assert_allclose(trains[0], [40.0, 250.0], rtol=0, atol=1e-9)
     np.testing.assert_allclose(trains[1], [500.0], rtol=0, atol=1e-9)
@@ -320,7 +327,7 @@ def test_trials_without_observation_are_left_out_and_not_silent(nwb, caplog):
     trials = [(start, start + 0.9, "edge") for start in (1.0, 10.0, 20.0, 30.0, 40.0)]
     seen = {"obs_intervals": [[25.0, 60.0], [9.0, 15.0], [15.0, 20.4]]}
     path = nwb("seen", trials, {3: [10.1, 20.2, 30.3]}, options={3: seen}, invalid=[(30.5, 30.6)])
-    recorded = fp.read_recordings(path, TWO)
+    recorded = read_recordings(path, TWO)
     assert [train.round(6).tolist() for train in recorded.recordings.trains] == [[100.0], [200.0], []]
     np.testing.assert_allclose(recorded.recordings.duration_ms, [900.0, 400.0, 900.0], rtol=0, atol=1e-6)
     assert "2 of 5 trials are left out" in caplog.text
@@ -331,9 +338,9 @@ def test_spikes_that_count_from_their_trial_are_refused_unless_observation_says_
     trials = [(first + 10.0 * number, first + 10.0 * number + 0.9, "edge") for number in range(3)]
     spikes = {3: [0.04, 0.25, 0.5]}
     with pytest.raises(fp.InputError, match="as if they counted from that of their trial; add start_time"):
-        fp.read_recordings(nwb(f"relative-{first:g}", trials, spikes), TWO)
+        read_recordings(nwb(f"relative-{first:g}", trials, spikes), TWO)
     seen = {3: {"obs_intervals": [[0.0, 60.0]]}}
-    trains = fp.read_recordings(nwb(f"seen-{first:g}", trials, spikes, options=seen), TWO).recordings.trains
+    trains = read_recordings(nwb(f"seen-{first:g}", trials, spikes, options=seen), TWO).recordings.trains
     assert [len(train) for train in trains] == [0 if first else 3, 0, 0]
 
 
@@ -355,6 +362,6 @@ def test_nwb_files_that_cannot_be_are_named(nwb, tmp_path):
     cases.append((damaged, None, "damaged.nwb cannot be read as NWB"))
     for path, unit, said in cases:
         with pytest.raises(fp.InputError) as refused:
-            fp.read_recordings(path, TWO, unit)
+            read_recordings(path, TWO, unit)
         assert said in str(refused.value)
         assert str(refused.value).startswith(str(path))

@@ -12,6 +12,7 @@ import pytest
 import xarray
 
 import fingerpad as fp
+from fingerpad.core.errors import StoreError
 from fingerpad.export import results
 from fingerpad.export.touch_file import PARTS, check_touch, spike_trains
 from fingerpad.skin.fields import Place, stored_fields
@@ -123,7 +124,7 @@ def test_a_killed_write_leaves_nothing(skin, tmp_path, name, monkeypatch):
 
     monkeypatch.setattr(results, "write_atomically", fails)
     monkeypatch.setattr(Path, "rename", fails)
-    with pytest.raises((OSError, fp.StoreError), match="no space"):
+    with pytest.raises((OSError, StoreError), match="no space"):
         skin.save(tmp_path / name)
     assert list(tmp_path.iterdir()) == []
 
@@ -131,7 +132,7 @@ def test_a_killed_write_leaves_nothing(skin, tmp_path, name, monkeypatch):
 def test_no_place_to_write_and_no_known_ending_are_refused(skin, tmp_path):
     (tmp_path / "file").write_text("")
     for name in ("touch.nc", "touch.zarr"):
-        with pytest.raises(fp.StoreError, match="cannot be written"):
+        with pytest.raises(StoreError, match="cannot be written"):
             skin.save(tmp_path / "file" / name)
     with pytest.raises(fp.InputError, match=r"A SkinResponse is saved as .csv, .*\.zarr, .*: got touch.h5"):
         skin.save(tmp_path / "touch.h5")

@@ -14,8 +14,10 @@ import fingerpad as fp
 from fingerpad.export.decks import abaqus_deck, calculix_deck, febio_deck
 from fingerpad.export.job import Job, job_of
 from fingerpad.export.outline import face_mesh, outline_of, rigid_mesh
+from fingerpad.geometry.embossed import Embossed
 from fingerpad.geometry.mesh import block_mesh, finger_mesh
 from fingerpad.mechanics.contact import place
+from fingerpad.mechanics.materials import Hencky, Polynomial
 from refusals import refusals
 
 PRONY = fp.Prony(shares=(0.1, 0.3), times_ms=(20.0, 700.0))
@@ -191,8 +193,8 @@ CALCULIX = {  # CalculiX CrunchiX User's Manual 2.20
 LAWS = [
     NEO_HOOKE,
     fp.Material.polynomial(6.0, 4.0, 0.0, 0.0, 0.0, 0.45),
-    fp.Material(fp.Polynomial(6.0, 4.0, 2.0, 1.0, 0.5, bulk_linear=90.0)),
-    fp.Material(fp.Polynomial(6.0, 4.0, 2.0, 1.0, 0.5, bulk_linear=90.0, bulk_cubic=40.0)),
+    fp.Material(Polynomial(6.0, 4.0, 2.0, 1.0, 0.5, bulk_linear=90.0)),
+    fp.Material(Polynomial(6.0, 4.0, 2.0, 1.0, 0.5, bulk_linear=90.0, bulk_cubic=40.0)),
     fp.Material.ogden((8.0,), (3.0,), 0.45),
     fp.Material.ogden((8.0, 2.0), (2.0, 6.0), 0.45),
     fp.Material.ogden((8.0, 2.0, 1.0), (2.0, 6.0, -2.0), 0.45),
@@ -645,7 +647,7 @@ FRAME = [[(-u, -u), (u, -u), (u, u), (-u, u)] for u in (1.8, 0.6)]
 
 def test_a_body_without_an_outline_is_divided_over_its_face():
     """Corners of facets lie on the face, facets turn their outer side to the skin, a hole stays a hole."""
-    body = fp.Embossed(FRAME, height_mm=0.5, edge_radius_mm=0.2)
+    body = Embossed(FRAME, height_mm=0.5, edge_radius_mm=0.2)
     found = face_mesh(body, -0.4, (-3.0, 3.0), (-2.0, 2.0))
     outer = found.nodes_mm[: len(found.nodes_mm) // 2]
     np.testing.assert_allclose(outer[:, 1], np.maximum(body.front(outer), -0.4), atol=1e-12)
@@ -662,7 +664,7 @@ def test_a_body_without_an_outline_is_divided_over_its_face():
 
 @pytest.mark.parametrize("write", [abaqus_deck, calculix_deck, febio_deck])
 def test_a_deck_has_the_facets_of_such_a_body(write):
-    job = block_job(fp.Embossed(FRAME, height_mm=0.6, edge_radius_mm=0.4))
+    job = block_job(Embossed(FRAME, height_mm=0.6, edge_radius_mm=0.4))
     deck = write(job)
     assert job.outline is None
     assert len(job.rigid.quads) > 1000
@@ -676,7 +678,7 @@ def test_a_deck_has_the_facets_of_such_a_body(write):
 @pytest.mark.parametrize("write", [abaqus_deck, calculix_deck, febio_deck])
 def test_a_law_that_a_solver_does_not_have_is_refused(write):
     with pytest.raises(fp.InputError, match=r"Hencky.*layer dermis|law Hencky has no card"):
-        write(block_job(material=fp.Material(fp.Hencky(20.0, 400.0))))
+        write(block_job(material=fp.Material(Hencky(20.0, 400.0))))
     own = fp.Material.from_energy("a / 2 * (I1 - 3) + k / 2 * (J - 1)**2", a=5.0, k=90.0)
     with pytest.raises(fp.InputError, match="Energy"):
         write(block_job(material=own))

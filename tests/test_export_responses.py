@@ -11,7 +11,10 @@ import pytest
 from numpy.testing import assert_array_equal
 
 import fingerpad as fp
+from fingerpad.core.errors import StoreError
 from fingerpad.core.phases import ramp_and_hold_phases
+from fingerpad.experiments.recording_files import read_recordings
+from fingerpad.experiments.requests.stimuli import read_stimuli
 from fingerpad.export.responses import read_response_csv, read_responses_nwb
 from fingerpad.neuron.response_maps import recruitment_rank
 from sections import SMALL_TOUCH as TOUCH
@@ -90,7 +93,7 @@ def test_a_table_that_is_no_response_is_refused(tmp_path):
     (tmp_path / "other.nwb").write_text("no session", encoding="utf-8")
     with pytest.raises(fp.InputError, match="must be a session of write_responses_nwb"):
         read_responses_nwb(tmp_path / "other.nwb")
-    with pytest.raises(fp.StoreError, match=r"other\.csv"):
+    with pytest.raises(StoreError, match=r"other\.csv"):
         random_response(2).save(tmp_path / "other.csv" / "map.csv")
 
 
@@ -105,9 +108,9 @@ def test_a_session_is_read_back_as_recordings_of_every_receptor(tmp_path):
     responses = responses_to_two_touches()
     path = fp.write_responses_nwb(tmp_path / "deeper" / "session.nwb", responses, pause_ms=250.0)
     assert [entry.name for entry in path.parent.iterdir()] == ["session.nwb"]
-    stimuli = fp.read_stimuli(tmp_path / "two.csv")
+    stimuli = read_stimuli(tmp_path / "two.csv")
     receptor = next(n for n in range(40) if all(answer.spikes[n].size > 1 for answer in responses.values()))
-    recorded = fp.read_recordings(path, stimuli, unit=receptor).recordings
+    recorded = read_recordings(path, stimuli, unit=receptor).recordings
     assert recorded.stimuli == ("edge", "flat")
     for train, answer in zip(recorded.trains, responses.values(), strict=True):
         np.testing.assert_allclose(train, answer.spikes[receptor], rtol=0, atol=1e-9)

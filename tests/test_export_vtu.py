@@ -17,9 +17,11 @@ from vtkmodules.vtkFiltersVerdict import vtkCellSizeFilter
 from vtkmodules.vtkIOXML import vtkXMLUnstructuredGridReader
 
 import fingerpad as fp
+from fingerpad.core.errors import StoreError
 from fingerpad.export.vtu import HEXAHEDRON, WEDGE, cells_of
 from fingerpad.geometry.mesh import Mesh, block_mesh
 from fingerpad.geometry.mesh_checks import jacobian_at_gauss
+from fingerpad.skin.indentation import Touch
 from sections import SMALL_TOUCH as TOUCH
 
 CELLS = (
@@ -129,7 +131,7 @@ def test_element_that_is_neither_brick_nor_wedge_is_named():
 def test_what_cannot_be_written_is_refused_and_nothing_is_pressed(skin, tmp_path, monkeypatch):
     with pytest.raises(fp.InputError, match=r"does not hold: solve the touch with whole=True\."):
         replace(skin, deformation=None).save(tmp_path / "other.pvd")
-    monkeypatch.setattr(fp.Touch, "solve", lambda touch, **_: pytest.fail("the touch was solved for nothing"))
+    monkeypatch.setattr(Touch, "solve", lambda touch, **_: pytest.fail("the touch was solved for nothing"))
     monkeypatch.setitem(sys.modules, "vtkmodules.vtkIOXML", None)
     monkeypatch.setitem(sys.modules, "xarray", None)
     with pytest.raises(fp.InputError, match=r"pip install 'fingerpad\[vtk\]'"):
@@ -143,12 +145,12 @@ def test_what_cannot_be_written_is_refused_and_nothing_is_pressed(skin, tmp_path
         assert written == tmp_path / file_name
         assert written.stat().st_size > 10_000
     monkeypatch.undo()
-    with pytest.raises(fp.StoreError, match=r"touch\.inp"):
+    with pytest.raises(StoreError, match=r"touch\.inp"):
         skin.save(tmp_path / "touch.inp" / "a.pvd")
 
 
 def test_a_touch_is_exported_by_the_name_of_a_format(skin, files, tmp_path, monkeypatch):
-    monkeypatch.setattr(fp.Touch, "solve", lambda touch, **_: skin)
+    monkeypatch.setattr(Touch, "solve", lambda touch, **_: skin)
     written = fp.export_touch(tmp_path, TOUCH, "vtu")
     assert written == (tmp_path / "touch.pvd",)
     assert [path.read_bytes() for path in sorted(tmp_path.glob("*.vtu"))] == [

@@ -21,22 +21,34 @@ from hypothesis import strategies as st
 import fingerpad as fp
 from fingerpad.cli import main
 from fingerpad.core.layouts import Layout
+from fingerpad.core.phases import Phase
 from fingerpad.core.plain_yaml import read_yaml
+from fingerpad.core.regions import Polygon, Rectangle
+from fingerpad.core.signals import HitRates
 from fingerpad.experiments.conditions import Conditions
 from fingerpad.experiments.discrimination.request import example_tasks
+from fingerpad.experiments.recording_files import read_recordings
 from fingerpad.experiments.requests.afferents import fitted_afferent
-from fingerpad.experiments.requests.stimuli import ShiftedBar
+from fingerpad.experiments.requests.stimuli import ShiftedBar, read_stimuli
 from fingerpad.experiments.requests.stimulus import TactileStimulus
 from fingerpad.experiments.requests.touch import EXAMPLE
 from fingerpad.experiments.runner import Runner
 from fingerpad.experiments.validation.observations import read_observations
+from fingerpad.geometry.dots import Dots
+from fingerpad.geometry.embossed import Embossed
+from fingerpad.geometry.motion import Cycles
+from fingerpad.geometry.surface import Surface
+from fingerpad.mechanics.materials import Hencky, Hyperfoam, Ogden, Polynomial
 from fingerpad.mechanics.newton import NewtonSettings
 from fingerpad.neuron.band_pass import BandPass
+from fingerpad.neuron.end_organs import EndOrgans
 from fingerpad.neuron.lif import LeakyIntegrateAndFire
 from fingerpad.neuron.transduction import Transduction
 from fingerpad.psychophysics.curve import JudgementCounts, PsychometricFunction
 from fingerpad.psychophysics.ideal_observer import GaussianResponses
 from fingerpad.psychophysics.observer import Experiment
+from fingerpad.reduction.training import ReducedRange
+from fingerpad.skin.sampling import SurfaceProfile
 
 LONGEST = 2600
 """Characters of an error."""
@@ -51,36 +63,36 @@ def examples(count):
 # -- value types ---------------------------------------------------------------------------------------------
 
 BALL = fp.Sphere(curvature_per_m=287)
-FOAM = fp.Material(fp.Hencky(5.0, 100.0))
+FOAM = fp.Material(Hencky(5.0, 100.0))
 VALUES = [
     fp.Sphere(curvature_per_m=287.0), fp.Cylinder(3.0), fp.Line(0.3), fp.Bar(3.0, 0.3), fp.Edge(0.1),
     fp.FlatPunch(3.0, 0.3), fp.Gap(1.0, 8.0, 0.1, 0.1), fp.Grating(1.0, 1.0, 0.1),
-    fp.Dots(((0.0, 0.0), (2.5, 0.0)), 1.4, 0.5),
-    fp.Embossed((((-1, -1), (1, -1), (1, 1.0)),), height_mm=0.5, edge_radius_mm=0.1),
+    Dots(((0.0, 0.0), (2.5, 0.0)), 1.4, 0.5),
+    Embossed((((-1, -1), (1, -1), (1, 1.0)),), height_mm=0.5, edge_radius_mm=0.1),
     fp.Union((BALL, fp.Plate()), ((0, 0, 0), (3, 0, 0)), seam_mm=0.0),
-    fp.Surface([[-1.0, 0, -1], [1.0, 0, -1], [0.0, 0, 1]], [[0, 2, 1]], 10.0),
+    Surface([[-1.0, 0, -1], [1.0, 0, -1], [0.0, 0, 1]], [[0, 2, 1]], 10.0),
     fp.RampAndHold(1.0, 50.0, 950.0), fp.ForceRampAndHold(100.0, 50.0, 950.0),
     fp.Trajectory((0.0, 10.0, 20.0), depth_mm=(0.0, 1.0, 1.0), x_mm=(0.0, 0.0, 0.5)),
-    fp.Cycles(0.0, 10.0, 3), fp.Phase("ramp", 0.0, 50.0), fp.Fingertip(),
+    Cycles(0.0, 10.0, 3), Phase("ramp", 0.0, 50.0), fp.Fingertip(),
     fp.Grading(17.0, 2.0, 2.0, 0.5, 0.5, dermis=3, full=True, finer_along=((16.0, 18.0, 0.1),)),
-    fp.Polynomial(5.0, bulk_linear=100.0), fp.Ogden((5.0, 1.0), (2.0, -2.0), 100.0),
-    fp.Hyperfoam((5.0,), (2.0,), 0.3), fp.Hencky(5.0, 100.0),
+    Polynomial(5.0, bulk_linear=100.0), Ogden((5.0, 1.0), (2.0, -2.0), 100.0),
+    Hyperfoam((5.0,), (2.0,), 0.3), Hencky(5.0, 100.0),
     fp.Energy("m * (I1 - 3) + k * (J - 1)**2", (("m", 5.0), ("k", 100.0))),
     fp.Prony((0.3, 0.1), (25.0, 300.0)), FOAM, fp.Tissues(FOAM, FOAM, FOAM, FOAM),
     fp.PressSettings(times_ms=(1.0, 2.0), cycle_tolerance=0.01), NewtonSettings(),
     fp.Afferent(), fp.RA(threshold=1.0), fp.PC(threshold=1.0), fp.SAI(), Transduction(0.0, 1.0, 1.0),
     LeakyIntegrateAndFire(80.0, 1e-6, 30.0, 1.0), BandPass(30.0, 2, 2),
     fp.Population([[17.0, 0.0], [18.0, 0.0]], 1.0, sensitivity=[1.0, 2.0]),
-    fp.EndOrgans([[[17.0, 0.0], [18.0, 0.0]]], [0.5, 0.5], "sum"),
+    EndOrgans([[[17.0, 0.0], [18.0, 0.0]]], [0.5, 0.5], "sum"),
     fp.Traces([0.0, 50.0, 100.0], [[0.0], [1.0], [1.0]], [50.0]), fp.SpikeTrains([1.0, 2.0, 1.5], [0, 2, 3]),
-    fp.HitRates([0.5, 0.7], [0.1, 0.1], seed=3, session=0),
-    Layout([[0.0, 0.0], [1.0, 0.0]], 1.0, pattern="uniform", seed=1), fp.Rectangle(3.0, 6.0, (1.0, 2.0)),
-    fp.Ellipse(3.0, 6.0, (1.0, 2.0)), fp.Polygon(((0.0, 0.0), (1.0, 0.0), (1.0, 1.0))),
+    HitRates([0.5, 0.7], [0.1, 0.1], seed=3, session=0),
+    Layout([[0.0, 0.0], [1.0, 0.0]], 1.0, pattern="uniform", seed=1), Rectangle(3.0, 6.0, (1.0, 2.0)),
+    fp.Ellipse(3.0, 6.0, (1.0, 2.0)), Polygon(((0.0, 0.0), (1.0, 0.0), (1.0, 1.0))),
     Experiment(presentations=10, criterion=0.5), PsychometricFunction(1.0, 0.5, 0.5, 0.0, "weibull"),
     JudgementCounts([1.0, 2.0], [5, 9], [10, 10]), GaussianResponses([1.0, 2.0], [[1.0, 0.1], [0.1, 1.0]]),
-    fp.RateRecordings(("a", "b"), [1.0, 2.0], [1.0, 2.0]), fp.SurfaceProfile([0.0, 1.0], [0.1, 0.2]),
+    fp.RateRecordings(("a", "b"), [1.0, 2.0], [1.0, 2.0]), SurfaceProfile([0.0, 1.0], [0.1, 0.2]),
     Conditions("quick", 3, "human"), TactileStimulus(BALL, x_mm=1.0, tilt_deg=3.0, friction=0.3),
-    fp.ReducedRange(depth_mm=1.0, x_mm=(-1, 1), parameter="curvature_per_m", values=(200, 300)),
+    ReducedRange(depth_mm=1.0, x_mm=(-1, 1), parameter="curvature_per_m", values=(200, 300)),
 ]  # fmt: skip
 
 
@@ -199,15 +211,15 @@ FILES = {
     ),
     "reduction.yaml": (b"object: {kind: sphere}\nrange: {depth_mm: 1}\n", fp.ReductionRequest.read),
     "any.yaml": (b"a: [1, 2.5, {b: 'c'}]\n", lambda path: read_yaml(path.read_text(errors="ignore"), "any")),
-    "stimuli.csv": (b"name,object,object.diameter_mm\nprobe,punch,1.0\nwide,punch,4\n", fp.read_stimuli),
-    "stimuli.yaml": (b"stimuli:\n- {name: a, object: {kind: sphere, radius_mm: 3}}\n", fp.read_stimuli),
+    "stimuli.csv": (b"name,object,object.diameter_mm\nprobe,punch,1.0\nwide,punch,4\n", read_stimuli),
+    "stimuli.yaml": (b"stimuli:\n- {name: a, object: {kind: sphere, radius_mm: 3}}\n", read_stimuli),
     "rates.csv": (
         b"shift_mm,static_rate_hz,dynamic_rate_hz,fold\n-1.5,60,20,1\n0,10,5,2\n",
-        lambda path: fp.read_recordings(path, ShiftedBar()),
+        lambda path: read_recordings(path, ShiftedBar()),
     ),
     "spikes.csv": (
         b"shift_mm,spike_times_ms,duration_ms\n-1.5,1 2 30,900\n0,,800\n",
-        lambda path: fp.read_recordings(path, ShiftedBar()),
+        lambda path: read_recordings(path, ShiftedBar()),
     ),
     "force.csv": (b"indenter,depth_mm,force_n\nplate,1,0.2\npunch:6.35,1,0.1\n", read_observations),
     "motion.csv": (b"time_ms,depth_mm,x_mm\n0,0,0\n50,1,0\n60,1,0.2\n", fp.read_trajectory),

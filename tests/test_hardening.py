@@ -18,6 +18,7 @@ import fingerpad as fp
 from fingerpad.cli import commands, main
 from fingerpad.core.errors import LONGEST_MESSAGE, FingerpadError, InputError, closest
 from fingerpad.core.files import read_text
+from fingerpad.core.phases import Phase
 from fingerpad.core.plain_yaml import DEEPEST, LARGEST_TEXT, read_yaml
 from fingerpad.core.regions import Rectangle, poisson_disc, rectangular
 from fingerpad.core.signals import Traces
@@ -29,8 +30,10 @@ from fingerpad.experiments.requests.afferents import fitted_afferent
 from fingerpad.experiments.requests.stimuli import ShiftedBar
 from fingerpad.experiments.requests.stimulus import TactileStimulus
 from fingerpad.experiments.requests.touch import estimate_press
+from fingerpad.export.sweep_results import observe_sweep, setting_response, write_sweep_spikes
 from fingerpad.inference.rate_model import AfferentModel
 from fingerpad.inference.recordings import RateRecordings
+from fingerpad.mechanics.materials import Hencky
 from fingerpad.neuron.population import sensitivities
 from fingerpad.psychophysics.curve_fit import fit_psychometric
 from fingerpad.psychophysics.encoding import gradient_sum
@@ -222,7 +225,7 @@ NO_NUMBERS = [
         lambda odd: fp.RampAndHold(depth_mm=odd),
         lambda odd: fp.Material.neo_hooke(odd, 0.4),
         lambda odd: Rectangle(odd, 6.0),
-        lambda odd: fp.Hencky(odd, 100.0),
+        lambda odd: Hencky(odd, 100.0),
         lambda odd: TactileStimulus(fp.Sphere(curvature_per_m=287), friction=odd),
         lambda odd: fp.Trajectory((0.0, 1.0), odd),
         lambda odd: fp.Traces([0.0, 1.0], odd),
@@ -289,7 +292,7 @@ def test_sequences_become_tuples_so_that_values_hash():
         lambda: SurfaceProfile([2, 1], [np.nan]),
         lambda: RateRecordings("ab", [1.0, 2.0], None),
         lambda: fp.Grading(17.0, 1.0, 1.0, 0.5, 0.5, full="yes"),
-        lambda: fp.Phase(3, 0.0, 1.0),
+        lambda: Phase(3, 0.0, 1.0),
         lambda: fp.SpikeTrains([1.0, 2.0], [0, 0.5, 2]),
         lambda: fp.Traces([0, 1], np.ma.array([[1.0], [2.0]], mask=[[0], [1]])),
         lambda: fp.Traces(np.array(["2001-01-01", "2001-01-02"], dtype="datetime64[D]"), [[1.0], [2.0]]),
@@ -450,10 +453,10 @@ def test_what_is_no_path_is_refused(read):
 @pytest.mark.parametrize(
     "use",
     [
-        fp.setting_touch, fp.setting_response,
-        lambda data: fp.observe_sweep(data, {"along": "motion.depth_mm"}),
+        fp.setting_touch, setting_response,
+        lambda data: observe_sweep(data, {"along": "motion.depth_mm"}),
         lambda data: fp.write_sweep_table(data, "rates.csv"),
-        lambda data: fp.write_sweep_spikes(data, "spikes.nwb"),
+        lambda data: write_sweep_spikes(data, "spikes.nwb"),
     ],
     ids=lambda use: getattr(use, "__name__", ""),
 )  # fmt: skip

@@ -6,12 +6,13 @@ import numpy as np
 import pytest
 
 import fingerpad as fp
+from fingerpad.geometry.dots import Dots
 from fingerpad.geometry.indenter_grading import THIN_SIZE_MM, first_touch_x_mm, grading_about
 from fingerpad.mechanics.assembly import Sparsity, assemble
 from fingerpad.mechanics.contact import place
 from fingerpad.mechanics.materials import MaterialTable
 from fingerpad.skin.fields import FIELDS, Place, sampled_fields
-from fingerpad.skin.indentation import settings_of
+from fingerpad.skin.indentation import Touch, settings_of
 from refusals import refusals
 
 FINGER, BALL = fp.Fingertip(), fp.Sphere(curvature_per_m=287)
@@ -22,7 +23,7 @@ COARSE = fp.Grading(17.37, 1.2, 1.2, 0.6, 0.6, largest_mm=4.0, stratum_corneum=1
 
 def coarse_touch(**changes):
     settings, motion = fp.PressSettings(ramp_steps=2, hold_steps=2), fp.RampAndHold(depth_mm=0.5)
-    return replace(fp.Touch(FINGER, BALL, motion, fp.named_tissues("trial3"), COARSE, settings), **changes)
+    return replace(Touch(FINGER, BALL, motion, fp.named_tissues("trial3"), COARSE, settings), **changes)
 
 
 @pytest.fixture(scope="module")
@@ -104,7 +105,7 @@ def test_a_touch_is_that_which_its_arguments_describe():
     """The named resolution and tissues, spelt out."""
     described = fp.touch_of(FINGER, BALL, SHALLOW, tissues="trial1", resolution="quick", at_mm=(16.0, 0.0))
     tissues, grading = fp.named_tissues("trial1"), grading_about(BALL, "quick", 16.0)
-    touch = fp.Touch(FINGER, BALL, SHALLOW, tissues, grading, settings_of("quick"), at_mm=(16.0, 0.0))
+    touch = Touch(FINGER, BALL, SHALLOW, tissues, grading, settings_of("quick"), at_mm=(16.0, 0.0))
     assert described == touch
     softer = coarse_touch(stimulus=SHALLOW).solve()  # stiffer tissues need more force
     assert coarse_touch(stimulus=SHALLOW, tissues=tissues).solve().force_mn[-1] > 1.1 * softer.force_mn[-1]
@@ -226,7 +227,7 @@ def test_force_of_a_grating_is_that_of_a_mesh_that_is_fine_everywhere():
 
 def test_fine_mesh_reaches_to_the_first_touch_of_wide_ridges_and_dots_alone():
     """A body that is pressed straight touches at its axis, and a flat one needs no fine mesh elsewhere."""
-    field = fp.Dots([(x, 0.0) for x in np.arange(-12.0, 12.1, 2.4)])
+    field = Dots([(x, 0.0) for x in np.arange(-12.0, 12.1, 2.4)])
     motion, highest_mm = fp.RampAndHold(depth_mm=0.3), first_touch_x_mm(FINGER, 17.37, np.inf, 0.0)
     for body, tilt_deg, reaches in (
         (fp.Grating(), 0.0, True), (field, 0.0, True), (fp.Grating(), 8.0, False),

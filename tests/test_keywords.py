@@ -18,6 +18,7 @@ from fingerpad.core.units import unit_of
 from fingerpad.experiments.requests.stimuli import read_stimuli
 from fingerpad.experiments.requests.stimulus import indenter_named
 from fingerpad.geometry.edged_indenters import INDENTERS, sizes_of
+from fingerpad.reduction.training import ReducedRange
 from fingerpad.skin.store import touch_key
 
 SAME = [
@@ -87,7 +88,7 @@ def test_fields_are_the_papers_and_units_cover_every_name():
         (lambda: indenter_named("bar:3:width_mm=4"), "indenter must have width_mm once"),
         (lambda: indenter_named("sphere:=4"), "is no argument of Sphere:"),
         (lambda: fp.sine(0.8, 0.1), "sine needs frequency_hz, cycles: they are not given."),
-        (lambda: fp.ReducedRange(), "ReducedRange needs depth_mm: it is not given."),
+        (lambda: ReducedRange(), "ReducedRange needs depth_mm: it is not given."),
         (lambda: fp.save_figure("a.png", None), "save_figure needs response: it is not given."),
         (lambda: fp.read_height_map("x.png"), "read_height_map needs pitch_mm: it is not given."),
         (lambda: fp.Fingertip("child"), "got 'child', write Fingertip.of('child')."),

@@ -32,6 +32,8 @@ from fingerpad.lab.server import HOST, reply_to, serve, spec_of
 from fingerpad.lab.state import LabState, state_of
 from fingerpad.lab.static import write_static
 from fingerpad.lab.view import view_of
+from fingerpad.reduction.model import write_reduced
+from fingerpad.skin.store import Store
 
 RANGE = "object: {kind: sphere, curvature_per_m: %g}\nrange: {depth_mm: 0.5, x_mm: [-1, 1]}\ncalibration: 0\n"
 PRESS = LabState("ball", depth_mm=0.4)
@@ -48,7 +50,7 @@ def laboratory(tmp_path_factory):
     model = made.model(PRESS)
     assert model is not None
     harder = replace(model, totals=1.2 * model.totals, coefficients=1.2 * model.coefficients)
-    fp.write_reduced(harder, made.path(replace(PRESS, object="flat")))
+    write_reduced(harder, made.path(replace(PRESS, object="flat")))
     return made
 
 
@@ -179,7 +181,7 @@ def test_the_python_lines_reproduce_the_view(laboratory):
     for site, train in enumerate(view.answer.spikes):
         np.testing.assert_allclose(spikes[site], train, atol=0.01)
     laboratory.answer(PRESS, exact=True)
-    assert fp.Store(laboratory.folder / "indentations").holds(names["exact"])
+    assert Store(laboratory.folder / "indentations").holds(names["exact"])
 
 
 def test_what_was_made_is_not_pressed_again(laboratory, monkeypatch):

@@ -17,7 +17,7 @@ from fingerpad.mechanics.balance import (
 )
 from fingerpad.mechanics.contact import place
 from fingerpad.mechanics.element import SHAPE_DERIVATIVES
-from fingerpad.mechanics.materials import MaterialTable
+from fingerpad.mechanics.materials import Hyperfoam, MaterialTable
 from fingerpad.mechanics.press import press
 from fingerpad.mechanics.viscoelastic import (
     StepCoefficients,
@@ -121,7 +121,7 @@ def test_work_of_the_relaxed_stress_is_that_of_a_slow_look_at_every_point():
     mesh = block_mesh([0.0, 1.0, 2.2], [0.0, 0.7], [0.0, 1.0], layers=[0])
     ends = [0.1 * rng.uniform(-1.0, 1.0, mesh.nodes_mm.shape) for _ in range(2)]
     full = np.array([[0, 3, 5], [3, 1, 4], [5, 4, 2]])
-    foam = fp.Material(fp.Hyperfoam((2.0, 3.0), (-3.0, 7.0), poisson=0.3), PRONY)
+    foam = fp.Material(Hyperfoam((2.0, 3.0), (-3.0, 7.0), poisson=0.3), PRONY)
     for material in (RELAXING, foam):
         table = MaterialTable.of([material])
         history = StressHistory(rng.normal(size=(2, 8, 6)), 0.2 * rng.normal(size=(2, 2, 8, 6)))

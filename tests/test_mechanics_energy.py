@@ -6,10 +6,11 @@ import warnings
 import numpy as np
 import pytest
 
-from fingerpad import Energy, Hencky, Hyperfoam, Material, MaterialWarning, Ogden, Polynomial
+from fingerpad import Energy, Material
+from fingerpad.core.errors import MaterialWarning
 from fingerpad.data import tissues
 from fingerpad.mechanics.energy import SECOND, translate
-from fingerpad.mechanics.materials import MaterialTable, instability
+from fingerpad.mechanics.materials import Hencky, Hyperfoam, MaterialTable, Ogden, Polynomial, instability
 from refusals import refusals
 
 LOGS = np.array([0.21, -0.34, 0.13, 0.17])

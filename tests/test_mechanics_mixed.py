@@ -5,12 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from fingerpad import ForceRampAndHold, Hencky, Material, Polynomial, PressSettings, RampAndHold, Sphere
+from fingerpad import ForceRampAndHold, Material, PressSettings, RampAndHold, Sphere
 from fingerpad.geometry.mesh import block_mesh
 from fingerpad.geometry.mesh_checks import jacobian_at_gauss
 from fingerpad.mechanics import press as press_module
 from fingerpad.mechanics.assembly import Sparsity
-from fingerpad.mechanics.materials import MaterialTable
+from fingerpad.mechanics.materials import Hencky, MaterialTable, Polynomial
 from fingerpad.mechanics.mixed import Pressures, exchange_pressure
 from fingerpad.mechanics.newton import NewtonSettings
 from presses import block, press_into

@@ -9,6 +9,7 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 
 import fingerpad as fp
+from fingerpad.core.phases import Phase
 from fingerpad.geometry.paths import check_path
 from refusals import refusals
 
@@ -149,7 +150,7 @@ def test_the_error_of_a_reduction_is_bounded_at_all_samples_of_all_columns():
 
 def test_given_names_of_phases_stay_when_samples_are_left_out():
     _, recorded = recording()
-    named = replace(recorded, phases=(fp.Phase("ramp", 0.0, 80.0), fp.Phase("rest", 80.0, 1200.0)))
+    named = replace(recorded, phases=(Phase("ramp", 0.0, 80.0), Phase("rest", 80.0, 1200.0)))
     assert fp.reduced(named).phases == named.phases
 
 
@@ -166,7 +167,7 @@ def test_a_file_is_read_with_its_units_from_its_first_row(tmp_path):
     path = written(
         tmp_path, "# robot\nx_mm,time_s,depth_um,tilt_deg\n7,3.0,-100,1\n7,3.1,900,1\n9.5,3.6,900,6\n"
     )
-    motion = fp.read_trajectory(path, phases=[fp.Phase("all", 0.0, 600.0)])
+    motion = fp.read_trajectory(path, phases=[Phase("all", 0.0, 600.0)])
     np.testing.assert_allclose(motion.times_ms, (0.0, 100.0, 600.0))
     np.testing.assert_allclose(motion.depth_mm, (-0.1, 0.9, 0.9))
     assert motion.x_mm == (0.0, 0.0, 2.5)

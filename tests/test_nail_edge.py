@@ -7,10 +7,11 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy.spatial import cKDTree
 
-from fingerpad import Fingertip, NailEdge, Population
+from fingerpad import Fingertip, Population
 from fingerpad.core.regions import uniform
 from fingerpad.geometry.grading import resolution_grading
 from fingerpad.geometry.mesh import finger_mesh
+from fingerpad.skin.nail_edge import NailEdge
 from fingerpad.skin.receptor_sheet import ReceptorSheet
 from refusals import refusals
 

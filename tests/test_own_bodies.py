@@ -6,7 +6,9 @@ import numpy as np
 import pytest
 
 import fingerpad as fp
+from fingerpad.geometry.dots import Dots
 from fingerpad.geometry.probing import check_gap, mirrored, traced_front
+from fingerpad.skin.indentation import Touch
 from fingerpad.skin.store import touch_key
 
 BODIES = [fp.Sphere(), fp.Cylinder(), fp.Bar(), fp.FlatPunch(), fp.Edge(), fp.Gap(), fp.Grating(), fp.Plate()]
@@ -61,9 +63,7 @@ PLATE = "return points[:, 1] + {} * points[:, 0] ** 2 * 0, np.tile([0.0, 1.0, 0.
 
 
 def key(body):
-    touch = fp.Touch(
-        fp.Fingertip(), body, fp.RampAndHold(depth_mm=0.3), TISSUES, COARSE, fp.PressSettings(1, 1)
-    )
+    touch = Touch(fp.Fingertip(), body, fp.RampAndHold(depth_mm=0.3), TISSUES, COARSE, fp.PressSettings(1, 1))
     return touch_key(touch)
 
 
@@ -89,7 +89,7 @@ def test_a_dot_beside_the_midline_is_pressed_on_a_whole_finger():
         assert Dot(z_mm).mirrors(0.0) == is_half
         assert fp.touch_of(fp.Fingertip(), Dot(z_mm)).grading.full != is_half
     with pytest.raises(fp.InputError, match="leaves Dot without symmetry"):
-        fp.Touch(fp.Fingertip(), Dot(), fp.RampAndHold(depth_mm=0.3), TISSUES, COARSE, fp.PressSettings(1, 1))
+        Touch(fp.Fingertip(), Dot(), fp.RampAndHold(depth_mm=0.3), TISSUES, COARSE, fp.PressSettings(1, 1))
 
 
 def test_a_derived_class_with_another_gap_is_not_trusted():
@@ -141,9 +141,7 @@ def test_a_gap_that_breaks_its_contract_is_refused_in_one_sentence(gap, said):
     assert "Own" in str(raised.value)
 
 
-@pytest.mark.parametrize(
-    "body", [fp.Dots([(0.0, 0.0)]), fp.Dots([(0.0, -1.25), (0.5, 1.25)]), fp.braille("k")]
-)
+@pytest.mark.parametrize("body", [Dots([(0.0, 0.0)]), Dots([(0.0, -1.25), (0.5, 1.25)]), fp.braille("k")])
 def test_the_normal_of_dots_is_the_gradient_of_their_gap(body):
     check_gap(body.gap, "Dots")
     points = np.random.default_rng(4).uniform([-3, -0.4, -3], [3, 0.6, 3], (300, 3))
@@ -178,4 +176,4 @@ def test_a_mesh_resolves_dots_and_their_distances():
     assert not grading.full  # two dots side by side, mirror images of each other
     assert max(grading.size_x_mm, grading.size_z_mm) <= (2.34 - 1.44) / 4
     with pytest.raises(fp.InputError, match="height_mm must not exceed"):
-        fp.Dots([(0.0, 0.0)], height_mm=1.0)
+        Dots([(0.0, 0.0)], height_mm=1.0)

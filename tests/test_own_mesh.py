@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import fingerpad as fp
+from fingerpad.experiments.requests.stimuli import read_stimuli
 from fingerpad.export.decks import abaqus_deck
 from fingerpad.export.job import job_of
 from fingerpad.geometry.free_mesh import FACES, FreeMesh, closest_on_triangles
@@ -448,7 +449,7 @@ def test_stimuli_of_a_fit_are_pressed_into_the_mesh(sent):
     folder, skin = sent
     path = folder / "stimuli.yaml"
     path.write_text("finger: finger.inp\nobject: sphere\nstimuli: [{name: probe}]\n")
-    read = fp.read_stimuli(path)
+    read = read_stimuli(path)
     assert read.finger_files == (folder / "finger.inp",)
     (touch,) = read.touches([read.named("probe")], read.conditions).values()
     assert len(touch.mesh.nodes_mm) == len(skin.mesh.nodes_mm)

@@ -6,7 +6,9 @@ from numpy.testing import assert_allclose, assert_array_equal
 from scipy.stats import kstest
 
 import fingerpad as fp
+from fingerpad.core.errors import TissuesWarning
 from fingerpad.core.regions import jittered
+from fingerpad.neuron.end_organs import EndOrgans
 from fingerpad.neuron.population import CENTRE_MM, sensitivities
 from refusals import refusals
 from sections import SED_DRIVEN, SENSITIVE
@@ -50,7 +52,7 @@ def test_the_default_grid_follows_the_finger_that_is_touched_and_others_stay():
     assert_array_equal(mixed["SAI"].positions_mm, response.positions_mm)
     stays = fp.Population.grid(centre_mm=CENTRE_MM, afferent=SENSITIVE).respond(skin)
     assert_array_equal(stays.positions_mm, fp.Population.grid().positions_mm)
-    branched = replace(fp.Population.grid(rows=1, columns=1), ends=fp.EndOrgans([[[17.0, 0.0]]]))
+    branched = replace(fp.Population.grid(rows=1, columns=1), ends=EndOrgans([[[17.0, 0.0]]]))
     assert branched.on(skin) is branched
 
 
@@ -108,9 +110,7 @@ def test_the_default_afferent_warns_of_other_tissues_and_their_own_does_not():
         skin.tissues_name = own
         assert fp.Population.grid(rows=1, columns=1).respond(skin).spikes
     skin.tissues_name = "paper"
-    with pytest.warns(
-        fp.TissuesWarning, match=r"the skin has 'paper': give .*for_tissues\('paper'\)"
-    ) as found:
+    with pytest.warns(TissuesWarning, match=r"the skin has 'paper': give .*for_tissues\('paper'\)") as found:
         fp.Population.grid(rows=1, columns=1).respond(skin)
     assert found[0].filename == __file__
     fp.Population.grid(rows=1, columns=1, afferent=fp.Afferent.for_tissues("paper")).respond(skin)

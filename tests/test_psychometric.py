@@ -9,9 +9,10 @@ from hypothesis import strategies as st
 from scipy import stats
 from scipy.optimize import differential_evolution
 
-from fingerpad import ConvergenceError, fit_psychometric
+from fingerpad import ConvergenceError
 from fingerpad.psychophysics import FunctionCloud, PsychometricFunction, bootstrap, goodness_of_fit, posterior
 from fingerpad.psychophysics.curve import SIGMOIDS, log_probability
+from fingerpad.psychophysics.curve_fit import fit_psychometric
 from fingerpad.psychophysics.curve_uncertainty import STEEPEST, weighted_quantiles
 from refusals import refusals
 

@@ -4,11 +4,13 @@ import re
 from pathlib import Path
 
 import pytest
-from fingerpad.cli.reproduce import EXPECTED_TIME
+
+import fingerpad
 
 ROOT = Path(__file__).parents[1]
 README = (ROOT / "README.md").read_text(encoding="utf-8")
 PAGES = sorted([*ROOT.glob("*.md"), *(ROOT / "docs").rglob("*.md")])
+GALLERY = sorted((ROOT / "docs" / "gallery").glob("*.py"))
 BLOCKS = [
     pytest.param(block, id=f"{page.relative_to(ROOT)}-{number}")
     for page in PAGES
@@ -42,5 +44,9 @@ def test_pictures_are_light() -> None:
     assert [image.name for image in (ROOT / "docs").rglob("*.png") if image.stat().st_size > 300_000] == []
 
 
-def test_the_time_is_the_one_the_command_expects() -> None:
-    assert f"It takes {EXPECTED_TIME['standard']}" in README.replace("\n", " ")
+def test_pages_import_nothing_below_the_package() -> None:
+    pages = [ROOT / "README.md", *(ROOT / "docs").rglob("*.md"), *(ROOT / "docs").rglob("*.ipynb")]
+    below = re.compile(r"(?:from|import) fingerpad\.[\w.]+")
+    found = {page.name: below.findall(page.read_text("utf-8")) for page in [*pages, *GALLERY]}
+    assert {name: lines for name, lines in found.items() if lines} == {}
+    assert len(fingerpad.__all__) <= 90

@@ -12,6 +12,7 @@ from fingerpad.geometry.grading import resolution_grading
 from fingerpad.geometry.mesh import finger_mesh
 from fingerpad.geometry.mesh_parts import MeshParts, finger_from
 from fingerpad.skin.fields import FIELDS, watched_elements
+from fingerpad.skin.store import Store, solve_missing
 from sections import SphereSkin, layered_block
 from test_sampling import SITES, response
 
@@ -176,8 +177,8 @@ def test_a_press_keeps_all_quantities_in_the_layers_of_its_receptor_depths(press
     says = "one at which the press kept von_mises: got 1.2 mm; press with receptor_depths_mm=(1.2,)."
     assert refused(lambda: plain.sample("von_mises", sites, depth_mm=1.2)) == f"depth_mm must be {says}"
     assert "receptor_depths_mm=(3,)" in refused(lambda: skin.sample("von_mises", sites, depth_mm=3.0))
-    store = fp.Store(tmp_path)
-    fp.solve_missing(store.missing([touch]), jobs=1)
+    store = Store(tmp_path)
+    solve_missing(store.missing([touch]), jobs=1)
     stored = store.load(touch)
     assert_allclose(
         stored.sample("von_mises", sites, depth_mm=0.9),

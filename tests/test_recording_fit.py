@@ -27,6 +27,7 @@ from fingerpad.experiments.fit.rate_uncertainty import rate_posterior
 from fingerpad.experiments.fit.results import ParameterProfile, PhaseBands, RateBand, RatePosterior
 from fingerpad.experiments.gerling2014 import nerve
 from fingerpad.experiments.manifest import sha256
+from fingerpad.experiments.recording_files import read_recordings
 from fingerpad.experiments.requests.afferents import fitted_afferent
 from fingerpad.experiments.requests.stimuli import ListedStimuli, NamedStimulus, ShiftedBar
 from fingerpad.inference.afferent_fit import OFFSETS_MM
@@ -260,7 +261,7 @@ def test_the_stimuli_of_the_bar_are_the_touches_of_the_reproduction(tmp_path):
     path = tmp_path / "bar.csv"
     path.write_text(request.example_recordings())
     bar, conditions = ShiftedBar(), Conditions("quick")
-    recorded = fp.read_recordings(path, bar)
+    recorded = read_recordings(path, bar)
     touches = bar.touches(list(recorded.stimuli.values()), conditions)
     assert list(touches.values()) == nerve.bar_touches(conditions)
     observed = bar_firing_rates()
@@ -485,7 +486,7 @@ def test_bad_input_is_one_sentence_and_status_2_and_nothing_is_written(
 def test_the_example_prints_its_command_and_writes_recordings(run_program, tmp_path):
     status, said, errors = run_program(cli.main, "fingerpad", "init", "recordings", "--out", "try")
     assert (status, said, errors) == (0, "Try: fingerpad fit try/bar.csv\n", "")
-    assert fp.read_recordings(tmp_path / "try/bar.csv", ShiftedBar()).recordings.n_rates == 72
+    assert read_recordings(tmp_path / "try/bar.csv", ShiftedBar()).recordings.n_rates == 72
 
 
 def test_figures_show_what_was_recorded_and_nothing_else(recovered):

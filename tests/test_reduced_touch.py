@@ -15,8 +15,18 @@ from fingerpad.cli import main
 from fingerpad.core.signals import Traces
 from fingerpad.geometry.motion import Pose
 from fingerpad.neuron.afferent_types import afferent_types
-from fingerpad.reduction.building import filtered, joint_bounds, largest_errors
-from fingerpad.reduction.model import AT_ONCE, LEVELS, Springs, amplitudes, levels_mm, lost, slope_changes
+from fingerpad.reduction.building import filtered, joint_bounds, largest_errors, reduce_touch
+from fingerpad.reduction.model import (
+    AT_ONCE,
+    LEVELS,
+    ReducedModel,
+    Springs,
+    amplitudes,
+    levels_mm,
+    lost,
+    slope_changes,
+    write_reduced,
+)
 from fingerpad.reduction.streaming import read_local
 from fingerpad.reduction.training import (
     Axis,
@@ -58,7 +68,7 @@ calibration: 0
 
 
 @pytest.fixture(scope="module")
-def model(written: tuple[Path, str], training: ReducedTraining) -> fp.ReducedModel:
+def model(written: tuple[Path, str], training: ReducedTraining) -> ReducedModel:
     return fp.read_reduced(written[0] / "ball.npz", training.touch)
 
 
@@ -144,7 +154,7 @@ def test_a_released_spring_stays_behind_and_recovers_in_closed_form() -> None:
 )  # fmt: skip
 def test_it_agrees_with_the_full_solver_on_touches_not_used(
     training: ReducedTraining,
-    model: fp.ReducedModel,
+    model: ReducedModel,
     times_ms: list[float],
     depth_mm: list[float],
     bounds: tuple[float, float, float],
@@ -166,7 +176,7 @@ def test_bounds_hold_for_all_quantities_together() -> None:
     assert np.mean(kept) == pytest.approx(20 / 21, abs=0.015)
 
 
-def test_a_force_finds_its_depth(model: fp.ReducedModel) -> None:
+def test_a_force_finds_its_depth(model: ReducedModel) -> None:
     by_depth, by_force = (fp.ReducedTouch(model, [(17.37, 0.0)]) for _ in range(2))
     wanted = by_depth.step(100.0, depth_mm=0.7)
     found = by_force.step(100.0, force_mn=wanted.force_mn)
@@ -175,7 +185,7 @@ def test_a_force_finds_its_depth(model: fp.ReducedModel) -> None:
     assert later.depth_mm > found.depth_mm  # the skin creeps
 
 
-def test_a_force_may_fall_to_nothing_and_come_back(model: fp.ReducedModel) -> None:
+def test_a_force_may_fall_to_nothing_and_come_back(model: ReducedModel) -> None:
     stream = fp.ReducedTouch(model, [(17.37, 0.0)])
     forces_mn = {1000.0: 40.0, 1020.0: 5.0, 1040.0: 0.01, 1060.0: 1e-9, 1100.0: 0.0, 1200.0: 20.0}
     for until_ms, wanted_mn in forces_mn.items():
@@ -185,7 +195,7 @@ def test_a_force_may_fall_to_nothing_and_come_back(model: fp.ReducedModel) -> No
         assert -1e-6 < sample.depth_mm < DEEPEST_MM
 
 
-def test_a_touch_out_of_its_range_leaves_the_state_as_it_was(model: fp.ReducedModel) -> None:
+def test_a_touch_out_of_its_range_leaves_the_state_as_it_was(model: ReducedModel) -> None:
     stream = fp.ReducedTouch(model, [(17.37, 0.0)])
     stream.step(50.0, depth_mm=0.5)
     for wrong in ({"depth_mm": 1.5}, {"depth_mm": 0.5, "x_mm": 1.0}, {"force_mn": 1e4}, {}):
@@ -198,9 +208,9 @@ def test_a_touch_out_of_its_range_leaves_the_state_as_it_was(model: fp.ReducedMo
     assert stream.step(70.0, depth_mm=0.6).fields == again.step(70.0, depth_mm=0.6).fields
 
 
-def test_a_file_has_the_same_bits_and_tells_damage(tmp_path: Path, model: fp.ReducedModel) -> None:
+def test_a_file_has_the_same_bits_and_tells_damage(tmp_path: Path, model: ReducedModel) -> None:
     path = tmp_path / "sphere.npz"
-    fp.write_reduced(model, path)
+    write_reduced(model, path)
     assert path.stat().st_size < 5e6
     read = fp.read_reduced(path, fp.touch_of(fp.Fingertip(), fp.Sphere()))
     assert (read.modes == model.modes).all()
@@ -231,7 +241,7 @@ test_what_cannot_be_reduced_is_told_before_a_press = refusals(
     (lambda: ReducedRange(1.0, parameter="curvature_per_m"), "or neither"),
     (lambda: ReducedTraining(replace(TOUCH, friction=0.5), ReducedRange(1.0, (-1, 1))), ("friction",)),
     (lambda: ReducedTraining(TOUCH, ReducedRange(1.0, parameter="a", values=(1, 2))), ("parameter",)),
-    (lambda: fp.reduce_touch(ReducedTraining(TOUCH, ReducedRange(1.0)), calibration=5), ("calibration",)),
+    (lambda: reduce_touch(ReducedTraining(TOUCH, ReducedRange(1.0)), calibration=5), ("calibration",)),
     (lambda: list(ReducedTraining(TOUCH, ReducedRange(9.0)).poses()), ("depth_mm",)),
 )  # fmt: skip
 

@@ -7,7 +7,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from fingerpad import Ellipse, Polygon, Rectangle
+from fingerpad import Ellipse
+from fingerpad.core.regions import Polygon, Rectangle
 from refusals import refusals
 
 L_SHAPE = Polygon(((0.0, 0.0), (4.0, 0.0), (4.0, 1.0), (1.0, 1.0), (1.0, 3.0), (0.0, 3.0)))

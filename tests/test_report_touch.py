@@ -14,6 +14,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 import fingerpad as fp
 from fingerpad.geometry.mesh import block_mesh
 from fingerpad.geometry.motion import Pose
+from fingerpad.geometry.surface import Surface
 from fingerpad.report import skin as touch_figure
 from fingerpad.report.style import new_figure
 from fingerpad.skin.section import middle_section
@@ -123,7 +124,7 @@ def test_a_hole_through_a_body_is_drawn_as_a_hole(skin):
     near = np.arange(48)
     after, outer = (near + 1) % 48, near + 48
     quads = np.stack([near, after, after + 48, outer], axis=1)
-    ring = fp.Surface(np.array(flat), np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]]))
+    ring = Surface(np.array(flat), np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]]))
     axes = new_figure(4.0, 3.0).subplots()
     touch_figure._draw_indenter(axes, skin, skin.section(), ring)
     left, right = (patch.get_xy()[:, 0] for patch in axes.patches)

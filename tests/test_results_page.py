@@ -8,7 +8,6 @@ import pytest
 
 from fingerpad.core.errors import InputError, StoreError
 from fingerpad.core.result_files import from_json
-from studies.command_line_page import command_line_page
 from studies.pages import with_blocks
 from studies.results_page import (
     README_END,
@@ -39,10 +38,6 @@ def test_the_page_of_results_is_written_from_its_numbers(shown):
 
 def test_the_table_of_the_readme_is_written_from_the_same_numbers(shown):
     assert with_table(page("README.md"), shown) == page("README.md")
-
-
-def test_the_page_of_the_command_line_is_written_from_the_commands():
-    assert page("docs/command-line.md") == command_line_page()
 
 
 def test_the_page_of_tissues_is_written_from_their_numbers():

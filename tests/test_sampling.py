@@ -8,10 +8,11 @@ import numpy as np
 import pytest
 from scipy.interpolate import CloughTocher2DInterpolator
 
-from fingerpad import Fingertip, InputError, SkinResponse
+from fingerpad import Fingertip, InputError
 from fingerpad.geometry.grading import resolution_grading
 from fingerpad.geometry.mesh import LAYERS, block_mesh, finger_mesh
 from fingerpad.skin.receptor_sheet import ReceptorSheet
+from fingerpad.skin.sampling import SkinResponse
 from sections import DEPTHS_MM, LAYER_OF_INTERVAL, layered_block
 
 TIMES_MS = np.array([0.0, 50.0, 1000.0])

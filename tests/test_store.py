@@ -18,18 +18,21 @@ import fingerpad
 import fingerpad as fp
 from cluster import wait_until
 from fingerpad.cli import main
+from fingerpad.core.errors import StoreError
 from fingerpad.core.units import QUANTITY_UNITS
 from fingerpad.mechanics.newton import NewtonSettings
 from fingerpad.skin import code_hash
 from fingerpad.skin.code_hash import MECHANICAL_SOURCES
 from fingerpad.skin.fields import FIELDS, Field, Place, Times
-from fingerpad.skin.store import _checksum, touch_key
+from fingerpad.skin.indentation import Touch
+from fingerpad.skin.sampling import SkinResponse
+from fingerpad.skin.store import Store, _checksum, solve_missing, touch_key
 from refusals import misused
 
 COARSE = fp.Grading(
     17.37, 1.2, 1.2, 0.8, 0.8, largest_mm=6.0, stratum_corneum=1, living_epidermis=1, dermis=1, subcutis=1
 )
-TINY = fp.Touch(
+TINY = Touch(
     finger=fp.Fingertip(),
     indenter=fp.Sphere(curvature_per_m=287.0),
     stimulus=fp.RampAndHold(depth_mm=0.1),
@@ -67,7 +70,7 @@ def skin():
 @pytest.fixture
 def stored(tmp_path, skin):
     """A store that holds one touch."""
-    store = fp.Store(tmp_path / "store")
+    store = Store(tmp_path / "store")
     store.save(TINY, skin)
     return store
 
@@ -113,7 +116,7 @@ def test_key_changes_with_the_last_bit_of_every_input():
     touch = replace(TINY, receptor_depths_mm=(1.2,))
     paths = dict(leaves(touch))
     named = {path[0] for path in paths}
-    assert named == {field.name for field in fields(fp.Touch) if field.compare}
+    assert named == {field.name for field in fields(Touch) if field.compare}
     assert ("settings", "newton", "residual_tolerance") in paths
     keys = [touch_key(changed(touch, path, nearest_other(leaf))) for path, leaf in paths.items()]
     assert len({touch_key(TINY), touch_key(touch), *keys}) == 2 + len(paths)
@@ -128,7 +131,7 @@ def test_indenters_of_equal_numbers_have_different_keys():
 
 
 def test_equal_touches_have_one_key_whatever_their_numbers_were_written_as():
-    again = fp.Touch(
+    again = Touch(
         finger=fp.Fingertip(),
         indenter=fp.Sphere(curvature_per_m=287),
         stimulus=fp.RampAndHold(depth_mm=np.float64(0.1), ramp_ms=50, hold_ms=950),
@@ -184,7 +187,7 @@ def test_any_change_of_the_mechanical_sources_presses_again(monkeypatch, tmp_pat
     monkeypatch.setattr(code_hash, "files", lambda _: tmp_path)
     for name in MECHANICAL_SOURCES:
         (tmp_path / name).mkdir(exist_ok=True, parents=True)
-    with pytest.raises(fp.StoreError, match=r"installed without its \.py files"):
+    with pytest.raises(StoreError, match=r"installed without its \.py files"):
         code_hash.code_hash.__wrapped__()
     (tmp_path / "mechanics" / "law.py").write_text("POWER = 1.0")
     before = code_hash.code_hash.__wrapped__()
@@ -200,7 +203,7 @@ def test_what_comes_back_is_what_went_in_rounded_to_single_precision(stored, ski
         came = back.fields[name]
         assert came.dtype == np.float64
         np.testing.assert_array_equal(came, went.astype(np.float32) if name in SINGLE else went)
-    for field in fields(fp.SkinResponse):
+    for field in fields(SkinResponse):
         if field.name not in ("mesh", "direction", "fields"):
             assert getattr(back, field.name) == getattr(skin, field.name)
     np.testing.assert_array_equal(back.direction, skin.direction)
@@ -213,7 +216,7 @@ def test_what_comes_back_is_what_went_in_rounded_to_single_precision(stored, ski
 
 def test_arrays_that_are_not_known_are_left_aside_and_a_missing_one_is_named(tmp_path):
     """The direction of pressing stood in files once; the area of contact did not."""
-    store, mesh, rng = fp.Store(tmp_path), TINY.mesh, np.random.default_rng(3)
+    store, mesh, rng = Store(tmp_path), TINY.mesh, np.random.default_rng(3)
     sizes = {"t": 4, "s": mesh.skin_nodes.size, "n": len(mesh.nodes_mm), "e": len(mesh.elements)}
     sizes |= {"r": mesh.living_epidermis.size, "3": 3}
     content = {
@@ -238,7 +241,7 @@ def test_arrays_that_are_not_known_are_left_aside_and_a_missing_one_is_named(tmp
         np.testing.assert_array_equal(file["solution"], solution)
     del content["contact_area_mm2"]
     write_signed(store.path(TINY), content | known)
-    with pytest.raises(fp.StoreError, match=r"contact_area_mm2.*: run again, which sets it aside\."):
+    with pytest.raises(StoreError, match=r"contact_area_mm2.*: run again, which sets it aside\."):
         store.load(TINY)
 
 
@@ -255,8 +258,8 @@ def test_one_declaration_is_stored_loaded_sampled_and_exported(tmp_path, monkeyp
     )
     monkeypatch.setitem(FIELDS, declared.name, declared)
     monkeypatch.setitem(QUANTITY_UNITS, declared.name, declared.unit)  # traces of the neural half name it too
-    store, skin = fp.Store(tmp_path), TINY.solve(whole=True)
-    fp.solve_missing(store.missing([TINY]), jobs=1)
+    store, skin = Store(tmp_path), TINY.solve(whole=True)
+    solve_missing(store.missing([TINY]), jobs=1)
     back = store.load(TINY)
     elements = TINY.mesh.living_epidermis.ravel()
     pressure = skin.deformation.fields.pressure_kpa[:, elements].astype(np.float32)
@@ -287,9 +290,9 @@ def test_fields_that_are_not_declared_or_have_another_shape_are_refused(skin):
 def test_only_the_touch_itself_is_held(stored):
     assert stored.holds(TINY)
     assert not stored.holds(SIX[0])
-    with pytest.raises(fp.StoreError, match="cannot be read"):
+    with pytest.raises(StoreError, match="cannot be read"):
         stored.load(SIX[0])
-    assert not fp.Store(stored.folder / "elsewhere").holds(TINY)
+    assert not Store(stored.folder / "elsewhere").holds(TINY)
 
 
 def content_of(path):
@@ -367,7 +370,7 @@ DAMAGES = {
 def test_a_damaged_file_is_named_in_one_sentence(stored, damage):
     path = stored.path(TINY)
     damage(path)
-    with pytest.raises(fp.StoreError) as refusal:
+    with pytest.raises(StoreError) as refusal:
         stored.load(TINY)
     said = str(refusal.value)
     assert str(path) in said
@@ -386,7 +389,7 @@ def test_a_damaged_file_is_set_aside_and_computed_again(stored, caplog, damage):
     assert str(path) in line
     assert "computed again" in line
     assert path.with_name(f"{path.name}.damaged").exists()
-    fp.solve_missing(missing, 1)
+    solve_missing(missing, 1)
     np.testing.assert_array_equal(stored.load(TINY).force_mn, known.force_mn)
     assert stored.missing([TINY]) == {}
 
@@ -394,7 +397,7 @@ def test_a_damaged_file_is_set_aside_and_computed_again(stored, caplog, damage):
 def test_a_file_of_another_touch_is_noticed(stored, skin):
     stored.save(SIX[0], skin)
     stored.path(TINY).write_bytes(stored.path(SIX[0]).read_bytes())
-    with pytest.raises(fp.StoreError, match="it is the result of another touch"):
+    with pytest.raises(StoreError, match="it is the result of another touch"):
         stored.load(TINY)
     assert set(stored.missing([TINY, SIX[0]])) == {stored.path(TINY)}
 
@@ -441,7 +444,7 @@ def test_any_byte_changed_is_noticed_or_harmless(stored):
         path.write_bytes(changed_bytes)
         try:
             back = stored.load(TINY)
-        except fp.StoreError:
+        except StoreError:
             noticed += 1
         else:
             assert all((back.fields[name] == values).all() for name, values in before.fields.items())
@@ -450,13 +453,13 @@ def test_any_byte_changed_is_noticed_or_harmless(stored):
 
 def test_a_store_that_cannot_be_written_is_an_error(tmp_path, skin):
     (tmp_path / "file").write_text("in the way")
-    store = fp.Store(tmp_path / "file" / "store")
+    store = Store(tmp_path / "file" / "store")
     assert not store.holds(TINY)
-    with pytest.raises(fp.StoreError, match="cannot be written") as refusal:
+    with pytest.raises(StoreError, match="cannot be written") as refusal:
         store.save(TINY, skin)
     assert str(store.path(TINY)) in str(refusal.value)
-    with pytest.raises(fp.StoreError, match="cannot be written"):
-        fp.solve_missing(store.missing([TINY]), jobs=1)
+    with pytest.raises(StoreError, match="cannot be written"):
+        solve_missing(store.missing([TINY]), jobs=1)
 
 
 @pytest.mark.parametrize("failure", [KeyboardInterrupt(), OSError(28, "No space left on device")])
@@ -464,9 +467,9 @@ def test_a_save_that_is_cut_short_leaves_nothing(tmp_path, monkeypatch, skin, fa
     def fail(*_):
         raise failure
 
-    store = fp.Store(tmp_path)
+    store = Store(tmp_path)
     monkeypatch.setattr(os, "replace", fail)
-    with pytest.raises((KeyboardInterrupt, fp.StoreError)):
+    with pytest.raises((KeyboardInterrupt, StoreError)):
         store.save(TINY, skin)
     assert not store.holds(TINY)
     assert list(tmp_path.iterdir()) == []
@@ -477,15 +480,15 @@ def test_the_rest_of_a_killed_write_does_not_count(stored):
     unfinished = path.with_name(f".{path.name}.0123456789abcdef.part")
     path.rename(unfinished)
     assert not stored.holds(TINY)
-    fp.solve_missing(stored.missing([TINY]), jobs=1)
+    solve_missing(stored.missing([TINY]), jobs=1)
     assert path.read_bytes() == unfinished.read_bytes()
 
 
 @pytest.fixture(scope="module")
 def uninterrupted(tmp_path_factory):
     """Store in which the six touches were solved in turn, in this process."""
-    store = fp.Store(tmp_path_factory.mktemp("uninterrupted"))
-    fp.solve_missing(store.missing(SIX), jobs=1)
+    store = Store(tmp_path_factory.mktemp("uninterrupted"))
+    solve_missing(store.missing(SIX), jobs=1)
     assert not store.missing(SIX)
     return store
 
@@ -495,30 +498,30 @@ def contents(store):
 
 
 def test_each_missing_touch_is_computed_once_and_reported(stored, monkeypatch):
-    solved, solve = [], fp.Touch.solve
+    solved, solve = [], Touch.solve
 
     def noted(touch, threads):
         solved.append(touch)
         return solve(touch, threads)
 
-    monkeypatch.setattr(fp.Touch, "solve", noted)
+    monkeypatch.setattr(Touch, "solve", noted)
     seconds: list[float] = []
     deeper = replace(TINY, stimulus=fp.RampAndHold(depth_mm=0.11))
     missing = stored.missing([deeper, TINY, deeper, TINY])
     assert missing == {stored.path(deeper): deeper}
-    fp.solve_missing(missing, 1, seconds.append)
+    solve_missing(missing, 1, seconds.append)
     assert solved == [deeper]
     assert len(seconds) == 1
     assert seconds[0] > 0.0
     assert not stored.missing([deeper, TINY])
-    fp.solve_missing({}, 1, seconds.append)
+    solve_missing({}, 1, seconds.append)
     assert len(seconds) == 1
 
 
 def test_two_processes_write_the_same_bytes_as_one(tmp_path, uninterrupted):
-    store, seconds = fp.Store(tmp_path), []
+    store, seconds = Store(tmp_path), []
     environment = dict(os.environ)
-    fp.solve_missing(store.missing([*SIX[:3], *SIX[:3]]), 2, seconds.append)
+    solve_missing(store.missing([*SIX[:3], *SIX[:3]]), 2, seconds.append)
     assert len(seconds) == 3
     assert dict(os.environ) == environment
     expected = contents(uninterrupted)
@@ -527,9 +530,9 @@ def test_two_processes_write_the_same_bytes_as_one(tmp_path, uninterrupted):
 
 @pytest.mark.parametrize("jobs", [1, 2])
 def test_what_does_not_converge_raises_and_is_not_stored(tmp_path, skin, jobs):
-    store = fp.Store(tmp_path)
+    store = Store(tmp_path)
     with pytest.raises(fp.ConvergenceError) as failure:
-        fp.solve_missing(store.missing([TINY, HOPELESS]), jobs)
+        solve_missing(store.missing([TINY, HOPELESS]), jobs)
     assert failure.value.history
     assert not store.holds(HOPELESS)
     wait_until(lambda: store.holds(TINY))  # what is under way in another process is finished and kept
@@ -539,8 +542,8 @@ def test_what_does_not_converge_raises_and_is_not_stored(tmp_path, skin, jobs):
 
 @pytest.mark.parametrize("jobs", [1, 2])
 def test_what_does_not_converge_is_told_and_the_others_are_stored(tmp_path, jobs):
-    store, failed, seconds = fp.Store(tmp_path), {}, []
-    fp.solve_missing(store.missing([HOPELESS, TINY]), jobs, seconds.append, failed.__setitem__)
+    store, failed, seconds = Store(tmp_path), {}, []
+    solve_missing(store.missing([HOPELESS, TINY]), jobs, seconds.append, failed.__setitem__)
     assert list(failed) == [HOPELESS]
     assert failed[HOPELESS].history
     assert os.listdir(tmp_path) == [store.path(TINY).name]
@@ -571,7 +574,7 @@ def group_lives(group):
 def test_a_run_killed_at_any_moment_goes_on_and_ends_with_the_same_bits(tmp_path, uninterrupted, kill):
     (tmp_path / "script.py").write_text(SCRIPT)
     (tmp_path / "touches").write_bytes(pickle.dumps(SIX))
-    store = fp.Store(tmp_path / "store")
+    store = Store(tmp_path / "store")
     run = subprocess.Popen(
         [sys.executable, tmp_path / "script.py", tmp_path / "touches", store.folder], start_new_session=True
     )
@@ -590,7 +593,7 @@ def test_a_run_killed_at_any_moment_goes_on_and_ends_with_the_same_bits(tmp_path
 
     missing = store.missing(SIX)
     assert len(missing) == len(SIX) - len(finished)
-    fp.solve_missing(missing, jobs=1)
+    solve_missing(missing, jobs=1)
     assert contents(store) == contents(uninterrupted)
     later = {path.name: path.stat().st_mtime_ns for path in store.folder.glob("*.npz")}
     assert finished.items() <= later.items()

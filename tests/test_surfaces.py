@@ -11,10 +11,13 @@ from PIL import Image
 
 import fingerpad as fp
 from fingerpad.geometry.closest_point import Triangles
+from fingerpad.geometry.composed import ridges
+from fingerpad.geometry.dots import Dots
 from fingerpad.geometry.grading import resolution_grading
 from fingerpad.geometry.indenter_grading import grading_about
 from fingerpad.geometry.probing import check_gap
 from fingerpad.geometry.relief import narrowest_relief
+from fingerpad.geometry.surface import Surface
 from fingerpad.geometry.surface_files import MOST_HEIGHTS
 from fingerpad.skin.store import touch_key
 from refusals import refusals
@@ -135,7 +138,7 @@ def test_only_hollow_creases_below_the_angle_are_rounded():
         side = np.tan(np.radians(angle / 2)) * 3.0
         vertices = np.array([[a, side * abs(a) / 3.0, z] for a in x for z in (-5.0, 5.0)])
         faces = np.array([[0, 1, 3], [0, 3, 2], [2, 3, 5], [2, 5, 4]])
-        bent, flat = (fp.Surface(vertices, faces, below).front(beside) for below in (30.0, 0.0))
+        bent, flat = (Surface(vertices, faces, below).front(beside) for below in (30.0, 0.0))
         rise = bent - flat
         np.testing.assert_allclose(rise[np.abs(beside[:, 0]) > 0.11], 0.0, rtol=0, atol=1e-8)
         assert rise.min() > -1e-8
@@ -161,7 +164,7 @@ def profile_surface(body, fillet_mm, step_deg, path):
     return fp.read_surface(path, up="-z")
 
 
-GRATING = fp.ridges([-2.5, 0.0, 2.5], [1.5, 1.5, 1.5], fillet_mm=0.2)
+GRATING = ridges([-2.5, 0.0, 2.5], [1.5, 1.5, 1.5], fillet_mm=0.2)
 RIDGES = {fp.Bar: ((0.0, 3.0),), fp.Union: ((-2.5, 1.5), (0.0, 1.5), (2.5, 1.5))}
 
 
@@ -201,14 +204,14 @@ def test_rounded_edges_are_those_of_the_analytic_bar(radius_mm, kind):
     Walls of a map lean by its pitch, so that one with a fine pitch near the edges is taken.
     """
     if kind == "surface":
-        body = fp.Surface(CUBE * [1.5, 2.0, 10.0], SIDES, edge_radius_mm=radius_mm)
+        body = Surface(CUBE * [1.5, 2.0, 10.0], SIDES, edge_radius_mm=radius_mm)
     elif kind == "union":
         halves = fp.Bar(2.5, 0.0), fp.Bar(2.5, 0.0)
         body = fp.Union(halves, [(-0.25, 0.0, 0.0), (0.25, 0.0, 0.0)], edge_radius_mm=radius_mm)
     else:
         heights = np.where(np.abs(np.arange(-2.0, 2.0005, 0.001)) < 1.5, 0.0, -4.0) * np.ones((2, 1))
         wide = fp.height_surface(heights, 0.001)
-        body = fp.Surface(wide.vertices_mm * [1.0, 1.0, 2e4], wide.faces, edge_radius_mm=radius_mm)
+        body = Surface(wide.vertices_mm * [1.0, 1.0, 2e4], wide.faces, edge_radius_mm=radius_mm)
     points = np.random.default_rng(2).uniform([-2.2, -1.5, -6.0], [2.2, 0.8, 6.0], (3000, 3))
     gap, normal = fp.Bar(3.0, radius_mm).gap(points)
     near = (gap > -radius_mm) & (gap < 0.7)
@@ -220,14 +223,14 @@ def test_rounded_edges_are_those_of_the_analytic_bar(radius_mm, kind):
 
 
 def test_corners_are_rounded_as_a_ball_and_hollows_stay():
-    cube = fp.Surface(CUBE, SIDES, edge_radius_mm=0.4)
+    cube = Surface(CUBE, SIDES, edge_radius_mm=0.4)
     points = np.random.default_rng(3).uniform([-1.6, -2.6, -2.1], [1.6, 0.6, 2.1], (4000, 3))
     core = points - np.clip(points, [-0.6, -1.6, -1.1], [0.6, -0.4, 1.1])
     exact = np.linalg.norm(core, axis=1) - 0.4
     outside = exact > -0.4 + 1e-9
     np.testing.assert_allclose(cube.gap(points[outside])[0], exact[outside], rtol=0, atol=1e-11)
     check_gap(cube.gap, "cube")
-    steps = fp.ridges([-1.0, 1.0], [1.0, 1.0], fillet_mm=0.0, height_mm=0.5)
+    steps = ridges([-1.0, 1.0], [1.0, 1.0], fillet_mm=0.0, height_mm=0.5)
     round_ones = replace(steps, edge_radius_mm=0.2)
     foot, top = np.array([[-0.45, -0.47, 0.0]]), np.array([[-0.5, 0.0, 0.0]])
     assert round_ones.gap(foot)[0] == steps.gap(foot)[0]
@@ -238,9 +241,7 @@ def test_the_content_of_a_surface_is_its_key():
     same, other = CUBE.copy(), CUBE.copy()
     other[3, 0] = np.nextafter(other[3, 0], 9.0)
     keys = [
-        touch_key(
-            fp.touch_of(fp.Fingertip(), fp.Surface(vertices, SIDES), grading=replace(COARSE, full=True))
-        )
+        touch_key(fp.touch_of(fp.Fingertip(), Surface(vertices, SIDES), grading=replace(COARSE, full=True)))
         for vertices in (CUBE, same, other)
     ]
     assert keys[0] == keys[1] != keys[2]
@@ -254,7 +255,7 @@ def test_fine_relief_asks_for_a_mesh_that_resolves_it():
         fp.touch_of(fp.Fingertip(), rippled, grading=replace(COARSE, full=True))
     assert fp.height_surface(map_of(fp.Sphere(curvature_per_m=287.0), 2.0), 0.1).relief_mm > 1.5
     assert cup(8.0).relief_mm == 2.0  # its borders are slopes, not ridges
-    assert [fp.Surface(CUBE * [half, 1.0, 1.0], SIDES).relief_mm for half in (0.05, 0.3)] == [0.1, 0.6]
+    assert [Surface(CUBE * [half, 1.0, 1.0], SIDES).relief_mm for half in (0.05, 0.3)] == [0.1, 0.6]
 
 
 def test_two_balls_are_meshed_for_what_touches_and_not_for_the_seam():
@@ -291,13 +292,13 @@ def test_only_what_skin_touches_is_measured(height, width_mm):
 
 
 def test_a_mesh_must_resolve_the_parts_of_a_union():
-    across = fp.ridges([-1.6, 0.0, 1.0], [1.2, 0.6, 0.6], fillet_mm=0.1)
+    across = ridges([-1.6, 0.0, 1.0], [1.2, 0.6, 0.6], fillet_mm=0.1)
     assert (across.narrowest_mm, across.relief_mm, across.edge_reach_mm) == (0.4, np.inf, 2.2)
     graded = grading_about(across, "quick", 17.37)
     assert graded.core_size_mm <= 0.1 < graded.size_z_mm
     with pytest.raises(fp.InputError, match="grading must have elements of at most"):
         fp.touch_of(fp.Fingertip(), across, grading=COARSE)
-    cross = fp.Union([fp.Bar(0.6, 0.1), fp.Dots([(0.0, 0.0)], 1.6, 0.4)], [(0, 0, 0), (0, 0, 0)])
+    cross = fp.Union([fp.Bar(0.6, 0.1), Dots([(0.0, 0.0)], 1.6, 0.4)], [(0, 0, 0), (0, 0, 0)])
     assert cross.relief_mm == 0.6
     assert (
         fp.Union([fp.Sphere(curvature_per_m=100.0), fp.Plate()], [(0, 0, 0), (0, -1, 0)]).narrowest_mm
@@ -340,12 +341,12 @@ TOP, BOTTOM = [6, 7], [4, 5]
 )  # fmt: skip
 def test_parts_of_a_block_are_one_block_and_what_was_done_is_told(parts, told, caplog):
     points = np.random.default_rng(1).uniform(-3.0, 1.5, (2000, 3))
-    gap, expected = fp.Surface(*parts).gap(points)[0], fp.Surface(CUBE, SIDES).gap(points)[0]
+    gap, expected = Surface(*parts).gap(points)[0], Surface(CUBE, SIDES).gap(points)[0]
     # Within a body of parts that overlap the gap is that of the deepest one.
     shallow = expected > -0.25
     np.testing.assert_allclose(gap[shallow], expected[shallow], rtol=0, atol=3e-6)
     assert ((gap < 0.0) == (expected < 0.0))[np.abs(expected) > 1e-5].all()
-    assert (told in caplog.text and told in repr(fp.Surface(*parts))) if told else not caplog.text
+    assert (told in caplog.text and told in repr(Surface(*parts))) if told else not caplog.text
 
 
 @pytest.mark.parametrize("turned", [False, True], ids=["outwards", "inwards"])
@@ -355,10 +356,10 @@ def test_an_open_box_is_refused_where_its_opening_faces_the_skin(side, turned):
     faces = faces[:, ::-1] if turned else faces
     box = CUBE, faces
     if side == BOTTOM and not turned:
-        assert fp.Surface(*box).front(np.zeros((1, 3))) == pytest.approx(0.0, abs=1e-9)
+        assert Surface(*box).front(np.zeros((1, 3))) == pytest.approx(0.0, abs=1e-9)
     else:
         with pytest.raises(fp.InputError, match="is open there or its sides are reversed"):
-            fp.Surface(*box)
+            Surface(*box)
 
 
 SHUT_AT_2 = _together((LOW, [-5e-5, 0, 1.5], SIDES), ([5e-5, -1.5, -1.5], HIGH, SIDES))
@@ -368,20 +369,20 @@ TOO_ROUND = "edge_radius_mm must not exceed half of the narrowest part"
 
 
 test_a_surface_that_cannot_be_pressed_is_refused_in_one_sentence = refusals(
-    (lambda: fp.Surface(CUBE * [0.3, 1.0, 1.0], SIDES, edge_radius_mm=0.5), TOO_ROUND),
+    (lambda: Surface(CUBE * [0.3, 1.0, 1.0], SIDES, edge_radius_mm=0.5), TOO_ROUND),
     (lambda: fp.Union([fp.Bar(0.5, 0.0), fp.Plate()], [(0, 0, 0), (0, -1, 0)], edge_radius_mm=0.3),
      TOO_ROUND),
-    (lambda: fp.Surface(*SHUT_AT_2), "must overlap or stand apart by more than 0.01 mm"),
-    (lambda: fp.Surface(*NEAR_WALLS), "walls of two are 0.0001 mm apart"),
-    (lambda: fp.Surface(CUBE * np.nan, SIDES), "finite numbers"),
-    (lambda: fp.Surface(CUBE, np.zeros((0, 3), int)), "at least one triangle"),
-    (lambda: fp.Surface(CUBE * [1.0, 0.0, 0.0], SIDES), "triangles with an area"),
-    (lambda: fp.Surface(CUBE * 1e-4, SIDES), "check the unit"),
-    (lambda: fp.Surface(CUBE * 1e4, SIDES), "check the unit"),
-    (lambda: fp.Surface(CUBE, SIDES + 1), "numbers of vertices, 0 to 7"),
-    (lambda: fp.Surface(FACING_AWAY, np.array([[0, 2, 1]])), "outer side"),
+    (lambda: Surface(*SHUT_AT_2), "must overlap or stand apart by more than 0.01 mm"),
+    (lambda: Surface(*NEAR_WALLS), "walls of two are 0.0001 mm apart"),
+    (lambda: Surface(CUBE * np.nan, SIDES), "finite numbers"),
+    (lambda: Surface(CUBE, np.zeros((0, 3), int)), "at least one triangle"),
+    (lambda: Surface(CUBE * [1.0, 0.0, 0.0], SIDES), "triangles with an area"),
+    (lambda: Surface(CUBE * 1e-4, SIDES), "check the unit"),
+    (lambda: Surface(CUBE * 1e4, SIDES), "check the unit"),
+    (lambda: Surface(CUBE, SIDES + 1), "numbers of vertices, 0 to 7"),
+    (lambda: Surface(FACING_AWAY, np.array([[0, 2, 1]])), "outer side"),
     # It was refused in terms of a grading that nobody gave, or took hours.
-    (lambda: fp.touch_of(fp.Fingertip(), fp.Surface(CUBE * [4.0, 1.0, 0.05], SIDES)),
+    (lambda: fp.touch_of(fp.Fingertip(), Surface(CUBE * [4.0, 1.0, 0.05], SIDES)),
      r"^Surface has a .* dot 0\.2 mm wide, .* enlarge the body"),
     (lambda: fp.height_surface(np.zeros((1500, 1500)), 0.01),
      f"heights_mm must have at most {MOST_HEIGHTS:,} heights"),
@@ -417,7 +418,7 @@ def test_every_kind_of_file_holds_the_same_triangles(tmp_path):
         body = b"".join(struct.pack(f"{order}B4I", 4, *quad) for quad in quads)
         body += b"".join(struct.pack(f"{order}3dB", *corner, 7) for corner in upright)
         (tmp_path / f"{name}.ply").write_bytes(head.format(name).encode() + body)
-    expected = fp.Surface(CUBE, SIDES)
+    expected = Surface(CUBE, SIDES)
     points = np.random.default_rng(1).uniform(-3.0, 3.0, (50, 3))
     for name in ("a.obj", "little_endian.ply", "big_endian.ply"):
         read = fp.read_surface(tmp_path / name)
@@ -465,7 +466,7 @@ def test_shades_of_every_depth_are_shares_of_white_and_signed_numbers_are_number
         np.testing.assert_allclose(read.vertices_mm, expected.vertices_mm, rtol=0, atol=1e-9, err_msg=name)
 
 
-RIDGE_ROW = fp.ridges([-2.0, 0.0, 1.4], [1.0, 0.6, 0.8])
+RIDGE_ROW = ridges([-2.0, 0.0, 1.4], [1.0, 0.6, 0.8])
 BALL_IN_A_PLATE = fp.Union(
     [fp.Sphere(curvature_per_m=1000.0), fp.Plate()], [(0.2, 0.0, 0.0), (0.0, -0.6, 0.0)], seam_mm=0.4
 )
@@ -482,6 +483,6 @@ def test_the_normal_of_a_composed_body_is_the_gradient_of_its_gap(body):
 
 
 def test_ridges_at_equal_distances_are_the_grating():
-    even = fp.ridges(np.arange(-8, 9) * 2.0, np.ones(17), fillet_mm=0.1, height_mm=3.0)
+    even = ridges(np.arange(-8, 9) * 2.0, np.ones(17), fillet_mm=0.1, height_mm=3.0)
     points = np.random.default_rng(5).uniform([-4, -1.0, -4], [4, 0.5, 4], (200, 3))
     np.testing.assert_allclose(even.gap(points)[0], fp.Grating(1.0, 1.0, 0.1).gap(points)[0], atol=1e-12)

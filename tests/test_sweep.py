@@ -22,8 +22,9 @@ from fingerpad.experiments.runner import Runner
 from fingerpad.experiments.sweep.observers import observe
 from fingerpad.experiments.sweep.request import Constraint
 from fingerpad.export.sweep_file import DONE, FAILED, LEFT_OUT, SweepFile
-from fingerpad.export.sweep_results import open_sweep
+from fingerpad.export.sweep_results import observe_sweep, open_sweep, setting_response, write_sweep_spikes
 from fingerpad.psychophysics.observer import ENCODERS, Experiment, discriminate_by
+from fingerpad.skin.indentation import Touch
 
 MOTION = {"ramp_ms": 50, "hold_ms": 60}
 TOUCH = {"object": "cylinder", "motion": MOTION, "afferents": {"rows": 1, "columns": 2}}
@@ -50,6 +51,8 @@ def run(folder, tmp_path, monkeypatch):
     def run(sweep, name="study.zarr", **options):
         monkeypatch.setattr(fp.Touch, "solve", pytest.fail)
         return fp.sweep(sweep, out=tmp_path / name, store=folder / "indentations", **options)
+        monkeypatch.setattr(Touch, "solve", pytest.fail)
+        return fp.run_sweep(sweep, tmp_path / name, store=folder / "indentations", **options)
 
     return run
 
@@ -188,7 +191,7 @@ def test_a_setting_has_the_numbers_and_the_response_of_its_touch(folder):
     touch = fp.setting_touch(data, **where)
     assert touch["motion"] == {"ramp_ms": 50, "hold_ms": 60, "depth_mm": 0.3}
     pressed = fp.SweepRequest.read(STUDY).described(1).run(Runner(folder))
-    one, found = data.isel(where), fp.setting_response(data, **where)
+    one, found = data.isel(where), setting_response(data, **where)
     assert one.force_mn.values.tolist() == pressed.skin.force_mn.tolist()
     assert one.time_ms.values.tolist() == pressed.skin.times_ms.tolist()
     trains = found.spikes
@@ -266,8 +269,8 @@ def test_a_table_that_cannot_be_written_is_refused(folder, tmp_path):
 def test_spikes_of_a_sweep_are_a_session_of_nwb(folder, tmp_path):
     pynwb = pytest.importorskip("pynwb")
     data = open_sweep(folder / "study.zarr")
-    path = fp.write_sweep_spikes(data, tmp_path / "spikes.nwb", afferents_columns=1)
-    responses = [fp.setting_response(data, motion_depth_mm=n, afferents_columns=1) for n in range(2)]
+    path = write_sweep_spikes(data, tmp_path / "spikes.nwb", afferents_columns=1)
+    responses = [setting_response(data, motion_depth_mm=n, afferents_columns=1) for n in range(2)]
     with pynwb.NWBHDF5IO(str(path), "r") as file:
         session = file.read()
         names = session.trials["stimulus"][:].tolist()
@@ -282,11 +285,11 @@ def test_spikes_of_a_sweep_are_a_session_of_nwb(folder, tmp_path):
         ]
         np.testing.assert_allclose(train, np.concatenate(own), rtol=1e-12)
     with pytest.raises(InputError, match="must come from the same receptors"):
-        fp.write_sweep_spikes(data, tmp_path / "all.nwb")
+        write_sweep_spikes(data, tmp_path / "all.nwb")
     with pytest.raises(InputError, match="depth must be one of motion_depth_mm, afferents_columns"):
-        fp.write_sweep_spikes(data, tmp_path / "all.nwb", depth=1)
+        write_sweep_spikes(data, tmp_path / "all.nwb", depth=1)
     with pytest.raises(InputError, match=r"must be done: .*because of the bone"):
-        fp.setting_response(data, motion_depth_mm=2, afferents_columns=1)
+        setting_response(data, motion_depth_mm=2, afferents_columns=1)
     with pytest.raises(InputError, match=r"must be within 0 \.\.\. 2: got 3"):
         fp.setting_touch(data, motion_depth_mm=3, afferents_columns=1)
 
@@ -470,7 +473,7 @@ def test_observers_of_a_run_are_in_the_data_set_and_others_are_asked_later(run, 
     data = open_sweep(tmp_path / "study.zarr")
     assert data.hit_rate.dims == ("motion_depth_mm", "observer_noise")
     assert 0.5 < data.hit_rate.values[1, 1] <= data.hit_rate.values[1, 0]
-    again = fp.observe_sweep(data, sweep["observer"], {"noise": [0.2, 0.3]})
+    again = observe_sweep(data, sweep["observer"], {"noise": [0.2, 0.3]})
     assert again.sel(motion_depth_mm=0.5).values[0] == data.hit_rate.values[1, 1]
     assert run(sweep).loaded == 0
 

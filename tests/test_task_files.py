@@ -21,6 +21,7 @@ from fingerpad.experiments.gerling2014.percept import sphere_touches
 from fingerpad.experiments.gerling2014.reproduction import ReproductionResult
 from fingerpad.experiments.requests.parts import parts_in
 from fingerpad.neuron.afferent import PARAMETER_NAMES
+from fingerpad.skin.nail_edge import NailEdge
 from tests.mutations import CHANGES, VALUES, places
 from tests.mutations import changed as mutated
 
@@ -164,7 +165,7 @@ def test_afferents_fill_the_pad_at_the_density_of_its_skin_or_line_the_nail():
     task = read(changed(SPHERES, afferents={"layout": "nail rows", "rows": 2}))
     rows = task.population
     np.testing.assert_array_equal(
-        rows.positions_mm, fp.NailEdge().points(fp.NailEdge().rows(2, density_per_cm2=100.0).places_mm)
+        rows.positions_mm, NailEdge().points(NailEdge().rows(2, density_per_cm2=100.0).places_mm)
     )
     assert len(task.neighbours) > 2 * len(rows)
 
@@ -335,6 +336,8 @@ def test_null_is_as_good_as_nothing():
     empty = {"layout": "nail rows", "jitter": None, "rows": None}
     with_null = changed(SPHERES, afferents=empty, motion={"force_mn": None, "depth_mm": 1.0})
     assert len(asked(with_null).population) == len(fp.NailEdge().rows(1, 100.0))
+    with_null = changed(SPHERES, population=empty, motion={"force_mn": None, "depth_mm": 1.0})
+    assert len(asked(with_null).population) == len(NailEdge().rows(1, 100.0))
 
 
 @pytest.mark.parametrize(

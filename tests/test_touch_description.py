@@ -33,7 +33,10 @@ from fingerpad.experiments.requests.touch import (
 )
 from fingerpad.export.requests import WRITERS, check_outputs
 from fingerpad.geometry import surface_files
+from fingerpad.geometry.dots import Dots
+from fingerpad.geometry.embossed import Embossed
 from fingerpad.neuron.afferent_types import afferent_types
+from fingerpad.skin.indentation import Touch
 from tests.mutations import CHANGES, VALUES, changed, places
 
 ROOT = Path(__file__).parents[1]
@@ -76,13 +79,13 @@ def test_a_description_is_the_touch_that_python_makes_and_its_defaults_are_the_p
         ({"kind": "bar", "width_mm": 4, "edge_radius_mm": 0.2}, fp.Bar(4.0, 0.2)),
         ({"kind": "grating", "period_mm": 2, "duty": 0.25}, fp.Grating(0.5, 1.5)),
         ({"kind": "dots", "at_mm": [[0, 0], [2.5, 0]], "height_mm": 0.3},
-         fp.Dots([(0, 0), (2.5, 0)], height_mm=0.3)),
+         Dots([(0, 0), (2.5, 0)], height_mm=0.3)),
         ({"kind": "braille", "text": "ab", "along_finger": False}, fp.braille("ab", along_finger=False)),
         ({"kind": "plate"}, fp.Plate()),
         ({"kind": "embossed_text", "text": "T", "capital_mm": 5, "weight": "normal"},
          fp.embossed_text("T", capital_mm=5.0, weight="normal")),
         ({"kind": "embossed", "outlines_mm": [[[0, 0], [3, 0], [0, 3]]], "height_mm": 0.4},
-         fp.Embossed([[(0.0, 0.0), (3.0, 0.0), (0.0, 3.0)]], 0.4)),
+         Embossed([[(0.0, 0.0), (3.0, 0.0), (0.0, 3.0)]], 0.4)),
     ],
 )  # fmt: skip
 def test_an_object_is_what_its_class_makes(content, body):
@@ -377,6 +380,8 @@ def test_a_touch_is_pressed_once_and_its_outputs_are_what_python_computes(call, 
     # The indentation is stored: the same touch with other afferents is not pressed again.
     monkeypatch.setattr(fp.Touch, "solve", pytest.fail)
     again = fp.touch(content | {"afferents": {"density_per_cm2": 200}, "outputs": ["spikes"]}, out="out")
+    monkeypatch.setattr(Touch, "solve", pytest.fail)
+    again = fp.run_touch(content | {"afferents": {"density_per_cm2": 200}, "outputs": ["spikes"]}, "out")
     assert again.summary.largest_force_mn == result.summary.largest_force_mn
     assert len(Path("out/spikes.csv").read_text(encoding="utf-8").splitlines()) == 19
     # Noise makes spikes random, and a seed repeats them.

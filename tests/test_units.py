@@ -12,6 +12,7 @@ from fingerpad.core.units import (
     name_and_unit,
     units_of,
 )
+from fingerpad.experiments.recording_files import read_recordings
 from fingerpad.experiments.requests.stimuli import ShiftedBar
 from fingerpad.experiments.validation.observations import read_observations
 from fingerpad.inference.identifiable import SPIKE_PARAMETER_NAMES
@@ -64,9 +65,9 @@ def test_spikes_in_seconds_are_noticed_before_anything_is_pressed(tmp_path):
     path = tmp_path / "spikes.csv"
     path.write_text("shift_mm,spike_times_ms\n0,0.011 0.034 0.61\n-1,0.015 0.4\n")
     with pytest.raises(fp.InputError, match=r"must be in ms: the last of all spikes came 0.61 ms"):
-        fp.read_recordings(path, ShiftedBar())
+        read_recordings(path, ShiftedBar())
     path.write_text("shift_mm,spike_times_ms\n0,11 34 610\n-1,15 400\n")
-    assert fp.read_recordings(path, ShiftedBar()).recordings.trains.times_ms.size == 5
+    assert read_recordings(path, ShiftedBar()).recordings.trains.times_ms.size == 5
 
 
 def test_a_force_that_no_finger_resists_with_is_asked_back(tmp_path):

@@ -8,7 +8,7 @@ from scipy.spatial import cKDTree
 from scipy.stats import poisson
 
 import fingerpad as fp
-from fingerpad.core.regions import jittered, uniform
+from fingerpad.core.regions import Rectangle, jittered, uniform
 from fingerpad.geometry.mesh import finger_mesh
 from fingerpad.skin.receptor_sheet import ReceptorSheet
 from fingerpad.skin.unrolled_skin import PAD_FACES_DEG, PAD_X_MM
@@ -94,7 +94,7 @@ def test_the_pad_ends_where_its_skin_turns_aside():
     assert not PAD.contains(SKIN.places(FINGER.skin_point([17.37], [9.0]))).any()
 
 
-FLANK = fp.Rectangle(12.0, 6.0, centre_mm=(-2.0, 12.0))
+FLANK = Rectangle(12.0, 6.0, centre_mm=(-2.0, 12.0))
 """Beside the pad, where seen from the volar side the skin is steep: chosen to lie about the ridge."""
 
 

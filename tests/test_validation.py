@@ -25,6 +25,8 @@ from fingerpad.experiments.validation import predictions
 from fingerpad.experiments.validation.observations import COLUMNS, KINDS, example_file, read_observations
 from fingerpad.experiments.validation.predictions import predict
 from fingerpad.report.validation import draw_validation, validation_summary
+from fingerpad.skin.indentation import Touch
+from fingerpad.skin.store import Store
 from refusals import misused
 
 ROOT = Path(__file__).parents[1]
@@ -265,14 +267,14 @@ def test_positions_on_a_grating_repeat_with_its_period(pressed, tmp_path):
 
 
 def test_what_cannot_be_pressed_has_a_reason_and_the_rest_is_scored(folder, monkeypatch):
-    solve = fp.Touch.solve
+    solve = Touch.solve
 
     def limited(touch, threads=None):
         if isinstance(touch.stimulus, fp.RampAndHold) and touch.stimulus.depth_mm == 0.3:
             raise fp.ConvergenceError("The press stopped.", ("at 3 ms",))
         return solve(touch, threads)
 
-    monkeypatch.setattr(fp.Touch, "solve", limited)
+    monkeypatch.setattr(Touch, "solve", limited)
     rows = "plate,0.3,1\nplate,0.2,0.01\nplate,9,3\nplate,0.4,0.04\nplate,0.3,2\n"
     found = result_of(folder, FORCE + rows)
     assert [np.isfinite(row.predicted) for row in found.predictions] == [False, True, False, True, False]
@@ -307,7 +309,7 @@ def test_the_published_deflection_scores_as_in_the_reproduction(folder):
     keys = {"resolution": third.resolution, "tissues": third.tissues}
     scored = run(fp.ValidationRequest.read({"observations": found} | keys), folder)
     touch = deflection_touches(third)["trial3", "cylinder"]
-    profile = fp.Store(folder / STORE_FOLDER).load(touch).surface_profile()
+    profile = Store(folder / STORE_FOLDER).load(touch).surface_profile()
     assert scored.r2 == pytest.approx(deflection_r2(profile), abs=1e-12)
     assert scored.r2_mirrored == pytest.approx(deflection_r2(profile, proximal_positive=False), abs=1e-12)
 
@@ -342,7 +344,7 @@ def test_the_command_writes_page_figure_and_results(call, folder, tmp_path):
 def test_an_interrupted_run_keeps_what_is_finished_and_goes_on(call, folder, tmp_path, monkeypatch):
     rows = "plate,0.2,0.01\nplate,0.4,0.05\n"
     expected = result_of(folder, FORCE + rows)
-    source, target = fp.Store(folder / STORE_FOLDER), fp.Store(tmp_path / "validate" / STORE_FOLDER)
+    source, target = Store(folder / STORE_FOLDER), Store(tmp_path / "validate" / STORE_FOLDER)
     pressed = {}
 
     def press_until_stopped(touch, threads=None):
@@ -352,7 +354,7 @@ def test_an_interrupted_run_keeps_what_is_finished_and_goes_on(call, folder, tmp
         return source.load(touch)
 
     is_resumed = False
-    monkeypatch.setattr(fp.Touch, "solve", press_until_stopped)
+    monkeypatch.setattr(Touch, "solve", press_until_stopped)
     written(tmp_path, FORCE + rows)
     options = ("mine.csv", "--resolution", "quick", "--jobs", "1")
     status, said, errors = call(*options)

@@ -10,6 +10,7 @@ import pytest
 import fingerpad as fp
 from fingerpad.data.tissues import DENSITY
 from fingerpad.geometry.mesh import block_mesh
+from fingerpad.geometry.motion import Cycles
 from fingerpad.geometry.motions import SAMPLES_PER_CYCLE
 from fingerpad.mechanics import cycles
 from fingerpad.mechanics.contact import place
@@ -127,10 +128,10 @@ def test_closed_form_of_relaxation_over_cycles_is_that_of_the_steps():
 
 def test_sine_knows_its_cycles_and_false_ones_are_refused():
     motion = fp.sine(0.8, 0.1, 20.0, cycles=4, hold_ms=100.0)
-    assert motion.cycles == fp.Cycles(start_ms=150.0, period_ms=50.0, count=4)
+    assert motion.cycles == Cycles(start_ms=150.0, period_ms=50.0, count=4)
     assert motion.cycles.end_ms == motion.end_ms
     assert sum(motion.cycles.start_ms < time for time in motion.times_ms) == 4 * SAMPLES_PER_CYCLE
-    for wrong in (fp.Cycles(150.0, 50.0, 5), fp.Cycles(151.0, 50.0, 3), fp.Cycles(100.0, 50.0, 5)):
+    for wrong in (Cycles(150.0, 50.0, 5), Cycles(151.0, 50.0, 3), Cycles(100.0, 50.0, 5)):
         with pytest.raises(fp.InputError, match="cycles must repeat the samples of the first"):
             replace(motion, cycles=wrong)
     grown = np.array(motion.depth_mm)

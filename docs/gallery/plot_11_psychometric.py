@@ -9,8 +9,6 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 import fingerpad as fp
-from fingerpad.psychophysics.encoding import neighbour_pairs
-from fingerpad.psychophysics.observer import GradientSum, discriminate_by
 
 curvatures = np.array([287.0, 300.0, 320.0, 360.0])
 motion = fp.RampAndHold(depth_mm=0.8, hold_ms=200)
@@ -21,10 +19,11 @@ rates = [
     ).dynamic_rate_hz
     for curvature in curvatures
 ]
-pairs = neighbour_pairs(population.positions_mm, population.pitch_mm)
-hits = discriminate_by(GradientSum(pairs), rates, 0.1, seed=1).hit_rate
+pairs = fp.psychophysics.neighbour_pairs(population.positions_mm, population.pitch_mm)
+observer = fp.psychophysics.GradientSum(pairs)
+hits = fp.psychophysics.discriminate_by(observer, rates, 0.1, seed=1).hit_rate
 differences, trials = curvatures[1:] - curvatures[0], np.full(3, 100)
-fit = fp.fit_psychometric(differences, np.round(hits * trials), trials)
+fit = fp.psychophysics.fit_psychometric(differences, np.round(hits * trials), trials)
 
 figure, axes = plt.subplots(figsize=(5, 3.5), layout="constrained")
 at = np.linspace(1.0, 90.0, 90)

@@ -10,8 +10,7 @@ import numpy as np
 
 import fingerpad as fp
 
-touch = fp.touch_of(fp.Fingertip(), fp.Sphere(radius_mm=3.5))
-model = fp.reduce_touch(fp.ReducedTraining(touch, fp.ReducedRange(depth_mm=0.6)), calibration=0)
+model = fp.reduce(object=fp.Sphere(radius_mm=3.5), range={"depth_mm": 0.6}, calibration=0)
 stream = fp.ReducedTouch(model, [(17.37, 0.0)])
 times_ms = np.arange(1.0, 300.0)
 depths_mm = 0.35 + 0.2 * np.sin(2.0 * np.pi * times_ms / 100.0)

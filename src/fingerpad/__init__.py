@@ -35,7 +35,8 @@ def __getattr__(name: str) -> object:
     """Fetch a public name when it is first used: Numba and SciPy take most of a second to load."""
     if name not in _HOME:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    value = getattr(_import_module(_HOME[name]), name)
+    home = _HOME[name]
+    value = _import_module(f"{home}.{name}") if home == __name__ else getattr(_import_module(home), name)
     globals()[name] = value
     return value
 

@@ -191,7 +191,7 @@ def _validate(given: argparse.Namespace, within: Options) -> int:
 
 def _sweep(given: argparse.Namespace, within: Options) -> int:
     from fingerpad.export.sweep import check_sweep
-    from fingerpad.export.sweep_results import check_outputs
+    from fingerpad.export.sweep_results import check_outputs, write_sweep_spikes
 
     source, keys = _asked("sweep", given, within)
     request = fp.SweepRequest.read(source, keys, given.allow_python)
@@ -204,7 +204,7 @@ def _sweep(given: argparse.Namespace, within: Options) -> int:
     if done.done and given.table is not None:
         _tell(f"Table: {fp.write_sweep_table(fp.open_sweep(given.out), given.table)}")
     if done.done and given.spikes is not None:
-        _tell(f"Spikes: {fp.write_sweep_spikes(fp.open_sweep(given.out), given.spikes)}")
+        _tell(f"Spikes: {write_sweep_spikes(fp.open_sweep(given.out), given.spikes)}")
     return min(10 + done.failed, MOST_FAILED) if done.failed else 0
 
 

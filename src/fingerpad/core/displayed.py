@@ -135,8 +135,8 @@ class Result(Displayed):
 
         Examples
         --------
-        >>> import fingerpad as fp
-        >>> fp.HitRates([0.6, 0.9], [0.05, 0.02]).to_frame().hit_rate.tolist()
+        >>> from fingerpad.core.signals import HitRates
+        >>> HitRates([0.6, 0.9], [0.05, 0.02]).to_frame().hit_rate.tolist()
         [0.6, 0.9]
         """
         from fingerpad.export.results import frame
@@ -180,9 +180,9 @@ class Result(Displayed):
         Examples
         --------
         >>> from tempfile import TemporaryDirectory
-        >>> import fingerpad as fp
+        >>> from fingerpad.core.signals import HitRates
         >>> with TemporaryDirectory() as folder:
-        ...     path = fp.HitRates([0.6, 0.9], [0.05, 0.02]).save(Path(folder) / "rates.csv")
+        ...     path = HitRates([0.6, 0.9], [0.05, 0.02]).save(Path(folder) / "rates.csv")
         ...     print(path.read_text(), end="")
         comparison,hit_rate,hit_rate_sd
         1,0.6,0.05

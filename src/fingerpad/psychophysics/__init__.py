@@ -9,6 +9,7 @@ from fingerpad.psychophysics.curve_uncertainty import (
     goodness_of_fit,
     posterior,
 )
+from fingerpad.psychophysics.encoding import delaunay_pairs, gradient_sum, neighbour_pairs
 from fingerpad.psychophysics.ideal_observer import (
     CodeEfficiency,
     Discriminability,
@@ -24,6 +25,13 @@ from fingerpad.psychophysics.ideal_observer import (
     noisy_presentations,
     present,
 )
+from fingerpad.psychophysics.observer import (
+    EuclideanDistance,
+    Experiment,
+    GradientSum,
+    discriminate_by,
+    fit_noise_sigma,
+)
 from fingerpad.psychophysics.sensitivity import (
     TASKS,
     Sensitivity,
@@ -36,10 +44,12 @@ from fingerpad.psychophysics.sensitivity import (
 )
 
 __all__ = [
-    "TASKS", "CodeEfficiency", "Discriminability", "FunctionCloud", "GaussianResponses", "GoodnessOfFit",
-    "JudgementCounts", "Presentation", "PsychometricFit", "PsychometricFunction", "ResponseModel",
-    "Sensitivity", "Statistic", "bootstrap", "code_efficiency", "d_prime_of_proportion",
-    "discriminability", "efficiency", "fit_psychometric", "forced_choice", "gaussian_information",
-    "goodness_of_fit", "multiplied_responses", "noisy_presentations", "posterior", "present",
-    "same_different_by_difference", "same_different_by_looks", "sensitivity", "yes_no",
+    "TASKS", "CodeEfficiency", "Discriminability", "EuclideanDistance", "Experiment", "FunctionCloud",
+    "GaussianResponses", "GoodnessOfFit", "GradientSum", "JudgementCounts", "Presentation",
+    "PsychometricFit", "PsychometricFunction", "ResponseModel", "Sensitivity", "Statistic", "bootstrap",
+    "code_efficiency", "d_prime_of_proportion", "delaunay_pairs", "discriminability", "discriminate_by",
+    "efficiency", "fit_noise_sigma", "fit_psychometric", "forced_choice", "gaussian_information",
+    "goodness_of_fit", "gradient_sum", "multiplied_responses", "neighbour_pairs", "noisy_presentations",
+    "posterior", "present", "same_different_by_difference", "same_different_by_looks", "sensitivity",
+    "yes_no",
 ]  # fmt: skip

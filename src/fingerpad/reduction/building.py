@@ -88,8 +88,9 @@ def reduce_touch(
     The range of this example is one place, and its error is not measured:
 
     >>> import fingerpad as fp
+    >>> from fingerpad.reduction.training import ReducedRange
     >>> touch = fp.touch_of(fp.Fingertip(), fp.Sphere(curvature_per_m=287))
-    >>> model = fp.reduce_touch(fp.ReducedTraining(touch, fp.ReducedRange(depth_mm=0.5)), calibration=0)
+    >>> model = reduce_touch(ReducedTraining(touch, ReducedRange(depth_mm=0.5)), calibration=0)
     >>> stream = fp.ReducedTouch(model, [(17.37, 0.0)])
     >>> sample = stream.step(50.0, depth_mm=0.5)
     >>> print(f"{sample.force_mn:.0f} mN")

@@ -16,8 +16,8 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, is_dataclass, replace
 from functools import cached_property
-from importlib import import_module
 from pathlib import Path
+from pkgutil import resolve_name
 from types import MappingProxyType
 from typing import Annotated, Any, ClassVar, Literal, TypeVar, Union, get_args
 
@@ -166,13 +166,13 @@ class LateKind:
     kind: str
     """Value of the key `kind`."""
     makes: Callable[..., Any] | str
-    """As of `made_by`, or its public name."""
+    """As of `made_by`, or its name below `fingerpad`."""
     without: Sequence[str] = ()
     """As of `made_by`."""
 
     @cached_property
     def part(self) -> type[Made]:
-        makes = getattr(import_module("fingerpad"), self.makes) if isinstance(self.makes, str) else self.makes
+        makes = resolve_name(f"fingerpad.{self.makes}") if isinstance(self.makes, str) else self.makes
         return made_by(self.kind, makes, self.without)
 
     def __get_pydantic_core_schema__(self, *_: Any) -> CoreSchema:

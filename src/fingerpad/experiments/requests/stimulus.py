@@ -77,15 +77,15 @@ FINGERS: dict[str, Callable[..., Finger] | str] = {
 
 OBJECTS: dict[str, Callable[..., Indenter] | str] = {
     **INDENTERS,
-    "dots": "Dots",
+    "dots": "geometry.dots.Dots",
     "braille": "braille",
-    "embossed": "Embossed",
+    "embossed": "geometry.embossed.Embossed",
     "embossed_text": "embossed_text",
-    "ridges": "ridges",
+    "ridges": "geometry.composed.ridges",
     "surface": "read_surface",
     "height_map": "read_height_map",
 }
-"""What can be pressed in, by kind; by its public name where only a file with it needs the module."""
+"""What can be pressed in, by kind; by its name below `fingerpad` where only a file with it needs the module."""
 
 MOTIONS: dict[str, Callable[..., Motion] | str] = {
     RAMP_AND_HOLD: ramp_and_hold,
