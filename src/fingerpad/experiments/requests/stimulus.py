@@ -85,7 +85,7 @@ OBJECTS: dict[str, Callable[..., Indenter] | str] = {
     "surface": "read_surface",
     "height_map": "read_height_map",
 }
-"""What can be pressed in, by kind; by its name below `fingerpad` where only a file with it needs the module."""
+"""What can be pressed in, by kind; by its name below `fingerpad` if only a file with it needs the module."""
 
 MOTIONS: dict[str, Callable[..., Motion] | str] = {
     RAMP_AND_HOLD: ramp_and_hold,
