@@ -6,11 +6,10 @@ import re
 from pathlib import Path
 
 import pytest
-import typer
 
 from benchmarks.__main__ import BENCHMARKS
-from fingerpad.cli import GENERAL_OPTIONS, app
-from studies.__main__ import app as studies_app
+from fingerpad.cli import FINGERPAD, GENERAL, Program, parser_of
+from studies.__main__ import PROGRAM
 
 ROOT = Path(__file__).parents[1]
 PAGES = sorted([*ROOT.glob("*.md"), *(ROOT / "docs").rglob("*.md"), ROOT / "benchmarks" / "README.md"])
@@ -55,19 +54,18 @@ def test_dotted_names_can_be_imported(page: Path) -> None:
     assert lost == []
 
 
-def commands(program: typer.Typer) -> dict[str, set[str]]:
+def commands(program: Program) -> dict[str, set[str]]:
     """The options of every command of a program."""
-    group = typer.main.get_command(program)
     return {
-        name: {option for parameter in command.params for option in parameter.opts} | {"--help"}
-        for name, command in group.commands.items()  # type: ignore[attr-defined]
+        name: {option for each in parser_of(program, name)._actions for option in each.option_strings}
+        for name in program.commands
     }
 
 
 PROGRAMS = {
-    "fingerpad": commands(app),
-    "python -m fingerpad": commands(app),
-    "python -m studies": commands(studies_app),
+    "fingerpad": commands(FINGERPAD),
+    "python -m fingerpad": commands(FINGERPAD),
+    "python -m studies": commands(PROGRAM),
     "python -m benchmarks": {name: set() for name in BENCHMARKS},
 }
 
@@ -85,7 +83,7 @@ def test_commands_and_their_options_exist(page: Path) -> None:
             if called is None:
                 continue
             options = set(re.findall(r"(?<!\S)--[\w-]+", called[2].split("#")[0]))
-            if called[1] not in known or not options <= known[called[1]] | {*GENERAL_OPTIONS}:
+            if called[1] not in known or not options <= known[called[1]] | {*GENERAL}:
                 lost.append(line)
     assert lost == []
 
@@ -100,11 +98,7 @@ def test_options_and_keywords_that_an_error_names_exist() -> None:
         for _, node in nodes
         if isinstance(node, ast.AnnAssign) and isinstance(node.target, ast.Name)
     }
-    options, groups = {*GENERAL_OPTIONS, "--help"}, [typer.main.get_command(app)]
-    while groups:
-        group = groups.pop()
-        options |= {option for parameter in group.params for option in parameter.opts}
-        groups += getattr(group, "commands", {}).values()
+    options = {*GENERAL, "--help"}.union(*commands(FINGERPAD).values())
     lost, seen = set(), 0
     for path, node in nodes:
         for part in ast.walk(node) if isinstance(node, ast.Raise) else ():

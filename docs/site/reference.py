@@ -55,6 +55,8 @@ def public_names() -> dict[str, dict[str, object]]:
     """Names and values of each package, in the order of the alphabet."""
     modules: dict[str, set[str]] = defaultdict(set)
     for name, home in fingerpad._HOME.items():
+        if home == "fingerpad":  # a package
+            continue
         modules[home.removeprefix("fingerpad.")].add(name)
     for home, names in (*FURTHER.items(), *_imported_by_pages()):
         modules[home].update(names)
