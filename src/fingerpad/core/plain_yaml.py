@@ -26,8 +26,6 @@ DEEPEST = 20  # Mappings and lists inside each other.
 def read_yaml(text: str, source: str) -> Any:
     """Plain values of one document in YAML; errors name the source.
 
-    Examples
-    --------
     Numbers such as 1e-6, without a point, are text in YAML 1.1. They are numbers here:
 
     >>> read_yaml("{gain: 1e-6, name: edge, off: [1, 2.5]}", "an example")

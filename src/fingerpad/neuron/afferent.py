@@ -138,8 +138,8 @@ class Afferent:
         Potential of the membrane at the start. By default that at rest, beta tau/C, so that spikes do not
         depend on how long nothing happened before a touch. [mV]
     smoothing_ms : float
-        Time constant tau_s of a low pass before the dynamic term, which then follows |S'| with
-        tau_s S' + S = Q; 0, as in the paper, for none. It makes an afferent right under vibration: the rate
+        Time constant tau_s of a low pass before the dynamic term, which then follows the absolute
+        rate of S with tau_s dS/dt + S = Q; 0, as in the paper, for none. It makes an afferent right under vibration: the rate
         of change of a fast one would otherwise make it as sensitive at 400 Hz as at 20 Hz. [ms]
     type : str
         Name of its type, of `fingerpad.data.afferents.TYPES` or of one's own.

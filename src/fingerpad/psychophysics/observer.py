@@ -112,6 +112,7 @@ class Experiment:
 
     @property
     def sums_per_sphere(self) -> tuple[int, int]:
+        """Means and standard deviations of each sphere, and gradient sums behind each of them."""
         if self.criterion_sigma > 0.0:
             return 1, self.presentations_varied
         return self.distributions, self.presentations
@@ -153,7 +154,7 @@ class Encoder(Protocol):
 
 
 @dataclass(frozen=True)
-class GradientSum:
+class GradientSum(Encoder):
     """Code: the sum of the differences between neighbours; steps (a) to (k)."""
 
     neighbours: ArrayLike  # From `neighbour_pairs`, int (n_pairs, 2).
@@ -193,7 +194,7 @@ class GradientSum:
 
 
 @dataclass(frozen=True)
-class EuclideanDistance:
+class EuclideanDistance(Encoder):
     """Code: the distance from the standard, receptor by receptor; steps (a) and (b*) to (h*).
 
     Every hit rate repeats the whole procedure: noisy sets (a)-(d*), random pairs of them (e*)-(g*) and the

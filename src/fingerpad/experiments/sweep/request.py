@@ -236,10 +236,12 @@ class SweepRequest(Request):
 
     @property
     def shape(self) -> tuple[int, ...]:
+        """Settings along each axis."""
         return tuple(map(len, self.axes))
 
     @property
     def press_shape(self) -> tuple[int, ...]:
+        """Settings along each axis that changes the press."""
         return tuple(len(axis) for axis in self.axes if axis.presses)
 
     @property
@@ -254,6 +256,7 @@ class SweepRequest(Request):
 
     @property
     def observer_shape(self) -> tuple[int, ...]:
+        """Settings along each axis of the observer."""
         return tuple(map(len, self.observer_axes))
 
     @cached_property
@@ -305,6 +308,7 @@ class SweepRequest(Request):
         return range(press * each, (press + 1) * each)
 
     def values(self, setting: int) -> Content:
+        """Value of each swept field in a setting."""
         place = np.unravel_index(setting, self.shape)
         return {
             field: values[int(number)]
@@ -337,6 +341,7 @@ class SweepRequest(Request):
                 raise InputError("where leaves no setting: give other constraints.")
 
     def allowed(self, setting: int) -> bool:
+        """Whether a setting meets all constraints of the sweep."""
         if not self._constraints:
             return True
         content = self.content(setting)
