@@ -139,8 +139,9 @@ class Afferent:
         depend on how long nothing happened before a touch. [mV]
     smoothing_ms : float
         Time constant tau_s of a low pass before the dynamic term, which then follows the absolute
-        rate of S with tau_s dS/dt + S = Q; 0, as in the paper, for none. It makes an afferent right under vibration: the rate
-        of change of a fast one would otherwise make it as sensitive at 400 Hz as at 20 Hz. [ms]
+        rate of S with tau_s dS/dt + S = Q; 0, as in the paper, for none. It makes an afferent right under
+        vibration: the rate of change of a fast one would otherwise make it as sensitive at 400 Hz as at
+        20 Hz. [ms]
     type : str
         Name of its type, of `fingerpad.data.afferents.TYPES` or of one's own.
 
