@@ -60,6 +60,7 @@ def recruited(latency_ms: ArrayLike, times_ms: ArrayLike) -> np.ndarray:
     return np.searchsorted(in_order, np.asarray(times_ms, dtype=np.float64), side="right")
 
 
+@checked
 def evoked_latency_ms(latency_ms: ArrayLike, resting_latency_ms: float) -> FloatArray:
     """Select first spikes that are evoked by a stimulus, for afferents that also fire at rest.
 

@@ -548,6 +548,7 @@ def expected_euclidean_hit_rates(
     return np.clip(normal + larger * edgeworth, 0.0, 1.0)
 
 
+@checked
 def fit_noise_sigma(
     hit_rates_of_sigma: Callable[[float], ArrayLike],
     target_hit_rates: ArrayLike = psychophysics.GOODWIN_HIT_RATES.value,
