@@ -22,6 +22,7 @@ from fingerpad.experiments.gerling2014.reproduction import ReproductionResult
 from fingerpad.experiments.requests.parts import parts_in
 from fingerpad.neuron.afferent import PARAMETER_NAMES
 from fingerpad.skin.nail_edge import NailEdge
+from fingerpad.skin.unrolled_skin import UnrolledSkin
 from tests.mutations import CHANGES, VALUES, places
 from tests.mutations import changed as mutated
 
@@ -161,7 +162,7 @@ def test_any_layout_fills_its_region_at_its_density(layout):
 def test_afferents_fill_the_pad_at_the_density_of_its_skin_or_line_the_nail():
     pad = {"layout": "poisson-disc", "density_per_cm2": 70, "region": {"shape": "pad"}}
     population = read(changed(SPHERES, afferents=pad)).population
-    assert len(population) == round(0.7 * fp.UnrolledSkin().pad().area_mm2)
+    assert len(population) == round(0.7 * UnrolledSkin().pad().area_mm2)
     task = read(changed(SPHERES, afferents={"layout": "nail rows", "rows": 2}))
     rows = task.population
     np.testing.assert_array_equal(
@@ -335,8 +336,6 @@ def test_a_file_without_fitted_parameters_is_refused(tmp_path, monkeypatch, cont
 def test_null_is_as_good_as_nothing():
     empty = {"layout": "nail rows", "jitter": None, "rows": None}
     with_null = changed(SPHERES, afferents=empty, motion={"force_mn": None, "depth_mm": 1.0})
-    assert len(asked(with_null).population) == len(fp.NailEdge().rows(1, 100.0))
-    with_null = changed(SPHERES, population=empty, motion={"force_mn": None, "depth_mm": 1.0})
     assert len(asked(with_null).population) == len(NailEdge().rows(1, 100.0))
 
 

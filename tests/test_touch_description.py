@@ -378,10 +378,8 @@ def test_a_touch_is_pressed_once_and_its_outputs_are_what_python_computes(call, 
     np.testing.assert_allclose(result.summary.largest_force_mn, skin.force_mn.max(), rtol=1e-12)
     assert result.manifest.inputs.keys() == {"touch.yaml"}
     # The indentation is stored: the same touch with other afferents is not pressed again.
-    monkeypatch.setattr(fp.Touch, "solve", pytest.fail)
-    again = fp.touch(content | {"afferents": {"density_per_cm2": 200}, "outputs": ["spikes"]}, out="out")
     monkeypatch.setattr(Touch, "solve", pytest.fail)
-    again = fp.run_touch(content | {"afferents": {"density_per_cm2": 200}, "outputs": ["spikes"]}, "out")
+    again = fp.touch(content | {"afferents": {"density_per_cm2": 200}, "outputs": ["spikes"]}, out="out")
     assert again.summary.largest_force_mn == result.summary.largest_force_mn
     assert len(Path("out/spikes.csv").read_text(encoding="utf-8").splitlines()) == 19
     # Noise makes spikes random, and a seed repeats them.
