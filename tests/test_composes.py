@@ -9,6 +9,7 @@ from numpy.testing import assert_array_equal
 
 import composing
 import fingerpad as fp
+from fingerpad.experiments.requests.stimuli import read_stimuli
 from fingerpad.lab.laboratory import Laboratory
 from fingerpad.lab.state import LabState
 
@@ -108,7 +109,7 @@ def fit(row, folder):
         own = {"afferent": own["population"]}
     names = ("0.6", "0.9", "1.2")
     recordings = fp.RateRecordings(names, [20.0, 60.0, 90.0], None)
-    listed = fp.read_stimuli(stimuli(folder, "[0.6, 0.9, 1.2]"), object=pressed["object"])
+    listed = read_stimuli(stimuli(folder, "[0.6, 0.9, 1.2]"), object=pressed["object"])
     found = fp.fit(
         recordings=recordings, stimuli=listed, free=[FREE.get(row, "static_gain")], folds=3,
         windows_ms={"dynamic": [0, 50], "static": [60, 150]}, out=folder,

@@ -39,7 +39,7 @@ def test_an_error_in_a_file_has_the_keys_that_lead_to_it(tmp_path, text, path):
     file = tmp_path / "touch.yaml"
     file.write_text(text)
     with pytest.raises(fp.InputError) as caught:
-        fp.read_touch_description(file).touch()
+        fp.TouchRequest.read(file).touch()
     assert caught.value.path == path
     assert str(caught.value).startswith(f"{file}, line ")
     assert not str(caught.value).endswith("..")

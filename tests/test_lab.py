@@ -501,8 +501,8 @@ def test_all_types_a_mixed_range_and_an_own_afferent_respond(laboratory):
         Laboratory(laboratory.folder, [folder / "own.yaml"])
     several = Laboratory(laboratory.folder, [folder / "mixed.yaml", folder / "own.yaml"], allow_python=True)
     model = laboratory.model(PRESS)
-    fp.write_reduced(model, several.path(state))
-    fp.write_reduced(model, several.path(replace(state, object="own")))
+    write_reduced(model, several.path(state))
+    write_reduced(model, several.path(replace(state, object="own")))
     mixed = several.answer(state).response
     assert list(mixed.parts) == ["RA", "PC", "SAII"]
     assert (

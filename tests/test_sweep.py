@@ -49,10 +49,8 @@ def run(folder, tmp_path, monkeypatch):
     """Run a sweep whose presses are all stored."""
 
     def run(sweep, name="study.zarr", **options):
-        monkeypatch.setattr(fp.Touch, "solve", pytest.fail)
-        return fp.sweep(sweep, out=tmp_path / name, store=folder / "indentations", **options)
         monkeypatch.setattr(Touch, "solve", pytest.fail)
-        return fp.run_sweep(sweep, tmp_path / name, store=folder / "indentations", **options)
+        return fp.sweep(sweep, out=tmp_path / name, store=folder / "indentations", **options)
 
     return run
 
