@@ -24,6 +24,7 @@ settings.load_profile("fingerpad")
 LONGEST = (
     "test_reproduction.py",
     "test_readme.py",
+    "test_composes.py",
     "test_surfaces.py",
     "test_small_bodies.py",
     "test_recording_fit.py",
