@@ -22,7 +22,6 @@ from fingerpad.core.compilation import SHORT_NOTICE, SUBJECT
 from fingerpad.core.errors import InputError
 from fingerpad.core.result_files import read_results, to_json
 from fingerpad.data import all_published
-from fingerpad.experiments import gerling2014
 from fingerpad.experiments.gerling2014 import nerve
 from fingerpad.experiments.gerling2014.reproduction import Reproduction, ReproductionResult, reproduce
 from fingerpad.experiments.runner import STORE_FOLDER
@@ -99,8 +98,8 @@ def second(first, stamps):
 def test_a_run_ends_with_status_0_and_whole_files_and_the_numbers_of_the_pages(first, stamps):
     assert first.status == 0
     # The kernels may be compiled only now.
-    assert told(first)[0].startswith("Reproducing at quick resolution with 2 process(es)")
-    assert all(PROGRESS.fullmatch(line) for line in told(first)[1:])
+    assert told(first)
+    assert all(PROGRESS.fullmatch(line) for line in told(first))
     report, results, *verdicts = first.said.splitlines()
     assert report == f"Report: {first.folder / 'report.html'}"
     assert results == f"Results: {first.folder / 'results.json'}"
@@ -216,11 +215,11 @@ def test_the_command_goes_beyond_the_paper_where_asked_and_by_default_not_when_q
 ):
     asked = []
 
-    def note(run, _progress):
-        asked.append(run.goes_beyond)
+    def note(reproduction, _progress):
+        asked.append(reproduction.goes_beyond)
         raise InputError("That is all.")
 
-    monkeypatch.setattr(gerling2014, "reproduce", note)
+    monkeypatch.setattr("fingerpad.experiments.run.reproduce", note)
     run_program(cli.main, "fingerpad", "reproduce", *words)
     assert asked == [goes_beyond]
 

@@ -380,6 +380,10 @@ def _store(given: argparse.Namespace, _: Options) -> int:
     from fingerpad.experiments.runner import STORE_FOLDER
     from fingerpad.skin.store import Store, pruned
 
+    if given.action == "prune" and given.days is None and given.size is None:
+        raise InputError("prune", "needs --days, --size or both", "neither")
+    age_s = None if given.days is None else SECONDS_PER_DAY * not_negative("--days", given.days, "days")
+    most = None if given.size is None else int(1e6 * not_negative("--size", given.size, "MB"))
     inner = given.folder / STORE_FOLDER
     found = inner if inner.is_dir() else given.folder
     if not found.is_dir():
@@ -400,10 +404,6 @@ def _store(given: argparse.Namespace, _: Options) -> int:
         _tell(*(f"{path}: {fault}" for path, fault in faults.items()),
               f"{len(files)} indentations, {len(faults)} damaged")  # fmt: skip
         return 1 if faults else 0
-    if given.days is None and given.size is None:
-        raise InputError("prune", "needs --days, --size or both", "neither")
-    age_s = None if given.days is None else SECONDS_PER_DAY * not_negative("--days", given.days, "days")
-    most = None if given.size is None else int(1e6 * not_negative("--size", given.size, "MB"))
     chosen = pruned(files, None if age_s is None else time.time() - age_s, most)
     try:
         for file in chosen if given.yes else ():

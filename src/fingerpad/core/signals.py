@@ -6,6 +6,7 @@ Skin -> `Traces` -> `Traces` of a current -> `SpikeTrains` -> `ResponseMap` -> `
 
 from __future__ import annotations
 
+import copyreg
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import field, fields, replace
 from inspect import signature
@@ -64,6 +65,15 @@ CURRENTS = (CURRENT, RELATIVE_CURRENT)  # Quantities that may jump and may be ne
 
 PLACES = {2: ("x_mm", "z_mm"), 3: ("x_mm", "y_mm", "z_mm")}
 """Columns of a position by the number of its coordinates."""
+
+
+def _frozen(values: dict[Any, Any]) -> MappingProxyType[Any, Any]:
+    """Read-only mapping; the class itself cannot be pickled by its name."""
+    return MappingProxyType(values)
+
+
+# Parts of populations and of responses by type are read-only mappings, which go to other processes.
+copyreg.pickle(MappingProxyType, lambda mapping: (_frozen, (dict(mapping),)))
 
 
 @runtime_checkable

@@ -21,7 +21,7 @@ from fingerpad.geometry.fingertip import Fingertip
 from fingerpad.geometry.motion import Pose
 from fingerpad.geometry.trajectory import Trajectory
 from fingerpad.lab.state import OF_RANGE, LabState
-from fingerpad.neuron.afferent import AnyAfferent, type_of
+from fingerpad.neuron.afferent import Afferent, AnyAfferent, type_of
 from fingerpad.neuron.afferent_types import afferent_of
 from fingerpad.neuron.population import Population
 from fingerpad.psychophysics.ideal_observer import multiplied_responses, present
@@ -132,6 +132,8 @@ def afferents_in(described: ReductionRequest, state: LabState) -> Mapping[str, A
     if state.afferent == OF_RANGE:
         laid = described.population
         return {name: part.afferent for name, part in (laid.parts or {type_of(laid.afferent): laid}).items()}
+    if state.afferent == "SAI":  # the fitted one, as in a touch that names no afferent
+        return {"SAI": Afferent.for_tissues(described.tissues)}
     return {state.afferent: afferent_of(state.afferent, described.tissues)}
 
 
