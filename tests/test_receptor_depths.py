@@ -186,7 +186,7 @@ def test_a_press_keeps_all_quantities_in_the_layers_of_its_receptor_depths(press
         rtol=1e-6,
     )
     assert store.path(touch) != store.path(plain.touch)
-    assert skin.to_xarray()["sheet"].size == watched.size
+    assert skin.to_dataset()["sheet"].size == watched.size
 
 
 def test_energy_below_a_sphere_is_that_of_its_elements_and_decays_in_the_subcutis(pressed):

@@ -134,14 +134,11 @@ def test_a_second_signal_ends_the_process_whatever_it_does(tmp_path: Path) -> No
 def test_an_interrupt_within_exec_ends_with_the_status_of_an_interrupt(tmp_path: Path, where: str) -> None:
     """As Ctrl-C does while a dataclass is made: CPython would end `python -m` by the signal."""
     script = (
-        "import typer\n"
-        "from fingerpad.cli import run\n"
-        "from fingerpad.cli.options import Command\n"
-        "def interrupted(**options):\n"
+        "from fingerpad import cli\n"
+        "def interrupted(*_):\n"
         "    exec('raise KeyboardInterrupt')\n"
-        "app = typer.Typer()\n"
-        "app.command('one', cls=Command)(lambda: interrupted())\n"
-        f"run({'interrupted' if where.startswith('before') else 'app'}, 'fingerpad')\n"
+        f"cli.{'_run' if where.startswith('before') else 'parser_of'} = interrupted\n"
+        "cli.main(['store', 'list', '.'])\n"
     )
     (tmp_path / "interrupted.py").write_text(script, encoding="utf-8")
     command = [sys.executable, "-m", "interrupted"]
