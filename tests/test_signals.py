@@ -144,4 +144,5 @@ def test_an_interrupt_within_exec_ends_with_the_status_of_an_interrupt(tmp_path:
     command = [sys.executable, "-m", "interrupted"]
     ended = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=LIMIT_S)
     assert ended.returncode == 130
-    assert ended.stderr == "fingerpad: stopped. Run the same command again.\n"
+    said = "fingerpad: stopped. The same command continues after the last finished indentation.\n"
+    assert ended.stderr == said
