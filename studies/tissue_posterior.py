@@ -20,7 +20,7 @@ from fingerpad.experiments.manifest import Manifest
 from fingerpad.experiments.runner import Runner
 from fingerpad.experiments.scores import coefficient_of_determination
 from fingerpad.inference.fitting.cross_validation import fractional_sum_of_squares
-from fingerpad.inference.fitting.posterior import Chains, credible_band
+from fingerpad.inference.fitting.posterior import credible_band
 from fingerpad.inference.identifiable import LARGEST_RESTING_SHARE, identifiable
 from fingerpad.neuron.afferent import Afferent
 from studies.finger_levels import SITES, Outputs, euclidean_hit_rates, largest_stress_kpa, outputs_of
@@ -363,21 +363,6 @@ def _fss(observed: Observations, dynamic_hz: FloatArray, static_hz: FloatArray) 
     ) + protocol.STATIC_WEIGHT.value * fractional_sum_of_squares(observed.static_hz, static_hz)
 
 
-def convergence(chains: Chains) -> PosteriorConvergence:
-    """Size and convergence of the draws."""
-    return PosteriorConvergence(
-        ensembles=chains.draws.shape[0],
-        walkers=chains.draws.shape[2],
-        draws=len(chains.flat),
-        evaluations=chains.n_evaluations,
-        acceptance=chains.acceptance,
-        r_hat=chains.r_hat.max(),
-        effective_draws=chains.effective_sizes.min(),
-        effective_draws_of_tails=chains.tail_effective_sizes.min(),
-        draws_per_effective_draw=chains.autocorrelation_steps.max(),
-    )
-
-
 # Synthetic experiments
 
 
@@ -524,7 +509,7 @@ def run(runner: Runner, conditions: Conditions) -> TissuePosterior:
         n_tissues=len(shares),
         n_unsolved=N_TISSUES - len(shares),
         errors=error_table(emulator_errors(centres, outputs, tissues.emulated(), times), residuals, observed),
-        convergence=convergence(posterior.chains),
+        convergence=PosteriorConvergence.of(posterior.chains),
         marginals=tuple(
             Marginal(
                 name=name,

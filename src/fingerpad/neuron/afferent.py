@@ -398,10 +398,3 @@ def spikes_where(
     fired, counts = SpikeTrains.joined(blocks), np.zeros(traces.n_sites, dtype=np.int64)
     counts[may_fire] = fired.counts
     return SpikeTrains(fired.times_ms, np.append(0, np.cumsum(counts)))
-
-
-def as_sai(afferent: AnyAfferent) -> Afferent:
-    """Return an afferent if it has the chain of SAI, or raise `InputError`."""
-    if not isinstance(afferent, Afferent):
-        raise InputError("afferent", "must have the chain of Afferent() here", shown(afferent))
-    return afferent

@@ -34,7 +34,7 @@ from fingerpad.inference.fitting.cross_validation import (
     interleaved_folds,
 )
 from fingerpad.inference.fitting.methods import Fit, FitStep, Method
-from fingerpad.inference.fitting.posterior import credible_band
+from fingerpad.inference.fitting.posterior import Chains, credible_band
 from fingerpad.inference.fitting.sensitivity import identifiability
 from fingerpad.inference.identifiable import IDENTIFIABLE_NAMES, identifiable
 from fingerpad.inference.problem import RateProblem
@@ -371,6 +371,21 @@ class PosteriorConvergence:
     effective_draws_of_tails: Number  # Smallest effective sample sizes.
     draws_per_effective_draw: Number  # Largest autocorrelation time, in draws.
 
+    @classmethod
+    def of(cls, chains: Chains) -> PosteriorConvergence:
+        """Convergence of ensembles, the worst of all coordinates."""
+        return cls(
+            ensembles=chains.draws.shape[0],
+            walkers=chains.draws.shape[2],
+            draws=len(chains.flat),
+            evaluations=chains.n_evaluations,
+            acceptance=chains.acceptance,
+            r_hat=chains.r_hat.max(),
+            effective_draws=chains.effective_sizes.min(),
+            effective_draws_of_tails=chains.tail_effective_sizes.min(),
+            draws_per_effective_draw=chains.autocorrelation_steps.max(),
+        )
+
 
 @result_class
 class PhasePrediction:
@@ -437,17 +452,7 @@ def uncertainty_result(
             silent_directions=tuple(map(_six, local.silent_directions)),
         ),
         posterior={name: _interval(values) for name, values in draws.items()},
-        convergence=PosteriorConvergence(
-            ensembles=chains.draws.shape[0],
-            walkers=chains.draws.shape[2],
-            draws=len(posterior.four),
-            evaluations=chains.n_evaluations,
-            acceptance=chains.acceptance,
-            r_hat=chains.r_hat.max(),
-            effective_draws=chains.effective_sizes.min(),
-            effective_draws_of_tails=chains.tail_effective_sizes.min(),
-            draws_per_effective_draw=chains.autocorrelation_steps.max(),
-        ),
+        convergence=PosteriorConvergence.of(chains),
         shift_mm=shift_mm,
         rates={
             phase: _prediction(drawn, getattr(recordings, f"{phase}_rate_hz"))
