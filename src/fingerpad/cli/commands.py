@@ -106,16 +106,20 @@ def _asked(name: str, given: argparse.Namespace, within: Options, main: str = ""
     return source, keys | within
 
 
-def _run_request(name: str, given: argparse.Namespace, within: Options, main: str = "", **more: Any) -> Any:
+def _run_request(
+    name: str,
+    given: argparse.Namespace,
+    within: Options,
+    main: str = "",
+    further_check: Callable[[Any], None] = lambda request: None,
+    **more: Any,
+) -> Any:
     """Check and run a request, with its files in --out."""
     kind, function = getattr(fp, KINDS[name]), getattr(fp, name)
     source, keys = _asked(name, given, within, main)
     request = kind.read(source, keys, given.allow_python)
+    further_check(request)
     request.check()
-    if name == "touch":
-        from fingerpad.export.requests import check_outputs
-
-        check_outputs(request)
     by = engine(given.jobs, given.scheduler)
     make_writable(given.out.parent if given.out.suffix in (".npz", ".zarr") else given.out)
     return function(
@@ -142,9 +146,10 @@ def _tell(*paragraphs: object) -> None:
 
 
 def _touch(given: argparse.Namespace, within: Options) -> None:
+    from fingerpad.export.requests import check_outputs
     from fingerpad.report.skin import PAGE, touch_summary
 
-    found = _run_request("touch", given, within)
+    found = _run_request("touch", given, within, further_check=check_outputs)
     _tell(*touch_summary(found.result), *(f"Not verified: {each.text}" for each in found.skin.caveats))
     if (given.out / PAGE).exists():
         _tell(f"Report: {given.out / PAGE}")
@@ -193,13 +198,14 @@ def _sweep(given: argparse.Namespace, within: Options) -> int:
     from fingerpad.export.sweep import check_sweep
     from fingerpad.export.sweep_results import check_outputs, write_sweep_spikes
 
-    source, keys = _asked("sweep", given, within)
-    request = fp.SweepRequest.read(source, keys, given.allow_python)
-    check_sweep(request, given.out, given.yes)
-    check_outputs(given.table, given.spikes)
+    def check(request: fp.SweepRequest) -> None:
+        check_sweep(request, given.out, given.yes)
+        check_outputs(given.table, given.spikes)
+
     done = _run_request(
-        "sweep", given, within, retry_failed=given.retry_failed, any_size=given.yes, store=given.store
-    )
+        "sweep", given, within, further_check=check,
+        retry_failed=given.retry_failed, any_size=given.yes, store=given.store,
+    )  # fmt: skip
     _tell(*done.lines)
     if done.done and given.table is not None:
         _tell(f"Table: {fp.write_sweep_table(fp.open_sweep(given.out), given.table)}")
