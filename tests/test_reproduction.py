@@ -330,7 +330,7 @@ object: {kind: sphere}
 motion: {depth_mm: 1.0, ramp_ms: 50, hold_ms: 950}
 stimuli: {vary: object.curvature_per_m, values: [287, 296, 305, 316, 328, 340, 365]}
 standard: 287
-afferent: results.json
+afferents: {afferent: results.json}
 measure: [static, dynamic, latency]
 noise: {noise}
 """
