@@ -1,16 +1,16 @@
 """Published numbers: each has a source and a status, and they agree with each other."""
 
 from dataclasses import FrozenInstanceError
+from pathlib import Path
 
 import numpy as np
 import pytest
 
+from fingerpad import data
 from fingerpad.data import (
     STATUSES,
     Published,
-    afferents,
     all_published,
-    fingers,
     fingertip,
     neuron,
     paper,
@@ -20,22 +20,9 @@ from fingerpad.data import (
 )
 from refusals import refusals
 
-NAMES = {"SPHERES", "DEFAULT_TISSUES", "TYPES", "HUMAN_QUANTITY"}
-"""Constants that are no published numbers."""
 
-
-def test_every_constant_of_every_module_is_collected_once() -> None:
-    modules = (afferents, fingers, fingertip, tissues, protocol, neuron, psychophysics, paper)
-    constants = [
-        getattr(module, name)
-        for module in modules
-        for name in vars(module)
-        if name.isupper() and not name.startswith("_") and name not in NAMES
-    ]
-    assert all(isinstance(constant, Published) for constant in constants)
-    rows = [number for row in afferents.TYPES.values() for number in row.numbers.values()]
-    published = {id(number) for number in (*constants, *rows) if isinstance(number, Published)}
-    assert sorted(published) == sorted(map(id, all_published()))
+def test_every_file_of_numbers_is_collected() -> None:
+    assert {entry.stem for entry in Path(data.__file__).parent.glob("tables/*.toml")} == set(data.TOPICS)
 
 
 def test_names_are_unique_and_statuses_known() -> None:
@@ -101,7 +88,8 @@ def test_start_points_differ_in_the_gains_only_and_the_scale_keeps_their_ratio()
 
 
 def test_assumed_spheres_are_never_called_the_papers() -> None:
-    statuses = {sphere.value: sphere.status for sphere in psychophysics.SPHERES}
+    spheres = [getattr(psychophysics, f"SPHERE_{each:.0f}") for each in psychophysics.SPHERE_CURVATURES.value]
+    statuses = {sphere.value: sphere.status for sphere in spheres}
     assumed = dict.fromkeys((316.0, 328.0, 340.0), "assumed")
     assert statuses == dict.fromkeys((287.0, 296.0, 365.0), "paper") | {305.0: "read"} | assumed
     assert psychophysics.SPHERE_CURVATURES.status == "assumed"

@@ -4,10 +4,6 @@ import numpy as np
 import pytest
 
 from fingerpad.data import bar_firing_rates, cylinder_deflection, goodwin_hit_rates, protocol, psychophysics
-from fingerpad.data.observations import parsed_table
-from refusals import refusals
-
-STORY = "# content: a\n# source: b\n# status: read\n"
 
 
 def fss(observed: np.ndarray, predicted: np.ndarray) -> float:
@@ -52,13 +48,3 @@ def test_observations_carry_their_story_and_cannot_be_changed(load) -> None:
         if isinstance(array, np.ndarray):
             with pytest.raises(ValueError, match="read-only"):
                 array[0] = 1
-
-
-test_broken_tables_are_refused = refusals(
-    ("# content: a\n# status: read\nrate_hz\n1\n", "needs a line '# source: ...'"),
-    ("# content: a\n# source: b\n# status: heard\nrate_hz\n1\n", "must be one of paper"),
-    (STORY + "shift_mm,rate_hz\n1\n", "needs 2 entries per row"),
-    (STORY + "shift_mm,rate_hz\n1,high\n", "rate_hz of rates must be a finite number: got 'high'"),
-    (STORY + "rate_hz\n", "needs a header and at least one row"),
-    call=lambda text: parsed_table('rates', text),
-)  # fmt: skip

@@ -1,11 +1,12 @@
 """Published parameters and reference observations, each with unit, source and status; no algorithm.
 
-`fingertip`, `fingers`, `tissues`, `neuron`, `protocol` and `psychophysics` are inputs of the model; `paper`
-contains the results for comparison.
+The numbers stand in the files of `tables`; each file is an object here, such as `fingertip.LENGTH`. All are
+inputs of the model but those of `paper`, its results for comparison.
 """
 
-from fingerpad.data import afferents, fingers, fingertip, neuron, paper, protocol, psychophysics, tissues
-from fingerpad.data.afferents import TYPES
+from types import SimpleNamespace
+
+from fingerpad.data import afferents, tissues
 from fingerpad.data.observations import (
     BarObservations,
     DeflectionObservations,
@@ -14,7 +15,7 @@ from fingerpad.data.observations import (
     cylinder_deflection,
     goodwin_hit_rates,
 )
-from fingerpad.data.published import STATUSES, Published
+from fingerpad.data.published import STATUSES, Published, numbers_of
 
 __all__ = [
     "STATUSES",
@@ -36,11 +37,18 @@ __all__ = [
     "tissues",
 ]
 
-_MODULES = (fingertip, fingers, tissues, protocol, neuron, psychophysics, paper, afferents)
+TOPICS = ("fingertip", "fingers", "tissues", "protocol", "neuron", "psychophysics", "paper", "afferents")
+
+fingers = SimpleNamespace(**numbers_of("fingers"))
+fingertip = SimpleNamespace(**numbers_of("fingertip"))
+neuron = SimpleNamespace(**numbers_of("neuron"))
+paper = SimpleNamespace(**numbers_of("paper"))
+protocol = SimpleNamespace(**numbers_of("protocol"))
+psychophysics = SimpleNamespace(**numbers_of("psychophysics"))
 
 
 def all_published() -> tuple[Published, ...]:
-    """Every published number of the package, module by module, in the order of definition.
+    """Every published number of the package, file by file, in the order of definition.
 
     Examples
     --------
@@ -48,9 +56,5 @@ def all_published() -> tuple[Published, ...]:
     >>> {number.status for number in all_published()} == {"paper", "read", "recalled", "assumed"}
     True
     """
-    found: list[object] = []
-    for value in (value for module in _MODULES for value in vars(module).values()):
-        found += value.values() if isinstance(value, dict) else [value]
-        if value is TYPES:
-            found += [each for row in TYPES.values() for each in (row.density_per_cm2, *row.numbers.values())]
-    return tuple({id(each): each for each in found if isinstance(each, Published)}.values())
+    found = (value for topic in TOPICS for value in numbers_of(topic).values())
+    return tuple(value for value in found if isinstance(value, Published))

@@ -4,58 +4,25 @@ from __future__ import annotations
 
 import csv
 from dataclasses import dataclass
-from importlib.resources import files
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fingerpad.core.errors import InputError
-from fingerpad.core.values import FloatArray, float_array, number_in, one_of
-from fingerpad.data.published import STATUSES
+from fingerpad.core.values import FloatArray, float_array
+from fingerpad.data.published import packaged_text
 
 
-@dataclass(frozen=True)
-class Table:
-    """Columns of numbers with content, source and status."""
-
-    columns: dict[str, FloatArray]  # Values by column name; the name carries the unit, (n_rows,).
-    content: str
-    source: str
-    status: str  # Observed quantity, publication, and status of the numbers.
-
-
-def packaged_table(name: str) -> Table:
-    """Table `name` of the data that come with the package."""
-    return parsed_table(
-        name, (files("fingerpad.data") / "tables" / f"{name}.csv").read_text(encoding="utf-8")
-    )
-
-
-def parsed_table(name: str, text: str) -> Table:
-    r"""Table from the text of a file with lines `# source: ...`, `# status: ...`, a header and numbers."""
-    lines = [line for line in text.splitlines() if line.strip()]
-    story = dict(_labelled(line) for line in lines if line.startswith("#"))
-    for label in ("content", "source", "status"):
-        if not story.get(label):
-            raise InputError(name, f"needs a line '# {label}", remedy=f"...': it has {sorted(story)}")
-    one_of(f"status of {name}", story["status"], tuple(STATUSES))
-    records = list(csv.reader(line for line in lines if not line.startswith("#")))
-    if len(records) < 2:
-        raise InputError(name, "needs a header and at least one row of numbers", f"{len(records)} line(s)")
-    header, *rows = records
-    for row in rows:
-        if len(row) != len(header):
-            raise InputError(name, f"needs {len(header)} entries per row", str(row))
+def packaged_table(name: str) -> dict[str, Any]:
+    """Columns of numbers of a CSV file of `tables`, whose names carry units, its source and its status."""
+    text = packaged_text(f"{name}.csv")
+    story = dict(line[2:].split(": ", 1) for line in text.splitlines() if line.startswith("# "))
+    header, *rows = csv.reader(line for line in text.splitlines() if not line.startswith("#"))
     columns = {
-        column: float_array(column, [number_in(f"{column} of {name}", value) for value in values], 1)
+        column: float_array(column, [float(value) for value in values], 1)
         for column, values in zip(header, zip(*rows, strict=True), strict=True)
     }
-    return Table(columns, story["content"], story["source"], story["status"])
-
-
-def _labelled(line: str) -> tuple[str, str]:
-    label, _, said = line.removeprefix("#").partition(":")
-    return label.strip(), said.strip()
+    return columns | {label: story[label] for label in ("source", "status")}
 
 
 @dataclass(frozen=True)
@@ -100,8 +67,7 @@ def bar_firing_rates() -> BarObservations:
     >>> observed.shift_mm.size, observed.dynamic_rate_hz.max(), observed.static_rate_hz.max()
     (36, np.float64(210.0), np.float64(61.0))
     """
-    table = packaged_table("bar_firing_rates")
-    return BarObservations(**table.columns, source=table.source, status=table.status)
+    return BarObservations(**packaged_table("bar_firing_rates"))
 
 
 def cylinder_deflection() -> DeflectionObservations:
@@ -116,10 +82,9 @@ def cylinder_deflection() -> DeflectionObservations:
     [-9.25]
     """
     table = packaged_table("cylinder_deflection")
-    is_artefact = table.columns["is_artefact"] == 1.0
+    is_artefact = table["is_artefact"] == 1.0
     is_artefact.setflags(write=False)
-    columns = table.columns | {"is_artefact": is_artefact}
-    return DeflectionObservations(**columns, source=table.source, status=table.status)
+    return DeflectionObservations(**table | {"is_artefact": is_artefact})
 
 
 def goodwin_hit_rates() -> HitRateObservations:
@@ -131,7 +96,4 @@ def goodwin_hit_rates() -> HitRateObservations:
     [0.58, 0.95]
     """
     table = packaged_table("goodwin_hit_rates")
-    standard, curvature, hit_rate = (
-        table.columns[name] for name in ("standard_per_m", "curvature_per_m", "hit_rate")
-    )
-    return HitRateObservations(float(standard[0]), curvature, hit_rate, table.source, table.status)
+    return HitRateObservations(**table | {"standard_per_m": float(table["standard_per_m"][0])})

@@ -1,13 +1,16 @@
-"""One published number: value, unit, source and status.
+"""Published numbers: value, unit, source and status of each, read from the files of `tables`.
 
-Modules of numbers are tables: what it is, its value and its unit in the first line of a row, then the source
-and the status. They are not formatted by the formatter, which would write one entry per line.
+In these files a table is a number: `name` says what it is, and `source` where it stands, in words with a
+`status` or as one of the `sources` of the file. All else is as it is written.
 """
 
 from __future__ import annotations
 
+import tomllib
 from dataclasses import dataclass
-from typing import Generic, Literal, TypeVar
+from functools import cache
+from importlib.resources import files
+from typing import Any, Generic, Literal, TypeVar
 
 from fingerpad.core.errors import InputError
 from fingerpad.core.values import finite, one_of
@@ -61,3 +64,23 @@ class Source:
 
     def __call__(self, name: str, value: Value, unit: str) -> Published[Value]:
         return Published(name, value, unit, self.text, self.status)
+
+
+def packaged_text(name: str) -> str:
+    """Text of a file of `tables`."""
+    return (files("fingerpad.data") / "tables" / name).read_text(encoding="utf-8")
+
+
+@cache
+def numbers_of(topic: str) -> dict[str, Any]:
+    """Return the numbers of a file of `tables` by their names there, and what else it holds."""
+    rows = tomllib.loads(packaged_text(f"{topic}.toml"))
+    sources = {name: Source(**row) for name, row in rows.pop("sources").items()}
+
+    def number(name: str, value: Any, unit: str, source: str, status: Any = None) -> Published[Any]:
+        said = Source(source, status) if status else sources[source]
+        return said(name, tuple(value) if isinstance(value, list) else value, unit)
+
+    return {
+        name: number(**row) if isinstance(row, dict) and "value" in row else row for name, row in rows.items()
+    }

@@ -34,7 +34,7 @@ from fingerpad.core.values import (
     positive,
 )
 from fingerpad.data import fingertip, psychophysics
-from fingerpad.data.afferents import TYPES, value_of
+from fingerpad.data.afferents import TYPES
 from fingerpad.data.tissues import DEFAULT_TISSUES
 from fingerpad.neuron.afferent import Afferent, AnyAfferent, checked_afferent, type_of
 from fingerpad.neuron.afferent_types import afferent_types
@@ -45,7 +45,7 @@ if TYPE_CHECKING:
     from fingerpad.core.regions import Region
 
 PUBLISHED_DENSITIES: Mapping[str, float] = MappingProxyType(
-    {name: float(value_of(row.density_per_cm2)) for name, row in TYPES.items()}
+    {name: row.density_per_cm2 for name, row in TYPES.items()}
 )
 """Densities of the types in the human fingertip. [1/cm2]"""
 

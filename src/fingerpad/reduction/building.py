@@ -22,7 +22,7 @@ from fingerpad.core.errors import InputError
 from fingerpad.core.random_streams import published_generator
 from fingerpad.core.signals import STORED_ENERGY
 from fingerpad.core.values import FloatArray, NotNegativeWhole
-from fingerpad.data.neuron import HUMAN_QUANTITY
+from fingerpad.data import neuron
 from fingerpad.geometry.fingertip import Fingertip
 from fingerpad.geometry.trajectory import Trajectory
 from fingerpad.reduction.model import (
@@ -59,7 +59,7 @@ Solve = Callable[[Sequence[Touch], str], list[SkinResponse]]
 def reduce_touch(
     training: ReducedTraining,
     solve: Solve | None = None,
-    quantities: Sequence[str] = (HUMAN_QUANTITY, STORED_ENERGY),
+    quantities: Sequence[str] = (neuron.HUMAN_QUANTITY, STORED_ENERGY),
     calibration: NotNegativeWhole = 20,
     seed: NotNegativeWhole = 1,
 ) -> ReducedModel:

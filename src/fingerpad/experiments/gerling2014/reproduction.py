@@ -13,8 +13,7 @@ from fingerpad.core.engine import Engine, Processes, engine_of
 from fingerpad.core.progress import Progress
 from fingerpad.core.signals import STORED_ENERGY
 from fingerpad.core.values import AnyPath, Flag, Number, Whole, choice
-from fingerpad.data import all_published
-from fingerpad.data.neuron import PAPER_INITIAL
+from fingerpad.data import all_published, neuron
 from fingerpad.experiments.conditions import RECEPTOR_X_MM, Conditions, Touch
 from fingerpad.experiments.gerling2014 import nerve, percept, skin
 from fingerpad.experiments.gerling2014.claims import ClaimRow, Statement, judged, paired
@@ -239,7 +238,7 @@ def set_result(
     bars, spheres, seed = list(responses["bar, 36 shifts"].values()), responses["spheres"], conditions.seed
     quantity, tissues = conditions.quantity, str(conditions.tissues)
     # The paper's own system is fitted by the paper's method; its membrane starts at 0, as the paper prints.
-    initial_mv: float | None = PAPER_INITIAL.value
+    initial_mv: float | None = neuron.PAPER_INITIAL.value
     method: Method = response_surface()
     if quantity != STORED_ENERGY:
         initial_mv, method = None, percept.to_rates_and_hit_rates(spheres, quantity)

@@ -11,7 +11,7 @@ from pydantic import BeforeValidator, Field, Strict
 from fingerpad.core.errors import InputError
 from fingerpad.core.signals import STORED_ENERGY
 from fingerpad.core.values import Pair, Positive, Seed, Text
-from fingerpad.data.neuron import HUMAN_QUANTITY
+from fingerpad.data import neuron
 from fingerpad.experiments.requests.afferents import Afferents, AfferentsSettings, population_of
 from fingerpad.experiments.requests.parts import Part, Request, as_list, at
 from fingerpad.experiments.requests.stimulus import (
@@ -28,7 +28,7 @@ from fingerpad.reduction.training import ReducedRange, ReducedTraining
 from fingerpad.skin.indentation import Touch
 from fingerpad.skin.sampling import SkinResponse
 
-KEPT = (HUMAN_QUANTITY, STORED_ENERGY)  # What every reduced touch keeps.
+KEPT = (neuron.HUMAN_QUANTITY, STORED_ENERGY)  # What every reduced touch keeps.
 NO_WAY = (0.0, 0.0)
 
 
