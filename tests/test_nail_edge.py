@@ -11,8 +11,8 @@ from fingerpad import Fingertip, Population
 from fingerpad.core.regions import uniform
 from fingerpad.geometry.grading import resolution_grading
 from fingerpad.geometry.mesh import finger_mesh
-from fingerpad.skin.nail_edge import NailEdge
 from fingerpad.skin.receptor_sheet import ReceptorSheet
+from fingerpad.skin.unrolled_skin import NailEdge
 from refusals import refusals
 
 NAIL = NailEdge()

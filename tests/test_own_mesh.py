@@ -189,7 +189,7 @@ def test_end_organs_stay_in_their_sheet_and_skin_faces_look_outwards(parts):
     own = finger_from(parts)
     receptors, mesh = FreeReceptors(own.mesh), own.mesh
     middles = mesh.nodes_mm[mesh.elements[mesh.living_epidermis]].mean(axis=1)
-    found = receptors.under(np.array([[8.0, 0.0], [9.5, 1.3], [12.0, -2.0]]))
+    found = receptors.below(np.array([[8.0, 0.0], [9.5, 1.3], [12.0, -2.0]]))
     np.testing.assert_allclose(receptors.read(found, np.ones((1, len(middles)))), 1.0)
     np.testing.assert_allclose(
         receptors.read(found, middles[None, :, 0] * 2.0 + 1.0)[0], [17.0, 20.0, 25.0], atol=1e-6
@@ -198,7 +198,7 @@ def test_end_organs_stay_in_their_sheet_and_skin_faces_look_outwards(parts):
     assert set(deeper.mesh.layer[deeper.mesh.living_epidermis]) == {LAYERS.index("dermis")}
     for sites, says in (([[40.0, 0.0]], "volar skin"), ([[10.0, 0.0, 0.0]], "mm beside it")):
         with pytest.raises(fp.InputError, match=says):
-            (receptors.under if len(sites[0]) == 2 else receptors.below)(np.array(sites))
+            receptors.below(np.array(sites))
     mesh = finger_from(parts).mesh
     middle = mesh.nodes_mm[mesh.skin_faces].mean(axis=1) - np.array([8.0, 0.0, 0.0])
     corners = mesh.nodes_mm[mesh.skin_faces]

@@ -79,13 +79,13 @@ def bump(centre):
 
 
 def test_sites_are_found_once_on_equal_meshes_and_anew_on_others(monkeypatch):
-    found, under = [], ReceptorSheet.under
+    found, below = [], ReceptorSheet.below
 
     def watched(sheet, organs):
         found.append(sheet.mesh)
-        return under(sheet, organs)
+        return below(sheet, organs)
 
-    monkeypatch.setattr(ReceptorSheet, "under", watched)
+    monkeypatch.setattr(ReceptorSheet, "below", watched)
     sites = SITES + np.array([0.125, 0.0])
     mesh = layered_block()
     same = replace(mesh, nodes_mm=mesh.nodes_mm.copy())
@@ -183,7 +183,7 @@ def test_smooth_fields_are_read_better_than_by_triangles(resolution, field, quic
     sites = np.random.default_rng(1).uniform([14.0, -3.0], [20.5, 3.0], (1000, 2))
     sheet, truth = ReceptorSheet(mesh), FIELDS_IN_SPACE[field]
     x, _, z = mesh.nodes_mm[mesh.elements[mesh.living_epidermis.ravel()]].mean(axis=1).T
-    read = sheet.read(sheet.under(sites), truth(x, z)[None])[0]
+    read = sheet.read(sheet.below(sites), truth(x, z)[None])[0]
     off = np.abs(read - truth(*sites.T))
     beside = np.abs(by_triangles(mesh, truth(x, z), sites) - truth(*sites.T))
     assert off.max() < (quick if resolution == "quick" else standard)
@@ -199,7 +199,7 @@ def test_the_error_falls_with_the_fourth_power_of_the_size_of_the_elements():
         sheet = ReceptorSheet(mesh)
         x, _, z = mesh.nodes_mm[mesh.elements[mesh.living_epidermis.ravel()]].mean(axis=1).T
         sites = np.random.default_rng(4).uniform(-0.8, 0.8, (400, 2))
-        read = sheet.read(sheet.under(sites), (np.sin(2.0 * x) * np.cos(1.5 * z))[None])[0]
+        read = sheet.read(sheet.below(sites), (np.sin(2.0 * x) * np.cos(1.5 * z))[None])[0]
         errors.append(np.abs(read - np.sin(2.0 * sites[:, 0]) * np.cos(1.5 * sites[:, 1])).max())
     orders = np.log2(np.divide(errors[:-1], errors[1:]))
     assert (orders > 3.7).all()
@@ -215,7 +215,7 @@ def test_every_place_of_the_volar_side_is_found(full):
     x = rng.uniform(0.5, 29.0, 2000)
     organs = np.stack([x, 0.9 * rng.uniform(-1.0, 1.0, 2000) * finger.section(x)[2]], axis=1)
     sheet = ReceptorSheet(mesh)
-    found = sheet.under(organs)
+    found = sheet.below(organs)
     inside = organs if mesh.full else np.abs(organs)
     np.testing.assert_allclose(sheet._centre(found)[0][:, [0, 2]], inside, rtol=0, atol=1e-8)
     assert (sheet._centre(found)[0][:, 1] < 0.0).mean() > 0.99

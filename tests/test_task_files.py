@@ -21,8 +21,7 @@ from fingerpad.experiments.gerling2014.percept import sphere_touches
 from fingerpad.experiments.gerling2014.reproduction import ReproductionResult
 from fingerpad.experiments.requests.parts import parts_in
 from fingerpad.neuron.afferent import PARAMETER_NAMES
-from fingerpad.skin.nail_edge import NailEdge
-from fingerpad.skin.unrolled_skin import UnrolledSkin
+from fingerpad.skin.unrolled_skin import NailEdge, UnrolledSkin
 from tests.mutations import CHANGES, VALUES, places
 from tests.mutations import changed as mutated
 

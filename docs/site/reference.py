@@ -67,7 +67,7 @@ FURTHER = {
     "reduction.streaming": ("ReducedSample",),
     "reduction.training": ("ReducedRange", "ReducedTraining"),
     "skin.indentation": ("Touch",),
-    "skin.nail_edge": ("NailEdge",),
+    "skin.unrolled_skin": ("NailEdge",),
     "skin.sampling": ("SkinResponse", "SurfaceProfile"),
     "skin.store": ("Store", "solve_missing"),
 }

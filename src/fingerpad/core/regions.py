@@ -217,11 +217,16 @@ def _bounds(centre: Point, half_length: float, half_width: float) -> tuple[Point
     return (x - half_length, z - half_width), (x + half_length, z + half_width)
 
 
+def rows_of(name: str, values: ArrayLike, needs: str, columns: int) -> FloatArray:
+    """Return an array of some columns, (n, columns), in words those that it `needs`."""
+    rows = float_array(name, values, 2)
+    if rows.shape[1] != columns:
+        raise InputError(name, f"needs {needs}", f"shape {rows.shape}")
+    return rows
+
+
 def _points(points_mm: ArrayLike) -> FloatArray:
-    points = float_array("points_mm", points_mm, 2)
-    if points.shape[1] != 2:
-        raise InputError("points_mm", "needs two columns", f"shape {points.shape}")
-    return points
+    return rows_of("points_mm", points_mm, "two columns", 2)
 
 
 SEPARATION = 0.75

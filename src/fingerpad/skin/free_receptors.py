@@ -16,10 +16,15 @@ from functools import cached_property
 import numpy as np
 from scipy.spatial import cKDTree
 
-from fingerpad.core.errors import InputError
 from fingerpad.core.values import FloatArray, IntArray
 from fingerpad.geometry.free_mesh import FACES, FreeMesh
-from fingerpad.skin.receptor_sheet import Part
+from fingerpad.skin.receptor_sheet import (
+    Part,
+    in_half,
+    refuse_beside_skin,
+    refuse_beside_tissue,
+    refuse_beside_volar_skin,
+)
 
 _NEIGHBOURS = 25
 _OFF_THE_SKIN = 0.25  # How far beside the skin a site may lie, over the size of the element there.
@@ -52,15 +57,11 @@ class FreeReceptors:
     mesh: FreeMesh
 
     def below(self, sites_mm: FloatArray) -> Interpolation:
-        """Find end organs below points of the skin, on any side; InputError if one is not on the skin."""
+        """Find end organs below points of the skin (n, 3), or by their x and z on the volar side (n, 2)."""
         return self._around(*self._organs(sites_mm, self.mesh.receptor_depth_mm), self.mesh.living_epidermis)
 
-    def under(self, organs_mm: FloatArray) -> Interpolation:
-        """Find end organs by their own x and z on the volar side; InputError if there is none."""
-        return self._around(*self._organs(organs_mm, self.mesh.receptor_depth_mm), self.mesh.living_epidermis)
-
     def at(self, sites_mm: FloatArray, depth_mm: FloatArray) -> list[Part]:
-        """Find end organs at a depth each, below points of the skin (n, 3) or by their own x and z (n, 2)."""
+        """Find end organs at a depth each, as of `below`."""
         mesh = self.mesh
         parts: list[Part] = []
         for depth in np.unique(depth_mm):
@@ -69,13 +70,7 @@ class FreeReceptors:
             corners = mesh.nodes_mm[mesh.elements[held]]
             away, near = cKDTree(corners.mean(axis=1)).query(organs)
             beside = away > np.linalg.norm(np.ptp(corners, axis=1), axis=1)[near] if held.size else away > 0.0
-            if beside.any():
-                place = ", ".join(f"{each:g}" for each in sites_mm[sites[np.argmax(beside)]])
-                raise InputError(
-                    "depth_mm",
-                    "must lie in the tissue, between the skin and the bone",
-                    f"{depth:g} mm at ({place}) mm",
-                )
+            refuse_beside_tissue(sites_mm[sites], depth_mm[sites], beside)
             for layer in np.unique(mesh.layer[held[near]]):
                 some = np.flatnonzero(mesh.layer[held[near]] == layer)
                 sheet = held[mesh.layer[held] == layer]
@@ -132,22 +127,16 @@ class FreeReceptors:
         return found(sites_mm, depth_mm)
 
     def _below(self, sites_mm: FloatArray, depth_mm: float) -> tuple[FloatArray, FloatArray]:
-        inside = self._in_mesh(sites_mm)
+        inside = in_half(self.mesh, sites_mm)
         feet, normals, sizes = self.mesh.on_skin(inside)
         away = np.linalg.norm(feet - inside, axis=1)
-        missed = away > _OFF_THE_SKIN * sizes
-        if missed.any():
-            x, y, z = sites_mm[np.argmax(missed)]
-            raise InputError(
-                "sites",
-                "must lie on the skin of the mesh",
-                remedy=f"(x, y, z) = ({x:g}, {y:g}, {z:g}) mm is {away[np.argmax(missed)]:.2g} mm beside it",
-            )
+        refuse_beside_skin(sites_mm, away > _OFF_THE_SKIN * sizes, away)
         return feet - depth_mm * normals, normals
 
     def _under(self, organs_mm: FloatArray, depth_mm: float) -> tuple[FloatArray, FloatArray]:
-        target = self._in_mesh(organs_mm)
-        feet = self._volar_mm[self._volar_tree.query(target)[1]]
+        target = in_half(self.mesh, organs_mm)
+        volar_mm, by_place = self._volar
+        feet = volar_mm[by_place.query(target)[1]]
         organs, normals = np.empty_like(feet), np.empty_like(feet)
         unsolved = np.arange(len(feet))
         for _ in range(_MOST_STEPS):
@@ -164,14 +153,7 @@ class FreeReceptors:
             rise = -(step[:, 0] * normal[:, 0] + step[:, 1] * normal[:, 2]) / upright
             feet[unsolved] += np.column_stack([step[:, 0], rise, step[:, 1]])
         missed = np.linalg.norm(organs[:, [0, 2]] - target, axis=1) > self._size_mm
-        missed |= normals[:, 1] >= 0.0
-        if missed.any():
-            x, z = organs_mm[np.argmax(missed)]
-            raise InputError(
-                "sites",
-                "must lie on the volar skin of the mesh",
-                remedy=f"(x, z) = ({x:g}, {z:g}) mm does not",
-            )
+        refuse_beside_volar_skin(organs_mm, missed | (normals[:, 1] >= 0.0))
         return organs, normals
 
     def read(self, places: Interpolation, values: FloatArray) -> FloatArray:
@@ -179,21 +161,12 @@ class FreeReceptors:
         known = np.asarray(values, dtype=np.float64)[:, places.elements]
         return np.einsum("tsk,sk->ts", known, places.weights)
 
-    def _in_mesh(self, sites: FloatArray) -> FloatArray:
-        inside = sites.copy()
-        if not self.mesh.full:
-            inside[:, -1] = np.abs(inside[:, -1])
-        return inside
-
     @cached_property
-    def _volar_mm(self) -> FloatArray:
-        """Nodes of the skin that face down."""
+    def _volar(self) -> tuple[FloatArray, cKDTree]:
+        """Nodes of the skin that face down, and how to find them by x and z."""
         nodes = self.mesh.skin_nodes
-        return self.mesh.nodes_mm[nodes[self.mesh.skin_normals[nodes, 1] < 0.0]]
-
-    @cached_property
-    def _volar_tree(self) -> cKDTree:
-        return cKDTree(self._volar_mm[:, [0, 2]])
+        volar_mm = self.mesh.nodes_mm[nodes[self.mesh.skin_normals[nodes, 1] < 0.0]]
+        return volar_mm, cKDTree(volar_mm[:, [0, 2]])
 
     @cached_property
     def _size_mm(self) -> float:

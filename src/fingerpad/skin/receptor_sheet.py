@@ -108,8 +108,8 @@ def _slopes(t: float) -> Four:
 
 
 @njit(cache=True, nogil=True)
-def _interpolated(known: FloatArray, uv: FloatArray, padding: int) -> FloatArray:
-    """Values (n_places, n_quantities)."""
+def values_at(known: FloatArray, uv: FloatArray, padding: int) -> FloatArray:
+    """Interpolate: values (n_places, n_quantities)."""
     found = np.zeros((len(uv), known.shape[2]))
     for n in range(len(uv)):
         row, column = math.floor(uv[n, 0]), math.floor(uv[n, 1])
@@ -121,8 +121,8 @@ def _interpolated(known: FloatArray, uv: FloatArray, padding: int) -> FloatArray
 
 
 @njit(cache=True, nogil=True)
-def _with_slopes(known: FloatArray, uv: FloatArray, padding: int) -> FloatArray:
-    """Values and their derivatives by u and by v, (3, n_places, n_quantities)."""
+def values_and_slopes_at(known: FloatArray, uv: FloatArray, padding: int) -> FloatArray:
+    """Interpolate, and differentiate by u and by v: (3, n_places, n_quantities)."""
     found = np.zeros((3, len(uv), known.shape[2]))
     for n in range(len(uv)):
         row, column = math.floor(uv[n, 0]), math.floor(uv[n, 1])
@@ -146,15 +146,6 @@ def _add_near(known: FloatArray, first: int, at: int, along: Four, around: Four,
         )  # fmt: skip
         for k in range(total.size):
             total[k] = total[k] + wa * a[k] + wb * b[k] + wc * c[k] + wd * d[k]
-
-
-def values_at(known: FloatArray, uv: FloatArray, padding: int) -> FloatArray:
-    return _interpolated(known, uv, padding)
-
-
-def values_and_slopes_at(known: FloatArray, uv: FloatArray, padding: int) -> FloatArray:
-    """Interpolate, and differentiate by u and by v."""
-    return _with_slopes(known, uv, padding)
 
 
 _PADDING = 24
@@ -190,6 +181,38 @@ class Part:
     weights: FloatArray | float  # Share of these elements in the value of each end organ.
 
 
+def refuse_beside_skin(sites_mm: FloatArray, missed: np.ndarray, away_mm: FloatArray) -> None:
+    """Raise `InputError` for the first point (x, y, z) that was missed."""
+    if missed.any():
+        x, y, z = sites_mm[np.argmax(missed)]
+        said = f"(x, y, z) = ({x:g}, {y:g}, {z:g}) mm is {away_mm[np.argmax(missed)]:.2g} mm beside it"
+        raise InputError("sites", "must lie on the skin of the mesh", remedy=said)
+
+
+def refuse_beside_volar_skin(organs_mm: FloatArray, missed: np.ndarray) -> None:
+    """Raise `InputError` for the first place (x, z) that was missed."""
+    if missed.any():
+        x, z = organs_mm[np.argmax(missed)]
+        said = f"(x, z) = ({x:g}, {z:g}) mm does not"
+        raise InputError("sites", "must lie on the volar skin of the mesh", remedy=said)
+
+
+def refuse_beside_tissue(sites_mm: FloatArray, depth_mm: FloatArray, missed: np.ndarray) -> None:
+    """Raise `InputError` for the first depth that was missed."""
+    if missed.any():
+        place = ", ".join(f"{each:g}" for each in sites_mm[np.argmax(missed)])
+        came = f"{depth_mm[np.argmax(missed)]:g} mm at ({place}) mm"
+        raise InputError("depth_mm", "must lie in the tissue, between the skin and the bone", came)
+
+
+def in_half(mesh: Mesh, sites_mm: FloatArray) -> FloatArray:
+    """Sites, mirrored into the half that a mesh holds."""
+    inside = sites_mm.copy()
+    if not mesh.full:
+        inside[:, -1] = np.abs(inside[:, -1])
+    return inside
+
+
 @dataclass(frozen=True)
 class ReceptorSheet:
     """The elements just above the epidermal-dermal border, and coordinates on them."""
@@ -204,15 +227,13 @@ class ReceptorSheet:
             raise InputError(f"Sampling needs two elements along and around, or more: got {shape}.")
 
     def below(self, sites_mm: FloatArray) -> FloatArray:
-        """Find end organs below points of the skin, on any side of the finger."""
+        """Find end organs below points of the skin (n, 3), or by their x and z on the volar side (n, 2)."""
+        if sites_mm.shape[1] == 2:
+            return self._facing_down(sites_mm, lambda uv, _: self._centre(uv))
         return self._below(self._above(sites_mm))
 
-    def under(self, organs_mm: FloatArray) -> FloatArray:
-        """Find end organs by their own x and z, on the volar side."""
-        return self._facing_down(organs_mm, lambda uv, _: self._centre(uv))
-
     def at(self, sites_mm: FloatArray, depth_mm: FloatArray) -> list[Part]:
-        """Find end organs at a depth each, below points of the skin (n, 3) or by their own x and z (n, 2)."""
+        """Find end organs at a depth each, as of `below`."""
         if sites_mm.shape[1] == 3:
             uv = self._above(sites_mm)
         else:
@@ -234,49 +255,30 @@ class ReceptorSheet:
                 some = weights > 0.0
                 missed[organs[some & lost]] = True
                 parts.append(Part(sheet.ravel(), organs[some], places[some], weights[some]))
-        if missed.any():
-            place = ", ".join(f"{each:g}" for each in sites_mm[np.argmax(missed)])
-            raise InputError(
-                "depth_mm",
-                "must lie in the tissue, between the skin and the bone",
-                f"{depth_mm[np.argmax(missed)]:g} mm at ({place}) mm",
-            )
+        refuse_beside_tissue(sites_mm, depth_mm, missed)
         return [part for part in parts if len(part.places)]
 
     def _above(self, sites_mm: FloatArray) -> FloatArray:
         """(u, v) of points of the skin."""
-        target = self._in_mesh(sites_mm)
+        target = in_half(self.mesh, sites_mm)
         start = self._middles[_nearest(self._skin(self._middles)[0], target)]
         uv, missed = self._solve(lambda uv, which: _tangential(self._skin(uv), target[which]), start)
         point, *slopes = self._skin(uv)
         away = np.linalg.norm(point - target, axis=1)
         missed |= away > _OFF_THE_SKIN * np.linalg.norm(slopes, axis=2).max(axis=0)
         missed |= self._past_the_rim(target)
-        if missed.any():
-            first = np.argmax(missed)
-            x, y, z = sites_mm[first]
-            raise InputError(
-                "sites",
-                "must lie on the skin of the mesh",
-                remedy=f"(x, y, z) = ({x:g}, {y:g}, {z:g}) mm is {away[first]:.2g} mm beside it",
-            )
+        refuse_beside_skin(sites_mm, missed, away)
         return uv
 
     def _facing_down(self, organs_mm: FloatArray, surface: Callable[..., FloatArray]) -> FloatArray:
         """(u, v) at which a surface has some x and z, on the volar side."""
-        target = self._in_mesh(organs_mm)
+        target = in_half(self.mesh, organs_mm)
         volar = self._middles[self._volar.ravel()]
         start = volar[_nearest(self._centre(volar)[0][:, [0, 2]], target)]
         uv, missed = self._solve(lambda uv, which: _projected(surface(uv, which), target[which]), start)
         missed |= self._turn(uv) * self._volar_sign <= 0.0
         missed |= self._past_the_rim(target)
-        if missed.any():
-            x, z = organs_mm[np.argmax(missed)]
-            raise InputError(
-                "sites",
-                "must lie on the volar skin of the mesh",
-                remedy=f"(x, z) = ({x:g}, {z:g}) mm does not",
-            )
+        refuse_beside_volar_skin(organs_mm, missed)
         return uv
 
     def read(self, uv: FloatArray, values: FloatArray) -> FloatArray:
@@ -384,13 +386,6 @@ class ReceptorSheet:
             z = sites_mm[:, -1]
             beyond = np.maximum(beyond, np.maximum(skin[:, 2].min() - z, z - skin[:, 2].max()))
         return beyond > _EXACT_MM
-
-    def _in_mesh(self, sites_mm: FloatArray) -> FloatArray:
-        """Sites, mirrored into the half that the mesh holds."""
-        inside = sites_mm.copy()
-        if not self.mesh.full:
-            inside[:, -1] = np.abs(inside[:, -1])
-        return inside
 
     @cached_property
     def _closed(self) -> bool:

@@ -61,15 +61,11 @@ class Receptors(Protocol):
         ...
 
     def below(self, sites_mm: FloatArray) -> Any:
-        """Find end organs below points of the skin, (n_sites, 3)."""
-        ...
-
-    def under(self, organs_mm: FloatArray) -> Any:
-        """Find end organs by their own x and z on the volar side, (n_sites, 2)."""
+        """Find end organs below points of the skin (n, 3), or by their x and z on the volar side (n, 2)."""
         ...
 
     def at(self, sites_mm: FloatArray, depth_mm: FloatArray) -> list[Part]:
-        """Find end organs at a depth each, as of `below` or `under`."""
+        """Find end organs at a depth each, as of `below`."""
         ...
 
     def read(self, places: Any, values: FloatArray) -> FloatArray:
@@ -111,64 +107,57 @@ class SurfaceProfile(Result):
         return np.interp(np.asarray(distance_mm, dtype=float), self.distance_mm, self.deflection_mm)
 
 
+def _stored(name: str) -> property:
+    """Make a property of a stored field, whose words are those of `FIELDS`."""
+    unit = FIELDS[name].unit
+
+    def values(self: SkinResponse) -> FloatArray:
+        return self.fields[name]
+
+    said = FIELDS[name].long_name.capitalize()
+    return property(values, doc=f"{said}. [{unit}]" if unit else f"{said}.")
+
+
 @value_class
 class SkinResponse(Result):
-    """Response of the skin to one indentation; the end of the mechanical half of the chain.
+    """Response of the skin to one indentation; the end of the mechanical half of the chain."""
 
-    Parameters
-    ----------
-    mesh : Mesh
-        The undeformed body.
-    kinks_ms : tuple of float
-        Times at which the speed of the motion jumps: the end of the ramp. [ms]
-    axis_x_mm : float
-        x at which the indenter's axis meets the midline. [mm]
-    direction : array (3,)
-        Unit direction of pressing.
-    fields : mapping of str to array
-        Values of stored fields by their names in `skin.fields.FIELDS`, "times_ms" among them.
-    force_imbalance : float
-        Largest difference of the indenter's force to the reaction of bone and nail, over that force.
-    energy_imbalance : float
-        Largest difference at any time between the indenter's work and what was stored, dissipated and held
-        by the contact, over that work.
-    penetration_mm : float
-        Deepest penetration of the indenter by any node at any time. [mm]
-    newton_steps, factorisations : int
-        Numbers of Newton steps and of factorisations.
-    linear_solver : str
-        The linear solver, and why it was chosen.
-    deformation : Deformation, optional
-        All nodes and elements over time, of `Touch.solve(whole=True)`; stored files do not hold it.
-    phases : tuple of Phase
-        Named phases of the motion.
-    pose : Pose
-        How far the indenter has moved aside and turned since first touch, at the last time.
-    touch : Touch, optional
-        What was solved: indenter, motion, tissues.
-    onset_ms : float
-        Time of first touch. [ms]
-    receptor_depths_mm : tuple of float
-        Depths at which all quantities are kept beside the border of epidermis and dermis. [mm]
-    """
-
-    mesh: Mesh
-    kinks_ms: Numbers
-    axis_x_mm: Number
-    direction: FloatArray
-    fields: Mapping[str, FloatArray]
+    mesh: Mesh  # The undeformed body.
+    kinks_ms: Numbers  # Times at which the speed of the motion jumps: the end of the ramp. [ms]
+    axis_x_mm: Number  # x at which the indenter's axis meets the midline. [mm]
+    direction: FloatArray  # Unit direction of pressing, (3,).
+    fields: Mapping[str, FloatArray]  # Stored fields by their names in `skin.fields.FIELDS`.
     force_imbalance: Number
+    """Largest difference of the indenter's force to the reaction of bone and nail, over that force."""
     energy_imbalance: Number
-    penetration_mm: Number
+    """Largest difference at any time between the indenter's work and what was stored, dissipated and held by
+    the contact, over that work."""
+    penetration_mm: Number  # Deepest penetration of the indenter by any node at any time. [mm]
     newton_steps: Whole
     factorisations: Whole
-    linear_solver: str
+    linear_solver: str  # The linear solver, and why it was chosen.
     deformation: Deformation | None = None
-    phases: Many[Phase] = ()
-    pose: Pose = STILL
-    touch: Touch | None = None
-    onset_ms: Number = 0.0
+    """All nodes and elements over time, of `Touch.solve(whole=True)`; stored files do not hold it."""
+    phases: Many[Phase] = ()  # Named phases of the motion.
+    pose: Pose = STILL  # How far the indenter has moved aside and turned since first touch, at the last time.
+    touch: Touch | None = None  # What was solved: indenter, motion, tissues.
+    onset_ms: Number = 0.0  # Time of first touch. [ms]
     receptor_depths_mm: Numbers = ()
+    """Depths at which all quantities are kept beside the border of epidermis and dermis. [mm]"""
+
+    times_ms = _stored("times_ms")  # From 0, the unloaded state, (n_times,).
+    force_mn = _stored("force_mn")  # Along the axis, (n_times,).
+    depth_mm = _stored("depth_mm")  # (n_times,)
+    contact_area_mm2 = _stored("contact_area_mm2")  # (n_times,)
+    contact_force_mn = _stored("contact_force_mn")  # (n_times, 3)
+    contact_pressure_kpa = _stored("contact_pressure_kpa")  # On `mesh.skin_nodes`, (n_times, n_skin_nodes).
+    shear_kpa = _stored("shear_kpa")  # (n_times, n_skin_nodes, 3)
+    slip_mm = _stored("slip_mm")  # Since the skin came to touch, (n_times, n_skin_nodes).
+    reaction_mn = _stored("reaction_mn")  # Of the whole finger, (n_times, 3).
+    skin_displacement_mm = _stored("skin_displacement_mm")  # (n_times, n_skin_nodes, 3)
+    displacement_mm = _stored("displacement_mm")  # Of all nodes at the last time, (n_nodes, 3).
+    sed_kpa = _stored("sed_kpa")  # Stored, element mean, (n_times, n_elements).
+    von_mises_kpa = _stored("von_mises_kpa")  # (n_elements,)
 
     def __post_init__(self) -> None:
         declared = {field.name: field for field in stored_fields()}
@@ -255,11 +244,6 @@ class SkinResponse(Result):
         return replace(self, fields={**self.fields, **fields})
 
     @property
-    def times_ms(self) -> FloatArray:
-        """Times from 0, the unloaded state, (n_times,). [ms]"""
-        return self.fields["times_ms"]
-
-    @property
     def pad_mm(self) -> tuple[float, float] | None:
         """X and z of the middle of the pad of the finger, None if `touch` is not known. [mm]"""
         return None if self.touch is None else self.touch.finger.contact_mm
@@ -268,66 +252,6 @@ class SkinResponse(Result):
     def tissues_name(self) -> str:
         """Name of the set of tissues; empty for tissues of your own, or if `touch` is not known."""
         return "" if self.touch is None else name_of_tissues(self.touch.tissues)
-
-    @property
-    def force_mn(self) -> FloatArray:
-        """Force of the indenter along its axis, on the whole finger, (n_times,). [mN]"""
-        return self.fields["force_mn"]
-
-    @property
-    def depth_mm(self) -> FloatArray:
-        """Advance of the indenter since first touch, (n_times,). [mm]"""
-        return self.fields["depth_mm"]
-
-    @property
-    def contact_area_mm2(self) -> FloatArray:
-        """Undeformed skin that the indenter touches, on the whole finger, (n_times,). [mm²]"""
-        return self.fields["contact_area_mm2"]
-
-    @property
-    def contact_pressure_kpa(self) -> FloatArray:
-        """Pressure of the indenter on `mesh.skin_nodes`, (n_times, n_skin_nodes). [kPa]"""
-        return self.fields["contact_pressure_kpa"]
-
-    @property
-    def contact_force_mn(self) -> FloatArray:
-        """Whole force of the indenter on the skin, with friction, (n_times, 3). [mN]"""
-        return self.fields["contact_force_mn"]
-
-    @property
-    def shear_kpa(self) -> FloatArray:
-        """Friction over the area of each of `mesh.skin_nodes`, (n_times, n_skin_nodes, 3). [kPa]"""
-        return self.fields["shear_kpa"]
-
-    @property
-    def slip_mm(self) -> FloatArray:
-        """How far skin in contact has slid since it came to touch, (n_times, n_skin_nodes). [mm]"""
-        return self.fields["slip_mm"]
-
-    @property
-    def reaction_mn(self) -> FloatArray:
-        """Force of the tissue on bone and nail, of the whole finger, (n_times, 3). [mN]"""
-        return self.fields["reaction_mn"]
-
-    @property
-    def skin_displacement_mm(self) -> FloatArray:
-        """Displacement of `mesh.skin_nodes`, (n_times, n_skin_nodes, 3). [mm]"""
-        return self.fields["skin_displacement_mm"]
-
-    @property
-    def displacement_mm(self) -> FloatArray:
-        """Displacement of all nodes at the last time, (n_nodes, 3). [mm]"""
-        return self.fields["displacement_mm"]
-
-    @property
-    def sed_kpa(self) -> FloatArray:
-        """Stored strain energy density, element mean, (n_times, n_elements). [kPa]"""
-        return self.fields["sed_kpa"]
-
-    @property
-    def von_mises_kpa(self) -> FloatArray:
-        """Equivalent stress after von Mises at the last time, (n_elements,). [kPa]"""
-        return self.fields["von_mises_kpa"]
 
     def at_end(self, quantity: str) -> tuple[str, FloatArray]:
         """Return a quantity that drives afferents in all elements at the last time, and its name.
@@ -540,5 +464,4 @@ def _places_of(sites: _Sites) -> Sequence[Part]:
     receptors, points = sites.receptors, sites.points
     if sites.depths is not None:
         return receptors.at(points, sites.depths)
-    places = receptors.under(points) if points.shape[1] == 2 else receptors.below(points)
-    return [Part(receptors.mesh.living_epidermis.ravel(), slice(None), places, 1.0)]
+    return [Part(receptors.mesh.living_epidermis.ravel(), slice(None), receptors.below(points), 1.0)]

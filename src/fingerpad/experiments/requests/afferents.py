@@ -319,7 +319,7 @@ def _along_nail(
     settings: PopulationSettings, afferent: AnyAfferent, place: str, finger: Fingertip
 ) -> Population:
     """Lay rows along the edge of the nail."""
-    from fingerpad.skin.nail_edge import NailEdge  # only what needs them loads what unrolls the skin
+    from fingerpad.skin.unrolled_skin import NailEdge  # only what needs them loads what unrolls the skin
 
     nail = NailEdge(finger)
     with placed(place):
