@@ -14,19 +14,11 @@ RELEASE, VIBRATION = "release", "vibration"  # The indenter goes back; it goes t
 
 @value_class
 class Phase:
-    """A named part of a touch.
-
-    Parameters
-    ----------
-    name : str
-        Its name.
-    start_ms, end_ms : float
-        From when until when, since the start of the touch. [ms]
-    """
+    """A named part of a touch."""
 
     name: str
-    start_ms: Finite
-    end_ms: Finite
+    start_ms: Finite  # Since the start of the touch. [ms]
+    end_ms: Finite  # Since the start of the touch. [ms]
 
     def __post_init__(self) -> None:
         if not self.name or not 0.0 <= self.start_ms < self.end_ms:

@@ -8,13 +8,12 @@ from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Protocol, runtime_checkable
+from typing import TYPE_CHECKING, Any, Protocol, runtime_checkable
 
 from fingerpad.core.checked import checked
 from fingerpad.core.errors import InputError
 
 if TYPE_CHECKING:
-    import rich.progress
     from rich.console import Console
 
 SHORTEST_WAIT_S = 0.5  # Shortest time between two looks at a stage in which no part has ended. [s]
@@ -164,63 +163,39 @@ def _line(stage: _Stage) -> str:
 
 
 class Bars:
-    """One bar per stage on a terminal; nothing elsewhere."""
+    """One bar per stage on a terminal, or below the cell of a notebook, by its `display`; else nothing."""
 
-    def __init__(self, console: Console):
-        self._console = console
-
-    @contextmanager
-    def stage(self, name: str, total: int) -> Iterator[Callable[[], None]]:
-        """Show one stage with its expected time."""
-        bars = _bars(name, self._console)
-        task = bars.add_task(name, total=total)
-
-        def show(stage: _Stage, _: bool) -> None:
-            bars.update(task, completed=stage.so_far)
-
-        with bars, _opened(total, show, 1.0) as advance:
-            yield advance
-
-
-class NotebookBars:
-    """One bar per stage below the cell of a notebook."""
-
-    def __init__(self, display: Callable[..., object], every_s: float = 0.5):
-        self._display, self._every_s = display, every_s
+    def __init__(self, console: Console | None, display: Callable[..., Any] | None = None):
+        self._console, self._display = console, display
 
     @contextmanager
     def stage(self, name: str, total: int) -> Iterator[Callable[[], None]]:
         """Show one stage with its expected time."""
-        bars = _bars(name)
+        from rich import progress as rich
+
+        bars = rich.Progress(
+            rich.TextColumn(f"{name:<24}"), rich.BarColumn(), rich.MofNCompleteColumn(),
+            rich.TimeElapsedColumn(), rich.TextColumn("left"), rich.TimeRemainingColumn(),
+            console=self._console, disable=self._console is None or not self._console.is_terminal,
+        )  # fmt: skip
         task, last = bars.add_task(name, total=total), 0.0
-        shown: object = None
+        shown: Any = None
 
         def show(stage: _Stage, _: bool) -> None:
             nonlocal last, shown
             bars.update(task, completed=stage.so_far)
             now = time.monotonic()
-            if now - last < self._every_s and stage.done < total:
+            if self._display is None or (now - last < SHORTEST_WAIT_S and stage.done < total):
                 return
             last = now
             picture = bars.make_tasks_table(bars.tasks)._repr_mimebundle_((), ())
             if shown is None:
                 shown = self._display(picture, raw=True, display_id=True)
             else:
-                shown.update(picture, raw=True)  # type: ignore[attr-defined]
+                shown.update(picture, raw=True)
 
-        with _opened(total, show, self._every_s) as advance:
+        with bars, _opened(total, show, SHORTEST_WAIT_S) as advance:
             yield advance
-
-
-def _bars(name: str, console: Console | None = None) -> rich.progress.Progress:
-    """Return the bar of one stage, which is shown only if the console is a terminal."""
-    from rich import progress as rich
-
-    return rich.Progress(
-        rich.TextColumn(f"{name:<24}"), rich.BarColumn(), rich.MofNCompleteColumn(),
-        rich.TimeElapsedColumn(), rich.TextColumn("left"), rich.TimeRemainingColumn(),
-        console=console, disable=console is None or not console.is_terminal,
-    )  # fmt: skip
 
 
 @checked
@@ -231,4 +206,4 @@ def notebook_progress() -> Progress:
     except ImportError as error:
         needs = "needs IPython, as in a notebook"
         raise InputError("notebook_progress", needs, remedy="it is not installed") from error
-    return NotebookBars(display)
+    return Bars(None, display)

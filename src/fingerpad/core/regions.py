@@ -57,13 +57,6 @@ class Region(Protocol):
 class Rectangle:
     """Rectangle with sides parallel to the axes.
 
-    Parameters
-    ----------
-    length_mm, width_mm : float
-        Extent along the first and the second axis. [mm]
-    centre_mm : (float, float), optional
-        Its middle. [mm]
-
     Examples
     --------
     >>> patch = Rectangle(length_mm=3.0, width_mm=6.0)
@@ -71,9 +64,9 @@ class Rectangle:
     (18.0, [True, False])
     """
 
-    length_mm: Positive
-    width_mm: Positive
-    centre_mm: Point = (0.0, 0.0)
+    length_mm: Positive  # Along the first axis. [mm]
+    width_mm: Positive  # Along the second axis. [mm]
+    centre_mm: Point = (0.0, 0.0)  # Its middle. [mm]
 
     @property
     def area_mm2(self) -> float:
@@ -95,13 +88,6 @@ class Rectangle:
 class Ellipse:
     """Ellipse with axes parallel to the coordinate axes; a disc if both semi-axes are equal.
 
-    Parameters
-    ----------
-    semi_length_mm, semi_width_mm : float
-        Semi-axes along the first and the second axis. [mm]
-    centre_mm : (float, float), optional
-        Its middle. [mm]
-
     Examples
     --------
     >>> disc = Ellipse(2.0, 2.0)
@@ -109,9 +95,9 @@ class Ellipse:
     (12.566, [True, False])
     """
 
-    semi_length_mm: Positive
-    semi_width_mm: Positive
-    centre_mm: Point = (0.0, 0.0)
+    semi_length_mm: Positive  # Semi-axis along the first axis. [mm]
+    semi_width_mm: Positive  # Semi-axis along the second axis. [mm]
+    centre_mm: Point = (0.0, 0.0)  # Its middle. [mm]
 
     @property
     def area_mm2(self) -> float:
@@ -133,11 +119,6 @@ class Ellipse:
 class Polygon:
     """Region inside a closed line of straight edges that does not cross itself.
 
-    Parameters
-    ----------
-    corners_mm : sequence of (float, float)
-        Three corners or more, in either direction; the last is joined to the first. [mm]
-
     Examples
     --------
     >>> triangle = Polygon(((0.0, 0.0), (4.0, 0.0), (0.0, 2.0)))
@@ -145,7 +126,7 @@ class Polygon:
     (4.0, [True, False])
     """
 
-    corners_mm: Pairs
+    corners_mm: Pairs  # Three or more, in either direction; the last is joined to the first. [mm]
 
     def __post_init__(self) -> None:
         corners = np.array(self.corners_mm)
@@ -254,16 +235,8 @@ def rectangular(region: Region, density_per_cm2: Finite) -> Layout:
 def hexagonal(region: Region, density_per_cm2: Finite) -> Layout:
     """Triangular lattice with six neighbours per receptor: pitch^2 = 2/(sqrt(3) density).
 
-    Parameters
-    ----------
-    region, density_per_cm2
-        As in `rectangular`.
-
-    Returns
-    -------
-    Layout
-        With a receptor in the middle of the region's bounds. One of three directions of neighbours is the
-        second axis.
+    A receptor lies in the middle of the region's bounds. One of three directions of neighbours is the second
+    axis.
 
     Examples
     --------
@@ -317,10 +290,8 @@ def poisson_disc(
 
     Parameters
     ----------
-    region, density_per_cm2
-        As in `rectangular`.
-    seed : int
-        Of the random numbers.
+    region, density_per_cm2, seed
+        As in `uniform`.
     separation : float, optional
         Least distance, over 1/sqrt(density).
     place : callable, optional

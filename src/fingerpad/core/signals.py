@@ -96,30 +96,6 @@ class Skin(Protocol):
 class Traces(Result):
     """One quantity at receptor sites over time: of the skin, or the current that it drives.
 
-    Parameters
-    ----------
-    times_ms : array (n_times,)
-        In order. A current may jump: its time is repeated once, with the values before and after. The times
-        of any other quantity are strictly increasing. [ms]
-    values : array (n_times, n_sites)
-        Values of the quantity; not negative, except those of a current. [`unit`]
-    kinks_ms : array (n_kinks,), optional
-        Those of `times_ms` at which the motion changes abruptly, as from ramp to hold: there the rate of
-        change is discontinuous, and interpolation must not smooth it. [ms]
-    quantity : str, optional
-        What the values are, a name in `fingerpad.core.units.QUANTITY_UNITS`: one of `SkinResponse.sample`,
-        "current", or "relative_current" (over that of the threshold). Default: "stored", strain energy
-        density (SED), which drives both terms of the current in the paper.
-    dynamic : Traces, optional
-        Another quantity at the same times and sites, if the dynamic term of an afferent follows another one
-        than the static term. Its kinks, phases and onset become those of these traces.
-    phases : tuple of Phase, optional
-        Named parts of the touch; by default one kink after the onset separates "ramp" and "hold", and there
-        are none where there is not one.
-    onset_ms : float, optional
-        Time of first touch, from which phases and latencies count; interpolation does not smooth it either.
-        By default the last time until which all values are 0. [ms]
-
     Examples
     --------
     >>> Traces([0.0, 50.0, 1000.0], [[0.0], [2.0], [1.8]])
@@ -132,12 +108,23 @@ class Traces(Result):
     """
 
     times_ms: FiniteVector
-    values: FiniteMatrix
+    """In order. A current may jump: its time is repeated once, with the values before and after. The times of
+    any other quantity are strictly increasing, (n_times,). [ms]"""
+    values: FiniteMatrix  # Not negative, except those of a current, (n_times, n_sites). [`unit`]
     kinks_ms: TimesMs = field(default_factory=lambda: np.empty(0))
+    """Those of `times_ms` at which the motion changes abruptly, as from ramp to hold: there the rate of change
+    is discontinuous, and interpolation must not smooth it, (n_kinks,). [ms]"""
     quantity: Annotated[str, choice(QUANTITY_UNITS)] = STORED_ENERGY
+    """What the values are: one of `SkinResponse.sample`, "current", or "relative_current" (over that of the
+    threshold). By default strain energy density (SED), which drives both terms of the current in the paper."""
     dynamic: Traces | None = None
+    """Another quantity at the same times and sites, if the dynamic term of an afferent follows another one
+    than the static term. Its kinks, phases and onset become those of these traces."""
     phases: Many[Phase] = ()
+    """Named parts of the touch; by default one kink after the onset separates "ramp" and "hold"."""
     onset_ms: Finite = None  # type: ignore[assignment]  # a number after initialisation
+    """Time of first touch, from which phases and latencies count; interpolation does not smooth it either. By
+    default the last time until which all values are 0. [ms]"""
 
     def __post_init__(self) -> None:
         times, values, kinks = self.times_ms, self.values, self.kinks_ms
@@ -319,32 +306,21 @@ def traces_below(
         raise InputError(
             "skin", "must have a method sed(sites), as a solved indentation has", f"{skin!r:.60}"
         )
-    if depth_mm is not None:
-        try:
-            signature(skin.sed).bind(sites, dynamic_quantity, static_quantity, depth_mm=depth_mm)
-        except TypeError as error:
-            raise InputError(
-                "skin.sed",
-                "must accept depth_mm, since end organs have a depth",
-                f"{type(skin).__name__}.sed{signature(skin.sed)}",
-                "add it, or leave out the depth",
-            ) from error
-        deep: Any = skin
-        return deep.sed(sites, dynamic_quantity, static_quantity, depth_mm=depth_mm)
-    if (dynamic_quantity, static_quantity) == (STORED_ENERGY, STORED_ENERGY):
-        return skin.sed(sites)
+    depth = {} if depth_mm is None else {"depth_mm": depth_mm}
+    followed = dynamic_quantity, static_quantity
+    quantities = followed if depth or followed != (STORED_ENERGY, STORED_ENERGY) else ()
     try:
-        signature(skin.sed).bind(sites, dynamic_quantity, static_quantity)
+        signature(skin.sed).bind(sites, *quantities, **depth)
     except TypeError as error:
-        raise InputError(
-            "skin.sed",
-            "must accept dynamic_quantity and static_quantity, since the afferent follows "
-            f"{dynamic_quantity!r} and {static_quantity!r}",
-            f"{type(skin).__name__}.sed{signature(skin.sed)}",
-            f"add them, or use an afferent that follows {STORED_ENERGY!r}, such as "
-            "Afferent.for_tissues('paper')",
-        ) from error
-    return skin.sed(sites, dynamic_quantity, static_quantity)
+        must, remedy = "depth_mm, since end organs have a depth", "add it, or leave out the depth"
+        if not depth:
+            must = "dynamic_quantity and static_quantity, since the afferent follows {!r} and {!r}"
+            remedy = f"add them, or use an afferent that follows {STORED_ENERGY!r}, such as "
+            remedy += "Afferent.for_tissues('paper')"
+        came = f"{type(skin).__name__}.sed{signature(skin.sed)}"
+        raise InputError("skin.sed", f"must accept {must.format(*followed)}", came, remedy) from error
+    sed: Any = skin.sed
+    return sed(sites, *quantities, **depth)
 
 
 def window_bounds(window_ms: Sequence[float]) -> tuple[float, float]:
@@ -448,56 +424,32 @@ class SpikeTrains(SpikingResult):
 class ResponseMap(SpikingResult):
     """Response of a population of afferents to one touch.
 
-    Parameters
-    ----------
-    positions_mm : array (n_receptors, 2) or (n_receptors, 3)
-        x (distal positive) and z (lateral) of each end organ, or x, y and z of the skin above it. [mm]
-    pitch_mm : float
-        Distance between neighbours of the layout. [mm]
-    spikes : SpikeTrains
-        One train per receptor.
-    dynamic_rate_hz, static_rate_hz : array (n_receptors,)
-        Firing rates in the two windows, as `rate_measure` says. [spikes/s]
-    first_spike_latency_ms : array (n_receptors,)
-        Time from first touch to the first spike after it; NaN without a spike. [ms]
-    duration_ms : float, optional
-        How long the touch lasted, if that is known. [ms]
-    phases : tuple of Phase
-        Named parts of the touch.
-    windows_ms : ((float, float), (float, float)), optional
-        Windows of the two rates, if they are known. [ms]
-    rate_measure : {"interval", "count"}
-        What the rates of this type of afferents are: one over the mean interval between spikes, Eqs. 6-10,
-        which is 0 without an interval; or spikes over the length of the window.
-    quantity : str, optional
-        What the static term of the afferents follows, a name of `SkinResponse.sample`. Default: SED.
-    parts : mapping of str to ResponseMap
-        In a mixed population, the response of each type, which follow each other: `response["RA"]`, or
-        `response[name] for name in response.parts`. From `joined`.
+    A mixed population has one response per type: `response["RA"]`, or those of `response.parts`.
     """
 
     positions_mm: FiniteMatrix
-    pitch_mm: Positive
-    spikes: SpikeTrains
+    """x (distal positive) and z (lateral) of each end organ, or x, y and z of the skin above it,
+    (n_receptors, 2 or 3). [mm]"""
+    pitch_mm: Positive  # Distance between neighbours of the layout. [mm]
+    spikes: SpikeTrains  # One train per receptor.
     dynamic_rate_hz: Annotated[FiniteVector, Column("firing rate in the ramp")]
     static_rate_hz: Annotated[FiniteVector, Column("firing rate in the hold")]
+    """Firing rates in the two windows, as `rate_measure` says, (n_receptors,). [spikes/s]"""
     first_spike_latency_ms: Annotated[Vector, Column("time from first touch to the first spike", holes=True)]
-    duration_ms: Positive | None = None
-    phases: Many[Phase] = ()
-    windows_ms: tuple[Numbers, Numbers] | None = None
+    """NaN without a spike, (n_receptors,). [ms]"""
+    duration_ms: Positive | None = None  # How long the touch lasted, if that is known. [ms]
+    phases: Many[Phase] = ()  # Named parts of the touch.
+    windows_ms: tuple[Numbers, Numbers] | None = None  # Windows of the two rates, if they are known. [ms]
     rate_measure: Annotated[str, choice((INTERVAL, COUNT))] = INTERVAL
-    quantity: str = STORED_ENERGY
+    """What the rates are: "interval", one over the mean interval between spikes, Eqs. 6-10, which is 0
+    without an interval; or "count", spikes over the length of the window."""
+    quantity: str = STORED_ENERGY  # What the static term of the afferents follows.
     parts: Mapping[str, ResponseMap] = field(default_factory=lambda: MappingProxyType({}))
+    """Response of each type of a mixed population, in the order of the receptors; from `joined`."""
 
     @classmethod
     def joined(cls, parts: Mapping[str, ResponseMap]) -> ResponseMap:
-        """Join responses of several types of afferents to the same touch.
-
-        Parameters
-        ----------
-        parts : mapping of str to ResponseMap
-            One per type, by its name.
-        """
+        """Join responses of several types of afferents, by their names, to the same touch."""
         maps = list(parts.values())
         measures: dict[str, Any] = {
             name: np.concatenate([each.measures[name] for each in maps]) for name in maps[0].measures

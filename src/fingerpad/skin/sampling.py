@@ -75,18 +75,12 @@ class Receptors(Protocol):
 
 @value_class
 class SurfaceProfile(Result):
-    """Deflection of the skin along the midline of the finger.
-
-    Parameters
-    ----------
-    distance_mm : array (n_nodes,)
-        Position of the undeformed skin relative to the indenter's axis, distal positive. [mm]
-    deflection_mm : array (n_nodes,)
-        Displacement along the direction of pressing, towards the bone positive. [mm]
-    """
+    """Deflection of the skin along the midline of the finger."""
 
     distance_mm: Annotated[FloatArray, Check(increasing, {})]
+    """Position of the undeformed skin relative to the indenter's axis, distal positive, (n_nodes,). [mm]"""
     deflection_mm: FiniteVector
+    """Displacement along the direction of pressing, towards the bone positive, (n_nodes,). [mm]"""
 
     def __post_init__(self) -> None:
         distance, deflection = self.distance_mm, self.deflection_mm

@@ -110,14 +110,6 @@ class _Quarter:
 class UnrolledSkin:
     """The plane of a finger's skin.
 
-    Parameters
-    ----------
-    finger : Fingertip
-        The finger.
-    origin_x_mm : float, optional
-        x of the point of the volar midline at which `along` is 0, distal positive; by default the middle of
-        the pad, `Fingertip.contact_mm`. [mm]
-
     Examples
     --------
     >>> skin = UnrolledSkin()
@@ -129,6 +121,8 @@ class UnrolledSkin:
 
     finger: Fingertip = field(default_factory=Fingertip)
     origin_x_mm: Finite = None  # type: ignore[assignment]  # a number after initialisation
+    """x of the point of the volar midline at which `along` is 0, distal positive; by default the middle of the
+    pad. [mm]"""
 
     def __post_init__(self) -> None:
         if self.origin_x_mm is None:
@@ -149,13 +143,7 @@ class UnrolledSkin:
         return self._around(s, np.full(s.shape, np.pi))
 
     def points(self, places_mm: ArrayLike) -> FloatArray:
-        """Points (n, 3) of the skin. [mm]
-
-        Parameters
-        ----------
-        places_mm : array_like (n, 2)
-            `along` and `around`; z has the sign of `around`. [mm]
-        """
+        """Points (n, 3) of the skin at `along` and `around`, whose sign z has, (n, 2). [mm]"""
         places = rows_of("places_mm", places_mm, "two columns, along and around", 2)
         first, last = self.ends_mm
         along, around = places[:, 0], np.abs(places[:, 1])
@@ -174,13 +162,9 @@ class UnrolledSkin:
         return self._point(s, np.copysign(self._phi(s, np.minimum(around, half_girth)), places[:, 1]))
 
     def places(self, points_mm: ArrayLike) -> FloatArray:
-        """Convert points of the skin to the plane: `along` and `around`, (n, 2). [mm]
+        """Convert points of the skin (n, 3) to the plane: `along` and `around`, (n, 2). [mm]
 
-        Parameters
-        ----------
-        points_mm : array_like (n, 3)
-            x, y and z of points on the skin. Another point is projected onto the skin along its ray from the
-            middle of the section. [mm]
+        Another point is projected onto the skin along its ray from the middle of the section.
         """
         points = rows_of("points_mm", points_mm, "three columns, x, y and z", 3)
         x, y, z = points.T
@@ -297,13 +281,6 @@ _FAN_LINES = 48
 class NailEdge:
     """The plane of the skin around a finger's nail.
 
-    Parameters
-    ----------
-    finger : Fingertip
-        The finger.
-    reach_mm : float
-        Largest distance from the nail's edge. [mm]
-
     Examples
     --------
     >>> nail = NailEdge()
@@ -315,7 +292,7 @@ class NailEdge:
     """
 
     finger: Fingertip = field(default_factory=Fingertip)
-    reach_mm: Positive = REACH_MM
+    reach_mm: Positive = REACH_MM  # Largest distance from the nail's edge. [mm]
 
     def __post_init__(self) -> None:
         narrowest = float(np.min(self.finger.section(np.array(self.finger.nail_x_mm))[2]))
@@ -332,13 +309,7 @@ class NailEdge:
         return np.interp(distances, _STEP_MM * np.arange(arcs.shape[1]), arcs[-1])
 
     def points(self, places_mm: ArrayLike) -> FloatArray:
-        """Points (n, 3) of the skin. [mm]
-
-        Parameters
-        ----------
-        places_mm : array_like (n, 2)
-            `along`, whose sign z has, and `distance`. [mm]
-        """
+        """Points (n, 3) of the skin at `along`, whose sign z has, and `distance`, (n, 2). [mm]"""
         places = rows_of("places_mm", places_mm, "two columns, along and distance", 2)
         along, distance = np.abs(places[:, 0]), places[:, 1]
         outside = (distance < -_ROUND_OFF_MM) | (distance > self.reach_mm + _ROUND_OFF_MM)
@@ -368,13 +339,7 @@ class NailEdge:
         return found
 
     def region(self, width_mm: Finite) -> Polygon:
-        """Return a strip along the whole edge as a region of the plane.
-
-        Parameters
-        ----------
-        width_mm : float
-            Its width from the edge, at most the reach. [mm]
-        """
+        """Return a strip along the whole edge, of at most the reach, as a region of the plane."""
         distances = np.linspace(0.0, self._within_reach("width_mm", width_mm), 33)
         side = np.stack([self.half_length_mm(distances), distances], axis=1)
         return Polygon(tuple(map(tuple, np.concatenate([side, side[::-1] * [-1.0, 1.0]]))))
