@@ -112,11 +112,11 @@ class Traces(Result):
     any other quantity are strictly increasing, (n_times,). [ms]"""
     values: FiniteMatrix  # Not negative, except those of a current, (n_times, n_sites). [`unit`]
     kinks_ms: TimesMs = field(default_factory=lambda: np.empty(0))
-    """Those of `times_ms` at which the motion changes abruptly, as from ramp to hold: there the rate of change
-    is discontinuous, and interpolation must not smooth it, (n_kinks,). [ms]"""
+    """Those of `times_ms` at which the motion changes abruptly, as from ramp to hold: there the rate of
+    change is discontinuous, and interpolation must not smooth it, (n_kinks,). [ms]"""
     quantity: Annotated[str, choice(QUANTITY_UNITS)] = STORED_ENERGY
     """What the values are: one of `SkinResponse.sample`, "current", or "relative_current" (over that of the
-    threshold). By default strain energy density (SED), which drives both terms of the current in the paper."""
+    threshold). By default strain energy density (SED), which drives both terms in the paper."""
     dynamic: Traces | None = None
     """Another quantity at the same times and sites, if the dynamic term of an afferent follows another one
     than the static term. Its kinks, phases and onset become those of these traces."""

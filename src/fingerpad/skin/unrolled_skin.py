@@ -121,8 +121,8 @@ class UnrolledSkin:
 
     finger: Fingertip = field(default_factory=Fingertip)
     origin_x_mm: Finite = None  # type: ignore[assignment]  # a number after initialisation
-    """x of the point of the volar midline at which `along` is 0, distal positive; by default the middle of the
-    pad. [mm]"""
+    """x of the point of the volar midline at which `along` is 0, distal positive; by default the middle of
+    the pad. [mm]"""
 
     def __post_init__(self) -> None:
         if self.origin_x_mm is None:
