@@ -13,7 +13,6 @@ from pathlib import Path
 import numpy as np
 
 from fingerpad.core.checked import result_class
-from fingerpad.core.errors import ConvergenceError
 from fingerpad.core.random_streams import Purpose, normals
 from fingerpad.core.units import MS_PER_S
 from fingerpad.core.values import FloatArray, Number
@@ -21,7 +20,6 @@ from fingerpad.data import paper, protocol, psychophysics
 from fingerpad.data.published import Published
 from fingerpad.experiments.conditions import RECEPTOR_X_MM, Conditions
 from fingerpad.experiments.gerling2014.skin import PLATE_DEPTHS_MM
-from fingerpad.experiments.gerling2014.thresholds import Observer, interpolated, just_noticeable_difference
 from fingerpad.experiments.manifest import Manifest
 from fingerpad.experiments.runner import Runner
 from fingerpad.experiments.validation.observations import KINDS, Observation, Observations, read_observations
@@ -38,6 +36,7 @@ from fingerpad.neuron.population import Population
 from fingerpad.neuron.spikes import firing_rate_hz, modulation_index
 from fingerpad.psychophysics.encoding import neighbour_pairs
 from fingerpad.psychophysics.observer import NOISE_DRAWS, expected_hit_rates, fit_noise_sigma
+from fingerpad.psychophysics.sensitivity import InterpolatedObserver
 from fingerpad.report.page import edition
 from fingerpad.report.tables import ABSENT, fixed, number
 from fingerpad.skin.indentation import Touch, touch_of
@@ -520,14 +519,8 @@ def weber_fractions_of(grid: Population, static_hz: FloatArray, seed: int) -> li
     people = (psychophysics.SPHERE_287.value, *psychophysics.GOODWIN_CURVATURES.value)
     rows = static_hz[[PRESSED_PER_M.index(curvature) for curvature in people]]
     sigma = fit_noise_sigma(lambda noise: expected_hit_rates(rows, pairs, noise, draws)).noise_sigma
-    observer = Observer(interpolated(np.array(PRESSED_PER_M), static_hz), pairs, sigma, draws)
-    found = []
-    for standard in STANDARDS_PER_M:
-        try:
-            found.append(just_noticeable_difference(observer, standard) / standard)
-        except ConvergenceError:
-            found.append(np.nan)
-    return found
+    observer = InterpolatedObserver(np.array(PRESSED_PER_M), static_hz, pairs, sigma, draws)
+    return [observer.difference(standard) / standard for standard in STANDARDS_PER_M]
 
 
 def threshold_checks(fractions: Sequence[float]) -> Iterable[Check]:

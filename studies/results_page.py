@@ -11,10 +11,10 @@ from pathlib import Path
 from fingerpad.core.checked import result_class
 from fingerpad.core.result_files import read_results
 from fingerpad.core.values import Number, Vector
-from fingerpad.experiments.gerling2014.claims import ClaimRow, Group, Statement
+from fingerpad.experiments.gerling2014.claims import ClaimRow, Group, Statement, Summary
 from fingerpad.experiments.gerling2014.nerve import SingleUnitResult
-from fingerpad.experiments.gerling2014.percept import CriterionErrorBars, SphereDiscrimination
-from fingerpad.experiments.gerling2014.reproduction import ReproductionResult, Summaries
+from fingerpad.experiments.gerling2014.percept import SphereDiscrimination
+from fingerpad.experiments.gerling2014.reproduction import ReproductionResult
 from fingerpad.report.reproduction import count_sentence, side_by_side, statement_cells, statement_table
 from fingerpad.report.tables import ABSENT, fixed, number
 from studies.pages import joined, replaced, table
@@ -71,13 +71,13 @@ class Excerpt:
     version: str
     resolution: str
     seed: int
-    summary: Summaries
+    summary: dict[str, Summary]
     indentations: dict[str, int]
     statements: tuple[Statement, ...]
     comparison: dict[str, tuple[ClaimRow, ...]]
     single_unit: dict[str, SingleUnitResult]
     percept: dict[str, Percept]
-    criterion: dict[str, CriterionErrorBars]
+    criterion: dict[str, dict[str, Vector]]
 
 
 def read_excerpt(path: Path) -> Excerpt:
@@ -190,18 +190,13 @@ SUMMARY_ROWS = (
 """Field, name, value of the paper or of people, whether it was fitted or chosen in sample, and digits."""
 
 
-def _summaries(summary: Summaries) -> str:
+def _summaries(summary: Mapping[str, Summary]) -> str:
     def shown(value: object, digits: int) -> str:
         values = value if isinstance(value, tuple) else (value,)
         return ", ".join(fixed(each, digits) for each in values)
 
     rows = [
-        (
-            name,
-            paper,
-            *(shown(getattr(each, field), digits) for each in (summary.paper, summary.human)),
-            basis,
-        )
+        (name, paper, *(shown(each[field], digits) for each in summary.values()), basis)
         for field, name, paper, basis, digits in SUMMARY_ROWS
     ]
     columns = ("quantity", "paper or people", "`paper`", "`human`", "fitted or predicted")
@@ -215,8 +210,7 @@ def _statements(statements: Sequence[Statement]) -> str:
 
 def _single_units(units: Mapping[str, SingleUnitResult]) -> str:
     def modulation(phase: str, ours: bool) -> list[str]:
-        each = [getattr(unit.modulation, phase) for unit in units.values()]
-        found = [one.ours if ours else one.observed for one in each]
+        found = [unit.modulation[phase]["ours" if ours else "observed"] for unit in units.values()]
         return [f"{number(one.maximum_hz)}, {number(one.minimum_hz)}, {number(one.index)}" for one in found]
 
     rows = [
@@ -242,12 +236,12 @@ def _scores(units: Mapping[str, SingleUnitResult], name: str) -> list[str]:
     return [fixed(getattr(unit, name), 3) for unit in units.values()]
 
 
-def _criteria(criterion: Mapping[str, CriterionErrorBars]) -> str:
+def _criteria(criterion: Mapping[str, Mapping[str, Vector]]) -> str:
     bars = "; ".join(
-        f"`{name}` {fixed(each.point[0], 3)} and {fixed(each.point[1], 3)}"
+        f"`{name}` {fixed(each['point'][0], 3)} and {fixed(each['point'][1], 3)}"
         for name, each in criterion.items()
     )
-    sigma = " and ".join(number(each) for each in next(iter(criterion.values())).criterion_sigma)
+    sigma = " and ".join(number(each) for each in next(iter(criterion.values()))["criterion_sigma"])
     return f"Mean error bar of a static hit rate with a decision point that varies by {sigma}: {bars}."
 
 

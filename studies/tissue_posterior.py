@@ -14,8 +14,7 @@ from fingerpad.core.errors import ConvergenceError, InputError
 from fingerpad.core.values import FloatArray, IntArray, Number
 from fingerpad.data import protocol
 from fingerpad.experiments.conditions import Conditions
-from fingerpad.experiments.gerling2014.nerve import CredibleInterval, PosteriorConvergence
-from fingerpad.experiments.gerling2014.thresholds import Observer, interpolated, just_noticeable_difference
+from fingerpad.experiments.fit.results import CredibleInterval, PosteriorConvergence
 from fingerpad.experiments.manifest import Manifest
 from fingerpad.experiments.runner import Runner
 from fingerpad.experiments.scores import coefficient_of_determination
@@ -23,6 +22,7 @@ from fingerpad.inference.fitting.cross_validation import fractional_sum_of_squar
 from fingerpad.inference.fitting.posterior import credible_band
 from fingerpad.inference.identifiable import LARGEST_RESTING_SHARE, identifiable
 from fingerpad.neuron.afferent import Afferent
+from fingerpad.psychophysics.sensitivity import InterpolatedObserver
 from studies.finger_levels import SITES, Outputs, euclidean_hit_rates, largest_stress_kpa, outputs_of
 from studies.finger_posterior import (
     LOGARITHMIC,
@@ -272,15 +272,12 @@ def weber_fractions(static_hz: FloatArray, noise_sigma: FloatArray) -> FloatArra
     noise_sigma : array (n_points,)
         Noise.
     """
-    found = np.full(len(static_hz), np.nan)
-    for row, (rates, sigma) in enumerate(zip(static_hz, noise_sigma.tolist(), strict=True)):
-        curve = interpolated(np.array(SPHERES_PER_M), rates)
-        observer = Observer(curve, SITES.neighbours, sigma, SITES.draws)
-        try:
-            found[row] = just_noticeable_difference(observer, STANDARD_PER_M) / STANDARD_PER_M
-        except ConvergenceError:
-            continue
-    return found
+    observers = (
+        InterpolatedObserver(np.array(SPHERES_PER_M), rates, SITES.neighbours, sigma, SITES.draws)
+        for rates, sigma in zip(static_hz, noise_sigma.tolist(), strict=True)
+    )
+    found = [observer.difference(STANDARD_PER_M) for observer in observers]
+    return np.array(found) / STANDARD_PER_M
 
 
 def judged(found: Prediction, values: FloatArray, observed: Observations) -> tuple[tuple[Target, ...], float]:

@@ -4,7 +4,7 @@ import base64
 import json
 import re
 import struct
-from dataclasses import asdict, fields, replace
+from dataclasses import fields, replace
 
 import matplotlib
 import numpy as np
@@ -14,16 +14,12 @@ from matplotlib.patches import Circle
 
 from fingerpad.core.result_files import schema_of, to_json
 from fingerpad.data import all_published
-from fingerpad.experiments.gerling2014.claims import Group, Verdict, paired
+from fingerpad.experiments.gerling2014.claims import Group, paired
 from fingerpad.experiments.gerling2014.nerve import PopulationMaps
 from fingerpad.experiments.gerling2014.percept import SphereDiscrimination
-from fingerpad.experiments.gerling2014.reproduction import (
-    PublishedNumber,
-    ReproductionResult,
-    SetResult,
-    Summary,
-)
+from fingerpad.experiments.gerling2014.reproduction import ReproductionResult, SetResult
 from fingerpad.experiments.gerling2014.skin import NailBorder, SkinForce, mesh_picture
+from fingerpad.experiments.scores import Verdict
 from fingerpad.experiments.tissue_sets import tissue_layers
 from fingerpad.geometry.fingertip import Fingertip
 from fingerpad.geometry.grading import resolution_grading
@@ -46,8 +42,6 @@ from sections import (
 )
 
 QUICK = finger_mesh(Fingertip(), resolution_grading("quick", 17.37))
-
-SUMMARY = [field.name for field in fields(Summary)]
 
 
 def synthetic_set(tissues: str = "paper") -> dict:
@@ -80,7 +74,7 @@ def synthetic_set(tissues: str = "paper") -> dict:
 
 def synthetic_results() -> dict:
     """Results of both sets."""
-    numbers = dict.fromkeys(SUMMARY, 0.5) | {"hit_rate_296": (0.6, 0.6), "hit_rate_365": (0.9, 0.9)}
+    numbers = {"deflection_r2": 0.5, "hit_rate_296": (0.6, 0.6), "weber_144": None}
     sets = {name: synthetic_set(name) for name in SETS}
     rows = [typed(SetResult, sets[name]).comparison for name in SETS]
     mesh = {
@@ -102,7 +96,7 @@ def synthetic_results() -> dict:
         ("spheres", CURVATURE_PER_M, "1/m", "lost", "assumed"),
     ]
     return sets | {
-        "summary": {"paper": numbers, "human": numbers, "wall_s": 1.0, "peak_memory_mb": 1.0},
+        "summary": {"paper": numbers, "human": numbers},
         "statements": [json.loads(to_json(each)) for each in paired(*rows)],
         "skin_deflection": skin_deflection_section(),
         "tissues": [json.loads(to_json(layer)) for layer in tissue_layers()],
@@ -144,11 +138,11 @@ def _single_unit_uncertainty() -> dict:
     six = (*names, "intercept_ma", "dynamic_gain", "static_gain", "resting_share")
     sobol = ("lower", "upper", "first", "first_half_width", "total", "total_half_width")
     return {
-        "level": 0.95, "seed": 0, "names": names,
+        "level": 0.95, "seed": 0,
         "units": dict(zip(names, ("1/ms", "1/kPa", "1/(kPa ms)", "ms"), strict=True)),
         "fit": dict.fromkeys(names, 1.0), "capacitance_mf": 6e-7, "threshold_mv": 30.0,
         "identifiability": {
-            "rank": 4, "silent_directions": [],
+            "rank": 4,
             "relative_singular_values": [1.0, 0.3, 0.2, 0.01, 1e-10, 1e-10],
         },
         "posterior": dict.fromkeys(six, interval),
@@ -177,17 +171,12 @@ def _curvature_thresholds() -> dict:
 
     population = {
         "layout": "paper", "rows": 3, "columns": 6, "noise_sigma": 0.14,
-        "gradient_sum": [600.0, 1400.0, 2300.0],
         "standards": [at(144.0), at(287.0)],
         "without_threshold": [{"standard_per_m": 400.0, "why_not": "No sphere reaches 75 %."}],
     }  # fmt: skip
-    literature = {
-        "standard_per_m": [144.0, 287.0], "comparison_per_m": [158.0, 319.0], "weber_fractions": [0.10, 0.14],
-    }  # fmt: skip
-    foretold = {"curvature_per_m": 287.0, "pressed": 1400.0, "foretold": 1402.0, "error_per_m": 0.2}
     return {
         "seed": 0, "proportion": 0.75, "judgements": 100, "pressed_per_m": [144.0, 287.0, 400.0],
-        "populations": [population], "literature": literature, "interpolation": [foretold],
+        "populations": [population],
     }  # fmt: skip
 
 
@@ -404,7 +393,7 @@ def test_the_first_screen_has_verdicts_and_the_contents_stand_beside_the_page(re
 
 
 def test_inputs_are_listed_exactly_and_the_assumed_ones_are_marked():
-    numbers = [PublishedNumber(**asdict(number)) for number in all_published()]
+    numbers = all_published()
     meanings, listed = reproduction.input_tables(numbers)
     assert [row.cells[0] for row in meanings.rows] == ["paper", "read", "recalled", "assumed"]
     assert sum(int(row.cells[2]) for row in meanings.rows) == len(numbers)
@@ -537,7 +526,7 @@ def test_figure_5_draws_the_fitted_line_over_observed_points_and_the_papers_leve
     assert dynamic.get_ylim()[1] > 212.0
     (difference,) = static.containers
     (low, high) = difference.lines[2][0].get_segments()[0][:, 1]
-    assert (low, high - low) == (given.modulation.static.ours.minimum_hz, pytest.approx(52.0))
+    assert (low, high - low) == (given.modulation["static"]["ours"].minimum_hz, pytest.approx(52.0))
     caption = filled(nerve.CAPTION_SINGLE_UNIT, given)
     assert "54 and 212 spikes/s" in caption
     assert "70 and 210 spikes/s as observed" in caption

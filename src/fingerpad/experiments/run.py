@@ -10,10 +10,11 @@ from typing import Annotated, Any, ClassVar
 from fingerpad.core.engine import Engine
 from fingerpad.core.progress import Progress
 from fingerpad.core.values import Flag, Seed, choice
+from fingerpad.experiments.conditions import Conditions
 from fingerpad.experiments.discrimination.analysis import discriminate
 from fingerpad.experiments.discrimination.request import DiscriminationRequest
 from fingerpad.experiments.fit.request import FitRequest, run_fit
-from fingerpad.experiments.gerling2014.reproduction import Reproduction, ReproductionResult, reproduce
+from fingerpad.experiments.gerling2014.reproduction import HUMAN, PAPER, ReproductionResult, reproduce
 from fingerpad.experiments.requests.parts import Request
 from fingerpad.experiments.requests.reduction import ReductionRequest
 from fingerpad.experiments.requests.touch import RespondRequest, TouchRequest
@@ -44,20 +45,20 @@ class ReproductionRequest(Request):
     word: ClassVar[str] = "reproduction"
 
     resolution: Annotated[str, choice(RESOLUTIONS)] = "standard"
-    tissues: Annotated[str, choice(TISSUES)] = "paper"
+    tissues: Annotated[str, choice(tuple(name for name in TISSUES if name != HUMAN))] = PAPER
     extended: Flag | None = None
     seed: Seed = 0
 
-    def check(self) -> None:
-        """Raise `InputError` if the reproduction is impossible."""
-        with self.origin.located():
-            self.of(Path())
+    @property
+    def goes_beyond(self) -> bool:
+        """Whether what goes beyond the paper is run."""
+        return self.resolution != "quick" if self.extended is None else self.extended
 
-    def of(self, folder: Path, jobs: int | Engine = 1) -> Reproduction:
-        """Return the reproduction in a folder."""
-        return Reproduction(
-            folder, self.resolution, self.seed, self.tissues, jobs=jobs, extended=self.extended
-        )
+    def run(self, runner: Runner) -> ReproductionResult:
+        """Run both columns, the paper's own system and the set human."""
+        tissues = {PAPER: self.tissues, HUMAN: HUMAN}
+        columns = {name: Conditions(self.resolution, self.seed, each) for name, each in tissues.items()}
+        return reproduce(columns, self.goes_beyond, runner)
 
 
 RUNS: Mapping[type[Request], Callable[[Any, Runner, str | None], Any]] = MappingProxyType(
@@ -68,6 +69,7 @@ RUNS: Mapping[type[Request], Callable[[Any, Runner, str | None], Any]] = Mapping
         DiscriminationRequest: discriminate,
         ValidationRequest: validate,
         ReductionRequest: lambda request, runner, _: request.run(runner),
+        ReproductionRequest: lambda request, runner, _: request.run(runner),
     }
 )
 """What runs a request, by its class."""
@@ -81,8 +83,4 @@ def run(
     command: str | None = None,
 ) -> Any:
     """Run a request, with its stored presses in a folder."""
-    if isinstance(request, ReproductionRequest):
-        found: ReproductionResult = reproduce(request.of(folder, jobs), progress)
-        return found
-    request_run = RUNS[type(request)]
-    return request_run(request, Runner(folder, jobs, progress), command)
+    return RUNS[type(request)](request, Runner(folder, jobs, progress), command)

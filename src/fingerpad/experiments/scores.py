@@ -1,14 +1,16 @@
-"""Scores of predictions: how near they are to what was observed."""
+"""Scores of predictions, estimates from sessions with their errors, and verdicts on bounds."""
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Sequence
+from collections.abc import Callable, Hashable, Sequence
 from dataclasses import dataclass
+from enum import StrEnum
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from fingerpad.core.values import FloatArray, float_array
+from fingerpad.core.checked import result_class
+from fingerpad.core.values import FloatArray, Number, float_array
 
 
 def coefficient_of_determination(observed: ArrayLike, predicted: ArrayLike) -> float:
@@ -65,3 +67,71 @@ def observed_ranges(conditions: Sequence[Hashable], observed: ArrayLike) -> Obse
         low[same], high[same] = values[same].min(), values[same].max()
         repeated[same] = len(same) > 1
     return ObservedRanges(low, high, tuple(same[0] for same in rows.values()), repeated)
+
+
+@result_class
+class Estimate:
+    """A mean over sessions and its standard error."""
+
+    value: Number
+    error: Number
+
+
+def estimate(by_session: FloatArray) -> Estimate:
+    by_session = np.asarray(by_session, dtype=np.float64)
+    error = float(by_session.std(ddof=1) / np.sqrt(by_session.size))
+    return Estimate(value=float(by_session.mean()), error=error)
+
+
+def extreme(by_session: FloatArray, pick: Callable[[FloatArray], np.intp]) -> Estimate:
+    """Estimate the one of several quantities that `pick` chooses by their means over the sessions."""
+    return estimate(by_session[:, int(pick(by_session.mean(axis=0)))])
+
+
+def largest(changes: FloatArray) -> Estimate:
+    """Absolute size of the largest of several changes (n_sessions, n_changes)."""
+    found = extreme(changes, lambda means: np.abs(means).argmax())
+    return Estimate(value=abs(found.value), error=found.error)
+
+
+def difference(one: Estimate, other: Estimate) -> Estimate:
+    """Subtract the second from the first, whose errors are independent."""
+    return Estimate(value=one.value - other.value, error=float(np.hypot(one.error, other.error)))
+
+
+ERRORS = 2.0  # Monte-Carlo errors by which two numbers must differ for the difference to count.
+
+
+class Verdict(StrEnum):
+    """Whether a claim is met."""
+
+    MET = "met"
+    MISSED = "missed"
+    NOT_DECIDABLE = "not decidable"  # Chance decides, or an interpretation of what is claimed.
+    NOT_APPLICABLE = "does not apply"  # There is nothing to compare.
+
+
+def of_truth(met: bool) -> Verdict:
+    return Verdict.MET if met else Verdict.MISSED
+
+
+def below(estimate: Estimate, bound: float) -> Verdict:
+    """Verdict of a bound from above; not decidable within two Monte-Carlo errors of it."""
+    if abs(estimate.value - bound) <= ERRORS * estimate.error:
+        return Verdict.NOT_DECIDABLE
+    return of_truth(estimate.value < bound)
+
+
+def above(estimate: Estimate, bound: float = 0.0) -> Verdict:
+    """Verdict of a bound from below, as `below`."""
+    return below(Estimate(value=-estimate.value, error=estimate.error), -bound)
+
+
+def every(*verdicts: Verdict) -> Verdict:
+    """Missed if one is, else not decidable if one is, else met."""
+    return min(verdicts, key=(Verdict.MISSED, Verdict.NOT_DECIDABLE, Verdict.MET).index)
+
+
+def all_or_none(bound: float, least: float, most: float, *_: object) -> Verdict:
+    """Verdict of several numbers that decide only if they agree."""
+    return Verdict.NOT_DECIDABLE if least < bound <= most else of_truth(least >= bound)

@@ -24,15 +24,28 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Annotated
 
 import numpy as np
+from scipy.interpolate import PchipInterpolator
 from scipy.optimize import brentq
 from scipy.special import ndtr, ndtri
 
 from fingerpad.core.checked import checked
 from fingerpad.core.errors import InputError
-from fingerpad.core.values import Finite, NotNegative, Positive, Several, Whole, choice, whole
+from fingerpad.core.values import (
+    Finite,
+    FloatArray,
+    IntArray,
+    NotNegative,
+    Positive,
+    Several,
+    Whole,
+    choice,
+    whole,
+)
+from fingerpad.psychophysics.observer import expected_hit_rates
 
 CORRECTIONS = ("log-linear", "half", "none")
 
@@ -247,3 +260,47 @@ def d_prime_of_proportion(
     if task is forced_choice:
         return float(math.sqrt(2.0) * ndtri(proportion_correct))
     return float(brentq(lambda d: task(d) - proportion_correct, 0.0, LARGEST_D_PRIME, xtol=1e-12))
+
+
+@dataclass(frozen=True)
+class InterpolatedObserver:
+    """Discriminates stimuli of any level by the Gradient Sum of interpolated responses.
+
+    Between the levels a response is a monotone cubic in the logarithm of the level.
+    """
+
+    levels: FloatArray  # Of the stimuli whose responses are known, increasing, (n_levels,).
+    table: FloatArray  # Responses to these, (n_levels, n_receptors).
+    neighbours: IntArray  # Pairs of the Gradient Sum, (n_pairs, 2).
+    noise_sigma: float  # Standard deviation of the multiplicative noise.
+    draws: FloatArray  # Common random presentations, (n_draws, n_receptors).
+
+    @cached_property
+    def _curve(self) -> PchipInterpolator:
+        return PchipInterpolator(np.log(self.levels), self.table)
+
+    @property
+    def highest(self) -> float:
+        """Largest level at which responses are known."""
+        return float(np.exp(self._curve.x[-1]))
+
+    def responses(self, level: float) -> FloatArray:
+        return self._curve(np.log(level))
+
+    def slopes(self, level: float) -> FloatArray:
+        """Return the derivatives of the responses (n_receptors,) by the level."""
+        return self._curve(np.log(level), 1) / level
+
+    def hit_rate(self, standard: float, comparison: float) -> float:
+        pair = [self.responses(standard), self.responses(comparison)]
+        return float(expected_hit_rates(pair, self.neighbours, self.noise_sigma, self.draws)[0])
+
+    def difference(self, standard: float, proportion: float = 0.75) -> float:
+        """Return how much higher a level must be for that hit rate; NaN if it is beyond the highest."""
+
+        def missing(comparison: float) -> float:
+            return self.hit_rate(standard, comparison) - proportion
+
+        if missing(self.highest) <= 0.0:
+            return math.nan
+        return float(brentq(missing, standard, self.highest, xtol=1e-3)) - standard

@@ -17,8 +17,13 @@ from fingerpad.core.units import gain_unit, unit_of
 from fingerpad.core.values import FloatArray
 from fingerpad.data import protocol
 from fingerpad.experiments.fit.request import FitFile
-from fingerpad.experiments.fit.results import FitResult, FssSensitivity, ParameterProfile, PhaseRates
-from fingerpad.experiments.gerling2014.nerve import UncertaintyResult
+from fingerpad.experiments.fit.results import (
+    FitResult,
+    FssSensitivity,
+    ParameterProfile,
+    PhaseRates,
+    UncertaintyResult,
+)
 from fingerpad.report.nerve import ALONG
 from fingerpad.report.page import both, figure, write_result_page
 from fingerpad.report.style import (

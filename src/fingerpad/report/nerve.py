@@ -344,7 +344,7 @@ def draw_single_unit(section: SingleUnitResult) -> Figure:
         axes.set_title(f"({letter}) {PHASE_LABELS[phase]}, FSS = {fss}", fontsize=10.0)
         axes.set_xlabel(ALONG)
     # The rates under the flat face and at the edge that the paper predicts, and the observed ones.
-    observed = section.modulation.dynamic.observed
+    observed = section.modulation["dynamic"]["observed"]
     printed = (paper.DYNAMIC_RATE_MINIMUM.value, paper.DYNAMIC_RATE_MAXIMUM.value)
     seen = (observed.minimum_hz, observed.maximum_hz)
     low, high = dynamic.get_xlim()
@@ -361,7 +361,7 @@ def draw_single_unit(section: SingleUnitResult) -> Figure:
     dynamic.set_ylim(top=1.1 * max(*printed, dynamic.get_ylim()[1] / 1.05))
     # The difference that the paper predicts, from our lowest rate: it prints no static rates.
     bar = 0.5 * paper.STATIC_RATE_DIFFERENCE.value
-    middle = section.modulation.static.ours.minimum_hz + bar
+    middle = section.modulation["static"]["ours"].minimum_hz + bar
     label = "difference predicted by the paper"
     static.errorbar(STATIC_MARK_MM, middle, bar, color=ORANGE, capsize=5.0, elinewidth=1.8, label=label)
     text = {"ha": "left", "va": "center", "color": ORANGE, "fontsize": 9.0}

@@ -100,12 +100,12 @@ def discrimination_tables(section: SphereDiscrimination) -> list[Table]:
     )
     bars = section.reasons.criterion
     multiplied = {
-        "the decision point (used)": bars.point,
-        "the fraction beta of the distance between the means": bars.fraction,
-        "a likelihood ratio of mean 1 between comparison and standard": bars.likelihood,
+        "the decision point (used)": bars["point"],
+        "the fraction beta of the distance between the means": bars["fraction"],
+        "a likelihood ratio of mean 1 between comparison and standard": bars["likelihood"],
     }
     spreads = [
-        Column(f"1.{place}", f"σ = {number(sigma)}", 4) for place, sigma in enumerate(bars.criterion_sigma)
+        Column(f"1.{place}", f"σ = {number(sigma)}", 4) for place, sigma in enumerate(bars["criterion_sigma"])
     ]
     return [
         table("Hit rates, mean ± standard deviation", rates, columns),
@@ -385,8 +385,8 @@ def draw_thresholds(section: CurvatureThresholds) -> Figure:
 
 
 def _draw_fractions(axes: Axes, section: CurvatureThresholds) -> None:
-    people, first = section.literature, section.populations[0]
-    low, high = PER_CENT * people.weber_fractions
+    first = section.populations[0]
+    low, high = (PER_CENT * fraction for fraction in psychophysics.WEBER_FRACTIONS.value)
     axes.axhspan(low, high, color=PALE, label=f"observed, as reported: {number(low, 2)}-{number(high, 2)} %")
 
     def of(population: PopulationThresholds, name: str) -> FloatArray:
@@ -404,8 +404,9 @@ def _draw_fractions(axes: Axes, section: CurvatureThresholds) -> None:
     best: Any = {"color": GREY, "linestyle": (0, (5, 2)), "marker": "."}
     label = f"ideal observer, {_layout(first)} receptors"
     axes.plot(at, of(first, "ideal_weber_fraction"), label=label, **best)
-    observed = PER_CENT * (people.comparison_per_m / people.standard_per_m - 1.0)
-    axes.plot(people.standard_per_m, observed, "D", label="observed (Goodwin et al. 1991)", **PEOPLE)
+    standards = np.array(psychophysics.THRESHOLD_STANDARDS.value)
+    observed = PER_CENT * (psychophysics.THRESHOLD_COMPARISONS.value / standards - 1.0)
+    axes.plot(standards, observed, "D", label="observed (Goodwin et al. 1991)", **PEOPLE)
     axes.set(title="(a) difference threshold", ylim=(0.0, LARGEST_FRACTION))
     axes.set(xlabel="curvature of the standard [1/m]", ylabel="Weber fraction at 75 % [%]")
     axes.legend(loc="upper right", fontsize=8.0)

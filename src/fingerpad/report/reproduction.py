@@ -13,10 +13,11 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Circle
 
 from fingerpad.core.units import MM_PER_M
-from fingerpad.data import STATUSES, paper, protocol, psychophysics
-from fingerpad.experiments.gerling2014.claims import ClaimRow, Group, Statement, Verdict
+from fingerpad.data import STATUSES, Published, paper, protocol, psychophysics
+from fingerpad.experiments.gerling2014.claims import ClaimRow, Group, Statement
 from fingerpad.experiments.gerling2014.nerve import ThreeLevels
-from fingerpad.experiments.gerling2014.reproduction import PublishedNumber, ReproductionResult
+from fingerpad.experiments.gerling2014.reproduction import ReproductionResult
+from fingerpad.experiments.scores import Verdict
 from fingerpad.experiments.tissue_sets import TissueLayer
 from fingerpad.report import fit, mesh_picture, nerve, percept, skin
 from fingerpad.report.page import (
@@ -105,7 +106,7 @@ def first_screen(result: ReproductionResult) -> list[Drawing]:
     fits = [f"`{name}` {fixed(getattr(result, name).single_unit.fss_out_of_sample, 2)}" for name in SETS]
     noises = [f"`{name}` {number(getattr(result, name).discrimination.noise_sigma)}" for name in SETS]
     deflection = result.skin_deflection
-    r2 = [trial.cylinder.r2 for trial in (deflection.trial1, deflection.trial2, deflection.trial3)]
+    r2 = [trial["cylinder"].r2 for trial in (deflection.trial1, deflection.trial2, deflection.trial3)]
     best = f"Trial {1 + int(np.argmax(r2))}"
     said = ", as in the paper." if best == IN_THE_PAPER else f"; in the paper {IN_THE_PAPER} is."
     fss, sigma = fixed(paper.FSS_OUT_OF_SAMPLE.value, 2), number(psychophysics.NOISE_SIGMA.value)
@@ -291,8 +292,8 @@ def tissue_table(layers: Sequence[TissueLayer]) -> Table:
     )
 
 
-def input_tables(inputs: Sequence[PublishedNumber]) -> list[Table]:
-    statuses = [entry.status for entry in inputs]
+def input_tables(inputs: Sequence[Published]) -> list[Table]:
+    statuses: list[str] = [entry.status for entry in inputs]
     meanings = [(status, meaning, statuses.count(status)) for status, meaning in STATUSES.items()]
     columns = (
         Column("name", "number"),

@@ -21,7 +21,7 @@ from fingerpad.core.signals import STORED_ENERGY, ResponseMap
 from fingerpad.core.units import cosine_and_sine
 from fingerpad.core.values import FloatArray, instance
 from fingerpad.data import protocol
-from fingerpad.experiments.gerling2014.skin import CylinderDeflection, NailBorder, SkinDeflectionResult
+from fingerpad.experiments.gerling2014.skin import NailBorder, SkinDeflectionResult
 from fingerpad.experiments.requests.touch import TouchFile, TouchResult
 from fingerpad.report.mesh_picture import corners
 from fingerpad.report.nerve import draw_raster_by_type, draw_trains
@@ -286,14 +286,14 @@ CAPTION_SKIN_DEFLECTION = (
 
 def skin_deflection_tables(section: SkinDeflectionResult) -> list[Table]:
     rows = [
-        (f"{name}, {body}", getattr(trial, key))
+        (f"{name}, {body}", trial[key])
         for name, trial in _trials(section).items()
         for key, body in BODIES.items()
     ]
     columns = (
         Column("0", "trial"),
-        Column(lambda row: getattr(row[1], "r2", None), "R²", 3),
-        Column(lambda row: getattr(row[1], "r2_mirrored", None), "R², mirrored", 3),
+        Column("1.r2", "R²", 3),
+        Column("1.r2_mirrored", "R², mirrored", 3),
         Column("1.force_mn", "force", 1),
     )
     note = "R², mirrored: with the proximal and the distal side of the observations exchanged."
@@ -321,8 +321,8 @@ def draw_profiles(axes: Axes, section: SkinDeflectionResult, body: str) -> None:
     """Draw the deflection of each trial under "line" or "cylinder", and what was observed under it."""
     # Results count distances proximal positive; all figures have the distal side on the right.
     for name, trial in _trials(section).items():
-        profile, (colour, style) = getattr(trial, body), TRIAL_STYLES[name]
-        fit = f", R² = {fixed(profile.r2, 2)}" if isinstance(profile, CylinderDeflection) else ""
+        profile, (colour, style) = trial[body], TRIAL_STYLES[name]
+        fit = f", R² = {fixed(profile.r2, 2)}" if np.isfinite(profile.r2) else ""
         axes.plot(
             -profile.distance_mm, profile.deflection_mm, color=colour, linestyle=style, label=name + fit
         )

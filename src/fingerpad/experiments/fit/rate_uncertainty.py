@@ -8,29 +8,38 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.stats import norm
 
+from fingerpad.core.units import units_of
 from fingerpad.core.values import FloatArray
 from fingerpad.experiments.fit.results import (
+    CredibleInterval,
     FssSensitivity,
+    ParameterIdentifiability,
     ParameterProfile,
     PhaseBands,
+    PhasePrediction,
+    PosteriorConvergence,
     RateBand,
     RatePosterior,
+    UncertaintyResult,
 )
 from fingerpad.inference.afferent_fit import start_points
 from fingerpad.inference.fitting.methods import halton
 from fingerpad.inference.fitting.posterior import credible_band
 from fingerpad.inference.fitting.profile_likelihood import ProfileLikelihood, profile_likelihoods
-from fingerpad.inference.fitting.sensitivity import sobol_indices
+from fingerpad.inference.fitting.sensitivity import identifiability, sobol_indices
 from fingerpad.inference.identifiable import IDENTIFIABLE_NAMES, identifiable
 from fingerpad.inference.problem import RateProblem
 from fingerpad.inference.rate_model import AfferentModel, four_number_model
 from fingerpad.inference.rate_posterior import (
+    INDEPENDENT,
     RateLikelihood,
+    ResidualDraws,
     afferent_posterior,
     from_coordinates,
     to_coordinates,
 )
 from fingerpad.inference.recordings import RateRecordings
+from fingerpad.neuron.afferent import PARAMETER_NAMES
 
 LEVEL = 0.95  # Probability within every interval and band.
 SEEDS_OF_PROFILES = 300  # Draws from the posterior that profiles start from.
@@ -179,3 +188,68 @@ def _likelihood(
 def _band(draws_hz: FloatArray) -> RateBand:
     low, high = credible_band(draws_hz, LEVEL)
     return RateBand(low_hz=low, high_hz=high)
+
+
+def uncertainty(
+    six_model: AfferentModel,
+    recordings: RateRecordings,
+    fitted: ArrayLike,
+    shift_mm: FloatArray,
+    seed: int,
+    **settings: Any,
+) -> UncertaintyResult:
+    """Find what rates determine of six fitted parameters, with stimuli at places along a line."""
+    model, six = four_number_model(six_model), np.asarray(fitted, dtype=np.float64)
+    four, capacitance_mf, threshold_mv = identifiable(six), float(six[4]), float(six[5])
+    alike, independent = RateLikelihood(model, recordings, shift_mm), RateLikelihood(model, recordings)
+    posterior = afferent_posterior(alike, four, seed=seed, **settings)
+    chains, gains = posterior.chains, posterior.six(capacitance_mf, threshold_mv)[:, :3]
+    draws = dict(zip((*IDENTIFIABLE_NAMES, *PARAMETER_NAMES[:3]), (*posterior.four.T, *gains.T), strict=True))
+    draws["resting_share"] = chains.flat[:, 0]
+    some = posterior.four[np.linspace(0, len(posterior.four) - 1, SEEDS_OF_PROFILES).astype(np.int64)]
+    local = identifiability(lambda values: np.concatenate(six_model.evaluate(values)), six, PARAMETER_NAMES)
+    return UncertaintyResult(
+        level=LEVEL,
+        seed=seed,
+        units=units_of(IDENTIFIABLE_NAMES),
+        fit=dict(zip(IDENTIFIABLE_NAMES, four.tolist(), strict=True)),
+        capacitance_mf=capacitance_mf,
+        threshold_mv=threshold_mv,
+        identifiability=ParameterIdentifiability(
+            rank=local.rank, relative_singular_values=local.singular_values / local.singular_values[0]
+        ),
+        posterior={name: _interval(values) for name, values in draws.items()},
+        convergence=PosteriorConvergence.of(chains),
+        shift_mm=shift_mm,
+        rates={
+            phase: _prediction(drawn, getattr(recordings, f"{phase}_rate_hz"))
+            for phase, drawn in posterior.rates.items()
+        },
+        evidence_for_alike_residuals=(
+            alike.log_likelihood(some).max() - independent.log_likelihood(some).max()
+        ),
+        profiles=profiles(alike, some),
+        sensitivity=fss_sensitivity(RateProblem(model, recordings), four, seed),
+    )
+
+
+def _interval(draws: FloatArray) -> CredibleInterval:
+    low, high = credible_band(draws, LEVEL)
+    return CredibleInterval(median=float(np.median(draws)), low=float(low), high=float(high))
+
+
+def _prediction(drawn: ResidualDraws, observed_hz: FloatArray) -> PhasePrediction:
+    low, high = credible_band(drawn.predicted_hz, LEVEL)
+    new_low, new_high = credible_band(drawn.new_hz, LEVEL)
+    return PhasePrediction(
+        observed_hz=observed_hz,
+        median_hz=np.median(drawn.predicted_hz, axis=0),
+        low_hz=low,
+        high_hz=high,
+        new_low_hz=new_low,
+        new_high_hz=new_high,
+        share_within_new=((new_low <= observed_hz) & (observed_hz <= new_high)).mean(),
+        residual_deviation_hz=_interval(drawn.deviation_hz),
+        residual_length_mm=_interval(drawn.length_mm),
+        probability_of_independence=(drawn.length_mm == INDEPENDENT).mean(),
+    )

@@ -9,6 +9,7 @@ import numpy as np
 from fingerpad.core.checked import result_class
 from fingerpad.core.displayed import Columns, Result
 from fingerpad.core.values import Matrix, Number, Vector, WholeVector
+from fingerpad.inference.fitting.posterior import Chains
 
 
 @result_class
@@ -80,6 +81,89 @@ class FssSensitivity:
     mean_fss: Number
     deviation_fss: Number  # Mean and standard deviation of FSS over the ranges. [1]
     evaluations: int
+
+
+@result_class
+class CredibleInterval:
+    """Posterior median and ends of the credible interval of one number, in its unit."""
+
+    median: Number
+    low: Number
+    high: Number
+
+
+@result_class
+class ParameterIdentifiability:
+    """Directions of the six parameters that the rates determine."""
+
+    rank: int  # Singular values of the Jacobian of the rates that are not zero.
+    relative_singular_values: Vector  # Over the largest, (6,). [1]
+
+
+@result_class
+class PosteriorConvergence:
+    """Size and convergence of the MCMC ensembles."""
+
+    ensembles: int
+    walkers: int  # Independent ensembles, and walkers of each.
+    draws: int
+    evaluations: int  # Draws kept, and evaluations of the likelihood.
+    acceptance: Number  # Share of accepted proposals. [1]
+    r_hat: Number  # Largest split R-hat. [1]
+    effective_draws: Number
+    effective_draws_of_tails: Number  # Smallest effective sample sizes.
+    draws_per_effective_draw: Number  # Largest autocorrelation time, in draws.
+
+    @classmethod
+    def of(cls, chains: Chains) -> PosteriorConvergence:
+        """Convergence of ensembles, the worst of all coordinates."""
+        return cls(
+            ensembles=chains.draws.shape[0],
+            walkers=chains.draws.shape[2],
+            draws=len(chains.flat),
+            evaluations=chains.n_evaluations,
+            acceptance=chains.acceptance,
+            r_hat=chains.r_hat.max(),
+            effective_draws=chains.effective_sizes.min(),
+            effective_draws_of_tails=chains.tail_effective_sizes.min(),
+            draws_per_effective_draw=chains.autocorrelation_steps.max(),
+        )
+
+
+@result_class
+class PhasePrediction:
+    """Posterior prediction of the rates of one phase, stimulus by stimulus."""
+
+    observed_hz: Vector
+    median_hz: Vector
+    low_hz: Vector
+    high_hz: Vector  # Observed; median and credible band of predicted rates, (n_stimuli,). [spikes/s]
+    new_low_hz: Vector
+    new_high_hz: Vector  # Credible band of a new recording, (n_stimuli,). [spikes/s]
+    share_within_new: Number  # Share of the observed rates within that band. [1]
+    residual_deviation_hz: CredibleInterval
+    residual_length_mm: CredibleInterval  # Of the residuals; length: of their correlation.
+    probability_of_independence: Number  # That residuals of neighbouring shifts are independent. [1]
+
+
+@result_class
+class UncertaintyResult:
+    """Uncertainty of a fit to rates whose residuals may be alike where stimuli are neighbours."""
+
+    level: Number  # Probability within each interval and band.
+    seed: int  # Of the random numbers.
+    units: dict[str, str]
+    fit: dict[str, Number]  # By the names of the four identifiable numbers.
+    capacitance_mf: Number
+    threshold_mv: Number  # Of the fit; they set the common scale of the gains in `posterior`. [mF], [mV]
+    identifiability: ParameterIdentifiability  # Of the six parameters.
+    posterior: dict[str, CredibleInterval]  # Of numbers, gains, and resting potential over threshold.
+    convergence: PosteriorConvergence
+    shift_mm: Vector  # Places of the stimuli along a line, (n_stimuli,). [mm]
+    rates: dict[str, PhasePrediction]
+    evidence_for_alike_residuals: Number  # Gain of the largest log likelihood by correlated residuals.
+    profiles: tuple[ParameterProfile, ...]  # Of the four numbers.
+    sensitivity: FssSensitivity  # Of FSS to the four numbers.
 
 
 @result_class

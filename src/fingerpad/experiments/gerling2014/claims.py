@@ -20,9 +20,20 @@ import numpy as np
 
 from fingerpad import data
 from fingerpad.core.checked import result_class
-from fingerpad.experiments.gerling2014.percept import USED, Estimate, difference
+from fingerpad.core.values import Number
+from fingerpad.experiments.gerling2014.percept import SWEPT_NOISE, USED
 from fingerpad.experiments.gerling2014.skin import SkinDeflectionResult
-from fingerpad.experiments.gerling2014.thresholds import LAYOUTS
+from fingerpad.experiments.gerling2014.thresholds import LAYOUTS, STANDARDS_PER_M
+from fingerpad.experiments.scores import (
+    Estimate,
+    Verdict,
+    above,
+    all_or_none,
+    below,
+    difference,
+    every,
+    of_truth,
+)
 from fingerpad.inference.fitting.methods import ResponseSurface
 
 if TYPE_CHECKING:
@@ -41,15 +52,6 @@ class Group(StrEnum):
     ADDITION = "addition"  # Our own addition, of which the paper says nothing that could be judged.
 
 
-class Verdict(StrEnum):
-    """Whether a claim is met."""
-
-    MET = "met"
-    MISSED = "missed"
-    NOT_DECIDABLE = "not decidable"  # A reading that the paper leaves open, or chance, decides.
-    NOT_APPLICABLE = "does not apply"  # The set of tissues has nothing to compare.
-
-
 @result_class
 class ClaimRow:
     """A claim of the paper beside this run."""
@@ -63,13 +65,6 @@ class ClaimRow:
     verdict: Verdict
     fitted_to: str = ""  # What was fitted to the number or chosen by it; in the group `FITTED` alone.
     note: str = ""
-
-    def __post_init__(self) -> None:
-        if (self.group is Group.FITTED) != bool(self.fitted_to):
-            raise ValueError(
-                "fitted_to must say what was fitted in rows of the group fitted, and in no others: "
-                f"got {self.fitted_to!r} in the group {self.group}."
-            )
 
 
 @result_class
@@ -86,6 +81,9 @@ class Statement:
     fitted_paper: str
     fitted_human: str  # What was fitted to it; empty where nothing was.
 
+
+Summary = dict[str, Number | tuple[Number, ...]]
+"""Numbers of one set by the names of the rows `summary`."""
 
 ABSENT = "–"
 
@@ -135,10 +133,28 @@ def two_digits(value: float) -> str:
     return ABSENT if math.isnan(value) else f"{float(f'{value:.2g}'):g}"
 
 
+def summary(found: SetResult) -> Summary:
+    """Collect the numbers of the rows `summary`; a threshold that does not exist is NaN."""
+    thresholds = found.curvature_thresholds
+    standards = thresholds.populations[0].standards if thresholds else ()
+    fractions = dict.fromkeys(STANDARDS_PER_M, np.nan)
+    fractions |= {one.standard_per_m: one.weber_fraction for one in standards}
+    known = vars(found) | {"statistics": found.discrimination.statistics, "weber_fractions": fractions}
+
+    def number(path: str) -> float:
+        return float(Formatter().get_field(path, (), known)[0])
+
+    return {
+        name: number(paths) if isinstance(paths, str) else tuple(map(number, paths))
+        for name, paths in _FILE["summary"].items()
+    }
+
+
 def judged(found: SetResult, trials: SkinDeflectionResult) -> tuple[ClaimRow, ...]:
     """Judge all claims for one set of tissues; a row is left out where there is nothing to compare."""
     known = vars(found) | {"trials": trials, "line_excess_mm": _line_excess_mm(trials)}
     known |= {"data": data, "statistics": found.discrimination.statistics, **_texts(found)}
+    known |= {"swept": (SWEPT_NOISE[0], SWEPT_NOISE[-1])}
     rows = [_row(claim, found, known) for claim in CLAIMS]
     return tuple(row for row in rows if row is not None)
 
@@ -180,34 +196,7 @@ def _texts(found: SetResult) -> dict[str, Any]:
 
 # Rules
 
-ERRORS = 2.0  # Monte-Carlo errors by which two numbers must differ for the difference to count.
 CLOSE, CLOSE_POINTS = _FILE["texts"]["close"], _FILE["texts"]["close_points"]
-
-
-def of_truth(met: bool) -> Verdict:
-    return Verdict.MET if met else Verdict.MISSED
-
-
-def below(estimate: Estimate, bound: float) -> Verdict:
-    """Verdict of a bound from above; not decidable within two Monte-Carlo errors of it."""
-    if abs(estimate.value - bound) <= ERRORS * estimate.error:
-        return Verdict.NOT_DECIDABLE
-    return of_truth(estimate.value < bound)
-
-
-def above(estimate: Estimate, bound: float = 0.0) -> Verdict:
-    """Verdict of a bound from below, as `below`."""
-    return below(Estimate(value=-estimate.value, error=estimate.error), -bound)
-
-
-def every(*verdicts: Verdict) -> Verdict:
-    """Missed if one is, else not decidable if one is, else met."""
-    return min(verdicts, key=(Verdict.MISSED, Verdict.NOT_DECIDABLE, Verdict.MET).index)
-
-
-def all_or_none(bound: float, least: float, most: float, *_: object) -> Verdict:
-    """Verdict of several numbers that decide only if they agree."""
-    return Verdict.NOT_DECIDABLE if least < bound <= most else of_truth(least >= bound)
 
 
 def _readings_agree(bound: float, least: float, most: float, *_: object) -> Verdict:
@@ -250,9 +239,9 @@ RULES: dict[str, Callable[..., Verdict | bool]] = {
 
 def _line_excess_mm(trials: SkinDeflectionResult) -> list[float]:
     """Mean deflection above Trial 3's, of Trials 1 and 2 in both regions, over nodes that both have. [mm]"""
-    third = trials.trial3.line
+    third = trials.trial3["line"]
     distance = np.abs(third.distance_mm)
-    excess = [one.line.deflection_mm - third.deflection_mm for one in (trials.trial1, trials.trial2)]
+    excess = [one["line"].deflection_mm - third.deflection_mm for one in (trials.trial1, trials.trial2)]
     near = [(distance >= start) & (distance <= end) for start, end in REGIONS_MM]
     return [float(more[region].mean()) for more in excess for region in near]
 
@@ -292,7 +281,8 @@ def _peaks_in_window(found: SetResult) -> Values:
 
 def _noise_and_rises(found: SetResult) -> Values:
     reasons = found.discrimination.reasons
-    both = (reasons.rise["static"], reasons.rise_for_paper_noise["static"])
+    used = next(reading for reading in reasons.readings if reading.reading == USED["static"])
+    both = (used.rise, reasons.rise_for_paper_noise["static"])
     texts = (" and ".join("none" if math.isnan(one) else f"{one:.0%}" for one in rises) for rises in both)
     return found.discrimination.noise_sigma, *texts
 
@@ -300,11 +290,6 @@ def _noise_and_rises(found: SetResult) -> Values:
 def _farthest_from_line(found: SetResult) -> Values:
     targets = found.discrimination.statistics.targets
     return (max((place.largest_from_line for place in targets), key=lambda one: one.value),)
-
-
-def _falls_with_noise(found: SetResult) -> Values:
-    lowers = found.discrimination.statistics.noise_lowers
-    return lowers.smallest_fall, lowers.noise_sigma[0], lowers.noise_sigma[-1]
 
 
 def _misfits(found: SetResult) -> Values:
@@ -358,8 +343,8 @@ def _rises(measure: str, found: SetResult) -> Values:
 def _euclidean_misfit(found: SetResult) -> Values:
     """Misfit of the Euclidean Distance, a noise of its own, and how much farther the other measures are."""
     misfit, own = found.discrimination.statistics.misfit, found.discrimination.reasons.euclidean
-    alone = f"with a separate noise of {own.noise_sigma:.3f}: {own.misfit:.3f}"
-    if own.hit_rate is None:
+    alone = f"with a separate noise of {own['noise_sigma']:.3f}: {own['misfit']:.3f}"
+    if math.isnan(own["noise_sigma"]):
         alone = "no separate noise fits the points"
     ours = misfit["euclidean"]
     return ours, alone, *(difference(misfit[name], ours) for name in MEASURES[1:] if name in misfit)
@@ -391,7 +376,6 @@ READERS: dict[str, Callable[[SetResult], Values | None]] = {
     ),
     "noise and rises": _noise_and_rises,
     "farthest from line": _farthest_from_line,
-    "falls with noise": _falls_with_noise,
     "misfits": _misfits,
     "latency shifts": _latency_shifts,
     **{f"rises, {measure}": partial(_rises, measure) for measure in MEASURES},

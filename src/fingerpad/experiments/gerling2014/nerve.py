@@ -4,20 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from functools import partial
 
 import numpy as np
-from numpy.typing import ArrayLike
 from scipy.interpolate import interp1d
 
 from fingerpad.core.checked import result_class
-from fingerpad.core.signals import STORED_ENERGY, ResponseMap, Traces, traces_below
-from fingerpad.core.units import MM_PER_M, units_of
+from fingerpad.core.signals import STORED_ENERGY, Skin, Traces, traces_below
+from fingerpad.core.units import MM_PER_M
 from fingerpad.core.values import FloatArray, Matrix, Number, Vector
 from fingerpad.data import bar_firing_rates, protocol
 from fingerpad.experiments.conditions import RECEPTOR_X_MM, Conditions, Touch
-from fingerpad.experiments.fit.rate_uncertainty import LEVEL, SEEDS_OF_PROFILES, fss_sensitivity, profiles
-from fingerpad.experiments.fit.results import FssSensitivity, ParameterProfile
+from fingerpad.experiments.fit.rate_uncertainty import uncertainty
+from fingerpad.experiments.fit.results import UncertaintyResult
 from fingerpad.experiments.gerling2014.skin import (
     DECIMALS,
     PLATE_DEPTHS_MM,
@@ -26,7 +24,7 @@ from fingerpad.experiments.gerling2014.skin import (
     plate,
 )
 from fingerpad.geometry.indenters import Bar
-from fingerpad.inference.afferent_fit import response_surface, start_points
+from fingerpad.inference.afferent_fit import response_surface, start_points, validated
 from fingerpad.inference.fitting.cross_validation import (
     CrossValidation,
     FoldFit,
@@ -34,13 +32,9 @@ from fingerpad.inference.fitting.cross_validation import (
     interleaved_folds,
 )
 from fingerpad.inference.fitting.methods import Fit, FitStep, Method
-from fingerpad.inference.fitting.posterior import Chains, credible_band
-from fingerpad.inference.fitting.sensitivity import identifiability
-from fingerpad.inference.identifiable import IDENTIFIABLE_NAMES, identifiable
 from fingerpad.inference.problem import RateProblem
-from fingerpad.inference.rate_model import AfferentModel, four_number_model
-from fingerpad.inference.rate_posterior import INDEPENDENT, RateLikelihood, ResidualDraws, afferent_posterior
-from fingerpad.inference.recordings import RateRecordings
+from fingerpad.inference.rate_model import AfferentModel
+from fingerpad.inference.recordings import PHASES, RateRecordings
 from fingerpad.neuron.afferent import PARAMETER_NAMES, Afferent, parameter_units
 from fingerpad.neuron.lif import membrane_potential
 from fingerpad.neuron.population import Population
@@ -54,7 +48,6 @@ from fingerpad.neuron.transduction import drive
 from fingerpad.skin.sampling import SkinResponse
 
 RECEPTOR = ((RECEPTOR_X_MM, 0.0),)  # Position of the end organ: x and z on the skin. [mm]
-PHASES = ("dynamic", "static")
 
 
 @result_class
@@ -65,22 +58,6 @@ class Modulation:
     minimum_hz: Number  # Smallest rate with the flat face of the bar over the receptor. [spikes/s]
     difference_hz: Number
     index: Number  # Modulation index; NaN if there are no spikes. [1]
-
-
-@result_class
-class PhaseModulation:
-    """Modulation of the rates of one phase."""
-
-    observed: Modulation
-    ours: Modulation  # Of the recorded and of the predicted rates.
-
-
-@result_class
-class RateModulation:
-    """Modulation of both rates."""
-
-    dynamic: PhaseModulation
-    static: PhaseModulation  # During the ramp and during the hold.
 
 
 @result_class
@@ -110,10 +87,8 @@ class FoldResult:
     fold: int
     start: int  # Number of the fold and of the better start point, from 1.
     testing_shift_mm: Vector  # Shifts left out, (n_testing,). [mm]
-    fss_start: Vector  # Fractional sum of squares of the training set at the start points, (n_starts,). [1]
     fss_train: Number
     fss_test: Number  # Of the better search. [1]
-    parameters: dict[str, Number]  # Six parameters of the better search, by name.
     climbs: tuple[Search, ...]  # One per start point.
 
 
@@ -124,8 +99,7 @@ class SingleUnitResult:
     fss_in_sample: Number
     fss_in_sample_dynamic: Number
     fss_in_sample_static: Number  # Fractional sum of squares over all shifts, weighted and by phase. [1]
-    fss_out_of_sample: Number
-    fss_training_mean: Number  # Mean over the folds, of the testing and of the training sets. [1]
+    fss_out_of_sample: Number  # Mean over the testing sets of the folds. [1]
     method: str
     dynamic_quantity: str
     static_quantity: str  # What the two terms of the current follow, see `SkinResponse.sample`.
@@ -138,7 +112,7 @@ class SingleUnitResult:
     observed_static_rate_hz: Vector  # Recorded rates, (n_shifts,). [spikes/s]
     start_points: tuple[dict[str, Number], ...]  # Both start points, by name of the parameter.
     folds: tuple[FoldResult, ...]
-    modulation: RateModulation
+    modulation: dict[str, dict[str, Modulation]]  # By phase: "observed", and predicted, "ours".
     initial_mv: Number | None = None  # Potential of the membrane at the start; by default at rest. [mV]
 
 
@@ -184,10 +158,9 @@ def fit(
     """Fit to all shifts, where the parameters are not known already, and cross-validate the method."""
     method, everything = method or response_surface(), np.arange(problem.n_observations)
     if known is None:
-        best = method.fit(problem, everything)
-    else:
-        score = problem.score(known, everything)
-        best = Fit(known, score, n_evaluations=0, seconds=0.0, history=(FitStep(known, score),))
+        return validated(problem, method)
+    score = problem.score(known, everything)
+    best = Fit(known, score, n_evaluations=0, seconds=0.0, history=(FitStep(known, score),))
     return best, cross_validate(problem, method, interleaved_folds(everything.size))
 
 
@@ -198,18 +171,11 @@ def single_unit_result(
     observed = {phase: getattr(recordings, f"{phase}_rate_hz") for phase in PHASES}
     ours = dict(zip(PHASES, problem.model.evaluate(best.parameters), strict=True))
     by_phase = problem.score_by_phase(best.parameters, np.arange(problem.n_observations))
-    modulation = {
-        phase: PhaseModulation(
-            observed=edge_modulation(shift_mm, observed[phase]), ours=edge_modulation(shift_mm, ours[phase])
-        )
-        for phase in PHASES
-    }
     return SingleUnitResult(
         fss_in_sample=best.score,
         fss_in_sample_dynamic=by_phase["dynamic"],
         fss_in_sample_static=by_phase["static"],
         fss_out_of_sample=folds.score_test,
-        fss_training_mean=folds.score_train,
         method=method,
         dynamic_quantity=afferent.dynamic_quantity,
         static_quantity=afferent.static_quantity,
@@ -223,7 +189,13 @@ def single_unit_result(
         observed_static_rate_hz=observed["static"],
         start_points=tuple(map(_six, start_points())),
         folds=tuple(_fold(problem, fold, shift_mm) for fold in folds.folds),
-        modulation=RateModulation(**modulation),
+        modulation={
+            phase: {
+                "observed": _modulation(shift_mm, observed[phase]),
+                "ours": _modulation(shift_mm, ours[phase]),
+            }
+            for phase in PHASES
+        },
     )
 
 
@@ -246,10 +218,8 @@ def _fold(problem: RateProblem, fold: FoldFit, shift_mm: FloatArray) -> FoldResu
         fold=fold.fold + 1,
         start=fold.fit.start + 1,
         testing_shift_mm=shift_mm[fold.testing],
-        fss_start=np.array([search.history[0].fss for search in searches]),
         fss_train=fold.score_train,
         fss_test=fold.score_test,
-        parameters=_six(fold.fit.parameters),
         climbs=tuple(searches),
     )
 
@@ -258,7 +228,7 @@ def _six(parameters: FloatArray) -> dict[str, float]:
     return dict(zip(PARAMETER_NAMES, parameters.tolist(), strict=True))
 
 
-def edge_modulation(shift_mm: FloatArray, rate_hz: FloatArray) -> Modulation:
+def _modulation(shift_mm: FloatArray, rate_hz: FloatArray) -> Modulation:
     """Compare the largest rate with the smallest under the flat face of the bar."""
     under_flat = np.abs(shift_mm) < protocol.BAR_WIDTH.value / 2 - protocol.BAR_FILLET.value
     largest, smallest = float(rate_hz.max()), float(rate_hz[under_flat].min())
@@ -332,166 +302,25 @@ PIECES = 8
 """Linear pieces of the drive between two given times. Rates differ by less than 0.01 spikes/s on average from
 those with 32, and an evaluation takes two thirds of the time."""
 
-THOROUGH = partial(afferent_posterior, smallest_effective_size=200.0)
-"""Sampler of a result: the error of the ends of a 95 % interval is a seventh of a standard deviation."""
-
-QUICK = partial(afferent_posterior, n_walkers=100, smallest_effective_size=100.0, largest_r_hat=1.02)
-"""Sampler of a quick result: the error of the ends is a fifth of a standard deviation."""
+CHAINS = {"smallest_effective_size": 200.0}
+"""Of the posterior: the error of the ends of a 95 % interval is a seventh of a standard deviation."""
 
 
-@result_class
-class CredibleInterval:
-    """Posterior median and ends of the credible interval of one number, in its unit."""
-
-    median: Number
-    low: Number
-    high: Number
-
-
-@result_class
-class ParameterIdentifiability:
-    """Directions of the six parameters that the rates determine."""
-
-    rank: int  # Singular values of the Jacobian of the rates that are not zero.
-    relative_singular_values: Vector  # Over the largest, (6,). [1]
-    silent_directions: tuple[dict[str, Number], ...]  # They do not change the rates; by parameter.
-
-
-@result_class
-class PosteriorConvergence:
-    """Size and convergence of the MCMC ensembles."""
-
-    ensembles: int
-    walkers: int  # Independent ensembles, and walkers of each.
-    draws: int
-    evaluations: int  # Draws kept, and evaluations of the likelihood.
-    acceptance: Number  # Share of accepted proposals. [1]
-    r_hat: Number  # Largest split R-hat. [1]
-    effective_draws: Number
-    effective_draws_of_tails: Number  # Smallest effective sample sizes.
-    draws_per_effective_draw: Number  # Largest autocorrelation time, in draws.
-
-    @classmethod
-    def of(cls, chains: Chains) -> PosteriorConvergence:
-        """Convergence of ensembles, the worst of all coordinates."""
-        return cls(
-            ensembles=chains.draws.shape[0],
-            walkers=chains.draws.shape[2],
-            draws=len(chains.flat),
-            evaluations=chains.n_evaluations,
-            acceptance=chains.acceptance,
-            r_hat=chains.r_hat.max(),
-            effective_draws=chains.effective_sizes.min(),
-            effective_draws_of_tails=chains.tail_effective_sizes.min(),
-            draws_per_effective_draw=chains.autocorrelation_steps.max(),
-        )
-
-
-@result_class
-class PhasePrediction:
-    """Posterior prediction of the rates of one phase, shift by shift."""
-
-    observed_hz: Vector
-    median_hz: Vector
-    low_hz: Vector
-    high_hz: Vector  # Observed; median and credible band of predicted rates, (n_shifts,). [spikes/s]
-    new_low_hz: Vector
-    new_high_hz: Vector  # Credible band of a new recording, (n_shifts,). [spikes/s]
-    share_within_new: Number  # Share of the observed rates within that band. [1]
-    residual_deviation_hz: CredibleInterval
-    residual_length_mm: CredibleInterval  # Of the residuals; length: of their correlation.
-    probability_of_independence: Number  # That residuals of neighbouring shifts are independent. [1]
-
-
-@result_class
-class UncertaintyResult:
-    """Uncertainty of the fit to the rates under the bar."""
-
-    level: Number  # Probability within each interval and band.
-    seed: int  # Of the random numbers.
-    names: tuple[str, ...]  # The four identifiable numbers.
-    units: dict[str, str]
-    fit: dict[str, Number]
-    capacitance_mf: Number
-    threshold_mv: Number  # Of the fit; they set the common scale of the gains in `posterior`. [mF], [mV]
-    identifiability: ParameterIdentifiability  # Of the six parameters.
-    posterior: dict[str, CredibleInterval]  # Of numbers, gains, and resting potential over threshold.
-    convergence: PosteriorConvergence
-    shift_mm: Vector  # Shifts of the bar, (n_shifts,). [mm]
-    rates: dict[str, PhasePrediction]
-    evidence_for_alike_residuals: Number  # Gain of the largest log likelihood by correlated residuals.
-    profiles: tuple[ParameterProfile, ...]  # Of the four numbers.
-    sensitivity: FssSensitivity  # Of FSS to the four numbers.
-
-
-def uncertainty_result(
-    traces: Traces, fitted: ArrayLike, seed: int, *, quick: bool = False, initial_mv: float | None = None
+def bar_uncertainty(
+    traces: Traces, fitted: FloatArray, seed: int, initial_mv: float | None = None
 ) -> UncertaintyResult:
-    recordings, shift_mm = bar_recordings(), bar_firing_rates().shift_mm
-    six_model = AfferentModel.of_drive(drive(traces, pieces=PIECES), initial_mv=initial_mv)
-    model, six = four_number_model(six_model), np.asarray(fitted, dtype=np.float64)
-    four, capacitance_mf, threshold_mv = identifiable(six), float(six[4]), float(six[5])
-    alike, independent = RateLikelihood(model, recordings, shift_mm), RateLikelihood(model, recordings)
-    posterior = (QUICK if quick else THOROUGH)(alike, four, seed=seed)
-    chains, gains = posterior.chains, posterior.six(capacitance_mf, threshold_mv)[:, :3]
-    draws = dict(zip((*IDENTIFIABLE_NAMES, *PARAMETER_NAMES[:3]), (*posterior.four.T, *gains.T), strict=True))
-    draws["resting_share"] = chains.flat[:, 0]
-    some = posterior.four[np.linspace(0, len(posterior.four) - 1, SEEDS_OF_PROFILES).astype(np.int64)]
-    local = identifiability(lambda values: np.concatenate(six_model.evaluate(values)), six, PARAMETER_NAMES)
-    return UncertaintyResult(
-        level=LEVEL,
-        seed=seed,
-        names=IDENTIFIABLE_NAMES,
-        units=units_of(IDENTIFIABLE_NAMES),
-        fit=dict(zip(IDENTIFIABLE_NAMES, four.tolist(), strict=True)),
-        capacitance_mf=capacitance_mf,
-        threshold_mv=threshold_mv,
-        identifiability=ParameterIdentifiability(
-            rank=local.rank,
-            relative_singular_values=local.singular_values / local.singular_values[0],
-            silent_directions=tuple(map(_six, local.silent_directions)),
-        ),
-        posterior={name: _interval(values) for name, values in draws.items()},
-        convergence=PosteriorConvergence.of(chains),
-        shift_mm=shift_mm,
-        rates={
-            phase: _prediction(drawn, getattr(recordings, f"{phase}_rate_hz"))
-            for phase, drawn in posterior.rates.items()
-        },
-        evidence_for_alike_residuals=(
-            alike.log_likelihood(some).max() - independent.log_likelihood(some).max()
-        ),
-        profiles=profiles(alike, some),
-        sensitivity=fss_sensitivity(RateProblem(model, recordings), four, seed),
-    )
-
-
-def _interval(draws: FloatArray) -> CredibleInterval:
-    low, high = credible_band(draws, LEVEL)
-    return CredibleInterval(median=float(np.median(draws)), low=float(low), high=float(high))
-
-
-def _prediction(drawn: ResidualDraws, observed_hz: FloatArray) -> PhasePrediction:
-    low, high = credible_band(drawn.predicted_hz, LEVEL)
-    new_low, new_high = credible_band(drawn.new_hz, LEVEL)
-    return PhasePrediction(
-        observed_hz=observed_hz,
-        median_hz=np.median(drawn.predicted_hz, axis=0),
-        low_hz=low,
-        high_hz=high,
-        new_low_hz=new_low,
-        new_high_hz=new_high,
-        share_within_new=((new_low <= observed_hz) & (observed_hz <= new_high)).mean(),
-        residual_deviation_hz=_interval(drawn.deviation_hz),
-        residual_length_mm=_interval(drawn.length_mm),
-        probability_of_independence=(drawn.length_mm == INDEPENDENT).mean(),
-    )
+    """Find what the rates under the bar determine of the afferent; neighbouring shifts may miss alike."""
+    model = AfferentModel.of_drive(drive(traces, pieces=PIECES), initial_mv=initial_mv)
+    shift_mm = bar_firing_rates().shift_mm
+    return uncertainty(model, bar_recordings(), fitted, shift_mm, seed, **CHAINS)
 
 
 # One sphere on all levels, and afferents all over the pad
 
 OFFSETS_MM = np.array([0.0, 1.0, 2.0])  # Distances of three afferents from the sphere's axis, distal. [mm]
 SHEET_PER_CM2, SHEET_ROWS = 1600.0, 41  # A square of afferents every 0.25 mm, to 5 mm from the axis.
+
+SHEET_MEASURES = ("dynamic_rate_hz", "static_rate_hz", "first_spike_latency_ms")
 
 UNTIL_MS, POTENTIAL_STEP_MS = 200.0, 0.5
 """Current and potential are given from the onset up to this time, at this spacing and about spikes. [ms]"""
@@ -572,31 +401,30 @@ class RestingResponse:
 
 
 @result_class
-class ResponseSheet:
-    """Responses of a sheet of afferents as tables over x (rows) and z (columns)."""
+class PopulationMaps:
+    """Responses of a dense sheet of afferents under the standard sphere (Figure 6), over x and z."""
 
     x_mm: Vector
     z_mm: Vector  # Places of the afferents, (n_x,). [mm]
     dynamic_rate_hz: Matrix
     static_rate_hz: Matrix  # Rates, (n_x, n_z). [spikes/s]
     first_spike_latency_ms: Matrix  # NaN without a spike, (n_x, n_z). [ms]
-
-
-@result_class
-class PopulationMaps(ResponseSheet):
-    """Responses of a dense sheet of afferents under the standard sphere (Figure 6)."""
-
     curvature_per_m: float  # Of the sphere. [1/m]
     at_rest: RestingResponse  # Of the same afferent.
     receptors_mm: Matrix  # Places of the paper's receptors, (18, 2). [mm]
 
 
-def population_maps(standard: SkinResponse, afferent: Afferent) -> PopulationMaps:
-    """Simulate a dense sheet of afferents under the standard sphere (Figure 6)."""
+def population_maps(standard: Skin, afferent: Afferent) -> PopulationMaps:
+    """Simulate afferents side by side on a square about the contact point, under the standard sphere."""
+    sheet = Population.grid(SHEET_PER_CM2, SHEET_ROWS, SHEET_ROWS, RECEPTOR[0], afferent).respond(standard)
+    x_mm, z_mm = (np.unique(places) for places in sheet.positions_mm.T)
+    tables = {name: getattr(sheet, name).reshape(x_mm.size, z_mm.size) for name in SHEET_MEASURES}
     return PopulationMaps(
+        x_mm=x_mm,
+        z_mm=z_mm,
+        **tables,
         curvature_per_m=protocol.STANDARD_CURVATURE.value,
         at_rest=resting_response(afferent),
-        **vars(response_sheet(sheet(afferent).respond(standard))),
         receptors_mm=Population.grid(centre_mm=RECEPTOR[0]).positions_mm,
     )
 
@@ -611,17 +439,3 @@ def resting_response(afferent: Afferent) -> RestingResponse:
         static_rate_hz=float(static_hz[0]),
         first_spike_latency_ms=latency_ms,
     )
-
-
-def sheet(afferent: Afferent) -> Population:
-    """Place afferents side by side on a square about the contact point, ordered by x, then by z."""
-    return Population.grid(SHEET_PER_CM2, SHEET_ROWS, SHEET_ROWS, RECEPTOR[0], afferent)
-
-
-def response_sheet(response: ResponseMap) -> ResponseSheet:
-    x, z = (np.unique(coordinate) for coordinate in response.positions_mm.T)
-    tables = {
-        name: getattr(response, name).reshape(x.size, z.size)
-        for name in ("dynamic_rate_hz", "static_rate_hz", "first_spike_latency_ms")
-    }
-    return ResponseSheet(x_mm=x, z_mm=z, **tables)

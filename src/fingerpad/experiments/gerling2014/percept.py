@@ -10,10 +10,8 @@ with the noise.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
-from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -25,9 +23,10 @@ from fingerpad.core.checked import result_class
 from fingerpad.core.errors import ConvergenceError
 from fingerpad.core.random_streams import Purpose, normals
 from fingerpad.core.signals import HitRates, Traces
-from fingerpad.core.values import FloatArray, IntArray, Matrix, Number, Vector, WholeVector
+from fingerpad.core.values import FloatArray, IntArray, Number, Vector, WholeVector
 from fingerpad.data import protocol, psychophysics
 from fingerpad.experiments.conditions import RECEPTOR_X_MM, Conditions, Touch
+from fingerpad.experiments.scores import Estimate, difference, estimate, extreme, largest
 from fingerpad.inference.afferent_fit import ToRatesAndHitRates
 from fingerpad.inference.problem import SphereHitRates
 from fingerpad.inference.rate_model import AfferentModel
@@ -46,6 +45,7 @@ from fingerpad.psychophysics.observer import (
     CRITERION_MOVES,
     END_OF_STIMULUS_MS,
     NOISE_DRAWS,
+    Encoder,
     EuclideanDistance,
     Experiment,
     GradientSum,
@@ -103,40 +103,6 @@ USED = {
 
 
 @result_class
-class Estimate:
-    """A mean over sessions and its standard error."""
-
-    value: Number
-    error: Number
-
-
-@result_class
-class NoiseEffect:
-    """How the mean hit rate falls with the noise."""
-
-    noise_sigma: Vector  # Noise sigma_1, (n_levels,).
-    smallest_fall: Estimate  # From one level to the next. [0-1]
-
-
-@result_class
-class ErrorBarChange:
-    """How a variant of the protocol changes the error bars."""
-
-    ratio: Estimate  # Mean error bar over that of the reference. [1]
-    change: Estimate  # Largest change of a mean hit rate. [0-1]
-
-
-@result_class
-class MeanStability:
-    """Standard deviation of a mean hit rate when the same sums are judged again."""
-
-    hit_rates: WholeVector  # Hit rates behind a mean, (2,).
-    few: Estimate
-    many: Estimate  # Standard deviation with either number. [0-1]
-    ratio: Estimate  # The first over the second. [1]
-
-
-@result_class
 class NoiseSweep:
     """Misfit of the static Gradient Sum over the noise."""
 
@@ -149,8 +115,7 @@ class TargetDistances:
     """Static hit rates of one position beside people's."""
 
     at_goodwin: tuple[Estimate, ...]  # Hit rates at Goodwin's spheres. [0-1]
-    from_line: tuple[Estimate, ...]  # Distance from the line in z. [0-1]
-    largest_from_line: Estimate  # Largest distance between Goodwin's points. [0-1]
+    largest_from_line: Estimate  # Largest distance from the line in z between Goodwin's points. [0-1]
 
 
 @result_class
@@ -162,10 +127,14 @@ class DiscriminationStatistics:
     shift: dict[str, Estimate]
     shift_above_static: dict[str, Estimate]  # Largest change of a hit rate by the shift. [0-1]
     smallest_rise: dict[str, tuple[Estimate, ...]]  # Smallest step from one sphere to the next. [0-1]
-    noise_lowers: NoiseEffect
-    ten_matrices: ErrorBarChange
-    criterion: ErrorBarChange  # 10 noise matrices instead of 100; a criterion that varies more.
-    unsteadiness: MeanStability  # Means of 10 and of 100 hit rates.
+    noise_lowers: dict[str, Estimate]  # "smallest_fall" of the mean hit rate to the next noise. [0-1]
+    ten_matrices: dict[str, Estimate]
+    criterion: dict[str, Estimate]
+    """Noise matrices are fewer, or the criterion varies more: "ratio" of the mean error bars, and largest
+    "change" of a mean hit rate. [1], [0-1]"""
+    unsteadiness: dict[str, Estimate]
+    """Standard deviation of the mean of "few" and of "many" hit rates when the same sums are judged again,
+    and "ratio" of the two. [0-1], [1]"""
     sweep: NoiseSweep
     targets: tuple[TargetDistances, ...]
 
@@ -177,25 +146,12 @@ class Interpretation:
     reading: str
     receptors: WholeVector  # Receptors that take part, (n_positions,).
     rise: Vector  # Rise of the Gradient Sum from the standard to the farthest sphere, (n_positions,).
-    hit_rate: Matrix  # With the noise of the study, (n_positions, n_comparisons). [0-1]
-    largest_shift: Number  # Largest change of these by the shift. [0-1]
-    noise_sigma: Number = np.nan
-    misfit: Number = np.nan
-    own_largest_shift: Number = np.nan
+    largest_shift: Number  # Largest change of a hit rate by the shift, at the noise of the study. [0-1]
+    noise_sigma: Number
+    misfit: Number
+    own_largest_shift: Number
     """Noise that fits people best, root mean square distance to them and largest change by the shift with it;
     NaN where no noise does. [1], [0-1], [0-1]"""
-
-
-@result_class
-class CriterionErrorBars:
-    """Mean error bar by the spread of the criterion, for three interpretations of what varies."""
-
-    criterion_sigma: Vector  # Standard deviation of the criterion, (n_spreads,).
-    point: Vector
-    fraction: Vector
-    likelihood: Vector
-    """Error bar if the decision point varies, the fraction beta that places it, or a likelihood ratio of mean
-    1 between comparison and standard, (n_spreads,). [0-1]"""
 
 
 @result_class
@@ -207,24 +163,18 @@ class MisfitCurve:
 
 
 @result_class
-class EuclideanFit:
-    """Noise that fits the Euclidean Distance to people, NaN and None if none does."""
-
-    noise_sigma: Number = np.nan
-    misfit: Number = np.nan  # Root mean square distance to Goodwin's points. [0-1]
-    hit_rate: Matrix | None = None  # With that noise, (n_positions, n_comparisons). [0-1]
-
-
-@result_class
 class DiscrepancyAnalysis:
     """Numbers behind the differences between the model's percept and the paper's."""
 
-    rise: dict[str, Vector]  # Rise of the Gradient Sum to the farthest sphere, by measure, (n_positions,).
-    rise_for_paper_noise: dict[str, Vector]  # With which the paper's noise meets people's hit rate, or NaN.
+    rise_for_paper_noise: dict[str, Vector]
+    """Rise of the Gradient Sum to the farthest sphere with which the paper's noise meets people's hit rate,
+    by measure, (n_positions,); NaN where none does."""
     readings: tuple[Interpretation, ...]  # Interpretations of the steps that the paper leaves open.
-    criterion: CriterionErrorBars
+    criterion: dict[str, Vector]
+    """Mean error bar by the spread of the criterion, "criterion_sigma", for each of `CRITERION_MOVES`: what
+    varies with it, (n_spreads,). [0-1]"""
     misfit_curve: MisfitCurve
-    euclidean: EuclideanFit
+    euclidean: dict[str, Number]  # Noise that fits the Euclidean Distance to people, as of `readings`.
 
 
 @result_class
@@ -236,7 +186,6 @@ class GoodwinHitRates:
     trials: int  # Trials behind each fraction (assumed).
     low: Vector
     high: Vector  # Observed fractions and their binomial 95 % intervals, (2,). [0-1]
-    line: Vector  # Hit rates at the spheres of the study, on the line in z, (n_comparisons,). [0-1]
 
 
 @result_class
@@ -257,10 +206,8 @@ class SphereDiscrimination:
     sessions: int  # Of all noise; repetitions of the protocol.
     curvature_per_m: Vector  # The spheres, the standard first, (7,). [1/m]
     noise_sigma: float
-    noise_fit_error: float
-    noise_sigma_paper: float  # Fitted noise, root mean square error of the fit [0-1], and the paper's noise.
+    noise_sigma_paper: float  # Fitted noise, and the paper's.
     goodwin: GoodwinHitRates  # Of people.
-    gradient_sums: dict[str, Matrix]  # Without noise, by measure, (n_positions, 7). [spikes/s or ms]
     gradient_sum: dict[str, ObserverHitRates]
     euclidean: dict[str, ObserverHitRates]
     variants: dict[str, ObserverHitRates]  # First session; variants of the static Gradient Sum by name.
@@ -376,12 +323,8 @@ def discriminate_spheres(
         sessions=sessions,
         curvature_per_m=np.array(CURVATURES),
         noise_sigma=noise.noise_sigma,
-        noise_fit_error=noise.root_mean_square_error,
         noise_sigma_paper=psychophysics.NOISE_SIGMA.value,
         goodwin=goodwin_hit_rates(),
-        gradient_sums={
-            name: np.array([gradient_sum(*one) for one in both]) for name, both in measures.items()
-        },
         gradient_sum={name: drawn[name] for name in measures},
         euclidean={"static": drawn["euclidean"]},
         variants={name: one for name, one in drawn.items() if name not in (*measures, "euclidean")},
@@ -411,7 +354,6 @@ def goodwin_hit_rates() -> GoodwinHitRates:
         trials=TRIALS,
         low=low,
         high=high,
-        line=line_in_z(CURVATURES[1:]),
     )
 
 
@@ -438,21 +380,19 @@ def observe(
     measures: Mapping[str, Sequence[Measured]], noise_sigma: float, seed: int, sessions: int = SESSIONS
 ) -> Observers:
     """Simulate the judgements of every observer at every position in several sessions."""
-    n_positions = len(measures["static"])
-    judged = []
-    for session in range(sessions):
-        for position in range(n_positions):
-            number = _FIRST_SESSION + session * n_positions + position
-            here = {name: each[position] for name, each in measures.items()}
-            judged.append(
-                (_judge(here, noise_sigma, seed, number), _unsteady(here, noise_sigma, seed, number))
-            )
-    shape = (sessions, n_positions, -1)
-    first, unsteady = judged[0]
+    n_positions, judged = len(measures["static"]), []
+    for trial in range(sessions * n_positions):
+        here = {name: each[trial % n_positions] for name, each in measures.items()}
+        given = here, noise_sigma, seed, _FIRST_SESSION + trial
+        judged.append((_judge(*given), _unsteady(*given)))
+
+    def table(values: list[FloatArray] | list[float]) -> FloatArray:
+        return np.reshape(values, (sessions, n_positions, -1))
+
     return Observers(
-        {name: np.reshape([rates[name].hit_rate for rates, _ in judged], shape) for name in first},
-        {name: np.reshape([rates[name].hit_rate_sd for rates, _ in judged], shape) for name in first},
-        {count: np.reshape([moved[count] for _, moved in judged], shape[:2]) for count in unsteady},
+        {name: table([rates[name].hit_rate for rates, _ in judged]) for name in judged[0][0]},
+        {name: table([rates[name].hit_rate_sd for rates, _ in judged]) for name in judged[0][0]},
+        {count: table([moved[count] for _, moved in judged])[..., 0] for count in (FEW, MANY)},
     )
 
 
@@ -460,26 +400,20 @@ def _judge(
     measures: Mapping[str, Measured], noise_sigma: float, seed: int, session: int
 ) -> dict[str, HitRates]:
     """Hit rates of every observer at one position in one session."""
-    usual = Experiment()
-    observers = {"static": (noise_sigma, usual)} | {
-        f"sigma_{sigma:g}": (sigma, usual) for sigma in SWEPT_NOISE
-    }
-    observers["ten_matrices"] = noise_sigma, Experiment(presentations=FEW)
-    observers["ten_hit_rates"] = noise_sigma, Experiment(hit_rates=FEW)
+    static, usual = measures["static"], Experiment()
+    plans = {"static": (noise_sigma, usual)} | {f"sigma_{sigma:g}": (sigma, usual) for sigma in SWEPT_NOISE}
+    plans["ten_matrices"] = noise_sigma, Experiment(presentations=FEW)
     for sigma in CRITERION_SIGMAS:
-        observers[f"criterion_{sigma:g}"] = noise_sigma, Experiment(criterion_sigma=sigma)
-    rates = {
-        name: discriminate_by(GradientSum(one.neighbours), one.responses, noise_sigma, seed, session=session)
-        for name, one in measures.items()
-        if name != "static"
+        plans[f"criterion_{sigma:g}"] = noise_sigma, Experiment(criterion_sigma=sigma)
+    code, asked = GradientSum(static.neighbours), list(plans.values())
+    found = compare_observers(code, static.responses, asked, seed, session=session)
+    rates = dict(zip(plans, found, strict=True))
+    others: dict[str, tuple[Encoder, FloatArray]] = {
+        name: (GradientSum(one.neighbours), one.responses) for name, one in measures.items()
     }
-    plans = list(observers.values())
-    static = measures["static"]
-    code = GradientSum(static.neighbours)
-    found = compare_observers(code, static.responses, plans, seed, session=session)
-    rates |= dict(zip(observers, found, strict=True))
-    distance = EuclideanDistance()
-    rates["euclidean"] = discriminate_by(distance, static.responses, noise_sigma, seed, session=session)
+    others["euclidean"] = EuclideanDistance(), others.pop("static")[1]
+    for name, (encoder, responses) in others.items():
+        rates[name] = discriminate_by(encoder, responses, noise_sigma, seed, session=session)
     return rates
 
 
@@ -490,41 +424,21 @@ def _unsteady(
     distributions, presentations = Experiment().sums_per_sphere
     trials = session_trials(session, len(measures["static"].responses), distributions)
     sums = noisy_gradient_sums(*measures["static"], noise_sigma, seed, trials, presentations)
+    # Session numbers far beyond those of the study: no other step uses their random numbers.
+    again = [session * 1000 + 1_000_000 + repeat for repeat in range(AGAIN)]
     found = {}
     for count in (FEW, MANY):
-        means = [
-            # Session numbers far beyond those of the study: no other step uses their random numbers.
-            hit_rates_of_sums(
-                sums, seed, Experiment(hit_rates=count), session * 1000 + 1_000_000 + again
-            ).hit_rate
-            for again in range(AGAIN)
-        ]
+        plan = Experiment(hit_rates=count)
+        means = [hit_rates_of_sums(sums, seed, plan, number).hit_rate for number in again]
         found[count] = float(np.sqrt(np.var(means, axis=0, ddof=1).mean()))
     return found
-
-
-def estimate(by_session: FloatArray) -> Estimate:
-    by_session = np.asarray(by_session, dtype=np.float64)
-    error = float(by_session.std(ddof=1) / np.sqrt(by_session.size))
-    return Estimate(value=float(by_session.mean()), error=error)
-
-
-def extreme(by_session: FloatArray, pick: Callable[[FloatArray], np.intp]) -> Estimate:
-    """Estimate the one of several quantities that `pick` chooses by their means over the sessions."""
-    return estimate(by_session[:, int(pick(by_session.mean(axis=0)))])
-
-
-def _largest(changes: FloatArray) -> Estimate:
-    """Absolute size of the largest of several changes (n_sessions, n_changes)."""
-    found = extreme(changes, lambda means: np.abs(means).argmax())
-    return Estimate(value=abs(found.value), error=found.error)
 
 
 def discrimination_statistics(observers: Observers, measures: Sequence[str]) -> DiscriminationStatistics:
     codes = [*measures, "euclidean"]
     mean, swept = observers.mean, [f"sigma_{sigma:g}" for sigma in SWEPT_NOISE]
     misfit = {name: goodwin_misfit(mean[name], axis=(1, 2)) for name in codes}
-    shift = {name: _largest(mean[name][:, 1] - mean[name][:, 0]) for name in codes}
+    shift = {name: largest(mean[name][:, 1] - mean[name][:, 0]) for name in codes}
     levels = [mean[name].mean(axis=(1, 2)) for name in swept]
     little, much = (f"criterion_{sigma:g}" for sigma in CRITERION_SIGMAS)
     few, many = (observers.unsteadiness[count].mean(axis=1) for count in (FEW, MANY))
@@ -540,18 +454,10 @@ def discrimination_statistics(observers: Observers, measures: Sequence[str]) -> 
             )
             for name in codes
         },
-        noise_lowers=NoiseEffect(
-            noise_sigma=np.array(SWEPT_NOISE),
-            smallest_fall=extreme(np.transpose([a - b for a, b in pairwise(levels)]), np.argmin),
-        ),
+        noise_lowers={"smallest_fall": extreme(-np.diff(levels, axis=0).T, np.argmin)},
         ten_matrices=_error_bars(observers, "ten_matrices", "static"),
         criterion=_error_bars(observers, much, little),
-        unsteadiness=MeanStability(
-            hit_rates=np.array([FEW, MANY]),
-            few=estimate(few),
-            many=estimate(many),
-            ratio=estimate(few / many),
-        ),
+        unsteadiness={"few": estimate(few), "many": estimate(many), "ratio": estimate(few / many)},
         sweep=NoiseSweep(
             noise_sigma=np.array(SWEPT_NOISE),
             misfit=tuple(
@@ -563,16 +469,11 @@ def discrimination_statistics(observers: Observers, measures: Sequence[str]) -> 
     )
 
 
-def difference(one: Estimate, other: Estimate) -> Estimate:
-    """Subtract the second from the first, whose errors are independent."""
-    return Estimate(value=one.value - other.value, error=float(np.hypot(one.error, other.error)))
-
-
-def _error_bars(observers: Observers, variant: str, reference: str) -> ErrorBarChange:
+def _error_bars(observers: Observers, variant: str, reference: str) -> dict[str, Estimate]:
     """How many times longer error bars are on average, and the largest change of a mean."""
     wide, usual = (observers.spread[name].mean(axis=(1, 2)) for name in (variant, reference))
     change = observers.mean[variant] - observers.mean[reference]
-    return ErrorBarChange(ratio=estimate(wide / usual), change=_largest(change.reshape(len(change), -1)))
+    return {"ratio": estimate(wide / usual), "change": largest(change.reshape(len(change), -1))}
 
 
 def _targets(hit_rates: FloatArray) -> TargetDistances:
@@ -580,8 +481,7 @@ def _targets(hit_rates: FloatArray) -> TargetDistances:
     away = hit_rates - line_in_z(CURVATURES[1:])
     return TargetDistances(
         at_goodwin=tuple(estimate(hit_rates[:, column]) for column in COLUMNS),
-        from_line=tuple(map(estimate, away.T)),
-        largest_from_line=_largest(away[:, BETWEEN]),
+        largest_from_line=largest(away[:, BETWEEN]),
     )
 
 
@@ -603,24 +503,17 @@ def discrepancy_analysis(
     codes["euclidean"] = apart = lambda sigma: np.array(
         [expected_euclidean_hit_rates(one.responses, sigma) for one in measures["static"]]
     )
-    euclidean = EuclideanFit()
-    with suppress(ConvergenceError):
-        own = fit_noise_to_goodwin(apart)
-        sigma, misfit = own.noise_sigma, own.root_mean_square_error
-        euclidean = EuclideanFit(noise_sigma=sigma, misfit=misfit, hit_rate=apart(sigma))
     static, paper_noise = measures["static"][0], psychophysics.NOISE_SIGMA.value
     # The mean error bar for each quantity that the criterion may multiply.
-    plans = {
-        moves: [Experiment(criterion_sigma=sigma, criterion_moves=moves) for sigma in CRITERION_SIGMAS]
-        for moves in CRITERION_MOVES
-    }
     given = GradientSum(static.neighbours), static.responses, noise_sigma, seed
     bars = {
-        moves: np.array([discriminate_by(*given, plan).hit_rate_sd.mean() for plan in those])
-        for moves, those in plans.items()
+        moves: [
+            discriminate_by(*given, Experiment(criterion_sigma=sigma, criterion_moves=moves)).hit_rate_sd
+            for sigma in CRITERION_SIGMAS
+        ]
+        for moves in CRITERION_MOVES
     }
     return DiscrepancyAnalysis(
-        rise={name: np.array([_rise(*one) for one in both]) for name, both in measures.items()},
         rise_for_paper_noise={
             name: np.array([rise_needed(one, paper_noise, draws) for one in both])
             for name, both in measures.items()
@@ -629,7 +522,10 @@ def discrepancy_analysis(
             _interpretation(name, both, noise_sigma, draws)
             for name, both in _readings(measures, latency_ms, population).items()
         ),
-        criterion=CriterionErrorBars(criterion_sigma=np.array(CRITERION_SIGMAS), **bars),
+        criterion={
+            "criterion_sigma": np.array(CRITERION_SIGMAS),
+            **{moves: np.array([spread.mean() for spread in those]) for moves, those in bars.items()},
+        },
         misfit_curve=MisfitCurve(
             noise_sigma=np.array(CURVE_NOISE),
             misfit={
@@ -637,7 +533,7 @@ def discrepancy_analysis(
                 for name, rates in codes.items()
             },
         ),
-        euclidean=euclidean,
+        euclidean=own_noise(apart),
     )
 
 
@@ -695,19 +591,27 @@ def _readings(
 def _interpretation(
     name: str, both: Sequence[Measured], noise_sigma: float, draws: FloatArray
 ) -> Interpretation:
-    """Hit rates of an interpretation at the study's noise and at its own, which may not exist."""
+    """Judge an interpretation at the study's noise and at its own, which may not exist."""
     rates = partial(expected_of_measure, both, draws)
-    at_study = rates(noise_sigma)
-    found = Interpretation(
+    here, aside = rates(noise_sigma)
+    return Interpretation(
         reading=name,
         receptors=np.array([len(np.unique(one.neighbours)) for one in both]),
         rise=np.array([_rise(*one) for one in both]),
-        hit_rate=at_study,
-        largest_shift=float(np.abs(at_study[1] - at_study[0]).max()),
+        largest_shift=float(np.abs(aside - here).max()),
+        **own_noise(rates),
     )
-    with suppress(ConvergenceError):
-        own = fit_noise_to_goodwin(rates)
-        here, aside = rates(own.noise_sigma)
-        shift, misfit = float(np.abs(aside - here).max()), own.root_mean_square_error
-        return replace(found, noise_sigma=own.noise_sigma, misfit=misfit, own_largest_shift=shift)
-    return found
+
+
+def own_noise(hit_rates: HitRatesOfNoise) -> dict[str, float]:
+    """Noise that fits people best, as `Interpretation` has it; NaN where no noise does."""
+    try:
+        own = fit_noise_to_goodwin(hit_rates)
+    except ConvergenceError:
+        return dict.fromkeys(("noise_sigma", "misfit", "own_largest_shift"), np.nan)
+    here, aside = hit_rates(own.noise_sigma)
+    return {
+        "noise_sigma": own.noise_sigma,
+        "misfit": own.root_mean_square_error,
+        "own_largest_shift": float(np.abs(aside - here).max()),
+    }

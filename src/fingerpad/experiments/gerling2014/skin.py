@@ -52,25 +52,15 @@ class IndenterDeflection:
 
     distance_mm: Vector
     deflection_mm: Vector  # Along the midline; distance from the axis, proximal positive, (n_nodes,). [mm]
-    force_mn: Number
-    peak_force_mn: Number  # Force at the end of the hold, and the largest force. [mN]
-    penetration_mm: Number  # Largest overlap of skin and indenter. [mm]
+    force_mn: Number  # At the end of the hold. [mN]
+    r2: Number = np.nan
+    r2_mirrored: Number = np.nan
+    """Coefficient of determination, see `deflection_r2`, and the same with proximal and distal exchanged; NaN
+    under the line, where nothing was observed."""
 
 
-@result_class
-class CylinderDeflection(IndenterDeflection):
-    """Deflection of the skin under the cylinder, compared with the observations."""
-
-    r2: Number  # Coefficient of determination, see `deflection_r2`.
-    r2_mirrored: Number  # The same with proximal and distal exchanged.
-
-
-@result_class
-class TrialDeflection:
-    """Deflections with the tissues of one trial."""
-
-    line: IndenterDeflection
-    cylinder: CylinderDeflection
+TrialDeflection = dict[str, IndenterDeflection]
+"""Deflections with the tissues of one trial, under "line" and "cylinder"."""
 
 
 @result_class
@@ -144,13 +134,12 @@ def deflection_r2(profile: SurfaceProfile, proximal_positive: bool = True) -> fl
 
 def deflection_result(responses: Mapping[tuple[str, str], SkinResponse]) -> SkinDeflectionResult:
     """Profiles, forces and R², with distances in the direction of the observations."""
-    trials = {}
+    trials: dict[str, TrialDeflection] = {}
     for trial in TRIALS:
         line, cylinder = (_under_indenter(responses[trial, name]) for name in INDENTERS)
         profile = responses[trial, "cylinder"].surface_profile()
         r2, mirrored = deflection_r2(profile), deflection_r2(profile, proximal_positive=False)
-        compared = CylinderDeflection(**vars(cylinder), r2=r2, r2_mirrored=mirrored)
-        trials[trial] = TrialDeflection(line=line, cylinder=compared)
+        trials[trial] = {"line": line, "cylinder": replace(cylinder, r2=r2, r2_mirrored=mirrored)}
     observed = {
         name: getattr(cylinder_deflection(), name) for name in ("distance_mm", "deflection_mm", "is_artefact")
     }
@@ -164,8 +153,6 @@ def _under_indenter(skin: SkinResponse) -> IndenterDeflection:
         distance_mm=-profile.distance_mm[shown],
         deflection_mm=profile.deflection_mm[shown],
         force_mn=float(skin.force_mn[-1]),
-        peak_force_mn=float(skin.force_mn.max()),
-        penetration_mm=skin.penetration_mm,
     )
 
 
@@ -226,13 +213,8 @@ class NailBorder:
     nail_mm: Stack  # Outline of the nail, (n_edges, 2, 3). [mm]
     ratio: Number
     ratio_range: tuple[Number, Number]  # Stress at the border over that away from it, median and range.
-    ratio_living_epidermis: Number
-    ratio_energy: Number  # The same median in the living epidermis, for stress and for strain energy density.
-    border_kpa: Number
-    far_kpa: Number
-    border_energy_kpa: Number  # Largest strain energy density at the border. [kPa]
-    peak_kpa: Number  # Stress: largest at the border, median away from it, largest anywhere. [kPa]
-    text: str
+    ratio_energy: Number  # The same median for strain energy density in the living epidermis.
+    border_kpa: Number  # Largest stress at the border. [kPa]
     profile: StressProfile  # Stress over distance from the nail.
     middle: MiddleSection
     across: CrossSection  # The section with the highest ratio.
@@ -264,14 +246,11 @@ def nail_border(skin: SkinResponse) -> NailBorder:
         )
 
     def compared(values: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Largest value at the border and mean value away from it, (n_sections,)."""
-        border = [values[n][near[n]].max() for n in sections]
-        return np.array(border), np.array([values[n][away[n]].mean() for n in sections])
+        """Largest value at the border, and this over the mean value away from it, (n_sections,)."""
+        border = np.array([values[n][near[n]].max() for n in sections])
+        return border, border / np.array([values[n][away[n]].mean() for n in sections])
 
-    border, far = compared(stress_kpa[surface])
-    inside, (energy, far_energy) = np.divide(*compared(stress_kpa[deep])), compared(skin.sed_kpa[-1][deep])
-    ratios, energies = border / far, energy / far_energy
-    ratio, low, high = float(np.median(ratios)), float(ratios.min()), float(ratios.max())
+    (border, ratios), (_, energies) = compared(stress_kpa[surface]), compared(skin.sed_kpa[-1][deep])
     grid, middle = (mesh.nodes_mm + skin.displacement_mm)[mesh.skin_grid], skin.section()
     crossing = np.isin(np.arange(len(distance)), sections)[:, None]
     classes = [crossing & (distance > start) & (distance <= end) for start, end in pairwise(PROFILE_MM)]
@@ -284,21 +263,10 @@ def nail_border(skin: SkinResponse) -> NailBorder:
         z_mm=grid[..., 2],
         von_mises_kpa=stress_kpa[surface],
         nail_mm=_outline(mesh, grid),
-        ratio=ratio,
-        ratio_range=(low, high),
-        ratio_living_epidermis=float(np.median(inside)),
+        ratio=float(np.median(ratios)),
+        ratio_range=(float(ratios.min()), float(ratios.max())),
         ratio_energy=float(np.median(energies)),
         border_kpa=float(border.max()),
-        far_kpa=float(np.median(far)),
-        border_energy_kpa=float(energy.max()),
-        peak_kpa=float(stress_kpa.max()),
-        text=(
-            f"At the lateral border of the nail the von Mises stress of the skin reaches {border.max():.2g} "
-            f"kPa. In the median section it is {ratio:.2g} times that of the skin {FAR_MM[0]:g} to "
-            f"{FAR_MM[1]:g} mm away ({low:.2g} to {high:.2g} over {sections.size} sections); in the living "
-            f"epidermis, where receptors lie, {np.median(inside):.2g} times, and strain energy density there "
-            f"{np.median(energies):.2g} times."
-        ),
         profile=StressProfile(
             distance_mm=0.5 * (PROFILE_MM[1:] + PROFILE_MM[:-1]),
             surface_kpa=surface_kpa,

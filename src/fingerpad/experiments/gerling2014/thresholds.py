@@ -11,15 +11,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
-from scipy.interpolate import PchipInterpolator
-from scipy.optimize import brentq
 
 from fingerpad.core.checked import result_class
 from fingerpad.core.errors import ConvergenceError
-from fingerpad.core.values import FloatArray, IntArray, Number, Vector
+from fingerpad.core.values import Number, Vector
 from fingerpad.data import psychophysics
 from fingerpad.experiments.conditions import Conditions, Touch
 from fingerpad.experiments.gerling2014.percept import CENTRE_MM, CURVATURES, GOODWIN_CURVATURES, draws_of
@@ -32,9 +30,10 @@ from fingerpad.psychophysics import (
     posterior,
     yes_no,
 )
-from fingerpad.psychophysics.encoding import gradient_sum, neighbour_pairs
+from fingerpad.psychophysics.encoding import neighbour_pairs
 from fingerpad.psychophysics.ideal_observer import SMALLEST_SPREAD
 from fingerpad.psychophysics.observer import expected_hit_rates, fit_noise_sigma
+from fingerpad.psychophysics.sensitivity import InterpolatedObserver
 from fingerpad.skin.sampling import SkinResponse
 
 STANDARDS_PER_M = (144.0, 200.0, 287.0, 400.0)
@@ -48,9 +47,6 @@ contact of a flatter sphere on all sides."""
 STEPS = (0.03, 0.06, 0.09, 0.12, 0.16, 0.21)  # Comparisons: shares by which they are more curved.
 PROPORTION = 0.75
 JUDGEMENTS = int(psychophysics.GOODWIN_TRIALS.value)  # Per comparison of an experiment.
-
-LEFT_OUT_PER_M = (296.0, 305.0, 316.0, 328.0, 340.0)
-"""Spheres whose responses are also predicted from the others, which gives the error of interpolation."""
 
 
 @result_class
@@ -92,28 +88,8 @@ class PopulationThresholds:
     rows: int
     columns: int  # Receptors along the finger and across.
     noise_sigma: Number  # Standard deviation of the multiplicative noise; NaN if none fits people.
-    gradient_sum: Vector  # Of static rates, without noise, (n_spheres,). [spikes/s]
     standards: tuple[CurvatureThreshold, ...]  # Standards with a threshold.
     without_threshold: tuple[MissingThreshold, ...]
-
-
-@result_class
-class ThresholdsOfPeople:
-    """Thresholds of people in the literature."""
-
-    standard_per_m: Vector
-    comparison_per_m: Vector  # Standards and the comparisons at threshold, (n,). [1/m]
-    weber_fractions: Vector  # Smallest and largest reported fraction, (2,).
-
-
-@result_class
-class InterpolationError:
-    """Gradient Sum of a pressed sphere and of its interpolation from the others."""
-
-    curvature_per_m: float  # Of the sphere. [1/m]
-    pressed: float
-    foretold: float  # The two sums. [spikes/s]
-    error_per_m: Number  # Difference as a curvature, by the slope of the sum. [1/m]
 
 
 @result_class
@@ -125,39 +101,6 @@ class CurvatureThresholds:
     judgements: int  # Per comparison of an experiment.
     pressed_per_m: Vector  # Pressed spheres, (n_spheres,). [1/m]
     populations: tuple[PopulationThresholds, ...]  # By layout, the paper's first.
-    literature: ThresholdsOfPeople
-    interpolation: tuple[InterpolationError, ...]  # Of the spheres in `LEFT_OUT_PER_M`.
-
-
-@dataclass(frozen=True)
-class Observer:
-    """Discriminates spheres by the Gradient Sum of interpolated rates."""
-
-    rates: PchipInterpolator  # From `interpolated`.
-    neighbours: IntArray
-    noise_sigma: float
-    draws: FloatArray  # Common random presentations, (n_draws, n_receptors).
-
-    @property
-    def farthest_per_m(self) -> float:
-        """Largest curvature between which rates are interpolated. [1/m]"""
-        return float(np.exp(self.rates.x[-1]))
-
-    def responses(self, curvature_per_m: float) -> FloatArray:
-        return self.rates(np.log(curvature_per_m))
-
-    def slopes(self, curvature_per_m: float) -> FloatArray:
-        """Return the derivatives of the rates (n_receptors,) by the curvature. [spikes/s m]"""
-        return self.rates(np.log(curvature_per_m), 1) / curvature_per_m
-
-    def hit_rate(self, standard_per_m: float, comparison_per_m: float) -> float:
-        pair = [self.responses(standard_per_m), self.responses(comparison_per_m)]
-        return float(expected_hit_rates(pair, self.neighbours, self.noise_sigma, self.draws)[0])
-
-
-def interpolated(curvature_per_m: FloatArray, table: FloatArray) -> PchipInterpolator:
-    """Rates (n_receptors,) as a function of the logarithm of the curvature."""
-    return PchipInterpolator(np.log(curvature_per_m), table)
 
 
 def threshold_touches(
@@ -172,26 +115,25 @@ def curvature_thresholds(
 ) -> CurvatureThresholds:
     """Thresholds of each layout: the paper's with a given noise, others with one that is fitted to people."""
     curvatures, populations = np.array(sorted(responses)), []
-    errors: tuple[InterpolationError, ...] = ()
     for name, (rows, columns) in LAYOUTS.items():
         population = Population.grid(rows=rows, columns=columns, centre_mm=CENTRE_MM, afferent=afferent)
         neighbours = neighbour_pairs(population.positions_mm, population.pitch_mm)
         static = np.array([population.respond(responses[at]).static_rate_hz for at in curvatures.tolist()])
-        draws, rates = draws_of(population, seed), interpolated(curvatures, static)
+        draws = draws_of(population, seed)
         standards: list[CurvatureThreshold] = []
         missed: list[MissingThreshold] = []
         sigma = noise_sigma
-        if name == "paper":
-            errors = interpolation_errors(curvatures, static, neighbours)
-        else:
+        if name != "paper":
             table = static[np.searchsorted(curvatures, (CURVATURES[0], *GOODWIN_CURVATURES))]
+            predicted = partial(expected_hit_rates, table, neighbours, standard_normals=draws)
             try:
-                sigma = _noise_of_people(table, neighbours, draws)
+                sigma = fit_noise_sigma(predicted).noise_sigma
             except ConvergenceError as error:
                 sigma, missed = math.nan, [MissingThreshold(standard_per_m=None, why_not=str(error))]
+        observer = InterpolatedObserver(curvatures, static, neighbours, sigma, draws)
         for standard in STANDARDS_PER_M if math.isfinite(sigma) else ():
             try:
-                standards.append(threshold_at(Observer(rates, neighbours, sigma, draws), standard))
+                standards.append(threshold_at(observer, standard))
             except ConvergenceError as error:
                 missed.append(MissingThreshold(standard_per_m=standard, why_not=str(error)))
         populations.append(
@@ -200,7 +142,6 @@ def curvature_thresholds(
                 rows=rows,
                 columns=columns,
                 noise_sigma=sigma,
-                gradient_sum=gradient_sum(static, neighbours),
                 standards=tuple(standards),
                 without_threshold=tuple(missed),
             )
@@ -211,38 +152,17 @@ def curvature_thresholds(
         judgements=JUDGEMENTS,
         pressed_per_m=curvatures,
         populations=tuple(populations),
-        literature=ThresholdsOfPeople(
-            standard_per_m=np.array(psychophysics.THRESHOLD_STANDARDS.value),
-            comparison_per_m=np.array(psychophysics.THRESHOLD_COMPARISONS.value),
-            weber_fractions=np.array(psychophysics.WEBER_FRACTIONS.value),
-        ),
-        interpolation=errors,
     )
 
 
-def _noise_of_people(table: FloatArray, neighbours: IntArray, draws: FloatArray) -> float:
-    fit = fit_noise_sigma(lambda sigma: expected_hit_rates(table, neighbours, sigma, draws))
-    return fit.noise_sigma
-
-
-def just_noticeable_difference(observer: Observer, standard_per_m: float) -> float:
-    """How much more curved a sphere must be to be discriminated in `PROPORTION` of trials. [1/m]"""
-    farthest = observer.farthest_per_m
-
-    def missing(comparison_per_m: float) -> float:
-        return observer.hit_rate(standard_per_m, comparison_per_m) - PROPORTION
-
-    if missing(farthest) <= 0.0:
+def threshold_at(observer: InterpolatedObserver, standard_per_m: float) -> CurvatureThreshold:
+    """Find the just noticeable difference at a standard, and the result of an experiment there."""
+    jnd_per_m, farthest = observer.difference(standard_per_m, PROPORTION), observer.highest
+    if math.isnan(jnd_per_m):
         raise ConvergenceError(
             f"No sphere up to {farthest:g} /m is discriminated from {standard_per_m:g} /m in "
             f"{PROPORTION:.0%} of trials: use spheres of larger curvature, or lower the noise."
         )
-    return float(brentq(missing, standard_per_m, farthest, xtol=1e-3)) - standard_per_m
-
-
-def threshold_at(observer: Observer, standard_per_m: float) -> CurvatureThreshold:
-    """Just noticeable difference at a standard, and the result of an experiment there."""
-    jnd_per_m, farthest = just_noticeable_difference(observer, standard_per_m), observer.farthest_per_m
     steps = np.array([step for step in STEPS if standard_per_m * (1.0 + step) <= farthest])
     hit_rate = np.array([observer.hit_rate(standard_per_m, standard_per_m * (1.0 + step)) for step in steps])
     counts = np.round(JUDGEMENTS * hit_rate)
@@ -262,24 +182,3 @@ def threshold_at(observer: Observer, standard_per_m: float) -> CurvatureThreshol
         fitted_interval=posterior(fit).threshold_interval(PROPORTION),
         curve=PsychometricCurve(step=at, hit_rate=fit.predict(at)),
     )
-
-
-def interpolation_errors(
-    curvature_per_m: FloatArray, table: FloatArray, neighbours: np.ndarray
-) -> tuple[InterpolationError, ...]:
-    """Predict the Gradient Sum of some pressed spheres from the others."""
-    sums = gradient_sum(table, neighbours)
-    rise, found = np.gradient(sums, curvature_per_m), []
-    for row in np.flatnonzero(np.isin(curvature_per_m, LEFT_OUT_PER_M)):
-        others = np.arange(curvature_per_m.size) != row
-        rates = interpolated(curvature_per_m[others], table[others])(np.log(curvature_per_m[row]))
-        foretold = float(gradient_sum(rates, neighbours))
-        found.append(
-            InterpolationError(
-                curvature_per_m=float(curvature_per_m[row]),
-                pressed=float(sums[row]),
-                foretold=foretold,
-                error_per_m=float((foretold - sums[row]) / rise[row]) if rise[row] else math.nan,
-            )
-        )
-    return tuple(found)
