@@ -11,7 +11,7 @@ from scipy.stats import binom, chi2, multivariate_t, norm
 
 from fingerpad import ConvergenceError, RateRecordings, Traces
 from fingerpad.inference.fitting.posterior import credible_band
-from fingerpad.inference.rate_model import AfferentModel, four_number_model
+from fingerpad.inference.rate_model import AfferentModel, evaluate_rows, four_number_model
 from fingerpad.inference.rate_posterior import (
     LENGTHS_MM,
     AfferentPrior,
@@ -73,7 +73,7 @@ def places():
     """Coordinates that cover the prior twice as wide, their rates, and the log density of the cover."""
     wide = CENTRE + COVER * SPREAD * np.random.default_rng(1).normal(size=(N_PLACES, 4))
     wide = wide[wide[:, 0] < 1.0]
-    rates = MODEL.evaluate_batch(from_coordinates(wide))
+    rates = evaluate_rows(MODEL, from_coordinates(wide))
     return wide, rates, norm.logpdf(wide, CENTRE, COVER * SPREAD).sum(axis=1)
 
 
@@ -98,8 +98,8 @@ class AtPlaces:
     def __init__(self, rates):
         self.rates = rates
 
-    def evaluate_batch(self, points):
-        return tuple(rate[points[:, 0]] for rate in self.rates)
+    def evaluate(self, parameters):
+        return tuple(rate[int(parameters[0])] for rate in self.rates)
 
 
 def ranks(places, n_recordings, width=1.0, noise=1.0, pedestal_hz=PEDESTAL_HZ):

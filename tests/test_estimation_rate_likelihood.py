@@ -6,7 +6,6 @@ from scipy.integrate import quad
 from scipy.special import gammaln, logsumexp
 
 from fingerpad import RateRecordings
-from fingerpad.inference.rate_model import evaluate_rows
 from fingerpad.inference.rate_posterior import RateLikelihood
 from refusals import refusals
 
@@ -27,9 +26,6 @@ class Scaled:
     def evaluate(self, parameters):
         shapes = [[100.0, 130.0, 110.0, 70.0, 0.0], [8.0, 25.0, 22.0, 6.0, 1.0]]
         return tuple(parameters[0] * np.array(shapes))
-
-    def evaluate_batch(self, points):
-        return evaluate_rows(self, points)
 
 
 def recordings(*phases):

@@ -37,7 +37,7 @@ def scattered(parameters, n_points=37):
     ids=["six", "two motions", "four", "offset", "closed form"],
 )  # fmt: skip
 def test_rows_equal_single_runs_to_the_bit(model, points):
-    dynamic, static = model.evaluate_batch(points)
+    dynamic, static = evaluate_rows(model, points)
     expected = np.array([model.evaluate(point) for point in points])
     assert dynamic.shape == (37, model.n_stimuli)
     np.testing.assert_array_equal(dynamic, expected[:, 0])
@@ -50,9 +50,7 @@ def test_single_runs_equal_the_afferent_to_the_bit():
     windows = ((20.0, 50.0), (500.0, 900.0))
     (driven,) = MODEL.drives
     chosen = AfferentModel.of_drive(driven, windows, 2.0)
-    assert four_number_model(MODEL).evaluate_batch(np.empty((0, 4)))[0].shape == (0, 6)
-    by_row = evaluate_rows(MODEL, scattered(SIX, 9))
-    np.testing.assert_array_equal(by_row, MODEL.evaluate_batch(scattered(SIX, 9)))
+    assert evaluate_rows(four_number_model(MODEL), np.empty((0, 4)))[0].shape == (0, 6)
     for point in scattered(SIX, 9):
         np.testing.assert_array_equal(MODEL.evaluate(point), sed_driven(point).rates(driven))
         rested = sed_driven(point, 2.0).rates(driven, *windows)
@@ -60,10 +58,10 @@ def test_single_runs_equal_the_afferent_to_the_bit():
 
 
 test_a_row_that_is_no_afferent_is_refused = refusals(
-    (lambda: MODEL.evaluate_batch([SIX, [*SIX[:3], -1.0, *SIX[4:]]]), ("time_constant_ms",)),
+    (lambda: evaluate_rows(MODEL, [SIX, [*SIX[:3], -1.0, *SIX[4:]]]), ("time_constant_ms",)),
     (lambda: MODEL.evaluate(SIX[:4]), "got 4 numbers"),
     (lambda: AfferentModel.of_traces(SED, refractory_ms=-1.0), ("refractory_ms",)),
-    (lambda: MODEL.evaluate_batch([SIX[:4]]), r"points must have 6 columns: got shape \(1, 4\)"),
-    (lambda: four_number_model(MODEL).evaluate_batch([SIX]),
+    (lambda: evaluate_rows(MODEL, [SIX[:4]]), r"points must have 6 columns: got shape \(1, 4\)"),
+    (lambda: evaluate_rows(four_number_model(MODEL), [SIX]),
      r"points must have 4 columns: got shape \(1, 6\)"),
 )  # fmt: skip

@@ -11,7 +11,7 @@ from fingerpad.inference.fitting.cross_validation import (
     fractional_sum_of_squares,
     interleaved_folds,
 )
-from fingerpad.inference.fitting.methods import ResponseSurface, coding_increments, maximise
+from fingerpad.inference.fitting.methods import ResponseSurface
 from refusals import refusals
 
 SHIFTS = np.linspace(-3.5, 3.5, 36)
@@ -48,8 +48,7 @@ def toy_problem(observed):
 
 
 def toy_method(smallest_gain=1e-4):
-    increments = [coding_increments(start, 0.01, where_zero=[0.01, 0.0, 0.0]) for start in STARTS]
-    return ResponseSurface(STARTS, increments, smallest_gain=smallest_gain)
+    return ResponseSurface(STARTS, np.maximum(0.01 * STARTS, [0.01, 0.0, 0.0]), smallest_gain=smallest_gain)
 
 
 def test_interleaved_folds_part_36_shifts_into_six_equal_sets():
@@ -81,9 +80,9 @@ def test_each_fold_is_fitted_without_its_own_observations():
     assert spoiled.folds[2].score_test < clean.folds[2].score_test - 0.01
     assert spoiled.folds[0].fit.parameters.tobytes() != clean.folds[0].fit.parameters.tobytes()
     fit, training, method = clean.folds[3].fit, clean.folds[3].training, toy_method()
-    score = toy_problem(observed).score
-    increments = np.asarray(method.increments)[fit.start]
-    alone = maximise(lambda parameters: score(parameters, training), STARTS[fit.start], increments)
+    alone = ResponseSurface([STARTS[fit.start]], np.asarray(method.increments)[fit.start]).fit(
+        toy_problem(observed), training
+    )
     assert alone.parameters.tobytes() == fit.parameters.tobytes()
     assert [row.score for row in alone.history] == [row.score for row in fit.history]
 

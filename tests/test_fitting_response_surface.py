@@ -7,14 +7,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from fingerpad.core.errors import ConvergenceError, InputError
-from fingerpad.inference.fitting.methods import (
-    coding_increments,
-    factorial_design,
-    maximise,
-    regression_slopes,
-)
-from refusals import refusals, refused
+from fingerpad.core.errors import ConvergenceError
+from fingerpad.inference.fitting.methods import ResponseSurface, factorial_design, regression_slopes
+from refusals import refusals
 
 
 class Counted:
@@ -29,6 +24,19 @@ class Counted:
         return float(self.function(parameters))
 
 
+class Scored:
+    """A problem that consists of a score."""
+
+    names, n_observations, residuals = ("x",), 1, None
+
+    def __init__(self, objective):
+        self.score = lambda parameters, chosen: objective(parameters)
+
+
+def maximise(objective, start, increments, **settings):
+    return ResponseSurface([start], increments, **settings).fit(Scored(objective), np.arange(1))
+
+
 def bowl(centre, curvature):
     return lambda parameters: 1.0 - float((curvature * (parameters - centre) ** 2).sum())
 
@@ -39,8 +47,6 @@ def test_design_of_six_parameters_has_65_different_runs():
     corners = {tuple(row) for row in design[:-1]}
     assert corners == set(itertools.product((-1.0, 1.0), repeat=6))
     assert not design[-1].any()
-    with pytest.raises(InputError, match="at most 12: got 13"):
-        factorial_design(13)
 
 
 @pytest.mark.parametrize("n_parameters", [1, 2, 3, 6])
@@ -122,13 +128,6 @@ def test_bounds_and_restrictions_are_kept_and_the_free_parameter_still_climbs():
     assert fit.score >= 0.98
 
 
-def test_increments_are_a_share_of_the_base_and_a_zero_needs_its_own():
-    np.testing.assert_allclose(coding_increments([-2.0, 50.0], 0.01), [0.02, 0.5])
-    with refused("increments"):
-        coding_increments([0.0, 50.0], 0.01)
-    np.testing.assert_allclose(coding_increments([0.0, 50.0], 0.01, where_zero=[1e-8, 9.0]), [1e-8, 0.5])
-
-
 def test_an_objective_without_maximum_is_reported_with_its_history():
     with pytest.raises(ConvergenceError, match="has not ended after 200 steps"):
         maximise(lambda parameters: float(parameters[0]), [0.0], [1.0])
@@ -140,13 +139,14 @@ def test_an_objective_without_maximum_is_reported_with_its_history():
 GOOD = {"objective": bowl(np.zeros(2), np.ones(2)), "start": [1.0, 1.0], "increments": [0.1, 0.1]}
 
 test_what_cannot_be_climbed_is_refused = refusals(
-    ({"increments": [0.1]}, "one entry per parameter: got 1 for 2"),
+    ({"increments": [0.1]}, r"increments must match starts \(1, 2\) or one row of it"),
     ({"increments": [0.1, 0.0]}, "increments must be greater than 0"),
-    ({"lower_bounds": [0.0]}, "lower_bounds needs one number"),
+    ({"lower_bounds": [0.0]}, "lower_bounds must match starts"),
     ({"lower_bounds": [0.95, 0.0]}, "at least one increment above lower_bounds"),
-    ({"start": [[1.0, 1.0]]}, ("start",)),
+    ({"lower_bounds": [np.nan, 0.0]}, "at least one increment above lower_bounds"),
+    ({"start": [[1.0, 1.0]]}, ("starts",)),
     ({"smallest_gain": -1.0}, ("smallest_gain",)),
     ({"most_iterations": 0}, ("most_iterations",)),
-    ({"objective": lambda parameters: np.nan}, r"objective at \[0.9, 0.9\] must be a finite number"),
+    ({"objective": lambda parameters: np.nan}, r"score at \[0.9, 0.9\] must be a finite number"),
     call=lambda change: maximise(**(GOOD | change)),
 )

@@ -26,7 +26,7 @@ from fingerpad.geometry.grading import Grading
 from fingerpad.geometry.indenters import Bar, Cylinder, Line, Sphere
 from fingerpad.geometry.mesh import finger_mesh
 from fingerpad.geometry.motion import RampAndHold
-from fingerpad.inference.afferent_fit import increments, printed_starts, start_points
+from fingerpad.inference.afferent_fit import response_surface, start_points
 from fingerpad.mechanics.press_settings import PressSettings
 from fingerpad.mechanics.tissues import named_tissues
 from fingerpad.neuron.afferent import Afferent
@@ -264,16 +264,14 @@ def test_single_unit_result_names_every_number(synthetic_problem, synthetic_fit)
 
 
 def test_both_start_points_are_the_papers_with_both_gains_rescaled_alike():
-    printed = printed_starts()
-    np.testing.assert_array_equal(printed[0], [0.0, 8e-9, 7e-7, 68.0, 1e-6, 50.0])
-    np.testing.assert_array_equal(printed[1], [0.0, 8.2e-9, 3e-7, 68.0, 1e-6, 50.0])
+    printed = np.array([[0.0, 8e-9, 7e-7, 68.0, 1e-6, 50.0], [0.0, 8.2e-9, 3e-7, 68.0, 1e-6, 50.0]])
     first, second = start_points()
     np.testing.assert_array_equal([first[[0, 3, 4, 5]], second[[0, 3, 4, 5]]], printed[:, [0, 3, 4, 5]])
     assert second[1] / first[1] == pytest.approx(8.2 / 8.0, rel=1e-12)
     assert second[2] / first[2] == pytest.approx(3.0 / 7.0, rel=1e-12)
     assert first[1] / printed[0, 1] == pytest.approx(neuron.DYNAMIC_GAIN_SCALE.value, rel=1e-12)
     assert first[2] / printed[0, 2] == pytest.approx(neuron.STATIC_GAIN_SCALE.value, rel=1e-12)
-    steps = increments(start_points())
+    steps = response_surface().increments
     np.testing.assert_allclose(steps[:, 1:], 0.01 * np.array([first, second])[:, 1:], rtol=1e-12)
     np.testing.assert_allclose(
         steps[:, 0], 0.01 * 1e-6 * 50.0 / 68.0, rtol=1e-12

@@ -31,7 +31,6 @@ from fingerpad.inference.fitting.methods import (
     Method,
     Problem,
     ResponseSurface,
-    coding_increments,
 )
 from fingerpad.inference.identifiable import (
     IDENTIFIABLE_NAMES,
@@ -41,13 +40,7 @@ from fingerpad.inference.identifiable import (
     six_parameters,
 )
 from fingerpad.inference.problem import RateProblem, RatesAndHitRates, SphereHitRates
-from fingerpad.inference.rate_model import (
-    AfferentModel,
-    ClosedFormModel,
-    Rates,
-    Reparametrised,
-    evaluate_rows,
-)
+from fingerpad.inference.rate_model import AfferentModel, ClosedFormModel, Rates, Reparametrised
 from fingerpad.inference.recordings import RateRecordings
 from fingerpad.neuron.afferent import PARAMETER_NAMES, AnyAfferent, type_of
 from fingerpad.neuron.spikes import RATE_OF, Windows, rate_windows_ms
@@ -118,10 +111,6 @@ class ReceptorOffset:
     def evaluate(self, parameters: FloatArray) -> Rates:
         return self.at(parameters[-1]).evaluate(parameters[:-1])
 
-    def evaluate_batch(self, points: FloatArray) -> Rates:
-        """Rates (n_points, n_stimuli) for rows of seven parameters, bit-equal to `evaluate`. [spikes/s]"""
-        return evaluate_rows(self, points)
-
 
 def _between(near: Drive, far: Drive, share: float) -> Drive:
     """Drive interpolated linearly: `near` for a share of 0, `far` for 1."""
@@ -139,27 +128,16 @@ LOWEST_SHARE = 0.05  # Lower bound of time constant, capacitance and threshold o
 START_WIDTH = 0.5  # Width of the threshold over the threshold at the start of fits to spikes. [1]
 
 
-def printed_starts() -> FloatArray:
-    """Both start points of the paper as printed, (2, 6), with energy density in kPa."""
-    shared = (neuron.TIME_CONSTANT.value, neuron.CAPACITANCE.value, neuron.THRESHOLD.value)
-    return np.array(
-        [
-            [neuron.INTERCEPT_START.value, dynamic.value, static.value, *shared]
-            for dynamic, static in (
-                (neuron.DYNAMIC_GAIN_START_1, neuron.STATIC_GAIN_START_1),
-                (neuron.DYNAMIC_GAIN_START_2, neuron.STATIC_GAIN_START_2),
-            )
-        ]
-    )
-
-
 def start_points() -> FloatArray:
     """Both start points of the paper, (2, 6), with rescaled gains.
 
     One factor of k_d and one of k_s hold for both, see docs/decisions.md#dynamic-gain-rescaled.
     """
-    scales = [1.0, neuron.DYNAMIC_GAIN_SCALE.value, neuron.STATIC_GAIN_SCALE.value, 1.0, 1.0, 1.0]
-    return printed_starts() * scales
+    first = neuron.DYNAMIC_GAIN_START_1.value, neuron.STATIC_GAIN_START_1.value
+    second = neuron.DYNAMIC_GAIN_START_2.value, neuron.STATIC_GAIN_START_2.value
+    gains = np.array([first, second]) * [neuron.DYNAMIC_GAIN_SCALE.value, neuron.STATIC_GAIN_SCALE.value]
+    shared = neuron.TIME_CONSTANT.value, neuron.CAPACITANCE.value, neuron.THRESHOLD.value
+    return np.array([[neuron.INTERCEPT_START.value, *pair, *shared] for pair in gains])
 
 
 def spike_start() -> FloatArray:
@@ -167,19 +145,15 @@ def spike_start() -> FloatArray:
     return np.array([*identifiable(start_points()[0]), START_WIDTH])
 
 
-def increments(starts: FloatArray) -> FloatArray:
-    """Coding increments of both start points (2, 6); that of the intercept is a share of the rheobase."""
-    time_constant, capacitance, threshold = starts[0, 3:]
-    rheobase = capacitance * threshold / time_constant
-    where_zero = np.full(6, INCREMENT * rheobase)
-    return np.array([coding_increments(start, INCREMENT, where_zero) for start in starts])
-
-
-def response_surface(starts: FloatArray | None = None) -> ResponseSurface:
+def response_surface() -> ResponseSurface:
     """Return the paper's method, silent at rest, with gains and parameters of the membrane bounded below."""
-    starts = start_points() if starts is None else starts
+    starts = start_points()
+    time_constant, capacitance, threshold = starts[0, 3:]
+    # Both intercepts start at 0: their increment is a share of the rheobase.
+    rheobase = capacitance * threshold / time_constant
+    increments = np.where(starts == 0.0, INCREMENT * rheobase, INCREMENT * np.abs(starts))
     bounds = np.array([-np.inf, 0.0, 0.0, *(LOWEST_SHARE * starts[0, 3:])])
-    return ResponseSurface(starts, increments(starts), bounds, restrict=silent_at_rest)
+    return ResponseSurface(starts, increments, bounds, restrict=silent_at_rest)
 
 
 OFFSETS_MM = (-0.3, -0.2, -0.1, 0.0, 0.1, 0.2, 0.3)
@@ -312,10 +286,6 @@ class TypedModel:
             rates.append([RATE_OF[measure](spikes, window) for window in windows])
         dynamic, static = (np.concatenate(phase) for phase in zip(*rates, strict=True))
         return dynamic, static
-
-    def evaluate_batch(self, points: FloatArray) -> Rates:
-        """Rates for rows of parameters, (n_points, n_stimuli) each."""
-        return evaluate_rows(self, points)
 
 
 @dataclass(frozen=True)

@@ -21,7 +21,7 @@ from fingerpad.core.errors import InputError
 from fingerpad.core.values import FiniteVector, FloatArray, IntArray, NotNegative, Positive
 from fingerpad.data import protocol
 from fingerpad.inference.fitting.cross_validation import fractional_sum_of_squares
-from fingerpad.inference.rate_model import RateModel, Rates
+from fingerpad.inference.rate_model import RateModel, Rates, evaluate_rows
 from fingerpad.inference.recordings import RateRecordings
 from fingerpad.psychophysics.observer import expected_euclidean_hit_rates, expected_hit_rates
 
@@ -94,7 +94,7 @@ class RateProblem:
     def score_batch(self, points: FloatArray) -> FloatArray:
         """FSS over all stimuli for rows of parameters, (n_points,), bit-equal to `score`."""
         everything = np.arange(self.n_observations)
-        rates = zip(*self.model.evaluate_batch(points), strict=True)
+        rates = zip(*evaluate_rows(self.model, points), strict=True)
         return np.array([self._score_of(row, everything) for row in rates])
 
     def _score_of(self, rates: Rates, chosen: IntArray) -> float:

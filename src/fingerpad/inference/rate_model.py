@@ -39,7 +39,6 @@ from fingerpad.neuron.spikes import Windows, check_windows, common_rate_windows_
 from fingerpad.neuron.transduction import Drive, drive
 
 Rates = tuple[FloatArray, FloatArray]  # Dynamic and static rates, one column per stimulus. [spikes/s]
-Evaluate = Callable[[FloatArray], Rates]  # From one set of parameters (n_parameters,) to rates (n_stimuli,).
 ROWS_PER_BLOCK = 4  # Rows of parameters that a thread evaluates at a time.
 
 
@@ -59,59 +58,25 @@ class RateModel(Protocol):
         """Rates (n_stimuli,) for one set of parameters (n_parameters,). [spikes/s]"""
         ...
 
-    def evaluate_batch(self, points: FloatArray) -> Rates:
-        """Rates (n_points, n_stimuli) for rows of parameters, bit-equal to `evaluate`. [spikes/s]"""
-        ...
 
-
-class SmoothRateModel(RateModel, Protocol):
-    """A rate model with derivatives."""
-
-    def slopes(self, parameters: FloatArray) -> Rates:
-        """Return the derivatives of both rates along the parameters, (n_stimuli, n_parameters) each."""
-        ...
-
-
-def evaluate_rows(
-    model: SkipValidation[RateModel], points: FloatArray, new_evaluator: Callable[[], Evaluate] | None = None
-) -> Rates:
-    """Evaluate a model row by row on all threads: what `evaluate_batch` of most models does."""
-    rows = checked_rows(model, points)
+def evaluate_rows(model: RateModel, points: ArrayLike) -> Rates:
+    """Rates (n_points, n_stimuli) for rows of parameters, on all threads. [spikes/s]"""
+    rows = np.asarray(points, dtype=np.float64)
+    if rows.ndim != 2 or rows.shape[1] != len(model.names):
+        raise InputError("points", f"must have {len(model.names)} columns", f"shape {rows.shape}")
     rates = np.empty((2, len(rows), model.n_stimuli))
 
     def work(block: slice) -> None:
-        evaluate = model.evaluate if new_evaluator is None else new_evaluator()
         for row in range(block.start, block.stop):
-            rates[0, row], rates[1, row] = evaluate(rows[row])
+            rates[:, row] = model.evaluate(rows[row])
 
     in_blocks(work, len(rows), ROWS_PER_BLOCK)
     return rates[0], rates[1]
 
 
-def checked_rows(model: RateModel, points: FloatArray) -> FloatArray:
-    """Return rows with one entry per parameter of the model, else raise `InputError`."""
-    rows = np.asarray(points, dtype=np.float64)
-    if rows.ndim != 2 or rows.shape[1] != len(model.names):
-        raise InputError("points", f"must have {len(model.names)} columns", f"shape {rows.shape}")
-    return rows
-
-
 @value_class
 class AfferentModel:
     """The paper's model of one afferent in its six parameters.
-
-    Parameters
-    ----------
-    drives : tuple of Drive
-        One per group of stimuli with the same times, so that a group is simulated at once.
-    stimuli : tuple of int array
-        Stimulus number of each column of each drive; every stimulus once.
-    windows_ms : ((float, float), (float, float)), optional
-        Windows of the dynamic and of the static rate; by default those of the phases of the stimuli. [ms]
-    refractory_ms : float
-        Refractory period, which is not fitted. [ms]
-    initial_mv : float, optional
-        Potential at the start, as of `Afferent`: that at rest by default. [mV]
 
     Examples
     --------
@@ -124,11 +89,13 @@ class AfferentModel:
     [63.0, 63.0, 63.0]
     """
 
-    drives: Many[Drive]
-    stimuli: Many[IntArray]
+    drives: Many[Drive]  # One per group of stimuli with the same times, so that a group is simulated at once.
+    stimuli: Many[IntArray]  # Stimulus number of each column of each drive; every stimulus once.
     windows_ms: Windows | None = None
-    refractory_ms: NotNegative = neuron.REFRACTORY.value
+    """Windows of the dynamic and of the static rate; by default those of the phases of the stimuli. [ms]"""
+    refractory_ms: NotNegative = neuron.REFRACTORY.value  # Refractory period, which is not fitted. [ms]
     initial_mv: Finite | None = None
+    """Potential at the start, as of `Afferent`: that at rest by default. [mV]"""
 
     def __post_init__(self) -> None:
         if self.windows_ms is not None:
@@ -212,24 +179,21 @@ class AfferentModel:
 
     def evaluate(self, parameters: FloatArray) -> Rates:
         """Rates (n_stimuli,) for six parameters, bit-equal to `Afferent.rates`. [spikes/s]"""
-        return self._evaluator()(parameters)
-
-    def evaluate_batch(self, points: FloatArray) -> Rates:
-        """Rates (n_points, n_stimuli) for rows of six parameters, bit-equal to `evaluate`. [spikes/s]"""
-        return evaluate_rows(self, points, self._evaluator)
-
-    def _evaluator(self) -> Evaluate:
-        """Return a function like `evaluate` that reuses its arrays: only one thread may call it."""
-        rest = self.refractory_ms, self.initial_mv
-        groups = [_evaluator_of(group, *rest, self.used_windows_ms) for group in self.drives]
-
-        def evaluate(parameters: FloatArray) -> Rates:
-            dynamic, static = np.empty((2, self.n_stimuli))
-            for group, columns in zip(groups, self.stimuli, strict=True):
-                dynamic[columns], static[columns] = group(parameters)
-            return dynamic, static
-
-        return evaluate
+        six = np.asarray(parameters, dtype=np.float64)
+        if not (six.shape == (len(PARAMETER_NAMES),) and np.isfinite(six).all() and (six[3:] > 0.0).all()):
+            # It raises the error that names the parameter.
+            Afferent.from_parameters(six, self.refractory_ms, initial_mv=self.initial_mv)
+        intercept, dynamic_gain, static_gain, *membrane = six.tolist()
+        membrane += [float(self.refractory_ms), np.nan if self.initial_mv is None else float(self.initial_mv)]
+        rates = np.empty((2, self.n_stimuli))
+        for driven, columns in zip(self.drives, self.stimuli, strict=True):
+            # I = beta + k_d U' + k_s U, in the order of Transduction.current.
+            current = dynamic_gain * driven.rate_per_ms
+            current += intercept
+            current += static_gain * driven.values
+            trains = exact_trains(driven.times_ms, current, *membrane)
+            rates[:, columns] = [window_rates_hz(*trains, *window) for window in self.used_windows_ms]
+        return rates[0], rates[1]
 
 
 @dataclass(frozen=True)
@@ -247,43 +211,10 @@ class Reparametrised:
     def evaluate(self, parameters: FloatArray) -> Rates:
         return self.model.evaluate(self.transform(parameters))
 
-    def evaluate_batch(self, points: FloatArray) -> Rates:
-        """Rates (n_points, n_stimuli) for rows of the new parameters, bit-equal to `evaluate`. [spikes/s]"""
-        rows = np.empty((len(points), len(self.model.names)))
-        for number, row in enumerate(checked_rows(self, points)):
-            rows[number] = self.transform(row)
-        return self.model.evaluate_batch(rows)
-
 
 def four_number_model(model: RateModel) -> Reparametrised:
     """Express a model of the paper's six parameters in the four identifiable ones."""
     return Reparametrised(model, IDENTIFIABLE_NAMES, six_parameters)
-
-
-def _evaluator_of(
-    driven: Drive, refractory_ms: float, initial_mv: float | None, windows_ms: Windows
-) -> Evaluate:
-    """Return the rates under one drive as a function of six parameters; its arrays are allocated once."""
-    current, static_part = np.empty_like(driven.values), np.empty_like(driven.values)
-    initial = np.nan if initial_mv is None else float(initial_mv)
-
-    def evaluate(parameters: FloatArray) -> Rates:
-        six = np.asarray(parameters, dtype=np.float64)
-        if not (six.shape == (len(PARAMETER_NAMES),) and np.isfinite(six).all() and (six[3:] > 0.0).all()):
-            # It raises the error that names the parameter.
-            Afferent.from_parameters(six, refractory_ms, initial_mv=initial_mv)
-        intercept, dynamic_gain, static_gain, tau, capacitance, threshold = six.tolist()
-        # I = beta + k_d U' + k_s U, in the order of Transduction.current.
-        np.multiply(driven.rate_per_ms, dynamic_gain, out=current)
-        current.__iadd__(intercept)
-        current.__iadd__(np.multiply(driven.values, static_gain, out=static_part))
-        times, offsets = exact_trains(
-            driven.times_ms, current, tau, capacitance, threshold, float(refractory_ms), initial
-        )
-        dynamic, static = (window_rates_hz(times, offsets, start, end) for start, end in windows_ms)
-        return dynamic, static
-
-    return evaluate
 
 
 BEND = 0.05  # Width s over which the rate sets in, relative to the threshold. [1]
@@ -322,7 +253,7 @@ def _bent(excess: FloatArray, bend: float) -> tuple[FloatArray, FloatArray]:
 
 @dataclass(frozen=True)
 class ClosedFormModel:
-    """Closed-form rates: the mean over each window of the rate under a constant drive; a `SmoothRateModel`.
+    """Closed-form rates: the mean over each window of the rate under a constant drive;.
 
     The model neglects the charging from rest and single spikes. It is inaccurate in the ramp, but smooth, and
     its derivatives are cheap.
@@ -342,10 +273,6 @@ class ClosedFormModel:
     def evaluate(self, parameters: FloatArray) -> Rates:
         dynamic, static = (self._window(parameters, window)[0] for window in self.stimuli.used_windows_ms)
         return dynamic, static
-
-    def evaluate_batch(self, points: FloatArray) -> Rates:
-        """Rates (n_points, n_stimuli) for rows of the four parameters, bit-equal to `evaluate`. [spikes/s]"""
-        return evaluate_rows(self, points)
 
     def slopes(self, parameters: FloatArray) -> Rates:
         """Return the derivatives of both rates along the four parameters, (n_stimuli, 4) each."""

@@ -36,10 +36,10 @@ from fingerpad.core.checked import value_class
 from fingerpad.core.errors import InputError
 from fingerpad.core.random_streams import generator
 from fingerpad.core.values import Finite, FiniteVector, FloatArray, Numbers, Positive, Whole
-from fingerpad.data import neuron
+from fingerpad.inference.afferent_fit import start_points
 from fingerpad.inference.fitting.posterior import Chains, LogDensity, sample
 from fingerpad.inference.identifiable import IDENTIFIABLE_NAMES, identifiable, six_parameters
-from fingerpad.inference.rate_model import RateModel
+from fingerpad.inference.rate_model import RateModel, evaluate_rows
 from fingerpad.inference.recordings import PHASES, RateRecordings
 
 INDEPENDENT = 0.0  # Length at which residuals are independent. [mm]
@@ -163,7 +163,7 @@ class RateLikelihood:
 
     def _phases(self, points: FloatArray) -> Iterator[tuple[str, FloatArray, FloatArray]]:
         """Name, predicted rates and residuals (n_points, n_stimuli) of each recorded phase."""
-        predicted = dict(zip(PHASES, self.model.evaluate_batch(points), strict=True))
+        predicted = dict(zip(PHASES, evaluate_rows(self.model, points), strict=True))
         for phase in self.phases:
             yield phase, predicted[phase], getattr(self.recordings, f"{phase}_rate_hz") - predicted[phase]
 
@@ -199,16 +199,7 @@ SMALLEST_MARGIN = 0.01
 
 N_PREDICTED = 1000  # Draws from which the bands of the rates are computed.
 
-_START = identifiable(
-    [
-        neuron.INTERCEPT_START.value,
-        neuron.DYNAMIC_GAIN_SCALE.value * neuron.DYNAMIC_GAIN_START_1.value,
-        neuron.STATIC_GAIN_SCALE.value * neuron.STATIC_GAIN_START_1.value,
-        neuron.TIME_CONSTANT.value,
-        neuron.CAPACITANCE.value,
-        neuron.THRESHOLD.value,
-    ]
-)
+_START = identifiable(start_points()[0])
 
 
 def to_coordinates(four: ArrayLike) -> FloatArray:

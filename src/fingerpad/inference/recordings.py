@@ -23,15 +23,6 @@ ROUNDING_MS = 1e-6
 class RateRecordings:
     """Firing rates of one afferent, one row per stimulus.
 
-    Parameters
-    ----------
-    stimuli : tuple of str
-        Names of the stimuli, without repetition.
-    dynamic_rate_hz, static_rate_hz : array (n_stimuli,) or None
-        Rates in the ramp and in the hold; None for a phase that was not recorded. [spikes/s]
-    source : str
-        Origin of the recordings.
-
     Examples
     --------
     >>> recordings = RateRecordings(("flat", "edge"), [54.0, 212.0], [9.0, 61.0])
@@ -39,10 +30,11 @@ class RateRecordings:
     [212.0]
     """
 
-    stimuli: Many[str]
+    stimuli: Many[str]  # Names of the stimuli, without repetition.
     dynamic_rate_hz: FiniteVector | None
     static_rate_hz: FiniteVector | None
-    source: str = ""
+    """Rates in the ramp and in the hold; None for a phase that was not recorded, (n_stimuli,). [spikes/s]"""
+    source: str = ""  # Origin of the recordings.
 
     def __post_init__(self) -> None:
         twice = sorted(name for name, count in Counter(self.stimuli).items() if count > 1)
@@ -89,17 +81,6 @@ class RateRecordings:
 class SpikeRecordings:
     """Spike trains of one afferent, one per presentation of a stimulus.
 
-    Parameters
-    ----------
-    stimuli : tuple of str
-        Stimulus of each presentation, repeated if it was presented several times.
-    trains : SpikeTrains
-        One train per presentation, times from the onset of the indentation. [ms]
-    duration_ms : array (n_presentations,) or float
-        Duration of each recording, or of all of them, from the onset. [ms]
-    source : str
-        Origin of the recordings.
-
     Examples
     --------
     >>> trains = SpikeTrains.from_lists([[10.0, 40.0, 45.0], [12.0, 38.0, 42.0], [100.0]])
@@ -109,10 +90,11 @@ class SpikeRecordings:
     (('edge', 'flat'), [61.9, 0.0])
     """
 
-    stimuli: Many[str]
-    trains: SpikeTrains
+    stimuli: Many[str]  # Stimulus of each presentation, repeated if it was presented several times.
+    trains: SpikeTrains  # One train per presentation, times from the onset of the indentation. [ms]
     duration_ms: FiniteArray
-    source: str = ""
+    """Duration of each recording, or of all of them, from the onset, (n_presentations,). [ms]"""
+    source: str = ""  # Origin of the recordings.
 
     def __post_init__(self) -> None:
         if len(self.trains) != len(self.stimuli):

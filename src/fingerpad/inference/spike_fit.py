@@ -28,7 +28,7 @@ from fingerpad.inference.identifiable import (
     from_canonical,
     six_parameters,
 )
-from fingerpad.inference.rate_model import Rates, evaluate_rows
+from fingerpad.inference.rate_model import Rates
 from fingerpad.inference.spike_likelihood import SpikeLikelihood
 from fingerpad.neuron.afferent import Afferent
 from fingerpad.neuron.escape_rate import EscapeRate
@@ -44,27 +44,13 @@ _LONGEST_STEP_OF_LOG_TAU = 1.0
 
 @value_class
 class SpikeFit(Result):
-    """Maximum-likelihood parameters and their covariance.
+    """Maximum-likelihood parameters and their covariance."""
 
-    Parameters
-    ----------
-    parameters : array (5,)
-        In the order of `fingerpad.inference.identifiable.SPIKE_PARAMETER_NAMES`.
-    covariance : array (5, 5)
-        Inverse of the Fisher information.
-    log_likelihood : float
-        At the parameters.
-    n_spikes : int
-        In all trains.
-    history : tuple of float
-        log L at the start and after each step.
-    """
-
-    parameters: FloatArray
-    covariance: FloatArray
-    log_likelihood: Number
-    n_spikes: Whole
-    history: Numbers
+    parameters: FloatArray  # In the order of `fingerpad.inference.identifiable.SPIKE_PARAMETER_NAMES`, (5,).
+    covariance: FloatArray  # Inverse of the Fisher information, (5, 5).
+    log_likelihood: Number  # At the parameters.
+    n_spikes: Whole  # In all trains.
+    history: Numbers  # log L at the start and after each step.
 
     def __repr__(self) -> str:
         (memory_ms, width), (memory_error, width_error) = self.parameters[3:], self.standard_errors[3:]
@@ -250,7 +236,3 @@ class SoftAfferent:
             for window in self.windows_ms
         )
         return dynamic, static
-
-    def evaluate_batch(self, points: FloatArray) -> Rates:
-        """Rates (n_points, n_stimuli) for rows of parameters, bit-equal to `evaluate`. [spikes/s]"""
-        return evaluate_rows(self, points)

@@ -195,21 +195,6 @@ _TRAINS_PER_BLOCK = 8
 class SpikeLikelihood:
     """Likelihood of parameters, given spike trains of one afferent under known drives.
 
-    Parameters
-    ----------
-    drive : Drive
-        Strain energy density U and its rate U' at each stimulus, one column per stimulus.
-    trains : SpikeTrains
-        One train per presentation. [ms]
-    sites : int array (n_trains,), optional
-        Column of the drive of each train. Default: in order.
-    duration_ms : float or array (n_trains,), optional
-        End of each recording. Default: the end of the drive. [ms]
-    refractory_ms : float, optional
-        Refractory period, which is not fitted. [ms]
-    escape_ms : float, optional
-        tau_e, a convention. [ms]
-
     Examples
     --------
     Without a stimulus, with an intercept that keeps the potential at the threshold: 1 spike per tau_e.
@@ -220,12 +205,13 @@ class SpikeLikelihood:
     -9998.8
     """
 
-    drive: Drive
-    trains: SpikeTrains
-    sites: Indices | None = None
+    drive: Drive  # Strain energy density U and its rate U' at each stimulus, one column per stimulus.
+    trains: SpikeTrains  # One train per presentation. [ms]
+    sites: Indices | None = None  # Column of the drive of each train. Default: in order, (n_trains,).
     duration_ms: FiniteArray | None = None
-    refractory_ms: Positive = neuron.REFRACTORY.value
-    escape_ms: Positive = ESCAPE_TIME_MS
+    """End of each recording. Default: the end of the drive, (n_trains,). [ms]"""
+    refractory_ms: Positive = neuron.REFRACTORY.value  # Refractory period, which is not fitted. [ms]
+    escape_ms: Positive = ESCAPE_TIME_MS  # tau_e, a convention. [ms]
     _intervals: tuple[FloatArray, np.ndarray, np.ndarray] = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:

@@ -44,9 +44,6 @@ from fingerpad.core.values import (
     positive,
 )
 
-LOWER, HALF, UPPER = 0.05, 0.5, 0.95
-"""Shares of F at the start of its width, at its threshold and at the end of its width."""
-
 Curve = Callable[[FloatArray], FloatArray]
 
 
@@ -70,12 +67,12 @@ class Sigmoid:
     @property
     def half(self) -> float:
         """s_50."""
-        return float(self.quantile(np.asarray(HALF)))
+        return float(self.quantile(np.asarray(0.5)))
 
     @property
     def stretch(self) -> float:
         """s_95 - s_05, the width of S itself."""
-        lower, upper = self.quantile(np.array([LOWER, UPPER]))
+        lower, upper = self.quantile(np.array([0.05, 0.95]))
         return float(upper - lower)
 
     def argument(self, coordinate: FloatArray, middle: ArrayLike, width: ArrayLike) -> FloatArray:
@@ -115,35 +112,17 @@ SIGMOIDS = {
 """Shapes by name. Gumbel is that of smallest extremes, 1 - exp(-exp t); Weibull is the same over ln x."""
 
 
-def proportion(
-    sigmoid: Sigmoid,
-    levels: ArrayLike,
-    threshold: ArrayLike,
-    width: ArrayLike,
-    guess: ArrayLike,
-    lapse: ArrayLike,
-) -> FloatArray:
-    """psi(x) of one or many functions; all arguments broadcast."""
-    x, m = np.asarray(levels, dtype=np.float64), np.asarray(threshold, dtype=np.float64)
-    w, gamma, lapses = (np.asarray(value, dtype=np.float64) for value in (width, guess, lapse))
-    share = sigmoid.cumulative(sigmoid.argument(sigmoid.coordinate(x), sigmoid.coordinate(m), w))
-    return gamma + (1.0 - gamma - lapses) * share
+def proportion(sigmoid: Sigmoid, levels: ArrayLike, parameters: ArrayLike) -> FloatArray:
+    """psi(x) of functions; the first axis of `parameters` holds threshold, width, guess and lapse."""
+    m, w, gamma, lapse = np.asarray(parameters, dtype=np.float64)
+    share = sigmoid.cumulative(sigmoid.argument(sigmoid.coordinate(levels), sigmoid.coordinate(m), w))
+    return gamma + (1.0 - gamma - lapse) * share
 
 
-def level_at(
-    sigmoid: Sigmoid,
-    proportion_correct: ArrayLike,
-    threshold: ArrayLike,
-    width: ArrayLike,
-    guess: ArrayLike,
-    lapse: ArrayLike,
-) -> FloatArray:
-    """Inverse of `proportion`: level at which psi has a value; -inf or inf if psi does not reach it.
-
-    All arguments broadcast.
-    """
-    m, w, gamma, lapses = (np.asarray(value, dtype=np.float64) for value in (threshold, width, guess, lapse))
-    share = np.clip((np.asarray(proportion_correct) - gamma) / (1.0 - gamma - lapses), 0.0, 1.0)
+def level_at(sigmoid: Sigmoid, proportion_correct: ArrayLike, parameters: ArrayLike) -> FloatArray:
+    """Inverse of `proportion`: level at which psi has a value; -inf or inf if psi does not reach it."""
+    m, w, gamma, lapse = np.asarray(parameters, dtype=np.float64)
+    share = np.clip((np.asarray(proportion_correct) - gamma) / (1.0 - gamma - lapse), 0.0, 1.0)
     with np.errstate(divide="ignore"):
         beyond_half = sigmoid.quantile(share) - sigmoid.half
     return sigmoid.level(sigmoid.coordinate(m) + w * beyond_half / sigmoid.stretch)
@@ -152,19 +131,6 @@ def level_at(
 @value_class
 class PsychometricFunction:
     """One psychometric function.
-
-    Parameters
-    ----------
-    threshold : float
-        Level m at which F is one half. [unit of the levels]
-    width : float
-        Distance w over which F rises from 5 to 95 %. [unit of the levels; of their logarithm for "weibull"]
-    guess : float
-        Rate gamma at levels far below the threshold. [0-1]
-    lapse : float
-        Difference lambda of psi to 1 far above the threshold. [0-1]
-    sigmoid : {"normal", "logistic", "weibull", "gumbel"}
-        Shape of F.
 
     Examples
     --------
@@ -175,11 +141,12 @@ class PsychometricFunction:
     320.3
     """
 
-    threshold: Finite
+    threshold: Finite  # Level m at which F is one half. [unit of the levels]
     width: Positive
-    guess: Finite = 0.5
-    lapse: NotNegative = 0.0
-    sigmoid: Annotated[str, choice(SIGMOIDS)] = "normal"
+    """Distance w over which F rises from 5 to 95 %. [unit of the levels; of their logarithm for "weibull"]"""
+    guess: Finite = 0.5  # Rate gamma at levels far below the threshold. [0-1]
+    lapse: NotNegative = 0.0  # Difference lambda of psi to 1 far above the threshold. [0-1]
+    sigmoid: Annotated[str, choice(SIGMOIDS)] = "normal"  # Shape of F.
 
     def __post_init__(self) -> None:
         check = positive if self.shape.logarithmic else finite
@@ -194,16 +161,14 @@ class PsychometricFunction:
         """The function S."""
         return SIGMOIDS[self.sigmoid]
 
+    @property
+    def parameters(self) -> tuple[float, float, float, float]:
+        """Threshold, width, guess and lapse."""
+        return self.threshold, self.width, self.guess, self.lapse
+
     def predict(self, levels: ArrayLike) -> FloatArray:
         """Psi (n_levels,) at levels of the stimulus. [0-1]"""
-        return proportion(
-            self.shape,
-            checked_levels(levels, self.sigmoid),
-            self.threshold,
-            self.width,
-            self.guess,
-            self.lapse,
-        )
+        return proportion(self.shape, checked_levels(levels, self.sigmoid), self.parameters)
 
     def level_at(self, proportion_correct: Finite | None = None) -> float:
         """Level at which psi has a value. [unit of the levels]
@@ -215,14 +180,13 @@ class PsychometricFunction:
         """
         if proportion_correct is None:
             return self.threshold
-        wanted = proportion_correct
-        if not self.guess < wanted < 1.0 - self.lapse:
+        if not self.guess < proportion_correct < 1.0 - self.lapse:
             raise InputError(
                 "proportion_correct",
                 f"must lie between guess and 1 - lapse, {self.guess:g} ... {1.0 - self.lapse:g}",
-                f"{wanted:g}",
+                f"{proportion_correct:g}",
             )
-        return float(level_at(self.shape, wanted, self.threshold, self.width, self.guess, self.lapse))
+        return float(level_at(self.shape, proportion_correct, self.parameters))
 
     def slope(self, proportion_correct: Finite | None = None) -> float:
         """Slope of psi, its derivative by the level, as in `level_at`. [1/unit of the levels]
@@ -262,22 +226,16 @@ LARGEST_LEVEL = 1e9  # Largest level of a stimulus; the fit loses its digits wit
 class JudgementCounts:
     """Numbers of judgements at each level that were correct, or "yes".
 
-    Parameters
-    ----------
-    levels : array (n_levels,)
-        Increasing. [any unit]
-    n_correct, n_trials : array (n_levels,)
-        Whole numbers.
-
     Examples
     --------
     >>> JudgementCounts([296.0, 365.0], [58, 95], [100, 100]).proportion.tolist()
     [0.58, 0.95]
     """
 
-    levels: FiniteVector
+    levels: FiniteVector  # Increasing, (n_levels,). [any unit]
     n_correct: FiniteVector
     n_trials: FiniteVector
+    """Whole numbers, (n_levels,)."""
 
     def __post_init__(self) -> None:
         levels, correct, trials = self.levels, self.n_correct, self.n_trials

@@ -13,6 +13,7 @@ bootstrap of a thousand sets takes tenths of a second.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Annotated
 
@@ -23,7 +24,7 @@ from scipy.special import digamma
 from fingerpad.core.checked import checked, value_class
 from fingerpad.core.displayed import Columns, Result
 from fingerpad.core.errors import ConvergenceError, InputError
-from fingerpad.core.values import Finite, FloatArray, Number, choice, finite
+from fingerpad.core.values import Finite, FloatArray, Number, choice
 from fingerpad.psychophysics.curve import (
     SIGMOIDS,
     SMALLEST_OVERDISPERSION,
@@ -221,33 +222,20 @@ LARGEST_LAPSE = 0.1  # Upper bound of a fitted lapse rate.
 
 LARGEST_GUESS = 0.5
 LARGEST_OVERDISPERSION = 0.5
+_VALID = (1.0, 1.0, 0.0, 0.0, 0.0)  # Values of parameters that are not given, to check the others.
 NARROWEST, WIDEST = 0.5, 5.0
 """Bounds of the width: times the smallest distance between levels, and times their span."""
 
 
 @value_class
 class PsychometricFit(Result):
-    """A psychometric function fitted to counts.
-
-    Parameters
-    ----------
-    counts : JudgementCounts
-        The counts.
-    function : PsychometricFunction
-        The maximum-likelihood function.
-    overdispersion : float
-        Correlation rho of judgements of one level; 0 for independent ones. [0-1]
-    log_likelihood : float
-        Natural logarithm of the probability of the counts.
-    model : Model
-        Free parameters and bounds.
-    """
+    """A psychometric function fitted to counts."""
 
     counts: JudgementCounts
-    function: PsychometricFunction
-    overdispersion: Number
-    log_likelihood: Number
-    model: Model
+    function: PsychometricFunction  # The one of maximum likelihood.
+    overdispersion: Number  # Correlation rho of judgements of one level; 0 for independent ones. [0-1]
+    log_likelihood: Number  # Natural logarithm of the probability of the counts.
+    model: Model  # Free parameters and bounds.
 
     def __repr__(self) -> str:
         return (
@@ -274,7 +262,7 @@ class PsychometricFit(Result):
     @property
     def point(self) -> FloatArray:
         """Working coordinates (5,) of the fit: c(m), ln w, gamma, lambda, rho."""
-        return working_point(self.function, self.overdispersion)
+        return _working_point(self.function, self.overdispersion)
 
     @property
     def at_bounds(self) -> tuple[str, ...]:
@@ -376,8 +364,7 @@ def fit_psychometric(
     (287, ('threshold', 'width'))
     """
     counts = JudgementCounts(checked_levels(levels, sigmoid), n_correct, n_trials)  # type: ignore[arg-type]
-    given = _given(sigmoid, threshold, width, guess, lapse, overdispersion)
-    model = _model(counts, sigmoid, given)
+    model = _model(counts, sigmoid, (threshold, width, guess, lapse, overdispersion))
     n_shaping = int(model.free[: WIDTH + 1].sum())
     if counts.levels.size < n_shaping:
         raise InputError(
@@ -387,12 +374,20 @@ def fit_psychometric(
             "measure more levels, or give one of the two",
         )
     points, heights = maximise_likelihood(model, counts.n_correct[np.newaxis])
-    fit = fit_at(counts, sigmoid, model, points[0], float(heights[0]))
-    _refuse_what_tells_no_threshold(fit, n_shaping)
+    (point,), (height,) = points, heights
+    function = PsychometricFunction(
+        float(model.sigmoid.level(point[THRESHOLD])),
+        float(np.exp(point[WIDTH])),
+        float(point[GUESS]),
+        float(point[LAPSE]),
+        sigmoid,
+    )
+    fit = PsychometricFit(counts, function, float(point[OVERDISPERSION]), float(height), model)
+    _check_threshold(fit, n_shaping)
     return fit
 
 
-def _refuse_what_tells_no_threshold(fit: PsychometricFit, n_shaping: int) -> None:
+def _check_threshold(fit: PsychometricFit, n_shaping: int) -> None:
     """Raise `ConvergenceError` if the threshold is on its bound, or one proportion explains all as well."""
     counts = fit.counts
     where = (
@@ -414,52 +409,21 @@ def _refuse_what_tells_no_threshold(fit: PsychometricFit, n_shaping: int) -> Non
         )
 
 
-def fit_at(
-    counts: JudgementCounts, sigmoid: str, model: Model, point: FloatArray, log_likelihood: float
-) -> PsychometricFit:
-    """Return working coordinates as a fit."""
-    shape = SIGMOIDS[sigmoid]
-    function = PsychometricFunction(
-        threshold=float(shape.level(point[THRESHOLD])),
-        width=float(np.exp(point[WIDTH])),
-        guess=float(point[2]),
-        lapse=float(point[LAPSE]),
-        sigmoid=sigmoid,
-    )
-    return PsychometricFit(counts, function, float(point[OVERDISPERSION]), log_likelihood, model)
-
-
-def working_point(function: PsychometricFunction, overdispersion: float) -> FloatArray:
+def _working_point(function: PsychometricFunction, overdispersion: float) -> FloatArray:
     """Working coordinates (5,) of a function: c(m), ln w, gamma, lambda, rho."""
     middle = function.shape.coordinate(function.threshold)
     return np.array([float(middle), np.log(function.width), function.guess, function.lapse, overdispersion])
 
 
-def _given(
-    sigmoid: str,
-    threshold: float | None,
-    width: float | None,
-    guess: float | None,
-    lapse: float | None,
-    overdispersion: float | None,
-) -> list[float | None]:
-    """Check the parameters that are given and return their working coordinates, None for the others."""
-    # The function checks the values; free parameters have valid dummy values.
-    PsychometricFunction(
-        1.0 if threshold is None else threshold,
-        1.0 if width is None else width,
-        0.0 if guess is None else guess,
-        0.0 if lapse is None else lapse,
-        sigmoid,
+def _model(counts: JudgementCounts, sigmoid: str, given: Sequence[float | None]) -> Model:
+    """Bounds of the free parameters; for given ones, in the order of `PARAMETERS`, both are the value."""
+    known = [value is not None for value in given]
+    m, w, gamma, lapse, rho = (
+        fallback if value is None else value for value, fallback in zip(given, _VALID, strict=True)
     )
-    if overdispersion is not None and not 0.0 <= finite("overdispersion", overdispersion) < 1.0:
-        raise InputError("overdispersion", "must lie within 0 ... 1 and below 1", f"{overdispersion:g}")
-    middle = None if threshold is None else float(SIGMOIDS[sigmoid].coordinate(threshold))
-    return [middle, None if width is None else float(np.log(width)), guess, lapse, overdispersion]
-
-
-def _model(counts: JudgementCounts, sigmoid: str, given: list[float | None]) -> Model:
-    """Bounds of the free parameters; for given ones both bounds are the value."""
+    if not 0.0 <= rho < 1.0:
+        raise InputError("overdispersion", "must lie within 0 ... 1 and below 1", f"{rho:g}")
+    point = _working_point(PsychometricFunction(m, w, gamma, lapse, sigmoid), rho)
     coordinates = SIGMOIDS[sigmoid].coordinate(counts.levels)
     span = float(np.ptp(coordinates)) or abs(float(coordinates[0])) or 1.0
     gap = float(np.diff(coordinates).min(initial=span))
@@ -472,7 +436,5 @@ def _model(counts: JudgementCounts, sigmoid: str, given: list[float | None]) -> 
             (SMALLEST_OVERDISPERSION, LARGEST_OVERDISPERSION),
         ]
     )
-    for index, value in enumerate(given):
-        if value is not None:
-            bounds[index] = value
+    bounds[known] = point[known, np.newaxis]
     return Model(SIGMOIDS[sigmoid], coordinates, counts.n_trials, bounds[:, 0], bounds[:, 1])

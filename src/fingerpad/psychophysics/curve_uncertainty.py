@@ -27,7 +27,7 @@ from numpy.typing import ArrayLike
 from fingerpad.core.checked import checked
 from fingerpad.core.errors import ConvergenceError, InputError
 from fingerpad.core.random_streams import Purpose, uniforms
-from fingerpad.core.values import Count, FloatArray, Whole, finite, float_array, one_of
+from fingerpad.core.values import Count, FloatArray, Whole, finite, one_of
 from fingerpad.psychophysics.curve import (
     SIGMOIDS,
     Sigmoid,
@@ -37,8 +37,6 @@ from fingerpad.psychophysics.curve import (
     proportion,
 )
 from fingerpad.psychophysics.curve_fit import (
-    GUESS,
-    LAPSE,
     OVERDISPERSION,
     PARAMETERS,
     THRESHOLD,
@@ -61,21 +59,11 @@ STEEPEST = 0.01  # Smallest width of the prior over that of the fit.
 
 @dataclass(frozen=True)
 class FunctionCloud:
-    """Weighted sample of psychometric functions.
+    """Weighted sample of psychometric functions."""
 
-    Parameters
-    ----------
-    sigmoid : str
-        Shape of all of them.
-    values : array (n_functions, 5)
-        threshold, width, guess, lapse and overdispersion of each.
-    weights : array (n_functions,)
-        Weights, with sum 1.
-    """
-
-    sigmoid: str
-    values: FloatArray
-    weights: FloatArray
+    sigmoid: str  # Shape of all of them.
+    values: FloatArray  # threshold, width, guess, lapse and overdispersion of each, (n_functions, 5).
+    weights: FloatArray  # Weights, with sum 1, (n_functions,).
 
     @property
     def shape(self) -> Sigmoid:
@@ -119,17 +107,12 @@ class FunctionCloud:
         if proportion_correct is None:
             return self.values[:, THRESHOLD]
         wanted = _share("proportion_correct", proportion_correct)
-        threshold, width, guess, lapse, _ = self.values.T
-        return level_at(self.shape, wanted, threshold, width, guess, lapse)
+        return level_at(self.shape, wanted, self.values.T[:OVERDISPERSION])
 
     def band(self, levels: ArrayLike, probability: float = 0.95) -> FloatArray:
         """Central interval (2, n_levels) of the curve at each level, level by level. [0-1]"""
-        x = checked_levels(levels, self.sigmoid)
-        threshold, width, guess, lapse, _ = self.values.T
-        ends = [
-            self._central(proportion(self.shape, level, threshold, width, guess, lapse), probability)
-            for level in x
-        ]
+        x, parameters = checked_levels(levels, self.sigmoid), self.values.T[:OVERDISPERSION]
+        ends = [self._central(proportion(self.shape, level, parameters), probability) for level in x]
         return np.array(ends).reshape(-1, 2).T
 
     def _central(self, quantity: FloatArray, probability: float) -> tuple[float, float]:
@@ -275,10 +258,7 @@ def _cloud(fit: PsychometricFit, points: FloatArray, weights: FloatArray) -> Fun
     values = points.copy()
     values[:, THRESHOLD] = fit.function.shape.level(points[:, THRESHOLD])
     values[:, WIDTH] = np.exp(points[:, WIDTH])
-    columns = [THRESHOLD, WIDTH, GUESS, LAPSE, OVERDISPERSION]
-    return FunctionCloud(
-        fit.function.sigmoid, float_array("values", values[:, columns], 2), float_array("weights", weights, 1)
-    )
+    return FunctionCloud(fit.function.sigmoid, values, weights)
 
 
 def _share(name: str, value: float) -> float:
@@ -289,27 +269,16 @@ def _share(name: str, value: float) -> float:
 
 @dataclass(frozen=True)
 class GoodnessOfFit:
-    """Deviance of a fit, and its p-value from simulated data.
-
-    Parameters
-    ----------
-    deviance : float
-        D of the observed counts; about the number of levels minus the fitted parameters for a good fit.
-    p_value : float
-        Share of the simulated data sets with at least that deviance; a small one rejects the function. [0-1]
-    residuals : array (n_levels,)
-        Root of each level's share of D, with the sign of observed minus predicted.
-    drawn_deviances : array (n_replicates,)
-        Of the simulated data sets.
-    seed : int
-        Of the random numbers.
-    """
+    """Deviance of a fit, and its p-value from simulated data."""
 
     deviance: float
+    """D of the observed counts; about the number of levels minus the fitted parameters for a good fit."""
     p_value: float
+    """Share of the simulated data sets with at least that deviance; a small one rejects the fit. [0-1]"""
     residuals: FloatArray
-    drawn_deviances: FloatArray
-    seed: int
+    """Root of each level's share of D, with the sign of observed minus predicted, (n_levels,)."""
+    drawn_deviances: FloatArray  # Of the simulated data sets, (n_replicates,).
+    seed: int  # Of the random numbers.
 
 
 def goodness_of_fit(fit: PsychometricFit, seed: int, n_replicates: int = 1000) -> GoodnessOfFit:

@@ -79,13 +79,6 @@ class ResponseModel(Protocol):
 class GaussianResponses:
     """Normally distributed responses.
 
-    Parameters
-    ----------
-    mean : array (n_receptors,)
-        mu. [any unit]
-    covariance : array (n_receptors, n_receptors)
-        S. [unit squared]
-
     Examples
     --------
     >>> one = GaussianResponses([0.0], [[1.0]])
@@ -93,8 +86,8 @@ class GaussianResponses:
     -0.9189
     """
 
-    mean: FiniteVector
-    covariance: FiniteMatrix
+    mean: FiniteVector  # mu, (n_receptors,). [any unit]
+    covariance: FiniteMatrix  # S, (n_receptors, n_receptors). [unit squared]
 
     def __post_init__(self) -> None:
         mean, covariance = self.mean, self.covariance
@@ -180,24 +173,12 @@ Statistic = Callable[[FloatArray], FloatArray]
 
 @dataclass(frozen=True)
 class Discriminability:
-    """Discriminability of two stimuli, in trials of two alternatives.
+    """Discriminability of two stimuli, in trials of two alternatives."""
 
-    Parameters
-    ----------
-    proportion_correct : float
-        Area under the ROC curve. [0-1]
-    standard_error : float
-        Of that, from the number of trials.
-    d_prime : float
-        sqrt 2 z(proportion); inf if every trial is correct. [standard deviations]
-    d_prime_error : float
-        Its standard error.
-    """
-
-    proportion_correct: float
-    standard_error: float
-    d_prime: float
-    d_prime_error: float
+    proportion_correct: float  # Area under the ROC curve. [0-1]
+    standard_error: float  # Of that, from the number of trials.
+    d_prime: float  # sqrt 2 z(proportion); inf if every trial is correct. [standard deviations]
+    d_prime_error: float  # Its standard error.
 
 
 @checked
@@ -236,23 +217,15 @@ def discriminability(standard: ArrayLike, comparison: ArrayLike) -> Discriminabi
 
 @dataclass(frozen=True)
 class Presentation:
-    """Responses of a population to two stimuli, trial by trial, shared by all observers of a comparison.
-
-    Parameters
-    ----------
-    standard, comparison : array (n_trials, n_receptors)
-        Responses. [any unit]
-    log_ratio_standard, log_ratio_comparison : array (n_trials,)
-        ln R of these responses.
-    seed : int
-        Of the random numbers.
-    """
+    """Responses of a population to two stimuli, trial by trial, shared by all observers of a comparison."""
 
     standard: FloatArray
     comparison: FloatArray
+    """Responses, (n_trials, n_receptors). [any unit]"""
     log_ratio_standard: FloatArray
     log_ratio_comparison: FloatArray
-    seed: int
+    """ln R of these responses, (n_trials,)."""
+    seed: int  # Of the random numbers.
 
     def ideal(self) -> Discriminability:
         """Discriminability by the ideal observer."""
@@ -403,21 +376,15 @@ LEAST_KNOWN = 10.0
 
 @dataclass(frozen=True)
 class CodeEfficiency:
-    """A code and the ideal observer of the same responses.
-
-    Parameters
-    ----------
-    code, ideal : Discriminability
-        Of either.
-    efficiency, efficiency_error : float
-        Squared ratio of d' and its standard error. NaN where the ideal observer is always correct, or its d'
-        is below `LEAST_KNOWN` standard errors.
-    """
+    """A code and the ideal observer of the same responses."""
 
     code: Discriminability
     ideal: Discriminability
+    """Of either."""
     efficiency: float
     efficiency_error: float
+    """Squared ratio of d' and its standard error. NaN where the ideal observer is always correct, or its
+    d' is below `LEAST_KNOWN` standard errors."""
 
 
 @checked

@@ -40,6 +40,7 @@ from fingerpad.core.values import (
     NotNegative,
     NotNegativeWhole,
     Whole,
+    array,
     choice,
     count_from,
     float_array,
@@ -359,10 +360,7 @@ def hit_rates_of_sums(
 @checked
 def checked_responses(responses: ArrayLike, silent_value: Finite | None = None) -> FloatArray:
     """Return responses as a table if they are valid for a discrimination, else raise `InputError`."""
-    try:
-        table = np.array(responses, dtype=np.float64)
-    except (TypeError, ValueError) as error:
-        raise InputError("responses", "must be numbers", type(responses).__name__) from error
+    table = np.array(array("responses", responses), dtype=np.float64)
     silent = np.isnan(table)
     if table.size and (silent | (table == 0.0)).all():
         raise InputError(
@@ -371,15 +369,13 @@ def checked_responses(responses: ArrayLike, silent_value: Finite | None = None) 
             remedy="the population stays silent under every sphere, so there is no hit rate; increase the "
             "depth or use more sensitive afferents",
         )
-    if silent.any():
-        if silent_value is None:
-            raise InputError(
-                "responses",
-                "must be finite",
-                remedy=f"{np.count_nonzero(silent)} are NaN, as of silent receptors; give silent_value to "
-                "replace them",
-            )
-        table[silent] = silent_value
+    if silent.any() and silent_value is None:
+        raise InputError(
+            "responses",
+            "must be finite",
+            remedy=f"{silent.sum()} are NaN, as of silent receptors; give silent_value to replace them",
+        )
+    table[silent] = silent_value
     table = float_array("responses", table, 2)
     if table.shape[0] < 2 or table.shape[1] == 0:
         raise InputError(
@@ -485,14 +481,13 @@ def expected_hit_rates(
     noise_sigma: Finite,
     standard_normals: ArrayLike,
     criterion: Finite = psychophysics.DECISION_CRITERION.value,
-    silent_value: Finite | None = None,
 ) -> FloatArray:
     """Predict the mean hit rates of a `GradientSum` without repeating the experiment.
 
     The same standard normal samples are used for every sphere and every noise, so the result is a smooth
     function of `noise_sigma`, as `fit_noise_sigma` needs.
     """
-    values = checked_responses(responses, silent_value)
+    values = checked_responses(responses)
     draws = float_array("standard_normals", standard_normals, 2)
     if draws.shape[1] != values.shape[1] or len(draws) < 2:
         raise InputError(
@@ -508,12 +503,7 @@ def expected_hit_rates(
 
 
 @checked
-def expected_euclidean_hit_rates(
-    responses: ArrayLike,
-    noise_sigma: Finite,
-    criterion: Finite = psychophysics.DECISION_CRITERION.value,
-    silent_value: Finite | None = None,
-) -> FloatArray:
+def expected_euclidean_hit_rates(responses: ArrayLike, noise_sigma: Finite) -> FloatArray:
     """Predict the mean hit rates of an `EuclideanDistance`, city-block, in closed form.
 
     For one receptor the difference of two noisy responses a and b is normal, and its absolute value has
@@ -530,7 +520,7 @@ def expected_euclidean_hit_rates(
     term of Edgeworth's series, g (z^2 - 1) phi(z) / 6 with the skewness g, corrects for it: without it hit
     rates near chance would be 0.02 too high.
     """
-    values = checked_responses(responses, silent_value)
+    values = checked_responses(responses)
     sigma = checked_noise(noise_sigma, above_zero=True)
     d = np.abs(values - values[0])
     s = np.maximum(sigma * np.hypot(values, values[0]), np.finfo(float).tiny)  # both silent: no difference
@@ -540,7 +530,7 @@ def expected_euclidean_hit_rates(
     third = s**3 * ((2.0 + x**2) * tail + (3.0 * x + x**3) * centre) - 3.0 * m * second + 2.0 * m**3
     means, spreads = m.sum(axis=1), np.sqrt((second - np.square(m)).sum(axis=1))
     larger = side(means[np.newaxis])
-    point = decision_point(means[0], means[1:], criterion)
+    point = decision_point(means[0], means[1:], psychophysics.DECISION_CRITERION.value)
     normal = hit_probability(point, means[1:], spreads[1:], larger)
     z = (means[1:] - point) / np.maximum(spreads[1:], np.finfo(float).tiny)
     skewness = third.sum(axis=1)[1:] / np.maximum(spreads[1:] ** 3, np.finfo(float).tiny)

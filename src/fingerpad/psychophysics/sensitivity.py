@@ -52,22 +52,13 @@ CORRECTIONS = ("log-linear", "half", "none")
 
 @dataclass(frozen=True)
 class Sensitivity:
-    """Detectability of a signal, and criterion of the observer.
+    """Detectability of a signal, and criterion of the observer."""
 
-    Parameters
-    ----------
-    d_prime : float
-        d', or d_a where the spreads differ. [standard deviations]
-    criterion : float
-        c; positive for a conservative observer. [standard deviations]
-    hit_rate, false_alarm_rate : float
-        As corrected. [0-1]
-    """
-
-    d_prime: float
-    criterion: float
+    d_prime: float  # d', or d_a where the spreads differ. [standard deviations]
+    criterion: float  # c; positive for a conservative observer. [standard deviations]
     hit_rate: float
     false_alarm_rate: float
+    """As corrected. [0-1]"""
 
 
 @checked

@@ -15,12 +15,11 @@ from numpy.typing import ArrayLike
 from scipy.optimize import least_squares
 from scipy.stats import qmc
 
-from fingerpad.core.checked import checked, value_class
+from fingerpad.core.checked import value_class
 from fingerpad.core.errors import ConvergenceError, InputError
 from fingerpad.core.random_streams import published_generator
 from fingerpad.core.values import (
     Count,
-    Finite,
     FloatArray,
     IntArray,
     NotNegative,
@@ -140,15 +139,9 @@ class Method(Protocol):
 def best_of(attempts: tuple[Fit, ...]) -> Fit:
     """Return the fit with the highest score, with the effort of all fits; the first one of equals."""
     start = int(np.argmax([attempt.score for attempt in attempts]))
-    return Fit(
-        parameters=attempts[start].parameters,
-        score=attempts[start].score,
-        n_evaluations=sum(attempt.n_evaluations for attempt in attempts),
-        seconds=sum(attempt.seconds for attempt in attempts),
-        history=attempts[start].history,
-        start=start,
-        attempts=attempts,
-    )
+    effort = sum(attempt.n_evaluations for attempt in attempts), sum(attempt.seconds for attempt in attempts)
+    best = attempts[start]
+    return Fit(best.parameters, best.score, *effort, best.history, start, attempts)
 
 
 @dataclass(frozen=True)
@@ -324,17 +317,11 @@ class CovarianceAdaptation:
 Objective = Callable[[FloatArray], float]
 Restriction = Callable[[FloatArray], FloatArray]
 
-_MOST_PARAMETERS = 12
-_MOST_STEPS = 200
+_MOST_STEPS = 200  # Of one ascent.
 
 
-@checked
-def factorial_design(n_parameters: Count) -> FloatArray:
+def factorial_design(n_parameters: int) -> FloatArray:
     """Two-level full factorial design with centre point, in coded units."""
-    if n_parameters > _MOST_PARAMETERS:
-        raise InputError(
-            "n_parameters", f"must be at most {_MOST_PARAMETERS}", f"{n_parameters}, too many corners"
-        )
     corners = np.indices((2,) * n_parameters).reshape(n_parameters, -1).T * 2.0 - 1.0
     return np.vstack([corners, np.zeros(n_parameters)])
 
@@ -347,157 +334,112 @@ def regression_slopes(design: FloatArray, values: FloatArray) -> FloatArray:
     return (design.T @ values) / (design**2).sum(axis=0)
 
 
-@checked
-def coding_increments(base: ArrayLike, share: Finite, where_zero: ArrayLike | None = None) -> FloatArray:
-    """Increments as a share of the base; a parameter whose base is zero needs an increment of its own."""
-    start = float_array("base", base, 1)
-    increments = share * np.abs(start)
-    if where_zero is not None:
-        increments = np.where(start == 0.0, float_array("where_zero", where_zero, 1), increments)
-    return _checked_increments(increments, start)
-
-
-@checked
-def maximise(
-    objective: Objective,
-    start: ArrayLike,
-    increments: ArrayLike,
-    lower_bounds: ArrayLike | None = None,
-    smallest_gain: NotNegative = 1.0e-4,
-    most_iterations: Count = 200,
-    restrict: Restriction | None = None,
-) -> Fit:
-    """Maximise `objective` from `start` by the response surface method.
-
-    Gerling et al. 2014, section 2.2.2; Box & Wilson 1951 for the method. Steps along the ascent are one coded
-    unit at first, double after each gain and halve after each loss; the ascent ends when a step of one unit
-    has no gain.
-    """
-    base = float_array("start", start, 1)
-    units = _checked_increments(increments, base)
-    floor = _floor(lower_bounds, base, units)
-
-    def allowed(point: FloatArray) -> FloatArray:
-        above = np.maximum(point, floor)
-        return above if restrict is None else restrict(above)
-
-    clock, design = time.perf_counter(), factorial_design(base.size)
-    history: list[FitStep] = []
-    n_evaluations = 0
-    for _ in range(most_iterations):
-        values = np.array([_value(objective, base + coded * units) for coded in design])
-        at_base = float(values[-1])
-        if not history:
-            history.append(FitStep(base, at_base))
-        best, highest, n_trials = _ascend(
-            objective, base, at_base, regression_slopes(design, values), units, allowed
-        )
-        n_evaluations += len(design) + n_trials
-        if highest - at_base <= smallest_gain:
-            return Fit(base, at_base, n_evaluations, time.perf_counter() - clock, tuple(history))
-        base = best
-        base.setflags(write=False)
-        history.append(FitStep(base, highest))
-    raise ConvergenceError(
-        f"maximise has not converged after {most_iterations} iterations: give more, "
-        f"most_iterations={10 * most_iterations}, or larger increments=.",
-        tuple(f"iteration {number}: {step.score:.6g}" for number, step in enumerate(history)),
-    )
-
-
-@dataclass(frozen=True)
+@value_class
 class ResponseSurface:
     """The paper's method: response surfaces and steepest ascent from each start; the best result is taken.
 
-    Gerling et al. 2014, section 2.2.2; see `maximise`. The method is deterministic.
+    Gerling et al. 2014, section 2.2.2; Box & Wilson 1951 for the method. Steps along the ascent are one coded
+    unit at first, double after each gain and halve after each loss; the ascent ends when a step of one unit
+    has no gain. The method is deterministic.
     """
 
     starts: ArrayLike  # Start points, (n_starts, n_parameters).
     increments: ArrayLike
     """One coded unit of each parameter, for all start points or for each, (n_parameters,)."""
-    lower_bounds: ArrayLike | None = None  # Lower limits of all evaluations; -inf for none, (n_parameters,).
-    smallest_gain: float = 1.0e-4  # A gain of at most this much ends a fit.
-    most_iterations: int = 200  # Largest number of iterations.
+    lower_bounds: ArrayLike = -np.inf  # Lower limits of all evaluations; -inf for none, (n_parameters,).
+    smallest_gain: NotNegative = 1.0e-4  # A gain of at most this much ends a fit.
+    most_iterations: Count = 200
     name: str = "response surface"
-    restrict: Restriction | None = None  # As of `maximise`.
+    restrict: Restriction | None = None  # From a point of an ascent to the nearest one that is allowed.
 
     def __post_init__(self) -> None:
         starts = float_array("starts", self.starts, 2)
-        units = np.array(self.increments, dtype=np.float64)
-        if units.shape not in (starts.shape, starts.shape[1:]):
+        sides = [starts]
+        for name in ("increments", "lower_bounds"):
+            side = np.asarray(getattr(self, name), dtype=np.float64)
+            if side.shape not in ((), starts.shape[1:], starts.shape):
+                raise InputError(name, f"must match starts {starts.shape} or one row of it", str(side.shape))
+            sides.append(np.broadcast_to(side, starts.shape))
+        _, units, floors = sides
+        if not (units > 0.0).all():
+            raise InputError("increments", "must be greater than 0", str(units.tolist()))
+        if not (starts >= floors + units).all():
             raise InputError(
-                "increments", f"must match starts {starts.shape} or one row of it", str(units.shape)
+                "starts",
+                "must lie at least one increment above lower_bounds",
+                f"{starts.tolist()} for {floors.tolist()}",
             )
-        object.__setattr__(self, "starts", starts)
-        object.__setattr__(self, "increments", np.broadcast_to(units, starts.shape))
+        for name, side in zip(("starts", "increments", "lower_bounds"), sides, strict=True):
+            object.__setattr__(self, name, side)
 
     def fit(self, problem: Problem, chosen: IntArray) -> Fit:
         """Fit from every start."""
 
         def score(parameters: FloatArray) -> float:
-            return problem.score(parameters, chosen)
+            return finite(f"score at {parameters.tolist()}", problem.score(parameters, chosen))
 
-        limits = (self.lower_bounds, self.smallest_gain, self.most_iterations, self.restrict)
-        pairs = zip(np.asarray(self.starts), np.asarray(self.increments), strict=True)
-        return best_of(tuple(maximise(score, start, units, *limits) for start, units in pairs))
+        starts, units, floors = (
+            np.asarray(side) for side in (self.starts, self.increments, self.lower_bounds)
+        )
+        rows = zip(starts, units, floors + units, strict=True)
+        return best_of(tuple(self._climb(score, *row) for row in rows))
+
+    def _climb(self, score: Objective, start: FloatArray, units: FloatArray, floor: FloatArray) -> Fit:
+        """Climb from one start; the corners of no design lie below the floor less one unit."""
+
+        def allowed(point: FloatArray) -> FloatArray:
+            above = np.maximum(point, floor)
+            return above if self.restrict is None else self.restrict(above)
+
+        clock, design, base = time.perf_counter(), factorial_design(start.size), start
+        history: list[FitStep] = []
+        n_evaluations = 0
+        for _ in range(self.most_iterations):
+            values = np.array([score(base + coded * units) for coded in design])
+            at_base = float(values[-1])
+            if not history:
+                history.append(FitStep(base, at_base))
+            slopes = regression_slopes(design, values)
+            best, highest, n_trials = _ascend(score, base, at_base, slopes, units, allowed)
+            n_evaluations += len(design) + n_trials
+            if highest - at_base <= self.smallest_gain:
+                return Fit(base, at_base, n_evaluations, time.perf_counter() - clock, tuple(history))
+            base = best
+            base.setflags(write=False)
+            history.append(FitStep(base, highest))
+        raise ConvergenceError(
+            f"The {self.name} has not converged after {self.most_iterations} iterations: give more, "
+            f"most_iterations={10 * self.most_iterations}, or larger increments=.",
+            tuple(f"iteration {number}: {step.score:.6g}" for number, step in enumerate(history)),
+        )
 
 
 def _ascend(
-    objective: Objective,
+    score: Objective,
     base: FloatArray,
-    value_at_base: float,
+    at_base: float,
     slopes: FloatArray,
     units: FloatArray,
     allowed: Restriction,
 ) -> tuple[FloatArray, float, int]:
-    """Best point on the path of steepest ascent, its value, and the steps that were tried."""
-    best, best_value = base, value_at_base
+    """Best point on the path of steepest ascent, its score, and the steps that were tried."""
+    best, highest = base, at_base
     steepness = float(np.linalg.norm(slopes))
     if steepness == 0.0:
-        return best, best_value, 0
+        return best, highest, 0
     direction = slopes / steepness * units
     step = 1.0
     for n_trials in range(1, _MOST_STEPS + 1):
         trial = allowed(best + step * direction)
-        value = _value(objective, trial)
-        if value > best_value:
-            best, best_value = trial, value
+        value = score(trial)
+        if value > highest:
+            best, highest = trial, value
             step *= 2.0
         elif step > 1.0:
             step /= 2.0
         else:
-            return best, best_value, n_trials
+            return best, highest, n_trials
     raise ConvergenceError(
         f"The ascent has not ended after {_MOST_STEPS} steps: the objective must have a maximum.",
-        (f"last point {best.tolist()}: {best_value:.6g}",),
+        (f"last point {best.tolist()}: {highest:.6g}",),
     )
-
-
-def _value(objective: Objective, parameters: FloatArray) -> float:
-    return finite(f"objective at {parameters.tolist()}", objective(parameters))
-
-
-def _checked_increments(increments: ArrayLike, base: FloatArray) -> FloatArray:
-    units = float_array("increments", increments, 1)
-    if units.shape != base.shape:
-        raise InputError("increments", "needs one entry per parameter", f"{units.size} for {base.size}")
-    if (units <= 0.0).any():
-        raise InputError("increments", "must be greater than 0", str(units.tolist()))
-    return units
-
-
-def _floor(lower_bounds: ArrayLike | None, base: FloatArray, units: FloatArray) -> FloatArray:
-    """Lowest base whose corners all lie within the bounds."""
-    if lower_bounds is None:
-        return np.full(base.size, -np.inf)
-    bounds = np.array(lower_bounds, dtype=np.float64)
-    if bounds.shape != base.shape or np.isnan(bounds).any():
-        raise InputError("lower_bounds", "needs one number or -inf per parameter", repr(lower_bounds))
-    floor = bounds + units
-    if (base < floor).any():
-        raise InputError(
-            "start",
-            "must lie at least one increment above lower_bounds",
-            f"{base.tolist()} for {bounds.tolist()}",
-        )
-    return floor
