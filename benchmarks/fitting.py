@@ -16,10 +16,8 @@ from fingerpad.experiments.conditions import Conditions
 from fingerpad.experiments.fit.methods import prepare
 from fingerpad.experiments.gerling2014 import nerve
 from fingerpad.inference.afferent_fit import response_surface, start_points
-from fingerpad.inference.fitting.cross_validation import cross_validate, interleaved_folds
-from fingerpad.inference.fitting.methods import Method
-from fingerpad.inference.problem import RateProblem
-from fingerpad.inference.rate_model import AfferentModel
+from fingerpad.inference.fitting.methods import Method, cross_validate, interleaved_folds
+from fingerpad.inference.rate_model import AfferentModel, RateProblem
 from fingerpad.neuron.transduction import drive
 from fingerpad.skin.store import Store, solve_missing
 

@@ -22,7 +22,7 @@ from fingerpad.experiments.gerling2014.nerve import PIECES
 from fingerpad.experiments.gerling2014.percept import POSITIONS_MM
 from fingerpad.experiments.gerling2014.skin import PLATE_DEPTHS_MM
 from fingerpad.geometry.indenters import Cylinder
-from fingerpad.inference.problem import CHANCE
+from fingerpad.inference.afferent_fit import CHANCE
 from fingerpad.neuron.exact_spikes import exact_trains
 from fingerpad.neuron.population import Population
 from fingerpad.neuron.spikes import PAPER_WINDOWS_MS, window_rates_hz

@@ -22,7 +22,7 @@ from fingerpad.experiments.conditions import RECEPTOR_X_MM, Conditions
 from fingerpad.experiments.gerling2014 import nerve, percept
 from fingerpad.experiments.runner import Runner
 from fingerpad.geometry.grading import Grading
-from fingerpad.inference.fitting.cross_validation import fractional_sum_of_squares
+from fingerpad.inference.fitting.methods import fractional_sum_of_squares
 from fingerpad.neuron.afferent import Afferent
 from fingerpad.neuron.population import Population
 from fingerpad.neuron.spikes import firing_rate_hz

@@ -18,7 +18,7 @@ from fingerpad.experiments.fit.results import CredibleInterval, PosteriorConverg
 from fingerpad.experiments.manifest import Manifest
 from fingerpad.experiments.runner import Runner
 from fingerpad.experiments.scores import coefficient_of_determination
-from fingerpad.inference.fitting.cross_validation import fractional_sum_of_squares
+from fingerpad.inference.fitting.methods import fractional_sum_of_squares
 from fingerpad.inference.fitting.posterior import credible_band
 from fingerpad.inference.identifiable import LARGEST_RESTING_SHARE, identifiable
 from fingerpad.neuron.afferent import Afferent

@@ -31,10 +31,9 @@ from fingerpad.experiments.validation.observations import read_observations
 from fingerpad.geometry.grading import Grading
 from fingerpad.geometry.indenters import Bar, Cylinder, Plate
 from fingerpad.geometry.motion import RampAndHold
-from fingerpad.inference.afferent_fit import ToRatesAndHitRates
-from fingerpad.inference.fitting.cross_validation import cross_validate, interleaved_folds
-from fingerpad.inference.problem import CHANCE, RateProblem
-from fingerpad.inference.rate_model import AfferentModel
+from fingerpad.inference.afferent_fit import CHANCE, ToRatesAndHitRates
+from fingerpad.inference.fitting.methods import cross_validate, interleaved_folds
+from fingerpad.inference.rate_model import AfferentModel, RateProblem
 from fingerpad.neuron.afferent import PARAMETER_NAMES
 from fingerpad.neuron.population import Population
 from fingerpad.psychophysics.encoding import neighbour_pairs

@@ -315,7 +315,7 @@ test_what_cannot_be_used_is_refused = refusals(
     (lambda: discriminate_by(GradientSum(PAIRS), bumps()[:1], 0.1, 0), "at least one comparison"),
     (lambda: discriminate_by(GradientSum(PAIRS), bumps(), -0.1, 0), ("noise_sigma",)),
     (lambda: discriminate_by(GradientSum(PAIRS + 1), bumps(), 0.1, 0), ("neighbours",)),
-    (lambda: discriminate_by(GradientSum(PAIRS), [["a"]], 0.1, 0), "responses must be numbers"),
+    (lambda: discriminate_by(GradientSum(PAIRS), [["a"]], 0.1, 0), "responses must be an array of numbers"),
     (lambda: discriminate_by(EuclideanDistance("maximum"), bumps(), 0.1, 0), ("norm",)),
     (lambda: discriminate_by(EuclideanDistance(), bumps(), 0.1, 0, VARIED), "criterion_sigma"),
     (lambda: expected_hit_rates(bumps(), PAIRS, 0.1, np.ones((9, 17))), ("standard_normals",)),

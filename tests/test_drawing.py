@@ -17,7 +17,7 @@ from fingerpad.core.displayed import Result
 from fingerpad.core.signals import RECEPTOR_COLUMNS, HitRates
 from fingerpad.experiments.discrimination.analysis import analyse
 from fingerpad.experiments.fit.fit import fit_recordings
-from fingerpad.inference.spike_fit import SpikeFit
+from fingerpad.inference.spike_likelihood import SpikeFit
 from fingerpad.psychophysics.curve_fit import fit_psychometric
 from fingerpad.reduction.streaming import ReducedSample
 from fingerpad.report.drawing import DRAWINGS

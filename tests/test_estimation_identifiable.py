@@ -44,7 +44,7 @@ test_what_are_not_such_numbers_is_refused = refusals(
     (lambda: identifiable([*SIX[:4], 0.0, 30.0]), "must be greater than 0"),
     (lambda: six_parameters(SIX), "four must hold intercept_per_ms, .*got shape \\(6,\\)"),
     (lambda: six_parameters(SIX[:4], threshold_mv=0.0), ("threshold_mv",)),
-    (lambda: six_parameters(["a"] * 4), "four must hold numbers"),
+    (lambda: six_parameters(["a"] * 4), "four must be an array of numbers"),
 )  # fmt: skip
 
 

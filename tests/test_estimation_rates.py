@@ -8,13 +8,12 @@ import pytest
 from fingerpad import InputError, RateRecordings, Traces
 from fingerpad.inference import afferent_fit
 from fingerpad.inference.afferent_fit import ReceptorOffset, fitted_four, fitted_six
-from fingerpad.inference.fitting.cross_validation import fractional_sum_of_squares
-from fingerpad.inference.fitting.methods import Bounds, LeastSquares
+from fingerpad.inference.fitting.methods import Bounds, LeastSquares, fractional_sum_of_squares
 from fingerpad.inference.identifiable import identifiable, six_parameters
-from fingerpad.inference.problem import RateProblem
 from fingerpad.inference.rate_model import (
     AfferentModel,
     ClosedFormModel,
+    RateProblem,
     constant_drive_rate,
     four_number_model,
 )

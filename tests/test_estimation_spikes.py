@@ -15,8 +15,7 @@ from fingerpad import ConvergenceError, SpikeTrains, Traces
 from fingerpad.core import threads
 from fingerpad.core.random_streams import Presentations
 from fingerpad.inference.identifiable import canonical, six_parameters
-from fingerpad.inference.spike_fit import fit_spikes
-from fingerpad.inference.spike_likelihood import SpikeLikelihood, time_rescaling
+from fingerpad.inference.spike_likelihood import SpikeLikelihood, fit_spikes, time_rescaling
 from fingerpad.neuron.escape_rate import EscapeRate
 from fingerpad.neuron.transduction import Drive, drive
 from refusals import refusals

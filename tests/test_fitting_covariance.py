@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from fingerpad.inference.fitting.cross_validation import jackknife_covariance
+from fingerpad.inference.fitting.methods import jackknife_covariance
 
 
 def left_out(design, observed, n_groups):

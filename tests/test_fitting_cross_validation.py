@@ -6,12 +6,12 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
-from fingerpad.inference.fitting.cross_validation import (
+from fingerpad.inference.fitting.methods import (
+    ResponseSurface,
     cross_validate,
     fractional_sum_of_squares,
     interleaved_folds,
 )
-from fingerpad.inference.fitting.methods import ResponseSurface
 from refusals import refusals
 
 SHIFTS = np.linspace(-3.5, 3.5, 36)

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from fingerpad.inference.fitting.cross_validation import fractional_sum_of_squares
+from fingerpad.inference.fitting.methods import fractional_sum_of_squares
 from refusals import refusals
 
 RATES = np.array([0.0, 20.0, 135.0, 210.0, 72.0, 5.0])

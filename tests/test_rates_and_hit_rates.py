@@ -4,11 +4,10 @@ import numpy as np
 import pytest
 
 from fingerpad import InputError, RateRecordings, Traces
-from fingerpad.inference.afferent_fit import ToRatesAndHitRates
-from fingerpad.inference.fitting.cross_validation import cross_validate
+from fingerpad.inference.afferent_fit import RatesAndHitRates, SphereHitRates, ToRatesAndHitRates
+from fingerpad.inference.fitting.methods import cross_validate
 from fingerpad.inference.identifiable import LARGEST_RESTING_SHARE, identifiable
-from fingerpad.inference.problem import RateProblem, RatesAndHitRates, SphereHitRates
-from fingerpad.inference.rate_model import AfferentModel, four_number_model
+from fingerpad.inference.rate_model import AfferentModel, RateProblem, four_number_model
 from fingerpad.psychophysics.encoding import neighbour_pairs
 from fingerpad.psychophysics.observer import expected_euclidean_hit_rates, expected_hit_rates
 from refusals import refused

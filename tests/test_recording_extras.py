@@ -14,8 +14,7 @@ from fingerpad.experiments.fit.rate_uncertainty import profiled
 from fingerpad.experiments.fit.results import ParameterProfile, RatePosterior
 from fingerpad.inference.afferent_fit import ReceptorOffset
 from fingerpad.inference.identifiable import IDENTIFIABLE_NAMES, identifiable
-from fingerpad.inference.problem import RateProblem
-from fingerpad.inference.rate_model import AfferentModel, four_number_model
+from fingerpad.inference.rate_model import AfferentModel, RateProblem, four_number_model
 from fingerpad.report import fit as report
 from fingerpad.report.fit import ALLOWED_LOSS
 from fingerpad.report.style import png

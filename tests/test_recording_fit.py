@@ -31,11 +31,11 @@ from fingerpad.experiments.recording_files import read_recordings
 from fingerpad.experiments.requests.afferents import fitted_afferent
 from fingerpad.experiments.requests.stimuli import ListedStimuli, NamedStimulus, ShiftedBar
 from fingerpad.inference.afferent_fit import OFFSETS_MM
-from fingerpad.inference.fitting.cross_validation import interleaved_folds
+from fingerpad.inference.fitting.methods import interleaved_folds
 from fingerpad.inference.identifiable import IDENTIFIABLE_NAMES, identifiable
 from fingerpad.inference.rate_model import AfferentModel, ClosedFormModel
 from fingerpad.inference.recordings import SpikeRecordings
-from fingerpad.inference.spike_fit import soft_spikes
+from fingerpad.inference.spike_likelihood import soft_spikes
 from fingerpad.neuron.afferent import type_of
 from fingerpad.neuron.spikes import PAPER_WINDOWS_MS
 from fingerpad.neuron.transduction import drive

@@ -8,29 +8,42 @@ afferent silent at rest (docs/decisions.md#silent-at-rest).
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, cast
 
 import numpy as np
 from numpy.typing import ArrayLike
+from pydantic import SkipValidation
 
-from fingerpad.core.checked import checked
+from fingerpad.core.checked import checked, value_class
 from fingerpad.core.errors import InputError
 from fingerpad.core.signals import INTERVAL, Traces
-from fingerpad.core.values import FloatArray, IntArray, finite, float_array, increasing, one_of, positive
+from fingerpad.core.values import (
+    FiniteVector,
+    FloatArray,
+    IntArray,
+    Positive,
+    finite,
+    float_array,
+    increasing,
+    one_of,
+    positive,
+)
 from fingerpad.data import neuron
-from fingerpad.inference.fitting.cross_validation import CrossValidation, cross_validate, interleaved_folds
 from fingerpad.inference.fitting.methods import (
     Bounds,
     Continued,
     CovarianceAdaptation,
+    CrossValidation,
     Fit,
     FitStep,
     LeastSquares,
     Method,
     Problem,
     ResponseSurface,
+    cross_validate,
+    interleaved_folds,
 )
 from fingerpad.inference.identifiable import (
     IDENTIFIABLE_NAMES,
@@ -39,12 +52,19 @@ from fingerpad.inference.identifiable import (
     silent_at_rest,
     six_parameters,
 )
-from fingerpad.inference.problem import RateProblem, RatesAndHitRates, SphereHitRates
-from fingerpad.inference.rate_model import AfferentModel, ClosedFormModel, Rates, Reparametrised
+from fingerpad.inference.rate_model import (
+    AfferentModel,
+    ClosedFormModel,
+    RateModel,
+    RateProblem,
+    Rates,
+    Reparametrised,
+)
 from fingerpad.inference.recordings import RateRecordings
 from fingerpad.neuron.afferent import PARAMETER_NAMES, AnyAfferent, type_of
 from fingerpad.neuron.spikes import RATE_OF, Windows, rate_windows_ms
 from fingerpad.neuron.transduction import Drive
+from fingerpad.psychophysics.observer import expected_euclidean_hit_rates, expected_hit_rates
 
 OFFSET_NAME = "offset_mm"  # Name of the parameter; positive is distal. [mm]
 
@@ -381,6 +401,81 @@ def fit_afferent(
     return TypedFit(
         model.at(best.parameters), model.names, best.score, validation.score_test, dynamic, static
     )
+
+
+WEIGHT = 2.0
+"""Weight of the squared differences of hit rates: 0.05 in each of eight costs as much as 0.04 of FSS."""
+
+CHANCE = 0.5  # Hit rate of an observer of a silent population. [0-1]
+
+
+@value_class
+class RatesAndHitRates:
+    """Recorded rates and hit rates h of people, to which one afferent is fitted.
+
+        score = FSS - w sum (h - h_people)^2
+
+    FSS is flat along some directions. The hit rates choose among parameters that explain the rates equally
+    well (docs/decisions/paper-and-human.md). All hit rates enter whichever rates are chosen, so that a cross
+    validation leaves out rates only.
+    """
+
+    rates: RateProblem  # Recorded rates and the model that predicts them.
+    hit_rates: Callable[[FloatArray], FloatArray]
+    """From the parameters of that model to predicted hit rates (n,). [0-1]"""
+    observed: FiniteVector  # Hit rates of people, (n,). [0-1]
+    weight: Positive = WEIGHT  # Weight w of the squared differences against FSS.
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        return self.rates.names
+
+    @property
+    def n_observations(self) -> int:
+        """Number of stimuli under which rates were recorded."""
+        return self.rates.n_observations
+
+    def residuals(self, parameters: FloatArray, chosen: IntArray) -> FloatArray:
+        """Residuals of the chosen rates, then those of all hit rates times the root of the weight."""
+        missed = self.hit_rates(parameters) - self.observed
+        return np.concatenate([self.rates.residuals(parameters, chosen), np.sqrt(self.weight) * missed])
+
+    def score(self, parameters: FloatArray, chosen: IntArray) -> float:
+        """FSS of the chosen rates less the weighted sum of the squared differences of hit rates."""
+        residuals = self.residuals(parameters, chosen)
+        return 1.0 - float(residuals @ residuals)
+
+
+@dataclass(frozen=True)
+class SphereHitRates:
+    """Hit rates of two codes, predicted from the parameters of every afferent of a population."""
+
+    model: SkipValidation[RateModel]
+    """Rates, a column per receptor, sphere and position, receptors fastest and positions slowest."""
+    n_positions: int
+    n_receptors: int  # Sizes; the number of spheres, the standard first, follows.
+    neighbours: np.ndarray  # Pairs of the Gradient Sum, (n_pairs, 2).
+    noise_sigma: float
+    standard_normals: FloatArray  # Common random presentations of the Gradient Sum, (n_draws, n_receptors).
+
+    def __post_init__(self) -> None:
+        if self.model.n_stimuli % (self.n_positions * self.n_receptors):
+            raise InputError(
+                "model",
+                "must have one column per position, sphere and receptor",
+                f"{self.model.n_stimuli} for {self.n_positions} positions and {self.n_receptors} receptors",
+            )
+
+    def __call__(self, parameters: FloatArray) -> FloatArray:
+        """Hit rates (n,): by position Gradient Sum, then Euclidean Distance, one per comparison. [0-1]"""
+        static = self.model.evaluate(parameters)[1].reshape(self.n_positions, -1, self.n_receptors)
+        return np.concatenate([self._at(table) for table in static])
+
+    def _at(self, static_hz: FloatArray) -> FloatArray:
+        if not static_hz.any():
+            return np.full(2 * (len(static_hz) - 1), CHANCE)
+        gradient = expected_hit_rates(static_hz, self.neighbours, self.noise_sigma, self.standard_normals)
+        return np.concatenate([gradient, expected_euclidean_hit_rates(static_hz, self.noise_sigma)])
 
 
 FIRST_SPREAD = 0.3  # Of `ToRatesAndHitRates`: standard deviation of the first generation, in scales.

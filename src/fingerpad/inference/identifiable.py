@@ -78,16 +78,9 @@ def silent_at_rest(parameters: ArrayLike) -> FloatArray:
 
 def _rows(name: str, values: ArrayLike, names: tuple[str, ...]) -> FloatArray:
     """Check that the last axis holds the named numbers."""
-    try:
-        array = np.asarray(values, dtype=np.float64)
-    except (TypeError, ValueError) as error:
-        raise InputError(name, "must hold numbers", type(values).__name__) from error
-    if array.ndim == 0 or array.shape[-1] != len(names):
+    array = float_array(name, values, None)
+    if array.shape[-1:] != (len(names),):
         raise InputError(name, f"must hold {', '.join(names)} along its last axis", f"shape {array.shape}")
-    if not np.isfinite(array).all():
-        raise InputError(
-            name, "must hold finite numbers only", remedy=f"{(~np.isfinite(array)).sum()} are not"
-        )
     return array
 
 

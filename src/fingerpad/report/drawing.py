@@ -46,7 +46,7 @@ from fingerpad.report.task import draw_curves_of_measure, main_decoding
 
 if TYPE_CHECKING:
     from fingerpad.geometry.fingertip import Fingertip
-    from fingerpad.inference.spike_fit import SpikeFit
+    from fingerpad.inference.spike_likelihood import SpikeFit
     from fingerpad.psychophysics.curve_fit import PsychometricFit
     from fingerpad.reduction.streaming import ReducedSample
     from fingerpad.skin.sampling import SkinResponse, SurfaceProfile

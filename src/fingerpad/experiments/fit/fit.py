@@ -15,14 +15,9 @@ from fingerpad.core.values import Flag, FloatArray, IntArray, Whole
 from fingerpad.experiments.fit.methods import Beside, Prepared, check_beside, fit_offset, prepare
 from fingerpad.experiments.fit.results import FitResult, FittedFold, PhaseRates
 from fingerpad.inference.afferent_fit import validated
-from fingerpad.inference.fitting.cross_validation import (
-    CrossValidation,
-    fractional_sum_of_squares,
-    interleaved_folds,
-)
+from fingerpad.inference.fitting.methods import CrossValidation, fractional_sum_of_squares, interleaved_folds
 from fingerpad.inference.identifiable import IDENTIFIABLE_NAMES, identifiable
-from fingerpad.inference.problem import RateProblem
-from fingerpad.inference.rate_model import AfferentModel, four_number_model
+from fingerpad.inference.rate_model import AfferentModel, RateProblem, four_number_model
 from fingerpad.inference.recordings import PHASES, RateRecordings, SpikeRecordings
 from fingerpad.neuron.afferent import PARAMETER_NAMES, parameter_units
 from fingerpad.neuron.spikes import Windows

@@ -24,11 +24,16 @@ from fingerpad.inference.afferent_fit import (
     response_surface,
     validated,
 )
-from fingerpad.inference.fitting.cross_validation import CrossValidation, jackknife_covariance
-from fingerpad.inference.fitting.methods import Continued, Fit, LeastSquares, Method
+from fingerpad.inference.fitting.methods import (
+    Continued,
+    CrossValidation,
+    Fit,
+    LeastSquares,
+    Method,
+    jackknife_covariance,
+)
 from fingerpad.inference.identifiable import IDENTIFIABLE_NAMES, SPIKE_PARAMETER_NAMES, identifiable
-from fingerpad.inference.problem import RateProblem
-from fingerpad.inference.rate_model import AfferentModel
+from fingerpad.inference.rate_model import AfferentModel, RateProblem
 from fingerpad.inference.recordings import RateRecordings, SpikeRecordings
 from fingerpad.neuron.spikes import Windows
 

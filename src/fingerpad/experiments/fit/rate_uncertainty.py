@@ -28,8 +28,7 @@ from fingerpad.inference.fitting.posterior import credible_band
 from fingerpad.inference.fitting.profile_likelihood import ProfileLikelihood, profile_likelihoods
 from fingerpad.inference.fitting.sensitivity import identifiability, sobol_indices
 from fingerpad.inference.identifiable import IDENTIFIABLE_NAMES, identifiable
-from fingerpad.inference.problem import RateProblem
-from fingerpad.inference.rate_model import AfferentModel, four_number_model
+from fingerpad.inference.rate_model import AfferentModel, RateProblem, four_number_model
 from fingerpad.inference.rate_posterior import (
     INDEPENDENT,
     RateLikelihood,
@@ -100,7 +99,7 @@ def profiles(likelihood: RateLikelihood, starts: FloatArray) -> tuple[ParameterP
 
     begun = np.concatenate([starts[:, :1], np.log(starts[:, 1:])], axis=1)
     found = profile_likelihoods(log_likelihood, begun, begun.std(axis=0), IDENTIFIABLE_NAMES, level=LEVEL)
-    return tuple(_profile(profile, logarithm=index > 0) for index, profile in enumerate(found.profiles))
+    return tuple(_profile(profile, logarithm=index > 0) for index, profile in enumerate(found))
 
 
 def _profile(profile: ProfileLikelihood, logarithm: bool) -> ParameterProfile:

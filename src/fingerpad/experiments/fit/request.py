@@ -64,7 +64,7 @@ from fingerpad.experiments.runner import Runner
 from fingerpad.geometry.grading import RESOLUTIONS
 from fingerpad.geometry.indenters import Bar
 from fingerpad.inference.afferent_fit import OFFSETS_MM, fit_afferent
-from fingerpad.inference.fitting.cross_validation import interleaved_folds
+from fingerpad.inference.fitting.methods import interleaved_folds
 from fingerpad.inference.identifiable import IDENTIFIABLE_NAMES
 from fingerpad.inference.recordings import RateRecordings, SpikeRecordings
 from fingerpad.neuron.afferent import AnyAfferent, type_of

@@ -13,14 +13,11 @@ from fingerpad.core.values import FloatArray, IntArray
 from fingerpad.experiments.fit.methods import Prepared, Recordings, check_spikes
 from fingerpad.experiments.fit.results import SpikeFitSummary
 from fingerpad.inference.afferent_fit import spike_start
-from fingerpad.inference.fitting.cross_validation import CrossValidation
-from fingerpad.inference.fitting.methods import Fit, Problem
+from fingerpad.inference.fitting.methods import CrossValidation, Fit, Problem
 from fingerpad.inference.identifiable import six_parameters
-from fingerpad.inference.problem import RateProblem
-from fingerpad.inference.rate_model import AfferentModel
+from fingerpad.inference.rate_model import AfferentModel, RateProblem
 from fingerpad.inference.recordings import RateRecordings, SpikeRecordings
-from fingerpad.inference.spike_fit import SoftAfferent, fit_spikes
-from fingerpad.inference.spike_likelihood import SpikeLikelihood, time_rescaling
+from fingerpad.inference.spike_likelihood import SoftAfferent, SpikeLikelihood, fit_spikes, time_rescaling
 from fingerpad.neuron.transduction import Drive
 
 

@@ -25,15 +25,16 @@ from fingerpad.experiments.gerling2014.skin import (
 )
 from fingerpad.geometry.indenters import Bar
 from fingerpad.inference.afferent_fit import response_surface, start_points, validated
-from fingerpad.inference.fitting.cross_validation import (
+from fingerpad.inference.fitting.methods import (
     CrossValidation,
+    Fit,
+    FitStep,
     FoldFit,
+    Method,
     cross_validate,
     interleaved_folds,
 )
-from fingerpad.inference.fitting.methods import Fit, FitStep, Method
-from fingerpad.inference.problem import RateProblem
-from fingerpad.inference.rate_model import AfferentModel
+from fingerpad.inference.rate_model import AfferentModel, RateProblem
 from fingerpad.inference.recordings import PHASES, RateRecordings
 from fingerpad.neuron.afferent import PARAMETER_NAMES, Afferent, parameter_units
 from fingerpad.neuron.lif import membrane_potential

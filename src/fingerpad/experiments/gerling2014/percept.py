@@ -27,8 +27,7 @@ from fingerpad.core.values import FloatArray, IntArray, Number, Vector, WholeVec
 from fingerpad.data import protocol, psychophysics
 from fingerpad.experiments.conditions import RECEPTOR_X_MM, Conditions, Touch
 from fingerpad.experiments.scores import Estimate, difference, estimate, extreme, largest
-from fingerpad.inference.afferent_fit import ToRatesAndHitRates
-from fingerpad.inference.problem import SphereHitRates
+from fingerpad.inference.afferent_fit import SphereHitRates, ToRatesAndHitRates
 from fingerpad.inference.rate_model import AfferentModel
 from fingerpad.neuron.afferent import Afferent
 from fingerpad.neuron.population import Population

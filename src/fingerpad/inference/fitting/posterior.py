@@ -179,7 +179,13 @@ def sample(
     """Sample a density until the ensembles agree and the effective sample sizes suffice."""
     labels = tuple(names)
     middle, scale = float_array("centre", centre, 1), float_array("spread", spread, 1)
-    _check_sizes(middle, scale, labels)
+    if not middle.size == scale.size == len(labels) or not labels:
+        raise InputError(
+            "centre, spread and names must have one entry per parameter: "
+            f"got {middle.size}, {scale.size} and {len(labels)}."
+        )
+    if (scale <= 0.0).any():
+        raise InputError("spread", "must be greater than 0 for every parameter", str(scale.tolist()))
     whole("n_ensembles", n_ensembles, at_least=2)
     whole("n_walkers", n_walkers, at_least=4 * len(labels))
     if n_walkers % 2:
@@ -190,17 +196,16 @@ def sample(
     density = _Checked(log_density)
     seeds = independent_keys(whole("seed", seed, at_least=0), n_ensembles)
     usual = [(emcee.moves.StretchMove(), 0.5), (emcee.moves.KDEMove(bw_method=BANDWIDTH), 0.5)]
-    proposals = usual if moves is None else list(moves)
-    ensembles = [_ensemble(density, middle, scale, n_walkers, one, proposals) for one in seeds]
+    ensembles = [_ensemble(density, middle, scale, n_walkers, one, list(moves or usual)) for one in seeds]
     history: list[str] = []
     done, wanted = 0, n_steps
     while True:
         # On several threads, BLAS takes a hundred times as long for the small systems of KDEMove.
         with threadpool_limits(limits=1):
-            for ensemble in ensembles:
-                ensemble.run(wanted - done)
+            for sampler, start in ensembles:
+                sampler.run_mcmc(None if done else start, wanted - done)
         done = wanted
-        draws = np.array([ensemble.sampler.get_chain(discard=done // 2) for ensemble in ensembles])
+        draws = np.array([sampler.get_chain(discard=done // 2) for sampler, _ in ensembles])
         each = np.moveaxis(draws, -1, 0)
         r_hat = np.array([split_r_hat(one) for one in each])
         bulk, tail = np.array([effective_sizes(one) for one in each]).T
@@ -212,9 +217,7 @@ def sample(
             return Chains(
                 names=labels,
                 draws=draws,
-                log_densities=np.array(
-                    [ensemble.sampler.get_log_prob(discard=done // 2) for ensemble in ensembles]
-                ),
+                log_densities=np.array([sampler.get_log_prob(discard=done // 2) for sampler, _ in ensembles]),
                 r_hat=r_hat,
                 effective_sizes=bulk,
                 tail_effective_sizes=tail,
@@ -238,17 +241,6 @@ def sample(
         wanted = min(2 * done, most_steps)
 
 
-@dataclass
-class _Ensemble:
-    """A sampler and its present state."""
-
-    sampler: emcee.EnsembleSampler
-    state: emcee.State
-
-    def run(self, n_steps: int) -> None:
-        self.state = self.sampler.run_mcmc(self.state, n_steps)
-
-
 def _ensemble(
     density: _Checked,
     centre: FloatArray,
@@ -256,13 +248,13 @@ def _ensemble(
     n_walkers: int,
     key: Key,
     proposals: list[tuple[Any, float]],
-) -> _Ensemble:
-    """Start an ensemble at scattered points, with random numbers of its own."""
+) -> tuple[emcee.EnsembleSampler, emcee.State]:
+    """Return an ensemble with random numbers of its own, and its start at scattered points."""
     start, moves = independent_keys(key, 2)
     walkers, heights = _start(density, centre, spread, n_walkers, generator(start))
     sampler = emcee.EnsembleSampler(n_walkers, centre.size, density, moves=proposals, vectorize=True)
     sampler.random_state = emcee_state(moves)
-    return _Ensemble(sampler, emcee.State(walkers, log_prob=heights, random_state=sampler.random_state))
+    return sampler, emcee.State(walkers, log_prob=heights, random_state=sampler.random_state)
 
 
 class _Checked:
@@ -284,16 +276,6 @@ class _Checked:
             )
         self.count += len(points)
         return heights
-
-
-def _check_sizes(centre: FloatArray, spread: FloatArray, names: tuple[str, ...]) -> None:
-    if not centre.size == spread.size == len(names) or not names:
-        raise InputError(
-            "centre, spread and names must have one entry per parameter: "
-            f"got {centre.size}, {spread.size} and {len(names)}."
-        )
-    if (spread <= 0.0).any():
-        raise InputError("spread", "must be greater than 0 for every parameter", str(spread.tolist()))
 
 
 def _start(

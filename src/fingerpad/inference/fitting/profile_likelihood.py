@@ -18,7 +18,7 @@ from scipy.stats import chi2
 from fingerpad.core.checked import checked
 from fingerpad.core.errors import ConvergenceError, InputError
 from fingerpad.core.threads import in_blocks
-from fingerpad.core.values import Finite, FloatArray, Several, float_array
+from fingerpad.core.values import Finite, FloatArray, float_array
 
 LogLikelihood = Callable[[FloatArray], FloatArray]
 """From points (n_points, n_parameters) to their log likelihoods, -inf where impossible."""
@@ -32,6 +32,7 @@ NEAREST = 20  # Number of starts nearest to a fixed value; a fit starts from the
 
 MOST_EVALUATIONS = 2000
 RESTARTS = 5
+MOST_STEPS = 12  # Steps to either side of the best fit.
 
 
 @dataclass(frozen=True)
@@ -46,16 +47,6 @@ class ProfileLikelihood:
     level: float  # Level of confidence. [0-1]
 
 
-@dataclass(frozen=True)
-class ProfileLikelihoods:
-    """Profile likelihoods of all parameters."""
-
-    best: FloatArray  # The most likely parameters found, (n_parameters,).
-    log_likelihood: float
-    profiles: tuple[ProfileLikelihood, ...]  # One per parameter.
-    n_evaluations: int
-
-
 @checked
 def profile_likelihoods(
     log_likelihood: LogLikelihood,
@@ -64,8 +55,7 @@ def profile_likelihoods(
     names: Sequence[str],
     *,
     level: Finite = 0.95,
-    most_steps: Several = 12,
-) -> ProfileLikelihoods:
+) -> tuple[ProfileLikelihood, ...]:
     """Profile the likelihood of every parameter.
 
     Each profile is computed outwards from the best fit. A fit starts from the result of its neighbour and, if
@@ -94,34 +84,25 @@ def profile_likelihoods(
             break
     allowed = 0.5 * float(chi2.ppf(level, 1))
 
-    def sweep(indices: slice) -> tuple[_Search, list[tuple[FloatArray, float]]]:
-        # Threads do not share a search.
-        own = _Search(log_likelihood, units, origins)
-        return own, own.sweep(best, indices.start, allowed, most_steps)
+    def sweep(indices: slice) -> list[tuple[FloatArray, float]]:
+        return search.sweep(best, indices.start, allowed)
 
     sweeps = in_blocks(sweep, len(labels), 1)
-    met = [fit for _, fits in sweeps for fit in fits]
-    most_likely, highest = max(met, key=lambda fit: fit[1])
-    profiles = tuple(
-        _profile(labels[index], index, fits, highest, level, allowed)
-        for index, (_, fits) in enumerate(sweeps)
-    )
-    return ProfileLikelihoods(
-        most_likely, highest, profiles, search.count + sum(own.count for own, _ in sweeps)
+    highest = max(height for fits in sweeps for _, height in fits)
+    return tuple(
+        _profile(labels[index], index, fits, highest, level, allowed) for index, fits in enumerate(sweeps)
     )
 
 
+@dataclass(frozen=True)
 class _Search:
     """Search for the most likely parameters, with at most one of them fixed."""
 
-    def __init__(self, log_likelihood: LogLikelihood, scales: FloatArray, starts: FloatArray):
-        self.log_likelihood = log_likelihood
-        self.scales = scales
-        self.starts = starts
-        self.count = 0
+    log_likelihood: LogLikelihood
+    scales: FloatArray
+    starts: FloatArray
 
     def heights(self, points: FloatArray) -> FloatArray:
-        self.count += len(points)
         values = np.asarray(self.log_likelihood(points), dtype=np.float64)
         if np.isnan(values).any():
             wrong = points[np.isnan(values)][0].tolist()
@@ -165,15 +146,13 @@ class _Search:
             )
         return moved(found.x)
 
-    def sweep(
-        self, best: FloatArray, index: int, allowed: float, most_steps: int
-    ) -> list[tuple[FloatArray, float]]:
+    def sweep(self, best: FloatArray, index: int, allowed: float) -> list[tuple[FloatArray, float]]:
         """Fit the others with one parameter fixed at steps to both sides; return points and values."""
         top = self.height(best)
         fits = [(best, top)]
         for side in (-1.0, 1.0):
             line = [(best, top)]
-            while len(line) <= most_steps and not all(top - height > allowed for _, height in line[-2:]):
+            while len(line) <= MOST_STEPS and not all(top - height > allowed for _, height in line[-2:]):
                 value = best[index] + side * PROFILE_STEP * len(line) * self.scales[index]
                 line.append(self._fit(line[-1][0], index, value))
             fits += line[1:]

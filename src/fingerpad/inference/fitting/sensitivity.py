@@ -1,8 +1,8 @@
 """Sobol indices: the share of the variance of a quantity that each parameter explains, alone and in total.
 
 `identifiability` finds the combinations of parameters that data determine, by the singular values of the
-Jacobian of a model's outputs. Derivatives are with respect to the parameters over their scales. Data cannot
-determine the parameters along a direction with a singular value of zero.
+Jacobian of a model's outputs by shares of the parameters. Data cannot determine the parameters along a
+direction with a singular value of zero.
 """
 
 from __future__ import annotations
@@ -18,15 +18,7 @@ from scipy.special import ndtri
 from fingerpad.core.checked import checked
 from fingerpad.core.errors import InputError
 from fingerpad.core.random_streams import generator
-from fingerpad.core.values import (
-    Finite,
-    FloatArray,
-    IntArray,
-    NotNegativeWhole,
-    Positive,
-    Several,
-    float_array,
-)
+from fingerpad.core.values import Finite, FloatArray, IntArray, NotNegativeWhole, Several, float_array
 
 BatchObjective = Callable[[FloatArray], FloatArray]
 """Called with points (n_points, n_parameters); returns one number for each."""
@@ -129,8 +121,7 @@ def _checked(values: ArrayLike, n_points: int) -> FloatArray:
 Answer = Callable[[FloatArray], FloatArray]
 """From parameters (n_parameters,) to observable outputs (n_answers,)."""
 
-JACOBIAN_STEP = 1e-6
-"""Step over the scale of a parameter: so small that outputs with jumps rarely jump within it. [1]"""
+JACOBIAN_STEP = 1e-6  # Step over the parameter: so small that outputs with jumps rarely jump within it. [1]
 
 ZERO = 1e-5
 """Singular values below this share of the largest count as zero: above the round-off of such steps. [1]"""
@@ -144,7 +135,7 @@ class Identifiability:
     singular_values: FloatArray
     """Change of the outputs per unit step along each direction, largest first, (n_parameters,)."""
     directions: FloatArray
-    """One unit direction per row, in the scales, singular value 0 last, (n_parameters, n_parameters)."""
+    """One unit direction per row, in shares, singular value 0 last, (n_parameters, n_parameters)."""
     rank: int  # Number of singular values above zero, the number of identifiable combinations.
 
     @property
@@ -154,40 +145,22 @@ class Identifiability:
 
 
 @checked
-def jacobian(
-    answer: Answer, parameters: ArrayLike, scales: ArrayLike, step: Positive = JACOBIAN_STEP
-) -> FloatArray:
-    """Change of every output per scale of every parameter, by central differences."""
-    centre, units = float_array("parameters", parameters, 1), float_array("scales", scales, 1)
-    if centre.shape != units.shape or (units <= 0.0).any():
-        raise InputError(
-            "scales", f"must be greater than 0, one for each of {centre.size} parameters", str(units.tolist())
-        )
-    columns = [
-        (float_array("answer", answer(centre + move), 1) - float_array("answer", answer(centre - move), 1))
-        / (2.0 * step)
-        for move in np.diag(step * units)
-    ]
-    return np.stack(columns, axis=1)
-
-
-def identifiability(
-    answer: Answer,
-    parameters: ArrayLike,
-    names: Sequence[str],
-    scales: ArrayLike | None = None,
-    *,
-    step: float = JACOBIAN_STEP,
-    zero: float = ZERO,
-) -> Identifiability:
+def identifiability(answer: Answer, parameters: ArrayLike, names: Sequence[str]) -> Identifiability:
     """Find the combinations of parameters on which outputs depend, and those on which they do not."""
-    centre = float_array("parameters", parameters, 1)
-    labels = tuple(names)
+    centre, labels = float_array("parameters", parameters, 1), tuple(names)
     if len(labels) != centre.size:
         raise InputError("names", f"must name {centre.size} parameters", str(len(labels)))
-    table = jacobian(answer, centre, np.abs(centre) if scales is None else scales, step)
+    if not centre.all():
+        raise InputError("parameters", "must not be 0, since steps are shares of them", str(centre.tolist()))
+    # The Jacobian: change of every output per share of every parameter, by central differences.
+    columns = [
+        (float_array("answer", answer(centre + move), 1) - float_array("answer", answer(centre - move), 1))
+        / (2.0 * JACOBIAN_STEP)
+        for move in np.diag(JACOBIAN_STEP * np.abs(centre))
+    ]
+    table = np.stack(columns, axis=1)
     if len(table) < centre.size:
         raise InputError("answer", f"must give at least {centre.size} numbers", str(len(table)))
     _, values, directions = np.linalg.svd(table, full_matrices=False)
-    rank = int((values > zero * values[0]).sum()) if values[0] > 0.0 else 0
+    rank = int((values > ZERO * values[0]).sum()) if values[0] > 0.0 else 0
     return Identifiability(labels, values, directions, rank)
