@@ -16,7 +16,6 @@ from fingerpad.core.phases import ramp_and_hold_phases
 from fingerpad.experiments.recording_files import read_recordings
 from fingerpad.experiments.requests.stimuli import read_stimuli
 from fingerpad.export.responses import read_response_csv, read_responses_nwb
-from fingerpad.neuron.response_maps import recruitment_rank
 from sections import SMALL_TOUCH as TOUCH
 
 
@@ -47,7 +46,10 @@ def test_every_number_comes_back_to_the_last_bit(tmp_path, columns, places):
     assert_array_equal(np.transpose([column(name) for name in places]), response.positions_mm)
     for name in ("dynamic_rate_hz", "static_rate_hz", "first_spike_latency_ms"):
         assert_array_equal(column(name), getattr(response, name))
-    assert_array_equal(column("recruitment_rank"), recruitment_rank(response.first_spike_latency_ms))
+    latency_ms = response.first_spike_latency_ms
+    firing = np.sort(latency_ms[~np.isnan(latency_ms)])  # no two are equal
+    ranks = [np.nan if np.isnan(each) else 1 + firing.searchsorted(each) for each in latency_ms]
+    assert_array_equal(column("recruitment_rank"), ranks)
     for receptor, row in enumerate(rows):
         assert_array_equal([float(time) for time in row["spike_times_ms"].split()], response.spikes[receptor])
     assert np.isnan(column("first_spike_latency_ms")).any()
