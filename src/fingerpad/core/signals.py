@@ -424,7 +424,7 @@ class SpikeTrains(SpikingResult):
 class ResponseMap(SpikingResult):
     """Response of a population of afferents to one touch.
 
-    A mixed population has one response per type: `response["RA"]`, or those of `response.parts`.
+    A mixed population has one response per type: `{name: response[name] for name in response}`.
     """
 
     positions_mm: FiniteMatrix
@@ -501,6 +501,10 @@ class ResponseMap(SpikingResult):
         """Distance between neighbours of the same type, of each receptor, (n_receptors,). [mm]"""
         several = list(self.parts.values()) or [self]
         return np.repeat([each.pitch_mm for each in several], [len(each.spikes) for each in several])
+
+    def __iter__(self) -> Iterator[str]:
+        """Names of the types of a mixed population."""
+        return iter(self.parts)
 
     def __getitem__(self, name: str) -> ResponseMap:
         if name not in self.parts:

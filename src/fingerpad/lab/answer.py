@@ -1,4 +1,4 @@
-"""What a touch of the laboratory gives: fields over the skin, contact, force and spikes over time."""
+"""The state of the laboratory, and its answer: fields over the skin, contact, force and spikes over time."""
 
 from __future__ import annotations
 
@@ -6,21 +6,21 @@ from collections.abc import Mapping
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from functools import cache
-from typing import cast
+from typing import Annotated, Any, cast
 
 import numpy as np
 from threadpoolctl import ThreadpoolController
 
-from fingerpad.core.checked import checked
+from fingerpad.core.checked import checked, value_class
 from fingerpad.core.errors import InputError
 from fingerpad.core.signals import STORED_ENERGY, ResponseMap, Traces
-from fingerpad.core.values import FloatArray, Whole
+from fingerpad.core.values import FloatArray, Text, Whole, choice, limits, number_in
 from fingerpad.data import psychophysics
+from fingerpad.data.afferents import TYPES
 from fingerpad.experiments.requests.reduction import ReductionRequest
 from fingerpad.geometry.fingertip import Fingertip
 from fingerpad.geometry.motion import Pose
 from fingerpad.geometry.trajectory import Trajectory
-from fingerpad.lab.state import OF_RANGE, LabState
 from fingerpad.neuron.afferent import Afferent, AnyAfferent, type_of
 from fingerpad.neuron.afferent_types import afferent_of
 from fingerpad.neuron.population import Population
@@ -29,6 +29,55 @@ from fingerpad.reduction.model import ON_THE_PAD, ReducedModel
 from fingerpad.reduction.streaming import ReducedTouch
 from fingerpad.reduction.training import first_touch_mm
 from fingerpad.skin.sampling import SkinResponse
+
+OF_RANGE = "range"  # Name of the afferents that the file of a range describes.
+AFFERENTS = (*TYPES, OF_RANGE)  # Who may respond.
+
+BOUNDS = {
+    "depth_mm": (0.05, 5.0),
+    "x_mm": (-20.0, 20.0),
+    "z_mm": (-20.0, 20.0),
+    "tilt_deg": (-45.0, 45.0),
+    "slide_mm": (-20.0, 20.0),
+    "ramp_ms": (20.0, 1000.0),
+    "hold_ms": (50.0, 2000.0),
+    "size": (0.0, 1e6),
+    "other_size": (0.0, 1e6),
+}
+"""Widest bounds of the numbers; those of a reduced touch are mostly narrower."""
+
+
+@value_class
+class LabState:
+    """What is pressed, how, and by whom it is felt."""
+
+    object: Text  # Name of what is pressed in.
+    other: str = ""  # What it is compared with, pressed in the same way; empty for nothing.
+    size: Annotated[float, limits(*BOUNDS["size"])] = 0.0
+    other_size: Annotated[float, limits(*BOUNDS["other_size"])] = 0.0
+    """The parameter of both that varies, such as the curvature; 0 for that of the range's middle."""
+    finger: str = ""
+    tissues: str = ""  # By name; empty for those of the range.
+    afferent: Annotated[str, choice(AFFERENTS)] = "SAI"
+    x_mm: Annotated[float, limits(*BOUNDS["x_mm"])] = 0.0
+    z_mm: Annotated[float, limits(*BOUNDS["z_mm"])] = 0.0
+    tilt_deg: Annotated[float, limits(*BOUNDS["tilt_deg"])] = 0.0
+    """Pose of the object, from its place and direction. [mm, degrees]"""
+    depth_mm: Annotated[float, limits(*BOUNDS["depth_mm"])] = 1.0  # Below first touch. [mm]
+    slide_mm: Annotated[float, limits(*BOUNDS["slide_mm"])] = 0.0  # Along the finger in the hold. [mm]
+    ramp_ms: Annotated[float, limits(*BOUNDS["ramp_ms"])] = 100.0  # Of the press and of the lift. [ms]
+    hold_ms: Annotated[float, limits(*BOUNDS["hold_ms"])] = 500.0
+
+
+@checked
+def state_of(asked: Mapping[str, Any]) -> LabState:
+    """Read a state from plain values, such as the texts in the address of the page."""
+    given: dict[str, Any] = {
+        name: number_in(name, value) if name in BOUNDS and isinstance(value, str) else value
+        for name, value in asked.items()
+    }
+    return LabState(**given)
+
 
 ABOVE_MS = 10.0  # Time to move aside above the skin, and time to approach it. [ms]
 CLEARANCE_MM = 0.5  # How far above the skin the object moves aside. [mm]
@@ -128,11 +177,14 @@ def population_of(described: ReductionRequest, state: LabState) -> Population:
 
 
 def afferents_in(described: ReductionRequest, state: LabState) -> Mapping[str, AnyAfferent]:
-    """Afferents of a state by type: of one type by its name, or those of the range."""
+    """Afferents of a state by type: of one type by its name, or those of the range.
+
+    Here SAI is the afferent that was fitted with the tissues, without the low pass of `fp.SAI()`.
+    """
     if state.afferent == OF_RANGE:
         laid = described.population
         return {name: part.afferent for name, part in (laid.parts or {type_of(laid.afferent): laid}).items()}
-    if state.afferent == "SAI":  # the fitted one, as in a touch that names no afferent
+    if state.afferent == "SAI":
         return {"SAI": Afferent.for_tissues(described.tissues)}
     return {state.afferent: afferent_of(state.afferent, described.tissues)}
 

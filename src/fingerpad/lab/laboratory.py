@@ -26,8 +26,7 @@ from fingerpad.core.values import Flag, Whole
 from fingerpad.experiments.requests.reduction import ReductionRequest
 from fingerpad.experiments.runner import Runner
 from fingerpad.geometry.fingertip import FINGERS
-from fingerpad.lab.answer import Answer, in_full, motion_of, reduced_answer
-from fingerpad.lab.state import LabState
+from fingerpad.lab.answer import Answer, LabState, in_full, motion_of, reduced_answer
 from fingerpad.mechanics.tissues import TISSUES
 from fingerpad.neuron.afferent_types import afferent_types
 from fingerpad.reduction.model import ReducedModel, read_reduced, write_reduced
@@ -179,7 +178,7 @@ class Laboratory:
         FingerpadError
             If the state is out of the range, or a press failed.
         """
-        described, key = self.described(state), (_alone(state), exact)
+        described, key = self.described(state), (alone(state), exact)
         if (kept := self._kept(key)) is not None:
             return kept
         model = self.model(state)
@@ -211,11 +210,11 @@ class Laboratory:
             told = _Told("errors")
             self._making[later] = self._later.submit(lambda: self.make(state, True)), told
         if ready and not exact:
-            return self._kept((_alone(state), False)) or self.answer(state)
+            return self._kept((alone(state), False)) or self.answer(state)
         making = None if ready else self.making(state)
         if not ready and making is None:
             return self.poll(state, exact)
-        full = _alone(state), True
+        full = alone(state), True
         if (kept := self._kept(full)) is not None:
             return kept
         # While somebody moves an object about, only one of the places is solved at a time.
@@ -254,7 +253,7 @@ class Laboratory:
             return self._answers.get(key)
 
 
-def _alone(state: LabState) -> LabState:
+def alone(state: LabState) -> LabState:
     """Without what does not change the answer."""
     return replace(state, other="", other_size=0.0)
 

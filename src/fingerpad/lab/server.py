@@ -16,8 +16,8 @@ from urllib.parse import urlsplit
 from fingerpad.core.errors import FingerpadError, InputError
 from fingerpad.core.units import unit_of
 from fingerpad.geometry.fingertip import FINGERS
+from fingerpad.lab.answer import AFFERENTS, BOUNDS, LabState, state_of
 from fingerpad.lab.laboratory import Laboratory, Making
-from fingerpad.lab.state import AFFERENTS, BOUNDS, LabState, state_of
 from fingerpad.lab.view import view_of
 from fingerpad.mechanics.tissues import TISSUES
 

@@ -15,9 +15,9 @@ import numpy as np
 from fingerpad.core.files import write_atomically
 from fingerpad.core.progress import NoProgress, Progress
 from fingerpad.core.units import unit_of
+from fingerpad.lab.answer import LabState
 from fingerpad.lab.laboratory import Laboratory
 from fingerpad.lab.server import CONTROLS as ALL
-from fingerpad.lab.state import LabState
 from fingerpad.lab.view import comparison, view_of_answer
 
 AFFERENTS = ("SAI", "RA")  # Who responds: each type makes the file as much longer.
@@ -51,7 +51,7 @@ def write_static(laboratory: Laboratory, folder: Path, progress: Progress | None
                     there = min(j, len(known[other][1]) - 1)
                     second = answers[other, i, there][1]
                     others[other] = comparison(label, other, answer, second)
-                view = view_of_answer(laboratory, state, answer, FRAMES, laboratory.path(state).name)
+                view = view_of_answer(laboratory, state, answer, FRAMES, beside=True)
                 views["|".join([label, afferent, str(i), str(j)])] = asdict(view) | {"comparisons": others}
     content = json.dumps({"spec": _spec(objects, known), "views": views}, separators=(",", ":"))
     here = resources.files("fingerpad.lab")

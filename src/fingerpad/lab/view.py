@@ -10,20 +10,8 @@ from typing import Any
 import numpy as np
 
 from fingerpad.core.values import FloatArray
-from fingerpad.experiments.requests.reduction import ReductionRequest
-from fingerpad.lab.answer import (
-    COLUMNS,
-    ROWS,
-    Answer,
-    compared,
-    finger_of,
-    motion_of,
-    sample_times_ms,
-    shape_of,
-)
-from fingerpad.lab.laboratory import Laboratory, Making
-from fingerpad.lab.state import OF_RANGE, LabState
-from fingerpad.reduction.model import ON_THE_PAD
+from fingerpad.lab.answer import Answer, LabState, compared, finger_of, shape_of
+from fingerpad.lab.laboratory import Laboratory, Making, alone
 
 OFF_THE_PAD = 255  # Byte of a point beside the pad; the others are shares of the peak, 0 to 254.
 OUTLINE_POINTS = 40
@@ -89,7 +77,7 @@ def view_of(laboratory: Laboratory, state: LabState, exact: bool = False) -> Vie
 
 
 def view_of_answer(
-    laboratory: Laboratory, state: LabState, answer: Answer, frames: int | None = None, path: str = ""
+    laboratory: Laboratory, state: LabState, answer: Answer, frames: int | None = None, beside: bool = False
 ) -> View:
     described = laboratory.described(state)
     touch, finger = described.training.touch, finger_of(described)
@@ -109,7 +97,7 @@ def view_of_answer(
         shown_ms=float(answer.times_ms[-1] - state.ramp_ms),
         said=f"{body}, tissues {asked.tissues}, {asked.resolution} mesh."
         + (" Its error is being measured." if there and not laboratory.measured(state) else ""),
-        python=python_lines(laboratory, state, path),
+        python=python_lines(laboratory, state, beside),
     )
 
 
@@ -183,83 +171,27 @@ def _plain(values: FloatArray) -> list[Any]:
     return np.round(values, 4).tolist()
 
 
-TEMPLATE = """import numpy as np
+SCRIPT = """from pathlib import Path
 
 import fingerpad as fp
 
-# {title}
-request = fp.ReductionRequest.read({asked})
-training, shape = request.training, {shape}
-model = fp.read_reduced({path!r}, training.touch)
-motion = fp.Trajectory(
-    {times},
-    depth_mm={depth},
-    x_mm={x},
-    z_mm={z},
-    tilt_deg={tilt},
-)
-times_ms = {samples}
-
-# The reduced touch at the afferents, and what these fire.
-finger = training.touch.finger
-afferents = {afferents}
-grid_mm = fp.Population.grid(rows={rows}, columns={columns}, finger=finger).positions_mm
-inside_mm = grid_mm[(grid_mm[:, 0] > 1.0) & (grid_mm[:, 0] < finger.length_mm - 1.0)]
-sites_mm = inside_mm[np.abs(inside_mm[:, 1]) < {pad} * finger.section(inside_mm[:, 0])[2]]
-stream = fp.ReducedTouch(model, sites_mm, *shape)
-samples = []
-for time in times_ms:
-    pose, depth_mm = motion.pose_at(time), float(motion.prescribed_at(time))
-    samples.append(stream.step(time, depth_mm, None, pose.x_mm, pose.z_mm, pose.tilt_deg))
-force_mn = np.array([sample.force_mn for sample in samples])
-
-
-def course(quantity, dynamic=None):
-    values = np.array([sample.fields[quantity] for sample in samples])
-    return fp.Traces(times_ms, values, motion.times_ms[1:-1], quantity=quantity, dynamic=dynamic)
-
-
-spikes = []
-for afferent in afferents:
-    dynamic, static = afferent.dynamic_quantity, afferent.static_quantity
-    spikes += afferent.spikes(course(static, None if dynamic == static else course(dynamic)))
-print(f"{{force_mn.max():.1f}} mN, {{sum(map(len, spikes))}} spikes")
+laboratory = fp.lab.Laboratory({folder!r}, [Path({source!r})], allow_python={allow_python})
+state = fp.lab.{state!r}
+answer = laboratory.answer(state)
+spikes_ms = list(answer.response.spikes)
+print(f"{{answer.force_mn.max():.1f}} mN, {{sum(map(len, spikes_ms))}} spikes")
 
 # The full solution of the same touch; it takes seconds to a minute.
-exact = training.touch_with(shape, motion)
-# skin = exact.solve()
+# exact = laboratory.answer(state, exact=True)
 """
 
 
-def python_of(described: ReductionRequest, state: LabState) -> str:
-    """Write the afferents of a state in Python."""
-    if state.afferent == OF_RANGE:
-        return "[part.afferent for part in request.population.parts.values() or [request.population]]"
-    fitted = f"fp.Afferent.for_tissues({described.tissues!r})"
-    return f"[{fitted if state.afferent == 'SAI' else f'fp.{state.afferent}()'}]"
-
-
-def python_lines(laboratory: Laboratory, state: LabState, path: str = "") -> str:
-    """Write the lines; they read the file of the reduced touch, or `path`."""
-    described = laboratory.described(state)
-    motion, shape = motion_of(described, laboratory.model(state), state)
-    source = laboratory.source(state).name if path else str(laboratory.source(state).resolve())
-    asked = f"{described.model_dump(exclude_unset=True)}, name={source!r}"
-    if laboratory.allow_python:  # objects of Python cannot be written here
-        asked = f"{source!r}, {laboratory.replaced(state)}, allow_python=True"
-    return TEMPLATE.format(
-        title=str(state),
-        asked=asked,
-        shape=shape,
-        rows=ROWS,
-        columns=COLUMNS,
-        pad=ON_THE_PAD,
-        path=path or str(laboratory.path(state).resolve()),
-        times=motion.times_ms,
-        depth=motion.depth_mm,
-        x=motion.x_mm,
-        z=motion.z_mm,
-        tilt=motion.tilt_deg,
-        samples=[round(time, 6) for time in sample_times_ms(motion).tolist()],
-        afferents=python_of(described, state),
+def python_lines(laboratory: Laboratory, state: LabState, beside: bool = False) -> str:
+    """Write lines that give the answer anew, `beside` the files if they lie in one folder."""
+    source, folder = laboratory.source(state), laboratory.folder
+    return SCRIPT.format(
+        folder="." if beside else str(folder.resolve()),
+        source=source.name if beside else str(source.resolve()),
+        allow_python=laboratory.allow_python,
+        state=alone(state),
     )
