@@ -69,7 +69,8 @@ SKINS = {
 
 def sed_driven(parameters, refractory_ms=1.0):
     """An afferent of six numbers that follows SED in both terms."""
-    return Afferent.from_parameters(parameters, refractory_ms, STORED_ENERGY, STORED_ENERGY)
+    quantities = {"dynamic_quantity": STORED_ENERGY, "static_quantity": STORED_ENERGY}
+    return Afferent.from_parameters(parameters, refractory_ms=refractory_ms, **quantities)
 
 
 SED_DRIVEN = sed_driven(Afferent.for_tissues("trial3").parameters)

@@ -10,8 +10,8 @@ from numpy.testing import assert_array_equal
 import composing
 import fingerpad as fp
 from fingerpad.experiments.requests.stimuli import read_stimuli
+from fingerpad.lab.answer import LabState
 from fingerpad.lab.laboratory import Laboratory
-from fingerpad.lab.state import LabState
 
 COLUMNS = ("touch", "population", "fit", "discriminate", "validate", "sweep", "stream", "laboratory")
 

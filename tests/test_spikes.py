@@ -7,12 +7,7 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 
 from fingerpad import InputError, SpikeTrains
-from fingerpad.neuron.spikes import (
-    firing_rate_hz,
-    first_spike_latency_ms,
-    modulation_difference,
-    modulation_index,
-)
+from fingerpad.neuron.spikes import firing_rate_hz, first_spike_latency_ms, modulation_index
 from refusals import refused
 
 
@@ -46,7 +41,6 @@ def test_modulation_index_ranges_from_0_to_1_and_ignores_scale():
     assert_array_equal(modulation_index([50.0, 50.0, 0.0], [50.0, 0.0, 0.0]), [0.0, 1.0, np.nan])
     assert_allclose(modulation_index(212.0, 54.0), modulation_index(21.2, 5.4), rtol=1e-14)
     assert_allclose(modulation_index(212.0, 54.0), 158.0 / 266.0, rtol=1e-14)
-    assert modulation_difference(212.0, 54.0) == 158.0
 
 
 def test_bad_windows_and_trains_are_refused():

@@ -1,7 +1,6 @@
 from dataclasses import replace
 
 import numpy as np
-import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy.interpolate import PchipInterpolator
 
@@ -43,15 +42,13 @@ def test_a_straight_ramp_has_its_slope_and_the_rate_jumps_at_a_kink_and_nowhere_
     assert_array_equal(plain.rate_per_ms, marked.rate_per_ms)
 
 
-def test_the_printed_difference_is_the_formula_of_the_paper_read_literally():
-    sed = Traces([0.0, 50.0, 100.0], [[0.0], [2.0], [2.0]], kinks_ms=[50.0])
-    step = 0.5
-    printed = drive(sed, difference_step_ms=step)
-    energy = np.interp(printed.times_ms, sed.times_ms, sed.values[:, 0])
-    earlier = np.interp(np.maximum(printed.times_ms - step, 0.0), sed.times_ms, sed.values[:, 0])
-    assert_allclose(printed.rate_per_ms[:, 0], np.abs(energy - earlier) / step, atol=1e-13)
-    assert printed.rate_per_ms[0] == 0.0
-    assert 50.5 in printed.times_ms
+def test_the_rate_is_the_limit_of_the_printed_difference():
+    sed, step = ramp_and_hold(), 1e-4
+    driven = drive(sed)
+    within = PchipInterpolator(TIMES_MS[TIMES_MS <= RAMP_MS], sed.values[TIMES_MS <= RAMP_MS])
+    at = (driven.times_ms > step) & (driven.times_ms < RAMP_MS)
+    printed = np.abs(within(driven.times_ms[at]) - within(driven.times_ms[at] - step)) / step
+    assert_allclose(driven.rate_per_ms[at], printed, rtol=1e-3, atol=1e-5)
 
 
 def test_twice_as_many_pieces_move_no_spike_by_more_than_the_documented_bound():
@@ -91,7 +88,6 @@ test_what_cannot_be_used_is_refused = refusals(
     (lambda: Drive([0.0, 1.0], np.zeros((2, 1)), np.zeros((2, 2))), "Drive needs one row"),
     (lambda: Transduction(np.nan, 0.0, 0.0), ("intercept_ma",)),
     (lambda: drive(ramp_and_hold(), pieces=0), ("pieces",)),
-    (lambda: drive(ramp_and_hold(), difference_step_ms=0.0), ("difference_step_ms",)),
     (lambda: drive(ramp_and_hold(), shortest_piece_ms=-1.0), ("shortest_piece_ms",)),
 )  # fmt: skip
 
@@ -155,33 +151,17 @@ def test_the_dynamic_term_follows_what_the_traces_bring_and_the_static_term_ener
         [RAMP_MS],
         dynamic=Traces(TIMES_MS, stress.values, quantity="compressive_stress"),
     )
-    for options in ({}, {"difference_step_ms": 0.001}, {"pieces": 4}):
+    for options in ({}, {"pieces": 4}):
         driven = drive(both, **options)
         assert_array_equal(driven.values, drive(energy, **options).values)
         assert_array_equal(driven.rate_per_ms, drive(stress, **options).rate_per_ms)
         assert driven.dynamic_quantity == "compressive_stress"
 
 
-@pytest.mark.parametrize("options", [{}, {"difference_step_ms": 0.001}])
-def test_both_terms_may_follow_one_other_quantity(options):
+def test_both_terms_may_follow_one_other_quantity():
     energy = ramp_and_hold()
     stress = Traces(TIMES_MS, energy.values, [RAMP_MS], quantity="von_mises")
-    driven = drive(stress, **options)
-    assert_array_equal(driven.rate_per_ms, drive(energy, **options).rate_per_ms)
+    driven = drive(stress)
+    assert_array_equal(driven.rate_per_ms, drive(energy).rate_per_ms)
     for kept in (driven, driven.part(slice(0, 1)), stress.part(slice(0, 1)), stress.scaled(np.ones(3))):
         assert kept.dynamic_quantity == kept.static_quantity == "von_mises"
-
-
-@pytest.mark.parametrize("gains", [(1e-6, 2e-4, 7e-7), (-1e-6, 2e-4, -7e-7), (0.0, -1e-4, 3e-6)])
-def test_the_current_is_nowhere_above_its_bound_which_is_at_most_three_times_as_large(gains):
-    rng = np.random.default_rng(4)
-    times = np.concatenate([[0.0], np.cumsum(rng.uniform(0.2, 20.0, 20))])
-    energy, strain = rng.exponential(size=(2, 21, 500)) * rng.integers(0, 2, (2, 21, 500))
-    mixed = Traces(times, energy, times[[7]], dynamic=Traces(times, strain, quantity="skin_stretch"))
-    chain = Transduction(*gains)
-    for sed in (mixed, Traces(times, energy)):
-        assert (chain.largest_current_ma(sed) >= chain.current(sed).values.max(axis=0)).all()
-    chain = Transduction(0.0, 2e-4, 7e-7)
-    ratio = chain.largest_current_ma(ramp_and_hold()) / chain.current(ramp_and_hold()).values.max(axis=0)
-    assert (ratio > 1.0).all()
-    assert (ratio < 3.0).all()

@@ -184,7 +184,7 @@ class AfferentModel:
         six = np.asarray(parameters, dtype=np.float64)
         if not (six.shape == (len(PARAMETER_NAMES),) and np.isfinite(six).all() and (six[3:] > 0.0).all()):
             # It raises the error that names the parameter.
-            Afferent.from_parameters(six, self.refractory_ms, initial_mv=self.initial_mv)
+            Afferent.from_parameters(six, refractory_ms=self.refractory_ms, initial_mv=self.initial_mv)
         intercept, dynamic_gain, static_gain, *membrane = six.tolist()
         membrane += [float(self.refractory_ms), np.nan if self.initial_mv is None else float(self.initial_mv)]
         rates = np.empty((2, self.n_stimuli))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
-from typing import ClassVar, Protocol, runtime_checkable
+from typing import Annotated, Any, ClassVar, Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -14,7 +14,7 @@ from fingerpad.core.errors import InputError, shown
 from fingerpad.core.signals import INTERVAL, STORED_ENERGY, SpikeTrains, Traces
 from fingerpad.core.threads import in_blocks
 from fingerpad.core.units import SKIN_QUANTITY_UNITS, gain_unit, units_of
-from fingerpad.core.values import Finite, FloatArray, NotNegative, float_array, one_of
+from fingerpad.core.values import Finite, FloatArray, NotNegative, choice, float_array
 from fingerpad.data import neuron
 from fingerpad.neuron.band_pass import resampled, smoothed_rate
 from fingerpad.neuron.lif import LeakyIntegrateAndFire
@@ -30,6 +30,9 @@ PARAMETER_NAMES = (
     "threshold_mv",
 )
 """The six fitted numbers in the paper's order: beta, k_d, k_s, tau, C, v."""
+
+SkinQuantity = Annotated[str, choice(SKIN_QUANTITY_UNITS)]
+"""What a term of the current may follow, by the names of `SkinResponse.sample`."""
 
 _SITES_PER_BLOCK = 256
 """Sites that a thread takes through the whole chain at once: their traces stay in the cache."""
@@ -92,12 +95,6 @@ def parameter_units(follows: Follows) -> dict[str, str]:
     } | units_of(PARAMETER_NAMES[3:])
 
 
-def check_known_quantities(afferent: Follows) -> None:
-    """Raise `InputError` if an afferent follows a quantity that is not in `SKIN_QUANTITY_UNITS`."""
-    for name in ("dynamic_quantity", "static_quantity"):
-        one_of(name, getattr(afferent, name), tuple(SKIN_QUANTITY_UNITS))
-
-
 def type_of(afferent: object) -> str:
     """Name of the type of an afferent: that of its class where it has none."""
     return str(getattr(afferent, "type", type(afferent).__name__))
@@ -110,6 +107,7 @@ _NEEDED = ("dynamic_quantity", "static_quantity", "spikes")
 class Afferent:
     """A slowly adapting type I (SAI) afferent.
 
+    This is the model of the paper, without a low pass; `SAI()` has one and is also right under vibration.
     The defaults are the fit with the default tissues, `human`, to the recordings under the shifted bar and to
     two hit rates of people (`fingerpad.data.neuron`, names that begin with HUMAN). They hold for the finger
     and the tissues with which they were fitted; `for_tissues` has those of other sets.
@@ -164,14 +162,13 @@ class Afferent:
     capacitance_mf: Finite = neuron.CAPACITANCE.value
     threshold_mv: Finite = neuron.THRESHOLD.value
     refractory_ms: Finite = neuron.REFRACTORY.value
-    dynamic_quantity: str = neuron.HUMAN_QUANTITY
-    static_quantity: str = neuron.HUMAN_QUANTITY
+    dynamic_quantity: SkinQuantity = neuron.HUMAN_QUANTITY
+    static_quantity: SkinQuantity = neuron.HUMAN_QUANTITY
     initial_mv: Finite | None = None
     smoothing_ms: NotNegative = 0.0
     type: str = "SAI"
 
     def __post_init__(self) -> None:
-        check_known_quantities(self)
         # Both stages check their parameters when they are made.
         self.transduction, self.membrane  # noqa: B018
 
@@ -196,41 +193,16 @@ class Afferent:
         """
         if isinstance(tissues, str) and tissues == "human":
             return cls()
-        fitted = (
-            (
-                neuron.PAPER_INTERCEPT,
-                neuron.PAPER_DYNAMIC_GAIN,
-                neuron.PAPER_STATIC_GAIN,
-                neuron.PAPER_TIME_CONSTANT,
-                neuron.PAPER_CAPACITANCE,
-                neuron.PAPER_THRESHOLD,
-            )
-            if isinstance(tissues, str) and tissues == "paper"
-            else (
-                neuron.TRIAL_3_INTERCEPT,
-                neuron.TRIAL_3_DYNAMIC_GAIN,
-                neuron.TRIAL_3_STATIC_GAIN,
-                neuron.TRIAL_3_TIME_CONSTANT,
-                neuron.TRIAL_3_CAPACITANCE,
-                neuron.TRIAL_3_THRESHOLD,
-            )
-        )
+        fitted = neuron.fitted["paper" if isinstance(tissues, str) and tissues == "paper" else "trial3"]
         return cls.from_parameters(
-            [each.value for each in fitted],
+            [getattr(neuron, name).value for name in fitted],
             dynamic_quantity=STORED_ENERGY,
             static_quantity=STORED_ENERGY,
             initial_mv=neuron.PAPER_INITIAL.value,
         )
 
     @classmethod
-    def from_parameters(
-        cls,
-        parameters: ArrayLike,
-        refractory_ms: Finite = neuron.REFRACTORY.value,
-        dynamic_quantity: str = neuron.HUMAN_QUANTITY,
-        static_quantity: str = neuron.HUMAN_QUANTITY,
-        initial_mv: Finite | None = None,
-    ) -> Afferent:
+    def from_parameters(cls, parameters: ArrayLike, **others: Any) -> Afferent:
         """Make an afferent from the six fitted numbers.
 
         Parameters
@@ -238,31 +210,20 @@ class Afferent:
         parameters : array_like (6,)
             beta [mA], k_d [mA ms/kPa], k_s [mA/kPa], tau [ms], C [mF], v [mV]: the order of
             `PARAMETER_NAMES`.
-        refractory_ms : float, optional
-            Refractory period after each spike, which is not fitted. [ms]
-        dynamic_quantity, static_quantity : str, optional
-            What the two terms follow; default: as of `Afferent()`.
-        initial_mv : float, optional
-            Potential at the start; default: that at rest. [mV]
+        **others
+            Any other field of `Afferent`.
 
         Examples
         --------
-        >>> Afferent.from_parameters([0.0, 2e-4, 7e-7, 68.0, 1e-6, 50.0]).time_constant_ms
-        68.0
+        >>> Afferent.from_parameters([0.0, 2e-4, 7e-7, 68.0, 1e-6, 50.0], refractory_ms=2.0).threshold_mv
+        50.0
         """
         values = float_array("parameters", parameters, 1)
         if values.size != len(PARAMETER_NAMES):
             raise InputError(
                 "parameters", f"must hold {', '.join(PARAMETER_NAMES)}", f"{values.size} numbers"
             )
-        fitted = dict(zip(PARAMETER_NAMES, values.tolist(), strict=True))
-        return cls(
-            refractory_ms=refractory_ms,
-            dynamic_quantity=dynamic_quantity,
-            static_quantity=static_quantity,
-            initial_mv=initial_mv,
-            **fitted,
-        )
+        return cls(**dict(zip(PARAMETER_NAMES, values.tolist(), strict=True)), **others)
 
     @property
     def parameters(self) -> FloatArray:
@@ -300,11 +261,6 @@ class Afferent:
     def with_static_threshold(self, quantity: NotNegative) -> Afferent:
         """Return the same afferent with another intercept, so that it fires above a constant quantity.
 
-        Parameters
-        ----------
-        quantity : float
-            The threshold. [its unit]
-
         Examples
         --------
         >>> round(Afferent().with_static_threshold(5.0).static_threshold, 9)
@@ -314,18 +270,13 @@ class Afferent:
         return replace(self, intercept_ma=self.intercept_ma - self.static_gain * raised)
 
     def spikes(self, traces: Traces | Drive) -> SpikeTrains:
-        """Simulate the spikes of this afferent at every site.
+        """Simulate the spikes of this afferent, a train per site.
 
         Parameters
         ----------
         traces : Traces or Drive
             What the two terms follow. Pass `fingerpad.neuron.transduction.drive` of it if many afferents are
             simulated under the same traces, as in a fit.
-
-        Returns
-        -------
-        SpikeTrains
-            One train per site.
         """
         check_quantities(self, traces)
         if isinstance(traces, Drive):
@@ -351,13 +302,17 @@ class Afferent:
         return replace(resampled(traces, self.smoothing_ms), times_ms=times_ms, rate_per_ms=np.abs(rate))
 
     def _largest_current_ma(self, traces: Traces) -> FloatArray:
-        """Bound of the current at every site, (n_sites,)."""
-        if not self.smoothing_ms:
-            return self.transduction.largest_current_ma(traces)
-        # A low pass changes at most by the range of its input in one time constant.
-        fastest = np.ptp(traces.dynamic_term.values, axis=0) / self.smoothing_ms
+        """Bound of the current at every site, (n_sites,): fastest change and largest value at once."""
+        # Between two times a monotone cubic is at most three times as steep as the line (Fritsch & Carlson
+        # 1980); a low pass changes at most by the range of its input in one time constant.
+        followed = traces.dynamic_term.values
+        if self.smoothing_ms:
+            fastest = np.ptp(followed, axis=0) / self.smoothing_ms
+        else:
+            slopes = np.diff(followed, axis=0) / np.diff(traces.times_ms)[:, np.newaxis]
+            fastest = 3.0 * np.abs(slopes).max(axis=0)
         static = (self.static_gain * traces.values).max(axis=0)
-        return self.intercept_ma + abs(self.dynamic_gain) * fastest + static
+        return self.intercept_ma + max(self.dynamic_gain, 0.0) * fastest + static
 
     def rates(
         self,
@@ -365,7 +320,9 @@ class Afferent:
         dynamic_window_ms: Window | None = None,
         static_window_ms: Window | None = None,
     ) -> tuple[FloatArray, FloatArray]:
-        """Compute the firing rates at every site in the ramp and in the hold, Eqs. 6-10.
+        """Compute the firing rates at every site in the ramp and in the hold, Eqs. 6-10. [spikes/s]
+
+        They are 0 where no interval closes in the window.
 
         Parameters
         ----------
@@ -374,11 +331,6 @@ class Afferent:
         dynamic_window_ms, static_window_ms : (float, float), optional
             Start and end of the two windows; by default those of `rate_windows_ms`, which follow the phases
             of `traces`: the paper's for the paper's motion. [ms]
-
-        Returns
-        -------
-        dynamic_hz, static_hz : array (n_sites,)
-            Rates; 0 where no interval closes in the window. [spikes/s]
         """
         dynamic, static = rate_windows_ms(
             traces.phases, dynamic_window_ms, static_window_ms, traces.times_ms[-1]

@@ -54,7 +54,7 @@ class AfferentStream:
         self._filtered = np.zeros((stages, count))
 
     def step(self, time_ms: Finite, static: ArrayLike, dynamic: ArrayLike | None = None) -> SpikeTrains:
-        """Go to a later time, and return the spikes since the last one.
+        """Go to a later time, and return the spikes since the last one, a train per site.
 
         Parameters
         ----------
@@ -64,11 +64,6 @@ class AfferentStream:
             What the static term follows, now; 0 at the time 0. [kPa, or the unit of the quantity]
         dynamic : array (n_sites,), optional
             What the dynamic term follows, if it is another quantity. [as above]
-
-        Returns
-        -------
-        SpikeTrains
-            One train per site.
         """
         if not finite("time_ms", time_ms, "ms") > self._time_ms:
             raise InputError("time_ms", "must go on", f"{time_ms:g} after {self._time_ms:g} ms")

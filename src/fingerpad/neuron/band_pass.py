@@ -27,7 +27,6 @@ from fingerpad.neuron.transduction import Drive, drive, knots_of
 _KNOTS_PER_TIME_CONSTANT = 4.0
 """Knots in the time constant of a stage; the output is linear between them, within 0.3 % of its peak."""
 
-
 _MOST_PIECES = 2**20
 
 
@@ -50,11 +49,6 @@ class BandPass:
     def largest_share(self) -> float:
         """Bound of the output over the range of the input: half of the integral of |impulse response|. [1]"""
         return _largest_share(self.rise, self.fall)
-
-    def gain(self, frequency_hz: FloatArray) -> FloatArray:
-        """Amplitude of the output over that of a sinusoidal input."""
-        relative = np.asarray(frequency_hz, np.float64) / self.corner_hz
-        return relative**self.rise / np.sqrt(1.0 + relative**2) ** (self.rise + self.fall)
 
     def of(self, traces: Traces | Drive) -> tuple[FloatArray, FloatArray]:
         """Filter the quantity of the static term at every site; before the first time it is constant."""

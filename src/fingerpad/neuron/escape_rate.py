@@ -74,7 +74,7 @@ class EscapeRate:
     escape_ms: Positive = ESCAPE_TIME_MS
 
     def spikes(self, current: Traces, seed: Whole, presentations: Presentations | None = None) -> SpikeTrains:
-        """Simulate spike times by time rescaling.
+        """Simulate spike times by time rescaling, a train per presentation.
 
         Parameters
         ----------
@@ -84,15 +84,12 @@ class EscapeRate:
             Seed of the run; the same seed gives the same spikes on any number of threads.
         presentations : Presentations, optional
             Site, trial and receptor of each train. Default: one presentation per site.
-
-        Returns
-        -------
-        SpikeTrains
-            One per presentation.
         """
         everyone = presentations or Presentations.of_population(current.n_sites)
         checked_sites(everyone.sites, checked_current(current).n_sites)
-        drives, initial = self.relative_drive(current), self.initial_potentials(current)
+        threshold_mv = self.membrane.threshold_mv
+        drives = np.ascontiguousarray(current.values.T) / (self.membrane.capacitance_mf * threshold_mv)
+        initial = self.membrane.initial_potentials_mv(current.values[0]) / threshold_mv
         numbers = (
             float(self.membrane.time_constant_ms),
             float(self.membrane.refractory_ms),
@@ -106,15 +103,6 @@ class EscapeRate:
             return SpikeTrains(*_escape_trains(current.times_ms, drives, initial, *keys, seed, *numbers))
 
         return SpikeTrains.joined(in_blocks(trains, len(everyone), _TRAINS_PER_BLOCK))
-
-    def initial_potentials(self, current: Traces) -> FloatArray:
-        """Potentials at the first time over the threshold, (n_sites,)."""
-        return self.membrane.initial_potentials_mv(current.values[0]) / self.membrane.threshold_mv
-
-    def relative_drive(self, current: Traces) -> FloatArray:
-        """I/(C v), a row for each site. [1/ms]"""
-        scale = self.membrane.capacitance_mf * self.membrane.threshold_mv
-        return np.ascontiguousarray(current.values.T) / scale
 
 
 @njit(cache=True, error_model="numpy", nogil=True)

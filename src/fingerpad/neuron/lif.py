@@ -75,18 +75,7 @@ class LeakyIntegrateAndFire:
             )
 
     def spikes(self, current: Traces) -> SpikeTrains:
-        """Spike times of one neuron per site, exact for a piecewise linear current.
-
-        Parameters
-        ----------
-        current : Traces
-            Of a current, one column per neuron. [mA]
-
-        Returns
-        -------
-        SpikeTrains
-            One train per site, up to the last knot.
-        """
+        """Spike times of one neuron per site, exact for a piecewise linear current [mA]."""
         checked_current(current)
 
         def trains(neurons: slice) -> SpikeTrains:

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import math
 import warnings
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import field, replace
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Annotated, Protocol, runtime_checkable
+from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -55,21 +55,11 @@ CENTRE_MM = (fingertip.CONTACT_POINT.value[0], 0.0)
 """Centre of the default layout: the contact point of the paper's finger, on the midline. [mm]"""
 
 
-@runtime_checkable
-class HasContact(Protocol):
-    """A finger with a place of contact."""
-
-    @property
-    def contact_mm(self) -> tuple[float, float]:
-        """X and z of the middle of the pad. [mm]"""
-        ...
-
-
 @checked
 def sensitivities(
     count: Annotated[int, count_from(1, MOST_RECEPTORS)], spread: NotNegative, seed: Whole
 ) -> FloatArray:
-    """Draw the relative sensitivity of each afferent, a factor of both gains.
+    """Draw the relative sensitivity of each afferent, a factor above 0 of both gains, (count,). [1]
 
     They are log-normal with mean 1: exp(spread n - spread^2/2), n from Normal(0, 1).
 
@@ -82,11 +72,6 @@ def sensitivities(
         `fingerpad.data.psychophysics.SENSITIVITY_SPREAD`.
     seed : int
         Seed of the random numbers; those of an afferent depend on its number only.
-
-    Returns
-    -------
-    array (count,)
-        Factors, above 0. [1]
 
     Examples
     --------
@@ -176,6 +161,10 @@ class Population:
             )
         return self.parts[name]
 
+    def __iter__(self) -> Iterator[str]:
+        """Names of the types of a mixed population."""
+        return iter(self.parts)
+
     def __len__(self) -> int:
         return len(self.positions_mm)
 
@@ -227,10 +216,10 @@ class Population:
         columns: Count = 6,
         centre_mm: Pair | None = None,
         afferent: AnyAfferent | None = None,
-        finger: HasContact | None = None,
+        finger: Any = None,
         depth_mm: Positive | None = None,
     ) -> Population:
-        """Place afferents on a square lattice that is symmetric about a point.
+        """Place afferents on a square lattice that is symmetric about a point, ordered by x, then by z.
 
         The paper's 18 receptors are 3 along the finger by 6 across; it draws 9 of them, because of symmetry.
 
@@ -249,11 +238,6 @@ class Population:
             pad of the paper's finger, and `respond` moves it to that of the finger that is touched.
         depth_mm : float, optional
             As in `Population`. [mm]
-
-        Returns
-        -------
-        Population
-            Ordered by x, then by z.
 
         Examples
         --------
@@ -350,12 +334,9 @@ class Population:
 
         Examples
         --------
-        >>> from fingerpad.core.regions import Ellipse, Rectangle
+        >>> from fingerpad.core.regions import Ellipse
         >>> Population.at_densities(Ellipse(5.0, 5.0, centre_mm=(17.37, 0.0)), seed=1)
         Population(55 SAI, 110 RA, 16 PC, 8 SAII)
-        >>> square = Rectangle(10.0, 10.0, centre_mm=(17.0, 0.0))
-        >>> len(Population.at_densities(square, {"RA": 140.0, "PC": 20.0}))
-        160
         """
         # Files of touches load this module, and only a layout at random needs that one.
         from fingerpad.core.regions import poisson_disc
@@ -381,27 +362,7 @@ class Population:
         return cls.mixed(parts)
 
     def on(self, skin: object) -> Population:
-        """Return this population as it lies on the finger of a skin.
-
-        Parameters
-        ----------
-        skin
-            Its `pad_mm` is the middle of the pad, as of a `SkinResponse`; a skin without one moves nothing.
-
-        Returns
-        -------
-        Population
-            Moved, if it has a `centre_mm` and no end organs of its own, to the middle of the pad.
-
-        Examples
-        --------
-        >>> class Child:
-        ...     pad_mm = 13.0, 0.0
-        >>> Population.grid(rows=1, columns=1).on(Child()).positions_mm.tolist()
-        [[13.0, 0.0]]
-        >>> Population.grid(rows=1, columns=1, centre_mm=(17.0, 0.0)).on(Child()).positions_mm.tolist()
-        [[17.0, 0.0]]
-        """
+        """Return this population as it lies on a skin: about its `pad_mm`, if it has a `centre_mm`."""
         if self.parts:
             return self.mixed({name: part.on(skin) for name, part in self.parts.items()})
         pad_mm = getattr(skin, "pad_mm", None)
@@ -421,11 +382,6 @@ class Population:
             Any object with `sed(sites)`, such as a solved indentation.
         dynamic_window_ms, static_window_ms : (float, float), optional
             Windows of the two firing rates, by default as of `Afferent.rates`. [ms]
-
-        Returns
-        -------
-        ResponseMap
-            Spikes, rates and first-spike latencies of each receptor.
 
         Warns
         -----
@@ -491,15 +447,7 @@ class Population:
     def respond_to(
         self, traces: Traces, dynamic_window_ms: Window | None = None, static_window_ms: Window | None = None
     ) -> ResponseMap:
-        """Simulate each afferent of a population of one type under traces that are known already.
-
-        Parameters
-        ----------
-        traces : Traces
-            Traces of `quantities` at `sites_mm`.
-        dynamic_window_ms, static_window_ms : (float, float), optional
-            As in `respond`. [ms]
-        """
+        """Simulate each afferent of a population of one type under known traces of `quantities`."""
         if self.parts:
             raise InputError(
                 "traces", "must be of one type of afferents", remedy="give those of population[type]"

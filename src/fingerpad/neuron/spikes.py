@@ -131,8 +131,3 @@ def modulation_index(largest_hz: ArrayLike, smallest_hz: ArrayLike) -> FloatArra
     largest, smallest = np.asarray(largest_hz, np.float64), np.asarray(smallest_hz, np.float64)
     difference, total = largest - smallest, largest + smallest
     return np.divide(difference, total, out=np.full(np.shape(total), np.nan), where=total != 0.0)
-
-
-def modulation_difference(largest_hz: ArrayLike, smallest_hz: ArrayLike) -> FloatArray:
-    """Difference R_max - R_min, which the text of the paper calls modulation index."""
-    return np.asarray(largest_hz, np.float64) - np.asarray(smallest_hz, np.float64)

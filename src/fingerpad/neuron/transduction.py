@@ -19,7 +19,6 @@ from itertools import pairwise
 
 import numpy as np
 from numba import njit
-from scipy.interpolate import PchipInterpolator, PPoly
 
 from fingerpad.core.checked import checked, value_class
 from fingerpad.core.errors import InputError
@@ -29,8 +28,6 @@ from fingerpad.core.values import Count, Finite, FiniteMatrix, FiniteVector, Flo
 
 PIECES_PER_INTERVAL = 32  # Largest number of linear pieces that replace the cubic between two given times.
 SHORTEST_PIECE_MS = 0.25  # Shortest linear piece: shorter intervals are divided into fewer pieces. [ms]
-
-
 SAME_COUNT = 1e-6  # Share of a piece by which an interval may be too short for one more.
 
 
@@ -96,17 +93,9 @@ class Transduction:
     static_gain: Finite
 
     def current(self, traces: Traces | Drive) -> Traces:
-        """Compute the current through the membrane at every site, Eq. 1: I = beta + k_d U' + k_s U.
+        """Compute the current through the membrane at every site, Eq. 1: I = beta + k_d U' + k_s U. [mA]
 
-        Parameters
-        ----------
-        traces : Traces or Drive
-            Traces are resampled with the defaults of `drive`.
-
-        Returns
-        -------
-        Traces
-            Of the current, which jumps where the rate jumps. [mA]
+        Traces are resampled with the defaults of `drive`. The current jumps where the rate jumps.
         """
         driven = traces if isinstance(traces, Drive) else drive(traces)
         current_ma = (
@@ -114,88 +103,30 @@ class Transduction:
         )
         return Traces(driven.times_ms, current_ma, quantity=CURRENT)
 
-    def largest_current_ma(self, traces: Traces) -> FloatArray:
-        """Bound of the current at every site, without a resampled trace.
-
-        Between two times a monotone cubic is at most as large as at one of them, and at most three times as
-        steep as the line between them.
-
-        Parameters
-        ----------
-        traces : Traces
-            As of `current`.
-
-        Returns
-        -------
-        array (n_sites,)
-            [mA]
-
-        Notes
-        -----
-        Fritsch & Carlson 1980.
-
-        Examples
-        --------
-        >>> traces = Traces([0.0, 50.0, 1000.0], [[0.0], [2.0], [2.0]], kinks_ms=[50.0])
-        >>> gains = Transduction(0.0, dynamic_gain=1e-4, static_gain=1e-6)
-        >>> gains.largest_current_ma(traces).round(9).tolist()
-        [1.4e-05]
-        """
-        slope, value = 3.0 * max(self.dynamic_gain, 0.0), self.static_gain
-        above = _largest_sum(
-            np.diff(traces.times_ms), traces.dynamic_term.values, traces.values, slope, value
-        )
-        return self.intercept_ma + above
-
-
-@njit(cache=True, error_model="numpy", nogil=True)
-def _largest_sum(lengths, dynamic, static, of_slope, of_value):  # type: ignore[no-untyped-def]
-    """Largest sum in any interval of the slope and the larger end value, each times a factor, (n_sites,)."""
-    found = np.full(static.shape[1], -np.inf)
-    for piece in range(lengths.size):
-        steep = of_slope / lengths[piece]
-        for site in range(found.size):
-            slope = abs(dynamic[piece + 1, site] - dynamic[piece, site])
-            value = max(of_value * static[piece, site], of_value * static[piece + 1, site])
-            found[site] = max(found[site], steep * slope + value)
-    return found
-
 
 @checked
 def drive(
-    traces: Traces,
-    *,
-    difference_step_ms: Positive | None = None,
-    pieces: Count = PIECES_PER_INTERVAL,
-    shortest_piece_ms: Positive = SHORTEST_PIECE_MS,
+    traces: Traces, *, pieces: Count = PIECES_PER_INTERVAL, shortest_piece_ms: Positive = SHORTEST_PIECE_MS
 ) -> Drive:
     """Resample what drives the current and compute the rate of change of its dynamic term, Eq. 2.
 
-    Each interval between two given times is divided into `pieces` equal pieces (fewer if they would be
-    shorter than `shortest_piece_ms`), on which the cubic and its derivative are replaced by linear
-    functions. The error decreases with the square of the number of pieces and is proportional to the change
-    in the interval, so long smooth intervals need no more knots than short steep ones. Twice the
-    default number moves half of the spikes of a ramp and hold of 8 + 12 steps by less than 0.005 ms, and
-    none by more than 0.1 ms (a spike whose potential hardly exceeds the threshold).
+    The rate is the limit of the printed difference, the derivative of the interpolant; it is 0 at the onset
+    and jumps there and at each kink. Each interval between two given times is divided into `pieces` equal
+    pieces (fewer if they would be shorter than `shortest_piece_ms`), on which the cubic and its derivative
+    are replaced by linear functions. The error decreases with the square of the number of pieces and is
+    proportional to the change in the interval. Twice the default number moves half of the spikes of a ramp
+    and hold of 8 + 12 steps by less than 0.005 ms, and none by more than 0.1 ms (a spike whose potential
+    hardly exceeds the threshold).
 
     Parameters
     ----------
     traces : Traces
         Its `kinks_ms` and its onset separate the phases, each with its own interpolant. The rate is
         that of the quantity of the dynamic term.
-    difference_step_ms : float, optional
-        Step h of the backward difference printed as Eq. 2 (the paper: 0.001 ms). Before the onset SED is
-        that of the onset. Default: the limit h -> 0, the derivative of the interpolant. [ms]
     pieces : int, optional
         Largest number of linear pieces per interval.
     shortest_piece_ms : float, optional
         Lower limit of the length of a piece. [ms]
-
-    Returns
-    -------
-    Drive
-        The rate is 0 at the onset and jumps there and at each kink; with `difference_step_ms`, a jump takes
-        one step.
 
     Examples
     --------
@@ -208,19 +139,12 @@ def drive(
     """
     if traces.dynamic is not None:
         static, dynamic = (
-            drive(
-                each,
-                difference_step_ms=difference_step_ms,
-                pieces=pieces,
-                shortest_piece_ms=shortest_piece_ms,
-            )
+            drive(each, pieces=pieces, shortest_piece_ms=shortest_piece_ms)
             for each in (replace(traces, dynamic=None), traces.dynamic)
         )
         return replace(static, rate_per_ms=dynamic.rate_per_ms, dynamic_quantity=dynamic.dynamic_quantity)
     spans = _between_kinks(traces)
     knots = [knots_of(traces.times_ms[first : last + 1], pieces, shortest_piece_ms) for first, last in spans]
-    if difference_step_ms is not None:
-        return _difference(traces, spans, knots, difference_step_ms)
     times = np.concatenate([traces.times_ms[:1], *knots])
     values, rates = np.empty((2, times.size, traces.n_sites))
     values[0], rates[0] = traces.values[0], 0.0
@@ -300,21 +224,3 @@ def knots_of(times_ms: FloatArray, pieces: int, shortest_piece_ms: float) -> Flo
     within = np.arange(counts.sum()) - np.repeat(np.cumsum(counts) - counts, counts)
     knots = np.repeat(times_ms[:-1], counts) + within * np.repeat(lengths / counts, counts)
     return np.append(knots, times_ms[-1])
-
-
-def _difference(
-    traces: Traces, spans: list[tuple[int, int]], knots: list[FloatArray], step_ms: float
-) -> Drive:
-    """Compute the backward difference of Eq. 2 as printed: U' = |U(t) - U(t - h)| / h."""
-    given = traces.times_ms
-    parts = [
-        PchipInterpolator(given[first : last + 1], traces.values[first : last + 1]) for first, last in spans
-    ]
-    values = PPoly(np.concatenate([part.c for part in parts], axis=1), given)
-    onset, end = given[0], given[-1]
-    # From one step after a kink on, the difference lies within one part: a knot there limits the jump.
-    settled = np.array([part.x[0] + step_ms for part in parts])
-    times = np.unique(np.concatenate([*knots, settled[settled < end]]))
-    before = np.maximum(times - step_ms, onset)
-    rates = np.abs(values(times) - values(before)) / step_ms
-    return Drive(times, values(times), rates, traces.quantity, traces.quantity, traces.phases)

@@ -57,7 +57,9 @@ def tuning_curve(
     hold: Finite = 0.0,
     impulses: Positive = 1.0,
 ) -> FloatArray:
-    """Smallest amplitude at which an afferent fires a given number of impulses per cycle.
+    """Smallest amplitude at which an afferent fires a given number of impulses per cycle. [µm]
+
+    From the middle to a peak, within 1 %, (n_frequencies,); NaN where 10 mm do not suffice.
 
     Parameters
     ----------
@@ -71,11 +73,6 @@ def tuning_curve(
         Its quantity in the hold.
     impulses : float, optional
         Impulses per cycle; 1 is entrainment, if they are equally distributed.
-
-    Returns
-    -------
-    array (n_frequencies,)
-        From the middle to a peak, within 1 %; NaN where 10 mm do not suffice. [µm]
 
     Examples
     --------

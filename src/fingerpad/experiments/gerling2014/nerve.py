@@ -39,12 +39,7 @@ from fingerpad.inference.recordings import PHASES, RateRecordings
 from fingerpad.neuron.afferent import PARAMETER_NAMES, Afferent, parameter_units
 from fingerpad.neuron.lif import membrane_potential
 from fingerpad.neuron.population import Population
-from fingerpad.neuron.spikes import (
-    PAPER_WINDOWS_MS,
-    first_spike_latency_ms,
-    modulation_difference,
-    modulation_index,
-)
+from fingerpad.neuron.spikes import PAPER_WINDOWS_MS, first_spike_latency_ms, modulation_index
 from fingerpad.neuron.transduction import drive
 from fingerpad.skin.sampling import SkinResponse
 
@@ -236,7 +231,7 @@ def _modulation(shift_mm: FloatArray, rate_hz: FloatArray) -> Modulation:
     return Modulation(
         maximum_hz=largest,
         minimum_hz=smallest,
-        difference_hz=float(modulation_difference(largest, smallest)),
+        difference_hz=float(largest - smallest),
         index=float(modulation_index(largest, smallest)) if largest > 0.0 else np.nan,
     )
 
