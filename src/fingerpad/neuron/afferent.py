@@ -112,37 +112,6 @@ class Afferent:
     two hit rates of people (`fingerpad.data.neuron`, names that begin with HUMAN). They hold for the finger
     and the tissues with which they were fitted; `for_tissues` has those of other sets.
 
-    Parameters
-    ----------
-    intercept_ma : float
-        Current without any load, beta. [mA]
-    dynamic_gain : float
-        Gain on the rate of change of what the dynamic term follows, k_d. [mA ms/kPa, or per its unit]
-    static_gain : float
-        Gain on what the static term follows, k_s. [mA/kPa, or per its unit]
-    time_constant_ms : float
-        Time constant of the membrane, tau. [ms]
-    capacitance_mf : float
-        Capacitance of the membrane, C. [mF]
-    threshold_mv : float
-        Potential that elicits a spike, v. [mV]
-    refractory_ms : float
-        Refractory period after each spike. [ms]
-    dynamic_quantity, static_quantity : str
-        What the two terms follow, by the names of `SkinResponse.sample`: compressive stress, unless another
-        one is given. The paper's is strain energy density (SED), "stored"; any other is an extension of its
-        model. The units of k_d and k_s depend on them.
-    initial_mv : float, optional
-        Potential of the membrane at the start. By default that at rest, beta tau/C, so that spikes do not
-        depend on how long nothing happened before a touch. [mV]
-    smoothing_ms : float
-        Time constant tau_s of a low pass before the dynamic term, which then follows the absolute
-        rate of S with tau_s dS/dt + S = Q; 0, as in the paper, for none. It makes an afferent right under
-        vibration: the rate of change of a fast one would otherwise make it as sensitive at 400 Hz as at
-        20 Hz. [ms]
-    type : str
-        Name of its type, of `fingerpad.data.afferents.TYPES` or of one's own.
-
     Examples
     --------
     SED rises to 2 kPa in 50 ms and stays: the rate is high in the ramp and low in the hold.
@@ -155,18 +124,28 @@ class Afferent:
 
     rate_measure: ClassVar[str] = INTERVAL  # What its rates are, as of `ResponseMap`: those of Eqs. 6-10.
 
-    intercept_ma: Finite = neuron.HUMAN_INTERCEPT.value
+    intercept_ma: Finite = neuron.HUMAN_INTERCEPT.value  # Current without any load, beta. [mA]
     dynamic_gain: Finite = neuron.HUMAN_DYNAMIC_GAIN.value
+    """Gain on the rate of change of what the dynamic term follows, k_d. [mA ms/kPa, or per its unit]"""
     static_gain: Finite = neuron.HUMAN_STATIC_GAIN.value
-    time_constant_ms: Finite = neuron.HUMAN_TIME_CONSTANT.value
-    capacitance_mf: Finite = neuron.CAPACITANCE.value
-    threshold_mv: Finite = neuron.THRESHOLD.value
-    refractory_ms: Finite = neuron.REFRACTORY.value
+    """Gain on what the static term follows, k_s. [mA/kPa, or per its unit]"""
+    time_constant_ms: Finite = neuron.HUMAN_TIME_CONSTANT.value  # Time constant of the membrane, tau. [ms]
+    capacitance_mf: Finite = neuron.CAPACITANCE.value  # Capacitance of the membrane, C. [mF]
+    threshold_mv: Finite = neuron.THRESHOLD.value  # Potential that elicits a spike, v. [mV]
+    refractory_ms: Finite = neuron.REFRACTORY.value  # Refractory period after each spike. [ms]
     dynamic_quantity: SkinQuantity = neuron.HUMAN_QUANTITY
     static_quantity: SkinQuantity = neuron.HUMAN_QUANTITY
+    """What the two terms follow, by the names of `SkinResponse.sample`: compressive stress, unless another
+    one is given. The paper's is strain energy density (SED), "stored"; any other is an extension of its
+    model. The units of k_d and k_s depend on them."""
     initial_mv: Finite | None = None
+    """Potential of the membrane at the start. By default that at rest, beta tau/C, so that spikes do not
+    depend on how long nothing happened before a touch. [mV]"""
     smoothing_ms: NotNegative = 0.0
-    type: str = "SAI"
+    """Time constant tau_s of a low pass before the dynamic term, which then follows the absolute rate of S
+    with tau_s dS/dt + S = Q; 0, as in the paper, for none. It makes an afferent right under vibration: the
+    rate of change of a fast one would otherwise make it as sensitive at 400 Hz as at 20 Hz. [ms]"""
+    type: str = "SAI"  # Name of its type, of `fingerpad.data.afferents.TYPES` or of one's own.
 
     def __post_init__(self) -> None:
         # Both stages check their parameters when they are made.

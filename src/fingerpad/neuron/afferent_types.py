@@ -219,19 +219,6 @@ def afferent_types(tissues: object = DEFAULT_TISSUES) -> dict[str, AnyAfferent]:
 class OwnAfferent:
     """An afferent of one's own: a function of the traces of the skin that returns current or spikes.
 
-    Parameters
-    ----------
-    respond : callable
-        From `Traces` of the skin, a column per site, to `Traces` of a current or to `SpikeTrains`.
-    membrane : LeakyIntegrateAndFire, optional
-        Membrane that a current charges; needed if `respond` returns a current.
-    dynamic_quantity, static_quantity : str, optional
-        What the traces hold, by the names of `SkinResponse.sample`; SED, unless another one is given.
-    rate_measure : {"interval", "count"}
-        What its rates are, as of `ResponseMap`: one over the mean interval, unless counts are wanted.
-    type : str
-        Name of the type.
-
     Examples
     --------
     One spike when strain energy density first exceeds 1 kPa:
@@ -246,11 +233,15 @@ class OwnAfferent:
     """
 
     respond: Callable[[Traces], Traces | SpikeTrains]
+    """From `Traces` of the skin, a column per site, to `Traces` of a current or to `SpikeTrains`."""
     membrane: LeakyIntegrateAndFire | None = None
+    """Membrane that a current charges; needed if `respond` returns a current."""
     dynamic_quantity: SkinQuantity = STORED_ENERGY
     static_quantity: SkinQuantity = STORED_ENERGY
+    """What the traces hold, by the names of `SkinResponse.sample`; SED, unless another one is given."""
     rate_measure: Annotated[str, choice((INTERVAL, COUNT))] = INTERVAL
-    type: str = "own"
+    """What its rates are, as of `ResponseMap`: "interval", or "count"."""
+    type: str = "own"  # Name of the type.
 
     MUST_RETURN: ClassVar[str] = "respond must return Traces of a current, or SpikeTrains, an entry per site"
 

@@ -25,15 +25,6 @@ class EndOrgans:
     What the afferent follows is the weighted sum of what its end organs follow, or what the strongest of them
     follows, as if the branch that first elicits a spike resets the others.
 
-    Parameters
-    ----------
-    positions_mm : array (n_afferents, n_ends, 2) or (n_afferents, n_ends, 3)
-        x and z of each end organ on the volar side, or x, y and z of the skin above it. [mm]
-    weights : array (n_ends,) or (n_afferents, n_ends), optional
-        Share of each end organ, not negative; those of an afferent sum to 1. Default: equal. [1]
-    combine : {"sum", "largest"}, optional
-        The weighted sum; or the largest of the quantities, each times its weight over the largest weight.
-
     Examples
     --------
     >>> ends = EndOrgans([[[17.0, 0.0], [18.0, 0.0]]], weights=[0.75, 0.25])
@@ -42,8 +33,13 @@ class EndOrgans:
     """
 
     positions_mm: Annotated[FloatArray, Check(partial(float_array, ndim=3), {})]
+    """x and z of each end organ on the volar side, or x, y and z of the skin above it, (n_afferents, n_ends,
+    2 or 3). [mm]"""
     weights: FiniteArray | None = None
+    """Share of each end organ, not negative, (n_ends,) or (n_afferents, n_ends); those of an afferent sum to
+    1. Default: equal. [1]"""
     combine: Annotated[str, choice(("sum", "largest"))] = "sum"
+    """"sum", weighted; or "largest" of the quantities, each times its weight over the largest weight."""
 
     def __post_init__(self) -> None:
         n_afferents, n_ends, columns = self.positions_mm.shape

@@ -50,15 +50,6 @@ _MOST_REFINEMENTS = 100
 class EscapeRate:
     """A leaky integrate-and-fire neuron with a soft threshold.
 
-    Parameters
-    ----------
-    membrane : LeakyIntegrateAndFire
-        Parameters of the membrane; at its threshold the hazard is 1/tau_e.
-    width : float
-        Width of the threshold over the threshold, delta/v. [1]
-    escape_ms : float, optional
-        tau_e. It can be absorbed in the threshold, docs/decisions.md#escape-rate. [ms]
-
     Examples
     --------
     >>> neuron = LeakyIntegrateAndFire(68.0, 1e-6, 50.0, 1.0)
@@ -69,9 +60,10 @@ class EscapeRate:
     [31.2, 63.4, 95.6]
     """
 
-    membrane: LeakyIntegrateAndFire
-    width: Positive
+    membrane: LeakyIntegrateAndFire  # Parameters of the membrane; at its threshold the hazard is 1/tau_e.
+    width: Positive  # Width of the threshold over the threshold, delta/v. [1]
     escape_ms: Positive = ESCAPE_TIME_MS
+    """tau_e. It can be absorbed in the threshold, docs/decisions.md#escape-rate. [ms]"""
 
     def spikes(self, current: Traces, seed: Whole, presentations: Presentations | None = None) -> SpikeTrains:
         """Simulate spike times by time rescaling, a train per presentation.

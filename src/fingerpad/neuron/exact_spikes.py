@@ -115,14 +115,10 @@ def exact_trains(
     refractory: float,
     initial: float,
 ) -> tuple[FloatArray, np.ndarray]:
-    """Compute the spike times of all neurons, neuron after neuron.
-
-    Notes
-    -----
-    All neurons are advanced over an interval before the next one begins: they share its exponential, rows of
-    `currents` are contiguous in memory, and the loops over neurons vectorise. For the same reason, spikes
-    within an interval are found in rounds of one spike per neuron, stage by stage in short loops.
-    """
+    """Compute the spike times of all neurons, neuron after neuron."""
+    # All neurons are advanced over an interval before the next one begins: they share its exponential, rows
+    # of `currents` are contiguous in memory, and the loops over neurons vectorise. For the same reason,
+    # spikes within an interval are found in rounds of one spike per neuron, stage by stage in short loops.
     n_neurons = currents.shape[1]
     potentials = initial_potentials(currents[0], tau, capacitance, threshold, initial)
     ready = np.full(n_neurons, times[0])

@@ -35,20 +35,6 @@ class LeakyIntegrateAndFire:
     When the potential reaches the threshold, a spike occurs, the potential is reset to 0 and stays there for
     the refractory period.
 
-    Parameters
-    ----------
-    time_constant_ms : float
-        Time constant of the leak, tau = R C, Eq. 3. [ms]
-    capacitance_mf : float
-        Capacitance of the membrane, C. [mF]
-    threshold_mv : float
-        Potential that elicits a spike, v. [mV]
-    refractory_ms : float
-        Refractory period after each spike. [ms]
-    initial_mv : float, optional
-        Potential at the first time. By default that at rest: the first current is taken to have flowed for
-        long, so that the spikes do not depend on how long nothing happened. The paper starts at 0. [mV]
-
     Examples
     --------
     A constant current of 2 µA charges at 2 mV/ms minus the leak and reaches 50 mV every 32 ms.
@@ -59,11 +45,13 @@ class LeakyIntegrateAndFire:
     [31.165, 63.33, 95.495]
     """
 
-    time_constant_ms: Positive
-    capacitance_mf: Positive
-    threshold_mv: Positive
-    refractory_ms: Positive
+    time_constant_ms: Positive  # Time constant of the leak, tau = R C, Eq. 3. [ms]
+    capacitance_mf: Positive  # Capacitance of the membrane, C. [mF]
+    threshold_mv: Positive  # Potential that elicits a spike, v. [mV]
+    refractory_ms: Positive  # Refractory period after each spike. [ms]
     initial_mv: Finite | None = None
+    """Potential at the first time. By default that at rest: the first current is taken to have flowed for
+    long, so that the spikes do not depend on how long nothing happened. The paper starts at 0. [mV]"""
 
     def __post_init__(self) -> None:
         if self.initial_mv is not None and self.initial_mv >= self.threshold_mv:

@@ -91,41 +91,29 @@ class Population:
     """Afferents at different positions of the skin, with their sensitivities and end organs.
 
     All are of one type, unless the population was made by `mixed` or `at_densities`.
-
-    Parameters
-    ----------
-    positions_mm : array (n_receptors, 2) or (n_receptors, 3)
-        x (distal positive) and z (lateral) of each end organ on the volar side, or x, y and z of the skin
-        above it on any side. [mm]
-    pitch_mm : float
-        Distance between neighbours of the layout. [mm]
-    afferent : AnyAfferent, optional
-        All afferents: `Afferent()` (SAI), `RA()`, `PC()`, `SAII()` or an `OwnAfferent`.
-    sensitivity : array (n_receptors,), optional
-        Factor of each afferent on what it follows, as from `sensitivities`; default: 1. [1]
-    places_mm : array (n_receptors, 2), optional
-        Positions in the plane of the layout, by which neighbours are found; default: x and z. [mm]
-    ends : EndOrgans, optional
-        Several end organs of each afferent; by default it has one, at its position.
-    centre_mm : (float, float), optional
-        Middle of the pad about which the positions lie, if they follow the finger that is touched: `on` moves
-        them to the middle of its pad. By default they stay. [mm]
-    depth_mm : float, optional
-        Depth of the end organs below the skin; by default the border of epidermis and dermis. Quantities of
-        the tissue other than strain energy density are kept at the depths that `indent` was given. [mm]
-    parts : mapping of str to Population
-        Of a mixed population, the afferents of each type, which follow each other; from `mixed`.
     """
 
     positions_mm: FiniteMatrix
-    pitch_mm: Positive
+    """x (distal positive) and z (lateral) of each end organ on the volar side, or x, y and z of the skin
+    above it on any side, (n_receptors, 2 or 3). [mm]"""
+    pitch_mm: Positive  # Distance between neighbours of the layout. [mm]
     afferent: SkipValidation[AnyAfferent] = field(default_factory=Afferent)
+    """All afferents: `Afferent()` (SAI), `RA()`, `PC()`, `SAII()` or an `OwnAfferent`."""
     sensitivity: FiniteVector | None = None
+    """Factor of each afferent on what it follows, as from `sensitivities`, (n_receptors,); default: 1. [1]"""
     places_mm: FiniteMatrix | None = None
+    """Positions in the plane of the layout, by which neighbours are found, (n_receptors, 2); default: x and
+    z. [mm]"""
     ends: EndOrgans | None = None
+    """Several end organs of each afferent; by default it has one, at its position."""
     centre_mm: Pair | None = None
+    """Middle of the pad about which the positions lie, if they follow the finger that is touched: `on` moves
+    them to the middle of its pad. By default they stay. [mm]"""
     depth_mm: Positive | None = None
+    """Depth of the end organs below the skin; by default the border of epidermis and dermis. Quantities of
+    the tissue other than strain energy density are kept at the depths that `indent` was given. [mm]"""
     parts: Mapping[str, Population] = field(default_factory=lambda: MappingProxyType({}))
+    """Of a mixed population, the afferents of each type, which follow each other; from `mixed`."""
 
     def __post_init__(self) -> None:
         positions, factors = self.positions_mm, self.sensitivity
@@ -285,20 +273,13 @@ class Population:
         if not parts:
             raise InputError("parts", "must hold at least one Population", "none")
         several = list(parts.values())
-        factors = [part.sensitivity for part in several]
-        unequal = any(each is not None for each in factors)
+        factors = [np.ones(len(part)) if part.sensitivity is None else part.sensitivity for part in several]
+        unequal = any(part.sensitivity is not None for part in several)
         return cls(
             np.concatenate([part.positions_mm for part in several]),
             min(part.pitch_mm for part in several),
             several[0].afferent,
-            np.concatenate(
-                [
-                    np.ones(len(part)) if each is None else each
-                    for part, each in zip(several, factors, strict=True)
-                ]
-            )
-            if unequal
-            else None,
+            np.concatenate(factors) if unequal else None,
             np.concatenate([np.asarray(part.places_mm) for part in several]),
             parts=MappingProxyType(dict(parts)),
         )

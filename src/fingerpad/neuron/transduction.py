@@ -69,15 +69,6 @@ class Drive:
 class Transduction:
     """Gains that transform strain energy density (SED) to membrane current.
 
-    Parameters
-    ----------
-    intercept_ma : float
-        Current without any load, beta. [mA]
-    dynamic_gain : float
-        Gain on the rate of change of SED, or of another quantity, k_d. [mA ms/kPa, or per its unit]
-    static_gain : float
-        Gain on SED itself, or on another quantity, k_s. [mA/kPa, or per its unit]
-
     Examples
     --------
     SED rises by 2 kPa in 50 ms and stays: the current jumps, grows, drops and stays.
@@ -88,9 +79,10 @@ class Transduction:
     ['0.0e+00', '4.0e-06', '6.0e-06', '2.0e-06', '2.0e-06']
     """
 
-    intercept_ma: Finite
+    intercept_ma: Finite  # Current without any load, beta. [mA]
     dynamic_gain: Finite
-    static_gain: Finite
+    """Gain on the rate of change of SED, or of another quantity, k_d. [mA ms/kPa, or per its unit]"""
+    static_gain: Finite  # Gain on SED itself, or on another quantity, k_s. [mA/kPa, or per its unit]
 
     def current(self, traces: Traces | Drive) -> Traces:
         """Compute the current through the membrane at every site, Eq. 1: I = beta + k_d U' + k_s U. [mA]

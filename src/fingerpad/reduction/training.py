@@ -139,31 +139,20 @@ class Axis:
 class ReducedRange:
     """Poses that a reduced touch serves.
 
-    Parameters
-    ----------
-    depth_mm : float
-        Largest depth below first touch at any pose. [mm]
-    x_mm, z_mm : (float, float), optional
-        Ways of the indenter along and across the finger, from the place of the touch. [mm]
-    tilt_deg : (float, float), optional
-        Tilt, added to that of the touch. [degrees]
-    parameter : str, optional
-        A parameter of the indenter that varies, such as "curvature_per_m" of a `Sphere`.
-    values : (float, float), optional
-        Its range.
-
     Examples
     --------
     >>> [axis.name for axis in ReducedRange(1.5, x_mm=(-3.0, 3.0)).axes if axis.count > 1]
     ['x_mm']
     """
 
-    depth_mm: Positive
+    depth_mm: Positive  # Largest depth below first touch at any pose. [mm]
     x_mm: Pair = (0.0, 0.0)
     z_mm: Pair = (0.0, 0.0)
-    tilt_deg: Pair = (0.0, 0.0)
+    """Ways of the indenter along and across the finger, from the place of the touch. [mm]"""
+    tilt_deg: Pair = (0.0, 0.0)  # Tilt, added to that of the touch. [degrees]
     parameter: str | None = None
-    values: Pair | None = None
+    """A parameter of the indenter that varies, such as "curvature_per_m" of a `Sphere`."""
+    values: Pair | None = None  # Its range.
 
     def __post_init__(self) -> None:
         for name in SPACING:
@@ -209,24 +198,13 @@ class TrainingPose:
 
 @value_class
 class ReducedTraining:
-    """All presses behind a reduced touch.
-
-    Parameters
-    ----------
-    touch : Touch
-        What is reduced: its finger, indenter, tissues, place, direction and friction, not its motion.
-    range : ReducedRange
-        The poses.
-    resolution : {"quick", "standard", "paper"}
-        How fine the mesh is.
-    grading : Grading, optional
-        Mesh instead of that which the resolution grades over the range.
-    """
+    """All presses behind a reduced touch."""
 
     touch: Touch
-    range: ReducedRange
+    """What is reduced: its finger, indenter, tissues, place, direction and friction, not its motion."""
+    range: ReducedRange  # The poses.
     resolution: Annotated[str, choice(RESOLUTIONS)] = "quick"
-    grading: Grading | None = None
+    grading: Grading | None = None  # Mesh instead of that which the resolution grades over the range.
 
     def __post_init__(self) -> None:
         touch = instance("touch", self.touch, Touch)
