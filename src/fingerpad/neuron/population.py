@@ -336,10 +336,9 @@ class Population:
                     f"{', '.join(known)}; give one in afferents={{{name!r}: ...}}."
                 )
             positive(f"densities_per_cm2[{name!r}] of a type that is not left out", density, "1/cm2")
-            afferent = checked_afferent(known[name])
             layout = poisson_disc(region, density, seed=seed_of(seed, number))
             unequal = sensitivities(len(layout), spread, seed_of(seed, number)) if spread else None
-            parts[name] = cls.of_layout(layout, place, afferent, unequal)
+            parts[name] = cls.of_layout(layout, place, known[name], unequal)
         return cls.mixed(parts)
 
     def on(self, skin: object) -> Population:
