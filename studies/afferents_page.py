@@ -107,7 +107,7 @@ def slow_ramp() -> SkinResponse:
 def linear_response(name: str, afferent: AnyAfferent) -> tuple[float, float]:
     """Return the hold and the change per µm of what a type follows, at its most sensitive place."""
     skin = step_on_hold()
-    values = skin.sample(afferent.static_quantity, [(X_MM, SITES[name])])[:, 0]
+    values = skin.sample(afferent.static_quantity, [(X_MM, SITES.get(name, 0.0))])[:, 0]
     at = [int(np.argmin(np.abs(skin.times_ms - time_ms))) for time_ms in (600.0, 601.0, 603.0)]
     return float(values[at[0]]), float((values[at[1]] - values[at[2]]) / 20.0)
 
@@ -238,7 +238,7 @@ def fields() -> None:
     )
     rows = []
     for name, units in (("RA", published.RA_VELOCITIES), ("PC", published.PC_VELOCITIES)):
-        slowest = velocity_threshold(afferent_types()[name], SITES[name])
+        slowest = velocity_threshold(afferent_types()[name], SITES.get(name, 0.0))
         rows.append([name, f"{slowest:.1f}", "{:g} to {:g}".format(*units.value)])
     _write_table("velocity", ["type", "model [mm/s]", "units [mm/s]"], rows)
     rows, areas_of = [], {}
