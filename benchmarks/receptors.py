@@ -23,8 +23,7 @@ def respond(receptors: int) -> dict[str, Any]:
     dict
         By kind of site, seconds of `Population.respond`, those of `SkinResponse.sed` in it, and spikes.
     """
-    from fingerpad.core.layouts import MM2_PER_CM2
-    from fingerpad.core.regions import hexagonal
+    from fingerpad.core.regions import MM2_PER_CM2, hexagonal
     from fingerpad.geometry.fingertip import Fingertip
     from fingerpad.neuron.population import Population
     from fingerpad.skin.unrolled_skin import UnrolledSkin

@@ -84,7 +84,7 @@ def test_a_command_needs_half_of_the_package_at_most(command):
 
 def test_a_command_loads_what_its_options_need_when_they_are_given():
     """The likelihood of spikes, the uncertainty of a fit and regions of the skin are loaded on demand."""
-    late = ("inference.spike_likelihood", "inference.fitting.posterior", "skin.unrolled_skin", "core.regions")
+    late = ("inference.spike_likelihood", "inference.fitting.posterior", "skin.unrolled_skin")
     loading = "import sys, fingerpad.experiments.fit.request, fingerpad.experiments.discrimination.request; "
     stated = f"{loading}print(*[name for name in {late!r} if 'fingerpad.' + name in sys.modules])"
     done = subprocess.run([sys.executable, "-c", stated], capture_output=True, text=True, check=True)

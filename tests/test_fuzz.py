@@ -20,10 +20,9 @@ from hypothesis import strategies as st
 
 import fingerpad as fp
 from fingerpad.cli import main
-from fingerpad.core.layouts import Layout
 from fingerpad.core.phases import Phase
 from fingerpad.core.plain_yaml import read_yaml
-from fingerpad.core.regions import Polygon, Rectangle
+from fingerpad.core.regions import Layout, Polygon, Rectangle
 from fingerpad.core.signals import HitRates
 from fingerpad.experiments.conditions import Conditions
 from fingerpad.experiments.discrimination.request import example_tasks

@@ -10,8 +10,16 @@ from numpy.testing import assert_allclose, assert_array_equal
 from scipy.stats import chisquare, kstest
 
 from fingerpad import Ellipse, Population, hexagonal, poisson_disc
-from fingerpad.core.layouts import PATTERNS, Layout
-from fingerpad.core.regions import MOST_RECEPTORS, Polygon, Rectangle, jittered, rectangular, uniform
+from fingerpad.core.regions import (
+    MOST_RECEPTORS,
+    PATTERNS,
+    Layout,
+    Polygon,
+    Rectangle,
+    jittered,
+    rectangular,
+    uniform,
+)
 from refusals import refusals
 
 PAD = Ellipse(6.0, 5.0, (17.0, 0.5))

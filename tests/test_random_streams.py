@@ -94,7 +94,7 @@ KEY = {"seed": 1, "trials": 1, "receptors": 1, "purpose": Purpose.GAIN, "count":
 
 test_a_key_is_made_of_whole_numbers = refusals(
     ({"seed": -1}, "seed must be a whole number of at least 0"),
-    ({"seed": 2**63}, "seed must not exceed"),
+    ({"seed": 2**63}, "seed must be at most"),
     ({"seed": 0.5}, ("seed",)),
     ({"trials": 0}, "trials must be a whole number of at least 1"),
     ({"trials": [-1]}, ("trials",)),

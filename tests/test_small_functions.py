@@ -21,9 +21,9 @@ SILENT = [[20.0, np.nan], [30.0, 40.0]]
 COURSE = np.array([[0.0], [0.9], [2.0], [2.0]])
 
 NUMBERS = [
-    ("core.layouts:mean_spacing_mm", (25.0,), 2.0),
-    ("core.layouts:around_zero", (2,), [-0.5, 0.5]),
-    ("core.layouts:around_zero", (3,), [-1.0, 0.0, 1.0]),
+    ("core.regions:mean_spacing_mm", (25.0,), 2.0),
+    ("core.regions:around_zero", (2,), [-0.5, 0.5]),
+    ("core.regions:around_zero", (3,), [-1.0, 0.0, 1.0]),
     ("core.threads:even_chunks", (300,), [(0, 128), (128, 256), (256, 300)]),
     ("core.threads:run_kernel", (lambda size, first, last: size * (last - first), 200, 10), [1280, 720]),
     ("experiments.gerling2014.percept:goodwin_misfit", (np.array([0.58, 0, 0, 0, 0, 0.93]),), 0.0141),

@@ -214,7 +214,7 @@ def _drawn(
     shape = *pairs[0].shape, whole("count", count, 0, MOST_NUMBERS // max(pairs[0].size, 1))
     numbers = np.empty((pairs[0].size, shape[-1]))
     key = (
-        _number("seed", seed),
+        whole("seed", seed, 0, LARGEST_SEED),
         pairs[0].ravel(),
         pairs[1].ravel(),
         int(instance("purpose", purpose, Purpose)),
@@ -244,11 +244,4 @@ def numbered(name: str, which: Numbers) -> IntArray:
         return np.arange(whole(name, which, 1, MOST_NUMBERS), dtype=np.int64)
     if isinstance(which, np.ndarray) and np.issubdtype(which.dtype, np.integer) and which.min(initial=0) >= 0:
         return which.astype(np.int64)
-    return np.array([_number(name, number) for number in which], dtype=np.int64)
-
-
-def _number(name: str, value: int) -> int:
-    number = whole(name, value, 0)
-    if number > LARGEST_SEED:
-        raise InputError(name, f"must not exceed {LARGEST_SEED}", str(number))
-    return number
+    return np.array([whole(name, number, 0, LARGEST_SEED) for number in which], dtype=np.int64)

@@ -10,28 +10,66 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from typing import Protocol, runtime_checkable
+from typing import Annotated, Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.spatial import cKDTree
 
 from fingerpad.core.checked import checked, value_class
 from fingerpad.core.errors import ConvergenceError, InputError
-from fingerpad.core.layouts import MM2_PER_CM2, MOST_RECEPTORS, Layout, Place, around_zero, mean_spacing_mm
 from fingerpad.core.random_streams import Purpose, normals, uniforms
 from fingerpad.core.values import (
     Finite,
+    FiniteMatrix,
     FloatArray,
     NotNegative,
+    NotNegativeWhole,
     Pairs,
     Positive,
     Whole,
+    choice,
     float_array,
     positive,
 )
 
 Point = tuple[float, float]
+
+Place = Callable[[FloatArray], FloatArray]
+"""From positions in the plane (n, 2) to points of the skin (n, 3), both in mm."""
+
+PATTERNS = ("rectangular", "hexagonal", "uniform", "jittered", "poisson-disc")
+"""Names of layouts, those of the functions below that make them."""
+
+MM2_PER_CM2 = 100.0
+MOST_RECEPTORS = 1_000_000  # Upper limit, to detect a wrong unit: the whole finger has some thousands.
+
+
+@value_class
+class Layout:
+    """Positions of receptors in a plane."""
+
+    places_mm: FiniteMatrix  # In the plane of the region, (n_receptors, 2). [mm]
+    pitch_mm: Positive  # Distance of neighbours in a lattice; 1/sqrt(density) in a random layout. [mm]
+    pattern: Annotated[str, choice(PATTERNS)]
+    seed: NotNegativeWhole | None = None  # Seed of random positions; None for a lattice.
+
+    def __post_init__(self) -> None:
+        if self.places_mm.shape[1] != 2 or len(self.places_mm) == 0:
+            raise InputError("places_mm", "must have rows of two numbers", f"shape {self.places_mm.shape}")
+
+    def __len__(self) -> int:
+        return len(self.places_mm)
+
+
+def mean_spacing_mm(density_per_cm2: float) -> float:
+    """Side of the square with the area per receptor, 1/sqrt(density). [mm]"""
+    return math.sqrt(MM2_PER_CM2 / density_per_cm2)
+
+
+def around_zero(count: int) -> FloatArray:
+    """Positions of `count` points with unit distance, centred on 0, (count,)."""
+    return np.arange(count, dtype=np.float64) - 0.5 * (count - 1)
+
 
 _ROUND_OFF = 1e-9  # Tolerance for points on the border of a region, over its size, because of round-off.
 
@@ -311,6 +349,7 @@ def poisson_disc(
     Examples
     --------
     >>> random = poisson_disc(Rectangle(8.0, 8.0), density_per_cm2=100.0, seed=7)
+    >>> from scipy.spatial import cKDTree
     >>> nearest_mm, _ = cKDTree(random.places_mm).query(random.places_mm, k=[2])
     >>> len(random), bool(nearest_mm.min() >= 0.75)
     (64, True)
@@ -345,6 +384,8 @@ def poisson_disc(
 
 def _apart(settled: FloatArray, candidates: FloatArray, least: float) -> np.ndarray:
     """Candidates that have the least distance from placed receptors and from earlier candidates."""
+    from scipy.spatial import cKDTree  # loads for a while, and most layouts do without
+
     free = np.ones(len(candidates), dtype=bool)
     if len(settled) and len(candidates):
         distance, _ = cKDTree(settled).query(candidates, distance_upper_bound=least)

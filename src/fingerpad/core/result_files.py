@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, Protocol, TypeVar, runtime_checkable
+from typing import Any, TypeVar
 
 import fastjsonschema
 from pydantic import TypeAdapter, ValidationError
@@ -15,21 +15,6 @@ from fingerpad.core.files import LARGEST_TEXT_MB, check_file, write_atomically
 from fingerpad.core.values import JsonSchema
 
 _Kind = TypeVar("_Kind")
-
-
-@runtime_checkable
-class ResultFile(Protocol):
-    """Results that are a file of their own: both fields are literals with a default."""
-
-    @property
-    def format(self) -> str:
-        """Name of the format; the schema of that name lies in the package."""
-        ...
-
-    @property
-    def format_version(self) -> int:
-        """Raised when a reader of the version before would not understand the file."""
-        ...
 
 
 def to_json(result: Any, indent: int | None = 1) -> bytes:
@@ -54,7 +39,7 @@ def schema_of(cls: type) -> JsonSchema:
     )
 
 
-def write_results(path: Path, results: ResultFile, schema: JsonSchema) -> None:
+def write_results(path: Path, results: Any, schema: JsonSchema) -> None:
     """Write a file of results atomically."""
     content = to_json(results)
     check_schema(path, json.loads(content), schema)
@@ -107,6 +92,6 @@ def _json_of_format(path: Path, versions: Mapping[str, int]) -> tuple[bytes, dic
 
 
 def file_format(cls: Any) -> tuple[str, int]:
-    """Format and version that a class of result files declares."""
+    """Format and version of a class of results that are a file: literals, each with a default."""
     declared = cls.__dataclass_fields__
     return declared["format"].default, declared["format_version"].default

@@ -10,8 +10,8 @@ from numpy.typing import ArrayLike
 
 from fingerpad.core.checked import value_class
 from fingerpad.core.errors import InputError
-from fingerpad.core.layouts import Place
 from fingerpad.core.random_streams import Purpose, uniforms
+from fingerpad.core.regions import Place
 from fingerpad.core.signals import Traces
 from fingerpad.core.values import Check, Count, FiniteArray, FloatArray, Positive, Whole, choice, float_array
 

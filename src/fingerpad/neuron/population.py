@@ -15,8 +15,8 @@ from pydantic import SkipValidation
 
 from fingerpad.core.checked import checked, value_class
 from fingerpad.core.errors import InputError, TissuesWarning, level_of_caller, shown
-from fingerpad.core.layouts import MOST_RECEPTORS, Layout, Place, around_zero
 from fingerpad.core.random_streams import Purpose, normals, seed_of
+from fingerpad.core.regions import MOST_RECEPTORS, Layout, Place, around_zero
 from fingerpad.core.signals import INTERVAL, ResponseMap, Skin, Traces, traces_below
 from fingerpad.core.values import (
     Count,
@@ -172,7 +172,7 @@ class Population:
         Parameters
         ----------
         layout : Layout
-            From `fingerpad.core.layouts`.
+            From `fingerpad.core.regions`.
         place : callable, optional
             From positions in the plane of the layout (n, 2) to points of the skin (n, 3), such as
             `UnrolledSkin.points`; by default the plane is x and z, the volar view of the skin.

@@ -24,8 +24,8 @@ from scipy.spatial import Delaunay, QhullError, cKDTree
 
 from fingerpad.core.checked import checked
 from fingerpad.core.errors import InputError
-from fingerpad.core.layouts import PATTERNS
 from fingerpad.core.random_streams import LARGEST_SEED, Purpose, four_normals, normals
+from fingerpad.core.regions import PATTERNS
 from fingerpad.core.signals import ResponseMap
 from fingerpad.core.threads import in_blocks
 from fingerpad.core.values import (
@@ -118,7 +118,7 @@ def delaunay_pairs(positions_mm: ArrayLike, pitch_mm: Positive) -> np.ndarray:
 def neighbours_of(
     places_mm: ArrayLike, pitch_mm: Finite, pattern: Annotated[str, choice(PATTERNS)]
 ) -> np.ndarray:
-    """Find the pairs of neighbours in a layout of any pattern of `fingerpad.core.layouts`."""
+    """Find the pairs of neighbours in a layout of any pattern of `fingerpad.core.regions`."""
     if pattern in _LATTICE_NEIGHBOURS:
         return neighbour_pairs(places_mm, pitch_mm, _LATTICE_NEIGHBOURS[pattern])
     return delaunay_pairs(places_mm, pitch_mm)

@@ -6,7 +6,7 @@ import hashlib
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property, lru_cache
-from typing import TYPE_CHECKING, Annotated, Any, Protocol, cast, runtime_checkable
+from typing import TYPE_CHECKING, Annotated, Any, TypeAlias, cast
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -43,34 +43,15 @@ if TYPE_CHECKING:
 
     from fingerpad.geometry.free_mesh import FreeMesh
     from fingerpad.mechanics.press import Deformation
+    from fingerpad.skin.free_receptors import FreeReceptors
     from fingerpad.skin.indentation import Touch
 else:  # both are set by a press alone, whose modules a stored touch does not need
     Deformation = Touch = Any
 
 
+Receptors: TypeAlias = "ReceptorSheet | FreeReceptors"  # Places of end organs in a mesh, and values there.
+
 _PLACES_KEPT = 4  # Sets of sites whose end organs are remembered.
-
-
-@runtime_checkable
-class Receptors(Protocol):
-    """Places of end organs in a mesh, and values there."""
-
-    @property
-    def mesh(self) -> Mesh:
-        """The undeformed body."""
-        ...
-
-    def below(self, sites_mm: FloatArray) -> Any:
-        """Find end organs below points of the skin (n, 3), or by their x and z on the volar side (n, 2)."""
-        ...
-
-    def at(self, sites_mm: FloatArray, depth_mm: FloatArray) -> list[Part]:
-        """Find end organs at a depth each, as of `below`."""
-        ...
-
-    def read(self, places: Any, values: FloatArray) -> FloatArray:
-        """Interpolate values of the elements in which places were found, (n_times, n_elements)."""
-        ...
 
 
 @value_class

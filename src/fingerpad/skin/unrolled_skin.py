@@ -37,8 +37,7 @@ from scipy.interpolate import CubicSpline
 
 from fingerpad.core.checked import value_class
 from fingerpad.core.errors import InputError
-from fingerpad.core.layouts import Layout, mean_spacing_mm
-from fingerpad.core.regions import Polygon, rows_of
+from fingerpad.core.regions import Layout, Polygon, mean_spacing_mm, rows_of
 from fingerpad.core.values import (
     Count,
     Finite,

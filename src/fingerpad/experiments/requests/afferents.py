@@ -13,8 +13,8 @@ from pydantic import BeforeValidator, Discriminator, Field, Strict, Tag
 
 from fingerpad.core.errors import InputError, StoreError, shown
 from fingerpad.core.files import read_text
-from fingerpad.core.layouts import PATTERNS, Layout
 from fingerpad.core.random_streams import seed_of
+from fingerpad.core.regions import PATTERNS, Layout
 from fingerpad.core.signals import ResponseMap, Skin
 from fingerpad.core.values import Count, Finite, IntArray, NotNegative, Pair, Positive, Seed, Text, choice
 from fingerpad.data import psychophysics

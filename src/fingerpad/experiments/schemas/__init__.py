@@ -12,7 +12,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:  # the help of commands needs schemas alone
-    from fingerpad.core.result_files import ResultFile
     from fingerpad.core.values import JsonSchema
 
 
@@ -41,7 +40,7 @@ def file_name(file_format: str) -> str:
     return file_format.replace(" ", "-") + ".schema.json"
 
 
-def write(path: Path, results: ResultFile) -> None:
+def write(path: Path, results: Any) -> None:
     """Write a file of results that meets the schema of its format."""
     from fingerpad.core.result_files import write_results
 
