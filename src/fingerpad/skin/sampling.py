@@ -229,17 +229,9 @@ class SkinResponse(Result):
         return "" if self.touch is None else name_of_tissues(self.touch.tissues)
 
     def at_end(self, quantity: str) -> tuple[str, FloatArray]:
-        """Return a quantity that drives afferents in all elements at the last time, and its name.
+        """Return a quantity of `sample` in words, and its values in all elements at the last time. [kPa]
 
-        Parameters
-        ----------
-        quantity : str
-            As of `sample`. Strain energy density stands for quantities that are not kept in all elements.
-
-        Returns
-        -------
-        str, array (n_elements,)
-            In words, and values. [kPa]
+        Strain energy density stands for quantities that are not kept in all elements.
         """
         kept = {"von_mises": "von_mises_kpa", "compressive_stress": "compressive_stress_kpa"}
         last = kept.get(quantity, "")

@@ -138,24 +138,12 @@ class Store:
         return {path: touch for path, touch in wanted.items() if not _is_whole(path)}
 
     def save(self, touch: Touch, response: SkinResponse) -> None:
-        """Write an indentation, as a whole or not at all.
-
-        Raises
-        ------
-        StoreError
-            If the folder cannot be written.
-        """
+        """Write an indentation, as a whole or not at all; `StoreError` if the folder cannot be written."""
         path = self.path(touch)
         write_atomically(path, _packed(response, path.stem))
 
     def load(self, touch: Touch) -> SkinResponse:
-        """Read an indentation.
-
-        Raises
-        ------
-        StoreError
-            If its file is missing, or is not what it was when it was written.
-        """
+        """Read an indentation; `StoreError` if its file is missing or not what it was when it was written."""
         path = self.path(touch)
         try:
             content = _unpacked(path)
@@ -171,13 +159,7 @@ class Store:
             ) from error
 
     def files(self) -> list[StoredFile]:
-        """Describe the files of the store, the oldest first.
-
-        Raises
-        ------
-        StoreError
-            If the folder cannot be read.
-        """
+        """Describe the files of the store, the oldest first; `StoreError` if the folder cannot be read."""
         try:
             found = [(path, path.stat()) for path in sorted(self.folder.glob(f"*{SUFFIX}"))]
         except OSError as error:
