@@ -117,9 +117,8 @@ class Result(Displayed):
         found: dict[str, Variable] = {}
         for name, values in self.columns().items():
             column = np.asarray(values)
-            column = (
-                column.astype(object) if column.dtype.kind == "U" else column
-            )  # as formats of files have texts
+            if column.dtype.kind == "U":  # as formats of files have texts
+                column = column.astype(object)
             number = column.dtype.kind in "fiu"
             unit = QUANTITY_UNITS.get(str(name).removesuffix("_error")) or unit_of(str(name))
             found[str(name)] = (("row",), column, {"units": udunits(unit)} if number else {})

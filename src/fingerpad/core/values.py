@@ -376,8 +376,6 @@ Pairs = Annotated[tuple[tuple[float, float], ...], entries(_PAIR)]
 Many = Annotated[tuple[_Entry, ...], Strict(False)]  # From any sequence, such as a list.
 Outlines = Annotated[tuple[tuple[tuple[float, float], ...], ...], entries(entries(_PAIR))]
 
-Points = Annotated[tuple[tuple[float, float, float], ...], entries(entries(_NUMBER, 3))]
-
 SizeMm = Annotated[float, limits(0.01, 400.0)]  # Width or diameter of a body that presses a fingertip.
 PointsMm = Annotated[FloatArray, Check(points, {"type": "array"})]
 TimesMs = Annotated[FloatArray, Check(increasing, {"type": "array", "items": {"type": "number"}})]
@@ -388,7 +386,7 @@ Indices = Annotated[IntArray, Check(partial(int_array, ndim=1), {"type": "array"
 FiniteMatrix = Annotated[FloatArray, Check(partial(float_array, ndim=2), {"type": "array"})]
 
 
-def _array(dtype: type, ndim: int | None, item: str) -> Check:
+def _array(dtype: type, ndim: int, item: str) -> Check:
     """Check of a read-only array of a result, where NaN is null in a file."""
 
     def check(name: str, value: Any) -> NDArray[Any]:
@@ -396,7 +394,7 @@ def _array(dtype: type, ndim: int | None, item: str) -> Check:
             array: NDArray[Any] = np.array(value, dtype=dtype)
         except (TypeError, ValueError) as error:
             raise InputError(name, f"must hold numbers of type {np.dtype(dtype)}", shown(value)) from error
-        if ndim is not None and array.ndim != ndim:
+        if array.ndim != ndim:
             if array.size or array.ndim > ndim:
                 raise InputError(name, f"must have {ndim} dimension(s)", f"shape {array.shape}")
             array = array.reshape((0,) * ndim)
@@ -404,9 +402,9 @@ def _array(dtype: type, ndim: int | None, item: str) -> Check:
         return array
 
     schema: JsonSchema = {"type": [item, "null"] if item == "number" else item}
-    for _ in range(ndim or 0):
+    for _ in range(ndim):
         schema = {"type": "array", "items": schema}
-    return Check(check, {"type": ["array", "number", "null"]} if ndim is None else schema, _listed)
+    return Check(check, schema, _listed)
 
 
 def _listed(array: NDArray[Any]) -> Any:
@@ -430,7 +428,6 @@ Number = Annotated[
     float, Check(_number, {"type": ["number", "null"]}, lambda value: value if math.isfinite(value) else None)
 ]
 """A number of a result that may be NaN, which is null in a file."""
-Array = Annotated[FloatArray, _array(np.float64, None, "number")]  # Float array of any shape.
 Vector = Annotated[FloatArray, _array(np.float64, 1, "number")]  # Float array (n,).
 Matrix = Annotated[FloatArray, _array(np.float64, 2, "number")]  # Float array (n, m).
 Stack = Annotated[FloatArray, _array(np.float64, 3, "number")]  # Float array (n, m, k).
