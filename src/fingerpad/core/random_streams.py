@@ -213,8 +213,8 @@ def _drawn(
     pairs = np.meshgrid(numbered("trials", trials), numbered("receptors", receptors), indexing="ij")
     shape = *pairs[0].shape, whole("count", count, 0, MOST_NUMBERS // max(pairs[0].size, 1))
     numbers = np.empty((pairs[0].size, shape[-1]))
-    keys = whole("seed", seed, 0, LARGEST_SEED), *(each.ravel() for each in pairs)
-    _fill(*keys, int(instance("purpose", purpose, Purpose)), normal, numbers)
+    who, chosen = [each.ravel() for each in pairs], int(instance("purpose", purpose, Purpose))
+    _fill(whole("seed", seed, 0, LARGEST_SEED), who[0], who[1], chosen, normal, numbers)
     return numbers.reshape(shape)
 
 
