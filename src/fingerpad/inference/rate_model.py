@@ -326,13 +326,7 @@ class RateProblem:
     """Weights of the two phases where both were recorded, Eq. 12. [1]"""
 
     def __post_init__(self) -> None:
-        observed = len(self.recordings.stimuli)
-        if observed != self.model.n_stimuli:
-            raise InputError(
-                "recordings",
-                "needs one stimulus per column of the model's drive",
-                f"{observed} for {self.model.n_stimuli}",
-            )
+        self.recordings.check_stimuli(self.model.n_stimuli)
 
     @property
     def names(self) -> tuple[str, ...]:

@@ -126,12 +126,7 @@ class RateLikelihood:
 
     def __post_init__(self) -> None:
         n = self.model.n_stimuli
-        if len(self.recordings.stimuli) != n:
-            raise InputError(
-                "recordings",
-                "needs one stimulus per column of the model's drive",
-                f"{len(self.recordings.stimuli)} for {n}",
-            )
+        self.recordings.check_stimuli(n)
         residuals = CorrelatedResiduals(n, self.positions_mm, self.lengths_mm, self.deviation_hz)
         object.__setattr__(self, "_residuals", residuals)
         object.__setattr__(self, "lengths_mm", residuals.lengths_mm)

@@ -66,6 +66,12 @@ class RateRecordings:
         """Number of rates in both phases."""
         return len(self.phases) * len(self.stimuli)
 
+    def check_stimuli(self, number: int) -> None:
+        """Raise `InputError` unless this is the number of stimuli."""
+        if len(self.stimuli) != number:
+            wanted = "needs one stimulus per column of the model's drive"
+            raise InputError("recordings", wanted, f"{len(self.stimuli)} for {number}")
+
     def chosen(self, rows: ArrayLike) -> RateRecordings:
         """Select stimuli by their indices."""
         indices = np.asarray(rows, dtype=np.int64)
