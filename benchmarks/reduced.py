@@ -14,7 +14,7 @@ import fingerpad as fp
 from benchmarks.measuring import run_job
 from benchmarks.results import Report, Table
 from fingerpad.experiments.runner import Runner
-from fingerpad.reduction.building import draw_touch, streamed
+from fingerpad.reduction.building import draw_touch, largest_errors, streamed
 from fingerpad.reduction.model import ReducedModel, write_reduced
 from fingerpad.reduction.training import ReducedTraining
 from fingerpad.skin.indentation import Touch
@@ -52,7 +52,7 @@ def answer(resolution: str) -> dict[str, Any]:
         held = [_held(request.training, random) for _ in range(RATES)]
         touches = {"held out": [touch for _, touch in drawn], "rates": held}
         found = runner.responses({stage: dict(enumerate(each)) for stage, each in touches.items()})
-    compared = [streamed(model, found["held out"][n], shape) for n, (shape, _) in enumerate(drawn)]
+    compared = [_errors(model, found["held out"][n], shape) for n, (shape, _) in enumerate(drawn)]
     return {
         "built_s": built_s,
         "size_mb": size_mb,
@@ -63,6 +63,15 @@ def answer(resolution: str) -> dict[str, Any]:
         "rates": [_rate_errors(model, skin) for skin in found["rates"].values()],
         **_step_times(model),
     }
+
+
+def _errors(
+    model: ReducedModel, skin: SkinResponse, shape: tuple[float, ...]
+) -> tuple[np.ndarray, np.ndarray, bool]:
+    """Largest errors and values of quantities and force, and whether the bounds hold."""
+    rows = list(streamed(model, skin, shape))
+    wrong, known = (np.max([getattr(row, name) for row in rows], axis=0) for name in ("wrong", "known"))
+    return wrong, known, bool((largest_errors(model, skin, shape) <= model.error).all())
 
 
 def _places() -> np.ndarray:

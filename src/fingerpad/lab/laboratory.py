@@ -32,11 +32,8 @@ from fingerpad.neuron.afferent_types import afferent_types
 from fingerpad.reduction.model import ReducedModel, read_reduced, write_reduced
 from fingerpad.skin.code_hash import code_hash
 
-FOLLOWED = tuple(
-    dict.fromkeys(
-        name for each in afferent_types().values() for name in (each.dynamic_quantity, each.static_quantity)
-    )
-)
+_TYPES = afferent_types().values()
+FOLLOWED = tuple(dict.fromkeys(q for one in _TYPES for q in (one.dynamic_quantity, one.static_quantity)))
 """Quantities that the types of afferents follow: a reduced touch of the laboratory keeps them all."""
 
 KEPT_ANSWERS = 16  # Answers that are kept, so that a comparison and a second user do not compute again.
@@ -140,13 +137,7 @@ class Laboratory:
             return self._models.get(path)
 
     def make(self, state: LabState, with_error: Flag = False, told: Progress | None = None) -> ReducedModel:
-        """Make the reduced touch of a state, without its error or with it.
-
-        Raises
-        ------
-        FingerpadError
-            If a press failed.
-        """
+        """Make the reduced touch of a state, without its error or with it."""
         described, path = self.described(state), self.path(state)
         if not with_error:
             described = described.changed(calibration=0)
@@ -164,20 +155,7 @@ class Laboratory:
         return not wanted or (model is not None and bool(np.isfinite(model.error).all()))
 
     def answer(self, state: LabState, exact: Flag = False, told: Progress | None = None) -> Answer:
-        """Answer a state, and make its reduced touch before that if there is none.
-
-        Parameters
-        ----------
-        state : LabState
-            What is pressed, and how.
-        exact : bool, optional
-            Whether the full solver presses.
-
-        Raises
-        ------
-        FingerpadError
-            If the state is out of the range, or a press failed.
-        """
+        """Answer a state by its reduced touch, which is made if there is none, or by the full solver."""
         described, key = self.described(state), (alone(state), exact)
         if (kept := self._kept(key)) is not None:
             return kept

@@ -63,38 +63,10 @@ def reduce_touch(
     calibration: NotNegativeWhole = 20,
     seed: NotNegativeWhole = 1,
 ) -> ReducedModel:
-    """Make a reduced touch from full presses.
+    """Make a reduced touch from full presses, which `solve` may find in a store; by default it solves them.
 
-    Parameters
-    ----------
-    training : ReducedTraining
-        The touch and the range.
-    solve : callable, optional
-        Solves touches, for example in many processes or from a store; by default one after the other.
-    quantities : sequence of str, optional
-        Quantities of `SkinResponse.sample` to keep; the first one must stand for the pressure on the skin.
-    calibration : int, optional
-        Number of random touches from which the error is measured: 0 for none, else 19 or more.
-    seed : int, optional
-        Of these touches.
-
-    Raises
-    ------
-    ConvergenceError
-        If a press cannot be solved.
-
-    Examples
-    --------
-    The range of this example is one place, and its error is not measured:
-
-    >>> import fingerpad as fp
-    >>> from fingerpad.reduction.training import ReducedRange
-    >>> touch = fp.touch_of(fp.Fingertip(), fp.Sphere(curvature_per_m=287))
-    >>> model = reduce_touch(ReducedTraining(touch, ReducedRange(depth_mm=0.5)), calibration=0)
-    >>> stream = fp.ReducedTouch(model, [(17.37, 0.0)])
-    >>> sample = stream.step(50.0, depth_mm=0.5)
-    >>> print(f"{sample.force_mn:.0f} mN")
-    22 mN
+    The first of the `quantities` must stand for the pressure on the skin. The error is measured on as many
+    random touches as `calibration` says: 0 for none, else 19 or more.
     """
     if not quantities:
         raise InputError("quantities", "must name at least one quantity", "none")
@@ -131,7 +103,7 @@ def with_exponents(model: ReducedModel, skin: SkinResponse, shape: Iterable[floa
     sums = []
     for exponent in EXPONENTS:
         tried = replace(model, exponents=np.full(model.error.size, exponent))
-        wrong = np.array([row.wrong for row in _compared(tried, skin, shape)])
+        wrong = np.array([row.wrong for row in streamed(tried, skin, shape)])
         sums.append((wrong**2).sum(axis=0))
     return replace(model, exponents=np.array(EXPONENTS)[np.argmin(sums, axis=0)])
 
@@ -171,24 +143,12 @@ def draw_touch(
 
 def largest_errors(model: ReducedModel, skin: SkinResponse, shape: Iterable[float] = ()) -> FloatArray:
     """Largest errors over a touch, of the quantities and of the force, over `ReducedModel.error_scale`."""
-    return _relative(model, _compared(model, skin, shape))
-
-
-def _relative(model: ReducedModel, rows: Iterable[_Row]) -> FloatArray:
     so_far = np.zeros(model.error.size)
     relative = so_far
-    for row in rows:
+    for row in streamed(model, skin, shape):
         so_far = np.maximum(so_far, row.reduced)
         relative = np.maximum(relative, row.wrong / model.error_scale(so_far))
     return relative
-
-
-def streamed(
-    model: ReducedModel, skin: SkinResponse, shape: Iterable[float] = ()
-) -> tuple[FloatArray, FloatArray, bool]:
-    rows = list(_compared(model, skin, shape))
-    wrong, known = (np.max([getattr(row, name) for row in rows], axis=0) for name in ("wrong", "known"))
-    return wrong, known, bool((_relative(model, rows) <= model.error).all())
 
 
 class _Row(NamedTuple):
@@ -199,7 +159,7 @@ class _Row(NamedTuple):
     reduced: FloatArray
 
 
-def _compared(model: ReducedModel, skin: SkinResponse, shape: Iterable[float]) -> Iterator[_Row]:
+def streamed(model: ReducedModel, skin: SkinResponse, shape: Iterable[float]) -> Iterator[_Row]:
     """Stream the motion of a full touch, and compare at each of its times."""
     motion = skin.touch.stimulus  # type: ignore[union-attr]
     sites = _sites(model)

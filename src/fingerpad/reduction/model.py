@@ -263,13 +263,7 @@ ARRAYS = tuple(name for name, hint in ReducedModel.__annotations__.items() if hi
 
 @checked
 def write_reduced(model: ReducedModel, path: str | Path) -> None:
-    """Write a reduced touch, as a whole or not at all.
-
-    Raises
-    ------
-    StoreError
-        If the file cannot be written.
-    """
+    """Write a reduced touch, as a whole or not at all."""
     head = {"format": FORMAT, "version": VERSION, "axes": [asdict(axis) for axis in model.axes]}
     head |= {name: getattr(model, name) for name in HEAD}
     arrays = {name: np.ascontiguousarray(getattr(model, name), dtype=np.float64) for name in ARRAYS}

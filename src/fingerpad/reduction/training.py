@@ -227,13 +227,7 @@ class ReducedTraining:
             raise InputError("parameter", must, repr(parameter))
 
     def poses(self) -> Iterator[TrainingPose]:
-        """List all poses, the last axis the first to change.
-
-        Raises
-        ------
-        InputError
-            If a pose cannot be pressed so deep: the sentence names the place.
-        """
+        """List all poses, the last axis the first to change; `InputError` if one cannot be pressed."""
         bases: dict[tuple[float, ...], Touch] = {}
         for values in itertools.product(*(axis.values.tolist() for axis in self.range.axes)):
             base = bases.setdefault(values[3:], self.touch_with(values[3:]))
@@ -247,23 +241,15 @@ class ReducedTraining:
             yield TrainingPose(values, lies_mm + meets_mm, meets_mm, touches)
 
     def pressed_again(self) -> tuple[tuple[float, ...], Touch]:
-        """Touch in the middle of the range that goes deeper and back after it has relaxed.
-
-        Value of the indenter's parameter, if one varies, and the touch.
-        """
+        """Shape and touch in the middle of the range that goes deeper and back after it has relaxed."""
         shape = tuple(0.5 * (axis.low + axis.high) for axis in self.range.axes[3:])
         depths_mm = tuple(share * self.range.depth_mm for share in PRESSED_AGAIN)
         return shape, self.touch_with(shape, Trajectory(PRESSED_AGAIN_MS, depth_mm=depths_mm))
 
     def touch_with(self, shape: Sequence[float] = (), stimulus: Trajectory | None = None) -> Touch:
-        """Touch on the mesh that serves all poses.
+        """Touch on the mesh that serves all poses, with the value of the indenter's parameter that varies.
 
-        Parameters
-        ----------
-        shape : sequence of float
-            Value of the indenter's parameter, if one varies.
-        stimulus : Trajectory, optional
-            Its motion, solved with the steps of the resolution; default: the first press of the training.
+        A motion of one's own is solved with the steps of the resolution; by default it is the first press.
         """
         base, range_ = self.touch, self.range
         body = base.indenter
