@@ -39,7 +39,7 @@ def press(folder: str, traces: str) -> dict[str, Any]:
     dict
         Number of times and of shifts.
     """
-    touches, store = nerve.bar_touches(Conditions(resolution=RESOLUTION)), Store(Path(folder))
+    touches, store = Conditions(resolution=RESOLUTION).bar_touches(), Store(Path(folder))
     solve_missing(store.missing(touches), JOBS)
     sed = nerve.traces_at_receptor([store.load(touch) for touch in touches])
     np.savez(traces, times_ms=sed.times_ms, sed_kpa=sed.values, kinks_ms=sed.kinks_ms)

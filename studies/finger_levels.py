@@ -17,9 +17,8 @@ from fingerpad.core.random_streams import Purpose, normals
 from fingerpad.core.units import MN_PER_N
 from fingerpad.core.values import FloatArray
 from fingerpad.data import cylinder_deflection, neuron, protocol
-from fingerpad.experiments.conditions import RECEPTOR_X_MM, Conditions
+from fingerpad.experiments.conditions import POSITIONS_MM, RECEPTOR_X_MM, Conditions
 from fingerpad.experiments.gerling2014.nerve import PIECES
-from fingerpad.experiments.gerling2014.percept import POSITIONS_MM
 from fingerpad.experiments.gerling2014.skin import PLATE_DEPTHS_MM
 from fingerpad.geometry.indenters import Cylinder
 from fingerpad.inference.afferent_fit import CHANCE

@@ -18,8 +18,7 @@ from fingerpad.core.checked import result_class
 from fingerpad.core.errors import InputError
 from fingerpad.core.values import FloatArray, Number, Vector, float_array, positive
 from fingerpad.data import bar_firing_rates, protocol, psychophysics
-from fingerpad.experiments.conditions import RECEPTOR_X_MM, Conditions
-from fingerpad.experiments.gerling2014 import nerve, percept
+from fingerpad.experiments.conditions import CURVATURES, POSITIONS_MM, RECEPTOR_X_MM, Conditions
 from fingerpad.experiments.runner import Runner
 from fingerpad.geometry.grading import Grading
 from fingerpad.inference.fitting.methods import fractional_sum_of_squares
@@ -47,7 +46,7 @@ CHOSEN_SPHERES: tuple[Sphere, ...] = tuple(
     for curvature in (protocol.STANDARD_CURVATURE.value, *psychophysics.GOODWIN_CURVATURES.value)
 )
 EVERY_SPHERE: tuple[Sphere, ...] = tuple(
-    (position, curvature) for position in percept.POSITIONS_MM for curvature in percept.CURVATURES
+    (position, curvature) for position in POSITIONS_MM for curvature in CURVATURES
 )
 LOWEST_ORDER, HIGHEST_ORDER = 0.3, 6.0
 """A quantity that converges slower or faster is not taken to converge at all on these meshes."""
@@ -68,12 +67,12 @@ class Level:
 
     def bars(self) -> dict[int, Touch]:
         """Touches of the bar, by the number of their shift."""
-        touches = nerve.bar_touches(Conditions(self.resolution, tissues=TISSUES))
+        touches = Conditions(self.resolution, tissues=TISSUES).bar_touches()
         return {shift: _at_factor(touches[shift], self.factor) for shift in self.shifts}
 
     def balls(self) -> dict[Sphere, Touch]:
         """Touches of the spheres, by position and curvature."""
-        touches = percept.sphere_touches(Conditions(self.resolution, tissues=TISSUES))
+        touches = Conditions(self.resolution, tissues=TISSUES).sphere_touches()
         return {sphere: _at_factor(touches[sphere], self.factor) for sphere in self.spheres}
 
 

@@ -21,9 +21,9 @@ from fingerpad.core.signals import Traces
 from fingerpad.core.units import MN_PER_N
 from fingerpad.core.values import FloatArray, Matrix, Number, Vector
 from fingerpad.data import protocol, psychophysics
-from fingerpad.experiments.conditions import RECEPTOR_X_MM, Conditions, Touch
+from fingerpad.experiments.conditions import POSITIONS_MM, RECEPTOR_X_MM, Conditions, Touch
 from fingerpad.experiments.gerling2014 import nerve
-from fingerpad.experiments.gerling2014.percept import FITTED_SPHERES, POSITIONS_MM, fit_to_people
+from fingerpad.experiments.gerling2014.percept import FITTED_SPHERES, fit_to_people
 from fingerpad.experiments.gerling2014.skin import PLATE_DEPTHS_MM, deflection_r2
 from fingerpad.experiments.manifest import Manifest
 from fingerpad.experiments.runner import Runner
@@ -76,7 +76,7 @@ def touches(candidate: Candidate, conditions: Conditions) -> dict[Key, Touch]:
     for depth_mm in PLATE_DEPTHS_MM:
         pressed["plate", depth_mm, 0.0] = replace(flat, stimulus=RampAndHold(depth_mm=depth_mm))
     if candidate.finalist:
-        bars = zip(protocol.BAR_SHIFTS.value, nerve.bar_touches(own), strict=True)
+        bars = zip(protocol.BAR_SHIFTS.value, own.bar_touches(), strict=True)
         pressed |= {("bar", shift, 0.0): touch for shift, touch in bars}
     else:
         pressed[ONE_BAR] = own.touch(Bar(), RECEPTOR_X_MM, _wide_bar_grading(own), tilt_deg=own.skin_tilt_deg)

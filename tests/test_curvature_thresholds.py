@@ -8,10 +8,9 @@ import pytest
 
 from fingerpad import ConvergenceError, Grading, Population, PressSettings
 from fingerpad.core.random_streams import Purpose, normals
-from fingerpad.experiments.conditions import RECEPTOR_X_MM, Conditions
+from fingerpad.experiments.conditions import CURVATURES, RECEPTOR_X_MM, Conditions
 from fingerpad.experiments.gerling2014 import thresholds as study
 from fingerpad.experiments.gerling2014.claims import READERS, RULES
-from fingerpad.experiments.gerling2014.percept import CURVATURES
 from fingerpad.psychophysics import yes_no
 from fingerpad.psychophysics.encoding import gradient_sum, neighbour_pairs
 from fingerpad.psychophysics.ideal_observer import SMALLEST_SPREAD

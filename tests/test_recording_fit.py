@@ -25,7 +25,6 @@ from fingerpad.experiments.fit import request
 from fingerpad.experiments.fit.methods import check_spikes
 from fingerpad.experiments.fit.rate_uncertainty import rate_posterior
 from fingerpad.experiments.fit.results import ParameterProfile, PhaseBands, RateBand, RatePosterior
-from fingerpad.experiments.gerling2014 import nerve
 from fingerpad.experiments.manifest import sha256
 from fingerpad.experiments.recording_files import read_recordings
 from fingerpad.experiments.requests.afferents import fitted_afferent
@@ -263,7 +262,7 @@ def test_the_stimuli_of_the_bar_are_the_touches_of_the_reproduction(tmp_path):
     bar, conditions = ShiftedBar(), Conditions("quick")
     recorded = read_recordings(path, bar)
     touches = bar.touches(list(recorded.stimuli.values()), conditions)
-    assert list(touches.values()) == nerve.bar_touches(conditions)
+    assert list(touches.values()) == conditions.bar_touches()
     observed = bar_firing_rates()
     np.testing.assert_array_equal(recorded.recordings.dynamic_rate_hz, observed.dynamic_rate_hz)
     np.testing.assert_array_equal(recorded.recordings.static_rate_hz, observed.static_rate_hz)

@@ -78,7 +78,7 @@ def test_three_trials_press_a_line_and_a_cylinder_at_one_place(conditions):
 
 
 def test_the_bar_is_shifted_36_times_along_the_skin_over_one_mesh(conditions):
-    touches = level_2.bar_touches(conditions)
+    touches = conditions.bar_touches()
     shift = -np.array([touch.at_mm[0] - 17.37 for touch in touches])  # positive towards the proximal end
     tilt_deg = touches[0].tilt_deg
     along_skin = shift / np.cos(np.deg2rad(tilt_deg))
@@ -110,7 +110,7 @@ def test_bar_shifts_are_whole_elements_and_all_edges_of_the_sampled_zone_lie_in_
 
 
 def test_seven_spheres_are_pressed_at_two_places_over_one_mesh(conditions):
-    touches = level_3.sphere_touches(conditions)
+    touches = conditions.sphere_touches()
     assert sorted(touches) == [(position, curvature) for position in (0.0, 0.2) for curvature in CURVATURES]
     for (position, curvature), touch in touches.items():
         assert follows_the_protocol(touch)
@@ -125,8 +125,8 @@ def test_seven_spheres_are_pressed_at_two_places_over_one_mesh(conditions):
 def test_tissues_of_the_conditions_reach_the_later_studies_but_not_the_trials(name):
     conditions = Conditions("quick", tissues=name)
     tissues = named_tissues(name)
-    assert {touch.tissues for touch in level_2.bar_touches(conditions)} == {tissues}
-    spheres = level_3.sphere_touches(conditions)
+    assert {touch.tissues for touch in conditions.bar_touches()} == {tissues}
+    spheres = conditions.sphere_touches()
     assert {touch.tissues for touch in spheres.values()} == {tissues}
     assert level_1.deflection_touches(conditions) == level_1.deflection_touches(Conditions("quick"))
 

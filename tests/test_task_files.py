@@ -17,7 +17,6 @@ from fingerpad.core.result_files import file_format
 from fingerpad.experiments.conditions import RECEPTOR_X_MM, Conditions
 from fingerpad.experiments.discrimination.request import example_tasks
 from fingerpad.experiments.fit.request import FitFile
-from fingerpad.experiments.gerling2014.percept import sphere_touches
 from fingerpad.experiments.gerling2014.reproduction import ReproductionResult
 from fingerpad.experiments.requests.parts import parts_in
 from fingerpad.neuron.afferent import PARAMETER_NAMES
@@ -114,7 +113,7 @@ def test_the_papers_spheres_are_the_very_touches_of_a_reproduction():
     ours = read("sphere_curvature", {"resolution": "quick"}).touches
     theirs = {
         f"{curvature:g}": touch
-        for (at, curvature), touch in sphere_touches(Conditions("quick")).items()
+        for (at, curvature), touch in Conditions("quick").sphere_touches().items()
         if at == 0.0
     }
     assert ours == theirs

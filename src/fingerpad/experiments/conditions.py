@@ -9,16 +9,21 @@ import numpy as np
 
 from fingerpad.core.checked import value_class
 from fingerpad.core.values import Finite, Numbers, Seed, choice
+from fingerpad.data import protocol, psychophysics
 from fingerpad.data.tissues import DEFAULT_TISSUES
 from fingerpad.geometry.fingertip import Finger, Fingertip
 from fingerpad.geometry.grading import RESOLUTIONS, Grading, resolution_grading
 from fingerpad.geometry.indenter_grading import grading_about
-from fingerpad.geometry.indenters import Indenter, Sphere
+from fingerpad.geometry.indenters import Bar, Indenter, Sphere
 from fingerpad.mechanics.materials import Tissues
 from fingerpad.mechanics.tissues import TISSUES
 from fingerpad.neuron.afferent import Afferent
 from fingerpad.skin.indentation import CONTACT_POINT_MM, touch_of
 from fingerpad.skin.indentation import Touch as Touch
+
+CURVATURES = psychophysics.SPHERE_CURVATURES.value
+POSITIONS_MM = protocol.SPHERE_POSITIONS.value
+"""Spheres of the population study, the standard first, and their places along the finger. [1/m, mm]"""
 
 RECEPTOR_X_MM = CONTACT_POINT_MM[0]  # `Conditions.receptor_x_mm` of the paper's finger. [mm]
 
@@ -130,6 +135,30 @@ class Conditions:
             grading or self.sphere_grading(),
             tilt_deg=self.skin_tilt_deg,
         )
+
+    def bar_touches(self) -> list[Touch]:
+        """36 touches of the bar, shifted along the finger.
+
+        Its flat face stays parallel to the skin at the receptor (docs/decisions.md#bar-orientation). A
+        positive shift moves the bar towards the proximal end (docs/decisions.md#bar-shift).
+        """
+        tilt, grading = self.skin_tilt_deg, self.bar_grading()
+        along = float(np.cos(np.deg2rad(tilt)))
+        return [
+            self.touch(Bar(), self.receptor_x_mm - shift * along, grading, tilt_deg=tilt)
+            for shift in protocol.BAR_SHIFTS.value
+        ]
+
+    def sphere_touches(self) -> dict[tuple[float, float], Touch]:
+        """Seven spheres at two positions along the finger; keys are position and curvature.
+
+        They press along the skin's normal, so that a sphere at 0.0 mm is centred on the population.
+        """
+        return {
+            (position, curvature): self.sphere_touch(curvature, position)
+            for position in POSITIONS_MM
+            for curvature in CURVATURES
+        }
 
     def tilt_deg(self, indenter: Indenter) -> float:
         """Tilt of an indenter that presses straight, see `straight_tilt_deg`. [degrees]"""

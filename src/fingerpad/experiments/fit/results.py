@@ -9,7 +9,9 @@ import numpy as np
 from fingerpad.core.checked import result_class
 from fingerpad.core.displayed import Columns, Result
 from fingerpad.core.values import Matrix, Number, Vector, WholeVector
+from fingerpad.inference.fitting.cross_validation import FoldFit
 from fingerpad.inference.fitting.posterior import Chains
+from fingerpad.inference.problem import RateProblem
 
 
 @result_class
@@ -212,6 +214,47 @@ class FittedFold:
     seconds: float  # Time on the clock. [s]
     parameters: dict[str, float]
     identifiable: dict[str, float]  # The paper's six parameters, and the four that rates identify.
+
+
+@result_class
+class SearchStep:
+    """One step of a search."""
+
+    iteration: int  # From 0, the start point.
+    fss: Number  # Fractional sum of squares of the training set. [1]
+    parameters: dict[str, Number]  # By name.
+
+
+@result_class
+class Search:
+    """Search of one fold from one start point."""
+
+    start: int  # Number of the start point, from 1.
+    fss_train: Number
+    fss_test: Number  # Fractional sum of squares of the training and of the testing set. [1]
+    runs: int  # Evaluations of the model.
+    history: tuple[SearchStep, ...]  # Steps from the start point to the end.
+
+    @classmethod
+    def of(cls, problem: RateProblem, fold: FoldFit) -> tuple[Search, ...]:
+        """Return the searches of a fold, one per start point."""
+        return tuple(
+            cls(
+                start=number,
+                fss_train=search.score,
+                fss_test=problem.score(search.parameters, fold.testing),
+                runs=search.n_evaluations,
+                history=tuple(
+                    SearchStep(
+                        iteration=iteration,
+                        fss=step.score,
+                        parameters=dict(zip(problem.names, step.parameters.tolist(), strict=True)),
+                    )
+                    for iteration, step in enumerate(search.history)
+                ),
+            )
+            for number, search in enumerate(fold.fit.attempts, start=1)
+        )
 
 
 @result_class

@@ -13,9 +13,9 @@ from fingerpad.core.signals import STORED_ENERGY, Skin, Traces, traces_below
 from fingerpad.core.units import MM_PER_M
 from fingerpad.core.values import FloatArray, Matrix, Number, Vector
 from fingerpad.data import bar_firing_rates, protocol
-from fingerpad.experiments.conditions import RECEPTOR_X_MM, Conditions, Touch
+from fingerpad.experiments.conditions import RECEPTOR_X_MM
 from fingerpad.experiments.fit.rate_uncertainty import uncertainty
-from fingerpad.experiments.fit.results import UncertaintyResult
+from fingerpad.experiments.fit.results import Search, UncertaintyResult
 from fingerpad.experiments.gerling2014.skin import (
     DECIMALS,
     PLATE_DEPTHS_MM,
@@ -23,7 +23,6 @@ from fingerpad.experiments.gerling2014.skin import (
     outline_nodes,
     plate,
 )
-from fingerpad.geometry.indenters import Bar
 from fingerpad.inference.afferent_fit import response_surface, start_points, validated
 from fingerpad.inference.fitting.methods import (
     CrossValidation,
@@ -54,26 +53,6 @@ class Modulation:
     minimum_hz: Number  # Smallest rate with the flat face of the bar over the receptor. [spikes/s]
     difference_hz: Number
     index: Number  # Modulation index; NaN if there are no spikes. [1]
-
-
-@result_class
-class SearchStep:
-    """One iteration of the response-surface method."""
-
-    iteration: int  # From 0, the start point.
-    fss: Number  # Fractional sum of squares of the training set. [1]
-    parameters: dict[str, Number]  # Six parameters, by name.
-
-
-@result_class
-class Search:
-    """Search of one fold from one start point."""
-
-    start: int  # Number of the start point, from 1.
-    fss_train: Number
-    fss_test: Number  # Fractional sum of squares of the training and of the testing set. [1]
-    runs: int  # Evaluations of the model.
-    history: tuple[SearchStep, ...]  # Steps from the start point to the end.
 
 
 @result_class
@@ -110,20 +89,6 @@ class SingleUnitResult:
     folds: tuple[FoldResult, ...]
     modulation: dict[str, dict[str, Modulation]]  # By phase: "observed", and predicted, "ours".
     initial_mv: Number | None = None  # Potential of the membrane at the start; by default at rest. [mV]
-
-
-def bar_touches(conditions: Conditions) -> list[Touch]:
-    """36 touches of the bar, shifted along the finger.
-
-    Its flat face stays parallel to the skin at the receptor (docs/decisions.md#bar-orientation). A positive
-    shift moves the bar towards the proximal end (docs/decisions.md#bar-shift).
-    """
-    tilt, grading = conditions.skin_tilt_deg, conditions.bar_grading()
-    along = float(np.cos(np.deg2rad(tilt)))
-    return [
-        conditions.touch(Bar(), RECEPTOR_X_MM - shift * along, grading, tilt_deg=tilt)
-        for shift in protocol.BAR_SHIFTS.value
-    ]
 
 
 def traces_at_receptor(
@@ -197,26 +162,13 @@ def single_unit_result(
 
 def _fold(problem: RateProblem, fold: FoldFit, shift_mm: FloatArray) -> FoldResult:
     """One fold: shifts left out, the better of its searches, and the steps of each."""
-    searches = [
-        Search(
-            start=number,
-            fss_train=search.score,
-            fss_test=problem.score(search.parameters, fold.testing),
-            runs=search.n_evaluations,
-            history=tuple(
-                SearchStep(iteration=iteration, fss=step.score, parameters=_six(step.parameters))
-                for iteration, step in enumerate(search.history)
-            ),
-        )
-        for number, search in enumerate(fold.fit.attempts, start=1)
-    ]
     return FoldResult(
         fold=fold.fold + 1,
         start=fold.fit.start + 1,
         testing_shift_mm=shift_mm[fold.testing],
         fss_train=fold.score_train,
         fss_test=fold.score_test,
-        climbs=tuple(searches),
+        climbs=Search.of(problem, fold),
     )
 
 

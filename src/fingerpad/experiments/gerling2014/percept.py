@@ -25,7 +25,7 @@ from fingerpad.core.random_streams import Purpose, normals
 from fingerpad.core.signals import HitRates, Traces
 from fingerpad.core.values import FloatArray, IntArray, Number, Vector, WholeVector
 from fingerpad.data import protocol, psychophysics
-from fingerpad.experiments.conditions import RECEPTOR_X_MM, Conditions, Touch
+from fingerpad.experiments.conditions import CURVATURES, POSITIONS_MM, RECEPTOR_X_MM
 from fingerpad.experiments.scores import Estimate, difference, estimate, extreme, largest
 from fingerpad.inference.afferent_fit import SphereHitRates, ToRatesAndHitRates
 from fingerpad.inference.rate_model import AfferentModel
@@ -58,8 +58,6 @@ from fingerpad.psychophysics.observer import (
 )
 from fingerpad.skin.sampling import SkinResponse
 
-CURVATURES = psychophysics.SPHERE_CURVATURES.value
-POSITIONS_MM = protocol.SPHERE_POSITIONS.value
 CENTRE_MM = (RECEPTOR_X_MM, 0.0)  # Of the population. [mm]
 
 GOODWIN_CURVATURES = psychophysics.GOODWIN_CURVATURES.value
@@ -236,18 +234,6 @@ class Observers:
     unsteadiness: dict[int, FloatArray]
     """Standard deviation of mu_3 when the judgements of the static Gradient Sum are repeated, by the number
     of hit rates behind it, (n_sessions, n_positions). [0-1]"""
-
-
-def sphere_touches(conditions: Conditions) -> dict[tuple[float, float], Touch]:
-    """Seven spheres at two positions along the finger; keys are position and curvature.
-
-    They press along the skin's normal, so that a sphere at 0.0 mm is centred on the population.
-    """
-    return {
-        (position, curvature): conditions.sphere_touch(curvature, position)
-        for position in POSITIONS_MM
-        for curvature in CURVATURES
-    }
 
 
 def draws_of(population: Population, seed: int, count: int = NOISE_DRAWS) -> FloatArray:

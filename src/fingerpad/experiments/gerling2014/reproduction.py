@@ -12,7 +12,7 @@ from fingerpad.core.checked import result_class
 from fingerpad.core.engine import Processes
 from fingerpad.core.signals import STORED_ENERGY
 from fingerpad.data import Published, all_published, neuron
-from fingerpad.experiments.conditions import RECEPTOR_X_MM, Conditions, Touch
+from fingerpad.experiments.conditions import CURVATURES, POSITIONS_MM, RECEPTOR_X_MM, Conditions, Touch
 from fingerpad.experiments.fit.results import UncertaintyResult
 from fingerpad.experiments.gerling2014 import nerve, percept, skin
 from fingerpad.experiments.gerling2014.claims import ClaimRow, Statement, Summary, judged, paired, summary
@@ -37,7 +37,7 @@ from fingerpad.inference.fitting.methods import Method
 from fingerpad.neuron.afferent import Afferent
 from fingerpad.skin.sampling import SkinResponse
 
-STANDARD_SPHERE = (percept.POSITIONS_MM[0], percept.CURVATURES[0])
+STANDARD_SPHERE = (POSITIONS_MM[0], CURVATURES[0])
 
 PAPER = "paper"  # The paper's own system.
 HUMAN = "human"  # The set that serves all three levels.
@@ -118,8 +118,8 @@ def set_touches(conditions: Conditions, extended: bool = False) -> dict[str, dic
     touches: dict[str, dict[Any, Touch]] = {
         "nail": {"nail": skin.nail_touch(conditions)},
         "force": dict(skin.force_touches(conditions)),
-        "bar, 36 shifts": dict(enumerate(nerve.bar_touches(conditions))),
-        "spheres": dict(percept.sphere_touches(conditions)),
+        "bar, 36 shifts": dict(enumerate(conditions.bar_touches())),
+        "spheres": dict(conditions.sphere_touches()),
     }
     if extended:
         touches["spheres, other curvatures"] = dict(threshold_touches(conditions))

@@ -19,8 +19,8 @@ from fingerpad.core.checked import result_class
 from fingerpad.core.errors import ConvergenceError
 from fingerpad.core.values import Number, Vector
 from fingerpad.data import psychophysics
-from fingerpad.experiments.conditions import Conditions, Touch
-from fingerpad.experiments.gerling2014.percept import CENTRE_MM, CURVATURES, GOODWIN_CURVATURES, draws_of
+from fingerpad.experiments.conditions import CURVATURES, Conditions, Touch
+from fingerpad.experiments.gerling2014.percept import CENTRE_MM, GOODWIN_CURVATURES, draws_of
 from fingerpad.neuron.afferent import Afferent
 from fingerpad.neuron.population import Population
 from fingerpad.psychophysics import (
