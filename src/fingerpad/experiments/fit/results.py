@@ -9,9 +9,9 @@ import numpy as np
 from fingerpad.core.checked import result_class
 from fingerpad.core.displayed import Columns, Result
 from fingerpad.core.values import Matrix, Number, Vector, WholeVector
-from fingerpad.inference.fitting.cross_validation import FoldFit
+from fingerpad.inference.fitting.methods import FoldFit
 from fingerpad.inference.fitting.posterior import Chains
-from fingerpad.inference.problem import RateProblem
+from fingerpad.inference.rate_model import RateProblem
 
 
 @result_class
