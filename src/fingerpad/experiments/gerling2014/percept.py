@@ -83,9 +83,7 @@ MANY = Experiment().hit_rates
 AGAIN = 20  # Repetitions of the judgements of one session, which show how stable their mean is.
 CRITERION_SIGMAS = psychophysics.DECISION_CRITERION_SIGMA.value
 CHANCE = 0.5
-
 _FIRST_SESSION = 1  # Session 0 of a seed belongs to the fit of the noise.
-
 DRAWS = 1000  # Common random presentations behind each interpretation.
 CURVE_NOISE = tuple(round(0.01 * step, 2) for step in range(1, 31))  # Noise of the misfits of codes.
 PATIENCE_MS = protocol.RAMP.value  # Time that an observer waits for first spikes: until the ramp ends. [ms]
