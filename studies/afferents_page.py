@@ -9,7 +9,7 @@ from __future__ import annotations
 import sys
 import time
 import warnings
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
 from itertools import product
@@ -24,6 +24,7 @@ from scipy.interpolate import interp1d
 import fingerpad as fp
 from fingerpad.core.errors import InertiaWarning
 from fingerpad.core.regions import Ellipse
+from fingerpad.core.signals import ResponseMap
 from fingerpad.core.values import FloatArray
 from fingerpad.data import afferents as published
 from fingerpad.geometry.motion import Cycles
@@ -31,13 +32,14 @@ from fingerpad.neuron.afferent import AnyAfferent
 from fingerpad.neuron.afferent_types import afferent_types
 from fingerpad.neuron.end_organs import EndOrgans
 from fingerpad.neuron.tuning import tuning_curve
-from fingerpad.report.nerve import STYLES, draw_mixed_responses
-from fingerpad.report.style import BLACK, BLUE, GREY, ORANGE, new_figure, write_png
+from fingerpad.report.nerve import draw_map_by_type, draw_raster_by_type
+from fingerpad.report.style import BLACK, BLUE, GREY, ORANGE, SERIES, new_figure, write_png
 from fingerpad.skin.indentation import settings_of
 from fingerpad.skin.sampling import SkinResponse
 from studies.pages import DOCS, IMAGES, table, write_blocks
 
 PAGE = DOCS / "afferents.md"
+STYLES = [(style["color"], style["marker"]) for style in SERIES]
 X_MM = 17.37
 DISC = Ellipse(5.0, 5.0, centre_mm=(X_MM, 0.0))
 BALL, PROBE = fp.Sphere(curvature_per_m=287), fp.FlatPunch(diameter_mm=1.0, fillet_mm=0.2)
@@ -76,6 +78,21 @@ def indented(indenter: fp.Indenter, motion: Any, tissues: str = "human", **more:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", InertiaWarning)
         return fp.indent(fp.Fingertip(), indenter, motion, tissues, **more)
+
+
+def draw_mixed_responses(touches: Mapping[str, Mapping[str, ResponseMap]]) -> Figure:
+    """Draw the responses to touches by type, one touch per row: all spikes over time, and the places.
+
+    In the map the area of a mark grows with the number of spikes over the largest of its type.
+    """
+    drawn = new_figure(9.5, 3.4 * len(touches))
+    grid = drawn.subplots(len(touches), 2, squeeze=False, width_ratios=(1.7, 1.0))
+    for (raster, places), (name, maps) in zip(grid, touches.items(), strict=True):
+        raster.set_title(name)
+        draw_raster_by_type(raster, maps)
+        draw_map_by_type(places, maps)
+    grid[0, 1].legend(loc="upper left", bbox_to_anchor=(1.0, 1.0))
+    return drawn
 
 
 def mixed() -> None:

@@ -55,7 +55,9 @@ def draw(skin: SkinResponse, response: ResponseMap, percept: Percept) -> Figure:
     motion = figure.add_subplot(grid[0, 1])
     spikes = figure.add_subplot(grid[1, 1], sharex=motion)
     touch_figure.draw_section(section, skin, Sphere(curvature_per_m=percept.standard_per_m))
-    touch_figure.draw_motion(motion, skin)
+    touch_figure.draw_depth(motion, skin)
+    motion.set(xlabel="", ylabel="depth\n[mm]")
+    motion.tick_params(labelbottom=False)
     touch_figure.draw_spikes(spikes, skin, response)
     draw_hit_rates(curve, percept)
     for axes, title in ((section, "Pressed skin"), (motion, "Spikes of afferents"), (curve, "Hit rates")):

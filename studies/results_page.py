@@ -13,9 +13,9 @@ from fingerpad.core.result_files import read_results
 from fingerpad.core.values import Number, Vector
 from fingerpad.experiments.gerling2014.claims import ClaimRow, Group, Statement, Summary
 from fingerpad.experiments.gerling2014.nerve import SingleUnitResult
-from fingerpad.experiments.gerling2014.percept import SphereDiscrimination
-from fingerpad.experiments.gerling2014.reproduction import ReproductionResult
-from fingerpad.report.reproduction import count_sentence, side_by_side, statement_cells, statement_table
+from fingerpad.experiments.gerling2014.percept import CriterionErrorBars, SphereDiscrimination
+from fingerpad.experiments.gerling2014.reproduction import ReproductionResult, Summaries
+from fingerpad.report.reproduction import SET_COLUMNS, count_sentence, side_by_side, statement_cells
 from fingerpad.report.tables import ABSENT, fixed, number
 from studies.pages import joined, replaced, table
 
@@ -204,8 +204,8 @@ def _summaries(summary: Mapping[str, Summary]) -> str:
 
 
 def _statements(statements: Sequence[Statement]) -> str:
-    found = statement_table(statements)
-    return table(tuple(found.columns), [tuple(row.cells) for row in found.rows])
+    columns = ("section", "statement", *SET_COLUMNS)
+    return table(columns, [(each.section, *statement_cells(each)) for each in statements])
 
 
 def _single_units(units: Mapping[str, SingleUnitResult]) -> str:
@@ -301,13 +301,13 @@ KINDS_OF_ROWS = {
 
 def paper_page(shown: Excerpt) -> str:
     """Return docs/paper.md: the paper section by section, each statement with the verdict of both sets."""
-    columns = ("statement", "the paper", "`paper`", "", "`human`", "")
+    columns = ("statement", *SET_COLUMNS)
     rows: dict[str, list[tuple[str, ...]]] = {section: [] for section in SECTIONS}
     for each in shown.statements:
         rows[each.section].append(statement_cells(each))
-    for first, row in side_by_side(*shown.comparison.values()):
-        if first.section:
-            quantity, *cells, _ = row.cells
+    for first, found in side_by_side(*shown.comparison.values()):
+        if first.section and first.group is not Group.STATEMENT:
+            quantity, *cells, _ = found
             rows[first.section].append((f"{quantity} ({KINDS_OF_ROWS[first.group]})", *cells))
     parts = [
         "# The paper, section by section",

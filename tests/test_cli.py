@@ -260,7 +260,7 @@ def test_every_example_can_be_written_and_is_possible(call):
 def test_the_exit_status_says_what_is_incomplete(call, monkeypatch):
     found = type("Found", (), {"n_rows": 3, "n_predicted": 2, "lines": ("so",), "failed": 4, "done": False})()
     monkeypatch.setattr(commands, "_run_request", lambda *_, **__: found)
-    monkeypatch.setattr("fingerpad.report.validation.validation_summary", lambda _: ("so",))
+    monkeypatch.setattr("fingerpad.report.results.summary", lambda *_: ("so",))
     assert call("validate", "force.csv")[0] == commands.INCOMPLETE == 3
     content = {"touch": {"object": "sphere"}, "grid": {"motion.depth_mm": [0.2, 0.3]}}
     Path("sweep.yaml").write_text(json.dumps(content))

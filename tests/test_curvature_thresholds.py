@@ -18,7 +18,7 @@ from fingerpad.psychophysics.observer import expected_hit_rates
 from fingerpad.psychophysics.sensitivity import InterpolatedObserver
 from fingerpad.report import percept as page
 from fingerpad.report.style import png
-from fingerpad.report.tables import filled
+from report_rows import caption_of
 from sections import SENSITIVE, SphereSkin
 
 POPULATION = Population.grid(rows=3, columns=4, centre_mm=(RECEPTOR_X_MM, 0.0), afferent=SENSITIVE)
@@ -70,7 +70,7 @@ def test_threshold_is_at_a_hit_rate_of_three_quarters_with_the_noise_that_fits_p
         assert len(each.standards) == 4
         assert all(one.ideal_weber_fraction < one.weber_fraction for one in each.standards)
     assert png(page.draw_thresholds, found)[:4] == b"\x89PNG"
-    assert len(page.threshold_tables(found)[0].rows) == 8
+    assert len(page.rows_of_thresholds(found)) == 8
 
 
 def test_ideal_threshold_is_fishers(found):
@@ -99,7 +99,7 @@ def test_a_threshold_out_of_range_is_reported_and_affects_only_its_row(found):
     assert "No sphere" in told
     assert not RULES["per cent within"]((0.1, 0.14), "", told, *values)
     assert png(page.draw_thresholds, loud)[:4] == b"\x89PNG"
-    assert "No sphere" in page.threshold_tables(loud)[0].note
+    assert any("No sphere" in cells[5] for cells in page.rows_of_thresholds(loud))
 
 
 def test_receptors_that_are_silent_under_a_standard_do_not_change_its_threshold():
@@ -120,7 +120,9 @@ def test_noise_that_cannot_be_fitted_is_reported_in_place_of_thresholds():
     assert np.isnan(square.noise_sigma)
     assert "No noise within" in square.without_threshold[0].why_not
     assert png(page.draw_thresholds, same)[:4] == b"\x89PNG"
-    assert f"{same.judgements} judgements of each" in filled(page.CAPTION_THRESHOLDS, same)
+    assert f"{same.judgements} judgements of each" in caption_of(
+        "reproduction", "figure_12_curvature_thresholds", same
+    )
 
 
 class Coarse(Conditions):

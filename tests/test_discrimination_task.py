@@ -24,7 +24,8 @@ from fingerpad.experiments.discrimination.request import CurveSettings, example_
 from fingerpad.psychophysics.encoding import gradient_sum, neighbour_pairs, taking_part
 from fingerpad.psychophysics.ideal_observer import code_efficiency, noisy_presentations
 from fingerpad.psychophysics.observer import EuclideanDistance, Experiment, GradientSum, discriminate_by
-from fingerpad.report import task as report
+from fingerpad.report import percept as report
+from fingerpad.report.results import task_sentences
 from refusals import misused
 
 ROOT = Path(__file__).parents[1]
@@ -125,9 +126,9 @@ def test_who_is_silent_under_one_stimulus_has_no_latency_under_any():
     inner = decoding(found, "gradient_sum", "latency").statistic.mean
     all_of_them = decoding(analyse(question, bumps(question)), "gradient_sum", "latency").statistic.mean
     assert (inner < all_of_them).all()  # the outer ones, which fire late, are left out
-    known = [latency for row in found.responses["latency"] for latency in row if not np.isnan(latency)]
     colours = report.draw_task_responses(found).axes[0].collections[0]
-    assert colours.get_clim() == (min(known), max(known))
+    standard = found.responses["latency"][0]
+    assert colours.get_clim() == (np.nanmin(standard), np.nanmax(standard))
 
 
 @pytest.mark.parametrize("code", ["gradient_sum", "euclidean"])
@@ -230,12 +231,12 @@ def test_two_stimuli_give_a_forced_choice_and_no_missing_threshold():
     greater = (sums[1][:, None] > sums[0]).mean()
     proportion = found.decodings[0].forced_choice.proportions[0, 0]
     assert proportion == pytest.approx(max(greater, 1 - greater), abs=1e-9)
-    said = report.task_summary(found)
+    said = task_sentences(found)
     assert re.search(r"correct in \d+ % of trials \(\d+ % … \d+ %\)", said[1])
     assert "threshold" not in " ".join(said)
-    titles = [table.title for table in report.task_tables(found)]
-    assert "Two-alternative forced choice" in titles
-    assert "Thresholds" not in titles
+    assert report.rows_of_task_thresholds(found) == []
+    correct = report.rows_of_comparisons(found)[0][3]
+    assert correct == f"{found.decodings[0].forced_choice.proportions[0, 0]:.3f}"
 
 
 def test_a_certain_answer_has_no_finite_d_prime_and_no_noise_no_forced_choice():
@@ -267,7 +268,7 @@ def test_curves_show_every_code_people_with_their_intervals_and_thresholds():
     for code in ("gradient_sum", "ideal"):
         level = round(decoding(found, code, "static").curves[0].fit.threshold.level, 6)
         assert (level, level) in drawn
-    table = {row.cells[0]: row.cells for row in report.task_tables(found)[0].rows}
+    table = {cells[0]: cells for cells in report.rows_of_task_thresholds(found)}
     threshold = decoding(found, "gradient_sum", "static").curves[0].fit.threshold
     assert table["Gradient Sum, static rate"][3] == f"{threshold.difference:.3g}"
 
@@ -313,9 +314,9 @@ def test_silence_under_one_stimulus_is_silence_of_that_measure_alone():
     assert (dynamic.silent, dynamic.hit_rate) == (("200",), None)
     assert static.silent == ()
     assert len(static.hit_rate) == 4
-    assert "silent under 200" in report.task_tables(found)[1].note
+    assert report.rows_of_comparisons(found)[0][1] == "silent under 200"
     assert report.draw_task_curves(found)
-    assert report.task_summary(found)[0].startswith("Gradient Sum of static rates discriminates")
+    assert task_sentences(found)[0].startswith("Gradient Sum of static rates discriminates")
 
 
 @pytest.fixture

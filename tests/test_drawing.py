@@ -21,8 +21,8 @@ from fingerpad.inference.spike_likelihood import SpikeFit
 from fingerpad.psychophysics.curve_fit import fit_psychometric
 from fingerpad.reduction.streaming import ReducedSample
 from fingerpad.report.drawing import DRAWINGS
+from fingerpad.report.percept import draw_task_responses
 from fingerpad.report.skin import draw_spikes
-from fingerpad.report.task import draw_task_responses
 from refusals import refused
 
 TASK = {
@@ -103,7 +103,7 @@ def results():
     }
 
 
-@pytest.mark.parametrize(("kind", "what"), [(kind, what) for kind in DRAWINGS for what in DRAWINGS[kind]])
+@pytest.mark.parametrize(("kind", "what"), DRAWINGS)
 def test_every_drawing_fills_axes_that_say_what_they_show(results, kind, what):
     axes = Figure().add_subplot()
     assert results[kind].plot(axes, what) is axes
@@ -117,10 +117,10 @@ def test_rasters_begin_on_top_and_maps_have_distal_to_the_right(results):
     by_touch, task = Figure(), draw_task_responses(results["TaskResult"])
     draw_spikes(by_touch.add_subplot(), results["SkinResponse"], response)
     rasters, maps = list(by_touch.axes), [task.axes[0]]
-    for kind, drawings in DRAWINGS.items():
-        for what, into in (("raster", rasters), ("map", maps), ("pad", maps)):
-            if what in drawings:
-                into.append(results[kind].plot(Figure().add_subplot(), what))
+    for kind, what in DRAWINGS:
+        into = {"raster": rasters, "map": maps, "pad": maps}.get(what)
+        if into is not None:
+            into.append(results[kind].plot(Figure().add_subplot(), what))
     assert (len(rasters), len(maps)) == (3, 3)
     for axes in rasters:
         bottom, top = axes.get_ylim()
@@ -178,7 +178,7 @@ def test_few_sites_have_a_key_and_many_have_none(results):
     assert many.get_legend() is None
 
 
-@pytest.mark.parametrize("kind", DRAWINGS)
+@pytest.mark.parametrize("kind", dict.fromkeys(kind for kind, _ in DRAWINGS))
 def test_a_notebook_shows_a_small_picture_and_one_line(results, kind):
     html, line = results[kind]._repr_html_(), repr(results[kind])
     assert 'src="data:image/png;base64,iVBOR' in html

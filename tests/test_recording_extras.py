@@ -14,10 +14,12 @@ from fingerpad.experiments.fit.rate_uncertainty import profiled
 from fingerpad.experiments.fit.results import ParameterProfile, RatePosterior
 from fingerpad.inference.afferent_fit import ReceptorOffset
 from fingerpad.inference.identifiable import IDENTIFIABLE_NAMES, identifiable
-from fingerpad.inference.rate_model import AfferentModel, RateProblem, four_number_model
-from fingerpad.report import fit as report
-from fingerpad.report.fit import ALLOWED_LOSS
+from fingerpad.inference.problem import RateProblem
+from fingerpad.inference.rate_model import AfferentModel, four_number_model
+from fingerpad.report import nerve as report
+from fingerpad.report.nerve import ALLOWED_LOSS
 from fingerpad.report.style import png
+from report_rows import caption_of, table_of
 
 TIMES_MS = np.array([0.0, 10.0, 20.0, 30.0, 40.0, 50.0, 80.0, 200.0, 1000.0])
 COURSE = np.minimum(TIMES_MS / 50.0, 1.0) ** 2 * (0.8 + 0.2 * np.exp(-np.maximum(TIMES_MS - 50.0, 0.0) / 200))
@@ -146,26 +148,24 @@ def test_figures_words_and_tables_hold_what_was_found(section):
     panels = report.draw_profiles(section).axes
     assert [axes.lines[0].get_ydata().tolist() for axes in panels] == [[3.0, 0.0, 2.5]] * 4
     assert panels[3].get_xlabel() == "τ [ms]"
-    (bars,) = report.draw_sensitivity(section).axes
-    heights = [patch.get_height() for patch in bars.patches]
-    assert heights == [*section.sensitivity.total, *section.sensitivity.first]
     (axes,) = report.draw_offset(section).axes
     lines = {line.get_label(): line for line in axes.lines}
     assert lines["held there"].get_ydata().tolist() == section.offset.held.fss_in_sample.tolist()
     assert lines["fitted to all"].get_xdata().tolist() == [section.offset.offset_mm]
     assert lines["fitted without a fold"].get_xdata().tolist() == section.offset.folds_mm.tolist()
-    for draw in (report.draw_profiles, report.draw_sensitivity, report.draw_offset):
+    for draw in (report.draw_profiles, report.draw_offset):
         assert png(draw, section).startswith(b"\x89PNG")
     found = section.offset
-    assert f"fitted offset is {found.offset_mm:.3g} mm" in report.caption_offset(section)
-    (table,) = report.offset_tables(section)
+    assert f"fitted offset is {found.offset_mm:.3g} mm" in caption_of("fit", "offset", section)
+    table = table_of("fit", "Offset", section)
     assert table.rows[1].cells[3] == f"{found.fss_in_sample:.3f}"
     assert table.rows[0].cells[6] == f"{section.fss_out_of_sample:.3f}"
     assert all(len(row.cells) == len(table.columns) for row in table.rows)
-    assert report.profile_tables(section)[0].rows[0].cells[-1] == "open … 2.8"
-    most = max(zip(section.sensitivity.total, ("β", "k_d", "k_s", "τ"), strict=True))[1]
-    assert f"The largest total index is that of {most}" in report.caption_sensitivity(section)
-    assert len(report.sensitivity_tables(section)[0].rows) == 4
+    assert table_of("fit", "Intervals", section).rows[0].cells[2] == "open … 2.8"
+    shares = [
+        row.cells[3].split(" ± ")[0] for row in table_of("fit", "Sensitivity", section.sensitivity).rows
+    ]
+    assert shares == [f"{total:.2f}".replace("-", "−") for total in section.sensitivity.total]
 
 
 def test_credible_intervals_are_drawn_where_there_are_some(section):
@@ -176,5 +176,3 @@ def test_credible_intervals_are_drawn_where_there_are_some(section):
     ))  # fmt: skip
     panels = zip(report.draw_profiles(drawn).axes, report.draw_profiles(section).axes, strict=True)
     assert all(len(more.lines) == len(fewer.lines) + 1 for more, fewer in panels)
-    assert "credible interval" in report.caption_profiles(drawn)
-    assert "credible interval" not in report.caption_profiles(section)

@@ -8,6 +8,7 @@ import sys
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -38,8 +39,10 @@ from fingerpad.inference.spike_likelihood import soft_spikes
 from fingerpad.neuron.afferent import type_of
 from fingerpad.neuron.spikes import PAPER_WINDOWS_MS
 from fingerpad.neuron.transduction import drive
-from fingerpad.report import fit as report
+from fingerpad.report import nerve as report
+from fingerpad.report.results import summary
 from refusals import misused, refusals
+from report_rows import table_of
 from sections import sed_driven
 
 ROOT = Path(__file__).parents[1]
@@ -129,7 +132,7 @@ def test_a_posterior_is_part_of_the_fit_and_of_its_page(recovered, monkeypatch):
     assert four.tolist() == list(fitted.identifiable.values())
     assert fitted.posterior is drawn
     assert recovered.posterior is None
-    assert report.fit_tables(fitted)[1].rows[0].cells[3] == "1 … 2"
+    assert table_of("fit", "The four", fitted).rows[0].cells[3] == "1 … 2"
     with_band, without = (report.draw_fit(fit).axes[1].collections for fit in (fitted, recovered))
     assert len(with_band) == len(without) + 1
 
@@ -150,7 +153,8 @@ def test_a_soft_threshold_is_recovered_from_its_spikes_within_their_information(
     assert 0.0 < spikes.log_likelihood - spikes.log_likelihood_out_of_sample < 20.0
     assert spikes.time_rescaling_p_value > 0.01
     assert fitted.fss_out_of_sample > 0.97
-    assert len(report.fit_tables(fitted)) == 6
+    shown = table_of("fit", "Fit of a soft threshold", fitted).rows[0].cells
+    assert shown == ("spikes", f"{spikes.n_spikes}")
 
 
 def test_regular_trains_advise_what_the_fit_has():
@@ -333,7 +337,7 @@ def test_a_fit_writes_page_figures_numbers_and_their_origin(call, tmp_path):
     )
     assert said.splitlines()[-2:] == ["Report: fit/fit.html", "Results: fit/fit.json"]
     found = {str(path.relative_to(tmp_path / "fit")) for path in (tmp_path / "fit").rglob("*.*")}
-    assert found == {"fit.html", "fit.json", "figures/fit.png", "figures/residuals.png"}
+    assert found == {"fit.html", "fit.json", "figures/fit.png"}
     assert fit["shift_mm"] == list(SHIFTS_MM)
     assert fit["presentations"] == [1] * 6
     assert manifest["command"] == shlex.join(["fingerpad", "fit", *arguments])
@@ -344,7 +348,7 @@ def test_a_fit_writes_page_figures_numbers_and_their_origin(call, tmp_path):
     page = (tmp_path / "fit" / "fit.html").read_text()
     assert "<h1>An afferent fitted to recordings</h1>" in page
     assert "its dynamic term follows compressive stress, its static term compressive stress" in page
-    assert page.count("data:image/png;base64,") == 2
+    assert page.count("data:image/png;base64,") == 1
     assert f"<td>{fit['fss_out_of_sample']:.3f}</td>" in page.replace("−", "-")
 
 
@@ -385,7 +389,7 @@ def test_what_is_asked_for_beside_the_fit_is_on_its_page(call, tmp_path, monkeyp
     assert len(fit["sensitivity"]["total"]) == 4
     assert fit["offset"]["held"]["offset_mm"] == list(OFFSETS_MM)
     figures = {path.stem for path in (tmp_path / "fit" / "figures").iterdir()}
-    assert figures == {"fit", "residuals", "profiles", "sensitivity", "offset"}
+    assert figures == {"fit", "profiles", "offset"}
     page = (tmp_path / "fit" / "fit.html").read_text()
     for words in ("<td>1.2 … open</td>", "Sensitivity of FSS (Sobol)", "Offset of the receptor"):
         assert words in page
@@ -496,13 +500,14 @@ def test_figures_show_what_was_recorded_and_nothing_else(recovered):
     unrecorded = replace(recovered.phases["dynamic"], observed_hz=None, fss_in_sample=None)
     alone = report.draw_fit(replace(recovered, phases=recovered.phases | {"dynamic": unrecorded}))
     assert [axes.get_title().split(",")[0] for axes in alone.axes] == ["static hold"]
-    shifted = report.draw_fit_residuals(replace(recovered, shift_mm=list(range(N, 0, -1))))
-    points = next(line for line in shifted.axes[0].lines if line.get_label() == "fitted to all")
-    assert list(points.get_xdata()) == list(range(-N, 0))
-    missed = RATES.dynamic_rate_hz - np.array(recovered.phases["dynamic"].fitted_hz)
-    np.testing.assert_allclose(points.get_ydata(), missed, rtol=0, atol=1e-9)
-    assert "need five folds or more" in report.fit_summary(recovered)[1]
-    assert [row.cells[2] for row in report.fit_tables(recovered)[1].rows] == ["–"] * 4
+    shifted = report.draw_fit(replace(recovered, shift_mm=np.arange(N, 0, -1)))
+    line = next(line for line in shifted.axes[0].lines if line.get_label() == "fitted to all")
+    assert list(line.get_xdata()) == list(range(-N, 0))
+    np.testing.assert_array_equal(line.get_ydata(), recovered.phases["dynamic"].fitted_hz)
+    assert "need five folds or more" in summary("fit", SimpleNamespace(fit=recovered))[1]
+    assert [row.cells[2] for row in table_of("fit", "The four", recovered).rows] == ["–"] * 4
+    observed = [cells[3] for cells in report.rows_of_rates(recovered)]
+    assert observed == [f"{rate:.1f}" for rate in RATES.dynamic_rate_hz]
 
 
 def test_a_fit_from_nothing_recovers_a_known_afferent(call, monkeypatch, tmp_path):

@@ -4,7 +4,8 @@ import base64
 import json
 import re
 import struct
-from dataclasses import fields, replace
+from dataclasses import asdict, fields, replace
+from types import SimpleNamespace
 
 import matplotlib
 import numpy as np
@@ -13,8 +14,8 @@ from matplotlib.collections import PolyCollection
 from matplotlib.patches import Circle
 
 from fingerpad.core.result_files import schema_of, to_json
-from fingerpad.data import all_published
-from fingerpad.experiments.gerling2014.claims import Group, paired
+from fingerpad.data import STATUSES, all_published
+from fingerpad.experiments.gerling2014.claims import Group, Verdict, paired
 from fingerpad.experiments.gerling2014.nerve import PopulationMaps
 from fingerpad.experiments.gerling2014.percept import SphereDiscrimination
 from fingerpad.experiments.gerling2014.reproduction import ReproductionResult, SetResult
@@ -24,13 +25,14 @@ from fingerpad.experiments.tissue_sets import tissue_layers
 from fingerpad.geometry.fingertip import Fingertip
 from fingerpad.geometry.grading import resolution_grading
 from fingerpad.geometry.mesh import finger_mesh
-from fingerpad.report import mesh_picture as mesh_picture_figure
 from fingerpad.report import nerve, percept, reproduction, skin, tables
 from fingerpad.report import page as page_module
 from fingerpad.report.page import SETS, VERDICTS, Chapter, Drawing, Page, write_html
-from fingerpad.report.reproduction import GROUPS, SIGNS, reproduction_page, write_report
+from fingerpad.report.reproduction import SIGNS
+from fingerpad.report.results import page_of, write_page
 from fingerpad.report.style import BLUE, GREEN, ORANGE, RESOLUTION_DPI, STYLE, new_figure, png
-from fingerpad.report.tables import Column, Row, Table, filled, table
+from fingerpad.report.tables import Row, Table, filled, filled_table
+from report_rows import caption_of, table_of
 from sections import (
     CURVATURE_PER_M,
     SHIFT_MM,
@@ -193,13 +195,21 @@ def _population() -> dict:
     }  # fmt: skip
 
 
-DRAWINGS = reproduction_page(typed(ReproductionResult, synthetic_results())).drawings
+def drawn(results):
+    return page_of("reproduction", typed(ReproductionResult, results))
+
+
+def written(results, folder):
+    return write_page("reproduction", results, folder)
+
+
+DRAWINGS = drawn(synthetic_results()).drawings
 
 
 @pytest.fixture(scope="module")
 def report(tmp_path_factory):
     results, settings = typed(ReproductionResult, synthetic_results()), dict(matplotlib.rcParams)
-    path = write_report(results, tmp_path_factory.mktemp("report"))
+    path = written(results, tmp_path_factory.mktemp("report"))
     again = to_json(typed(ReproductionResult, synthetic_results()))
     assert to_json(results) == again, "drawing changed the results"
     assert dict(matplotlib.rcParams) == settings, "drawing changed settings that others share"
@@ -211,7 +221,7 @@ def test_the_report_is_one_page_with_its_figures_and_loads_no_other_file(report)
     pictures = [entry for entry in files if entry.suffix == ".png"]
     assert files == sorted([report, *pictures])
     numbered = {int(path.name.split("_")[1]) for path in pictures if path.name.startswith("figure_")}
-    assert numbered == {drawing.number for drawing in DRAWINGS if drawing.number} == set(range(1, 13))
+    assert numbered == {drawing.number for drawing in DRAWINGS if drawing.number} == {*range(1, 13)} - {3, 10}
     for picture in pictures:
         png = picture.read_bytes()
         start = png.index(b"pHYs") + 4
@@ -233,7 +243,7 @@ def test_equal_results_give_equal_bytes(report, tmp_path, monkeypatch):
             assert png(draw) == (report.parent / "figures" / f"{name}.png").read_bytes()
     monkeypatch.setattr(page_module, "png", lambda draw: b"")
     results = [typed(ReproductionResult, synthetic_results()) for _ in range(2)]
-    one, two = (write_report(each, tmp_path / f"{n}").read_bytes() for n, each in enumerate(results))
+    one, two = (written(each, tmp_path / f"{n}").read_bytes() for n, each in enumerate(results))
     assert one == two
 
 
@@ -297,7 +307,7 @@ def test_texts_are_escaped_wherever_they_stand(tmp_path, monkeypatch):
     manifest["packages"][HOSTILE] = HOSTILE
     results["manifest"] = manifest
     results["paper"]["single_unit"]["parameters"][HOSTILE] = 1.0
-    text = write_report(typed(ReproductionResult, results), tmp_path).read_text(encoding="utf-8")
+    text = written(typed(ReproductionResult, results), tmp_path).read_text(encoding="utf-8")
     assert "<script" not in text
     assert text.count("&lt;script&gt;") > 40
 
@@ -335,7 +345,7 @@ def test_what_does_not_exist_is_drawn_as_nothing_and_written_as_a_dash(tmp_path,
     results = without_numbers(synthetic_results(), schema, schema["$defs"])
     assert results["human"]["discrimination"]["statistics"]["misfit"]["static"]["value"] is None
     assert results["skin_deflection"]["trial1"]["cylinder"]["r2"] is None
-    text = write_report(typed(ReproductionResult, results), tmp_path).read_text(encoding="utf-8")
+    text = written(typed(ReproductionResult, results), tmp_path).read_text(encoding="utf-8")
     visible = re.sub(r"base64,[^\"]+", "", text)
     assert "nan" not in re.sub(r"<[^>]+>", " ", visible).lower().split()
     assert "None" not in visible
@@ -347,8 +357,8 @@ def test_parts_beyond_the_paper_are_left_out_where_they_were_not_run():
     for name in SETS:
         for key in ("single_unit_uncertainty", "curvature_thresholds"):
             short[name].pop(key)
-    pages = [reproduction_page(typed(ReproductionResult, each)) for each in (synthetic_results(), short)]
-    assert [[drawing.number for drawing in page.drawings][-2:] for page in pages] == [[11, 12], [9, 10]]
+    pages = [drawn(each) for each in (synthetic_results(), short)]
+    assert [[drawing.number for drawing in page.drawings][-2:] for page in pages] == [[11, 12], [8, 9]]
     (beyond,) = (chapter for chapter in pages[1].chapters if chapter.title == "Beyond the paper")
     assert "`fingerpad reproduce --extended`" in beyond.parts[0]
 
@@ -361,14 +371,15 @@ def test_a_miss_is_marked_in_words_and_by_its_cell(report):
     assert set(cells) == {*marks, ("missed", "✗ missed (fitted)")}
     assert len(set(SIGNS.values())) == len(SIGNS) == len(Verdict)  # they differ without colour
     assert set(VERDICTS) == {SIGNS[each] for each in Verdict if each is not Verdict.NOT_APPLICABLE}
-    assert set(GROUPS) == set(Group)
+    made = [row.get("made") for row in page_module.PAGES["reproduction"]["parts"]]
+    assert [name for name in made if name and "claims" in name] == [f"claims, {group}" for group in Group]
 
 
 def test_the_first_screen_has_verdicts_and_the_contents_stand_beside_the_page(report):
     text = report.read_text(encoding="utf-8")
-    page = reproduction_page(typed(ReproductionResult, synthetic_results()))
+    page = drawn(synthetic_results())
     assert not page.paragraphs
-    assert [row.cells for row in page.verdicts.rows] == [
+    assert [row.cells for row in page.verdicts[0].rows] == [
         ("3.1 FSS out of sample", "✓ met", "✓ met"),
         ("3.1 rises", "✗ missed", "✓ met"),
         ("3.1 latency", "? not decidable", "? not decidable"),
@@ -377,26 +388,23 @@ def test_the_first_screen_has_verdicts_and_the_contents_stand_beside_the_page(re
     first = text[text.index("<main>") : text.index("<section")]
     assert (first.count("<table"), first.count("<img"), first.count("<figcaption>")) == (1, 3, 3)
     deflection, afferent, hits = (drawing.caption for drawing in page.opening)
-    assert deflection == "Skin: Trial 3 is closest to the observed deflection, as in the paper."
+    wanted = "R² of the deflection 0.93 with Trial 1, 0.94 with Trial 2, 0.95 with Trial 3; in the paper"
+    assert deflection == f"Skin: {wanted} Trial 3 is the closest."
     assert afferent == "Afferent: FSS out of sample `paper` 0.82 and `human` 0.82; the paper 0.81."
     assert "`paper` 0.12 and `human` 0.12; the paper 0.055" in hits
-    results = synthetic_results()
-    results["skin_deflection"]["trial1"]["cylinder"]["r2"] = 0.99
-    deflection = reproduction_page(typed(ReproductionResult, results)).opening[0].caption
-    assert deflection == "Skin: Trial 1 is closest to the observed deflection; in the paper Trial 3 is."
     contents = re.findall(r'<a href="#([^"]+)"', text[: text.index("<main>")])
     assert contents == [chapter.anchor for chapter in page.chapters]
     open_parts = re.sub(r"<details>.*?</details>", "", text, flags=re.DOTALL)
-    assert open_parts.count("<table") == 1
-    assert open_parts.count("<img") == 3 + 2 * len([1, 2, 3, 4, 5, 6, 7, 8, 9]) - 3
+    assert open_parts.count("<table") == len(["verdicts", "steps to a hit rate"])
+    assert open_parts.count("<img") == 3 + 2 * len([1, 2, 4, 5, 6, 7, 8, 9]) - 2
     assert text.count("<table") > 25
 
 
 def test_inputs_are_listed_exactly_and_the_assumed_ones_are_marked():
-    numbers = all_published()
-    meanings, listed = reproduction.input_tables(numbers)
-    assert [row.cells[0] for row in meanings.rows] == ["paper", "read", "recalled", "assumed"]
-    assert sum(int(row.cells[2]) for row in meanings.rows) == len(numbers)
+    numbers = [PublishedNumber(**asdict(number)) for number in all_published()]
+    meanings = table_of("reproduction", "Status of a number", None)
+    assert dict(row.cells for row in meanings.rows) == STATUSES
+    listed = table_of("reproduction", "Published numbers", SimpleNamespace(inputs=numbers))
     for number, row in zip(numbers, listed.rows, strict=True):
         values = number.value if isinstance(number.value, tuple) else (number.value,)
         # Numbers are set in groups of three and with true minus signs; undone, they are the very numbers.
@@ -410,23 +418,21 @@ def test_inputs_are_listed_exactly_and_the_assumed_ones_are_marked():
 
 
 def test_steps_and_searches_of_the_fit_have_a_table_each():
-    made = nerve.single_unit_tables(typed(SetResult, synthetic_set()).single_unit)
-    steps, searches = (
-        next(table for table in made if table.title.startswith(each)) for each in ("Steps", "Searches")
-    )
-    assert "fold 3, start 2" in steps.title
-    assert [row.kind for row in steps.rows] == ["", "", "", "final"]
-    assert steps.rows[-1].cells[:2] == ("3", "0.840")
-    pairs = [f"{fold}, {start}" for fold in range(1, 7) for start in (1, 2)]
-    assert [row.cells[0] for row in searches.rows] == pairs
-    assert searches.rows[5].cells == ("3, 2", "0.780", "0.850", "0.840", "3", "402")
-    assert [row.kind for row in searches.rows[:4]] == ["", "final", "final", ""]
+    section = typed(SetResult, synthetic_set()).single_unit
+    steps, folds = (table_of("reproduction", each, section) for each in ("Steps of", "Folds"))
+    assert "fold 3" in steps.title
+    assert "start 2" in steps.note
+    assert [row.cells[0] for row in steps.rows] == ["0", "1", "2", "3"]
+    assert steps.rows[-1].cells[1] == "0.840"
+    assert [row.cells[0] for row in folds.rows] == ["1", "2", "3", "4", "5", "6"]
+    assert folds.rows[2].cells[-1] == "0.850, 0.840; 402"
 
 
 def test_tables_of_discrimination_have_hit_rates_interpretations_and_readings_of_the_criterion():
     section = typed(SphereDiscrimination, discrimination_section())
-    rates, meant, read = percept.discrimination_tables(section)[:3]
-    assert rates.columns[2:] == ("296 1/m", "305 1/m", "316 1/m", "328 1/m", "340 1/m", "365 1/m")
+    titles = ("Hit rates", "Interpretations", "Error bars")
+    rates, meant, read = (table_of("reproduction", each, section) for each in titles)
+    assert rates.columns[2:] == ["296 1/m", "305 1/m", "316 1/m", "328 1/m", "340 1/m", "365 1/m"]
     assert len(rates.rows) == 20
     first = section.gradient_sum["static"]
     assert rates.rows[0].cells[2] == f"{first.hit_rate[0]:.2f}\N{NO-BREAK SPACE}±\N{NO-BREAK SPACE}0.02"
@@ -438,7 +444,7 @@ def test_tables_of_discrimination_have_hit_rates_interpretations_and_readings_of
 
 
 def test_every_table_is_rectangular():
-    page = reproduction_page(typed(ReproductionResult, synthetic_results()))
+    page = drawn(synthetic_results())
     parts = [part for chapter in page.chapters for part in (*chapter.parts, *chapter.folded)]
     made = [part for part in parts if isinstance(part, Table)]
     assert len(made) > 12
@@ -446,45 +452,47 @@ def test_every_table_is_rectangular():
         assert {len(row.cells) for row in each.rows} == {len(each.columns)}, each.title
 
 
-def test_a_column_names_its_field_with_the_unit_and_finds_it_along_a_path():
-    rows = ({"fss": 0.5, "steps": [(1, 2.0)]}, {"steps": [(3, None)]})
-    made = table("T", rows, (Column("steps.0.0", "n"), Column("fss", form=2), Column("steps.0.1", "depth")))
-    assert made.rows == [Row(("1", "0.50", "2")), Row(("3", "–", "–"))]
-    titles = {"shear_kpa": None, "a.jnd_per_m": "JND", "depth_mm": "depth [cm]", "n_mm": ""}
-    named = [Column(value, heading).title for value, heading in titles.items()]
-    assert named == ["shear [kPa]", "JND [1/m]", "depth [cm]", ""]
-    assert filled("{fss}, {fss:2}, {fss:p}, {steps:n}, {steps.0.1}", rows[0]) == "0.5, 0.50, 50 %, 1, 2"
-
-
-def test_a_figure_is_one_function_that_enters_the_list_with_its_caption_and_tables(monkeypatch):
-    monkeypatch.setattr(page_module, "FIGURES", [])
-
-    @page_module.figure(
-        "page",
-        "Skin",
-        2,
-        "depths",
-        "Depths",
-        lambda *sets: f"{len(sets)} sets.",
-        of=page_module.both("depth_mm"),
-        tables=lambda depth_mm: [table("T", [depth_mm], [Column(float, "depth [mm]", 1)])],
+def test_texts_and_tables_are_filled_with_what_lies_at_paths():
+    found = {"fss": 0.5, "steps": [(1, 2.0)], "level": None, "n": {"a.b": 1, "low": None}}
+    assert (
+        filled("{fss}, {fss:2}, {fss:percent}, {steps:count}, {steps.0.1}", found) == "0.5, 0.50, 50 %, 1, 2"
     )
+    assert filled("{level}, {level.low}, {steps.7.1}, {steps.-1.0}", found) == "–, –, –, 1"
+    assert filled("{data.protocol.DEPTH.value:1} mm, {kept}", {"kept": "{fss}"}) == "1.0 mm, {fss}"
+    rows = {"table": "T", "columns": ["n", "over {fss}"], "note": "{steps:count} step."}
+    each = filled_table(rows | {"each": "steps", "cells": ["{0} (used)", "{1:1}"]}, found)
+    assert each == Table("T", ["n", "over 0.5"], [Row(("1 (used)", "2.0"), "final")], "1 step.")
+    listed = filled_table(rows | {"rows": [["x", "assumed"], ["y", "{fss}"]]}, found)
+    assert listed.rows == [Row(("x", "assumed"), "assumed"), Row(("y", "0.5"))]
+
+
+def test_a_figure_is_one_function_and_one_row_of_its_page(monkeypatch):
+    row = {"chapter": "Skin", "both": "depth_mm"}
+    shown = row | {"figure": "depths", "number": 2, "title": "Depths", "caption": "{0} mm."}
+    numbers = row | {"table": "T", "columns": ["depth [mm]"], "rows": [["{0:1}"]]}
+    made = row | {"table": "Twice", "columns": ["depth"], "made": "twice"}
+    monkeypatch.setitem(page_module.PAGES, "page", {"parts": [shown, numbers, made]})
+
+    @page_module.enter(page_module.DRAW, "depths")
     def draw(depth_mm):
-        return new_figure(depth_mm, 1.0)
+        return new_figure(depth_mm[0], 1.0)
+
+    @page_module.enter(page_module.ROWS, "twice")
+    def make(depth_mm):
+        return [(str(2.0 * depth_mm[0]),)]
 
     class Sets:
-        paper, human = ({"depth_mm": depth_mm} for depth_mm in (1.0, 2.0))
+        paper, human = ({"depth_mm": [depth_mm]} for depth_mm in (1.0, 2.0))
 
-    ((chapter, (drawing, *numbers)),) = page_module.figures("page", Sets).items()
-    assert (chapter, drawing.label, drawing.caption) == ("Skin", "Figure 2. Depths", "2 sets.")
+    ((chapter, (drawing, *tables)),) = page_module.page_parts("page", Sets).items()
+    assert (chapter, drawing.label, drawing.caption) == ("Skin", "Figure 2. Depths", "1 mm.")
     widths = {name: made().get_figwidth() for name, made in drawing.images.items()}
     assert widths == {"depths_paper": 1.0, "depths_human": 2.0}
-    assert [(each.title, each.rows[0].cells) for each in numbers] == [
-        ("T, paper", ("1.0",)),
-        ("T, human", ("2.0",)),
-    ]
+    assert [(each.title, *each.rows[0].cells) for each in tables] == [
+        ("T, paper", "1.0"), ("T, human", "2.0"), ("Twice, paper", "2.0"), ("Twice, human", "4.0"),
+    ]  # fmt: skip
     Sets.human = {}
-    assert page_module.figures("page", Sets) == {}
+    assert page_module.page_parts("page", Sets) == {"Skin": []}
 
 
 def lines(axes):
@@ -526,20 +534,19 @@ def test_figure_5_draws_the_fitted_line_over_observed_points_and_the_papers_leve
     assert dynamic.get_ylim()[1] > 212.0
     (difference,) = static.containers
     (low, high) = difference.lines[2][0].get_segments()[0][:, 1]
-    assert (low, high - low) == (given.modulation["static"]["ours"].minimum_hz, pytest.approx(52.0))
-    caption = filled(nerve.CAPTION_SINGLE_UNIT, given)
+    assert (low, high - low) == (given.modulation.static.ours.minimum_hz, pytest.approx(52.0))
+    caption = caption_of("reproduction", "figure_5_single_unit", given)
     assert "54 and 212 spikes/s" in caption
     assert "70 and 210 spikes/s as observed" in caption
 
 
 def test_figure_1_draws_the_finger_in_three_dimensions_and_every_element_of_the_planes_by_its_layer():
     section = typed(SetResult, synthetic_set()).mesh
-    whole, cut, across, along, near = mesh_picture_figure.draw_mesh(section).axes
+    figure = skin.draw_mesh(section)
+    whole, across, along, near = figure.axes
     n_skin, n_through = (section.x_mm.shape[0] - 1) * (section.x_mm.shape[1] - 1), section.layer.size
-    n_plane = (section.along.right_mm.shape[0] - 1) * n_through
-    assert whole.name == cut.name == "3d"
-    solid, half = (len(axes.collections[0].get_facecolor()) for axes in (whole, cut))
-    assert (solid, half) == (2 * n_skin, n_skin + n_plane + 1)
+    assert whole.name == "3d"
+    assert len(whole.collections[0].get_facecolor()) == 2 * n_skin
     for axes, plane, halves in (
         (along, section.along, 1),
         (across, section.across, 2),
@@ -550,12 +557,15 @@ def test_figure_1_draws_the_finger_in_three_dimensions_and_every_element_of_the_
         for part in faces:
             assert len(part.get_paths()) == (plane.right_mm.shape[0] - 1) * n_through
             drawn = [matplotlib.colors.to_hex(colour) for colour in part.get_facecolor()[:n_through]]
-            assert drawn == [mesh_picture_figure.LAYER_COLOURS[layer] for layer in section.layer]
+            assert drawn == [skin.LAYER_COLOURS[layer] for layer in section.layer]
     (receptor,) = near.get_lines()
     assert np.hypot(*(receptor.get_xydata()[0] - section.contact_mm)) == pytest.approx(0.471, abs=0.002)
-    named = [text.get_text() for text in near.texts]
-    assert named == ["stratum corneum 0.371 mm", "living epidermis 0.1 mm", "dermis 1.153 mm"]
-    assert f"{len(QUICK.nodes_mm)} nodes and" in mesh_picture_figure.caption_mesh(section)
+    named = [text.get_text() for text in figure.legends[0].get_texts()]
+    assert named == [
+        "stratum corneum 0.371 mm", "living epidermis 0.1 mm", "dermis 1.153 mm", "subcutis", "bone", "nail",
+    ]  # fmt: skip
+    caption = caption_of("reproduction", "figure_1_mesh", section)
+    assert f"{tables.number(len(QUICK.nodes_mm))} nodes and" in caption
     np.testing.assert_array_equal(
         section.across.right_mm[:, 0], QUICK.nodes_mm[QUICK.skin_grid[0], 2].round(4)
     )
@@ -578,38 +588,29 @@ def test_figure_2_draws_skin_current_potential_and_the_spikes_of_three_afferents
     assert labels == ["0 mm\n140 and 66/s", "1 mm\n200 and 58/s", "2 mm\n0 and 0/s"]
 
 
-def test_figure_3_has_the_steps_of_both_codes_as_in_the_paper_with_the_numbers_of_the_run():
-    result = typed(ReproductionResult, synthetic_results())
-    section = result.paper.discrimination
-    silent = replace(result.human, discrimination=replace(section, gradient_sum={}))
-    axes = percept.draw_steps(replace(result, human=silent)).axes[0]
-    texts = "\n".join(text.get_text() for text in axes.texts)
+def test_the_steps_of_both_codes_have_the_letters_of_the_paper_and_the_noise_of_the_run():
+    steps = table_of("reproduction", "Steps to a hit rate", typed(ReproductionResult, synthetic_results()))
+    texts = "\n".join(cell for row in steps.rows for cell in row.cells)
     for letter in ("a", "b", "c", "d, e", "f", "g, h", "i, j", "k", *(f"{each}*" for each in "bcdefgh")):
         assert f"({letter})" in texts
-    assert (
-        len(axes.collections[0].get_offsets()) == len(typed(PopulationMaps, _population()).receptors_mm) == 18
-    )
-    assert "first-spike latency" in texts
-    rates = [section.gradient_sum["latency"].hit_rate[end] for end in (0, -1)]
-    assert f"latency {rates[0]:.2f} and {rates[1]:.2f}" in texts
-    assert "human, 296 1/m and 365 1/m: no hit rates: the population is silent" in texts
+    assert "σ₁ = 0.12 (`paper`) and 0.12 (`human`)" in texts
+    assert "287 1/m" in steps.note
 
 
 def test_figure_6_leaves_silent_places_open_and_tells_the_rate_without_a_touch():
     section = typed(PopulationMaps, _population())
-    maps = [axes for axes in nerve.draw_population(section).axes if axes.name != "3d" and axes.get_xlabel()]
+    maps = [axes for axes in nerve.draw_population(section).axes if axes.get_title()]
     assert len(maps) == 3
     for axes, name in zip(maps, nerve.QUANTITIES, strict=True):
         shown = np.ma.getmaskarray(axes.collections[0].get_array()).reshape(13, 11)
         silent = ~(getattr(section, name) > 0.0)
         assert 0 < silent.sum() < silent.size
         np.testing.assert_array_equal(shown, silent.T)
-    for axes in maps:
         np.testing.assert_array_equal(axes.get_lines()[0].get_xydata(), section.receptors_mm)
-    caption = nerve.caption_population(section, section)
-    assert "The afferent of human also fires without touch, 4 spikes/s from 251 ms on" in caption
-    silent = replace(section, at_rest=replace(section.at_rest, first_spike_latency_ms=np.nan))
-    assert "without touch" not in nerve.caption_population(silent, silent)
+    untouched = table_of("reproduction", "The afferent without touch", section)
+    assert [row.cells[1] for row in untouched.rows] == ["0", "4", "251"]
+    nowhere = replace(section, first_spike_latency_ms=np.full_like(section.static_rate_hz, np.nan))
+    assert "no afferent fires" in nerve.draw_population(nowhere).axes[2].texts[0].get_text()
 
 
 def test_figure_7_has_the_papers_letters_people_and_our_curves_with_bars_of_one_deviation():
@@ -640,25 +641,20 @@ def test_figure_7_has_the_papers_letters_people_and_our_curves_with_bars_of_one_
         np.testing.assert_allclose(lengths, 2.0 * getattr(rates, f"hit_rate{suffix}_sd"))
 
 
-def test_figure_9_shows_each_place_from_its_own_side_with_two_scales_and_both_halves():
+def test_figure_9_shows_the_nail_from_above_and_in_a_section_with_both_halves():
     section = typed(NailBorder, nail_section())
-    axes = skin.draw_nail(section).axes
-    below, middle, above, across, profile = axes[:5]
+    above, across, profile = skin.draw_nail(section).axes[:3]
     half = 19 * 15
-    assert [axes.collections[0].get_array().size for axes in (below, above)] == [2 * half, 2 * half]
-    seen = [np.ma.getdata(axes.collections[0].get_array()) for axes in (below, above)]
-    # The pad, with the peak under the sphere, is nearest to the eye below and farthest from it above.
-    assert seen[0].argmax() > half > seen[1].argmax()
-    assert len(middle.collections[0].get_paths()) == len(section.middle.von_mises_kpa)
+    seen = np.ma.getdata(above.collections[0].get_array())
+    assert seen.size == 2 * half
+    # The pad, with the peak under the sphere, is farthest from the eye.
+    assert seen.argmax() < half
     assert len(across.collections[0].get_paths()) == 2 * len(section.across.von_mises_kpa)
     labels = [line.get_label() for line in profile.get_lines()[:2]]
     assert labels == ["surface of the skin", "living epidermis"]
     assert f"{section.ratio:.3g} times" in profile.get_title()
-    scales = [each.collections[0].norm for each in axes[:4]]
-    wide, near = ({(each.vmin, each.vmax) for each in part} for part in (scales[:2], scales[2:]))
-    peak = max(np.max(section.von_mises_kpa), np.max(section.middle.von_mises_kpa))
-    assert wide == {(peak / 1e4, peak)}
-    assert near == {(0.0, section.border_kpa)}
+    scales = {(axes.collections[0].norm.vmin, axes.collections[0].norm.vmax) for axes in (above, across)}
+    assert scales == {(0.0, section.border_kpa)}
     edges = [np.array(lines.get_segments()) for lines in above.collections[1:]]
     np.testing.assert_array_equal(edges[0] * [1.0, -1.0], edges[1])
     assert edges[0][0].tolist() == [[17.0, 0.0], [17.0, 5.0]]
@@ -670,8 +666,8 @@ def test_colours_of_trials_and_layers_differ_in_grey_and_lines_without_colour():
 
     trials = greys((BLUE, ORANGE, GREEN))
     assert min(abs(np.subtract.outer(trials, trials))[np.triu_indices(3, 1)]) > 0.08
-    assert len({style for _, style in skin.TRIAL_STYLES.values()}) == 3
-    assert (np.diff(greys(mesh_picture_figure.LAYER_COLOURS)) > 0.15).all()
+    assert len({style["linestyle"] for style in skin.TRIAL_STYLES.values()}) == 3
+    assert (np.diff(greys(skin.LAYER_COLOURS)) > 0.15).all()
 
 
 NUMBERS = {

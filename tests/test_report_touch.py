@@ -153,7 +153,7 @@ def test_trains_stand_in_the_order_of_their_distance_and_silent_ones_are_counted
 def test_the_picture_is_saved_with_folders_on_the_way_or_nothing_is_written(skin, tmp_path):
     response = fp.Population.grid(density_per_cm2=10).respond(skin)
     for name, given, said in (
-        ("a.png", (response, skin), "response must be of type ResponseMap: got SkinResponse"),
+        ("a.png", (response, skin), "skin must be of type SkinResponse: got ResponseMap"),
         ("a.png", (skin, fp.Sphere(), response), "response must be of type ResponseMap"),
         ("a.png", (skin, response, response), "indenter must be of type Indenter"),
         ("a.xyz", (skin, response), r"A figure is written as \.png: got a\.xyz\."),

@@ -27,7 +27,7 @@ from fingerpad.experiments.gerling2014.reproduction import ReproductionResult
 from fingerpad.experiments.run import ReproductionRequest
 from fingerpad.experiments.run import run as run_request
 from fingerpad.experiments.runner import STORE_FOLDER
-from fingerpad.report.reproduction import reproduction_page
+from fingerpad.report.results import page_of
 from fingerpad.skin.store import Store
 from studies.results_page import excerpt, readme_table
 
@@ -276,7 +276,9 @@ def test_the_page_shows_every_compared_number_and_figure_and_no_machine_path(fir
             assert row["ours"] in text
     assert str(first.folder) not in page
     assert str(Path.home()) + "/" not in page
-    drawings = reproduction_page(read_results(first.folder / "results.json", ReproductionResult)).drawings
+    drawings = page_of(
+        "reproduction", read_results(first.folder / "results.json", ReproductionResult)
+    ).drawings
     assert page.count("<img ") == sum(len(drawing.images) for drawing in drawings)
     for path in (first.folder / "figures").iterdir():
         content = path.read_bytes()

@@ -12,10 +12,9 @@ from fingerpad.experiments.fit.results import UncertaintyResult
 from fingerpad.experiments.gerling2014 import nerve
 from fingerpad.inference.identifiable import IDENTIFIABLE_NAMES, identifiable
 from fingerpad.inference.rate_model import AfferentModel
-from fingerpad.neuron.transduction import drive
-from fingerpad.report import fit as report
+from fingerpad.report import nerve as report
 from fingerpad.report.style import png
-from fingerpad.report.tables import filled
+from report_rows import caption_of, table_of
 from sections import SED_DRIVEN
 
 SHIFTS = bar_firing_rates().shift_mm
@@ -100,9 +99,11 @@ def test_the_figure_shows_bands_over_points_and_a_profile_of_each_number(section
 
 
 def test_the_words_hold_the_numbers(section: UncertaintyResult) -> None:
-    caption = filled(report.CAPTION_UNCERTAINTY, section)
-    assert "95 % bands" in caption
-    tables = determined, residuals, _, _ = report.uncertainty_tables(section)
+    assert "95 % bands" in caption_of("reproduction", "figure_11_uncertainty", section)
+    given = {"Numbers that the rates": section, "Residuals": section, "Sensitivity": section.sensitivity}
+    given["Convergence"] = section.convergence
+    tables = [table_of("reproduction", title, part) for title, part in given.items()]
+    determined, residuals = tables[:2]
     assert [len(table.rows) for table in tables] == [8, 2, 4, 9]
     assert all(len(row.cells) == len(table.columns) for table in tables for row in table.rows)
     shares = [f"{rates.share_within_new:.2f}" for rates in section.rates.values()]
@@ -110,4 +111,4 @@ def test_the_words_hold_the_numbers(section: UncertaintyResult) -> None:
     assert "known only up to a common scale" in determined.note
     assert "4 are not zero" in determined.note
     opened = replace(section, profiles=tuple(replace(profile, low=None) for profile in section.profiles))
-    assert report.uncertainty_tables(opened)[0].rows[0].cells[-1].startswith("open … ")
+    assert table_of("reproduction", "Numbers that the rates", opened).rows[0].cells[-1].startswith("open … ")

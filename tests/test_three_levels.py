@@ -9,7 +9,7 @@ from fingerpad.experiments.gerling2014.skin import mesh_picture, outline_element
 from fingerpad.geometry.grading import resolution_grading
 from fingerpad.geometry.mesh import finger_mesh
 from fingerpad.neuron.lif import LeakyIntegrateAndFire, membrane_potential
-from fingerpad.report.mesh_picture import _thicknesses
+from fingerpad.report.skin import layer_thicknesses_mm
 
 CONTACT_X_MM = 17.37
 
@@ -32,7 +32,7 @@ def test_the_outline_lies_on_the_plane_and_its_elements_beside_it(mesh):
 def test_figure_1_has_the_layers_of_the_finger_and_its_nail_on_the_back(mesh):
     finger, picture = Fingertip(), mesh_picture(mesh, CONTACT_X_MM)
     wanted = (finger.stratum_corneum_mm, finger.living_epidermis_mm, finger.dermis_mm)
-    assert_allclose(_thicknesses(picture)[:3], wanted, atol=0.002)
+    assert_allclose(layer_thicknesses_mm(picture)[:3], wanted, atol=0.002)
     # The section across lies at the proximal end, where there is no nail.
     assert picture.along.under_nail.any()
     assert not picture.across.under_nail.any()

@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from itertools import chain, product
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -10,7 +11,11 @@ from fingerpad.data import tissues as published
 from fingerpad.experiments.tissue_sets import ELASTICITY, tissue_layers
 from fingerpad.geometry.mesh import LAYERS
 from fingerpad.mechanics.tissues import TISSUES, named_tissues
-from fingerpad.report.reproduction import tissue_table
+from report_rows import table_of
+
+
+def tissue_table(layers):
+    return table_of("reproduction", "Tissues", SimpleNamespace(tissues=layers))
 
 
 def shear_kpa(numbers, poisson):

@@ -24,7 +24,7 @@ from fingerpad.experiments.schemas import read
 from fingerpad.experiments.validation import predictions
 from fingerpad.experiments.validation.observations import COLUMNS, KINDS, example_file, read_observations
 from fingerpad.experiments.validation.predictions import predict
-from fingerpad.report.validation import draw_validation, validation_summary
+from fingerpad.report.results import draw_validation, summary
 from fingerpad.skin.indentation import Touch
 from fingerpad.skin.store import Store
 from refusals import misused
@@ -285,7 +285,7 @@ def test_what_cannot_be_pressed_has_a_reason_and_the_rest_is_scored(folder, monk
     assert found.r2 == pytest.approx(
         scores.coefficient_of_determination([row.observed for row in kept], [row.predicted for row in kept])
     )
-    assert "3 row(s) have no prediction. The first reason: The press stopped." in validation_summary(found)
+    assert "3 row(s) have no prediction. The first reason: The press stopped." in summary("validate", found)
     nothing = result_of(folder, FORCE + "plate,0.3,1\n")
     assert nothing.n_predicted == 0
     assert np.isnan([nothing.r2, nothing.gain, nothing.correlation, nothing.share_inside]).all()

@@ -147,12 +147,12 @@ def _tell(*paragraphs: object) -> None:
 
 def _touch(given: argparse.Namespace, within: Options) -> None:
     from fingerpad.export.requests import check_outputs
-    from fingerpad.report.skin import PAGE, touch_summary
+    from fingerpad.report.results import summary
 
     found = _run_request("touch", given, within, further_check=check_outputs)
-    _tell(*touch_summary(found.result), *(f"Not verified: {each.text}" for each in found.skin.caveats))
-    if (given.out / PAGE).exists():
-        _tell(f"Report: {given.out / PAGE}")
+    _tell(*summary("touch", found), *(f"Not verified: {each.text}" for each in found.skin.caveats))
+    if (given.out / "touch.html").exists():
+        _tell(f"Report: {given.out / 'touch.html'}")
     _tell(f"Results: {given.out / 'touch.json'}")
 
 
@@ -161,33 +161,33 @@ def _respond(given: argparse.Namespace, within: Options) -> None:
 
 
 def _fit(given: argparse.Namespace, within: Options) -> None:
-    from fingerpad.report.fit import fit_summary
+    from fingerpad.report.results import summary
 
     found = _run_request("fit", given, within, "recordings")
     if hasattr(found, "fit"):
-        _tell(*fit_summary(found.fit), f"Report: {given.out / 'fit.html'}")
+        _tell(*summary("fit", found), f"Report: {given.out / 'fit.html'}")
     else:
         _tell(*found.summary())
     _tell(f"Results: {given.out / 'fit.json'}")
 
 
 def _discriminate(given: argparse.Namespace, within: Options) -> None:
-    from fingerpad.report.task import task_summary
+    from fingerpad.report.results import summary
 
     found = _run_request("discriminate", given, within)
     _tell(
-        *task_summary(found.discrimination),
+        *summary("discriminate", found),
         f"Report: {given.out / 'discriminate.html'}",
         f"Results: {given.out / 'discriminate.json'}",
     )
 
 
 def _validate(given: argparse.Namespace, within: Options) -> int:
-    from fingerpad.report.validation import validation_summary
+    from fingerpad.report.results import summary
 
     found = _run_request("validate", given, within, "observations")
     _tell(
-        *validation_summary(found),
+        *summary("validate", found),
         f"Report: {given.out / 'validate.html'}",
         f"Results: {given.out / 'validate.json'}",
     )

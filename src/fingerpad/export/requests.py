@@ -34,11 +34,7 @@ from fingerpad.export.formats import DECKS, REQUIRED, RESULTS, write_deck
 from fingerpad.export.job import job_of
 from fingerpad.export.responses import require_pynwb
 from fingerpad.reduction.model import ReducedModel, write_reduced
-from fingerpad.report.fit import write_fit_page
-from fingerpad.report.reproduction import write_report
-from fingerpad.report.skin import write_touch_page
-from fingerpad.report.task import write_task_page
-from fingerpad.report.validation import write_validation_page
+from fingerpad.report.results import write_page
 from fingerpad.skin.sampling import SkinResponse
 
 Write = Callable[[TouchResult, Path], object]
@@ -184,7 +180,7 @@ def fit(
     found: FitFile | ChosenNumbersFile = _run(asked, out, jobs, progress, command)
     if out is not None:
         if isinstance(found, FitFile):
-            write_fit_page(found, Path(out))
+            write_page("fit", found, Path(out))
         schemas.write(Path(out) / "fit.json", found)
     return found
 
@@ -227,7 +223,7 @@ def discriminate(
     asked = DiscriminationRequest.read(request, given, allow_python)
     found: DiscriminationFile = _run(asked, out, jobs, progress, command)
     if out is not None:
-        write_task_page(found, Path(out))
+        write_page("discriminate", found, Path(out))
         schemas.write(Path(out) / "discriminate.json", found)
     return found
 
@@ -265,7 +261,7 @@ def validate(
     asked = ValidationRequest.read(request, given, allow_python)
     found: ValidationFile = _run(asked, out, jobs, progress, command)
     if out is not None:
-        write_validation_page(found, Path(out))
+        write_page("validate", found, Path(out))
         schemas.write(Path(out) / "validate.json", found)
     return found
 
@@ -337,7 +333,7 @@ def reproduce(
     asked = ReproductionRequest.read(request, given, allow_python)
     found: ReproductionResult = _run(asked, out, jobs, progress, command)
     if out is not None:
-        write_report(found, Path(out))
+        write_page("reproduction", found, Path(out))
         schemas.write(Path(out) / "results.json", found)
     return found
 
@@ -384,7 +380,7 @@ def _deck(name: str) -> Write:
 
 
 WRITERS: dict[str, Write] = {
-    "figures": write_touch_page,
+    "figures": lambda pressed, folder: write_page("touch", pressed, folder),
     "spikes": lambda pressed, folder: pressed.response.save(folder / "spikes.csv"),
     "nwb": lambda pressed, folder: pressed.response.to_nwb(folder / "touch.nwb"),
     **{name: _result(name) for name in RESULTS},

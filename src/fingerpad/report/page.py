@@ -1,16 +1,17 @@
-"""Pages: paragraphs, tables and figures in chapters; the list of all figures; one template."""
+"""Pages: the rows of `pages.toml` become chapters of text, tables and figures, written by one template."""
 
 from __future__ import annotations
 
 import base64
 import html
 import re
+import tomllib
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import partial
-from operator import attrgetter
+from importlib.resources import files
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
 from matplotlib.figure import Figure
@@ -18,7 +19,7 @@ from matplotlib.figure import Figure
 from fingerpad.core.files import write_atomically
 from fingerpad.experiments.manifest import Manifest
 from fingerpad.report.style import png
-from fingerpad.report.tables import Column, Table, at, facts_table, filled, table
+from fingerpad.report.tables import Row, Table, at, facts_table, filled, filled_table, plain, spelled
 
 SETS = ("paper", "human")  # Sets of tissues of a reproduction, in the order of their columns.
 
@@ -37,6 +38,8 @@ class Drawing:
         return self.title if self.number is None else f"Figure {self.number}. {self.title}"
 
 
+Made = TypeVar("Made")
+Rows = list[tuple[str, ...]]  # Cells of the rows of a table.
 Part = str | Table | Drawing  # Text is a paragraph, with code in backticks.
 
 
@@ -67,90 +70,105 @@ class Page:
     subtitle: str  # Title, and what the page is about.
     paragraphs: Sequence[str]
     chapters: Sequence[Chapter]
-    opening: Sequence[Drawing] = ()  # Small figures after the summary, each with one sentence as its caption.
-    verdicts: Table | None = None  # What stands beside them.
+    opening: Sequence[Part] = ()  # Small figures after the summary, each with one sentence as its caption.
+    verdicts: Sequence[Part] = ()  # What stands beside them.
 
     @property
     def drawings(self) -> list[Drawing]:
         parts = (part for chapter in self.chapters for part in (*chapter.parts, *chapter.folded))
-        return [*self.opening, *(part for part in parts if isinstance(part, Drawing))]
+        return [part for part in (*self.opening, *parts) if isinstance(part, Drawing)]
 
 
-FIGURES: list[figure] = []
-"""Every figure of every page."""
+PAGES: dict[str, dict[str, Any]] = tomllib.loads(
+    (files(__package__) / "pages.toml").read_text(encoding="utf-8")
+)
+"""What stands on each page; `pages.toml` says how to read it."""
+
+DRAW: dict[str, Callable[[Any], Figure]] = {}
+ROWS: dict[str, Callable[[Any], Rows]] = {}
+"""What draws the figures, and what makes rows of the tables, that the pages name."""
+
+DRAWINGS: dict[tuple[str, str], Callable[..., None]] = {}
+"""What `plot` of results draws, by the name of the result's class and of the drawing; the default first."""
 
 
-@dataclass
-class figure:
-    """Enter the function below into the list of figures: where it stands, its caption and its tables."""
+def enter(names: dict[Any, Any], name: Any) -> Callable[[Made], Made]:
+    """Enter the function below by its name."""
 
-    page: str
-    chapter: str
-    number: int
-    name: str  # Of the image file, without its ending.
-    title: str
-    caption: str | Callable[..., str]  # Text with `{paths}` of numbers, see `filled`; or what makes it.
-    of: tuple[str, ...] = ()  # Sections as paths in the result: none is the result itself, two are two sets.
-    needs: str = ""  # Field of the result without which the figure is left out.
-    tables: Callable[[Any], Sequence[Table]] = lambda section: ()  # Numbers below it.
+    def entered(made: Made) -> Made:
+        names[name] = made
+        return made
 
-    def __call__(self, draw: Callable[[Any], Figure]) -> Callable[[Any], Figure]:
-        self.draw = draw
-        FIGURES.append(self)
-        return draw
-
-    def parts(self, result: Any) -> list[Table | Drawing]:
-        """Return the figure and its tables; nothing if the result has no such section."""
-        sections = [at(result, path) for path in self.of] or [result]
-        if any(each is None for each in sections) or (self.needs and not getattr(result, self.needs)):
-            return []
-        two = len(sections) > 1
-        names = [f"{self.name}_{name}" for name in SETS] if two else [self.name]
-        images = {name: partial(self.draw, each) for name, each in zip(names, sections, strict=True)}
-        told = filled(self.caption, sections[0]) if isinstance(self.caption, str) else self.caption(*sections)
-        tables = [
-            replace(each, title=f"{each.title}, {name}") if two else each
-            for name, section in zip(SETS, sections, strict=False)
-            for each in self.tables(section)
-        ]
-        return [Drawing(self.title, images, told, self.number), *tables]
+    return entered
 
 
-def both(path: str) -> tuple[str, ...]:
-    """Return the paths of a section of both sets of a reproduction."""
-    return tuple(f"{name}.{path}" for name in SETS)
+def holds(row: Mapping[str, Any], result: Any) -> bool:
+    """Whether a row of a page is to be shown: a result has what it needs, and not what it stands in for."""
+    needed = "needs" not in row or at(result, row["needs"]) is not None
+    return needed and ("without" not in row or at(result, row["without"]) is None)
 
 
-def figures(page: str, result: Any) -> dict[str, list[Table | Drawing]]:
-    """Return the figures of a page by chapter in the order of their numbers, each with its tables."""
-    found: dict[str, list[Table | Drawing]] = {}
-    for row in sorted((row for row in FIGURES if row.page == page), key=attrgetter("number")):
-        found.setdefault(row.chapter, []).extend(row.parts(result))
-    return {chapter: parts for chapter, parts in found.items() if parts}
+def parts_of(row: Mapping[str, Any], result: Any) -> list[Part]:
+    """Return what a row of a page shows of a result; nothing if the result has no such section."""
+    two = "both" in row
+    paths = [f"{name}.{row['both']}" for name in SETS] if two else [row.get("of", "")]
+    sections = [at(result, path) for path in paths]
+    if not holds(row, result) or any(each is None for each in sections):
+        return []
+    if "text" in row:
+        return [row["text"]]
+    if "figure" in row:
+        names = [f"{row['figure']}_{name}" for name in SETS] if two else [row["figure"]]
+        draw = DRAW[row["figure"]]
+        images = {name: partial(draw, each) for name, each in zip(names, sections, strict=True)}
+        return [Drawing(row["title"], images, filled(row["caption"], sections[0]), row.get("number"))]
+    made = [ROWS[row["made"]](each) if "made" in row else () for each in sections]
+    tables = [filled_table(row, each, rows) for each, rows in zip(sections, made, strict=True)]
+    if two:
+        named = zip(SETS, tables, strict=True)
+        tables = [replace(each, title=f"{each.title}, {name}") for name, each in named]
+    return [each for each in tables if each.rows]
 
 
-def write_result_page(
-    page: str, result: Any, heading: str, about: str, summary: Sequence[str], manifest: Manifest, folder: Path
-) -> Path:
-    """Write the page of a result: its figures, the tables below them, and how it was made."""
-    chapters = [
-        Chapter(title, sorted(parts, key=lambda part: isinstance(part, Table)))
-        for title, parts in figures(page, result).items()
-    ]
-    made = Page(heading, f"{about} {edition(manifest)}", summary, [*chapters, manifest_chapter(manifest)])
-    return write_html(made, Path(folder) / f"{page}.html")
+def page_parts(page: str, result: Any) -> dict[str, list[Part]]:
+    """Return the paragraphs, figures and tables of a page by chapter."""
+    found: dict[str, list[Part]] = {}
+    for row in PAGES[page]["parts"]:
+        found.setdefault(row["chapter"], []).extend(parts_of(row, result))
+    return found
 
 
-def manifest_chapter(manifest: Manifest, folded: bool = False) -> Chapter:
-    """Return the chapter: facts about the run, its stages, and versions of packages."""
+def result_page(page: str, result: Any, paragraphs: Sequence[str]) -> Page:
+    """Return the page of a result: its figures and tables by chapter, and how it was made."""
+    spec = PAGES[page]
+    found = page_parts(page, at(result, spec["of"])) | {"Provenance": [*manifest_tables(result.manifest)]}
+    closed, chapters = spec.get("folded"), []
+    for title, parts in found.items():
+        pictured = any(isinstance(part, Drawing) for part in parts)
+        folded = [
+            part
+            for part in parts
+            if closed and not isinstance(part, str)
+            and (title in closed or (pictured and isinstance(part, Table)))
+        ]  # fmt: skip
+        if parts:
+            chapters.append(Chapter(title, [part for part in parts if part not in folded], folded))
+    opening = [part for row in spec.get("opening", ()) for part in parts_of(row, result)]
+    verdicts = parts_of(spec["verdicts"], result) if "verdicts" in spec else ()
+    about = f"{filled(spec['about'], result)} {edition(result.manifest)}"
+    return Page(filled(spec["heading"], result), about, paragraphs, chapters, opening, verdicts)
+
+
+def manifest_tables(manifest: Manifest) -> list[Table]:
+    """Return facts about the run, its stages, and versions of packages."""
     facts = asdict(manifest)
     stages, packages = facts.pop("stages"), facts.pop("packages")
-    tables = [facts_table("The run", facts)]
+    made = [facts_table("The run", facts), facts_table("Packages", packages)]
     if stages:
         names = [name for name in stages[0] if any(stage[name] for stage in stages)]
-        tables.append(table("Stages", manifest.stages, [Column(name) for name in names]))
-    tables.append(facts_table("Packages", packages))
-    return Chapter("Provenance", (), tables) if folded else Chapter("Provenance", tables)
+        rows = [Row([plain(stage[name]) for name in names]) for stage in stages]
+        made.insert(1, Table("Stages", [spelled(name) for name in names], rows))
+    return made
 
 
 def edition(manifest: Manifest) -> str:

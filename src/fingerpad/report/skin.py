@@ -1,52 +1,52 @@
-"""Figures of the skin: one touch, the deflection under a line and a cylinder, stress at the nail."""
+"""Figures of the skin: one touch, the mesh, the deflection under two bodies, stress at the nail."""
 
 from __future__ import annotations
 
-from dataclasses import asdict
 from pathlib import Path
 from textwrap import fill
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
-from matplotlib import colormaps
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection, PolyCollection
-from matplotlib.colors import LinearSegmentedColormap, LogNorm, Normalize
+from matplotlib.colors import LightSource, LinearSegmentedColormap, LogNorm, Normalize, to_rgb
 from matplotlib.figure import Figure
+from matplotlib.patches import Patch
+from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 
 from fingerpad.core.checked import checked
 from fingerpad.core.errors import InputError
 from fingerpad.core.files import path_of
 from fingerpad.core.signals import STORED_ENERGY, ResponseMap
 from fingerpad.core.units import cosine_and_sine
-from fingerpad.core.values import FloatArray, instance
+from fingerpad.core.values import FloatArray
 from fingerpad.data import protocol
-from fingerpad.experiments.gerling2014.skin import NailBorder, SkinDeflectionResult
-from fingerpad.experiments.requests.touch import TouchFile, TouchResult
-from fingerpad.report.mesh_picture import corners
+from fingerpad.experiments.gerling2014.skin import MeshPicture, MeshPlane, NailBorder, SkinDeflectionResult
+from fingerpad.experiments.requests.touch import TouchResult
+from fingerpad.geometry.fingertip import Fingertip
+from fingerpad.geometry.indenters import Indenter
+from fingerpad.reduction.streaming import ReducedSample
 from fingerpad.report.nerve import draw_raster_by_type, draw_trains
-from fingerpad.report.page import both, figure, write_result_page
+from fingerpad.report.page import DRAW, DRAWINGS, enter
 from fingerpad.report.style import (
     BLACK,
     BLUE,
     COLUMN_IN,
-    GREEN,
     GREY,
+    MAP_AXES,
+    NO_MARKER,
     ORANGE,
     PALE,
+    SERIES,
     fill_band,
     name_panel,
     new_figure,
+    quantity_label,
     write_png,
 )  # fmt: skip
-from fingerpad.report.tables import Column, Table, facts_table, fixed, number, table
-
-if TYPE_CHECKING:
-    from fingerpad.geometry.indenters import Indenter
-    from fingerpad.skin.sampling import SkinResponse
-    from fingerpad.skin.section import Section
-
-PAGE = "touch.html"
+from fingerpad.report.tables import fixed, number
+from fingerpad.skin.sampling import SkinResponse, SurfaceProfile
+from fingerpad.skin.section import Section
 
 SKIN = LinearSegmentedColormap.from_list(
     "skin", ["#f7ece1", "#f3c9a5", "#e58a5e", "#b8405e", "#5c1a63", "#1d0b33"]
@@ -54,6 +54,7 @@ SKIN = LinearSegmentedColormap.from_list(
 """From pale skin to dark violet; the lightness falls all the way, so that the order survives greyscale."""
 
 DECADES = 2.5  # Values that are further below the largest share the palest colour.
+OUTLINE_POINTS = 200
 
 REACH_MM, ROOM_BELOW_MM, MARGIN_MM = 16.0, 2.0, 0.5
 """Skin to either side of the indenter's axis, room below and beside the finger that is shown. [mm]"""
@@ -97,50 +98,19 @@ def save_figure(
     >>> fp.save_figure(Path(mkdtemp()) / "touch.png", skin, response, sphere).name
     'touch.png'
     """
-    # Only a call needs these classes.
-    from fingerpad.geometry.indenters import Indenter
-    from fingerpad.skin.sampling import SkinResponse
-
-    instance("skin", skin, SkinResponse)
-    if indenter is not None:
-        instance("indenter", indenter, Indenter)
     file = path_of("path", path)
     if file.suffix.lower() != ".png":
         raise InputError(f"A figure is written as .png: got {file.name}.")
-    answer = instance("response", response, ResponseMap)
-    return write_png(lambda parts: draw_touch(*parts), (skin, answer, indenter), file)
+    return write_png(lambda parts: draw_touch(*parts), (skin, response, indenter), file)
 
 
-def write_touch_page(pressed: TouchResult, folder: Path) -> Path:
-    found = pressed.result
-    about = "A finite-element fingertip and a population of afferents."
-    said = touch_summary(found)
-    return write_result_page("touch", pressed, found.touch.title, about, said, found.manifest, folder)
+@enter(DRAWINGS, ("SkinResponse", "force"))
+def draw_force(axes: Axes, skin: SkinResponse) -> None:
+    axes.plot(skin.times_ms, skin.force_mn, color=BLACK)
+    axes.set(xlabel="time [ms]", ylabel="force [mN]")
 
 
-def touch_summary(result: TouchFile) -> list[str]:
-    found = result.summary
-    return [
-        f"The largest force is {number(found.largest_force_mn)} mN, the largest depth "
-        f"{number(found.largest_depth_mm)} mm, the largest contact {number(found.largest_contact_mm2)} mm².",
-        f"{found.firing} of {found.afferents} afferents fire, at up to {number(found.dynamic_rate_hz)} "
-        f"spikes/s in the dynamic window and {number(found.static_rate_hz)} spikes/s in the static window.",
-    ]
-
-
-def _touch_tables(pressed: TouchResult) -> list[Table]:
-    facts = asdict(pressed.summary).items()
-    named = {"number of times" if name == "times" else name: value for name, value in facts}
-    return [facts_table("In numbers", named)]
-
-
-CAPTION_TOUCH = (
-    "Left: the middle plane of the finger at the end of the touch. Right: depth "
-    "over time, and the spikes of the afferents that fire."
-)
-
-
-@figure("touch", "Results", 1, "touch", "The touch", CAPTION_TOUCH, tables=_touch_tables)
+@enter(DRAW, "touch")
 def _draw_pressed(pressed: TouchResult) -> Figure:
     return draw_touch(pressed.skin, pressed.response, pressed.request.touch.indenter)
 
@@ -151,7 +121,9 @@ def draw_touch(skin: SkinResponse, response: ResponseMap, indenter: Indenter | N
     grid = figure.add_gridspec(2, 2, width_ratios=(1.6, 1.0), height_ratios=(1.0, 4.0))
     draw_section(figure.add_subplot(grid[:, 0]), skin, indenter, response.quantity)
     motion = figure.add_subplot(grid[0, 1])
-    draw_motion(motion, skin)
+    draw_depth(motion, skin)
+    motion.set(xlabel="", ylabel="depth\n[mm]", ylim=(0.0, 1.15 * float(skin.depth_mm.max())))
+    motion.tick_params(labelbottom=False)
     draw_spikes(figure.add_subplot(grid[1, 1], sharex=motion), skin, response)
     if skin.caveats:
         text = " ".join(caveat.text for caveat in skin.caveats)
@@ -159,6 +131,7 @@ def draw_touch(skin: SkinResponse, response: ResponseMap, indenter: Indenter | N
     return figure
 
 
+@enter(DRAWINGS, ("SkinResponse", "section"))
 def draw_section(
     axes: Axes, skin: SkinResponse, indenter: Indenter | None = None, quantity: str = STORED_ENERGY
 ) -> None:
@@ -174,23 +147,22 @@ def draw_section(
     ):
         axes.add_collection(LineCollection(list(edges), colors=colour, linewidths=width, capstyle="round"))
     (x, y), axis_x_mm = np.moveaxis(section.corners_mm, -1, 0), skin.axis_x_mm + skin.pose.x_mm
-    axes.set(
-        xlim=(max(x.min(), axis_x_mm - REACH_MM), min(x.max(), axis_x_mm + REACH_MM) + MARGIN_MM),
-        ylim=(y.min() - ROOM_BELOW_MM, y.max() + MARGIN_MM),
-        aspect="equal",
-        xlabel="along the finger, x [mm]",
-        ylabel="towards the back, y [mm]",
-    )
+    axes.set_xlim(max(x.min(), axis_x_mm - REACH_MM), min(x.max(), axis_x_mm + REACH_MM) + MARGIN_MM)
+    axes.set_ylim(y.min() - ROOM_BELOW_MM, y.max() + MARGIN_MM)
+    axes.set(xlabel="along the finger, x [mm]", ylabel="towards the back, y [mm]", aspect="equal")
     if indenter is not None:
         _draw_indenter(axes, skin, section, indenter)
     axes.grid(visible=False)
     label_skin(axes, faces, f"{name} [kPa]", 0.75)
 
 
-def paint_skin(axes: Axes, outlines: FloatArray, values: Any, **edges: Any) -> PolyCollection:
-    """Colour faces by their values on a logarithmic scale."""
-    largest = float(np.max(values[values > 0.0], initial=0.0)) or 1.0
-    norm = LogNorm(largest / 10.0**DECADES, largest, clip=True)
+def paint_skin(
+    axes: Axes, outlines: FloatArray, values: Any, norm: Normalize | None = None, **edges: Any
+) -> PolyCollection:
+    """Colour faces by their values, by default on a logarithmic scale."""
+    if norm is None:
+        largest = float(np.max(values[values > 0.0], initial=0.0)) or 1.0
+        norm = LogNorm(largest / 10.0**DECADES, largest, clip=True)
     shown = np.ma.masked_invalid(values)
     faces = PolyCollection(list(outlines), array=shown, cmap=SKIN, norm=norm, **edges)
     axes.add_collection(faces)
@@ -240,13 +212,6 @@ def _draw_indenter(axes: Axes, skin: SkinResponse, section: Section, indenter: I
         axes.fill(*outline.T, facecolor=BODY, edgecolor=BLACK, linewidth=1.0)
 
 
-def draw_motion(axes: Axes, skin: SkinResponse) -> None:
-    axes.plot(skin.times_ms, skin.depth_mm, color=BLUE)
-    axes.set(ylabel="depth\n[mm]", ylim=(0.0, 1.15 * float(skin.depth_mm.max())))
-    axes.tick_params(labelbottom=False)
-    axes.grid(visible=False)
-
-
 def draw_spikes(axes: Axes, skin: SkinResponse, response: ResponseMap) -> None:
     """Draw the trains of the afferents that fire, the nearest to the indenter on top; a band per type."""
     if response.types:
@@ -259,8 +224,160 @@ def draw_spikes(axes: Axes, skin: SkinResponse, response: ResponseMap) -> None:
     axes.set_xlim(0.0, skin.times_ms[-1])
 
 
-TRIAL_STYLES = {"Trial 1": (BLUE, (0, (5, 2))), "Trial 2": (ORANGE, (0, (1, 1.2))), "Trial 3": (GREEN, "-")}
-"""Colour and dashes of the paper's trials."""
+@enter(DRAWINGS, ("SkinResponse", "profile"))
+@enter(DRAWINGS, ("SurfaceProfile", "profile"))
+def draw_profile(axes: Axes, shown: SkinResponse | SurfaceProfile) -> None:
+    profile = shown if isinstance(shown, SurfaceProfile) else shown.surface_profile()
+    axes.plot(profile.distance_mm, profile.deflection_mm, color=BLACK)
+    axes.set(xlabel="distance from the object's axis [mm]", ylabel="deflection towards the bone [mm]")
+
+
+@enter(DRAWINGS, ("SkinResponse", "pad"))
+def draw_pad(axes: Axes, skin: SkinResponse, quantity: str = "stored", reach_mm: float = 6.0) -> None:
+    """Draw a quantity at the end organs below the pad, at the last time."""
+    z = np.linspace(-reach_mm, reach_mm, 61)
+    x = skin.axis_x_mm + skin.pose.x_mm + z
+    sites = np.stack(np.meshgrid(x, z, indexing="ij"), axis=-1).reshape(-1, 2)
+    values = skin.sample(quantity, sites)[-1].reshape(x.size, z.size)
+    drawn = axes.pcolormesh(x, z, values.T, cmap="viridis", shading="gouraud")
+    axes.figure.colorbar(drawn, ax=axes, label=quantity_label(quantity))
+    axes.set(**MAP_AXES)
+    axes.grid(visible=False)
+
+
+@enter(DRAWINGS, ("SkinResponse", "depth"))
+def draw_depth(axes: Axes, skin: SkinResponse) -> None:
+    """Draw the depth from first touch over time."""
+    axes.plot(skin.times_ms, skin.depth_mm, color=BLACK)
+    axes.set(xlabel="time [ms]", ylabel="depth [mm]")
+
+
+@enter(DRAWINGS, ("ReducedSample", "quantity"))
+def draw_sample(axes: Axes, sample: ReducedSample) -> None:
+    """Draw the first quantity at each receptor, with the error of the reduced touch."""
+    name, values = next(iter(sample.fields.items()))
+    bars: Any = {"fmt": "o", "color": BLUE, "markersize": 3.0}
+    axes.errorbar(np.arange(values.size), values, sample.field_errors[name], **bars)
+    axes.set(xlabel="receptor", ylabel=quantity_label(name))
+
+
+@enter(DRAWINGS, ("Fingertip", "outline"))
+def draw_finger(axes: Axes, finger: Fingertip) -> None:
+    """Draw the outline of a finger in its middle plane, with skin, bone and nail."""
+    # A square root of the way to the tip, where the outline is round.
+    x = finger.length_mm * (1.0 - np.linspace(1.0, 0.0, OUTLINE_POINTS) ** 2)
+    volar, dorsal, _ = finger.section(x)
+    outline = np.concatenate([x, x[::-1]]), np.concatenate([-volar, dorsal[::-1]])
+    axes.fill(*outline, facecolor="#f7ece1", edgecolor=BLACK, linewidth=1.0)
+    start, tip = finger.spine_end_x_mm, finger.bone_tip_x_mm
+    way = np.linspace(0.0, np.pi, OUTLINE_POINTS)
+    bone_x = np.concatenate([[0.0], start + (tip - start) * np.sin(way), [0.0]])
+    bone_y = finger.spine_y_mm + finger.bone_height_mm * np.concatenate([[1.0], np.cos(way), [-1.0]])
+    axes.fill(bone_x, bone_y, facecolor=BONE_INSIDE, edgecolor=BONE, linewidth=1.2)
+    nail = np.linspace(finger.nail_x_mm[0], finger.nail_x_mm[1], OUTLINE_POINTS)
+    axes.plot(nail, finger.section(nail)[1], color=BONE, linewidth=4.0)
+    for depth in finger.layer_depths_mm:
+        below = np.where(volar > 2.0 * depth, depth - volar, np.nan)  # layers turn upright at the tip
+        axes.plot(x, below, color=GREY, linewidth=0.5)
+    axes.plot([finger.contact_mm[0]], [-float(finger.section(finger.contact_mm[0])[0])], "v", color=BLUE)
+    axes.set(xlabel="along, x [mm]", ylabel="towards the back, y [mm]", aspect="equal")
+    axes.grid(visible=False)
+
+
+LAYER_COLOURS = ("#2b1a3d", "#d9650a", "#f2b183", "#fbeee2")
+"""From the skin inwards; the lightness increases, so that the layers differ in greyscale."""
+
+FIXED_COLOURS = {"bone": "#a9b4bd", "nail": "#0a5c99"}
+PALE_SKIN, NAIL_WIDTH = "#f0d9c4", 4.0
+ENLARGED_MM = (1.3, 2.0)  # Half width and height of the layers that are enlarged. [mm]
+
+
+def corners(points: np.ndarray) -> np.ndarray:
+    """Return the four corners of each face of a grid of points, (n_faces, 4, ...)."""
+    around = (points[:-1, :-1], points[1:, :-1], points[1:, 1:], points[:-1, 1:])
+    return np.stack(around, axis=2).reshape(-1, 4, *points.shape[2:])
+
+
+@enter(DRAW, "figure_1_mesh")
+def draw_mesh(section: MeshPicture) -> Figure:
+    figure = new_figure(11.0, 7.2)
+    grid = figure.add_gridspec(2, 2, height_ratios=(1.0, 1.1))
+    _draw_solid(figure.add_subplot(grid[0, 0], projection="3d"), section)
+    across, along, near = (figure.add_subplot(grid[place]) for place in ((0, 1), (1, 0), (1, 1)))
+    for sign in (1.0, -1.0):
+        _draw_plane(across, section.across, section, lines=0.15, sign=sign)
+    _draw_plane(along, section.along, section, lines=0.15)
+    _draw_plane(near, section.along, section, lines=0.4)
+    name_panel(across, "(b) proximal end, x = 0", "z, lateral [mm]", "y, dorsal [mm]")
+    name_panel(along, "(c) inner mesh, z = 0", "x, distal [mm]", "y, dorsal [mm]")
+    name_panel(near, "(d) four layers below the contact", "x, distal [mm]", "y, dorsal [mm]")
+    (x, y), (width, height) = section.contact_mm, ENLARGED_MM
+    near.set(xlim=(x - width, x + width), ylim=(y - 0.15, y - 0.15 + height))
+    organ = _below_contact(section)[int((section.layer < section.layers.index("dermis")).sum())]
+    depth = f"end organ, {number(section.receptor_depth_mm)} mm deep"
+    near.plot(*organ, "o", markersize=7.0, color="white", markeredgecolor=BLACK, zorder=7, label=depth)
+    near.legend(loc="upper right", fontsize=8.5, frameon=True, edgecolor="none", framealpha=1.0)
+    # The subcutis ends at the bone, so that its thickness depends on the place.
+    thick = [f" {number(thickness, 4)} mm" for thickness in layer_thicknesses_mm(section)[:-1]]
+    labels = [f"{name}{mm}" for name, mm in zip(section.layers, [*thick, ""], strict=True)]
+    named = [*zip(labels, LAYER_COLOURS, strict=True), *FIXED_COLOURS.items()]
+    patches = [Patch(facecolor=colour, edgecolor=BLACK, linewidth=0.5, label=name) for name, colour in named]
+    figure.legend(handles=patches, loc="outside lower center", ncols=len(patches))
+    return figure
+
+
+def _draw_solid(axes: Any, section: MeshPicture) -> None:
+    """Draw the skin and the nail in light."""
+    skin = np.stack([section.x_mm, section.z_mm, section.y_mm], axis=-1)
+    nailed = np.all(corners(section.under_nail), axis=1, keepdims=True)
+    colours = np.where(nailed, to_rgb(FIXED_COLOURS["nail"]), to_rgb(PALE_SKIN))
+    # The corners of the mirror image go round the other way, so that both halves face outwards.
+    faces = [*corners(skin)[:, ::-1], *corners(skin * [1.0, -1.0, 1.0])]
+    light: Any = {"shade": True, "lightsource": LightSource(azdeg=225.0, altdeg=45.0)}
+    drawn: Any = {"edgecolors": "#00000060", "linewidths": 0.2} | light
+    axes.add_collection3d(
+        Poly3DCollection(faces, facecolors=np.tile(colours, (2, 1)), **drawn), autolim=False
+    )
+    low, high = skin.min(axis=(0, 1)), skin.max(axis=(0, 1))
+    axes.set(xlim=(low[0], high[0]), ylim=(-high[1], high[1]), zlim=(low[2], high[2]))
+    axes.set_box_aspect((high[0] - low[0], 2.0 * high[1], high[2] - low[2]), zoom=1.3)
+    axes.view_init(elev=18.0, azim=-62.0)
+    axes.set_title("(a) overall mesh", fontsize=10.0)
+    axes.set(xlabel="x, distal [mm]", ylabel="z, lateral [mm]", zlabel="y, dorsal [mm]")
+    axes.locator_params(nbins=4)
+
+
+def _draw_plane(axes: Axes, plane: MeshPlane, section: MeshPicture, lines: float, sign: float = 1.0) -> None:
+    """Draw the elements of a plane by layers, the bone inside of them and the nail upon them."""
+    right, up = sign * plane.right_mm, plane.up_mm
+    colours = np.tile(np.array(LAYER_COLOURS)[section.layer], right.shape[0] - 1)
+    axes.fill(right[:, -1], up[:, -1], facecolor=FIXED_COLOURS["bone"], edgecolor="none", zorder=0)
+    faces, edges = list(corners(np.stack([right, up], axis=-1))), "#00000080"
+    drawn = PolyCollection(faces, facecolors=colours.tolist(), edgecolors=edges, linewidths=lines)
+    axes.add_collection(drawn)
+    skin = np.stack([right[:, 0], up[:, 0]], axis=-1)
+    nail = np.stack([skin[:-1], skin[1:]], axis=1)[plane.under_nail[1:] & plane.under_nail[:-1]]
+    style: Any = {"colors": FIXED_COLOURS["nail"], "linewidths": NAIL_WIDTH, "capstyle": "round"}
+    axes.add_collection(LineCollection(list(nail), **style))
+    axes.autoscale_view()
+    axes.set_aspect("equal")
+    axes.grid(visible=False)
+
+
+def _below_contact(section: MeshPicture) -> FloatArray:
+    """Nodes from the contact to the bone, (n_through + 1, 2). [mm]"""
+    x, y = section.contact_mm
+    plane = section.along
+    column = int(np.hypot(plane.right_mm[:, 0] - x, plane.up_mm[:, 0] - y).argmin())
+    return np.stack([plane.right_mm[column], plane.up_mm[column]], axis=-1)
+
+
+def layer_thicknesses_mm(section: MeshPicture) -> list[float]:
+    steps = np.linalg.norm(np.diff(_below_contact(section), axis=0), axis=1)
+    return [float(steps[section.layer == layer].sum().round(3)) for layer in range(len(section.layers))]
+
+
+TRIAL_STYLES = {"Trial 1": SERIES[0], "Trial 2": SERIES[1], "Trial 3": SERIES[3]}
 
 BODIES = {
     "line": f"{protocol.LINE_DIAMETER.value * 1000.0:.0f} µm line",
@@ -269,41 +386,7 @@ BODIES = {
 """The two indenters, as they are named on the page."""
 
 
-def _trials(section: SkinDeflectionResult) -> dict[str, Any]:
-    return dict(zip(TRIAL_STYLES, (section.trial1, section.trial2, section.trial3), strict=True))
-
-
-CAPTION_SKIN_DEFLECTION = (
-    "Deflection of the skin along the midline of the fingertip at the end of the indentation, drawn "
-    "downwards, under (a) a line load and (b) a cylinder. Lines: the model with the paper's three "
-    "trials, which are the sets of tissues trial1, trial2 and trial3 whatever the tissues of the run "
-    "are. Circles: observed under the cylinder on a living human fingertip (Dandekar 1995); the cross "
-    "is an artefact of digitising at the end of the curve and is left out of R². No observations under "
-    "the line are available. The inner moduli of Trials 2 and 3 were identified from these circles. In "
-    "the paper Trial 1 overshoots, Trial 2 undershoots and Trial 3, which combines the two, matches."
-)
-
-
-def skin_deflection_tables(section: SkinDeflectionResult) -> list[Table]:
-    rows = [
-        (f"{name}, {body}", trial[key])
-        for name, trial in _trials(section).items()
-        for key, body in BODIES.items()
-    ]
-    columns = (
-        Column("0", "trial"),
-        Column("1.r2", "R²", 3),
-        Column("1.r2_mirrored", "R², mirrored", 3),
-        Column("1.force_mn", "force", 1),
-    )
-    note = "R², mirrored: with the proximal and the distal side of the observations exchanged."
-    return [table("Fit and force", rows, columns, note)]
-
-
-@figure(
-    "reproduction", "Level 1: skin", 4, "figure_4_skin_deflection", "Deflection of the skin",
-    CAPTION_SKIN_DEFLECTION, of=("skin_deflection",), tables=skin_deflection_tables,
-)  # fmt: skip
+@enter(DRAW, "figure_4_skin_deflection")
 def draw_skin_deflection(section: SkinDeflectionResult) -> Figure:
     figure = new_figure(11.0, 4.2)
     panels = figure.subplots(1, 2, sharey=True)
@@ -320,12 +403,11 @@ def draw_skin_deflection(section: SkinDeflectionResult) -> Figure:
 def draw_profiles(axes: Axes, section: SkinDeflectionResult, body: str) -> None:
     """Draw the deflection of each trial under "line" or "cylinder", and what was observed under it."""
     # Results count distances proximal positive; all figures have the distal side on the right.
-    for name, trial in _trials(section).items():
-        profile, (colour, style) = trial[body], TRIAL_STYLES[name]
-        fit = f", R² = {fixed(profile.r2, 2)}" if np.isfinite(profile.r2) else ""
-        axes.plot(
-            -profile.distance_mm, profile.deflection_mm, color=colour, linestyle=style, label=name + fit
-        )
+    trials = zip(TRIAL_STYLES.items(), (section.trial1, section.trial2, section.trial3), strict=True)
+    for (name, style), trial in trials:
+        profile = getattr(trial, body)
+        label = f"{name}, R² = {fixed(profile.r2, 2)}" if body == "cylinder" else name
+        axes.plot(-profile.distance_mm, profile.deflection_mm, label=label, **style | NO_MARKER)
     if body == "cylinder":
         observed, artefact = section.observed, section.observed.is_artefact
         x, y, kept = -observed.distance_mm, observed.deflection_mm, ~artefact
@@ -337,70 +419,37 @@ def draw_profiles(axes: Axes, section: SkinDeflectionResult, body: str) -> None:
     axes.margins(x=0.01)
 
 
-NAIL_DECADES, VON_MISES = 4.0, "von Mises stress [kPa]"
-
-CAPTION_NAIL = (
-    "Predicted von Mises stress at the end of the hold, on the finger that the standard sphere deforms; "
-    "nothing here was observed: (a) in the outermost elements of the skin and (b) in the middle section, "
-    f"on a logarithmic scale of {number(NAIL_DECADES)} decades; (c) the back of the finger and (d) the "
-    "section with the highest ratio, on a linear scale up to the highest stress at the border of the "
-    "nail (its outline in white); (e) median and middle 80 % of all sections that cross that border. "
-    "The paper shows high stresses at the border of the nail."
-)
-
-
-@figure(
-    "reproduction", "The border of the nail", 9, "figure_9_nail", "Stress at the border of the nail",
-    CAPTION_NAIL, of=both("nail"),
-)  # fmt: skip
+@enter(DRAW, "figure_9_nail")
 def draw_nail(section: NailBorder) -> Figure:
-    figure = new_figure(COLUMN_IN, 7.4)
-    grid = figure.add_gridspec(3, 2, height_ratios=(1.0, 1.0, 1.1))
-    below, cut, above, beside = (figure.add_subplot(grid[panel // 2, panel % 2]) for panel in range(4))
-    profile = figure.add_subplot(grid[2, :])
-    middle, across, nail = section.middle, section.across, section.nail_mm
-    stress = section.von_mises_kpa.ravel()
-    shown = np.concatenate([stress, middle.von_mises_kpa])
-    peak = float(shown[np.isfinite(shown)].max(initial=0.0)) or 1.0
-    # Values below these decades have the darkest colour.
-    wide = LogNorm(vmin=peak / 10.0**NAIL_DECADES, vmax=peak, clip=True)
-    near = Normalize(0.0, section.border_kpa or 1.0)
+    drawn = new_figure(COLUMN_IN, 5.2)
+    grid = drawn.add_gridspec(2, 2)
+    above, beside, profile = (drawn.add_subplot(grid[place]) for place in ((0, 0), (0, 1), (1, slice(None))))
+    near, across, sides = Normalize(0.0, section.border_kpa or 1.0), section.across, (1.0, -1.0)
     x, y, z = (corners(grid) for grid in (section.x_mm, section.y_mm, section.z_mm))
-    halves = np.concatenate([np.stack([x, sign * z], axis=-1) for sign in (1.0, -1.0)])
-    for axes, height, scale in ((below, -y, wide), (above, y, near)):
-        # The skin as seen from far away: nearer faces are drawn later and hide the others.
-        order = np.argsort(np.tile(height.mean(axis=1), 2), kind="stable")
-        _paint(axes, halves[order], np.tile(stress, 2)[order], scale)
-    _paint(cut, np.stack([middle.x_mm, middle.y_mm], axis=-1), middle.von_mises_kpa, wide)
-    for sign in (1.0, -1.0):
-        edges = list(nail[..., [0, 2]] * [1.0, sign])
-        above.add_collection(LineCollection(edges, colors="white", linewidths=1.2))
+    halves = np.concatenate([np.stack([x, sign * z], axis=-1) for sign in sides])
+    # The skin as seen from far away: nearer faces are drawn later and hide the others.
+    order = np.argsort(np.tile(y.mean(axis=1), 2), kind="stable")
+    stress = np.tile(section.von_mises_kpa.ravel(), 2)
+    paint_skin(above, halves[order], stress[order], near, edgecolors="face", linewidths=0.3)
+    for sign in sides:
+        edges = list(section.nail_mm[..., [0, 2]] * [1.0, sign])
+        above.add_collection(LineCollection(edges, colors=BLACK, linewidths=1.2))
     half = np.stack([across.z_mm, across.y_mm], axis=-1)
-    _paint(beside, np.concatenate([half, half * [-1.0, 1.0]]), np.tile(across.von_mises_kpa, 2), near)
+    both = np.concatenate([half, half * [-1.0, 1.0]])
+    stress = np.tile(across.von_mises_kpa, 2)
+    faces = paint_skin(beside, both, stress, near, edgecolors="face", linewidths=0.3)
     _draw_stress(profile, section)
-    beyond = f"(e) border of the nail: {number(section.ratio)} times the stress of skin 2 to 3 mm away"
     distal, lateral, dorsal = "x, distal [mm]", "z, lateral [mm]", "y, dorsal [mm]"
-    name_panel(below, "(a) from below: the pad", distal, lateral)
-    name_panel(cut, "(b) middle section, z = 0", distal, dorsal)
-    name_panel(above, "(c) from above: the nail", distal, lateral)
-    name_panel(beside, f"(d) across, x = {number(across.x_mm)} mm", lateral, dorsal)
-    name_panel(profile, beyond, "distance from the nail [mm]", VON_MISES)
-    near_nail = "the same near the nail [kPa]"
-    for row, text, ends in (((below, cut), VON_MISES, "min"), ((above, beside), near_nail, "max")):
-        bar = figure.colorbar(row[0].collections[0], ax=row, extend=ends, pad=0.02, aspect=15)
-        bar.set_label(text, fontsize=9.0)
-    return figure
-
-
-def _paint(axes: Axes, outlines: FloatArray, stress: FloatArray, scale: Normalize) -> None:
-    # A lighter ground than the darkest colour keeps the outline of the finger visible.
-    axes.set_facecolor(PALE)
-    colours = colormaps["inferno"].with_extremes(bad=GREY)
-    drawn: Any = {"cmap": colours, "norm": scale, "edgecolors": "face", "linewidths": 0.3}
-    axes.add_collection(PolyCollection(list(outlines), array=np.ma.masked_invalid(stress), **drawn))
-    axes.autoscale_view()
-    axes.set_aspect("equal")
-    axes.grid(visible=False)
+    name_panel(above, "(a) from above: the nail", distal, lateral)
+    name_panel(beside, f"(b) across, x = {number(across.x_mm)} mm", lateral, dorsal)
+    beyond = f"(c) border of the nail: {number(section.ratio)} times the stress of skin 2 to 3 mm away"
+    name_panel(profile, beyond, "distance from the nail [mm]", "von Mises stress [kPa]")
+    for axes in (above, beside):
+        axes.autoscale_view()
+        axes.set(aspect="equal", facecolor=PALE)
+        axes.grid(visible=False)
+    drawn.colorbar(faces, ax=[above, beside], extend="max", label="von Mises stress [kPa]", aspect=15)
+    return drawn
 
 
 def _draw_stress(axes: Axes, section: NailBorder) -> None:

@@ -16,7 +16,9 @@ from matplotlib.text import Text
 
 from fingerpad.core.checked import checked
 from fingerpad.core.files import path_of, write_atomically
+from fingerpad.core.units import with_unit
 from fingerpad.core.values import FloatArray
+from fingerpad.report.tables import in_words
 
 RESOLUTION_DPI = 150
 COLUMN_IN = 6.4  # Width of a figure of one set of tissues; two of them stand side by side. [in]
@@ -28,6 +30,21 @@ ORANGE = "#d9650a"
 GREEN = "#3fae8a"
 GREY = "#8a8a8a"
 PALE = "#e9e9e6"
+
+SERIES: tuple[dict[str, Any], ...] = tuple(
+    {"color": colour, "marker": marker, "linestyle": dashes}
+    for colour, marker, dashes in (
+        (BLUE, "o", "-"),
+        (ORANGE, "^", ":"),
+        (BLACK, "s", "--"),
+        (GREEN, "D", "-."),
+        (GREY, "v", (0, (8, 2, 1, 2, 1, 2))),
+        (BLUE, "P", (0, (2, 1, 2, 3))),
+    )
+)
+"""What is drawn side by side: any two differ in marker and in dashes, the first five in colour, too."""
+
+NO_MARKER: Any = {"marker": ""}
 
 # Untyped, since Matplotlib lists every setting by name in the type that it asks for.
 STYLE: Any = {
@@ -51,12 +68,10 @@ STYLE: Any = {
     "savefig.dpi": RESOLUTION_DPI,
 }
 
-
 PEOPLE: Any = {
     "color": BLACK, "markerfacecolor": "none", "markeredgewidth": 1.6, "markersize": 7.5, "zorder": 5,
 }  # fmt: skip
 """How observations of people are drawn: open diamonds before all else."""
-
 
 MAP_AXES: Any = {"xlabel": "x, distal [mm]", "ylabel": "z, lateral [mm]", "aspect": "equal"}
 """Axes of a map of the pad: distal is to the right."""
@@ -98,6 +113,11 @@ def name_panel(axes: Axes, title: str, xlabel: str, ylabel: str, **more: Any) ->
 
 def draw_chance(axes: Axes, label: str | None = None) -> None:
     axes.axhline(CHANCE, color=GREY, linewidth=1.0, linestyle=(0, (6, 3)), label=label)
+
+
+def quantity_label(quantity: str) -> str:
+    """Name a quantity at an end organ in words, with its unit."""
+    return with_unit(in_words(quantity), quantity)
 
 
 def fill_band(

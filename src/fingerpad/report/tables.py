@@ -1,4 +1,4 @@
-"""Numbers as text, and tables: rows of any objects, columns that say what of them is shown and how."""
+"""Numbers as text, and tables: rows of cells, made here or filled in by the rows of `pages.toml`."""
 
 from __future__ import annotations
 
@@ -6,23 +6,17 @@ import math
 import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any, Literal, NamedTuple
 
+import numpy as np
+
+from fingerpad import data
 from fingerpad.core.units import name_and_unit
 
 ABSENT = "–"
 UNBROKEN = "\N{NO-BREAK SPACE}"
 PHASE_LABELS = {"dynamic": "dynamic ramp", "static": "static hold"}
-PARAMETER_SYMBOLS = {
-    "intercept_ma": "intercept β",
-    "dynamic_gain": "dynamic gain k_d",
-    "static_gain": "static gain k_s",
-    "time_constant_ms": "time constant τ",
-    "capacitance_mf": "capacitance C",
-    "threshold_mv": "threshold v",
-}
-"""The six parameters of the paper, with their symbols."""
-
 IDENTIFIABLE_SYMBOLS = {
     "intercept_per_ms": "β/(C v)",
     "dynamic_gain_per_kpa": "k_d/(C v)",
@@ -68,6 +62,14 @@ def span(ends: Iterable[float | None] | None, absent: str = ABSENT) -> str:
     return ABSENT if ends is None else " … ".join(absent if end is None else number(end) for end in ends)
 
 
+WORDS = {"stored": "strain energy density", "work": "work of the stress"}
+"""Names in words, where these are not those of the code."""
+
+
+def in_words(name: str) -> str:
+    return WORDS.get(name, name.replace("_", " "))
+
+
 def joined(parts: Sequence[str]) -> str:
     """Return a list as a sentence has it."""
     return " and ".join([", ".join(parts[:-1]), parts[-1]] if len(parts) > 1 else parts)
@@ -81,6 +83,8 @@ def spelled(key: str) -> str:
 
 def plain(value: Any, digits: int = 3, longest: int = 8) -> str:
     """Return any JSON value as a short text: lists above the longest by their size and range."""
+    if isinstance(value, np.ndarray):
+        value = value.tolist()
     if isinstance(value, bool):
         return "yes" if value else "no"
     if value is None or isinstance(value, int | float):
@@ -95,16 +99,19 @@ def plain(value: Any, digits: int = 3, longest: int = 8) -> str:
         known = [item for item in value if isinstance(item, int | float) and not math.isnan(item)]
         within = f", {number(min(known))} … {number(max(known))}" if known else ""
         return f"{len(value)} values{within}"
-    return str(value)
+    return str(value) or ABSENT
 
 
-def whole_percent(share: float | None) -> str:
-    """Return a share in whole percent, or a dash for one that does not exist."""
-    return f"{fixed(None if share is None else 100.0 * share, 0)} %"
+def percent(share: float | None, decimals: int = 0) -> str:
+    """Return a share in percent, or a dash for one that does not exist."""
+    return f"{fixed(None if share is None else 100.0 * share, decimals)} %"
 
 
-def with_error(value: float | None, error: float | None, decimals: int = 2, space: str = UNBROKEN) -> str:
-    return f"{fixed(value, decimals)}{space}±{space}{fixed(error, decimals)}"
+def with_error(value: float | None, error: float | None, decimals: int = 2) -> str:
+    """Return a value with its error; a dash for one that does not exist."""
+    if value is None or math.isnan(value):
+        return ABSENT
+    return f"{fixed(value, decimals)}{UNBROKEN}±{UNBROKEN}{fixed(error, decimals)}"
 
 
 Kind = Literal["", "assumed", "final"]  # An assumed input, or the row that is the result.
@@ -127,73 +134,65 @@ class Table:
     note: str = ""  # A sentence below it.
 
 
-class Column(NamedTuple):
-    """A column of a table of objects."""
-
-    value: (
-        str | Callable[[Any], Any]
-    )  # Path of fields, keys and places, as in "folds.0.fss"; or what computes it.
-    heading: str | None = None  # By default the name in words; the unit of a field is added.
-    form: int | Callable[[Any], str] = plain  # Number of decimals, or what makes a text.
-
-    @property
-    def title(self) -> str:
-        name = "" if callable(self.value) else self.value.rpartition(".")[2]
-        if self.heading is None:
-            return spelled(name)
-        unit = name_and_unit(name)[1] if self.heading and "[" not in self.heading else ""
-        return f"{self.heading} [{unit}]" if unit else self.heading
-
-    def cell(self, row: Any) -> str:
-        value = self.value(row) if callable(self.value) else at(row, self.value)
-        return fixed(value, self.form) if isinstance(self.form, int) else self.form(value)
-
-
 def at(found: Any, path: str) -> Any:
-    """Return what lies at a path: names of fields, keys and places, with dots between them."""
-    for part in path.split("."):
+    """Return what lies at a path: names of fields, keys and places with dots between them, or None."""
+    for part in path.split(".") if path else ():
+        if found is None:
+            return None
         if isinstance(found, Mapping):
             found = found.get(part)
+        elif part.removeprefix("-").isdigit():
+            found = found[int(part)] if int(part) < len(found) else None
         else:
-            found = found[int(part)] if part.isdigit() else getattr(found, part)
+            found = getattr(found, part)
     return found
 
 
+FORMS: dict[str, Callable[[Any], str]] = {
+    "": plain,
+    "count": lambda items: plain(len(items)),
+    "percent": percent,
+    "interval": lambda found: ABSENT if found is None else span((found.low, found.high), "open"),
+    "ends": span,
+    # The record of what was used: nothing is rounded or left out.
+    "exact": partial(plain, digits=12, longest=1000),
+    "words": in_words,
+}
+"""Forms of values in texts of `pages.toml`, beside a number of decimals."""
+
+
 def filled(text: str, found: Any) -> str:
-    """Fill in what lies at paths: `{fss}`, `{fss:2}` with decimals, `{folds:n}` counted, `{level:p}` in %."""
+    """Fill in what lies at paths, `{fss}` or `{fss:2}`, see `FORMS`; a path may begin with `data`."""
 
     def value(match: re.Match[str]) -> str:
-        path, form = match.groups()
-        shown = at(found, path)
-        if form is None:
-            return plain(shown)
-        forms = {"n": lambda items: plain(len(items)), "p": whole_percent}
-        return forms[form](shown) if form in forms else fixed(shown, int(form))
+        path, form = match.groups(default="")
+        root, _, rest = path.partition(".")
+        shown = at(data, rest) if root == "data" else at(found, path)
+        return fixed(shown, int(form)) if form.isdigit() else FORMS[form](shown)
 
-    return re.sub(r"\{([\w.]+)(?::(\w))?\}", value, text)
+    return re.sub(r"\{([\w.-]+)(?::(\w+))?\}", value, text)
 
 
-def table(
-    title: str,
-    rows: Iterable[Any],
-    columns: Sequence[Column],
-    note: str = "",
-    mark: Callable[[Any], Kind] = lambda row: "",
-) -> Table:
-    """Return a table with a row for each object; `mark` says how its row is marked."""
-    made = [Row(tuple(column.cell(row) for column in columns), mark(row)) for row in rows]
-    return Table(title, tuple(column.title for column in columns), made, note)
+def filled_table(spec: Mapping[str, Any], found: Any, made: Sequence[Sequence[str]] = ()) -> Table:
+    """Return a table of `pages.toml`: of its `rows`, of its `cells` for `each` part, or of what was made."""
+    if "rows" in spec:
+        made = [tuple(filled(cell, found) for cell in row) for row in spec["rows"]]
+    elif "each" in spec:
+        parts = at(found, spec["each"])
+        parts = parts.items() if isinstance(parts, Mapping) else parts
+        made = [tuple(filled(cell, part) for cell in spec["cells"]) for part in parts]
+    columns = [filled(heading, found) for heading in spec.get("columns", ("", ""))]
+    rows = [Row(cells, _kind(cells)) for cells in made]
+    return Table(filled(spec["table"], found), columns, rows, filled(spec.get("note", ""), found))
 
 
-def listed(
-    title: str, values: Mapping[str, Any], columns: tuple[str, str] = ("", ""), note: str = "",
-    form: int | Callable[[Any], str] = plain,
-) -> Table:  # fmt: skip
-    """Return names and values as a table."""
-    return table(title, values.items(), (Column("0", columns[0]), Column("1", columns[1], form)), note)
+def _kind(row: Sequence[str]) -> Kind:
+    if "assumed" in row:
+        return "assumed"
+    return "final" if row[0] == "met" or row[0].endswith("(used)") else ""
 
 
 def facts_table(title: str, facts: Mapping[str, object]) -> Table:
     """Return names of fields and their values; what is None or empty is left out."""
     given = {key: value for key, value in facts.items() if value is not None and value not in ({}, ())}
-    return listed(title, {spelled(key): value for key, value in given.items()})
+    return Table(title, ("", ""), [Row((spelled(key), plain(value))) for key, value in given.items()])
