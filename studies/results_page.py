@@ -13,8 +13,8 @@ from fingerpad.core.result_files import read_results
 from fingerpad.core.values import Number, Vector
 from fingerpad.experiments.gerling2014.claims import ClaimRow, Group, Statement, Summary
 from fingerpad.experiments.gerling2014.nerve import SingleUnitResult
-from fingerpad.experiments.gerling2014.percept import CriterionErrorBars, SphereDiscrimination
-from fingerpad.experiments.gerling2014.reproduction import ReproductionResult, Summaries
+from fingerpad.experiments.gerling2014.percept import SphereDiscrimination
+from fingerpad.experiments.gerling2014.reproduction import ReproductionResult
 from fingerpad.report.reproduction import SET_COLUMNS, count_sentence, side_by_side, statement_cells
 from fingerpad.report.tables import ABSENT, fixed, number
 from studies.pages import joined, replaced, table

@@ -4,7 +4,7 @@ import base64
 import json
 import re
 import struct
-from dataclasses import asdict, fields, replace
+from dataclasses import fields, replace
 from types import SimpleNamespace
 
 import matplotlib
@@ -15,7 +15,7 @@ from matplotlib.patches import Circle
 
 from fingerpad.core.result_files import schema_of, to_json
 from fingerpad.data import STATUSES, all_published
-from fingerpad.experiments.gerling2014.claims import Group, Verdict, paired
+from fingerpad.experiments.gerling2014.claims import Group, paired
 from fingerpad.experiments.gerling2014.nerve import PopulationMaps
 from fingerpad.experiments.gerling2014.percept import SphereDiscrimination
 from fingerpad.experiments.gerling2014.reproduction import ReproductionResult, SetResult
@@ -401,7 +401,7 @@ def test_the_first_screen_has_verdicts_and_the_contents_stand_beside_the_page(re
 
 
 def test_inputs_are_listed_exactly_and_the_assumed_ones_are_marked():
-    numbers = [PublishedNumber(**asdict(number)) for number in all_published()]
+    numbers = all_published()
     meanings = table_of("reproduction", "Status of a number", None)
     assert dict(row.cells for row in meanings.rows) == STATUSES
     listed = table_of("reproduction", "Published numbers", SimpleNamespace(inputs=numbers))

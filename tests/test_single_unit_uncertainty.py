@@ -12,6 +12,7 @@ from fingerpad.experiments.fit.results import UncertaintyResult
 from fingerpad.experiments.gerling2014 import nerve
 from fingerpad.inference.identifiable import IDENTIFIABLE_NAMES, identifiable
 from fingerpad.inference.rate_model import AfferentModel
+from fingerpad.neuron.transduction import drive
 from fingerpad.report import nerve as report
 from fingerpad.report.style import png
 from report_rows import caption_of, table_of

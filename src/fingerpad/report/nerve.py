@@ -15,9 +15,9 @@ from fingerpad.core.signals import COUNT, CURRENT, RECEPTOR_COLUMNS, ResponseMap
 from fingerpad.core.units import unit_of
 from fingerpad.core.values import FloatArray, one_of
 from fingerpad.data import paper, protocol
-from fingerpad.experiments.fit.results import FitResult, ParameterProfile
-from fingerpad.experiments.gerling2014.nerve import PopulationMaps, SingleUnitResult, UncertaintyResult
-from fingerpad.inference.spike_fit import SpikeFit
+from fingerpad.experiments.fit.results import FitResult, ParameterProfile, UncertaintyResult
+from fingerpad.experiments.gerling2014.nerve import PopulationMaps, SingleUnitResult
+from fingerpad.inference.spike_likelihood import SpikeFit
 from fingerpad.report.page import DRAW, DRAWINGS, ROWS, Rows, enter
 from fingerpad.report.style import (
     BLACK,

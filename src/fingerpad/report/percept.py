@@ -183,8 +183,8 @@ def _layout(population: PopulationThresholds) -> str:
 def draw_thresholds(section: CurvatureThresholds) -> Figure:
     drawn = new_figure(COLUMN_IN, 4.0)
     axes = drawn.subplots()
-    people, first = section.literature, section.populations[0]
-    low, high = PER_CENT * people.weber_fractions
+    first = section.populations[0]
+    low, high = (PER_CENT * fraction for fraction in psychophysics.WEBER_FRACTIONS.value)
     axes.axhspan(low, high, color=PALE, label=f"observed, as reported: {number(low, 2)}-{number(high, 2)} %")
 
     def of(population: PopulationThresholds, name: str) -> FloatArray:
@@ -200,8 +200,9 @@ def draw_thresholds(section: CurvatureThresholds) -> Figure:
     best: Any = {"color": GREY, "linestyle": (0, (5, 2)), "marker": "."}
     label = f"ideal observer, {_layout(first)} receptors"
     axes.plot(at, of(first, "ideal_weber_fraction"), label=label, **best)
-    observed = PER_CENT * (people.comparison_per_m / people.standard_per_m - 1.0)
-    axes.plot(people.standard_per_m, observed, "D", label="observed (Goodwin et al. 1991)", **PEOPLE)
+    standards = np.array(psychophysics.THRESHOLD_STANDARDS.value)
+    observed = PER_CENT * (psychophysics.THRESHOLD_COMPARISONS.value / standards - 1.0)
+    axes.plot(standards, observed, "D", label="observed (Goodwin et al. 1991)", **PEOPLE)
     axes.set(xlabel="curvature of the standard [1/m]", ylabel="Weber fraction at 75 % [%]")
     axes.set_ylim(0.0, LARGEST_FRACTION)
     axes.legend(loc="upper right", fontsize=8.0)

@@ -12,9 +12,10 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Circle
 
 from fingerpad.core.units import MM_PER_M
-from fingerpad.experiments.gerling2014.claims import ClaimRow, Group, Statement, Verdict
+from fingerpad.experiments.gerling2014.claims import ClaimRow, Group, Statement
 from fingerpad.experiments.gerling2014.nerve import ThreeLevels
 from fingerpad.experiments.gerling2014.reproduction import ReproductionResult
+from fingerpad.experiments.scores import Verdict
 from fingerpad.report import nerve, percept, skin
 from fingerpad.report.page import DRAW, ROWS, SETS, Rows, enter
 from fingerpad.report.style import (

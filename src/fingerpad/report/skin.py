@@ -405,7 +405,7 @@ def draw_profiles(axes: Axes, section: SkinDeflectionResult, body: str) -> None:
     # Results count distances proximal positive; all figures have the distal side on the right.
     trials = zip(TRIAL_STYLES.items(), (section.trial1, section.trial2, section.trial3), strict=True)
     for (name, style), trial in trials:
-        profile = getattr(trial, body)
+        profile = trial[body]
         label = f"{name}, R² = {fixed(profile.r2, 2)}" if body == "cylinder" else name
         axes.plot(-profile.distance_mm, profile.deflection_mm, label=label, **style | NO_MARKER)
     if body == "cylinder":
