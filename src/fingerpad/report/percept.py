@@ -92,7 +92,6 @@ def criterion_panels(section: SphereDiscrimination) -> list[Panel]:
 
 @enter(ROWS, "hit_rates")
 def rows_of_hit_rates(section: SphereDiscrimination) -> Rows:
-    """Return the hit rates of Figures 7 and 8."""
     return [
         (title.replace("\n", ", "), place, *map(with_error, means, spreads))
         for title, each in (*observer_panels(section), *criterion_panels(section))

@@ -220,5 +220,4 @@ def statement_cells(each: Statement) -> tuple[str, ...]:
 
 
 def _marked(verdict: Verdict, fitted: str) -> str:
-    """Sign and words of a verdict, and whether something was fitted to it."""
     return f"{SIGNS[verdict]} {verdict.value}" + (" (fitted)" if fitted else "")
