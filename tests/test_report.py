@@ -534,7 +534,7 @@ def test_figure_5_draws_the_fitted_line_over_observed_points_and_the_papers_leve
     assert dynamic.get_ylim()[1] > 212.0
     (difference,) = static.containers
     (low, high) = difference.lines[2][0].get_segments()[0][:, 1]
-    assert (low, high - low) == (given.modulation.static.ours.minimum_hz, pytest.approx(52.0))
+    assert (low, high - low) == (given.modulation["static"]["ours"].minimum_hz, pytest.approx(52.0))
     caption = caption_of("reproduction", "figure_5_single_unit", given)
     assert "54 and 212 spikes/s" in caption
     assert "70 and 210 spikes/s as observed" in caption
