@@ -7,7 +7,7 @@ import pytest
 
 from fingerpad.core.result_files import file_format
 from fingerpad.experiments.schemas import file_name, request_schema, schema
-from fingerpad.experiments.schemas.__main__ import REQUESTS, RESULT_FILES, write_schemas
+from tools.schemas import REQUESTS, RESULT_FILES, write_schemas
 
 
 @pytest.mark.parametrize("results", RESULT_FILES)

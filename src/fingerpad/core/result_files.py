@@ -53,7 +53,7 @@ def check_schema(path: Path, values: dict[str, Any], schema: JsonSchema) -> None
     except fastjsonschema.JsonSchemaValueException as error:
         raise StoreError(
             f"{path} must meet the schema of its format: {error.message}; run the command again, or, after a "
-            "change of a type, `python -m fingerpad.experiments.schemas`."
+            "change of a type, `python -m tools.schemas`."
         ) from error
 
 

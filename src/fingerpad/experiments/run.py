@@ -71,8 +71,7 @@ RUNS: Mapping[type[Request], Callable[[Any, Runner, str | None], Any]] = Mapping
         ReductionRequest: lambda request, runner, _: request.run(runner),
         ReproductionRequest: lambda request, runner, _: request.run(runner),
     }
-)
-"""What runs a request, by its class."""
+)  # What runs a request, by its class.
 
 
 def run(

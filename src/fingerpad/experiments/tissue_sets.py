@@ -47,8 +47,7 @@ ELASTICITY: dict[str, tuple[Numbers, ...]] = {
         (published.LABORATORY_DERMIS_SHEAR,),
         (published.LABORATORY_SUBCUTIS_SHEAR,),
     ),
-}
-"""Published numbers behind the moduli of every layer of every set, from the skin inwards."""
+}  # Published numbers behind the moduli of every layer of every set, from the skin inwards.
 
 _RATIOS = (published.LONG_TERM_POISSON, published.POISSON_RATIO, published.WU_HYPERFOAM_POISSON)
 

@@ -102,8 +102,7 @@ class CurveSettings(Part):
     lapse: Annotated[
         Annotated[float, Field(ge=0, lt=0.5)] | Annotated[str, choice((FREE,))],
         with_message(f"a number within 0 ... 0.5, or {FREE}"),
-    ] = 0.0
-    """What is missing to 1 far above threshold, or that it shall be fitted. [0-1]"""
+    ] = 0.0  # What is missing to 1 far above threshold, or that it shall be fitted. [0-1]
     proportion: Annotated[float, Field(gt=0.5, lt=1.0), with_message("a number between 0.5 and 1")] = 0.75
     """Where the threshold is read. [0-1]"""
 

@@ -115,8 +115,7 @@ METHODS = {
     "closed_form": FitMethod(_of_four(lambda search, seed: search.along_slopes())),
     "cma_es": FitMethod(_of_four(_evolution), in_place="closed_form", moving=_evolution_from_0),
     "likelihood": FitMethod(_spikes, needs_spikes=True),
-}
-"""Methods that fit recordings, by the names that the command line gives."""
+}  # Methods that fit recordings, by the names that the command line gives.
 
 OFFSET_METHODS = tuple(name for name, method in METHODS.items() if method.moving)
 """Methods that an offset can be added to."""

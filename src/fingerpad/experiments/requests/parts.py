@@ -49,8 +49,7 @@ from fingerpad.experiments.manifest import sha256
 _FORM = "form "
 LISTED, VARIED, NAMED, SPELLED, OBJECT, UNKNOWN = (
     f"{_FORM}{form}" for form in ("listed", "varied", "named", "spelled", "object", "unknown")
-)
-"""Forms that a part may have; pydantic puts them into the places of errors."""
+)  # Forms that a part may have; pydantic puts them into the places of errors.
 
 
 def form_of(kind: str) -> str:
@@ -75,8 +74,7 @@ def with_message(words: str) -> WrapValidator:
     return WrapValidator(validated)
 
 
-Content = Mapping[str, Any]
-"""Keys and values of a description, as its file holds them."""
+Content = Mapping[str, Any]  # Keys and values of a description, as its file holds them.
 Block = Annotated[dict[str, Any], with_message("a mapping of keys to values")]
 """Keys and values that are checked once it is known what they belong to."""
 BlockOrObject = Annotated[
@@ -86,8 +84,7 @@ BlockOrObject = Annotated[
         {"anyOf": [{"type": "object"}, {"type": "string"}, {"type": "null"}]},
         lambda value: value if isinstance(value, dict | str | None) else repr(value),
     ),
-]
-"""A block, a text, or an object of Python, checked once it is known what it belongs to."""
+]  # A block, a text, or an object of Python, checked once it is known what it belongs to.
 LevelOrName = Annotated[float | str, Field(union_mode="left_to_right"), with_message("a number or a name")]
 
 
@@ -117,21 +114,18 @@ class Part(BaseModel):
         return {name: value for name, value in values.items() if value is not None}
 
 
-UNKNOWN_MODEL = "Unknown_"
-"""Beginning of the name of a part that only serves the error of an unknown kind."""
+UNKNOWN_MODEL = "Unknown_"  # Beginning of the name of a part that only serves the error of an unknown kind.
 
 _PLAIN = (bool, int, float, list, tuple, type(None))  # What a file may have in the place of a block.
 
-File = Annotated[Text, "file"]
-"""Name of a file, from the folder of the description."""
+File = Annotated[Text, "file"]  # Name of a file, from the folder of the description.
 
 
 class Made(Part):
     """Part that a function makes from its keys."""
 
     makes: ClassVar[Callable[..., Any]]
-    files: ClassVar[frozenset[str]]
-    """Keys that name files."""
+    files: ClassVar[frozenset[str]]  # Keys that name files.
 
     def made(self, beside: Path = Path()) -> Any:
         """Return what the function makes."""
@@ -163,12 +157,9 @@ def made_by(kind: str, makes: Callable[..., Any], without: Sequence[str] = ()) -
 class LateKind:
     """Part of one kind, made when it is first needed: a file of spheres does not load braille."""
 
-    kind: str
-    """Value of the key `kind`."""
-    makes: Callable[..., Any] | str
-    """As of `made_by`, or its name below `fingerpad`."""
-    without: Sequence[str] = ()
-    """As of `made_by`."""
+    kind: str  # Value of the key `kind`.
+    makes: Callable[..., Any] | str  # As of `made_by`, or its name below `fingerpad`.
+    without: Sequence[str] = ()  # As of `made_by`.
 
     @cached_property
     def part(self) -> type[Made]:
@@ -242,12 +233,9 @@ _Request = TypeVar("_Request", bound="Request")
 class Origin:
     r"""Where a description comes from: errors begin with its name and line."""
 
-    name: str
-    """Of the file: files that it names are searched beside it."""
-    text: str = ""
-    """Its content in YAML, for lines; empty where there is none."""
-    rows: tuple[int, ...] = ()
-    """Lines of the entries of `stimuli` in a table."""
+    name: str  # Of the file: files that it names are searched beside it.
+    text: str = ""  # Its content in YAML, for lines; empty where there is none.
+    rows: tuple[int, ...] = ()  # Lines of the entries of `stimuli` in a table.
 
     @property
     def beside(self) -> Path:
@@ -384,10 +372,8 @@ class Request(Part):
     _origin: Origin = PrivateAttr(default=Origin("request"))
     _allow_python: bool = PrivateAttr(default=False)
 
-    word: ClassVar[str] = "request"
-    """What an error calls a request that is from no file."""
-    python: ClassVar[tuple[str, ...]] = ()
-    """Keys at which a file may name an object of Python."""
+    word: ClassVar[str] = "request"  # What an error calls a request that is from no file.
+    python: ClassVar[tuple[str, ...]] = ()  # Keys at which a file may name an object of Python.
 
     def __eq__(self, other: object) -> bool:
         """Compare values alone: where a request comes from does not matter."""

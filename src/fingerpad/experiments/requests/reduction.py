@@ -35,18 +35,13 @@ NO_WAY = (0.0, 0.0)
 class RangeSettings(Part):
     """Poses that the reduced touch serves."""
 
-    depth_mm: Positive
-    """Largest depth below first touch at any pose. [mm]"""
+    depth_mm: Positive  # Largest depth below first touch at any pose. [mm]
     x_mm: Pair = NO_WAY
-    """Ways of the object along and across the finger, from its place. [mm]"""
-    z_mm: Pair = NO_WAY
-    """Ways of the object along and across the finger, from its place. [mm]"""
-    tilt_deg: Pair = NO_WAY
-    """Tilt, added to that of the place. [degrees]"""
+    z_mm: Pair = NO_WAY  # Ways of the object along and across the finger, from its place. [mm]
+    tilt_deg: Pair = NO_WAY  # Tilt, added to that of the place. [degrees]
     parameter: Text | None = None
     """A parameter of the object that varies, such as `curvature_per_m` of a sphere."""
-    values: Pair | None = None
-    """Its range."""
+    values: Pair | None = None  # Its range.
 
 
 class ReductionRequest(Request, StimulusDescription, FingerDescription):

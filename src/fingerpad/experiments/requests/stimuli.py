@@ -58,22 +58,17 @@ class StimulusBlocks(Part):
     """What a stimulus, or all of them, say of themselves: blocks of a `StimulusDescription`, or parts."""
 
     object: BlockOrObject = None
-    """As in the file of a touch. A stimulus has the keys of its own block, then those that all have."""
     motion: BlockOrObject = None
-    """As in the file of a touch. A stimulus has the keys of its own block, then those that all have."""
     place: Block | None = None
     """As in the file of a touch. A stimulus has the keys of its own block, then those that all have."""
-    friction: Finite | None = None
-    """Coulomb's coefficient."""
+    friction: Finite | None = None  # Coulomb's coefficient.
 
 
 class ListedStimulus(StimulusBlocks):
     """One stimulus by name."""
 
-    name: Text
-    """How it is called."""
-    level: Finite | None = None
-    """Where it stands on the axis of the psychometric curve."""
+    name: Text  # How it is called.
+    level: Finite | None = None  # Where it stands on the axis of the psychometric curve.
 
 
 class VariedStimuli(Part):
@@ -81,8 +76,7 @@ class VariedStimuli(Part):
 
     vary: Text
     """Block and key, such as "object.radius_mm", "motion.force_mn" or "place.spin_deg"; or "friction"."""
-    values: Annotated[tuple[LevelOrName, ...], Strict(False)]
-    """One per stimulus."""
+    values: Annotated[tuple[LevelOrName, ...], Strict(False)]  # One per stimulus.
 
 
 class StimulusSet(StimulusBlocks, FingerDescription):
@@ -97,24 +91,19 @@ class StimulusSet(StimulusBlocks, FingerDescription):
         Annotated[tuple[ListedStimulus, ...], Strict(False), Tag(LISTED)]
         | Annotated[VariedStimuli, Tag(VARIED)],
         Discriminator(lambda value: LISTED if isinstance(value, list | tuple) else VARIED),
-    ]
-    """Which they are."""
+    ]  # Which they are.
 
 
 @dataclass(frozen=True, kw_only=True)
 class NamedStimulus(TactileStimulus):
     """One of several stimuli."""
 
-    name: str
-    """How it is called."""
-    level: float | None = None
-    """Where it stands on the axis of a psychometric curve."""
-    files: tuple[Path, ...] = field(default=(), compare=False)
-    """Those that its object and motion name."""
+    name: str  # How it is called.
+    level: float | None = None  # Where it stands on the axis of a psychometric curve.
+    files: tuple[Path, ...] = field(default=(), compare=False)  # Those that its object and motion name.
     in_file: Callable[[Place], tuple[Place, str]] = field(
         default=lambda place: (place, spelled(place)), compare=False, repr=False
-    )
-    """From a place in its description to that in the file of all, and the words for it."""
+    )  # From a place in its description to that in the file of all, and the words for it.
 
 
 def named_stimuli(described: StimulusSet, beside: Path = Path()) -> list[NamedStimulus]:
@@ -280,8 +269,7 @@ COLUMNS = (
     *(f"motion.{number}" for number in PLAUSIBLE),
     *(f"place.{name}" for name in PlaceSettings.model_fields),
     "friction",
-)
-"""Usual columns of a table of stimuli; any other key of a block is one as well, such as `motion.file`."""
+)  # Usual columns of a table of stimuli; any other key of a block is one as well, such as `motion.file`.
 
 BAR = "bar"  # The stimuli that are no file: the paper's bar, shifted along the finger.
 

@@ -72,8 +72,7 @@ FINGERS: dict[str, Callable[..., Finger] | str] = {
     MEASURED: Fingertip.of,
     "outline": Fingertip,
     "mesh": "read_finger",
-}
-"""How a finger can be given, by kind."""
+}  # How a finger can be given, by kind.
 
 OBJECTS: dict[str, Callable[..., Indenter] | str] = {
     **INDENTERS,
@@ -84,16 +83,14 @@ OBJECTS: dict[str, Callable[..., Indenter] | str] = {
     "ridges": "geometry.composed.ridges",
     "surface": "read_surface",
     "height_map": "read_height_map",
-}
-"""What can be pressed in, by kind; by its name below `fingerpad` if only a file with it needs the module."""
+}  # What can be pressed in, by kind; by its name below `fingerpad` if only a file with it needs the module.
 
 MOTIONS: dict[str, Callable[..., Motion] | str] = {
     RAMP_AND_HOLD: ramp_and_hold,
     **{kind: kind for kind in ("sine", "chirp", "repeated", "staircase", "stroke")},
     "recorded": recorded,
     "trajectory": "Trajectory",
-}
-"""How it can move, by kind."""
+}  # How it can move, by kind.
 
 _WITHOUT: Mapping[str, Sequence[str]] = {"trajectory": ("phases", "cycles")}
 """Parameters that a file does not have."""
@@ -171,26 +168,21 @@ _PLACES: dict[str, Place] = {
     "spin_deg": ("place", "spin_deg"),
     "times_ms": ("times_ms",),
     "friction": ("friction",),
-}
-"""Keys of a file that set arguments of the solver; any other argument is one of the motion."""
+}  # Keys of a file that set arguments of the solver; any other argument is one of the motion.
 
-MadeObjects = list[tuple[object, Indenter]]
-"""Parts of files with the objects that were made of them."""
+MadeObjects = list[tuple[object, Indenter]]  # Parts of files with the objects that were made of them.
 
 
 class PlaceSettings(Part):
     """Where and in which direction the object is pressed."""
 
     x_mm: Finite = 0.0
-    """Where the object's axis meets the skin, from the middle of the pad: along the finger, distal positive,
-    and across. [mm]"""
     z_mm: Finite = 0.0
     """Where the object's axis meets the skin, from the middle of the pad: along the finger, distal positive,
     and across. [mm]"""
     tilt_deg: Finite | None = None
     """0 is perpendicular to the long axis of the finger; without it, perpendicular to the skin. [degrees]"""
-    spin_deg: Finite = 0.0
-    """Turn about the direction of pressing. [degrees]"""
+    spin_deg: Finite = 0.0  # Turn about the direction of pressing. [degrees]
 
 
 def tissues_of(name: str, value: Any) -> str | Tissues:
@@ -218,8 +210,7 @@ TissuesPart = Annotated[
         {"anyOf": [{"enum": list(TISSUES)}, {"type": "string"}]},
         lambda value: value if isinstance(value, str) else repr(value),
     ),
-]
-"""Tissues by name, or of one's own."""
+]  # Tissues by name, or of one's own.
 
 
 FINGER_OBJECTS: tuple[str, ...] = (
@@ -232,15 +223,13 @@ FINGER_OBJECTS: tuple[str, ...] = (
 class FingerDescription(Part):
     """The finger that is pressed."""
 
-    resolution: Annotated[str, choice(RESOLUTIONS)] = "quick"
-    """How fine mesh and steps are."""
+    resolution: Annotated[str, choice(RESOLUTIONS)] = "quick"  # How fine mesh and steps are.
     finger: FingerPart = Field(default={}, validate_default=True)
     """Whose: a preset such as "child", the sizes of `fingerpad.Fingertip.of`, `kind: outline` with those of
     `fingerpad.Fingertip`, or `kind: mesh` with the parameters of `fingerpad.read_finger`."""
     tissues: TissuesPart = DEFAULT_TISSUES
     """A set of tissues by name, as of `fingerpad.indent`; in Python also tissues of one's own."""
-    stiffness: Positive = 1.0
-    """Factor of the moduli of all tissues."""
+    stiffness: Positive = 1.0  # Factor of the moduli of all tissues.
     grading: Annotated[Any, Check(grading_of, {"type": "object"}, dict_of)] = None
     """Mesh instead of that which `resolution` grades about the objects: the fields of `fingerpad.Grading`."""
 
@@ -262,14 +251,11 @@ class FingerDescription(Part):
 class StimulusDescription(Part):
     """What is pressed in, and how."""
 
-    object: ObjectPart
-    """What is pressed in: `kind` and its sizes, or a text such as "sphere:radius_mm=3.5"."""
+    object: ObjectPart  # What is pressed in: `kind` and its sizes, or a text such as "sphere:radius_mm=3.5".
     motion: MotionPart = Field(default={}, validate_default=True)
     """How: `kind` and its numbers; a ramp and hold by default."""
-    place: PlaceSettings = PlaceSettings()
-    """Where, and in which direction."""
-    friction: NotNegative = 0.0
-    """Coulomb's coefficient between skin and object."""
+    place: PlaceSettings = PlaceSettings()  # Where, and in which direction.
+    friction: NotNegative = 0.0  # Coulomb's coefficient between skin and object.
 
     def stimulus(self, beside: Path = Path(), made: MadeObjects | None = None) -> TactileStimulus:
         """Make what is described."""
@@ -292,13 +278,9 @@ class StimulusDescription(Part):
 class TactileStimulus:
     """An indenter, its motion, its place from the middle of the pad, and friction."""
 
-    indenter: Indenter
-    """The rigid body."""
-    motion: Motion = field(default_factory=RampAndHold)
-    """How it is pressed."""
+    indenter: Indenter  # The rigid body.
+    motion: Motion = field(default_factory=RampAndHold)  # How it is pressed.
     x_mm: Finite = 0.0
-    """Where its axis meets the skin, from the middle of the pad: along the finger, distal positive, and
-    across. [mm]"""
     z_mm: Finite = 0.0
     """Where its axis meets the skin, from the middle of the pad: along the finger, distal positive, and
     across. [mm]"""
@@ -306,8 +288,7 @@ class TactileStimulus:
     """As in `fingerpad.Touch`; by default it presses perpendicular to the skin in the middle. [degrees]"""
     spin_deg: Finite = 0.0
     """As in `fingerpad.Touch`: the orientation of a bar, an edge, a gap or a grating. [degrees]"""
-    friction: Finite = 0.0
-    """Coulomb's coefficient."""
+    friction: Finite = 0.0  # Coulomb's coefficient.
 
     def tilt_on(self, finger: Finger) -> float:
         """Tilt of the indenter on a finger. [degrees]"""

@@ -47,8 +47,7 @@ OUTPUTS = ("figures", "csv", "spikes", "npz", "netcdf", "zarr", "nwb", "vtu", "a
 
 MODULI = ("long_term", "instantaneous")
 
-WHOLE = ("netcdf", "zarr", "vtu")
-"""Outputs that hold all nodes and elements over time."""
+WHOLE = ("netcdf", "zarr", "vtu")  # Outputs that hold all nodes and elements over time.
 
 
 class TouchRequest(Request, StimulusDescription, FingerDescription):
@@ -215,25 +214,15 @@ class TouchSummary:
     """What a touch did, in a few numbers."""
 
     nodes: int
-    """Size of the mesh, and number of times."""
-    times: int
-    """Size of the mesh, and number of times."""
-    end_ms: Number
-    """End of the motion. [ms]"""
+    times: int  # Size of the mesh, and number of times.
+    end_ms: Number  # End of the motion. [ms]
     largest_force_mn: Number
-    """Over time. [mN], [mm], [mm²]"""
     largest_depth_mm: Number
-    """Over time. [mN], [mm], [mm²]"""
-    largest_contact_mm2: Number
-    """Over time. [mN], [mm], [mm²]"""
+    largest_contact_mm2: Number  # Over time. [mN], [mm], [mm²]
     afferents: int
-    """How many, and how many fire at all."""
-    firing: int
-    """How many, and how many fire at all."""
+    firing: int  # How many, and how many fire at all.
     dynamic_rate_hz: Number
-    """Largest firing rates in the two windows. [spikes/s]"""
-    static_rate_hz: Number
-    """Largest firing rates in the two windows. [spikes/s]"""
+    static_rate_hz: Number  # Largest firing rates in the two windows. [spikes/s]
 
 
 @result_class
@@ -241,29 +230,20 @@ class TouchFile:
     """The file `touch.json`."""
 
     format: Literal["fingerpad touch result"] = "fingerpad touch result"
-    """By which a reader knows the file."""
-    format_version: Literal[1] = 1
-    """By which a reader knows the file."""
-    touch: TouchRequest
-    """What was described."""
-    summary: TouchSummary
-    """What it did."""
-    manifest: Manifest
-    """What ran."""
+    format_version: Literal[1] = 1  # By which a reader knows the file.
+    touch: TouchRequest  # What was described.
+    summary: TouchSummary  # What it did.
+    manifest: Manifest  # What ran.
 
 
 @dataclass(frozen=True)
 class TouchResult:
     """What became of a touch: the responses of skin and afferents."""
 
-    request: TouchRequest
-    """What was asked."""
-    skin: SkinResponse
-    """Response of the skin; with all nodes and elements if it was pressed `whole`."""
-    response: ResponseMap
-    """Responses of the afferents."""
-    manifest: Manifest
-    """What ran."""
+    request: TouchRequest  # What was asked.
+    skin: SkinResponse  # Response of the skin; with all nodes and elements if it was pressed `whole`.
+    response: ResponseMap  # Responses of the afferents.
+    manifest: Manifest  # What ran.
 
     @property
     def summary(self) -> TouchSummary:
@@ -309,14 +289,10 @@ class PressEstimate:
 
     nodes: int
     elements: int
-    steps: int
-    """Size of the mesh, and number of steps that are solved at least."""
+    steps: int  # Size of the mesh, and number of steps that are solved at least.
     time_s: float
-    """Time on two cores with compiled kernels, and memory of the process. [s], [MB]"""
-    memory_mb: float
-    """Time on two cores with compiled kernels, and memory of the process. [s], [MB]"""
-    by_force: bool = False
-    """Whether the force is given, so that the depth is not known before the press."""
+    memory_mb: float  # Time on two cores with compiled kernels, and memory of the process. [s], [MB]
+    by_force: bool = False  # Whether the force is given, so that the depth is not known before the press.
 
     @property
     def lines(self) -> tuple[str, ...]:

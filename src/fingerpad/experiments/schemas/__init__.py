@@ -1,6 +1,6 @@
 """JSON schemas of the files of results, generated from their types; a file is checked before it is written.
 
-`python -m fingerpad.experiments.schemas` rewrites them after a change of a type.
+`python -m tools.schemas` rewrites them after a change of a type.
 """
 
 from __future__ import annotations
@@ -15,8 +15,7 @@ if TYPE_CHECKING:  # the help of commands needs schemas alone
     from fingerpad.core.values import JsonSchema
 
 
-TOUCH_SCHEMA = "fingerpad-touch.schema.json"
-"""Schema of the request of a touch, from which editors complete."""
+TOUCH_SCHEMA = "fingerpad-touch.schema.json"  # Schema of the request of a touch, from which editors complete.
 
 
 @cache

@@ -29,8 +29,7 @@ PLACES_MM: dict[Place, tuple[str, Callable[[SkinResponse], np.ndarray]]] = {
         "sheet_mm",
         lambda skin: skin.mesh.nodes_mm[skin.mesh.elements[skin.watched_elements]].mean(axis=1),
     ),
-}
-"""Where the values of fields are, undeformed: name of the positions, and the positions. [mm]"""
+}  # Where the values of fields are, undeformed: name of the positions, and the positions. [mm]
 
 
 @dataclass(frozen=True)

@@ -46,8 +46,7 @@ COLUMNS: dict[str, Callable[..., float]] = {
     "force_n": not_negative,
     "deflection_mm": finite,
     "rate_hz": not_negative,
-}
-"""Check of each column of numbers; the other column is the indenter."""
+}  # Check of each column of numbers; the other column is the indenter.
 
 INDENTER = "indenter"
 

@@ -196,5 +196,4 @@ _READING: Mapping[str, Callable[[Mapping[str, Value], ValidationRequest], Readin
     "force_n": _force,
     "deflection_mm": _deflection,
     "rate_hz": _rate,
-}
-"""By what was observed."""
+}  # By what was observed.
