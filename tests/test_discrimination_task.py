@@ -20,7 +20,8 @@ from fingerpad.experiments.conditions import RECEPTOR_X_MM
 from fingerpad.experiments.discrimination import analysis
 from fingerpad.experiments.discrimination.analysis import analyse, forced_choice_of
 from fingerpad.experiments.discrimination.decoding import SESSION, side_curves
-from fingerpad.experiments.discrimination.request import CurveSettings, example_tasks
+from fingerpad.experiments.discrimination.request import CurveSettings
+from fingerpad.experiments.examples import tasks
 from fingerpad.psychophysics.encoding import gradient_sum, neighbour_pairs, taking_part
 from fingerpad.psychophysics.ideal_observer import code_efficiency, noisy_presentations
 from fingerpad.psychophysics.observer import EuclideanDistance, Experiment, GradientSum, discriminate_by
@@ -387,7 +388,7 @@ def test_an_example_task_runs_by_name_or_as_a_file_of_ones_own(call, tmp_path, a
 
     monkeypatch.setattr(analysis, "analyse", known)
     assert call("sphere_curvature", "--resolution", "quick", "--out", "named")[0] == 0
-    (tmp_path / "mine.yaml").write_text(example_tasks()["sphere_curvature"])
+    (tmp_path / "mine.yaml").write_text(tasks()["sphere_curvature"])
     assert call("mine.yaml", "--resolution", "quick", "--out", "own")[0] == 0
     named, own = (json.loads((tmp_path / one / "discriminate.json").read_text()) for one in ("named", "own"))
     assert named["discrimination"] == own["discrimination"]

@@ -25,12 +25,11 @@ from fingerpad.core.plain_yaml import read_yaml
 from fingerpad.core.regions import Layout, Polygon, Rectangle
 from fingerpad.core.signals import HitRates
 from fingerpad.experiments.conditions import Conditions
-from fingerpad.experiments.discrimination.request import example_tasks
+from fingerpad.experiments.examples import examples as example_files
 from fingerpad.experiments.recording_files import read_recordings
 from fingerpad.experiments.requests.afferents import fitted_afferent
 from fingerpad.experiments.requests.stimuli import ShiftedBar, read_stimuli
 from fingerpad.experiments.requests.stimulus import TactileStimulus
-from fingerpad.experiments.requests.touch import EXAMPLE
 from fingerpad.experiments.runner import Runner
 from fingerpad.experiments.validation.observations import read_observations
 from fingerpad.geometry.dots import Dots
@@ -202,8 +201,8 @@ def _picture():
 
 
 FILES = {
-    "task.yaml": (example_tasks()["sphere_curvature"].encode(), fp.DiscriminationRequest.read),
-    "touch.yaml": (EXAMPLE.encode(), fp.TouchRequest.read),
+    "task.yaml": (example_files()["sphere_curvature"].text.encode(), fp.DiscriminationRequest.read),
+    "touch.yaml": (example_files()["touch"].text.encode(), fp.TouchRequest.read),
     "sweep.yaml": (
         b"touch:\n  object: {kind: sphere}\ngrid:\n  object.radius_mm: [2, 3]\n",
         fp.SweepRequest.read,

@@ -20,6 +20,7 @@ from fingerpad.core.random_streams import Presentations
 from fingerpad.data import bar_firing_rates
 from fingerpad.experiments import runner
 from fingerpad.experiments.conditions import RECEPTOR_X_MM, Conditions
+from fingerpad.experiments.examples import examples
 from fingerpad.experiments.fit import fit as study
 from fingerpad.experiments.fit import rate_uncertainty as recording_posterior
 from fingerpad.experiments.fit import request
@@ -262,7 +263,7 @@ def touches(*stimuli):
 
 def test_the_stimuli_of_the_bar_are_the_touches_of_the_reproduction(tmp_path):
     path = tmp_path / "bar.csv"
-    path.write_text(request.example_recordings())
+    path.write_text(examples()["recordings"].text)
     bar, conditions = ShiftedBar(), Conditions("quick")
     recorded = read_recordings(path, bar)
     touches = bar.touches(list(recorded.stimuli.values()), conditions)

@@ -19,8 +19,8 @@ from fingerpad.core.signals import RECEPTOR_COLUMNS
 from fingerpad.experiments.discrimination.decoding import SESSION
 from fingerpad.experiments.manifest import software
 from fingerpad.experiments.runner import Runner
-from fingerpad.experiments.sweep.observers import observe
 from fingerpad.experiments.sweep.request import Constraint
+from fingerpad.experiments.sweep.settings import observe
 from fingerpad.export.sweep_file import DONE, FAILED, LEFT_OUT, SweepFile
 from fingerpad.export.sweep_results import observe_sweep, open_sweep, setting_response, write_sweep_spikes
 from fingerpad.psychophysics.observer import ENCODERS, Experiment, discriminate_by

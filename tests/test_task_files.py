@@ -15,7 +15,7 @@ from fingerpad.core import result_files
 from fingerpad.core.plain_yaml import read_yaml
 from fingerpad.core.result_files import file_format
 from fingerpad.experiments.conditions import RECEPTOR_X_MM, Conditions
-from fingerpad.experiments.discrimination.request import example_tasks
+from fingerpad.experiments.examples import tasks
 from fingerpad.experiments.fit.request import FitFile
 from fingerpad.experiments.gerling2014.reproduction import ReproductionResult
 from fingerpad.experiments.requests.parts import parts_in
@@ -190,7 +190,7 @@ def test_an_afferent_is_ours_or_ones_own_numbers_or_of_a_file_of_results(tmp_pat
         assert found == replace(expected, **quantities)
 
 
-@pytest.mark.parametrize("name", example_tasks())
+@pytest.mark.parametrize("name", tasks())
 def test_ready_made_questions_can_be_asked(name):
     task = read(name, {"resolution": "quick"})
     task.check()

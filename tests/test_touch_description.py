@@ -18,19 +18,12 @@ from fingerpad.core.plain_yaml import read_yaml
 from fingerpad.core.result_files import from_json, to_json
 from fingerpad.experiments import schemas
 from fingerpad.experiments.conditions import RECEPTOR_X_MM, Conditions
+from fingerpad.experiments.estimates import BASE_MB, OWN_EXPONENT, OWN_NODE_MB, OWN_NODES, estimate_press
+from fingerpad.experiments.examples import examples
 from fingerpad.experiments.requests.parts import part_from
 from fingerpad.experiments.requests.stimuli import StimulusSet, named_stimuli
 from fingerpad.experiments.requests.stimulus import MOTIONS, OBJECTS
-from fingerpad.experiments.requests.touch import (
-    BASE_MB,
-    EXAMPLE,
-    OUTPUTS,
-    OWN_EXPONENT,
-    OWN_NODE_MB,
-    OWN_NODES,
-    TouchFile,
-    estimate_press,
-)
+from fingerpad.experiments.requests.touch import OUTPUTS, TouchFile
 from fingerpad.export.requests import WRITERS, check_outputs
 from fingerpad.geometry import surface_files
 from fingerpad.geometry.dots import Dots
@@ -167,7 +160,7 @@ def test_the_page_and_the_example_know_every_word_and_the_pages_files_are_possib
     assert set(WRITERS) == set(OUTPUTS)
     for name in (*OBJECTS, *MOTIONS, *OUTPUTS):
         assert f"`{name}`" in page, name
-        assert name in EXAMPLE, name
+        assert name in examples()["touch"].text, name
     blocks = re.findall(r"```yaml\n(.*?)```", page, re.S)
     assert blocks
     for block in blocks:
@@ -189,7 +182,7 @@ def test_the_schema_accepts_what_is_accepted_and_explains_every_key():
     schema = schemas.request_schema("touch")
     check = fastjsonschema.compile(schema)
     check(FULL)
-    check(read_yaml(EXAMPLE, "example"))
+    check(read_yaml(examples()["touch"].text, "example"))
     for wrong in (
         {"object": {"kind": "sphere", "raduis_mm": 3}},
         {"object": {"kind": "ball"}},

@@ -16,13 +16,14 @@ from fingerpad import cli
 from fingerpad.data import cylinder_deflection, protocol
 from fingerpad.experiments import scores
 from fingerpad.experiments.conditions import RECEPTOR_X_MM, Conditions
+from fingerpad.experiments.examples import examples
 from fingerpad.experiments.gerling2014.skin import deflection_r2, deflection_touches
 from fingerpad.experiments.requests.stimulus import indenter_named
 from fingerpad.experiments.run import run
 from fingerpad.experiments.runner import STORE_FOLDER, Runner
 from fingerpad.experiments.schemas import read
 from fingerpad.experiments.validation import predictions
-from fingerpad.experiments.validation.observations import COLUMNS, KINDS, example_file, read_observations
+from fingerpad.experiments.validation.observations import COLUMNS, KINDS, read_observations
 from fingerpad.experiments.validation.predictions import predict
 from fingerpad.report.results import draw_validation, summary
 from fingerpad.skin.indentation import Touch
@@ -82,10 +83,10 @@ def test_columns_stand_in_any_order_and_lines_keep_their_numbers(tmp_path):
 
 @pytest.mark.parametrize("kind", KINDS.values(), ids=lambda kind: kind.name)
 def test_the_header_decides_the_kind_and_every_example_is_read(tmp_path, kind):
-    text = example_file(kind.name)
+    text = examples()[kind.name].text
     assert text.startswith("# Made-up numbers")
     found = read_observations(written(tmp_path, text))
-    assert (found.kind, len(found.rows)) == (kind, len(kind.example))
+    assert found.kind == kind
     assert len(set(found.conditions)) < len(found.rows) or kind.name == "grating"
     assert set(kind.columns) <= {"indenter", *COLUMNS}
 

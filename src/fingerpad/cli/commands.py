@@ -6,7 +6,6 @@ import argparse
 import time
 from collections.abc import Callable
 from datetime import UTC, datetime
-from functools import cache, partial
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
@@ -254,41 +253,24 @@ def _add_init(parser: argparse.ArgumentParser) -> None:
     option(parser, "--list", "List the examples, and exit.", bool)
 
 
-@cache
-def _examples() -> dict[str, tuple[str, str, Callable[[], str]]]:
-    """Examples by name: what it is, the name of the file, and its content."""
-    from fingerpad.experiments.discrimination.request import example_tasks, title
-    from fingerpad.experiments.fit.request import example_recordings
-    from fingerpad.experiments.requests.touch import EXAMPLE
-    from fingerpad.experiments.validation.observations import KINDS as OBSERVED
-    from fingerpad.experiments.validation.observations import example_file
-
-    found = {"touch": ("A touch", "touch.yaml", lambda: EXAMPLE)}
-    found["recordings"] = ("Rates under the paper's bar, for a fit", "bar.csv", example_recordings)
-    for name in OBSERVED:
-        found[name] = ("Observations to be predicted", f"{name}.csv", partial(example_file, name))
-    for name, text in example_tasks().items():
-        found[name] = (title(text), f"{name}.yaml", partial(str, text))
-    return found
-
-
 def _init(given: argparse.Namespace, within: Options) -> None:
     import json
 
     from fingerpad.core.files import check_new, write_atomically
     from fingerpad.core.values import one_of
+    from fingerpad.experiments.examples import examples
     from fingerpad.experiments.schemas import TOUCH_SCHEMA
 
     if given.list:
-        _tell(*(f"{name}: {what} ({file})" for name, (what, file, content) in _examples().items()))
+        _tell(*(f"{name}: {each.what} ({each.file})" for name, each in examples().items()))
         return
     asked = Path(given.what)
-    name = "touch" if asked.suffix in (".yaml", ".yml") else one_of("WHAT", given.what, tuple(_examples()))
-    _what, file, content = _examples()[name]
-    path = given.out / (asked if asked.suffix in (".yaml", ".yml") else file)
+    name = "touch" if asked.suffix in (".yaml", ".yml") else one_of("WHAT", given.what, tuple(examples()))
+    example = examples()[name]
+    path = given.out / (asked if asked.suffix in (".yaml", ".yml") else example.file)
     check_new(path)
     make_writable(path.parent)
-    write_atomically(path, content().encode())
+    write_atomically(path, example.text.encode())
     if name == "touch":
         write_atomically(path.parent / TOUCH_SCHEMA, json.dumps(request_schema("touch"), indent=1).encode())
     verb = {".csv": "fit" if name == "recordings" else "validate"}.get(path.suffix, "check")
@@ -313,13 +295,13 @@ def _check(given: argparse.Namespace, _: Options) -> None:
     request = getattr(fp, KINDS[name]).read(given.file, allow_python=given.allow_python)
     request.check()
     if name == "touch":
-        from fingerpad.experiments.requests.touch import estimate_press
+        from fingerpad.experiments.estimates import estimate_press
 
         check_outputs(request)
         _tell(*estimate_press(request).lines)
     elif name == "sweep":
         from fingerpad.cli.running import processes
-        from fingerpad.experiments.sweep.estimate import estimate_sweep
+        from fingerpad.experiments.estimates import estimate_sweep
 
         _tell(*estimate_sweep(request, processes(None)).lines)
     else:

@@ -21,9 +21,8 @@ from fingerpad.core.progress import NoProgress, Progress
 from fingerpad.core.values import Flag, Whole
 from fingerpad.experiments.manifest import software
 from fingerpad.experiments.runner import STORE_FOLDER
-from fingerpad.experiments.sweep.observers import observe
 from fingerpad.experiments.sweep.request import SweepRequest
-from fingerpad.experiments.sweep.settle import Case, settle, unsettled
+from fingerpad.experiments.sweep.settings import Case, observe, settle, unsettled
 from fingerpad.export.sweep_file import DONE, FAILED, LEFT_OUT, PENDING, SweepFile
 from fingerpad.mechanics.kernels import KERNELS
 

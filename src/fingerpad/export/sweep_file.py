@@ -28,9 +28,8 @@ from fingerpad.core.displayed import Variable, udunits
 from fingerpad.core.errors import InputError, StoreError
 from fingerpad.core.files import path_of
 from fingerpad.core.units import unit_of
-from fingerpad.experiments.sweep.observers import MEASURED
 from fingerpad.experiments.sweep.request import SweepRequest
-from fingerpad.experiments.sweep.settle import Settled
+from fingerpad.experiments.sweep.settings import MEASURED, Settled
 from fingerpad.export.results import first_line, library
 from fingerpad.skin.dataset import field_variable
 from fingerpad.skin.fields import FIELDS

@@ -15,8 +15,8 @@ from fingerpad.core.errors import InputError, shown
 from fingerpad.core.files import path_of, write_atomically
 from fingerpad.core.signals import PLACES, RECEPTOR_COLUMNS, ResponseMap
 from fingerpad.experiments.requests.parts import Content
-from fingerpad.experiments.sweep.observers import MEASURED, observe
 from fingerpad.experiments.sweep.request import OBSERVER, SweepRequest
+from fingerpad.experiments.sweep.settings import MEASURED, observe
 from fingerpad.export.responses import MEASURED as MEASURED_COLUMNS
 from fingerpad.export.responses import require_pynwb, write_responses_nwb
 from fingerpad.export.results import library, table_csv

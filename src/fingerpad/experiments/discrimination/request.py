@@ -9,7 +9,6 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property
-from importlib.resources import files
 from pathlib import Path
 from types import MappingProxyType
 from typing import Annotated, Any, ClassVar
@@ -18,7 +17,6 @@ from pydantic import Field, Strict
 
 from fingerpad.core.errors import InputError, closest
 from fingerpad.core.files import path_of, read_text
-from fingerpad.core.plain_yaml import read_yaml
 from fingerpad.core.signals import ResponseMap, Skin
 from fingerpad.core.units import name_and_unit
 from fingerpad.core.values import (
@@ -36,6 +34,7 @@ from fingerpad.core.values import (
 )
 from fingerpad.data import psychophysics
 from fingerpad.experiments.conditions import Conditions
+from fingerpad.experiments.examples import tasks
 from fingerpad.experiments.requests.afferents import (
     Afferents,
     AfferentsSettings,
@@ -345,21 +344,9 @@ def stimulus_index(stimuli: Sequence[NamedStimulus], place: float | str, key: st
     raise InputError(key, f"must be one of the stimuli, {names}", repr(place))
 
 
-SUFFIX = ".yaml"
-
-
-def example_tasks() -> dict[str, str]:
-    folder = files("fingerpad.experiments.discrimination") / "tasks"
-    return {
-        entry.name.removesuffix(SUFFIX): entry.read_text(encoding="utf-8")
-        for entry in sorted(folder.iterdir(), key=lambda entry: entry.name)
-        if entry.name.endswith(SUFFIX)
-    }
-
-
 def task_text(source: str | Path) -> str:
-    """Text of a task, from a file or from the package; arguments as of `read_task`."""
-    name, path, known = str(source), path_of("source", source), example_tasks()
+    """Text of a task, from a file or from the package."""
+    name, path, known = str(source), path_of("source", source), tasks()
     if name in known and not path.is_file():
         return known[name]
     if path.suffix or path.exists():
@@ -369,8 +356,3 @@ def task_text(source: str | Path) -> str:
         f"{name} must be a YAML file or one of the example tasks, {', '.join(known)}: it is neither"
         + (f", did you mean {near}?" if near else ".")
     )
-
-
-def title(text: str) -> str:
-    """Question of an example."""
-    return str(read_yaml(text, "task")["question"])

@@ -27,7 +27,6 @@ from fingerpad.core.values import (
     one_of,
     positive,
 )
-from fingerpad.data.observations import bar_firing_rates
 from fingerpad.experiments.conditions import Conditions
 from fingerpad.experiments.fit.fit import check_enough, fit_recordings
 from fingerpad.experiments.fit.methods import METHODS, check_offset, check_spikes
@@ -412,16 +411,3 @@ def _shifts_mm(stimuli: Sequence[NamedStimulus], along: float) -> list[float] | 
     if len({replace(stimulus, x_mm=0.0, name="", level=None) for stimulus in stimuli}) > 1:
         return None
     return [0.0 - float(f"{stimulus.x_mm / along:.9g}") for stimulus in stimuli]
-
-
-def example_recordings() -> str:
-    """Return example recordings: the rates under the paper's bar that come with the package."""
-    observed = bar_firing_rates()
-    rows = np.column_stack([observed.shift_mm, observed.dynamic_rate_hz, observed.static_rate_hz])
-    lines = [
-        f"# One SAI afferent under a bar 3 mm wide, pressed in by 1 mm. {observed.source}",
-        "# shift: of the bar from the centre of the receptive field, proximal positive.",
-        "shift_mm,dynamic_rate_hz,static_rate_hz",
-        *(",".join(f"{value:g}" for value in row) for row in rows),
-    ]
-    return "\n".join(lines) + "\n"

@@ -16,7 +16,6 @@ from fingerpad.core.checked import result_class
 from fingerpad.core.signals import ResponseMap, window_bounds
 from fingerpad.core.values import Number, Numbers, Text, choice, some_of
 from fingerpad.data.tissues import DEFAULT_TISSUES
-from fingerpad.experiments import schemas
 from fingerpad.experiments.manifest import Manifest
 from fingerpad.experiments.requests.afferents import (
     Afferents,
@@ -36,7 +35,6 @@ from fingerpad.experiments.requests.stimulus import (
 )
 from fingerpad.experiments.runner import Runner
 from fingerpad.geometry.fingertip import Finger
-from fingerpad.mechanics.press_settings import MOST_SOLVED
 from fingerpad.neuron.population import Population
 from fingerpad.neuron.spikes import rate_windows_ms
 from fingerpad.skin.indentation import Touch
@@ -266,119 +264,3 @@ class TouchResult:
     def result(self) -> TouchFile:
         """Content of `touch.json`."""
         return TouchFile(touch=self.request, summary=self.summary, manifest=self.manifest)
-
-
-STEP_S = 1.8e-5
-"""Time of a step per node, by depth, straight and without friction, on two cores with compiled kernels: mean
-of benchmarks/results/growth.json. [s]"""
-
-BY_FORCE, WITH_FRICTION, ASIDE, ASIDE_WITH_FRICTION = 3.0, 3.1, 3.2, 5.1
-"""Factors of that time for a press by force, with friction, and aside; measured on ten presses."""
-
-BASE_MB, NODE_MB, NODE_EXPONENT = 200.0, 0.043, 0.865
-"""Memory of a process: with its libraries, and of n nodes, `NODE_MB` n^`NODE_EXPONENT`. [MB]"""
-
-OWN_NODES, OWN_NODE_MB, OWN_EXPONENT = 1200.0, 2.8e-3, 4 / 3
-"""A mesh of one's own is solved by elimination: its time grows by the number of nodes over `OWN_NODES`, and
-its memory by `OWN_NODE_MB` n^`OWN_EXPONENT`; measured at 3,249, 4,797 and 6,813 nodes. [MB]"""
-
-
-@dataclass(frozen=True)
-class PressEstimate:
-    """What a press will take."""
-
-    nodes: int
-    elements: int
-    steps: int  # Size of the mesh, and number of steps that are solved at least.
-    time_s: float
-    memory_mb: float  # Time on two cores with compiled kernels, and memory of the process. [s], [MB]
-    by_force: bool = False  # Whether the force is given, so that the depth is not known before the press.
-
-    @property
-    def lines(self) -> tuple[str, ...]:
-        """The estimate in words."""
-        depth = " How deep this force presses, and whether into the bone, only the press shows."
-        return (
-            f"The touch is possible: {self.nodes} nodes, {self.elements} elements, {self.steps} steps.",
-            f"A press will take about {self.time_s:.0f} s on two idle cores and {self.memory_mb:.0f} MB."
-            f"{depth if self.by_force else ''}",
-        )
-
-
-def _interpolated_steps(touch: Touch) -> int:
-    """Count the steps of equal cycles that are interpolated, at most."""
-    cycles = touch.stimulus.cycles
-    if cycles is None or cycles.count <= MOST_SOLVED:
-        return 0
-    if touch.friction or touch.settings.cycle_tolerance is None:
-        return 0
-    times_ms = touch.settings.steps_ms(touch.stimulus)
-    inside = np.count_nonzero((times_ms > cycles.start_ms) & (times_ms <= cycles.end_ms))
-    return int(inside * (cycles.count - MOST_SOLVED) / cycles.count)
-
-
-def estimate_press(request: TouchRequest) -> PressEstimate:
-    """Estimate a press from the sizes of its mesh and its steps; the mesh is built for it."""
-    touch = request.touch
-    nodes = len(touch.mesh.nodes_mm)
-    steps = touch.settings.steps_ms(touch.stimulus).size - 1 - _interpolated_steps(touch)
-    factor = BY_FORCE if touch.stimulus.by_force else 1.0
-    if touch.friction:
-        factor *= WITH_FRICTION if touch.stimulus.stays else ASIDE_WITH_FRICTION
-    elif not touch.stimulus.stays:
-        factor *= ASIDE
-    own = touch.finger.own_mesh is not None
-    if own:
-        factor *= max(1.0, nodes / OWN_NODES)
-    return PressEstimate(
-        nodes=nodes,
-        elements=len(touch.mesh.elements),
-        steps=steps,
-        time_s=STEP_S * nodes * steps * factor,
-        memory_mb=(
-            BASE_MB + NODE_MB * nodes**NODE_EXPONENT + (OWN_NODE_MB * nodes**OWN_EXPONENT if own else 0.0)
-        ),
-        by_force=touch.stimulus.by_force,
-    )
-
-
-EXAMPLE = f"""\
-# yaml-language-server: $schema={schemas.TOUCH_SCHEMA}
-#
-# One touch. Try: fingerpad check touch.yaml, then fingerpad touch touch.yaml --out touch
-# Keys that are left out have the values below or the paper's. docs/touch.md explains every key.
-
-title: A ball on the finger pad
-
-resolution: quick          # quick for a first look, standard for results
-tissues: human             # a set of tissues; all others: docs/tissues.md
-finger: adult              # small, large, child, macaque, aged; or measures:
-# finger: {{length_mm: 24, width_mm: 18, height_mm: 15, stratum_corneum_mm: 0.5}}
-
-object:
-  kind: sphere             # cylinder, bar, line, punch, plate, edge, gap, grating, dots, braille,
-                           # embossed, embossed_text, ridges, surface, height_map
-  radius_mm: 4             # [mm]
-
-motion:
-  kind: ramp_and_hold      # sine, chirp, repeated, staircase, stroke, recorded, trajectory
-  depth_mm: 0.8            # [mm]; or force_mn, in mN
-  ramp_ms: 50
-  hold_ms: 450
-
-place:                     # from the middle of the finger pad
-  x_mm: 0                  # along the finger, towards the tip
-  z_mm: 0                  # across it
-  spin_deg: 0              # turn about the direction of pressing
-
-friction: 0                # Coulomb's coefficient between skin and object
-
-afferents:
-  layout: grid             # rectangular, hexagonal, uniform, jittered, poisson-disc, nail rows
-  density_per_cm2: 100
-  afferent: default        # the one that was fitted with the tissues, or fit.json of fingerpad fit
-  noise: 0                 # width of a soft threshold over the threshold; 0 is without randomness
-  seed: 0
-
-outputs: [figures, csv, spikes]   # npz, netcdf, zarr, nwb, vtu, abaqus, calculix, febio
-"""

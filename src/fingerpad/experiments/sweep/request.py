@@ -8,10 +8,9 @@ from __future__ import annotations
 import ast
 import json
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import islice
 from typing import Annotated, Any, ClassVar
 
 import numpy as np
@@ -43,15 +42,11 @@ SOBOL, LATIN_HYPERCUBE = "sobol", "latin_hypercube"
 ZIP, SAMPLE = "zip", "sample"  # Dimensions of fields that vary together.
 MOST_CHECKED = 1000  # Most points of an axis whose values are checked before anything is pressed.
 _COMPARED = "a constraint must be a comparison such as a.b < 2 * c.d"
-_ARITHMETIC = "a constraint must have fields, numbers, + - * / and comparisons"
-_COMPARISONS = {
-    ast.Lt: np.less, ast.LtE: np.less_equal, ast.Gt: np.greater, ast.GtE: np.greater_equal,
-    ast.Eq: np.equal, ast.NotEq: np.not_equal,
-}  # fmt: skip
-_OPERATIONS: dict[type, Any] = {
-    ast.Add: np.add, ast.Sub: np.subtract, ast.Mult: np.multiply, ast.Div: np.true_divide,
-}  # fmt: skip
-_OPERATORS = (*_COMPARISONS, *_OPERATIONS, ast.And, ast.Or, ast.USub)
+_ARITHMETIC = (
+    ast.Expression, ast.Compare, ast.BoolOp, ast.BinOp, ast.UnaryOp, ast.Constant, ast.Name, ast.Attribute,
+    ast.Load, ast.And, ast.Or, ast.USub, ast.Add, ast.Sub, ast.Mult, ast.Div,
+    ast.Lt, ast.LtE, ast.Gt, ast.GtE, ast.Eq, ast.NotEq,
+)  # fmt: skip
 
 
 class EvenValues(Part):
@@ -206,26 +201,24 @@ class SweepRequest(Request):
     @cached_property
     def _all_axes(self) -> tuple[Axis, ...]:
         """All dimensions; InputError if a field has no values, or is given twice."""
-        asked = self
         found = []
-        for field, values in asked.grid.items():
-            with self.origin.located(), at("grid", field):
-                found.append(Axis(field.replace(".", "_"), {field: _listed(values)}))
-        if asked.zip:
-            with self.origin.located(), at("zip"):
-                together = {field: _listed(values) for field, values in asked.zip.items()}
-                lengths = {field: len(values) for field, values in together.items()}
-                if len(set(lengths.values())) > 1:
-                    raise InputError(f"all fields must have as many values: got {lengths}.")
-                found.append(Axis(ZIP, together))
-        if asked.sample is not None:
-            with self.origin.located(), at("sample"):
-                found.append(Axis(SAMPLE, asked.sample.values))
-        fields = [field for axis in found for field in axis.values]
         with self.origin.located():
+            for field, values in self.grid.items():
+                with at("grid", field):
+                    found.append(Axis(field.replace(".", "_"), {field: _listed(values)}))
+            if self.zip:
+                with at("zip"):
+                    together = {field: _listed(values) for field, values in self.zip.items()}
+                    lengths = {field: len(values) for field, values in together.items()}
+                    if len(set(lengths.values())) > 1:
+                        raise InputError(f"all fields must have as many values: got {lengths}.")
+                    found.append(Axis(ZIP, together))
+            if self.sample is not None:
+                with at("sample"):
+                    found.append(Axis(SAMPLE, self.sample.values))
             if not found:
                 raise InputError("grid, zip or sample must name a field that varies: none does.")
-            for field, count in Counter(fields).items():
+            for field, count in Counter(field for axis in found for field in axis.values).items():
                 if count > 1:
                     raise InputError(field, "must vary in one way", remedy="it is given twice")
                 if field.partition(".")[0] in NOT_SWEPT or field == f"{OBSERVER}.along":
@@ -262,18 +255,16 @@ class SweepRequest(Request):
     @cached_property
     def observers(self) -> tuple[ObserverSettings, ...]:
         """Observers in the order of a C array of `observer_shape`; none without a block `observer`."""
-        content = self.observer
-        if content is None:
+        with self.origin.located():
+            if self.observer is not None:
+                return tuple(self._observer(place) for place in np.ndindex(self.observer_shape))
             if self.observer_axes:
-                with self.origin.located():
-                    raise InputError(
-                        "observer", "must be given where its fields vary", remedy="it is missing"
-                    )
-            return ()
-        return tuple(self._observer(dict(content), place) for place in np.ndindex(self.observer_shape))
+                raise InputError("observer", "must be given where its fields vary", remedy="it is missing")
+        return ()
 
-    def _observer(self, content: Content, place: tuple[int, ...]) -> ObserverSettings:
-        with self.origin.located(), at(OBSERVER):
+    def _observer(self, place: tuple[int, ...]) -> ObserverSettings:
+        content: Content = dict(self.observer or {})
+        with at(OBSERVER):
             for axis, number in zip(self.observer_axes, place, strict=True):
                 for field, values in axis.values.items():
                     content = with_value(content, field.split(".")[1:], values[number])
@@ -349,12 +340,9 @@ class SweepRequest(Request):
             return all(met(content) for met in self._constraints)
 
     @cached_property
-    def _constraints(self) -> tuple[Constraint, ...]:
-        found = []
-        for number, text in enumerate(self.where):
-            with self.origin.located(), at("where", number):
-                found.append(Constraint(text))
-        return tuple(found)
+    def _constraints(self) -> list[Constraint]:
+        with self.origin.located(), at("where"):
+            return [Constraint(text) for text in self.where]
 
     @property
     def hashed(self) -> str:
@@ -379,61 +367,31 @@ class Constraint:
     def __init__(self, text: str):
         self.text = text
         try:
-            self._tree = ast.parse(text.strip(), mode="eval").body
+            tree = ast.parse(text.strip(), mode="eval")
         except SyntaxError as error:
-            raise InputError(
-                f"a constraint must be a comparison such as a.b < 2 * c.d: got {text!r}."
-            ) from error
-        if not isinstance(self._tree, ast.Compare | ast.BoolOp):
+            raise InputError(f"{_COMPARED}: got {text!r}.") from error
+        if not isinstance(tree.body, ast.Compare | ast.BoolOp):
             raise InputError(f"{_COMPARED}: got {text!r}.")
-        for _ in self._fields(self._tree):
-            pass
+        # What is evaluated can call nothing.
+        if not all(isinstance(node, _ARITHMETIC) for node in ast.walk(tree)):
+            raise InputError(
+                f"a constraint must have fields, numbers, + - * / and comparisons: got {text!r}."
+            )
+        self._code = compile(ast.fix_missing_locations(_FieldNames().visit(tree)), "constraint", "eval")
 
     def __call__(self, content: Content) -> bool:
-        return bool(self._value(self._tree, content))
+        values = {name: _at(content, name, self.text) for name in self._code.co_names}
+        try:
+            return bool(eval(self._code, {"__builtins__": {}}, values))
+        except (ArithmeticError, TypeError) as error:
+            raise InputError(f"{self.text!r} cannot be computed: {error}.") from error
 
-    def _fields(self, node: ast.AST) -> Iterator[str]:
-        """Names of its fields; anything that is not arithmetic is refused."""
-        known = (ast.Compare, ast.BoolOp, ast.BinOp, ast.UnaryOp, ast.Constant, ast.Name, ast.Attribute)
-        if not isinstance(node, known):
-            raise InputError(
-                f"a constraint must have fields, numbers, + - * / and comparisons: got {self.text!r}."
-            )
-        operators = [getattr(node, "op", None), *getattr(node, "ops", ())]
-        if not all(isinstance(each, _OPERATORS) for each in operators if each is not None):
-            raise InputError(f"{_ARITHMETIC}: got {self.text!r}.")
-        if isinstance(node, ast.Name | ast.Attribute):
-            yield _name(node)
-            return
-        for child in ast.iter_child_nodes(node):
-            if isinstance(child, ast.expr):
-                yield from self._fields(child)
 
-    def _value(self, node: ast.AST, content: Content) -> Any:
-        def value(part: ast.AST) -> Any:
-            return self._value(part, content)
+class _FieldNames(ast.NodeTransformer):
+    """Makes one name of a field such as `motion.depth_mm`."""
 
-        match node:
-            case ast.Constant():
-                return node.value
-            case ast.Name() | ast.Attribute():
-                return _at(content, _name(node), self.text)
-            case ast.BoolOp():
-                joined = all if isinstance(node.op, ast.And) else any
-                return joined(value(part) for part in node.values)
-            case ast.UnaryOp():
-                return -value(node.operand)
-            case ast.BinOp():
-                return _OPERATIONS[type(node.op)](value(node.left), value(node.right))
-            case ast.Compare():
-                sides = [value(part) for part in (node.left, *node.comparators)]
-                return all(
-                    _COMPARISONS[type(each)](left, right)
-                    for each, left, right in zip(node.ops, sides, islice(sides, 1, None), strict=False)
-                )
-        raise InputError(
-            f"a constraint must have fields, numbers, + - * / and comparisons: got {self.text!r}."
-        )
+    def visit_Attribute(self, node: ast.Attribute) -> ast.Name:
+        return ast.Name(ast.unparse(node), ast.Load())
 
 
 def _listed(values: Any) -> list[Any]:
@@ -443,16 +401,6 @@ def _listed(values: Any) -> list[Any]:
             f"a field that varies must have a list of values, or start, stop and count: got {values!r}."
         )
     return list(found)
-
-
-def _name(node: ast.AST) -> str:
-    parts: list[str] = []
-    while isinstance(node, ast.Attribute):
-        parts.append(node.attr)
-        node = node.value
-    if not isinstance(node, ast.Name):
-        raise InputError("a constraint must name fields as in motion.depth_mm.")
-    return ".".join([node.id, *reversed(parts)])
 
 
 def _at(content: Any, name: str, text: str) -> Any:

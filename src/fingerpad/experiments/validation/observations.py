@@ -13,7 +13,7 @@ from fingerpad.core.checked import checked
 from fingerpad.core.errors import InputError
 from fingerpad.core.tables import TableRow, read_csv
 from fingerpad.core.units import unit_of
-from fingerpad.core.values import FloatArray, finite, float_array, not_negative, one_of, positive
+from fingerpad.core.values import FloatArray, finite, float_array, not_negative, positive
 from fingerpad.experiments.requests.stimulus import indenter_named
 from fingerpad.geometry.indenters import Indenter
 
@@ -58,7 +58,6 @@ class Kind:
     name: str
     conditions: tuple[str, ...]  # Columns that say under what was observed.
     observed: str  # Column of what was observed.
-    example: tuple[str, ...]  # Rows of an example file, with made-up numbers.
 
     @property
     def columns(self) -> tuple[str, ...]:
@@ -82,29 +81,13 @@ class Kind:
 KINDS: dict[str, Kind] = {
     kind.name: kind
     for kind in (
-        Kind(
-            "force", (INDENTER, "depth_mm"), "force_n",
-            ("plate,0.5,0.10", "plate,0.5,0.20", "punch:6.35,1,0.25", "sphere:287,0.8,0.05"),
-        ),
-        Kind(
-            "deflection", (INDENTER, "depth_mm", "distance_mm"), "deflection_mm",
-            tuple(f"cylinder:3.17,0.5,{made_up}" for made_up in ("-4,0.1", "0,0.5", "0,0.48", "4,0.1")),
-        ),
-        Kind(
-            "rate_curvature", ("force_n", "curvature_per_m"), "rate_hz",
-            ("0.2,0,10", "0.2,287,40", "0.2,287,50"),
-        ),
-        Kind(
-            "rate_position", ("force_n", "curvature_per_m", "position_mm"), "rate_hz",
-            ("0.2,287,0,45", "0.2,287,0,50", "0.2,287,2,10"),
-        ),
-        Kind(
-            "grating", ("force_n", "ridge_mm", "groove_mm", "position_mm"), "rate_hz",
-            ("0.2,1.5,1.5,0,30", "0.2,1.5,1.5,0.75,60", "0.2,1.5,1.5,1.5,5"),
-        ),
+        Kind("force", (INDENTER, "depth_mm"), "force_n"),
+        Kind("deflection", (INDENTER, "depth_mm", "distance_mm"), "deflection_mm"),
+        Kind("rate_curvature", ("force_n", "curvature_per_m"), "rate_hz"),
+        Kind("rate_position", ("force_n", "curvature_per_m", "position_mm"), "rate_hz"),
+        Kind("grating", ("force_n", "ridge_mm", "groove_mm", "position_mm"), "rate_hz"),
     )
-}  # fmt: skip
-"""Kinds by name."""
+}  # By name.
 
 
 @dataclass(frozen=True)
@@ -217,10 +200,3 @@ def _value(line: TableRow, column: str, own: Mapping[str, Indenter]) -> Value:
         if text not in own:
             indenter_named(text)
     return text
-
-
-def example_file(kind: str) -> str:
-    """Return an example file of a kind, whose numbers are made up."""
-    shown = KINDS[one_of("--example", kind, tuple(KINDS))]
-    lines = ["# Made-up numbers that show the format. They are no data.", ",".join(shown.columns)]
-    return "\n".join([*lines, *shown.example, ""])
