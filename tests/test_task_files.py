@@ -276,7 +276,7 @@ afferents: {layout: uniform, region: {shape: rectangle, length_mm: 1}} =>
 afferents: {layout: uniform, region: {shape: rectangle, length_mm: 3, width_mm: 6, corners_mm: []}} =>
     afferents.region.corners_mm must not be given: a rectangle has length_mm, width_mm.
 afferents: {layout: uniform, region: {shape: polygon, corners_mm: [[0, 0], [1, 1], [2, 2]]}} =>
-    afferents.region: corners_mm must enclose an area
+    afferents.region.corners_mm must enclose an area
 afferents: {layout: uniform, density_per_cm2: 0.1, region: {shape: rectangle, length_mm: 3, width_mm: 6}}
     =>
     afferents: A density of

@@ -278,7 +278,7 @@ WRONG = [
     (BALL + "afferents: {rows: 0}\n", "afferents.rows must be a whole number of at least 1: got 0"),
     (BALL + "afferents: {afferent: fit.json}\n", "afferent: "),
     (BALL + "afferents: {afferent: RB}\n", "RB"),
-    (BALL + "afferents: {windows_ms: {static: [900, 600]}}\n", "afferents.windows_ms.window_ms must"),
+    (BALL + "afferents: {windows_ms: {static: [900, 600]}}\n", "afferents.windows_ms.static must"),
     (BALL + "outputs: []\n", "outputs must have at least one entry"),
     (BALL + "outputs: [csv, figure]\n", "line 2, outputs[2] must be one of figures, csv"),
     (BALL + "motion: {kind: stroke, depth_mm: 0.4, speed_mm_per_s: 20, x_mm: 2}\noutputs: febio\n",

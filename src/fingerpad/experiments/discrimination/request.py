@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
 from types import MappingProxyType
@@ -38,13 +37,13 @@ from fingerpad.experiments.examples import tasks
 from fingerpad.experiments.requests.afferents import (
     Afferents,
     AfferentsSettings,
-    check_noise,
-    file_of,
+    check_windows,
+    files_of,
     population_neighbours,
     population_of,
     respond_to,
 )
-from fingerpad.experiments.requests.parts import LevelOrName, Part, Request, with_message
+from fingerpad.experiments.requests.parts import LevelOrName, Part, at, with_message
 from fingerpad.experiments.requests.stimuli import (
     NamedStimulus,
     StimulusSet,
@@ -52,7 +51,7 @@ from fingerpad.experiments.requests.stimuli import (
     named_stimuli,
     touches_of,
 )
-from fingerpad.experiments.requests.stimulus import FINGER_OBJECTS, named_files
+from fingerpad.experiments.requests.stimulus import FINGER_OBJECTS, FingerRequest
 from fingerpad.neuron.population import Population
 from fingerpad.neuron.spikes import Windows, rate_windows_ms
 from fingerpad.psychophysics.curve import SIGMOIDS
@@ -121,7 +120,7 @@ class ObservedSettings(Part):
     source: Text = "people"  # Who observed it.
 
 
-class DiscriminationRequest(Request, StimulusSet):
+class DiscriminationRequest(StimulusSet, FingerRequest):
     """A discrimination task, as `fingerpad.discriminate` runs it and a file describes it.
 
     Parameters
@@ -205,9 +204,8 @@ class DiscriminationRequest(Request, StimulusSet):
     def settings(self) -> Conditions:
         """Finger, tissues, accuracy and seed."""
         with self.origin.located():
-            found = self.conditions(self.experiment.seed, self.beside)
-            laid = population_of(self.afferents, self.tissues, self.beside, found.finger)
-            return replace(found, receptor_depths_mm=laid.kept_depths_mm)
+            depths_mm = self.population.kept_depths_mm
+            return self.conditions(self.pressed_finger, self.experiment.seed, depths_mm)
 
     @cached_property
     def pressed(self) -> tuple[NamedStimulus, ...]:
@@ -230,9 +228,7 @@ class DiscriminationRequest(Request, StimulusSet):
     def population(self) -> Population:
         """The afferents."""
         with self.origin.located():
-            laid = population_of(self.afferents, self.tissues, self.beside, self.settings.finger)
-            check_noise(self.afferents, laid)
-            return laid
+            return population_of(self.afferents, self.tissues, self.beside, self.pressed_finger)
 
     @cached_property
     def touches(self) -> dict[str, Touch]:
@@ -253,8 +249,9 @@ class DiscriminationRequest(Request, StimulusSet):
                     raise InputError(key, "must name each once", remedy=f"{name} is given {count} times")
         stimuli = self.pressed
         self.population  # noqa: B018
-        for stimulus in stimuli:
-            self._check_windows(stimulus)
+        with at("afferents"):
+            for stimulus in stimuli:
+                check_windows(self.windows_of(stimulus), stimulus.motion.end_ms, repr(stimulus.name))
         for number, point in enumerate(self.observed.points if self.observed else (), start=1):
             if isinstance(point.at, str) or stimuli[0].level is None:
                 stimulus_index(stimuli, point.at, f"observed.points[{number}].at")
@@ -275,19 +272,6 @@ class DiscriminationRequest(Request, StimulusSet):
                 "must be 0 where code has euclidean, whose decision point does not vary",
                 f"{self.experiment.criterion_sigma:g}",
             )
-
-    def _check_windows(self, stimulus: NamedStimulus) -> None:
-        for key, (start, end) in zip(("dynamic", "static"), self.windows_of(stimulus), strict=True):
-            if not 0.0 <= start < end:
-                raise InputError(
-                    f"afferents.windows_ms.{key} must be a start from 0 on and a later end: got {start:g}, "
-                    f"{end:g}."
-                )
-            if stimulus.motion.end_ms < end:
-                raise InputError(
-                    f"afferents.windows_ms.{key} must end with the stimuli, not at {end:g} ms: "
-                    f"{stimulus.name!r} ends at {stimulus.motion.end_ms:g} ms."
-                )
 
     def windows_of(self, stimulus: NamedStimulus) -> Windows:
         """Windows of the two rates under a stimulus. [ms]"""
@@ -324,15 +308,10 @@ class DiscriminationRequest(Request, StimulusSet):
             for stimulus in self.pressed
         ]
 
-    def input_hashes(self) -> dict[str, str]:
-        """SHA-256 of the task and of the files that it names."""
-        named = [
-            *named_files(self.finger, self.beside),
-            *(path for stimulus in self.pressed for path in stimulus.files),
-        ]
-        if file := file_of(self.afferents.afferent):
-            named.append(self.beside / file)
-        return self.origin.hashes(named)
+    def further_files(self) -> list[Path]:
+        """Files of the stimuli and of the afferent."""
+        of_stimuli = [path for stimulus in self.pressed for path in stimulus.files]
+        return [*of_stimuli, *files_of(self.afferents.afferent, self.beside)]
 
 
 def stimulus_index(stimuli: Sequence[NamedStimulus], place: float | str, key: str) -> int:

@@ -37,10 +37,11 @@ from fingerpad.experiments.requests.afferents import (
     DEFAULT,
     AfferentChoice,
     RateWindowSettings,
+    check_windows,
     chosen_afferent,
-    file_of,
+    files_of,
 )
-from fingerpad.experiments.requests.parts import Request, as_list, at, object_of_python
+from fingerpad.experiments.requests.parts import as_list, at, object_of_python
 from fingerpad.experiments.requests.stimuli import (
     BAR,
     NamedStimulus,
@@ -52,9 +53,9 @@ from fingerpad.experiments.requests.stimuli import (
 from fingerpad.experiments.requests.stimulus import (
     FINGER_OBJECTS,
     FingerDescription,
+    FingerRequest,
     MotionPart,
     ObjectPart,
-    finger_of,
     made_of,
     named_files,
     object_of,
@@ -88,7 +89,7 @@ class FitFile:
     manifest: Manifest
 
 
-class FitRequest(Request, FingerDescription):
+class FitRequest(FingerRequest):
     """A fit to recordings, as `fingerpad.fit` runs it and a file or a command describes it.
 
     Parameters
@@ -160,19 +161,8 @@ class FitRequest(Request, FingerDescription):
     def _check(self) -> None:
         if self.free or self.afferent != DEFAULT:
             self._check_chosen()
-        for start, end in self.used_windows_ms:
-            if not 0.0 <= start < end:
-                raise InputError(
-                    "windows_ms", "must be a start from 0 on and a later end", f"{start:g}, {end:g}"
-                )
-        end = max(end for _, end in self.used_windows_ms)
         for name, stimulus in self.recorded.stimuli.items():
-            if stimulus.motion.end_ms < end:
-                raise InputError(
-                    "windows_ms",
-                    f"must end with the stimuli, not at {end:g} ms",
-                    remedy=f"{name} ends at {stimulus.motion.end_ms:g} ms",
-                )
+            check_windows(self.used_windows_ms, stimulus.motion.end_ms, name)
         if self.offset:
             check_offset(self.method, [stimulus.x_mm for stimulus in self.recorded.stimuli.values()])
         n_free = len(self.free) or len(IDENTIFIABLE_NAMES) + self.offset
@@ -210,7 +200,7 @@ class FitRequest(Request, FingerDescription):
                 if not isinstance(bar, Bar):
                     raise InputError("object", "must be a bar where the stimuli are the bar", repr(bar))
             motion = {} if self.motion is None else {"motion": made_of(self.motion, self.beside)}
-            found: Any = ShiftedBar(bar, **motion, conditions=self.conditions(self.seed, self.beside))
+            found: Any = ShiftedBar(bar, **motion, conditions=self.conditions(self.pressed_finger, self.seed))
             found = replace(found, finger_files=tuple(named_files(self.finger, self.beside)))
         else:
             for name in ("object", "motion"):
@@ -222,8 +212,7 @@ class FitRequest(Request, FingerDescription):
             fields = self.model_fields_set & set(FingerDescription.model_fields)
             given = {name: getattr(self, name) for name in fields}
             if "finger" in given:
-                with at("finger"):
-                    given["finger"] = finger_of(self.finger, self.beside)
+                given["finger"] = self.pressed_finger
             found = read_stimuli(self.beside / self.stimuli, **given)
         return found if self.stimulus_column is None else replace(found, column=self.stimulus_column)
 
@@ -288,15 +277,12 @@ class FitRequest(Request, FingerDescription):
         default = self.settings.quantity
         return self.dynamic_quantity or default, self.static_quantity or default
 
-    def input_hashes(self) -> dict[str, str]:
-        """SHA-256 of the request and of the files that it names."""
+    def further_files(self) -> list[Path]:
+        """Files of the recordings, the stimuli and the afferent."""
         asked = (self.recordings, None if self.stimuli == BAR else self.stimuli)
-        named = [self.beside / file for file in asked if isinstance(file, str | Path)]
-        named += self.presented.finger_files
-        named += [file for stimulus in self.recorded.stimuli.values() for file in stimulus.files]
-        if file := file_of(self.afferent):
-            named.append(self.beside / file)
-        return self.origin.hashes(named)
+        own = [self.beside / file for file in asked if isinstance(file, str | Path)]
+        of_stimuli = [file for stimulus in self.recorded.stimuli.values() for file in stimulus.files]
+        return [*own, *self.presented.finger_files, *of_stimuli, *files_of(self.afferent, self.beside)]
 
 
 def run_fit(request: FitRequest, runner: Runner, command: str | None = None) -> FitFile | ChosenNumbersFile:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, TypeAlias, cast
@@ -11,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any, TypeAlias, cast
 import numpy as np
 from pydantic import BeforeValidator, Discriminator, Field, Strict, Tag
 
-from fingerpad.core.errors import InputError, StoreError, shown
+from fingerpad.core.errors import InputError, Place, StoreError, shown
 from fingerpad.core.files import read_text
 from fingerpad.core.random_streams import seed_of
 from fingerpad.core.regions import PATTERNS, Layout
@@ -168,14 +166,10 @@ def file_of(chosen: Any) -> str | None:
     return chosen if isinstance(chosen, str) and chosen not in (DEFAULT, *TYPES) else None
 
 
-_OF_LAYOUT = {
-    "rows": (GRID, NAIL_ROWS),
-    "columns": (GRID,),
-    "region": PATTERNS,
-    "offset_mm": (GRID, *PATTERNS),
-    "jitter": ("jittered",),
-    "separation": ("poisson-disc",),
-}
+def files_of(chosen: Any, beside: Path) -> list[Path]:
+    """Files that an afferent is read from, from the folder `beside`: one or none."""
+    file = file_of(chosen)
+    return [] if file is None else [beside / file]
 
 
 def chosen_afferent(chosen: Any, tissues: str | Tissues, beside: Path = Path()) -> AnyAfferent:
@@ -190,92 +184,123 @@ def chosen_afferent(chosen: Any, tissues: str | Tissues, beside: Path = Path()) 
     return fitted if chosen == DEFAULT else afferent_of(chosen, tissues)
 
 
+_OF_LAYOUT = {
+    "rows": (GRID, NAIL_ROWS),
+    "columns": (GRID,),
+    "region": PATTERNS,
+    "offset_mm": (GRID, *PATTERNS),
+    "jitter": ("jittered",),
+    "separation": ("poisson-disc",),
+}
+
+
 def population_of(
     settings: AfferentsSettings,
     tissues: str | Tissues,
     beside: Path = Path(),
     finger: Finger | None = None,
-    place: str = "afferents",
+    place: Place = ("afferents",),
 ) -> Population:
     """Lay out the afferents of a request."""
     if settings.population is not None:
         of_layout = set(AfferentsSettings.model_fields) - {"population", "noise", "windows_ms", "seed"}
         for key in sorted(of_layout & set(settings.given)):
-            raise InputError((place, key), "must not be given beside a population", remedy="leave it out")
-        return cast(Population, settings.population)
-    for key, layouts in _OF_LAYOUT.items():
-        if key in settings.given and settings.layout not in layouts:
-            raise InputError(
-                f"{place}.{key} must not be given: it belongs to the layout {' or '.join(layouts)}, and "
-                f"this one is {settings.layout}."
-            )
-    with at(*filter(None, [place]), "afferent"):
-        afferent = chosen_afferent(settings.afferent, tissues, beside)
-    if settings.densities_per_cm2 is None:
-        return _laid(settings, afferent, place, finger)
-    chosen = settings.afferent
+            raise InputError((*place, key), "must not be given beside a population", remedy="leave it out")
+        found = cast(Population, settings.population)
+    else:
+        for key, layouts in _OF_LAYOUT.items():
+            if key in settings.given and settings.layout not in layouts:
+                belongs = f"it belongs to the layout {' or '.join(layouts)}, not to {settings.layout}"
+                raise InputError((*place, key), "must not be given", remedy=belongs)
+        with at(*place, "afferent"):
+            afferent = chosen_afferent(settings.afferent, tissues, beside)
+        if settings.densities_per_cm2 is None:
+            found = _laid(settings, afferent, place, finger)
+        else:
+            found = _mixed(settings, settings.densities_per_cm2, afferent, tissues, place, finger)
+    _check_noise(settings, found, place)
+    return found
+
+
+def _mixed(
+    settings: AfferentsSettings,
+    densities_per_cm2: dict[str, float],
+    afferent: AnyAfferent,
+    tissues: str | Tissues,
+    place: Place,
+    finger: Finger | None,
+) -> Population:
+    """Lay out the afferents of several types."""
+    chosen, types = settings.afferent, afferent_types(tissues)
     if "density_per_cm2" in settings.given or (isinstance(chosen, str) and chosen in TYPES):
-        raise InputError(
-            place,
-            "must have density_per_cm2 and the type of one afferent, or densities_per_cm2 of several",
-            "both",
-            "leave one out",
-        )
-    types = afferent_types(tissues) | (
-        {} if isinstance(chosen, str) and chosen == DEFAULT else {"SAI": afferent}
-    )
+        words = "must have density_per_cm2 and the type of one afferent, or densities_per_cm2 of several"
+        raise InputError(place or "afferents", words, "both", "leave one out")
+    if not (isinstance(chosen, str) and chosen == DEFAULT):
+        types["SAI"] = afferent
     parts = {}
-    for number, (name, density) in enumerate(settings.densities_per_cm2.items()):
+    for number, (name, density) in enumerate(densities_per_cm2.items()):
         one = {"density_per_cm2": density, "seed": seed_of(settings.seed, number)}
         parts[name] = _laid(settings.model_copy(update=one), types[name], place, finger)
     return Population.mixed(parts)
 
 
 def _laid(
-    settings: PopulationSettings, afferent: AnyAfferent, place: str, finger: Finger | None
+    settings: PopulationSettings, afferent: AnyAfferent, place: Place, finger: Finger | None
 ) -> Population:
     """Lay out the afferents of one type."""
+    finger = finger or Fingertip()
     if settings.layout == GRID:
-        laid = _grid(settings, afferent, finger or Fingertip())
+        (x, z), (along, across) = finger.contact_mm, settings.offset_mm
+        rows_columns = settings.chosen("rows", "columns")
+        centre_mm = (x + along, z + across)
+        laid = Population.grid(
+            settings.density_per_cm2, **rows_columns, centre_mm=centre_mm, afferent=afferent
+        )
+    elif not isinstance(finger, Fingertip):
+        words = "must be grid on a mesh, whose skin has no plane"
+        raise InputError((*place, "layout"), words, settings.layout)
     else:
-        laid = _lay(settings, afferent, place, finger or Fingertip())
+        # Only what needs them loads the modules that unroll the skin.
+        lay = _along_nail if settings.layout == NAIL_ROWS else _in_region
+        laid = Population.of_layout(*lay(settings, place, finger), afferent)
     laid = replace(laid, depth_mm=settings.depth_mm)
     if settings.sensitivity_spread == 0.0:
         return laid
     return replace(laid, sensitivity=sensitivities(len(laid), settings.sensitivity_spread, settings.seed))
 
 
-def population_neighbours(settings: AfferentsSettings, population: Population) -> IntArray:
-    """Return who is whose neighbour in a population that was laid out by `settings`, (n_pairs, 2).
+def _along_nail(settings: PopulationSettings, place: Place, finger: Fingertip) -> tuple[Layout, Any]:
+    """Rows along the edge of the nail, and what places their points on the skin."""
+    from fingerpad.skin.unrolled_skin import NailEdge
 
-    Afferents of a mixed population have neighbours of their own type.
-    """
-    if population.parts:
-        parts = list(population.parts.values())
-        starts = np.cumsum([0, *map(len, parts)])
-        return np.concatenate(
-            [
-                start + population_neighbours(settings, part)
-                for start, part in zip(starts, parts, strict=False)
-            ]
-        )
-    places = np.asarray(population.places_mm)
-    if settings.population is not None:  # it may have any layout
-        lattice = neighbours_of(places, population.pitch_mm, "rectangular")
-        return lattice if len(lattice) else neighbours_of(places, population.pitch_mm, "poisson-disc")
-    pattern = "rectangular" if settings.layout in (GRID, NAIL_ROWS) else settings.layout
-    return neighbours_of(places, population.pitch_mm, pattern)
+    nail = NailEdge(finger)
+    with at(*place):
+        return nail.rows(settings.rows or 1, settings.density_per_cm2), nail.points
 
 
-def _grid(settings: PopulationSettings, afferent: AnyAfferent, finger: Finger) -> Population:
-    """Lay the paper's rows and columns."""
-    (x, z), (along, across) = finger.contact_mm, settings.offset_mm
-    return Population.grid(
-        settings.density_per_cm2,
-        **settings.chosen("rows", "columns"),
-        centre_mm=(x + along, z + across),
-        afferent=afferent,
-    )
+def _in_region(settings: PopulationSettings, place: Place, finger: Fingertip) -> tuple[Layout, Any]:
+    """Pattern in a region of the unrolled skin, and what places its points on the skin."""
+    from fingerpad.core import regions
+    from fingerpad.skin.unrolled_skin import UnrolledSkin
+
+    if settings.region is None:
+        missing = f"must be given for the layout {settings.layout}"
+        raise InputError((*place, "region"), missing, remedy="it is missing")
+    skin, density, seed = UnrolledSkin(finger), settings.density_per_cm2, settings.seed
+    region = _region(settings.region, settings.offset_mm, skin, (*place, "region"))
+    with at(*place):
+        if settings.layout == "rectangular":
+            layout = regions.rectangular(region, density)
+        elif settings.layout == "hexagonal":
+            layout = regions.hexagonal(region, density)
+        elif settings.layout == "uniform":
+            layout = regions.uniform(region, density, seed)
+        elif settings.layout == "jittered":
+            layout = regions.jittered(region, density, seed, **settings.chosen("jitter"))
+        else:
+            apart = settings.chosen("separation")
+            layout = regions.poisson_disc(region, density, seed, **apart, place=skin.points)
+    return layout, skin.points
 
 
 _OF_SHAPE = {
@@ -286,91 +311,56 @@ _OF_SHAPE = {
 }
 
 
-def _lay(settings: PopulationSettings, afferent: AnyAfferent, place: str, finger: Finger) -> Population:
-    """Lay out afferents by any layout but the paper's grid."""
-    if not isinstance(finger, Fingertip):
-        raise InputError(
-            f"{place}.layout must be grid on a mesh, whose skin has no plane: got {settings.layout}."
-        )
-    return (_along_nail if settings.layout == NAIL_ROWS else _in_region)(settings, afferent, place, finger)
-
-
-def _along_nail(
-    settings: PopulationSettings, afferent: AnyAfferent, place: str, finger: Fingertip
-) -> Population:
-    """Lay rows along the edge of the nail."""
-    from fingerpad.skin.unrolled_skin import NailEdge  # only what needs them loads what unrolls the skin
-
-    nail = NailEdge(finger)
-    with placed(place):
-        rows = nail.rows(settings.rows or 1, settings.density_per_cm2)
-    return Population.of_layout(rows, nail.points, afferent)
-
-
-def _in_region(
-    settings: PopulationSettings, afferent: AnyAfferent, place: str, finger: Fingertip
-) -> Population:
-    """Fill a region of the unrolled skin."""
-    if settings.region is None:
-        raise InputError(f"{place}.region must be given for the layout {settings.layout}: it is missing.")
-    from fingerpad.skin.unrolled_skin import UnrolledSkin
-
-    skin = UnrolledSkin(finger)
-    region = _region(settings.region, settings.offset_mm, skin, place)
-    with placed(place):
-        return Population.of_layout(_layout(settings, region, skin), skin.points, afferent)
-
-
-def _region(settings: RegionSettings, offset_mm: tuple[float, ...], skin: Any, place: str) -> Any:
+def _region(settings: RegionSettings, offset_mm: tuple[float, ...], skin: Any, place: Place) -> Any:
     """Part of the unrolled skin that is meant."""
     from fingerpad.core.regions import Ellipse, Polygon, Rectangle
 
-    wanted = _OF_SHAPE[settings.shape]
+    shape, wanted, given = settings.shape, _OF_SHAPE[settings.shape], set(settings.given) - {"shape"}
     for key in wanted:
-        if key not in settings.given:
-            raise InputError(f"{place}.region.{key} must be given for a {settings.shape}: it is missing.")
-    for key in settings.given:
-        if key not in ("shape", *wanted):
-            raise InputError(
-                f"{place}.region.{key} must not be given: a {settings.shape} has "
-                f"{', '.join(wanted) or 'no size'}."
-            )
+        if key not in given:
+            raise InputError((*place, key), f"must be given for a {shape}", remedy="it is missing")
+    for key in sorted(given - set(wanted)):
+        sizes = ", ".join(wanted) or "no size"
+        raise InputError((*place, key), "must not be given", remedy=f"a {shape} has {sizes}")
     along, across = offset_mm
     length, width = settings.length_mm or 0.0, settings.width_mm or 0.0
-    with placed(f"{place}.region"):
-        if settings.shape == PAD:
+    with at(*place):
+        if shape == PAD:
             return skin.pad()
-        if settings.shape == "polygon":
-            corners = [(along + x, across + z) for x, z in settings.corners_mm or ()]
-            return Polygon(tuple(corners))
-        if settings.shape == "ellipse":
+        if shape == "polygon":
+            return Polygon(tuple((along + x, across + z) for x, z in settings.corners_mm or ()))
+        if shape == "ellipse":
             return Ellipse(0.5 * length, 0.5 * width, (along, across))
         return Rectangle(length, width, (along, across))
 
 
-def _layout(settings: PopulationSettings, region: Any, skin: Any) -> Layout:
-    """Places in a region."""
-    from fingerpad.core.regions import hexagonal, jittered, poisson_disc, rectangular, uniform
+def population_neighbours(settings: AfferentsSettings, population: Population) -> IntArray:
+    """Return who is whose neighbour in a population that was laid out by `settings`, (n_pairs, 2).
 
-    density, seed = settings.density_per_cm2, settings.seed
-    if settings.layout == "rectangular":
-        return rectangular(region, density)
-    if settings.layout == "hexagonal":
-        return hexagonal(region, density)
-    if settings.layout == "uniform":
-        return uniform(region, density, seed)
-    if settings.layout == "jittered":
-        return jittered(region, density, seed, **settings.chosen("jitter"))
-    return poisson_disc(region, density, seed, **settings.chosen("separation"), place=skin.points)
+    Afferents of a mixed population have neighbours of their own type.
+    """
+    if population.parts:
+        parts = list(population.parts.values())
+        pairs = [population_neighbours(settings, part) for part in parts]
+        starts = np.cumsum([0, *map(len, parts)])[:-1]
+        return np.concatenate([start + own for start, own in zip(starts, pairs, strict=True)])
+    places = np.asarray(population.places_mm)
+    if settings.population is not None:  # it may have any layout
+        lattice = neighbours_of(places, population.pitch_mm, "rectangular")
+        return lattice if len(lattice) else neighbours_of(places, population.pitch_mm, "poisson-disc")
+    pattern = "rectangular" if settings.layout in (GRID, NAIL_ROWS) else settings.layout
+    return neighbours_of(places, population.pitch_mm, pattern)
 
 
-@contextmanager
-def placed(key: str) -> Iterator[None]:
-    """Put the key in front of an `InputError` from within."""
-    try:
-        yield
-    except InputError as error:
-        raise InputError(f"{key}: {error}") from error
+def check_windows(windows_ms: Windows, end_ms: float, of: str = "the touch") -> None:
+    """Raise `InputError` unless both windows of the rates lie within a touch."""
+    for key, (start, end) in zip(("dynamic", "static"), windows_ms, strict=True):
+        if not 0.0 <= start < end:
+            words, came = "must be a start from 0 on and a later end", f"{start:g}, {end:g}"
+            raise InputError(("windows_ms", key), words, came)
+        if end > end_ms:
+            words, came = f"must end with the stimuli, not at {end:g} ms", f"{of} ends at {end_ms:g} ms"
+            raise InputError(("windows_ms", key), words, remedy=came)
 
 
 CHOSEN = "fingerpad fit of chosen numbers"  # Format of a fit of some numbers of one type.
@@ -381,9 +371,6 @@ def fitted_afferent(path: Path, tissues: str | Tissues = DEFAULT_TISSUES) -> Any
     try:
         read_text(path)  # names a file that cannot be read
         values = schemas.read(path, "fingerpad fit", CHOSEN, "fingerpad reproduction")
-    except StoreError as error:
-        raise InputError(str(error)) from error
-    try:
         if "fitted" in values:
             return afferent_of(values["type"], tissues, **values["fitted"])
         column = "human" if tissues == "human" else "paper"
@@ -391,6 +378,8 @@ def fitted_afferent(path: Path, tissues: str | Tissues = DEFAULT_TISSUES) -> Any
         named = values if "fit" in values else fitted
         parameters = [fitted["parameters"][name] for name in PARAMETER_NAMES]
         quantities = {name: named[name] for name in ("dynamic_quantity", "static_quantity")}
+    except StoreError as error:
+        raise InputError(str(error)) from error
     except (LookupError, TypeError) as error:
         raise InputError(
             f"{path} must hold the parameters of a fit: {shown(error.args[0])} is missing there."
@@ -422,25 +411,19 @@ def parameters_of(population: Population) -> dict[str, float | str]:
     """Parameters of the afferents by name, with the type in a mixed population; a function by its name."""
     found: dict[str, float | str] = {}
     for kind, part in population.parts.items() or [("", population)]:
-        names = list(getattr(part.afferent, "__dataclass_fields__", ()))
-        for name in names:
+        for name in getattr(part.afferent, "__dataclass_fields__", ()):
             value = getattr(part.afferent, name)
             if value is not None:
                 plain = isinstance(value, float | int | str)
-                found[f"{kind}.{name}" if kind else name] = (
-                    value if plain else getattr(value, "__qualname__", repr(value))
-                )
+                shown_as = value if plain else getattr(value, "__qualname__", repr(value))
+                found[f"{kind}.{name}" if kind else name] = shown_as
     return found
 
 
-def check_noise(settings: AfferentsSettings, population: Population) -> None:
+def _check_noise(settings: AfferentsSettings, population: Population, place: Place) -> None:
     """Raise `InputError` if a soft threshold is asked for afferents that have none."""
     afferent = None if population.parts else population.afferent
     plain = isinstance(afferent, Afferent) and afferent.smoothing_ms == 0.0
     if settings.noise > 0.0 and not plain:
-        raise InputError(
-            "afferents.noise",
-            "must be 0 for other types and mixed populations, because a soft threshold is that of "
-            "the default afferent alone",
-            f"{settings.noise:g}",
-        )
+        words = "must be 0 for other types and mixed populations, because a soft threshold is that of "
+        raise InputError((*place, "noise"), words + "the default afferent alone", f"{settings.noise:g}")

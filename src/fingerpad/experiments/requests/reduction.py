@@ -13,13 +13,8 @@ from fingerpad.core.signals import STORED_ENERGY
 from fingerpad.core.values import Pair, Positive, Seed, Text
 from fingerpad.data import neuron
 from fingerpad.experiments.requests.afferents import Afferents, AfferentsSettings, population_of
-from fingerpad.experiments.requests.parts import Part, Request, as_list, at
-from fingerpad.experiments.requests.stimulus import (
-    FINGER_OBJECTS,
-    FingerDescription,
-    StimulusDescription,
-    finger_of,
-)
+from fingerpad.experiments.requests.parts import Part, as_list, at
+from fingerpad.experiments.requests.stimulus import FINGER_OBJECTS, FingerRequest, StimulusDescription
 from fingerpad.experiments.runner import Runner
 from fingerpad.neuron.population import Population
 from fingerpad.reduction.building import reduce_touch
@@ -44,7 +39,7 @@ class RangeSettings(Part):
     values: Pair | None = None  # Its range.
 
 
-class ReductionRequest(Request, StimulusDescription, FingerDescription):
+class ReductionRequest(StimulusDescription, FingerRequest):
     """A touch to be reduced, as `fingerpad.reduce` presses it and a file describes it.
 
     Parameters
@@ -84,10 +79,8 @@ class ReductionRequest(Request, StimulusDescription, FingerDescription):
                     raise InputError(
                         "motion", "must be left out", remedy="a reduced touch serves any motion in its range"
                     )
-            with at("finger"):
-                finger = finger_of(self.finger, self.beside)
-            made = self.stimulus(self.beside)
-            touch = made.touch(finger, self.scaled_tissues, self.resolution, self.grading)
+            pressed = self.pressed_finger, self.scaled_tissues, self.resolution, self.grading
+            touch = self.stimulus(self.beside).touch(*pressed)
             with at("range"):
                 training = ReducedTraining(
                     touch, ReducedRange(**dict(self.range)), self.resolution, self.grading
@@ -105,7 +98,7 @@ class ReductionRequest(Request, StimulusDescription, FingerDescription):
                     ("afferents", "depth_mm"),
                     "must be left out, because a reduced touch keeps the border of the epidermis alone",
                 )
-            return population_of(self.afferents, self.tissues, self.beside, self.training.touch.finger)
+            return population_of(self.afferents, self.tissues, self.beside, self.pressed_finger)
 
     @property
     def kept(self) -> tuple[str, ...]:

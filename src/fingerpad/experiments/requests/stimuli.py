@@ -39,6 +39,7 @@ from fingerpad.experiments.requests.stimulus import (
     StimulusDescription,
     TactileStimulus,
     about,
+    finger_of,
     named_files,
 )
 from fingerpad.geometry.edged_indenters import SIZES
@@ -400,14 +401,15 @@ def read_stimuli(path: str | Path, **replacing: Any) -> ListedStimuli:
         content = {"stimuli": [_blocks(row) for row in rows]}
     with origin.located():
         described = part_from(StimulusSet, content | given if isinstance(content, dict) else content)
-        conditions = described.conditions(beside=origin.beside)
+        with at("finger"):
+            finger = finger_of(described.finger, origin.beside)
         stimuli = named_stimuli(described, origin.beside)
         if not stimuli:
             raise InputError("stimuli", "must have at least one entry", "none")
     return ListedStimuli(
         {stimulus.name: replace(stimulus, in_file=_located(stimulus, origin)) for stimulus in stimuli},
         str(path),
-        conditions=conditions,
+        conditions=described.conditions(finger),
         reach_mm=described.reach_mm,
         finger_files=tuple(named_files(described.finger, origin.beside)),
     )

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import field, fields
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, TypeAlias
 
@@ -28,7 +28,7 @@ from fingerpad.core.values import (
 from fingerpad.data import protocol
 from fingerpad.data.tissues import DEFAULT_TISSUES
 from fingerpad.experiments.conditions import Conditions, straight_tilt_deg
-from fingerpad.experiments.requests.parts import Made, Part, at, one_of_kinds
+from fingerpad.experiments.requests.parts import Made, Part, Request, at, one_of_kinds
 from fingerpad.geometry.edged_indenters import INDENTERS
 from fingerpad.geometry.fingertip import Finger, Fingertip
 from fingerpad.geometry.grading import RESOLUTIONS, Grading
@@ -233,11 +233,9 @@ class FingerDescription(Part):
     grading: Annotated[Any, Check(grading_of, {"type": "object"}, dict_of)] = None
     """Mesh instead of that which `resolution` grades about the objects: the fields of `fingerpad.Grading`."""
 
-    def conditions(self, seed: int = 0, beside: Path = Path()) -> Conditions:
-        """Finger, tissues and accuracy, with a seed; the file of a mesh is named from the folder `beside`."""
-        with at("finger"):
-            finger = finger_of(self.finger, beside)
-        return Conditions(self.resolution, seed, self.scaled_tissues, finger, self.grading)
+    def conditions(self, finger: Finger, seed: int = 0, depths_mm: tuple[float, ...] = ()) -> Conditions:
+        """Finger, tissues and accuracy, with a seed and depths at which presses keep quantities."""
+        return Conditions(self.resolution, seed, self.scaled_tissues, finger, self.grading, depths_mm)
 
     @property
     def scaled_tissues(self) -> str | Tissues:
@@ -246,6 +244,24 @@ class FingerDescription(Part):
             return self.tissues
         named = named_tissues(self.tissues) if isinstance(self.tissues, str) else self.tissues
         return named.scaled(self.stiffness)
+
+
+class FingerRequest(Request, FingerDescription):
+    """Base of requests that press into a finger."""
+
+    @cached_property
+    def pressed_finger(self) -> Finger:
+        """The finger."""
+        with self.origin.located(), at("finger"):
+            return finger_of(self.finger, self.beside)
+
+    def input_hashes(self) -> dict[str, str]:
+        """SHA-256 of the request and of the files that it names."""
+        return self.origin.hashes([*named_files(self.finger, self.beside), *self.further_files()])
+
+    def further_files(self) -> list[Path]:
+        """Files that it names beside that of the finger."""
+        return []
 
 
 class StimulusDescription(Part):

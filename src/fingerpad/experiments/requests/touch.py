@@ -13,28 +13,21 @@ from typing import Annotated, ClassVar, Literal
 import numpy as np
 
 from fingerpad.core.checked import result_class
-from fingerpad.core.signals import ResponseMap, window_bounds
+from fingerpad.core.signals import ResponseMap
 from fingerpad.core.values import Number, Numbers, Text, choice, some_of
 from fingerpad.data.tissues import DEFAULT_TISSUES
 from fingerpad.experiments.manifest import Manifest
 from fingerpad.experiments.requests.afferents import (
     Afferents,
     AfferentsSettings,
-    check_noise,
-    file_of,
+    check_windows,
+    files_of,
     population_of,
     respond_to,
 )
 from fingerpad.experiments.requests.parts import BlockOrObject, Request, at
-from fingerpad.experiments.requests.stimulus import (
-    FINGER_OBJECTS,
-    FingerDescription,
-    StimulusDescription,
-    finger_of,
-    named_files,
-)
+from fingerpad.experiments.requests.stimulus import FINGER_OBJECTS, FingerRequest, StimulusDescription
 from fingerpad.experiments.runner import Runner
-from fingerpad.geometry.fingertip import Finger
 from fingerpad.neuron.population import Population
 from fingerpad.neuron.spikes import rate_windows_ms
 from fingerpad.skin.indentation import Touch
@@ -48,7 +41,7 @@ MODULI = ("long_term", "instantaneous")
 WHOLE = ("netcdf", "zarr", "vtu")  # Outputs that hold all nodes and elements over time.
 
 
-class TouchRequest(Request, StimulusDescription, FingerDescription):
+class TouchRequest(StimulusDescription, FingerRequest):
     """A touch, as `fingerpad.touch` presses it and a file describes it.
 
     Parameters
@@ -87,39 +80,26 @@ class TouchRequest(Request, StimulusDescription, FingerDescription):
     elastic_moduli: Annotated[str, choice(MODULI)] = MODULI[0]
 
     @cached_property
-    def pressed_finger(self) -> Finger:
-        """The finger."""
-        with self.origin.located(), at("finger"):
-            return finger_of(self.finger, self.beside)
-
-    @cached_property
     def touch(self) -> Touch:
         """The touch, described for the solver."""
         with self.origin.located():
             made = self.stimulus(self.beside)
             pressed = self.pressed_finger, self.scaled_tissues, self.resolution
-            depths_mm = self._laid.kept_depths_mm
+            depths_mm = self.population.kept_depths_mm
             return made.touch(*pressed, self.grading, self.times_ms, receptor_depths_mm=depths_mm)
-
-    @cached_property
-    def _laid(self) -> Population:
-        with self.origin.located():
-            return population_of(self.afferents, self.tissues, self.beside, self.pressed_finger)
 
     @cached_property
     def population(self) -> Population:
         """The afferents."""
-        laid = self._laid
         with self.origin.located():
-            check_noise(self.afferents, laid)
-        with self.origin.located(), at("afferents", "windows_ms"):
-            for window in rate_windows_ms(self.touch.stimulus.phases, *self.afferents.windows_ms.both):
-                window_bounds(window)
-        return laid
+            return population_of(self.afferents, self.tissues, self.beside, self.pressed_finger)
 
     def check(self) -> None:
         """Raise `InputError` if the touch is impossible."""
-        self.touch, self.population  # noqa: B018
+        stimulus = self.touch.stimulus
+        with self.origin.located(), at("afferents"):
+            windows_ms = rate_windows_ms(stimulus.phases, *self.afferents.windows_ms.both)
+            check_windows(windows_ms, stimulus.end_ms)
 
     def pressed_as(self, other: TouchRequest) -> TouchRequest:
         """Take over the finger and the touch of a request that differs in its afferents alone."""
@@ -131,12 +111,9 @@ class TouchRequest(Request, StimulusDescription, FingerDescription):
         """Responses of the afferents to a skin."""
         return respond_to(self.afferents, self.population, skin)
 
-    def input_hashes(self) -> dict[str, str]:
-        """SHA-256 of the request and of the files that it names."""
-        named = [*named_files(self.finger, self.beside), *self.files(self.beside)]
-        if file := file_of(self.afferents.afferent):
-            named.append(self.beside / file)
-        return self.origin.hashes(named)
+    def further_files(self) -> list[Path]:
+        """Files of the object, the motion and the afferent."""
+        return [*self.files(self.beside), *files_of(self.afferents.afferent, self.beside)]
 
     def run(self, runner: Runner, command: str | None = None) -> TouchResult:
         """Press the touch, or load it from where it is stored, and let the afferents respond."""
@@ -153,7 +130,7 @@ class TouchRequest(Request, StimulusDescription, FingerDescription):
             response = self.respond(skin)
             advance()
         manifest = runner.manifest(
-            self.conditions(self.afferents.seed, self.beside),
+            self.conditions(self.pressed_finger, self.afferents.seed),
             {"touch": skin.mesh},
             half_model=not self.touch.grading.full,
             command=command,
@@ -202,8 +179,7 @@ class RespondRequest(Request, AfferentsSettings):
         finger = None if skin.touch is None else skin.touch.finger
         named = skin.tissues_name or (DEFAULT_TISSUES if skin.touch is None else skin.touch.tissues)
         with self.origin.located():
-            population = population_of(self, named, self.beside, finger, place="")
-            check_noise(self, population)
+            population = population_of(self, named, self.beside, finger, place=())
         return respond_to(self, population, skin)
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
 from typing import Annotated, ClassVar
@@ -13,11 +12,11 @@ from fingerpad.core.errors import InputError
 from fingerpad.core.values import Pair, Positive, Text, choice
 from fingerpad.data import protocol
 from fingerpad.experiments.conditions import Conditions
-from fingerpad.experiments.requests.afferents import DEFAULT, AfferentChoice, chosen_afferent, file_of
-from fingerpad.experiments.requests.parts import Request, at, object_of_python
+from fingerpad.experiments.requests.afferents import DEFAULT, AfferentChoice, chosen_afferent, files_of
+from fingerpad.experiments.requests.parts import at, object_of_python
 from fingerpad.experiments.requests.stimulus import (
     FINGER_OBJECTS,
-    FingerDescription,
+    FingerRequest,
     ObjectPart,
     named_files,
     object_of,
@@ -31,7 +30,7 @@ RAMP_AND_HOLD, QUASI_STATIC = "ramp_and_hold", "quasi_static"
 LOADINGS = (RAMP_AND_HOLD, QUASI_STATIC)  # Read at the end of the paper's hold, or with relaxed tissues.
 
 
-class ValidationRequest(Request, FingerDescription):
+class ValidationRequest(FingerRequest):
     """A validation, as `fingerpad.validate` runs it and a file or a command describes it.
 
     Parameters
@@ -81,7 +80,7 @@ class ValidationRequest(Request, FingerDescription):
         """Finger, tissues and accuracy."""
         with self.origin.located():
             depths_mm = () if self.depth_mm is None else (self.depth_mm,)
-            return replace(self.conditions(beside=self.beside), receptor_depths_mm=depths_mm)
+            return self.conditions(self.pressed_finger, depths_mm=depths_mm)
 
     @cached_property
     def responding(self) -> AnyAfferent:
@@ -101,12 +100,8 @@ class ValidationRequest(Request, FingerDescription):
                     f"{start:g}, {end:g}",
                 )
 
-    def input_hashes(self) -> dict[str, str]:
-        """SHA-256 of the request and of the files that it names."""
-        named = [self.beside / self.observations] if isinstance(self.observations, str | Path) else []
-        named += named_files(self.finger, self.beside)
-        for part in self.objects.values():
-            named += named_files(part, self.beside)
-        if file := file_of(self.afferent):
-            named.append(self.beside / file)
-        return self.origin.hashes(named)
+    def further_files(self) -> list[Path]:
+        """Files of the observations, the objects and the afferent."""
+        own = [self.beside / self.observations] if isinstance(self.observations, str | Path) else []
+        of_objects = [file for part in self.objects.values() for file in named_files(part, self.beside)]
+        return [*own, *of_objects, *files_of(self.afferent, self.beside)]
