@@ -10,7 +10,7 @@ import numpy as np
 
 import fingerpad as fp
 from benchmarks.results import Report, Table
-from fingerpad.experiments.manifest import peak_memory_mb
+from fingerpad.experiments.runner import peak_memory_mb
 from fingerpad.export.sweep_results import observe_sweep
 from fingerpad.skin.store import Store
 

@@ -20,8 +20,7 @@ from fingerpad.data import paper, protocol, psychophysics
 from fingerpad.data.published import Published
 from fingerpad.experiments.conditions import RECEPTOR_X_MM, Conditions
 from fingerpad.experiments.gerling2014.skin import PLATE_DEPTHS_MM
-from fingerpad.experiments.manifest import Manifest
-from fingerpad.experiments.runner import Runner
+from fingerpad.experiments.runner import Manifest, Runner
 from fingerpad.experiments.validation.observations import KINDS, Observation, Observations, read_observations
 from fingerpad.experiments.validation.predictions import Condition, predict
 from fingerpad.experiments.validation.request import LOADINGS, RAMP_AND_HOLD, ValidationRequest

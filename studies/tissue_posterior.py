@@ -15,8 +15,7 @@ from fingerpad.core.values import FloatArray, IntArray, Number
 from fingerpad.data import protocol
 from fingerpad.experiments.conditions import Conditions
 from fingerpad.experiments.fit.results import CredibleInterval, PosteriorConvergence
-from fingerpad.experiments.manifest import Manifest
-from fingerpad.experiments.runner import Runner
+from fingerpad.experiments.runner import Manifest, Runner
 from fingerpad.experiments.scores import coefficient_of_determination
 from fingerpad.inference.fitting.methods import fractional_sum_of_squares
 from fingerpad.inference.fitting.posterior import credible_band

@@ -25,8 +25,7 @@ from fingerpad.experiments.conditions import POSITIONS_MM, RECEPTOR_X_MM, Condit
 from fingerpad.experiments.gerling2014 import nerve
 from fingerpad.experiments.gerling2014.percept import FITTED_SPHERES, fit_to_people
 from fingerpad.experiments.gerling2014.skin import PLATE_DEPTHS_MM, deflection_r2
-from fingerpad.experiments.manifest import Manifest
-from fingerpad.experiments.runner import Runner
+from fingerpad.experiments.runner import Manifest, Runner
 from fingerpad.experiments.validation.observations import read_observations
 from fingerpad.geometry.grading import Grading
 from fingerpad.geometry.indenters import Bar, Cylinder, Plate

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from fingerpad import Fingertip, FlatPunch, Population, RampAndHold, Sphere, touch_of
-from fingerpad.experiments.manifest import StageSummary
-from fingerpad.experiments.runner import Runner
+from fingerpad.experiments.runner import Runner, StageSummary
 from fingerpad.mechanics.inertia import LARGEST_SHARE
 from fingerpad.report import skin as touch_figure
 from fingerpad.skin.caveats import LARGEST_SED_RATIO

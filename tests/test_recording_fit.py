@@ -1,5 +1,6 @@
 """Fit to recordings of a user: recovery of known parameters, then reports, errors and files."""
 
+import hashlib
 import json
 import re
 import shlex
@@ -27,7 +28,6 @@ from fingerpad.experiments.fit import request
 from fingerpad.experiments.fit.methods import check_spikes
 from fingerpad.experiments.fit.rate_uncertainty import rate_posterior
 from fingerpad.experiments.fit.results import ParameterProfile, PhaseBands, RateBand, RatePosterior
-from fingerpad.experiments.manifest import sha256
 from fingerpad.experiments.recording_files import read_recordings
 from fingerpad.experiments.requests.afferents import fitted_afferent
 from fingerpad.experiments.requests.stimuli import ListedStimuli, NamedStimulus, ShiftedBar
@@ -342,7 +342,7 @@ def test_a_fit_writes_page_figures_numbers_and_their_origin(call, tmp_path):
     assert fit["shift_mm"] == list(SHIFTS_MM)
     assert fit["presentations"] == [1] * 6
     assert manifest["command"] == shlex.join(["fingerpad", "fit", *arguments])
-    assert manifest["inputs"] == {"mine.csv": sha256(tmp_path / "mine.csv")}
+    assert manifest["inputs"] == {"mine.csv": hashlib.sha256(Path("mine.csv").read_bytes()).hexdigest()}
     assert (manifest["seed"], manifest["resolution"], manifest["materials"]) == (3, "quick", "human")
     assert results["dynamic_quantity"] == results["static_quantity"] == "compressive_stress"
     assert results["windows_ms"] == [[30.0, 50.0], [600.0, 950.0]]

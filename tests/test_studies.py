@@ -12,7 +12,7 @@ from fingerpad.core.errors import InputError
 from fingerpad.core.result_files import from_json, to_json
 from fingerpad.core.signals import Traces
 from fingerpad.data import bar_firing_rates, cylinder_deflection, neuron
-from fingerpad.experiments.conditions import RECEPTOR_X_MM, Conditions
+from fingerpad.experiments.conditions import RECEPTOR_X_MM, Conditions, straight_tilt_deg
 from fingerpad.experiments.gerling2014 import nerve as level_2
 from fingerpad.experiments.gerling2014 import percept as level_3
 from fingerpad.experiments.gerling2014 import skin as level_1
@@ -808,5 +808,7 @@ def test_both_numbers_are_written():
 
 def test_a_wire_presses_straight_and_every_other_body_along_the_normal_of_the_skin():
     conditions = Conditions("quick")
-    assert conditions.tilt_deg(Line()) == 0.0
-    assert conditions.tilt_deg(Sphere(curvature_per_m=287.0)) == conditions.skin_tilt_deg != 0.0
+    assert straight_tilt_deg(conditions.finger, Line()) == 0.0
+    assert (
+        straight_tilt_deg(conditions.finger, Sphere(curvature_per_m=287.0)) == conditions.skin_tilt_deg != 0.0
+    )

@@ -17,8 +17,7 @@ from fingerpad.cli import main
 from fingerpad.core.errors import InputError, StoreError
 from fingerpad.core.signals import RECEPTOR_COLUMNS
 from fingerpad.experiments.discrimination.decoding import SESSION
-from fingerpad.experiments.manifest import software
-from fingerpad.experiments.runner import Runner
+from fingerpad.experiments.runner import Runner, software
 from fingerpad.experiments.sweep.request import Constraint
 from fingerpad.experiments.sweep.settings import observe
 from fingerpad.export.sweep_file import DONE, FAILED, LEFT_OUT, SweepFile

@@ -19,7 +19,7 @@ from fingerpad.core.engine import Outcomes, Work
 from fingerpad.core.errors import InputError, StoreError
 from fingerpad.core.logger import LOGGER
 from fingerpad.core.values import Finite
-from fingerpad.experiments.manifest import software
+from fingerpad.experiments.runner import software
 
 WAITING_IN_LINE = 512  # Most items that the scheduler knows at a time: a sweep may have a million.
 Versions = dict[str, str]  # Versions of all on which the numbers of a press depend, by name.

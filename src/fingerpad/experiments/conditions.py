@@ -93,7 +93,7 @@ class Conditions:
 
     @property
     def skin_tilt_deg(self) -> float:
-        """Tilt at which an indenter presses along the inward normal of the skin at the receptor. [degrees]"""
+        """As of the function `skin_tilt_deg`."""
         return skin_tilt_deg(self.finger)
 
     def touch(
@@ -118,17 +118,7 @@ class Conditions:
     def sphere_touch(
         self, curvature_per_m: Finite, position_mm: Finite = 0.0, grading: Grading | None = None
     ) -> Touch:
-        """One touch of the population study: a sphere along the skin's normal, centred on the receptors.
-
-        Parameters
-        ----------
-        curvature_per_m : float
-            Of the sphere. [1/m]
-        position_mm : float, optional
-            Along the finger, from the middle of the population, distal positive. [mm]
-        grading : Grading, optional
-            Mesh; default: that of all spheres.
-        """
+        """One touch of the population study: a sphere along the skin's normal, centred on the receptors."""
         return self.touch(
             Sphere(curvature_per_m=curvature_per_m),
             self.receptor_x_mm + position_mm,
@@ -160,28 +150,19 @@ class Conditions:
             for curvature in CURVATURES
         }
 
-    def tilt_deg(self, indenter: Indenter) -> float:
-        """Tilt of an indenter that presses straight, see `straight_tilt_deg`. [degrees]"""
-        return straight_tilt_deg(self.finger, indenter)
-
     def deflection_grading(self, indenter: Indenter) -> Grading:
         """Mesh of the skin deflection study: fine about the indenter."""
-        place = self.receptor_x_mm
-        return self.grading or grading_about(
-            indenter, self.resolution, place, finger_size=self.finger.relative_size
-        )
+        size = self.finger.relative_size
+        return self.grading or grading_about(indenter, self.resolution, self.receptor_x_mm, finger_size=size)
 
     def bar_grading(self) -> Grading:
         """Mesh of the single-unit study: fine about the receptor, the same for all shifts."""
         if self.grading is not None:
             return self.grading
-        grading = resolution_grading(
-            self.resolution, self.receptor_x_mm, BAR_REACH_MM, 0.6, self.finger.relative_size
-        )
-        if self.resolution in BAR_SIZE_MM:
-            size_x, size_z = BAR_SIZE_MM[self.resolution]
-            grading = replace(grading, size_x_mm=size_x, size_z_mm=size_z)
-        return grading
+        size = self.finger.relative_size
+        grading = resolution_grading(self.resolution, self.receptor_x_mm, BAR_REACH_MM, 0.6, size)
+        size_x, size_z = BAR_SIZE_MM.get(self.resolution, (grading.size_x_mm, grading.size_z_mm))
+        return replace(grading, size_x_mm=size_x, size_z_mm=size_z)
 
     def sphere_grading(self) -> Grading:
         """Mesh of the population study: fine about both positions, the same for all spheres."""

@@ -61,15 +61,15 @@ class ReproductionRequest(Request):
         return reproduce(columns, self.goes_beyond, runner)
 
 
-RUNS: Mapping[type[Request], Callable[[Any, Runner, str | None], Any]] = MappingProxyType(
+RUNS: Mapping[type[Request], Callable[[Any, Runner], Any]] = MappingProxyType(
     {
         TouchRequest: TouchRequest.run,
         RespondRequest: RespondRequest.run,
         FitRequest: run_fit,
         DiscriminationRequest: discriminate,
         ValidationRequest: validate,
-        ReductionRequest: lambda request, runner, _: request.run(runner),
-        ReproductionRequest: lambda request, runner, _: request.run(runner),
+        ReductionRequest: ReductionRequest.run,
+        ReproductionRequest: ReproductionRequest.run,
     }
 )  # What runs a request, by its class.
 
@@ -82,4 +82,4 @@ def run(
     command: str | None = None,
 ) -> Any:
     """Run a request, with its stored presses in a folder."""
-    return RUNS[type(request)](request, Runner(folder, jobs, progress), command)
+    return RUNS[type(request)](request, Runner(folder, jobs, progress, command))

@@ -19,8 +19,7 @@ from fingerpad.core.engine import Engine, engine_of
 from fingerpad.core.errors import InputError
 from fingerpad.core.progress import NoProgress, Progress
 from fingerpad.core.values import Flag, Whole
-from fingerpad.experiments.manifest import software
-from fingerpad.experiments.runner import STORE_FOLDER
+from fingerpad.experiments.runner import STORE_FOLDER, software
 from fingerpad.experiments.sweep.request import SweepRequest
 from fingerpad.experiments.sweep.settings import Case, observe, settle, unsettled
 from fingerpad.export.sweep_file import DONE, FAILED, LEFT_OUT, PENDING, SweepFile

@@ -17,7 +17,7 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 from matplotlib.figure import Figure
 
 from fingerpad.core.files import write_atomically
-from fingerpad.experiments.manifest import Manifest
+from fingerpad.experiments.runner import Manifest
 from fingerpad.report.style import png
 from fingerpad.report.tables import Row, Table, at, facts_table, filled, filled_table, plain, spelled
 

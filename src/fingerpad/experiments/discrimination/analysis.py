@@ -25,11 +25,10 @@ from fingerpad.experiments.discrimination.decoding import (
     task_statistic,
 )
 from fingerpad.experiments.discrimination.request import IDEAL, DiscriminationRequest, stimulus_index
-from fingerpad.experiments.manifest import Manifest
 from fingerpad.experiments.requests.afferents import parameters_of
 from fingerpad.experiments.requests.parts import at
 from fingerpad.experiments.requests.stimuli import NamedStimulus
-from fingerpad.experiments.runner import Runner
+from fingerpad.experiments.runner import Manifest, Runner
 from fingerpad.psychophysics.curve import binomial_interval
 from fingerpad.psychophysics.encoding import taking_part
 from fingerpad.psychophysics.ideal_observer import (
@@ -378,9 +377,7 @@ class DiscriminationFile:
     manifest: Manifest
 
 
-def discriminate(
-    task: DiscriminationRequest, runner: Runner, command: str | None = None
-) -> DiscriminationFile:
+def discriminate(task: DiscriminationRequest, runner: Runner) -> DiscriminationFile:
     """Indent with all stimuli, compute the responses of the population, and decode them."""
     task.check()
     with task.origin.located(), at("afferents"):
@@ -396,5 +393,5 @@ def discriminate(
         discrimination=found,
         task=task,
         afferent=parameters_of(task.population),
-        manifest=runner.manifest(task.settings, meshes, command=command, inputs=task.input_hashes()),
+        manifest=runner.manifest(task.settings, meshes, inputs=task.input_hashes()),
     )

@@ -31,7 +31,6 @@ from fingerpad.experiments.conditions import Conditions
 from fingerpad.experiments.fit.fit import check_enough, fit_recordings
 from fingerpad.experiments.fit.methods import METHODS, check_offset, check_spikes
 from fingerpad.experiments.fit.results import FitResult
-from fingerpad.experiments.manifest import Manifest
 from fingerpad.experiments.recording_files import Recorded, read_recordings, recorded_of
 from fingerpad.experiments.requests.afferents import (
     DEFAULT,
@@ -60,7 +59,7 @@ from fingerpad.experiments.requests.stimulus import (
     named_files,
     object_of,
 )
-from fingerpad.experiments.runner import Runner
+from fingerpad.experiments.runner import Manifest, Runner
 from fingerpad.geometry.grading import RESOLUTIONS
 from fingerpad.geometry.indenters import Bar
 from fingerpad.inference.afferent_fit import OFFSETS_MM, fit_afferent
@@ -285,13 +284,13 @@ class FitRequest(FingerRequest):
         return [*own, *self.presented.finger_files, *of_stimuli, *files_of(self.afferent, self.beside)]
 
 
-def run_fit(request: FitRequest, runner: Runner, command: str | None = None) -> FitFile | ChosenNumbersFile:
+def run_fit(request: FitRequest, runner: Runner) -> FitFile | ChosenNumbersFile:
     """Indent with all stimuli, fit, and record what ran."""
     request.check()
     skins = runner.responses({"stimuli": request.touches})["stimuli"]
     mesh = next(iter(skins.values())).mesh
     if request.free:
-        return _fit_chosen_numbers(request, runner, skins, command)
+        return _fit_chosen_numbers(request, runner, skins)
     recorded = request.recorded
     offsets_mm = OFFSETS_MM if request.offset else (0.0,)
     x_mm, z_mm = request.settings.finger.contact_mm
@@ -328,9 +327,7 @@ def run_fit(request: FitRequest, runner: Runner, command: str | None = None) -> 
         windows_ms=request.used_windows_ms,
         dynamic_quantity=request.quantities[0],
         static_quantity=request.quantities[1],
-        manifest=runner.manifest(
-            request.settings, {"stimuli": mesh}, command=command, inputs=request.input_hashes()
-        ),
+        manifest=runner.manifest(request.settings, {"stimuli": mesh}, inputs=request.input_hashes()),
     )
 
 
@@ -362,7 +359,7 @@ class ChosenNumbersFile:
 
 
 def _fit_chosen_numbers(
-    request: FitRequest, runner: Runner, skins: Mapping[str, SkinResponse], command: str | None
+    request: FitRequest, runner: Runner, skins: Mapping[str, SkinResponse]
 ) -> ChosenNumbersFile:
     """Fit the numbers `request.free` of an afferent."""
     site = [request.settings.finger.contact_mm]
@@ -384,10 +381,7 @@ def _fit_chosen_numbers(
         fss_out_of_sample=found.fss_out_of_sample,
         windows_ms=windows_ms,
         manifest=runner.manifest(
-            request.settings,
-            {"stimuli": next(iter(skins.values())).mesh},
-            command=command,
-            inputs=request.input_hashes(),
+            request.settings, {"stimuli": next(iter(skins.values())).mesh}, inputs=request.input_hashes()
         ),
     )
 

@@ -29,8 +29,7 @@ from fingerpad.experiments.gerling2014.thresholds import (
     curvature_thresholds,
     threshold_touches,
 )
-from fingerpad.experiments.manifest import Manifest, StageSummary
-from fingerpad.experiments.runner import Runner
+from fingerpad.experiments.runner import Manifest, Runner, StageSummary
 from fingerpad.experiments.tissue_sets import TissueLayer, tissue_layers
 from fingerpad.inference.afferent_fit import response_surface
 from fingerpad.inference.fitting.methods import Method

@@ -44,7 +44,6 @@ from fingerpad.core.files import path_of, read_text
 from fingerpad.core.plain_yaml import line_at, read_yaml
 from fingerpad.core.values import Check, JsonSchema, Text, choice, like
 from fingerpad.core.values import instance as instance_of
-from fingerpad.experiments.manifest import sha256
 
 _FORM = "form "
 LISTED, VARIED, NAMED, SPELLED, OBJECT, UNKNOWN = (
@@ -244,8 +243,9 @@ class Origin:
 
     def hashes(self, files: Sequence[Path]) -> dict[str, str]:
         """SHA-256 of the file, if the request is from one, and of the files that it names, by name."""
-        own = {self.name: hashlib.sha256(self.text.encode()).hexdigest()} if self.text else {}
-        return own | {str(path): sha256(path) for path in files}
+        contents = {self.name: self.text.encode()} if self.text else {}
+        contents |= {str(path): path.read_bytes() for path in files}
+        return {name: hashlib.sha256(content).hexdigest() for name, content in contents.items()}
 
     @contextmanager
     def located(self) -> Iterator[None]:

@@ -16,7 +16,6 @@ from fingerpad.core.checked import result_class
 from fingerpad.core.signals import ResponseMap
 from fingerpad.core.values import Number, Numbers, Text, choice, some_of
 from fingerpad.data.tissues import DEFAULT_TISSUES
-from fingerpad.experiments.manifest import Manifest
 from fingerpad.experiments.requests.afferents import (
     Afferents,
     AfferentsSettings,
@@ -27,7 +26,7 @@ from fingerpad.experiments.requests.afferents import (
 )
 from fingerpad.experiments.requests.parts import BlockOrObject, Request, at
 from fingerpad.experiments.requests.stimulus import FINGER_OBJECTS, FingerRequest, StimulusDescription
-from fingerpad.experiments.runner import Runner
+from fingerpad.experiments.runner import Manifest, Runner
 from fingerpad.neuron.population import Population
 from fingerpad.neuron.spikes import rate_windows_ms
 from fingerpad.skin.indentation import Touch
@@ -115,7 +114,7 @@ class TouchRequest(StimulusDescription, FingerRequest):
         """Files of the object, the motion and the afferent."""
         return [*self.files(self.beside), *files_of(self.afferents.afferent, self.beside)]
 
-    def run(self, runner: Runner, command: str | None = None) -> TouchResult:
+    def run(self, runner: Runner) -> TouchResult:
         """Press the touch, or load it from where it is stored, and let the afferents respond."""
         self.check()
         if not set(WHOLE).isdisjoint(self.outputs):
@@ -133,7 +132,6 @@ class TouchRequest(StimulusDescription, FingerRequest):
             self.conditions(self.pressed_finger, self.afferents.seed),
             {"touch": skin.mesh},
             half_model=not self.touch.grading.full,
-            command=command,
             inputs=self.input_hashes(),
         )
         return TouchResult(self, skin, response, manifest)
@@ -171,7 +169,7 @@ class RespondRequest(Request, AfferentsSettings):
             source = self.beside / self.touch if isinstance(self.touch, str | Path) else self.touch
             return TouchRequest.read(source, allow_python=self._allow_python)
 
-    def run(self, runner: Runner, command: str | None = None) -> ResponseMap:
+    def run(self, runner: Runner) -> ResponseMap:
         """Press the touch if it is not solved, and let the afferents respond."""
         skin = self.pressed
         if isinstance(skin, TouchRequest):

@@ -9,9 +9,8 @@ import numpy as np
 from fingerpad.core.checked import result_class
 from fingerpad.core.values import Number
 from fingerpad.data import fingertip
-from fingerpad.experiments.manifest import Manifest
 from fingerpad.experiments.requests.afferents import parameters_of
-from fingerpad.experiments.runner import Runner
+from fingerpad.experiments.runner import Manifest, Runner
 from fingerpad.experiments.scores import (
     coefficient_of_determination,
     correlation,
@@ -75,7 +74,7 @@ class ValidationFile:
     manifest: Manifest
 
 
-def validate(request: ValidationRequest, runner: Runner, command: str | None = None) -> ValidationFile:
+def validate(request: ValidationRequest, runner: Runner) -> ValidationFile:
     """Predict every row of a file of observations, and score the predictions.
 
     Rows whose touch cannot be solved have a reason instead of a prediction.
@@ -93,7 +92,6 @@ def validate(request: ValidationRequest, runner: Runner, command: str | None = N
     manifest = runner.manifest(
         request.settings,
         {kind.name: found.meshed.mesh} if found.meshed else {},
-        command=command,
         inputs=request.input_hashes(),
     )
     r2_mirrored = np.nan
