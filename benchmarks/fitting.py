@@ -13,7 +13,7 @@ from benchmarks.measuring import Spread, run_job
 from benchmarks.results import Report, Table
 from fingerpad.core.signals import Traces
 from fingerpad.experiments.conditions import Conditions
-from fingerpad.experiments.fit.methods import prepare
+from fingerpad.experiments.fit.fit import prepare
 from fingerpad.experiments.gerling2014 import nerve
 from fingerpad.inference.afferent_fit import response_surface, start_points
 from fingerpad.inference.fitting.methods import Method, cross_validate, interleaved_folds

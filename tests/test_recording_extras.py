@@ -8,10 +8,9 @@ from fingerpad.inference.problem import RateProblem
 from numpy.testing import assert_allclose, assert_array_equal
 
 from fingerpad import InputError, RateRecordings, Traces
-from fingerpad.experiments.fit import rate_uncertainty
-from fingerpad.experiments.fit.fit import fit_recordings
-from fingerpad.experiments.fit.methods import check_offset, fit_offset
-from fingerpad.experiments.fit.rate_uncertainty import profiled
+from fingerpad.experiments.fit import likelihoods
+from fingerpad.experiments.fit.fit import check_offset, fit_offset, fit_recordings
+from fingerpad.experiments.fit.likelihoods import profiled
 from fingerpad.experiments.fit.results import ParameterProfile, RatePosterior
 from fingerpad.inference.afferent_fit import ReceptorOffset
 from fingerpad.inference.identifiable import IDENTIFIABLE_NAMES, identifiable
@@ -130,7 +129,7 @@ def test_ranges_are_shares_of_the_fit_and_a_gain_of_nothing_has_one_too(fitted):
     four = np.array(list(fitted.identifiable.values()))
     assert_allclose(found.lower, np.minimum(0.75 * four, 1.25 * four), rtol=1e-12)
     problem = RateProblem(four_number_model(MODEL), IN_PLACE)
-    nothing = rate_uncertainty.fss_sensitivity(problem, [0.0, 0.0, 0.018, 60.0], 1)
+    nothing = likelihoods.fss_sensitivity(problem, [0.0, 0.0, 0.018, 60.0], 1)
     assert_allclose(nothing.lower[:2], [-0.25 / 68.0, 0.0], rtol=1e-12)
     assert (nothing.upper > nothing.lower).all()
     # Without a dynamic gain to speak of, rates hang on the static one.

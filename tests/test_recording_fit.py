@@ -23,10 +23,10 @@ from fingerpad.experiments import runner
 from fingerpad.experiments.conditions import RECEPTOR_X_MM, Conditions
 from fingerpad.experiments.examples import examples
 from fingerpad.experiments.fit import fit as study
-from fingerpad.experiments.fit import rate_uncertainty as recording_posterior
+from fingerpad.experiments.fit import likelihoods as recording_posterior
 from fingerpad.experiments.fit import request
-from fingerpad.experiments.fit.methods import check_spikes
-from fingerpad.experiments.fit.rate_uncertainty import rate_posterior
+from fingerpad.experiments.fit.fit import check_spikes
+from fingerpad.experiments.fit.likelihoods import rate_posterior
 from fingerpad.experiments.fit.results import ParameterProfile, PhaseBands, RateBand, RatePosterior
 from fingerpad.experiments.recording_files import read_recordings
 from fingerpad.experiments.requests.afferents import fitted_afferent

@@ -7,7 +7,7 @@ import pytest
 
 from fingerpad import RateRecordings, Traces
 from fingerpad.data import bar_firing_rates
-from fingerpad.experiments.fit import rate_uncertainty
+from fingerpad.experiments.fit import likelihoods
 from fingerpad.experiments.fit.results import UncertaintyResult
 from fingerpad.experiments.gerling2014 import nerve
 from fingerpad.inference.identifiable import IDENTIFIABLE_NAMES, identifiable
@@ -37,7 +37,7 @@ def section() -> UncertaintyResult:
     ]
     recordings = RateRecordings(nerve.bar_recordings().stimuli, *rates)
     model = AfferentModel.of_drive(drive(SED, pieces=nerve.PIECES))
-    return rate_uncertainty.uncertainty(model, recordings, TRUTH, SHIFTS, 1, **SHORT_CHAINS)
+    return likelihoods.uncertainty(model, recordings, TRUTH, SHIFTS, 1, **SHORT_CHAINS)
 
 
 def test_the_truth_lies_within_its_intervals_and_four_of_six_directions_are_identified(section):
@@ -81,7 +81,7 @@ def test_bands_hold_most_of_what_was_observed_and_convergence_is_reported(sectio
     np.testing.assert_allclose(found.lower, 0.75 * identifiable(TRUTH), rtol=1e-12)
     # What a number does alone is part of what it does with others.
     assert (np.array(found.total) >= np.array(found.first) - 0.15).all()
-    assert found.evaluations == 6 * rate_uncertainty.SENSITIVITY_POINTS
+    assert found.evaluations == 6 * likelihoods.SENSITIVITY_POINTS
 
 
 def test_the_figure_shows_bands_over_points_and_a_profile_of_each_number(section: UncertaintyResult) -> None:

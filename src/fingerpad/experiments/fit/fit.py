@@ -1,8 +1,10 @@
-"""Fit an afferent to recordings under known stimuli, and score the fit out of sample."""
+"""Fit an afferent to recordings under known stimuli by several methods, and score the fit out of sample."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -11,16 +13,92 @@ from fingerpad.core.checked import checked
 from fingerpad.core.errors import InputError
 from fingerpad.core.signals import Traces
 from fingerpad.core.units import units_of
-from fingerpad.core.values import Flag, FloatArray, IntArray, Whole
-from fingerpad.experiments.fit.methods import Beside, Prepared, check_beside, fit_offset, prepare
-from fingerpad.experiments.fit.results import FitResult, FittedFold, PhaseRates
-from fingerpad.inference.afferent_fit import validated
-from fingerpad.inference.fitting.methods import CrossValidation, fractional_sum_of_squares, interleaved_folds
-from fingerpad.inference.identifiable import IDENTIFIABLE_NAMES, identifiable
+from fingerpad.core.values import Flag, FloatArray, IntArray, Whole, choice
+from fingerpad.data import neuron
+from fingerpad.experiments.fit.results import (
+    FitResult,
+    FittedFold,
+    HeldOffset,
+    OffsetFit,
+    PhaseRates,
+    SpikeFitSummary,
+)
+from fingerpad.inference.afferent_fit import (
+    ReceptorOffset,
+    Search,
+    fitted_four,
+    fitted_six,
+    four_numbers,
+    four_numbers_and_offset,
+    response_surface,
+    validated,
+)
+from fingerpad.inference.fitting.methods import (
+    Continued,
+    CrossValidation,
+    Fit,
+    LeastSquares,
+    Method,
+    fractional_sum_of_squares,
+    interleaved_folds,
+    jackknife_covariance,
+)
+from fingerpad.inference.identifiable import IDENTIFIABLE_NAMES, SPIKE_PARAMETER_NAMES, identifiable
 from fingerpad.inference.rate_model import AfferentModel, RateProblem, four_number_model
 from fingerpad.inference.recordings import PHASES, RateRecordings, SpikeRecordings
 from fingerpad.neuron.afferent import PARAMETER_NAMES, parameter_units
 from fingerpad.neuron.spikes import Windows
+
+Recordings = RateRecordings | SpikeRecordings
+
+METHODS = ("least_squares", "response_surface", "closed_form", "cma_es", "likelihood")
+"""Methods that fit recordings; the likelihood is that of spikes."""
+
+OFFSET_METHODS = ("least_squares", "cma_es")  # Methods that an offset can be added to.
+
+
+@dataclass(frozen=True)
+class Prepared:
+    """A problem, the method that fits it, and the meaning of its parameters."""
+
+    problem: RateProblem  # What is fitted, in the parameters of the method.
+    method: Method
+    six: Callable[[FloatArray], FloatArray]  # From those parameters to the paper's six.
+
+    def covariance(self, fit: Fit, folds: CrossValidation) -> FloatArray | None:
+        """Covariance (4, 4) of the identifiable numbers, from the fits of the folds; None for few folds."""
+        return jackknife_covariance([identifiable(self.six(fold.fit.parameters)) for fold in folds.folds])
+
+    def spikes(self, fit: Fit, folds: CrossValidation) -> SpikeFitSummary | None:
+        """Summary of a fit to spikes; None for a fit to rates."""
+        return None
+
+
+@checked
+def prepare(
+    method: Annotated[str, choice(METHODS)],
+    model: AfferentModel,
+    recordings: Recordings,
+    rates: RateRecordings,
+    seed: Whole,
+) -> Prepared:
+    """Make the problem of a method."""
+    if method == "response_surface":
+        return Prepared(RateProblem(model, rates), response_surface(), lambda six: six)
+    if method == "likelihood":
+        # Only this method loads the module and its kernels.
+        from fingerpad.experiments.fit.likelihoods import prepare_spikes
+
+        return prepare_spikes(model, recordings, rates, seed)
+    search = four_numbers(model, rates)
+    if method == "closed_form":
+        return Prepared(search.problem, search.along_slopes(), fitted_six)
+    if method == "cma_es":  # from where the slopes in closed form lead
+        evolved = Continued(
+            search.along_slopes(), lambda begun: search.by_evolution(begun, seed), name="CMA-ES"
+        )
+        return Prepared(search.problem, evolved, fitted_six)
+    return Prepared(search.problem, search.by_differences(), fitted_six)
 
 
 @checked
@@ -51,7 +129,7 @@ def fit_recordings(
         Fold of each stimulus from 0; by default assigned in turn to six folds, or to one per stimulus where
         there are fewer.
     method : str, optional
-        One of `fingerpad.experiments.fit.methods.METHODS`.
+        One of `METHODS`.
     windows_ms : ((float, float), (float, float)), optional
         Windows of the dynamic and of the static rate; by default those that follow the phases of `traces`,
         the paper's for the paper's motion. [ms]
@@ -101,7 +179,7 @@ def fit_recordings(
     errors = np.full(len(IDENTIFIABLE_NAMES), np.nan) if covariance is None else np.sqrt(np.diag(covariance))
     posterior = profiles = sensitivity = None
     if with_posterior or with_profiles or with_sensitivity:
-        from fingerpad.experiments.fit.rate_uncertainty import fss_sensitivity, profiled, rate_posterior
+        from fingerpad.experiments.fit.likelihoods import fss_sensitivity, profiled, rate_posterior
 
         problem = RateProblem(four_number_model(model), rates)
         posterior = rate_posterior(model, rates, four, seed, positions_mm) if with_posterior else None
@@ -194,3 +272,109 @@ def _folds(prepared: Prepared, rates: RateRecordings, validation: CrossValidatio
         )
         for fold, each in zip(validation.folds, six, strict=True)
     )
+
+
+def check_spikes(recordings: Recordings, n_motions: int) -> SpikeRecordings:
+    """Return the recordings if the likelihood of their spikes is defined, else raise `InputError`."""
+    if isinstance(recordings, RateRecordings):
+        raise InputError("likelihood", "needs spike times", "rates, choose another method")
+    if n_motions > 1:
+        raise InputError(
+            "likelihood", "needs stimuli that move alike", f"{n_motions} motions, choose another method"
+        )
+    if recordings.trains.times_ms.size < len(SPIKE_PARAMETER_NAMES):
+        raise InputError(
+            "likelihood",
+            f"needs at least {len(SPIKE_PARAMETER_NAMES)} spikes, one per parameter",
+            str(recordings.trains.times_ms.size),
+        )
+    for presentation, name in enumerate(recordings.stimuli):
+        train = recordings.trains[presentation]
+        if train.size and train[0] <= 0.0:
+            raise InputError(
+                "likelihood", "needs spikes after the onset", remedy=f"{name} has one at {train[0]:g} ms"
+            )
+        closest = np.diff(train).min(initial=np.inf)
+        if closest <= neuron.REFRACTORY.value:
+            raise InputError(
+                "likelihood",
+                f"needs spikes more than {neuron.REFRACTORY.value:g} ms apart, the rest after a spike",
+                remedy=f"{name} has two that are {closest:.3g} ms apart; sort the unit again, or fit rates",
+            )
+    return recordings
+
+
+Beside = Mapping[float, Traces | Sequence[Traces]]
+"""Strain energy density by offset from the believed place, distal positive [mm], one column per stimulus."""
+
+
+def check_offset(method: str, places_mm: Sequence[float]) -> None:
+    """Raise `InputError` if a receptor's offset cannot be determined."""
+    if method not in OFFSET_METHODS:
+        raise InputError("offset", f"needs a method that fits it, {' or '.join(OFFSET_METHODS)}", str(method))
+    if len(set(places_mm)) < 2:
+        words = "needs stimuli at several places along the finger, as those of the shifted bar are"
+        raise InputError("offset", words, remedy=f"all are at {places_mm[0]:g} mm, leave it out")
+
+
+def check_beside(beside: Beside) -> FloatArray:
+    """Return the places in order (n_places,) [mm], or raise `InputError` if they miss a side."""
+    beside_mm = np.array(sorted(beside), dtype=np.float64)
+    if not (beside_mm.size and beside_mm[0] < 0.0 < beside_mm[-1]):
+        raise InputError(
+            "beside",
+            "needs energy density on both sides of the receptor, at offsets below and above 0 mm",
+            str(", ".join(f"{offset:g}" for offset in beside_mm) or "none"),
+        )
+    return beside_mm
+
+
+@checked
+def fit_offset(
+    beside: Beside,
+    rates: RateRecordings,
+    memberships: IntArray,
+    method: Annotated[str, choice(OFFSET_METHODS)],
+    windows_ms: Windows | None,
+    seed: Whole = 0,
+) -> OffsetFit:
+    """Fit a receptor in its place, then let it move from the best fit, which it can only improve."""
+    beside_mm = check_beside(beside)
+    roving = ReceptorOffset.of_traces({offset: beside[offset] for offset in beside_mm}, windows_ms)
+    search = four_numbers_and_offset(roving, rates)
+    in_place = {"least_squares": "least_squares", "cma_es": "closed_form"}[method]
+    first = prepare(in_place, roving.at(0.0), rates, rates, seed)
+
+    def moving(begun: FloatArray) -> Method:
+        if method == "cma_es":
+            return search.by_evolution(np.append(begun, 0.0), seed)
+        return _from_all_offsets(search, begun, roving.offsets_mm)
+
+    best, crossed = validated(search.problem, Continued(first.method, moving, first.problem), memberships)
+    four, offset_mm = fitted_four(best.parameters[:4]).tolist(), float(best.parameters[-1])
+    folds_mm = [float(fold.fit.parameters[-1]) for fold in crossed.folds]
+    error = jackknife_covariance(np.reshape(folds_mm, (-1, 1)))
+    everything = np.arange(roving.n_stimuli)
+    held = [prepare(method, place, rates, rates, seed) for place in roving.models]
+    return OffsetFit(
+        offset_mm=offset_mm,
+        standard_error_mm=np.nan if error is None else np.sqrt(error[0, 0]),
+        folds_mm=np.array(folds_mm),
+        identifiable=dict(zip(IDENTIFIABLE_NAMES, four, strict=True)),
+        fss_in_sample=best.score,
+        fss_out_of_sample=crossed.score_test,
+        fss_by_phase=search.problem.score_by_phase(best.parameters, everything),
+        n_evaluations=best.n_evaluations,
+        seconds=best.seconds,
+        held=HeldOffset(
+            offset_mm=beside_mm,
+            fss_in_sample=np.array([one.method.fit(one.problem, everything).score for one in held]),
+        ),
+    )
+
+
+def _from_all_offsets(search: Search, begun: FloatArray, offsets_mm: FloatArray) -> Method:
+    """Least squares from each offset."""
+    within = np.clip(begun, search.bounds.low[:4], search.bounds.high[:4])  # round-off at a bound
+    starts = [np.append(within, offset) for offset in sorted({0.0, *offsets_mm[1:-1].tolist()})]
+    return LeastSquares(starts, search.bounds, n_refined=2)

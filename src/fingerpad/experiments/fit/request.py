@@ -28,8 +28,7 @@ from fingerpad.core.values import (
     positive,
 )
 from fingerpad.experiments.conditions import Conditions
-from fingerpad.experiments.fit.fit import check_enough, fit_recordings
-from fingerpad.experiments.fit.methods import METHODS, check_offset, check_spikes
+from fingerpad.experiments.fit.fit import METHODS, check_enough, check_offset, check_spikes, fit_recordings
 from fingerpad.experiments.fit.results import FitResult
 from fingerpad.experiments.recording_files import Recorded, read_recordings, recorded_of
 from fingerpad.experiments.requests.afferents import (
@@ -166,7 +165,7 @@ class FitRequest(FingerRequest):
             check_offset(self.method, [stimulus.x_mm for stimulus in self.recorded.stimuli.values()])
         n_free = len(self.free) or len(IDENTIFIABLE_NAMES) + self.offset
         check_enough(self.rates, self.memberships, n_free)
-        if METHODS[self.method].needs_spikes:
+        if self.method == "likelihood":
             motions = {stimulus.motion for stimulus in self.recorded.stimuli.values()}
             check_spikes(self.recorded.recordings, len(motions))
 

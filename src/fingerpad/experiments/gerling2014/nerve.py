@@ -14,7 +14,7 @@ from fingerpad.core.units import MM_PER_M
 from fingerpad.core.values import FloatArray, Matrix, Number, Vector
 from fingerpad.data import bar_firing_rates, protocol
 from fingerpad.experiments.conditions import RECEPTOR_X_MM
-from fingerpad.experiments.fit.rate_uncertainty import uncertainty
+from fingerpad.experiments.fit.likelihoods import uncertainty
 from fingerpad.experiments.fit.results import Search, UncertaintyResult
 from fingerpad.experiments.gerling2014.skin import (
     DECIMALS,

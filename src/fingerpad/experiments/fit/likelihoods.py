@@ -1,15 +1,20 @@
-"""Uncertainty of a fit to rates: credible intervals, profile likelihoods, and sensitivity of FSS."""
+"""Fits by the likelihood of spikes, and what the likelihood of rates says of a fit: intervals, profiles."""
 
 from __future__ import annotations
 
+import time
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy.stats import norm
 
+from fingerpad.core.errors import ConvergenceError
+from fingerpad.core.signals import SpikeTrains
 from fingerpad.core.units import units_of
-from fingerpad.core.values import FloatArray
+from fingerpad.core.values import FloatArray, IntArray
+from fingerpad.experiments.fit.fit import Prepared, Recordings, check_spikes
 from fingerpad.experiments.fit.results import (
     CredibleInterval,
     FssSensitivity,
@@ -20,14 +25,15 @@ from fingerpad.experiments.fit.results import (
     PosteriorConvergence,
     RateBand,
     RatePosterior,
+    SpikeFitSummary,
     UncertaintyResult,
 )
-from fingerpad.inference.afferent_fit import start_points
-from fingerpad.inference.fitting.methods import halton
+from fingerpad.inference.afferent_fit import spike_start, start_points
+from fingerpad.inference.fitting.methods import CrossValidation, Fit, Problem, halton
 from fingerpad.inference.fitting.posterior import credible_band
 from fingerpad.inference.fitting.profile_likelihood import ProfileLikelihood, profile_likelihoods
 from fingerpad.inference.fitting.sensitivity import identifiability, sobol_indices
-from fingerpad.inference.identifiable import IDENTIFIABLE_NAMES, identifiable
+from fingerpad.inference.identifiable import IDENTIFIABLE_NAMES, identifiable, six_parameters
 from fingerpad.inference.rate_model import AfferentModel, RateProblem, four_number_model
 from fingerpad.inference.rate_posterior import (
     INDEPENDENT,
@@ -37,8 +43,10 @@ from fingerpad.inference.rate_posterior import (
     from_coordinates,
     to_coordinates,
 )
-from fingerpad.inference.recordings import RateRecordings
+from fingerpad.inference.recordings import RateRecordings, SpikeRecordings
+from fingerpad.inference.spike_likelihood import SoftAfferent, SpikeLikelihood, fit_spikes, time_rescaling
 from fingerpad.neuron.afferent import PARAMETER_NAMES
+from fingerpad.neuron.transduction import Drive
 
 LEVEL = 0.95  # Probability within every interval and band.
 SEEDS_OF_PROFILES = 300  # Draws from the posterior that profiles start from.
@@ -251,4 +259,77 @@ def _prediction(drawn: ResidualDraws, observed_hz: FloatArray) -> PhasePredictio
         residual_deviation_hz=_interval(drawn.deviation_hz),
         residual_length_mm=_interval(drawn.length_mm),
         probability_of_independence=(drawn.length_mm == INDEPENDENT).mean(),
+    )
+
+
+@dataclass(frozen=True)
+class MaximumLikelihood:
+    """Fit the soft threshold under which the spikes of the chosen stimuli are most likely."""
+
+    drive: Drive  # One column per stimulus.
+    recordings: SpikeRecordings  # Spikes of all presentations.
+    sites: IntArray  # Column of the drive that each presentation belongs to, (n_presentations,).
+    name: str = "likelihood"
+
+    def of(self, chosen: IntArray) -> SpikeLikelihood:
+        rows = np.flatnonzero(np.isin(self.sites, chosen))
+        trains = SpikeTrains.from_lists([self.recordings.trains[int(row)] for row in rows])
+        return SpikeLikelihood(self.drive, trains, self.sites[rows], self.recordings.duration_ms[rows])
+
+    def fit(self, problem: Problem, chosen: IntArray) -> Fit:
+        """Climb to the likeliest parameters; the problem only scores them."""
+        clock = time.perf_counter()
+        try:
+            found = fit_spikes(self.of(chosen), spike_start())
+        except ConvergenceError as error:
+            raise ConvergenceError(
+                f"likelihood is not determined by the spikes of {len(chosen)} stimuli "
+                f"({str(error).partition(':')[0]}): record each stimulus more than once, or choose another "
+                "method, such as least_squares.",
+                error.history,
+            ) from error
+        seconds = time.perf_counter() - clock
+        score = problem.score(found.parameters, chosen)
+        return Fit(found.parameters, score, len(found.history), seconds, ())
+
+
+@dataclass(frozen=True)
+class PreparedSpikes(Prepared):
+    """The likelihood of spikes, the method that maximises it, and the meaning of its parameters."""
+
+    method: MaximumLikelihood
+    everything: SpikeLikelihood  # Likelihood of all spikes.
+
+    def covariance(self, fit: Fit, folds: CrossValidation) -> FloatArray:
+        """Covariance (4, 4) of the identifiable numbers: part of the inverse of the Fisher information."""
+        return self._covariance(fit)[:4, :4]
+
+    def spikes(self, fit: Fit, folds: CrossValidation) -> SpikeFitSummary:
+        left_out = [(self.method.of(fold.testing), fold.fit.parameters) for fold in folds.folds]
+        test = time_rescaling(self.everything, fit.parameters)
+        return SpikeFitSummary(
+            n_spikes=self.everything.n_spikes,
+            log_likelihood=self.everything.log_likelihood(fit.parameters),
+            log_likelihood_out_of_sample=sum(part.log_likelihood(five) for part, five in left_out),
+            escape_width=fit.parameters[4],
+            escape_width_standard_error=np.sqrt(self._covariance(fit)[4, 4]),
+            time_rescaling_distance=test.statistic,
+            time_rescaling_p_value=test.p_value,
+        )
+
+    def _covariance(self, fit: Fit) -> FloatArray:
+        return np.linalg.inv(self.everything.derivatives(fit.parameters)[2]).astype(np.float64)
+
+
+def prepare_spikes(
+    model: AfferentModel, recordings: Recordings, rates: RateRecordings, seed: int
+) -> PreparedSpikes:
+    trains, (drive,) = check_spikes(recordings, len(model.drives)), model.drives
+    sites = np.array([rates.stimuli.index(name) for name in trains.stimuli], dtype=np.int64)
+    method = MaximumLikelihood(drive, trains, sites)
+    return PreparedSpikes(
+        RateProblem(SoftAfferent(drive, model.used_windows_ms, seed), rates),
+        method,
+        lambda five: six_parameters(five[:4]),
+        method.of(np.arange(drive.n_sites)),
     )
