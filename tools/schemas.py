@@ -139,7 +139,7 @@ def _written_beside(part: type[Part]) -> dict[str, str]:
     except (OSError, TypeError):
         return {}
     comments = {
-        token.start[0]: token.string.lstrip("# ")
+        token.start[0]: token.string.lstrip("#: ")
         for token in tokenize.generate_tokens(io.StringIO(source).readline)
         if token.type == tokenize.COMMENT and not token.string.startswith(("# type:", "# fmt:"))
     }

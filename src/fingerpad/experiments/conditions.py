@@ -51,30 +51,16 @@ def straight_tilt_deg(finger: Finger, indenter: Indenter) -> float:
 
 @value_class
 class Conditions:
-    """Finger, tissues and accuracy of a reproduction.
+    """Finger, tissues and accuracy of a reproduction."""
 
-    Parameters
-    ----------
-    resolution : {"quick", "standard", "paper"}
-        How fine meshes and steps are.
-    seed : int
-        Seed of the observer's noise.
-    tissues : str or Tissues
-        Tissues of all but the paper's three trials: a name, see `mechanics.tissues`, or your own.
-    finger : Fingertip or FingerMesh
-        The finger.
-    grading : Grading, optional
-        Mesh instead of those that the resolution grades.
-    receptor_depths_mm : tuple of float
-        Depths at which presses keep quantities, as of `fingerpad.indent`. [mm]
-    """
-
-    resolution: Annotated[str, choice(RESOLUTIONS)] = "standard"
-    seed: Seed = 0
+    resolution: Annotated[str, choice(RESOLUTIONS)] = "standard"  #: How fine meshes and steps are.
+    seed: Seed = 0  #: Seed of the observer's noise.
     tissues: Annotated[str, choice(TISSUES)] | Tissues = DEFAULT_TISSUES
-    finger: Finger = field(default_factory=Fingertip)
-    grading: Grading | None = None
+    """Tissues of all but the paper's three trials: a name, see `mechanics.tissues`, or your own."""
+    finger: Finger = field(default_factory=Fingertip)  #: The finger.
+    grading: Grading | None = None  #: Mesh instead of those that the resolution grades.
     receptor_depths_mm: Numbers = ()
+    """Depths at which presses keep quantities, as of `fingerpad.indent`. [mm]"""
 
     @property
     def afferent(self) -> Afferent:

@@ -26,28 +26,18 @@ from fingerpad.mechanics.tissues import TISSUES
 
 
 class ReproductionRequest(Request):
-    """A reproduction of Gerling et al. (2014), as `fingerpad.reproduce` runs it.
-
-    Parameters
-    ----------
-    resolution : {"quick", "standard", "paper"}
-        How fine meshes and steps are.
-    tissues : str
-        Tissues of the first column: "paper", Trial 3 with a Poisson's ratio of 0.40, our reading; "trial3",
-        Trial 3 to the letter, 0.48; or any other named set but human.
-    extended : bool, optional
-        Whether what goes beyond the paper is run as well: uncertainty of the fit, curvature thresholds; by
-        default at all resolutions but quick.
-    seed : int
-        Of all random numbers.
-    """
+    """A reproduction of Gerling et al. (2014), as `fingerpad.reproduce` runs it."""
 
     word: ClassVar[str] = "reproduction"
 
-    resolution: Annotated[str, choice(RESOLUTIONS)] = "standard"
+    resolution: Annotated[str, choice(RESOLUTIONS)] = "standard"  #: How fine meshes and steps are.
     tissues: Annotated[str, choice(tuple(name for name in TISSUES if name != HUMAN))] = PAPER
+    """Tissues of the first column: "paper", Trial 3 with a Poisson's ratio of 0.40, our reading; "trial3",
+    Trial 3 to the letter, 0.48; or any other named set but human."""
     extended: Flag | None = None
-    seed: Seed = 0
+    """Whether what goes beyond the paper is run as well: uncertainty of the fit, curvature thresholds; by
+    default at all resolutions but quick."""
+    seed: Seed = 0  #: Of all random numbers.
 
     @property
     def goes_beyond(self) -> bool:

@@ -138,40 +138,18 @@ class TaskObservations:
 
 @result_class
 class TaskResult(Result):
-    """Result of a discrimination task.
-
-    Parameters
-    ----------
-    question : str
-        The task in words.
-    axis : str
-        What the levels are.
-    stimulus : tuple of str
-        Names, the standard first.
-    level : array (n_stimuli,), optional
-        Where the stimuli stand on the axis of the psychometric curve.
-    population : TaskPopulation
-        The afferents.
-    noise : TaskNoise
-        Given or fitted.
-    responses : dict of str to array (n_stimuli, n_receptors)
-        By measure. [spikes/s or ms]
-    decodings : tuple of Decoding
-        One per measure and code.
-    observed : TaskObservations, optional
-        Hit rates of people.
-    """
+    """Result of a discrimination task."""
 
     whole_as_json: ClassVar[bool] = True
-    question: str
-    axis: str
-    stimulus: tuple[str, ...]
-    level: Vector | None
-    population: TaskPopulation
-    noise: TaskNoise
-    responses: dict[str, Matrix]
-    decodings: tuple[Decoding, ...]
-    observed: TaskObservations | None
+    question: str  #: The task in words.
+    axis: str  #: What the levels are.
+    stimulus: tuple[str, ...]  #: Names, the standard first.
+    level: Vector | None  #: Where the stimuli stand on the axis of the psychometric curve.
+    population: TaskPopulation  #: The afferents.
+    noise: TaskNoise  #: Given or fitted.
+    responses: dict[str, Matrix]  #: By measure. [spikes/s or ms]
+    decodings: tuple[Decoding, ...]  #: One per measure and code.
+    observed: TaskObservations | None  #: Hit rates of people.
 
     def columns(self) -> Columns:
         """Return what each decoding makes of each comparison; NaN where it has no answer."""

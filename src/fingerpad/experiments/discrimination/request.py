@@ -123,34 +123,6 @@ class ObservedSettings(Part):
 class DiscriminationRequest(StimulusSet, FingerRequest):
     """A discrimination task, as `fingerpad.discriminate` runs it and a file describes it.
 
-    Parameters
-    ----------
-    question : str
-        In words: the title of the page.
-    axis : str, optional
-        What the levels are, for the axes of figures; by default the key that varies.
-    standard : float or str
-        Level or name of the stimulus that all others are compared with.
-    afferents : AfferentsSettings
-        Who responds, as of a touch.
-    code, measure : list of str
-        How the population is decoded, and what is measured of each afferent, by the names of `CODES` and
-        `MEASURES`; the first are the main ones.
-    latest_ms : float, optional
-        Latest first spike that counts; a later one, or none, counts as this time. Without it, receptors that
-        are silent under one stimulus are left out. [ms]
-    noise : float or "fitted"
-        Standard deviation of the multiplicative noise, or that which brings the main code and measure closest
-        to the observed hit rates.
-    experiment : ExperimentSettings
-        Repetitions, criterion and seed.
-    curve : CurveSettings
-        The psychometric curve.
-    observed : ObservedSettings, optional
-        Hit rates of people.
-    object, motion, place, friction, stimuli, reach_mm, resolution, finger, tissues, stiffness, grading
-        As of `StimulusSet`.
-
     Examples
     --------
     >>> spheres = {"vary": "object.curvature_per_m", "values": [287, 340]}
@@ -167,20 +139,26 @@ class DiscriminationRequest(StimulusSet, FingerRequest):
         *FINGER_OBJECTS, "object", "motion", "afferents", "afferents.afferent", "afferents.population",
     )  # fmt: skip
 
-    question: Text = "Which stimuli can be told apart?"
-    axis: Text | None = None
-    standard: LevelOrName
-    afferents: Afferents = AfferentsSettings()
+    question: Text = "Which stimuli can be told apart?"  #: In words: the title of the page.
+    axis: Text | None = None  #: What the levels are, for the axes of figures; by default the key that varies.
+    standard: LevelOrName  #: Level or name of the stimulus that all others are compared with.
+    afferents: Afferents = AfferentsSettings()  #: Who responds, as of a touch.
     code: Annotated[tuple[str, ...], some_of(CODES)] = ("gradient_sum",)
     measure: Annotated[tuple[str, ...], some_of(MEASURES)] = ("static",)
+    """How the population is decoded, and what is measured of each afferent, by the names of `CODES` and
+    `MEASURES`; the first are the main ones."""
     latest_ms: Positive | None = None
+    """Latest first spike that counts; a later one, or none, counts as this time. Without it, receptors that
+    are silent under one stimulus are left out. [ms]"""
     noise: Annotated[
         Annotated[float, limits(0.0, LARGEST_NOISE)] | Annotated[str, choice((FITTED,))],
         with_message(f"a number from 0 to {LARGEST_NOISE:g}, or {FITTED}"),
     ]
-    experiment: ExperimentSettings = ExperimentSettings()
-    curve: CurveSettings = CurveSettings()
-    observed: ObservedSettings | None = None
+    """Standard deviation of the multiplicative noise, or that which brings the main code and measure closest
+    to the observed hit rates."""
+    experiment: ExperimentSettings = ExperimentSettings()  #: Repetitions, criterion and seed.
+    curve: CurveSettings = CurveSettings()  #: The psychometric curve.
+    observed: ObservedSettings | None = None  #: Hit rates of people.
 
     @classmethod
     def read(cls, source: Any = None, given: Any = MappingProxyType({}), *args: Any, **more: Any) -> Any:

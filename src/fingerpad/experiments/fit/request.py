@@ -88,67 +88,44 @@ class FitFile:
 
 
 class FitRequest(FingerRequest):
-    """A fit to recordings, as `fingerpad.fit` runs it and a file or a command describes it.
-
-    Parameters
-    ----------
-    recordings : str, Path, RateRecordings or SpikeRecordings
-        A CSV or NWB file (docs/fit.md), or recordings whose names are those of the stimuli.
-    stimuli : str, Path or Stimuli
-        "bar" (shifted along the finger), or a CSV or YAML file with stimuli.
-    stimulus_column : str, optional
-        Column of the recordings with the name of the stimulus; by default shift_mm or stimulus.
-    unit : int, optional
-        Id of the spike unit of an NWB file.
-    object, motion
-        The bar and how it is pressed, where the stimuli are the bar.
-    afferent : str or AnyAfferent
-        Type of the afferent for `free`, a file of results, numbers, or an afferent of Python.
-    depth_mm : float, optional
-        Depth of the receptor below the skin; by default the border of epidermis and dermis. [mm]
-    free : list of str
-        Fit these numbers of the afferent alone; by default the four that spikes of an SAI determine.
-    dynamic_quantity, static_quantity : str, optional
-        What each term follows: strain energy density, "stored", as in the paper, or another quantity; by
-        default that of the tissues.
-    windows_ms : RateWindowSettings
-        Windows of the two rates; by default they follow the phases of the stimuli. [ms]
-    method : str
-        One of `METHODS`.
-    posterior, profiles, sensitivity, offset : bool
-        Whether credible intervals, profile likelihoods and Sobol indices are computed, and whether the
-        receptor's offset along the finger is fitted.
-    folds : int, optional
-        Number of interleaved folds; by default 6, or the column fold of the recordings.
-    seed : int
-        Of methods that draw.
-    resolution, finger, tissues, stiffness, grading
-        As of `FingerDescription`; "standard" by default, and those of the file of the stimuli.
-    """
+    """A fit to recordings, as `fingerpad.fit` runs it and a file or a command describes it."""
 
     word: ClassVar[str] = "fit"
     python: ClassVar[tuple[str, ...]] = (*FINGER_OBJECTS, "object", "motion", "afferent")
 
     recordings: Text | Path | object_of_python(RateRecordings | SpikeRecordings | Recorded)  # type: ignore[valid-type]
+    """A CSV or NWB file (docs/fit.md), or recordings whose names are those of the stimuli."""
     stimuli: Text | Path | object_of_python(Stimuli) = BAR  # type: ignore[valid-type]
+    """"bar" (shifted along the finger), or a CSV or YAML file with stimuli."""
     stimulus_column: Text | None = None
-    unit: Whole | None = None
+    """Column of the recordings with the name of the stimulus; by default shift_mm or stimulus."""
+    unit: Whole | None = None  #: Id of the spike unit of an NWB file.
     object: ObjectPart | None = None
-    motion: MotionPart | None = None
+    motion: MotionPart | None = None  #: The bar and how it is pressed, where the stimuli are the bar.
     afferent: AfferentChoice = DEFAULT
+    """Type of the afferent for `free`, a file of results, numbers, or an afferent of Python."""
     depth_mm: Positive | None = None
+    """Depth of the receptor below the skin; by default the border of epidermis and dermis. [mm]"""
     free: Annotated[tuple[Text, ...], Strict(False), BeforeValidator(as_list)] = ()
+    """Fit these numbers of the afferent alone; by default the four that spikes of an SAI determine."""
     dynamic_quantity: Annotated[str, choice(QUANTITIES)] | None = None
     static_quantity: Annotated[str, choice(QUANTITIES)] | None = None
+    """What each term follows: strain energy density, "stored", as in the paper, or another quantity; by
+    default that of the tissues."""
     windows_ms: RateWindowSettings = RateWindowSettings()
-    method: Annotated[str, choice(METHODS)] = "least_squares"
+    """Windows of the two rates; by default they follow the phases of the stimuli. [ms]"""
+    method: Annotated[str, choice(METHODS)] = "least_squares"  #: One of `METHODS`.
     posterior: Flag = False
     profiles: Flag = False
     sensitivity: Flag = False
     offset: Flag = False
+    """Whether credible intervals, profile likelihoods and Sobol indices are computed, and whether the
+    receptor's offset along the finger is fitted."""
     folds: Count | None = None
-    seed: Seed = 0
+    """Number of interleaved folds; by default 6, or the column fold of the recordings."""
+    seed: Seed = 0  #: Of methods that draw.
     resolution: Annotated[str, choice(RESOLUTIONS)] = "standard"
+    """As of `FingerDescription`; "standard" by default, and those of the file of the stimuli."""
 
     def check(self) -> None:
         """Raise `InputError` if the fit is impossible; before anything is solved."""

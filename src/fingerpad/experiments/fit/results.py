@@ -259,73 +259,37 @@ class Search:
 
 @result_class
 class FitResult(Result):
-    """Result of a fit to recordings.
-
-    Parameters
-    ----------
-    method, source : str
-        How it was fitted, and where the recordings come from.
-    n_evaluations : int
-        Evaluations of the model.
-    seconds : float
-        Time on the clock. [s]
-    parameters, identifiable : dict of str to float
-        The paper's six parameters, and the four that rates identify.
-    units, identifiable_units : dict of str to str
-        Their units.
-    identifiable_standard_error : dict of str to float
-        NaN where there is no covariance.
-    identifiable_covariance : array (4, 4), optional
-        Of the four numbers.
-    fss_in_sample, fss_training_mean, fss_out_of_sample : float
-        Over all stimuli; over training sets and testing sets, mean of the folds.
-    stimulus : tuple of str
-        Names.
-    fold : int array (n_stimuli,)
-        Fold of each stimulus, from 1.
-    phases : dict of str to PhaseRates
-        Rates by phase, "dynamic" and "static".
-    folds : tuple of FittedFold
-        The cross validation.
-    spikes : SpikeFitSummary, optional
-        Of the likelihood of spikes.
-    posterior, profiles, sensitivity, offset : optional
-        Credible intervals, profile likelihoods, Sobol indices, and the fit with the receptor's offset as a
-        further parameter, where they were asked for.
-    shift_mm : array (n_stimuli,), optional
-        Shift of each stimulus, proximal positive, where stimuli differ in nothing else. [mm]
-    presentations : tuple of int
-        Presentations of each stimulus.
-    spikes_after_hold : int
-        Spikes that were left out because they came after the hold.
-    """
+    """Result of a fit to recordings."""
 
     whole_as_json: ClassVar[bool] = True
     method: str
-    source: str
-    n_evaluations: int
-    seconds: float
+    source: str  #: How it was fitted, and where the recordings come from.
+    n_evaluations: int  #: Evaluations of the model.
+    seconds: float  #: Time on the clock. [s]
     parameters: dict[str, float]
-    identifiable: dict[str, float]
+    identifiable: dict[str, float]  #: The paper's six parameters, and the four that rates identify.
     units: dict[str, str]
-    identifiable_units: dict[str, str]
-    identifiable_standard_error: dict[str, Number]
-    identifiable_covariance: Matrix | None
+    identifiable_units: dict[str, str]  #: Their units.
+    identifiable_standard_error: dict[str, Number]  #: NaN where there is no covariance.
+    identifiable_covariance: Matrix | None  #: Of the four numbers.
     fss_in_sample: float
     fss_training_mean: float
-    fss_out_of_sample: float
-    stimulus: tuple[str, ...]
-    fold: WholeVector
-    phases: dict[str, PhaseRates]
-    folds: tuple[FittedFold, ...]
-    spikes: SpikeFitSummary | None
+    fss_out_of_sample: float  #: Over all stimuli; over training sets and testing sets, mean of the folds.
+    stimulus: tuple[str, ...]  #: Names.
+    fold: WholeVector  #: Fold of each stimulus, from 1.
+    phases: dict[str, PhaseRates]  #: Rates by phase, "dynamic" and "static".
+    folds: tuple[FittedFold, ...]  #: The cross validation.
+    spikes: SpikeFitSummary | None  #: Of the likelihood of spikes.
     posterior: RatePosterior | None
     profiles: tuple[ParameterProfile, ...] | None
     sensitivity: FssSensitivity | None
     offset: OffsetFit | None
+    """Credible intervals, profile likelihoods, Sobol indices, and the fit with the receptor's offset as a
+    further parameter, where they were asked for."""
     shift_mm: Vector | None = None
-    presentations: tuple[int, ...] = ()
-    spikes_after_hold: int = 0
+    """Shift of each stimulus, proximal positive, where stimuli differ in nothing else. [mm]"""
+    presentations: tuple[int, ...] = ()  #: Presentations of each stimulus.
+    spikes_after_hold: int = 0  #: Spikes that were left out because they came after the hold.
 
     def columns(self) -> Columns:
         """Rates that were observed, fitted and predicted out of the fold, by stimulus and phase."""

@@ -40,35 +40,21 @@ class RangeSettings(Part):
 
 
 class ReductionRequest(StimulusDescription, FingerRequest):
-    """A touch to be reduced, as `fingerpad.reduce` presses it and a file describes it.
-
-    Parameters
-    ----------
-    range : RangeSettings
-        The poses.
-    afferents : AfferentsSettings
-        Who will respond: what they follow is kept.
-    quantities : list of str
-        What is kept beside that, by the names of `SkinResponse.sample`; by default compressive stress and
-        strain energy density.
-    calibration : int
-        Number of random touches from which the error is measured: 0 for none, else 19 or more.
-    seed : int
-        Of these touches.
-    object, place, friction, resolution, finger, tissues, stiffness, grading
-        As of a touch; there is no motion.
-    """
+    """A touch to be reduced, as `fingerpad.reduce` presses it and a file describes it."""
 
     word: ClassVar[str] = "range"
     python: ClassVar[tuple[str, ...]] = (
         *FINGER_OBJECTS, "object", "afferents", "afferents.afferent", "afferents.population",
     )  # fmt: skip
 
-    range: RangeSettings
-    afferents: Afferents = AfferentsSettings()
+    range: RangeSettings  #: The poses.
+    afferents: Afferents = AfferentsSettings()  #: Who will respond: what they follow is kept.
     quantities: Annotated[tuple[str, ...], Strict(False), BeforeValidator(as_list)] = KEPT
+    """What is kept beside that, by the names of `SkinResponse.sample`; by default compressive stress and
+    strain energy density."""
     calibration: Annotated[int, Field(ge=0)] = 20
-    seed: Seed = 1
+    """Number of random touches from which the error is measured: 0 for none, else 19 or more."""
+    seed: Seed = 1  #: Of these touches.
 
     @cached_property
     def training(self) -> ReducedTraining:

@@ -43,23 +43,6 @@ WHOLE = ("netcdf", "zarr", "vtu")  # Outputs that hold all nodes and elements ov
 class TouchRequest(StimulusDescription, FingerRequest):
     """A touch, as `fingerpad.touch` presses it and a file describes it.
 
-    Parameters
-    ----------
-    title : str
-        What it is, in words: the title of the page.
-    resolution, finger, tissues, stiffness, grading
-        As of `FingerDescription`.
-    object, motion, place, friction
-        As of `StimulusDescription`.
-    times_ms : list of float
-        Times at which the result is wanted beside those that the motion has. [ms]
-    afferents : AfferentsSettings
-        Who responds.
-    outputs : list of str
-        What is written, by the names of `OUTPUTS`.
-    elastic_moduli : str
-        For calculix, which has no relaxation: the moduli of the layers, "long_term" or "instantaneous".
-
     Examples
     --------
     >>> touch = TouchRequest.read({"object": {"kind": "sphere", "radius_mm": 4}})
@@ -72,11 +55,13 @@ class TouchRequest(StimulusDescription, FingerRequest):
         *FINGER_OBJECTS, "object", "motion", "afferents", "afferents.afferent", "afferents.population",
     )  # fmt: skip
 
-    title: Text = "One touch"
-    times_ms: Numbers = ()
-    afferents: Afferents = AfferentsSettings()
+    title: Text = "One touch"  #: What it is, in words: the title of the page.
+    times_ms: Numbers = ()  #: Times at which the result is wanted beside those that the motion has. [ms]
+    afferents: Afferents = AfferentsSettings()  #: Who responds.
     outputs: Annotated[tuple[str, ...], some_of(OUTPUTS)] = ("figures", "csv", "spikes")
+    """What is written, by the names of `OUTPUTS`."""
     elastic_moduli: Annotated[str, choice(MODULI)] = MODULI[0]
+    """For calculix, which has no relaxation: the moduli of the layers, "long_term" or "instantaneous"."""
 
     @cached_property
     def touch(self) -> Touch:
@@ -138,20 +123,12 @@ class TouchRequest(StimulusDescription, FingerRequest):
 
 
 class RespondRequest(Request, AfferentsSettings):
-    """Afferents that respond to a touch, as `fingerpad.respond` lets them and a file describes it.
-
-    Parameters
-    ----------
-    touch : SkinResponse, TouchResult, TouchRequest, mapping, str or Path
-        A solved touch; or one that is pressed first, or loaded from where it is stored.
-    layout, density_per_cm2, afferent, population, noise, windows_ms and the others
-        As of `AfferentsSettings`, the block `afferents` of a touch.
-    """
+    """Afferents that respond to a touch, as `fingerpad.respond` lets them and a file describes it."""
 
     word: ClassVar[str] = "afferents"
     python: ClassVar[tuple[str, ...]] = ("afferent", "population")
 
-    touch: BlockOrObject
+    touch: BlockOrObject  #: A solved touch; or one that is pressed first, or loaded from where it is stored.
 
     def check(self) -> None:
         """Raise `InputError` if the touch or the afferents are impossible; before anything is solved."""

@@ -150,43 +150,30 @@ class SweepRequest(Request):
 
     A setting is a number from 0 to `size` - 1, in the order of a C array of `shape`; so is a press within
     `press_shape`.
-
-    Parameters
-    ----------
-    title : str
-        What it is, in words.
-    touch : mapping or TouchRequest
-        The touch, with the keys of `TouchRequest`; what varies need not be given.
-    observer : mapping, optional
-        An observer of the responses, with the keys of `ObserverSettings`; what varies need not be given.
-    grid : mapping
-        Values by field, such as "motion.depth_mm": each field is a dimension, and settings are all
-        combinations.
-    zip : mapping
-        Fields that vary together, one value of each per setting: one dimension.
-    sample : SampleSettings, optional
-        Fields that vary together over a box: one dimension.
-    where : list of str
-        Constraints such as "motion.depth_mm < 0.5 * object.radius_mm": other settings are left out.
-    fields : list of str
-        Fields of the skin that the result holds beside force, depth and contact, by the names of
-        `fingerpad.skin.fields.FIELDS`.
     """
 
     word: ClassVar[str] = "sweep"
 
-    title: Text = "A sweep"
+    title: Text = "A sweep"  #: What it is, in words.
     touch: Annotated[Block, BeforeValidator(_as_block)]
+    """The touch, with the keys of `TouchRequest`; what varies need not be given."""
     observer: Block | None = None
+    """An observer of the responses, with the keys of `ObserverSettings`; what varies need not be given."""
     grid: Block = Field(default={})
+    """Values by field, such as "motion.depth_mm": each field is a dimension, and settings are all
+    combinations."""
     zip: Block = Field(default={})
-    sample: SampleSettings | None = None
+    """Fields that vary together, one value of each per setting: one dimension."""
+    sample: SampleSettings | None = None  #: Fields that vary together over a box: one dimension.
     where: Annotated[tuple[Text, ...], Strict(False), BeforeValidator(as_list)] = ()
+    """Constraints such as "motion.depth_mm < 0.5 * object.radius_mm": other settings are left out."""
     fields: Annotated[
         tuple[Annotated[str, choice([field.name for field in stored_fields()])], ...],
         Strict(False),
         BeforeValidator(as_list),
     ] = ()
+    """Fields of the skin that the result holds beside force, depth and contact, by the names of
+    `fingerpad.skin.fields.FIELDS`."""
 
     @property
     def axes(self) -> tuple[Axis, ...]:

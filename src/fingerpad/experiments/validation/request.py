@@ -31,37 +31,26 @@ LOADINGS = (RAMP_AND_HOLD, QUASI_STATIC)  # Read at the end of the paper's hold,
 
 
 class ValidationRequest(FingerRequest):
-    """A validation, as `fingerpad.validate` runs it and a file or a command describes it.
-
-    Parameters
-    ----------
-    observations : str, Path or Observations
-        A CSV file (docs/validate.md), or what `read_observations` returns.
-    objects : mapping of str to object
-        Objects by the names that the column `indenter` has for them, beside `sphere:287` and the like.
-    afferent : str or AnyAfferent
-        Whose rates are predicted: "default", that of the tissues; a type; a file of results; or numbers.
-    depth_mm : float, optional
-        Depth of the receptor below the skin; by default the border of epidermis and dermis. [mm]
-    loading : {"ramp_and_hold", "quasi_static"}
-        How a depth of force or deflection is reached: read at the end of the paper's ramp and hold, or with
-        relaxed tissues.
-    static_window_ms : (float, float)
-        Window of the rates, within the paper's ramp and hold. [ms]
-    resolution, finger, tissues, stiffness, grading
-        As of `FingerDescription`; "standard" by default.
-    """
+    """A validation, as `fingerpad.validate` runs it and a file or a command describes it."""
 
     word: ClassVar[str] = "validation"
     python: ClassVar[tuple[str, ...]] = (*FINGER_OBJECTS, "afferent")
 
     observations: Text | Path | object_of_python(Observations)  # type: ignore[valid-type]
+    """A CSV file (docs/validate.md), or what `read_observations` returns."""
     objects: dict[str, ObjectPart] = Field(default={})
+    """Objects by the names that the column `indenter` has for them, beside `sphere:287` and the like."""
     afferent: AfferentChoice = DEFAULT
+    """Whose rates are predicted: "default", that of the tissues; a type; a file of results; or numbers."""
     depth_mm: Positive | None = None
+    """Depth of the receptor below the skin; by default the border of epidermis and dermis. [mm]"""
     loading: Annotated[str, choice(LOADINGS)] = RAMP_AND_HOLD
+    """How a depth of force or deflection is reached: read at the end of the paper's ramp and hold, or with
+    relaxed tissues."""
     static_window_ms: Pair = (protocol.STATIC_WINDOW.value[0], protocol.STATIC_WINDOW.value[1])
+    """Window of the rates, within the paper's ramp and hold. [ms]"""
     resolution: Annotated[str, choice(RESOLUTIONS)] = "standard"
+    """As of `FingerDescription`; "standard" by default."""
 
     @cached_property
     def observed(self) -> Observations:
