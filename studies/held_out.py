@@ -22,9 +22,8 @@ from fingerpad.experiments.conditions import RECEPTOR_X_MM, Conditions
 from fingerpad.experiments.gerling2014.skin import PLATE_DEPTHS_MM
 from fingerpad.experiments.runner import Manifest, Runner
 from fingerpad.experiments.validation.observations import KINDS, Observation, Observations, read_observations
-from fingerpad.experiments.validation.predictions import Condition, predict
 from fingerpad.experiments.validation.request import LOADINGS, RAMP_AND_HOLD, ValidationRequest
-from fingerpad.experiments.validation.validation import validate
+from fingerpad.experiments.validation.validation import Condition, predict, validate
 from fingerpad.geometry.edged_indenters import Grating
 from fingerpad.geometry.indenters import FlatPunch, Indenter, Plate
 from fingerpad.geometry.mesh_checks import jacobian_at_gauss

@@ -18,8 +18,7 @@ from fingerpad.core.result_files import to_json
 from fingerpad.experiments import runner
 from fingerpad.experiments.conditions import RECEPTOR_X_MM
 from fingerpad.experiments.discrimination import analysis
-from fingerpad.experiments.discrimination.analysis import analyse, forced_choice_of
-from fingerpad.experiments.discrimination.decoding import SESSION, side_curves
+from fingerpad.experiments.discrimination.analysis import SESSION, analyse, forced_choice_of, side_curves
 from fingerpad.experiments.discrimination.request import CurveSettings
 from fingerpad.experiments.examples import tasks
 from fingerpad.psychophysics.encoding import gradient_sum, neighbour_pairs, taking_part

@@ -16,7 +16,7 @@ import fingerpad as fp
 from fingerpad.cli import main
 from fingerpad.core.errors import InputError, StoreError
 from fingerpad.core.signals import RECEPTOR_COLUMNS
-from fingerpad.experiments.discrimination.decoding import SESSION
+from fingerpad.experiments.discrimination.analysis import SESSION
 from fingerpad.experiments.runner import Runner, software
 from fingerpad.experiments.sweep.request import Constraint
 from fingerpad.experiments.sweep.settings import observe

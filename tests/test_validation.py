@@ -22,9 +22,9 @@ from fingerpad.experiments.requests.stimulus import indenter_named
 from fingerpad.experiments.run import run
 from fingerpad.experiments.runner import STORE_FOLDER, Runner
 from fingerpad.experiments.schemas import read
-from fingerpad.experiments.validation import predictions
+from fingerpad.experiments.validation import validation
 from fingerpad.experiments.validation.observations import COLUMNS, KINDS, read_observations
-from fingerpad.experiments.validation.predictions import predict
+from fingerpad.experiments.validation.validation import predict
 from fingerpad.report.results import draw_validation, summary
 from fingerpad.skin.indentation import Touch
 from fingerpad.skin.store import Store
@@ -239,7 +239,7 @@ def pressed(monkeypatch):
             return SimpleNamespace(static_rate_hz=[7.0])
 
     monkeypatch.setattr(Runner, "responses", responses)
-    monkeypatch.setattr(predictions, "Population", Receptor)
+    monkeypatch.setattr(validation, "Population", Receptor)
     return touches, sites
 
 

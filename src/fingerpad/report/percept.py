@@ -11,8 +11,7 @@ from matplotlib.figure import Figure
 from fingerpad.core.signals import HitRates
 from fingerpad.core.values import FloatArray, one_of
 from fingerpad.data import psychophysics
-from fingerpad.experiments.discrimination.analysis import Decoding, TaskResult
-from fingerpad.experiments.discrimination.decoding import SideCurve
+from fingerpad.experiments.discrimination.analysis import Decoding, SideCurve, TaskResult
 from fingerpad.experiments.gerling2014.percept import GoodwinHitRates, ObserverHitRates, SphereDiscrimination
 from fingerpad.experiments.gerling2014.thresholds import CurvatureThresholds, PopulationThresholds
 from fingerpad.psychophysics.curve_fit import PsychometricFit

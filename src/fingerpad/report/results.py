@@ -8,8 +8,7 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from fingerpad.experiments.discrimination.analysis import ForcedChoice, TaskResult
-from fingerpad.experiments.discrimination.decoding import SideCurve
+from fingerpad.experiments.discrimination.analysis import ForcedChoice, SideCurve, TaskResult
 from fingerpad.experiments.validation.observations import KINDS
 from fingerpad.experiments.validation.validation import Prediction, ValidationFile
 from fingerpad.report import nerve, percept, reproduction, skin

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import ClassVar, Literal
@@ -11,26 +12,23 @@ from scipy.special import ndtr, ndtri
 
 from fingerpad.core.checked import checked, result_class
 from fingerpad.core.displayed import Columns, Result
-from fingerpad.core.errors import InputError
+from fingerpad.core.errors import ConvergenceError, InputError
 from fingerpad.core.signals import Skin
-from fingerpad.core.values import FloatArray, IntArray, Matrix, Vector
-from fingerpad.experiments.discrimination.decoding import SESSION as TASK_SESSION
-from fingerpad.experiments.discrimination.decoding import (
-    SideCurve,
-    TaskStatistic,
-    fit_task_noise,
-    response_table,
-    side_curves,
-    silent_stimuli,
-    task_statistic,
+from fingerpad.core.values import FloatArray, IntArray, Matrix, Number, Vector
+from fingerpad.experiments.discrimination.request import (
+    IDEAL,
+    CurveSettings,
+    DiscriminationRequest,
+    stimulus_index,
 )
-from fingerpad.experiments.discrimination.request import IDEAL, DiscriminationRequest, stimulus_index
 from fingerpad.experiments.requests.afferents import parameters_of
 from fingerpad.experiments.requests.parts import at
 from fingerpad.experiments.requests.stimuli import NamedStimulus
 from fingerpad.experiments.runner import Manifest, Runner
 from fingerpad.psychophysics.curve import binomial_interval
-from fingerpad.psychophysics.encoding import taking_part
+from fingerpad.psychophysics.curve_fit import fit_psychometric
+from fingerpad.psychophysics.curve_uncertainty import bootstrap, posterior
+from fingerpad.psychophysics.encoding import RESPONSE_MEASURES, taking_part
 from fingerpad.psychophysics.ideal_observer import (
     EFFICIENCY_TRIALS,
     SMALLEST_SPREAD,
@@ -39,9 +37,13 @@ from fingerpad.psychophysics.ideal_observer import (
     multiplied_responses,
     noisy_presentations,
 )
-from fingerpad.psychophysics.observer import ENCODERS, discriminate_by
+from fingerpad.psychophysics.observer import ENCODERS, discriminate_by, fit_noise_sigma
 
-SESSION = 2  # Session of the random numbers of efficiencies; that of the hit rates is another.
+SESSION, EFFICIENCY_SESSION = 1, 2
+"""Sessions of random numbers: of hit rates, as the reproduction's spheres at 0.0 mm; of efficiencies."""
+SHOWN_PRESENTATIONS = 1000  # Presentations behind the mean and spread of a statistic that a figure shows.
+CURVE_POINTS = 61
+CREDIBLE = 0.95
 Encoded = tuple[FloatArray, np.ndarray]  # A measure (n_stimuli, n_receptors), and pairs of neighbours.
 
 
@@ -90,14 +92,61 @@ class ForcedChoice:
     n_comparisons)."""
 
 
-def forced_choice_of(d_prime: FloatArray, trials: int) -> ForcedChoice:
-    """Two-alternative forced choice at some d', with the intervals of an experiment."""
-    proportion = ndtr(np.asarray(d_prime) / np.sqrt(2.0))
-    proportions = np.array([proportion, *binomial_interval(proportion, trials)])
-    d_primes = np.sqrt(2.0) * ndtri(proportions)
-    return ForcedChoice(
-        trials=trials, proportions=proportions, d_primes=np.where(np.isfinite(d_primes), d_primes, np.nan)
-    )
+@result_class
+class TaskStatistic:
+    """Mean and standard deviation of a code's statistic over noisy presentations, (n_stimuli,)."""
+
+    mean: Vector
+    sd: Vector
+
+
+@result_class
+class CurveThreshold:
+    """Threshold of a psychometric curve."""
+
+    proportion: float  # Hit rate at the threshold. [0-1]
+    difference: Number
+    level: Number  # From the standard, and on the axis. [unit of what varies]
+    over_standard: float | None  # Difference over standard (Weber fraction); absent where that is 0.
+    bootstrap_interval: tuple[Number, Number] | None
+    posterior_interval: tuple[Number, Number]
+    """Confidence and credible interval of the difference; the former is absent where no comparison lies on
+    the rise of the curve. [unit of what varies]"""
+
+
+@result_class
+class CurvePoints:
+    """A fitted curve at points (n_points,), with its credible band."""
+
+    difference: Vector
+    level: Vector
+    proportion: Vector
+    low: Vector
+    high: Vector
+
+
+@result_class
+class CurveFit:
+    """A fitted psychometric curve."""
+
+    sigmoid: str
+    trials: int  # Judgements per comparison behind the intervals.
+    threshold: CurveThreshold  # At the proportion that the task asks for.
+    slope: Number  # Of the hit rate at the threshold; NaN where no comparison lies on the rise.
+    lapse: float  # What is missing to 1 far above the threshold. [0-1]
+    at_bounds: tuple[str, ...]  # Parameters that ended at a bound.
+    curve: CurvePoints
+
+
+@result_class
+class SideCurve:
+    """Hit rates on one side of the standard, with their curve or the reason why there is none."""
+
+    side: str  # Of the standard.
+    difference: Vector
+    hit_rate: Vector  # Distance from the standard, and hit rate, (n_comparisons,).
+    fit: CurveFit | None = None
+    why_not: str | None = None  # Why there is no curve.
 
 
 @result_class
@@ -192,7 +241,11 @@ def analyse(task: DiscriminationRequest, skins: Mapping[str, Skin]) -> TaskResul
     """
     stimuli, latest_ms = task.pressed, task.latest_ms
     maps = task.responses(skins)
-    tables = {measure: response_table(maps, measure, latest_ms) for measure in task.measure}
+    tables = {
+        measure: np.array([RESPONSE_MEASURES[measure](answer) for answer in maps]) for measure in task.measure
+    }
+    if "latency" in tables and latest_ms is not None:
+        tables["latency"] = np.fmin(tables["latency"], latest_ms)
     silent = {measure: silent_stimuli(table, measure, latest_ms) for measure, table in tables.items()}
     if all(rows.size for rows in silent.values()):
         raise InputError(
@@ -247,9 +300,9 @@ def _noise(
             f"{_named(task.pressed, silent[measure])}; give a number, or another measure first."
         )
     rows, observed = [row - 1 for row in points], list(points.values())
-    table, neighbours = encoded[measure]
-    encoder, settings = ENCODERS[code](neighbours), task.experiment
-    fit = fit_task_noise(encoder, table, rows, observed, settings.seed, settings.plan)
+    (table, neighbours), settings = encoded[measure], task.experiment
+    predict = ENCODERS[code](neighbours).predictor(table, settings.seed, settings.plan, SESSION)
+    fit = fit_noise_sigma(lambda sigma: predict(sigma)[rows], observed)
     return TaskNoise(
         sigma=fit.noise_sigma,
         fitted_to=FittedNoise(
@@ -271,7 +324,7 @@ def _decodings(
     if silent.size:
         names = tuple(task.pressed[row].name for row in silent)
         return [Decoding(code=code, measure=measure, silent=names) for code in codes]
-    shown = noisy_presentations(encoded[0], sigma, seed, SESSION) if sigma > 0.0 else []
+    shown = noisy_presentations(encoded[0], sigma, seed, EFFICIENCY_SESSION) if sigma > 0.0 else []
     return [_decoding(task, code, measure, encoded, sigma, shown) for code in codes]
 
 
@@ -295,17 +348,18 @@ def _decoding(
         )
     else:
         encoder = ENCODERS[code](neighbours)
-        rates = discriminate_by(encoder, table, sigma, settings.seed, settings.plan, session=TASK_SESSION)
+        rates = discriminate_by(encoder, table, sigma, settings.seed, settings.plan, session=SESSION)
+        values = encoder.of_noisy(table, sigma, settings.seed, SESSION, SHOWN_PRESENTATIONS)
         decoding = Decoding(
             code=code,
             measure=measure,
             hit_rate=rates.hit_rate,
             hit_rate_sd=rates.hit_rate_sd,
-            statistic=task_statistic(encoder, table, sigma, settings.seed),
+            statistic=TaskStatistic(mean=values.mean(axis=1), sd=values.std(axis=1, ddof=1)),
         )
         if shown:
             standard = multiplied_responses(table[0], sigma, SMALLEST_SPREAD)
-            statistic = encoder.statistic(standard, settings.seed, SESSION)
+            statistic = encoder.statistic(standard, settings.seed, EFFICIENCY_SESSION)
             compared = [code_efficiency(presentation, statistic) for presentation in shown]
             decoding = replace(
                 decoding,
@@ -325,22 +379,106 @@ def _decoding(
 
 def _observed(task: DiscriminationRequest) -> TaskObservations | None:
     """Observed points with their levels, and binomial intervals where the trials are known."""
-    observed, stimuli, points = task.observed, task.pressed, []
-    if observed is None:
+    if task.observed is None:
         return None
-    for point in observed.points:
-        at = point.at
-        low_high = binomial_interval(point.hit_rate, point.trials) if point.trials else None
-        points.append(
-            TaskObservation(
-                at=at,
-                level=stimuli[stimulus_index(stimuli, at, "at")].level if isinstance(at, str) else at,
-                hit_rate=point.hit_rate,
-                trials=point.trials,
-                interval=None if low_high is None else (float(low_high[0]), float(low_high[1])),
+    points = []
+    for point in task.observed.points:
+        at, interval = point.at, None
+        level = task.pressed[stimulus_index(task.pressed, at, "at")].level if isinstance(at, str) else at
+        if point.trials:
+            low, high = binomial_interval(point.hit_rate, point.trials)
+            interval = float(low), float(high)
+        points.append(TaskObservation(**dict(point), level=level, interval=interval))
+    return TaskObservations(source=task.observed.source, points=tuple(points))
+
+
+def silent_stimuli(table: FloatArray, measure: str, latest_ms: float | None = None) -> IntArray:
+    if measure != "latency" or latest_ms is not None:
+        return np.flatnonzero((table == (latest_ms if measure == "latency" else 0.0)).all(axis=1))
+    missing = np.isnan(table)
+    if not missing.any(axis=0).all():
+        return np.empty(0, dtype=np.int64)
+    return np.flatnonzero(missing.sum(axis=1) == missing.sum(axis=1).max())
+
+
+def forced_choice_of(d_prime: FloatArray, trials: int) -> ForcedChoice:
+    """Two-alternative forced choice at some d', with the intervals of an experiment."""
+    proportion = ndtr(np.asarray(d_prime) / np.sqrt(2.0))
+    proportions = np.array([proportion, *binomial_interval(proportion, trials)])
+    d_primes = np.sqrt(2.0) * ndtri(proportions)
+    return ForcedChoice(
+        trials=trials, proportions=proportions, d_primes=np.where(np.isfinite(d_primes), d_primes, np.nan)
+    )
+
+
+def side_curves(
+    levels: Sequence[float], rates: FloatArray, trials: int, settings: CurveSettings, seed: int
+) -> tuple[SideCurve, ...]:
+    """Psychometric curves over the distance from the standard, where the hit rate is chance, on either side.
+
+    The intervals are those of an experiment with so many trials per comparison that finds these hit rates.
+    """
+    standard, others = levels[0], np.asarray(levels[1:], dtype=np.float64)
+    found = []
+    for side, sign in (("above", 1.0), ("below", -1.0)):
+        difference = sign * (others - standard)
+        order = [int(row) for row in np.argsort(difference) if difference[row] > 0.0]
+        if not order:
+            continue
+        fit, why_not = None, None
+        try:
+            fit = _curve_fit(standard, sign, difference[order], rates[order], trials, settings, seed)
+        except (ConvergenceError, InputError) as error:
+            why_not = str(error).splitlines()[0]
+        found.append(
+            SideCurve(
+                side=side, difference=difference[order], hit_rate=rates[order], fit=fit, why_not=why_not
             )
         )
-    return TaskObservations(source=observed.source, points=tuple(points))
+    return tuple(found)
+
+
+def _curve_fit(
+    standard: float,
+    sign: float,
+    difference: FloatArray,
+    rates: FloatArray,
+    trials: int,
+    settings: CurveSettings,
+    seed: int,
+) -> CurveFit:
+    if difference.size < 2:
+        raise InputError("A curve needs two comparisons on a side of the standard or more: got 1.")
+    counts = np.round(rates * trials)
+    lapse = None if isinstance(settings.lapse, str) else settings.lapse  # free, to be fitted
+    fit = fit_psychometric(
+        difference, counts, np.full(rates.size, trials), sigmoid=settings.sigmoid, lapse=lapse
+    )
+    wanted = settings.proportion
+    threshold = fit.threshold(wanted)
+    of_posterior = posterior(fit)
+    at = np.linspace(0.0, 1.05 * difference[-1], CURVE_POINTS + 1)[1:]
+    low, high = of_posterior.band(at, CREDIBLE)
+    return CurveFit(
+        sigmoid=settings.sigmoid,
+        trials=trials,
+        threshold=CurveThreshold(
+            proportion=wanted,
+            difference=threshold,
+            level=standard + sign * threshold,
+            over_standard=threshold / abs(standard) if standard else None,
+            bootstrap_interval=(
+                None if fit.is_step else bootstrap(fit, seed).threshold_interval(wanted, CREDIBLE)
+            ),
+            posterior_interval=of_posterior.threshold_interval(wanted, CREDIBLE),
+        ),
+        slope=math.nan if fit.is_step else fit.slope(wanted),
+        lapse=fit.function.lapse,
+        at_bounds=fit.at_bounds,
+        curve=CurvePoints(
+            difference=at, level=standard + sign * at, proportion=fit.predict(at), low=low, high=high
+        ),
+    )
 
 
 @result_class

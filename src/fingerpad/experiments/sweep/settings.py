@@ -14,7 +14,7 @@ import numpy as np
 from fingerpad.core.errors import ConvergenceError, InputError
 from fingerpad.core.signals import ResponseMap
 from fingerpad.core.values import FloatArray, IntArray
-from fingerpad.experiments.discrimination.decoding import SESSION, silent_stimuli
+from fingerpad.experiments.discrimination.analysis import SESSION, silent_stimuli
 from fingerpad.experiments.requests.afferents import population_neighbours
 from fingerpad.experiments.requests.touch import TouchRequest
 from fingerpad.experiments.sweep.request import ObserverSettings, SweepRequest
