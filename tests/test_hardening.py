@@ -24,12 +24,12 @@ from fingerpad.core.regions import Rectangle, poisson_disc, rectangular
 from fingerpad.core.signals import Traces
 from fingerpad.core.tables import read_csv
 from fingerpad.experiments.conditions import Conditions
-from fingerpad.experiments.estimates import estimate_press
 from fingerpad.experiments.fit.fit import fit_recordings
 from fingerpad.experiments.recording_files import read_recordings
 from fingerpad.experiments.requests.afferents import fitted_afferent
 from fingerpad.experiments.requests.stimuli import ShiftedBar
 from fingerpad.experiments.requests.stimulus import TactileStimulus
+from fingerpad.experiments.requests.touch import estimate_press
 from fingerpad.export.sweep_results import observe_sweep, setting_response, write_sweep_spikes
 from fingerpad.inference.rate_model import AfferentModel
 from fingerpad.inference.recordings import RateRecordings

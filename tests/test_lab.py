@@ -25,7 +25,7 @@ from tornado.httpclient import HTTPRequest
 from tornado.websocket import websocket_connect
 
 import fingerpad as fp
-from fingerpad.experiments.requests.reduction import ReductionRequest
+from fingerpad.experiments.requests.touch import ReductionRequest
 from fingerpad.lab.answer import Answer, LabState, compared, state_of
 from fingerpad.lab.laboratory import Laboratory, Making, shipped
 from fingerpad.lab.server import HOST, reply_to, serve, spec_of

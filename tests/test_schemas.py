@@ -5,8 +5,9 @@ import json
 import fastjsonschema
 import pytest
 
+from fingerpad.core.errors import StoreError
 from fingerpad.core.result_files import file_format
-from fingerpad.experiments.schemas import file_name, request_schema, schema
+from fingerpad.experiments.schemas import all_formats, file_name, read, request_schema, schema
 from tools.schemas import REQUESTS, RESULT_FILES, write_schemas
 
 
@@ -37,3 +38,11 @@ def test_a_schema_refuses_a_file_without_its_parts(results):
     check = fastjsonschema.compile(schema(name))
     with pytest.raises(fastjsonschema.JsonSchemaValueException, match="must contain"):
         check({"format": name, "format_version": version})
+
+
+def test_a_file_of_results_of_any_format_is_read_if_none_is_named(tmp_path):
+    assert sorted(all_formats()) == sorted(file_format(each)[0] for each in RESULT_FILES)
+    path = tmp_path / "other.json"
+    path.write_text('{"format": "shopping list", "format_version": 1}')
+    with pytest.raises(StoreError, match=r"the format fingerpad discrimination, version \d or .*: got shop"):
+        read(path)

@@ -18,12 +18,19 @@ from fingerpad.core.plain_yaml import read_yaml
 from fingerpad.core.result_files import from_json, to_json
 from fingerpad.experiments import schemas
 from fingerpad.experiments.conditions import RECEPTOR_X_MM, Conditions
-from fingerpad.experiments.estimates import BASE_MB, OWN_EXPONENT, OWN_NODE_MB, OWN_NODES, estimate_press
 from fingerpad.experiments.examples import examples
 from fingerpad.experiments.requests.parts import part_from
 from fingerpad.experiments.requests.stimuli import StimulusSet, named_stimuli
 from fingerpad.experiments.requests.stimulus import MOTIONS, OBJECTS
-from fingerpad.experiments.requests.touch import OUTPUTS, TouchFile
+from fingerpad.experiments.requests.touch import (
+    BASE_MB,
+    OUTPUTS,
+    OWN_EXPONENT,
+    OWN_NODE_MB,
+    OWN_NODES,
+    TouchFile,
+    estimate_press,
+)
 from fingerpad.export.requests import WRITERS, check_outputs
 from fingerpad.geometry import surface_files
 from fingerpad.geometry.dots import Dots

@@ -28,9 +28,8 @@ from fingerpad.experiments.discrimination.request import DiscriminationRequest
 from fingerpad.experiments.fit.request import ChosenNumbersFile, FitFile, FitRequest
 from fingerpad.experiments.gerling2014.reproduction import ReproductionResult
 from fingerpad.experiments.requests.parts import UNKNOWN_MODEL, Made, Part, Request, parts_in
-from fingerpad.experiments.requests.reduction import ReductionRequest
 from fingerpad.experiments.requests.stimulus import MEASURED, RAMP_AND_HOLD
-from fingerpad.experiments.requests.touch import RespondRequest, TouchFile, TouchRequest
+from fingerpad.experiments.requests.touch import ReductionRequest, RespondRequest, TouchFile, TouchRequest
 from fingerpad.experiments.run import ReproductionRequest
 from fingerpad.experiments.sweep.request import SweepRequest
 from fingerpad.experiments.validation.request import ValidationRequest

@@ -17,7 +17,7 @@ from fingerpad.core.signals import Traces as Traces
 from fingerpad.experiments.cluster import Cluster as Cluster
 from fingerpad.experiments.discrimination.request import DiscriminationRequest as DiscriminationRequest
 from fingerpad.experiments.fit.request import FitRequest as FitRequest
-from fingerpad.experiments.requests.reduction import ReductionRequest as ReductionRequest
+from fingerpad.experiments.requests.touch import ReductionRequest as ReductionRequest
 from fingerpad.experiments.requests.touch import RespondRequest as RespondRequest
 from fingerpad.experiments.requests.touch import TouchRequest as TouchRequest
 from fingerpad.experiments.run import ReproductionRequest as ReproductionRequest

@@ -295,13 +295,13 @@ def _check(given: argparse.Namespace, _: Options) -> None:
     request = getattr(fp, KINDS[name]).read(given.file, allow_python=given.allow_python)
     request.check()
     if name == "touch":
-        from fingerpad.experiments.estimates import estimate_press
+        from fingerpad.experiments.requests.touch import estimate_press
 
         check_outputs(request)
         _tell(*estimate_press(request).lines)
     elif name == "sweep":
         from fingerpad.cli.running import processes
-        from fingerpad.experiments.estimates import estimate_sweep
+        from fingerpad.experiments.sweep.settings import estimate_sweep
 
         _tell(*estimate_sweep(request, processes(None)).lines)
     else:

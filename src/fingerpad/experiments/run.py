@@ -16,8 +16,7 @@ from fingerpad.experiments.discrimination.request import DiscriminationRequest
 from fingerpad.experiments.fit.request import FitRequest, run_fit
 from fingerpad.experiments.gerling2014.reproduction import HUMAN, PAPER, ReproductionResult, reproduce
 from fingerpad.experiments.requests.parts import Request
-from fingerpad.experiments.requests.reduction import ReductionRequest
-from fingerpad.experiments.requests.touch import RespondRequest, TouchRequest
+from fingerpad.experiments.requests.touch import ReductionRequest, RespondRequest, TouchRequest
 from fingerpad.experiments.runner import Runner
 from fingerpad.experiments.validation.request import ValidationRequest
 from fingerpad.experiments.validation.validation import validate

@@ -25,8 +25,7 @@ from fingerpad.experiments.discrimination.request import DiscriminationRequest
 from fingerpad.experiments.fit.request import ChosenNumbersFile, FitFile, FitRequest
 from fingerpad.experiments.gerling2014.reproduction import ReproductionResult
 from fingerpad.experiments.requests.parts import Request, at
-from fingerpad.experiments.requests.reduction import ReductionRequest
-from fingerpad.experiments.requests.touch import RespondRequest, TouchRequest, TouchResult
+from fingerpad.experiments.requests.touch import ReductionRequest, RespondRequest, TouchRequest, TouchResult
 from fingerpad.experiments.run import ReproductionRequest, run
 from fingerpad.experiments.validation.request import ValidationRequest
 from fingerpad.experiments.validation.validation import ValidationFile

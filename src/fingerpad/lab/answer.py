@@ -17,7 +17,7 @@ from fingerpad.core.signals import STORED_ENERGY, ResponseMap, Traces
 from fingerpad.core.values import FloatArray, Text, Whole, choice, limits, number_in
 from fingerpad.data import psychophysics
 from fingerpad.data.afferents import TYPES
-from fingerpad.experiments.requests.reduction import ReductionRequest
+from fingerpad.experiments.requests.touch import ReductionRequest
 from fingerpad.geometry.fingertip import Fingertip
 from fingerpad.geometry.motion import Pose
 from fingerpad.geometry.trajectory import Trajectory

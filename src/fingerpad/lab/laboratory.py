@@ -23,7 +23,7 @@ from fingerpad.core.errors import InputError
 from fingerpad.core.files import path_of
 from fingerpad.core.progress import Progress
 from fingerpad.core.values import Flag, Whole
-from fingerpad.experiments.requests.reduction import ReductionRequest
+from fingerpad.experiments.requests.touch import ReductionRequest
 from fingerpad.experiments.runner import Runner
 from fingerpad.geometry.fingertip import FINGERS
 from fingerpad.lab.answer import Answer, LabState, in_full, motion_of, reduced_answer

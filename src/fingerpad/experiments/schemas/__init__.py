@@ -47,10 +47,17 @@ def write(path: Path, results: Any) -> None:
 
 
 def read(path: Path, *formats: str) -> dict[str, Any]:
-    """Read the values of a file of results without its types."""
+    """Read the values of a file of results without its types; it may have any format if none is named."""
     from fingerpad.core.result_files import check_schema, read_format
 
-    versions = {name: schema(name)["properties"]["format_version"]["const"] for name in formats}
+    known = formats or all_formats()
+    versions = {name: schema(name)["properties"]["format_version"]["const"] for name in known}
     values = read_format(path, versions)
     check_schema(path, values, schema(values["format"]))
     return values
+
+
+def all_formats() -> list[str]:
+    """Names of the formats of all files of results."""
+    names = sorted(entry.name for entry in files(__name__).iterdir() if entry.name.endswith(".schema.json"))
+    return [_packaged(name)["properties"]["format"]["const"] for name in names if "-request." not in name]
