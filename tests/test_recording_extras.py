@@ -4,7 +4,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from fingerpad.inference.problem import RateProblem
 from numpy.testing import assert_allclose, assert_array_equal
 
 from fingerpad import InputError, RateRecordings, Traces
@@ -14,7 +13,7 @@ from fingerpad.experiments.fit.likelihoods import profiled
 from fingerpad.experiments.fit.results import ParameterProfile, RatePosterior
 from fingerpad.inference.afferent_fit import ReceptorOffset
 from fingerpad.inference.identifiable import IDENTIFIABLE_NAMES, identifiable
-from fingerpad.inference.rate_model import AfferentModel, four_number_model
+from fingerpad.inference.rate_model import AfferentModel, RateProblem, four_number_model
 from fingerpad.report import nerve as report
 from fingerpad.report.nerve import ALLOWED_LOSS
 from fingerpad.report.style import png
