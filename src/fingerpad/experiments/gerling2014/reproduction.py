@@ -100,6 +100,7 @@ def reproduce(columns: Mapping[str, Conditions], extended: bool, runner: Runner)
     }
     sets = {name: found[name][0] for name in columns}
     manifest = runner.manifest(columns[PAPER], meshes, half_model=not sphere.grading.full)
+    manifest = replace(manifest, command=None)  # It names folders, and results are compared between machines.
     return ReproductionResult(
         summary={name: summary(each) for name, each in sets.items()},
         statements=paired(sets[PAPER].comparison, sets[HUMAN].comparison),
