@@ -89,7 +89,7 @@ def test_fields_are_the_papers_and_units_cover_every_name():
         (lambda: indenter_named("sphere:=4"), "is no argument of Sphere:"),
         (lambda: fp.sine(0.8, 0.1), "sine needs frequency_hz, cycles: they are not given."),
         (lambda: ReducedRange(), "ReducedRange needs depth_mm: it is not given."),
-        (lambda: fp.save_figure("a.png", None), "save_figure needs response: it is not given."),
+        (lambda: fp.save_figure("a.png", None), "skin must be of type SkinResponse: got None."),
         (lambda: fp.read_height_map("x.png"), "read_height_map needs pitch_mm: it is not given."),
         (lambda: fp.Fingertip("child"), "got 'child', write Fingertip.of('child')."),
         (lambda: fp.RampAndHold(force_mn=60), "argument of RampAndHold: take ForceRampAndHold."),

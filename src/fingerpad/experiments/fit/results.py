@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
@@ -10,8 +10,10 @@ from fingerpad.core.checked import result_class
 from fingerpad.core.displayed import Columns, Result
 from fingerpad.core.values import Matrix, Number, Vector, WholeVector
 from fingerpad.inference.fitting.methods import FoldFit
-from fingerpad.inference.fitting.posterior import Chains
 from fingerpad.inference.rate_model import RateProblem
+
+if TYPE_CHECKING:
+    from fingerpad.inference.fitting.posterior import Chains
 
 
 @result_class
