@@ -49,5 +49,5 @@ def write_pages(results: Path | None = None, picture: bool = True) -> None:
 RESULTS: Command = (
     "Write the pages that show the numbers of a reproduction.",
     _add,
-    lambda given, _: write_pages(given.results, not given.no_picture),
+    lambda given: write_pages(given.results, not given.no_picture),
 )

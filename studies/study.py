@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import Any
 
 from fingerpad.cli.commands import Command, option
-from fingerpad.cli.running import make_writable, processes, progress
-from fingerpad.core.files import write_atomically
+from fingerpad.cli.running import processes, progress
+from fingerpad.core.files import make_writable, write_atomically
 from fingerpad.core.result_files import to_json
 from fingerpad.experiments.conditions import Conditions
 from fingerpad.experiments.runner import Runner
@@ -74,13 +74,13 @@ def command_of(study: Study) -> Command:
             option(parser, "--seed", "Seed of all random numbers.", int, 0)
             option(parser, "--tissues", "A set of tissues.", str, "human")
 
-    return study.help, add, lambda given, _: execute(study, given)
+    return study.help, add, lambda given: execute(study, given)
 
 
 def execute(study: Study, given: argparse.Namespace) -> None:
     """Run a study from the command line, with bars on a terminal, and print the paths of its files."""
     asked = (given.resolution, given.seed, given.tissues) if study.has_conditions else ()
     conditions, runner = Conditions(*asked), Runner(given.out, processes(given.jobs), progress())
-    make_writable(given.out)
+    make_writable(given.out, "--out")
     page, numbers = run_study(study, runner, conditions)
     print(f"Page: {page}\nResults: {numbers}")

@@ -82,15 +82,17 @@ def test_one_set_of_tissues_is_the_default_everywhere():
         ([*BALL, "--depth_mm", "1"], "No such option: --depth_mm", ""),
         ([*BALL, "--frictoin", "1"], "No such option: --frictoin; write --friction", ""),
         ([*BALL, "--materials=a"], "No such option: --materials; write --tissues", ""),
+        (["fit", "--stimulus", "3"], "No such option: --stimulus; write --stimuli.", ""),
+        (["fit", "--stimulus_colum", "3"], "No such option: --stimulus_colum; write --stimulus-column.", ""),
         ([*BALL, "--resolution", "qick"], "resolution must be one of quick, standard, paper", "'qick'"),
         ([*BALL, "--tissues", "humann"], "tissues must be one of human, paper, trial1", "'humann'"),
         ([*BALL, "--jobs", "0"], "jobs must be a whole number of at least 1", "0"),
         ([*BALL, "--jobs", "1.5"], "--jobs: must be a whole number", "'1.5'"),
         ([*BALL, "--jobs", "2", "--scheduler", "tcp://none:1"], "leave one out", "--scheduler tcp://none:1"),
         ([*BALL, "--friction"], "--friction: expected one argument", ""),
-        ([*BALL, "--friction", "--jobs", "1"], "'--friction' requires an argument", "'--jobs'"),
+        ([*BALL, "--friction", "--jobs", "1"], "--friction: expected one argument", ""),
         ([*BALL, "--friction", "rough"], "friction must be", "'rough'"),
-        ([*BALL, "--motion.depth_mm"], "'--motion.depth_mm' requires an argument", ""),
+        ([*BALL, "--motion.depth_mm"], "--motion.depth_mm: expected one argument", ""),
         ([*BALL, "--motion.depth_mm", "-1"], "motion.depth_mm must lie within 0.001 to 20 mm", "-1"),
         ([*BALL, "--motion.dept_mm", "1"], "motion.dept_mm is unknown: did you mean depth_mm?", ""),
         ([*BALL, "--friction.depth_mm", "1"], "friction", "depth_mm"),
@@ -220,6 +222,31 @@ def test_options_replace_keys_of_the_file_and_go_into_blocks(asked):
     assert given.windows_ms.static == (600.0, 950.0)
     stimulus = given.presented.named("1")
     assert (stimulus.indenter, stimulus.motion.depth_mm) == (fp.Bar(width_mm=2.0), 0.6)
+
+
+@pytest.mark.parametrize(
+    ("hold_ms", "options", "said"),
+    [
+        ("200", ["--friction", "rough"], "--friction must be a finite number: got 'rough'."),
+        ("200", ["--motion.depth_mm", "-1"], "--motion.depth_mm must lie within 0.001 to 20 mm: got -1"),
+        ("200", ["--motion.dept_mm", "1"], "--motion.dept_mm is unknown: did you mean depth_mm?"),
+        ("200", ["--times-ms", "20,soon"], "--times-ms must be an array of numbers"),
+        ("200", ["--object.depth_mm", "1"], "--object.depth_mm is unknown: object has kind."),
+        ("long", ["--tissues", "human"], "touch.yaml, line 3, motion.hold_ms must"),
+    ],
+)
+def test_an_error_names_the_option_that_replaces_a_key(call, hold_ms, options, said):
+    motion = f"motion: {{depth_mm: 0.4, hold_ms: {hold_ms}}}\n"
+    Path("touch.yaml").write_text(f"object: plate\nfriction: 0.1\n{motion}")
+    status, _, errors = call("touch", "touch.yaml", *options)
+    assert status == 2
+    assert errors.startswith(f"fingerpad: {said}")
+
+
+def test_a_keyword_that_replaces_a_key_is_not_blamed_on_the_file(tmp_path):
+    (tmp_path / "touch.yaml").write_text("object: plate\nfriction: 0.1\n")
+    with pytest.raises(fp.InputError, match=r"^friction must be a finite number"):
+        fp.TouchRequest.read(tmp_path / "touch.yaml", {"friction": "rough"})
 
 
 def test_a_file_names_objects_of_python_only_where_this_is_allowed(call, asked):

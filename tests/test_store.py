@@ -426,7 +426,7 @@ def test_the_command_lists_verifies_and_prunes(stored, skin, run_program, caplog
     assert stored.files() == []
     for words, expected in (
         (("prune", stored.folder), "prune needs --days, --size or both"),
-        (("list", stored.folder / "none"), "must be a folder of stored indentations"),
+        (("list", stored.folder / "none"), "must hold stored indentations"),
         (("prune", stored.folder, "--days", -1), "must not be negative"),
     ):
         misused(call(*words), expected)

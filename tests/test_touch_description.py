@@ -31,7 +31,8 @@ from fingerpad.experiments.requests.touch import (
     TouchFile,
     estimate_press,
 )
-from fingerpad.export.requests import WRITERS, check_outputs
+from fingerpad.export.formats import FORMATS
+from fingerpad.export.requests import check_outputs
 from fingerpad.geometry import surface_files
 from fingerpad.geometry.dots import Dots
 from fingerpad.geometry.embossed import Embossed
@@ -164,7 +165,7 @@ def test_afferents_are_those_of_a_task_with_the_same_words():
 
 def test_the_page_and_the_example_know_every_word_and_the_pages_files_are_possible():
     page = (ROOT / "docs" / "touch.md").read_text(encoding="utf-8")
-    assert set(WRITERS) == set(OUTPUTS)
+    assert {"figures", "spikes", "nwb", *FORMATS} == set(OUTPUTS)
     for name in (*OBJECTS, *MOTIONS, *OUTPUTS):
         assert f"`{name}`" in page, name
         assert name in examples()["touch"].text, name

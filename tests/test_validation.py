@@ -393,7 +393,7 @@ def test_an_example_can_be_tried_as_it_says(run_program, tmp_path, kind):
         (["mine.csv", "--resolution", "high"], "resolution must be one of"),
         (["mine.csv", "--jobs", "0"], "jobs must be a whole number of at least 1"),
         (["mine.csv", "--afferent", "fit.json"], "afferent: fit.json must be a file that can be read"),
-        (["mine.csv", "--static-window-ms", "600,500"], "static_window_ms must be a start"),
+        (["mine.csv", "--static-window-ms", "600,500"], "--static-window-ms must be a start"),
         (["mine.csv"], "mine.csv, line 2: depth_mm must not be negative"),
     ],
     ids=" ".join,

@@ -11,7 +11,7 @@ import logging
 import os
 import sys
 import warnings
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any, NoReturn
@@ -93,7 +93,7 @@ def _run(program: Program, words: list[str]) -> int | None:
         print(f"fingerpad {__version__}")
         return 0
     if not words or words[0] in ("--help", "-h"):
-        print(_help(program))
+        _show_help(program)
         return 0 if words else 2
     name, *rest = words
     if name not in program.commands:
@@ -105,67 +105,43 @@ def _run(program: Program, words: list[str]) -> int | None:
     if "--verbose" in general:
         logging.basicConfig(format="%(asctime)s %(name)s: %(message)s", datefmt="%H:%M:%S")
     parser, run = parser_of(program, name), program.commands[name][2]
-    _check_words(parser, rest)
-    rest, within = _within_blocks(parser, rest)
+    _add_within_blocks(parser, rest)
+    for before, word in zip(["An argument", *rest], rest, strict=False):
+        if not word:
+            raise InputError(f"{before} must not be empty: write a name, or leave it out.")
     given, unknown = parser.parse_known_args(rest)
     for word in unknown:
         if not word.startswith("-"):
             raise InputError(f"Got an unexpected extra argument: {word!r}.")
         option = word.partition("=")[0]
-        near = closest(option.lstrip("-"), _names(parser))
-        raise InputError(f"No such option: {option}" + (f"; write --{near}." if near else "."))
-    return run(given, within)
-
-
-def _check_words(parser: Parser, words: Sequence[str]) -> None:
-    """Raise `InputError` for an option in the place of a value, and for an empty name."""
-    flags = {name for each in parser._actions for name in each.option_strings if each.nargs == 0}
-    known = {name for each in parser._actions for name in each.option_strings}
-    for before, word in zip(["An argument", *words], words, strict=False):
-        if not word:
-            raise InputError(f"{before} must not be empty: write a name, or leave it out.")
-        if before in known - flags and word in known:
-            raise InputError(f"Option {before!r} requires an argument: got {word!r}; write its value first.")
+        near = closest(
+            option.lstrip("-").replace("-", "_"), [name.replace("-", "_") for name in _names(parser)]
+        )
+        remedy = f"; write --{near.replace('_', '-')}." if near else "."
+        raise InputError(f"No such option: {option}{remedy}")
+    return run(given)
 
 
 def _names(parser: Parser) -> list[str]:
     return [name.lstrip("-") for each in parser._actions for name in each.option_strings]
 
 
-def _within_blocks(parser: Parser, words: Sequence[str]) -> tuple[list[str], dict[str, Any]]:
-    """Take options such as `--motion.depth_mm 0.5` out of the words: what is left, and values by place."""
-    found: dict[str, Any] = {}
-    left, rest = [], list(words)
-    while rest:
-        word = rest.pop(0)
-        option, equals, value = word.partition("=")
-        place = option.removeprefix("--").replace("-", "_")
-        if not option.startswith("--") or place.partition(".")[0] not in _names(parser) or "." not in place:
-            left.append(word)
-            continue
-        if not equals:
-            if not rest:
-                raise InputError(f"Option {option!r} requires an argument.")
-            value = rest.pop(0)
-        found[place] = commands.plain(value, option)
-    return left, found
+def _add_within_blocks(parser: Parser, words: Iterable[str]) -> None:
+    """Add the options among the words that name a key within a block, such as `--motion.depth_mm`."""
+    for option in {word.partition("=")[0] for word in words}:
+        key, dot, _ = option.removeprefix("--").partition(".")
+        if option.startswith("--") and dot and key in _names(parser):
+            place = option.removeprefix("--").replace("-", "_")
+            parser.add_argument(option, dest=f"{commands.KEY}{place}", metavar="VALUE")
 
 
-def _help(program: Program) -> str:
-    """Return the list of commands."""
+def _show_help(program: Program) -> None:
+    """Print the list of commands."""
     width = max(map(len, program.commands)) + 2
-    return "\n".join(
-        [
-            f"usage: {program.name} [--version] [--help] COMMAND ...",
-            "",
-            program.what,
-            "",
-            "commands:",
-            *(f"  {name:{width}}{what}" for name, (what, _, _) in program.commands.items()),
-            "",
-            f"`{program.name} COMMAND --help` explains its options. All take --quiet and --verbose.",
-        ]
-    )
+    print(f"usage: {program.name} [--version] [--help] COMMAND ...\n\n{program.what}\n\ncommands:")
+    for name, (what, _, _) in program.commands.items():
+        print(f"  {name:{width}}{what}")
+    print(f"\n`{program.name} COMMAND --help` explains its options. All take --quiet and --verbose.")
 
 
 def _give_up_output() -> None:

@@ -4,15 +4,17 @@ from __future__ import annotations
 
 import argparse
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from datetime import UTC, datetime
+from functools import partial
 from pathlib import Path
-from types import MappingProxyType
 from typing import Any
 
 import fingerpad as fp
-from fingerpad.cli.running import command_line, engine, make_writable, progress
+from fingerpad.cli.running import command_line, engine, processes, progress
 from fingerpad.core.errors import InputError, StoreError
+from fingerpad.core.files import make_writable
 from fingerpad.experiments.schemas import request_schema
 
 # What a command runs is imported where it runs: help and version need none of it and come at once.
@@ -21,111 +23,7 @@ INCOMPLETE = 3  # Exit status of a validation of which some rows have no predict
 MOST_FAILED = 99  # Largest exit status for settings of a sweep that failed: larger ones have other meanings.
 SECONDS_PER_DAY = 86_400.0
 ENDING = "The same command continues after the last finished indentation."
-
-Options = dict[str, Any]
-
-
-def plain(text: str, option: str = "an option", schema: Any = MappingProxyType({})) -> Any:
-    """Return the value that a text of the command line means, as YAML has it; 30,50 is a list."""
-    from fingerpad.core.plain_yaml import read_yaml
-
-    kinds = {each.get("type") for each in (schema, *schema.get("anyOf", ()), *schema.get("oneOf", ()))}
-    numbers = {"number", "integer", "array", "boolean", "object"} & kinds
-    if schema and not numbers:
-        return text
-    if "," in text and text[0] not in "[{" and (not schema or "array" in kinds):
-        return [read_yaml(part.strip(), option) for part in text.split(",") if part.strip()]
-    return read_yaml(text, option)
-
-
-def option(
-    parser: argparse.ArgumentParser, name: str, words: str, kind: Any = Path, default: Any = None
-) -> None:
-    """Add an option, or an argument if its name has no dashes."""
-    words = words if default in (None, False) else f"{words} Default: {default}."
-    if kind is bool:
-        parser.add_argument(name, action="store_true", help=words)
-        return
-    read = {int: _whole, float: _number}.get(kind, kind)
-    metavar = (
-        {int: "N", float: "NUMBER", Path: "PATH"}.get(kind, "NAME") if name.startswith("-") else name.upper()
-    )
-    parser.add_argument(name, type=read, default=default, metavar=metavar, help=words)
-
-
-def _add_request(name: str, parser: argparse.ArgumentParser, out: str, of_out: str, main: str = "") -> None:
-    """Add the options of a request: its fields, and where and how it runs."""
-    what = f"YAML file of the request, or {main}." if main else "YAML file of the request."
-    parser.add_argument("request", nargs="?", metavar="FILE", help=what)
-    option(parser, "--out", of_out, Path, Path(out))
-    option(parser, "--jobs", "Number of processes. Default: one per core.", int)
-    option(parser, "--scheduler", "Press on the workers of this Dask scheduler, tcp://HOST:PORT.", str)
-    option(parser, "--allow-python", "Let the file name objects of Python as module:object.", bool)
-    group: Any = parser.add_argument_group("keys of the request, which replace those of the file")
-    for key, schema in request_schema(name)["properties"].items():
-        words = schema.get("description", "").replace("%", "%%")
-        names = [f"--{key}", f"--{key.replace('_', '-')}"][: 1 + ("_" in key)]
-        if schema.get("type") == "boolean" or {"type": "boolean"} in schema.get("anyOf", ()):
-            group.add_argument(*names, dest=f"key:{key}", action=argparse.BooleanOptionalAction, help=words)
-            continue
-        choices = schema.get("enum") or schema.get("items", {}).get("enum")
-        words += f" One of {', '.join(map(str, choices))}." if choices else ""
-        default = schema.get("default")
-        words += f" Default: {default}." if isinstance(default, str | int | float) else ""
-        group.add_argument(*names, dest=f"key:{key}", metavar="VALUE", help=words)
-
-
-def _whole(text: str) -> int:
-    try:
-        return int(text)
-    except ValueError as error:
-        raise argparse.ArgumentTypeError(f"must be a whole number: got {text!r}") from error
-
-
-def _number(text: str) -> float:
-    try:
-        return float(text)
-    except ValueError as error:
-        raise argparse.ArgumentTypeError(f"must be a number: got {text!r}") from error
-
-
-def _asked(name: str, given: argparse.Namespace, within: Options, main: str = "") -> tuple[Any, Options]:
-    """Source of a request, and the keys that replace some of it."""
-    schema = request_schema(name)["properties"]
-    keys = {
-        key.removeprefix("key:"): value if isinstance(value, bool) else plain(value, key, schema[key[4:]])
-        for key, value in vars(given).items()
-        if key.startswith("key:") and value is not None
-    }
-    source = given.request
-    if main and source is not None and Path(source).suffix not in (".yaml", ".yml"):
-        source, keys = None, {main: source} | keys
-    if request_schema(name).get("required") and source is None and not keys and not within:
-        raise InputError(name, f"needs a file{f', {main}' if main else ''} or options", remedy="see --help")
-    return source, keys | within
-
-
-def _run_request(
-    name: str,
-    given: argparse.Namespace,
-    within: Options,
-    main: str = "",
-    further_check: Callable[[Any], None] = lambda request: None,
-    **more: Any,
-) -> Any:
-    """Check and run a request, with its files in --out."""
-    kind, function = getattr(fp, KINDS[name]), getattr(fp, name)
-    source, keys = _asked(name, given, within, main)
-    request = kind.read(source, keys, given.allow_python)
-    further_check(request)
-    request.check()
-    by = engine(given.jobs, given.scheduler)
-    make_writable(given.out.parent if given.out.suffix in (".npz", ".zarr") else given.out)
-    return function(
-        request, out=given.out, jobs=by, progress=progress(), command=command_line(),
-        allow_python=given.allow_python, **more,
-    )  # fmt: skip
-
+KEY = "key:"  # Begin of what argparse calls the value of a key of the request.
 
 KINDS = {
     "touch": "TouchRequest",
@@ -140,71 +38,155 @@ KINDS = {
 """Public name of the request of each command."""
 
 
+def plain(text: str, option: str, schema: Mapping[str, Any]) -> Any:
+    """Return the value that a text of the command line means, as YAML has it; 30,50 is a list."""
+    from fingerpad.core.plain_yaml import read_yaml
+
+    kinds = {each.get("type") for each in (schema, *schema.get("anyOf", ()), *schema.get("oneOf", ()))}
+    if schema and not {"number", "integer", "array", "boolean", "object"} & kinds:
+        return text
+    if "," in text and text[0] not in "[{" and (not schema or "array" in kinds):
+        return [read_yaml(part.strip(), option) for part in text.split(",") if part.strip()]
+    return read_yaml(text, option)
+
+
+def option(
+    parser: argparse.ArgumentParser, name: str, words: str, kind: Any = Path, default: Any = None
+) -> None:
+    """Add an option, or an argument if its name has no dashes."""
+    words = words if default in (None, False) else f"{words} Default: {default}."
+    if kind is bool:
+        parser.add_argument(name, action="store_true", help=words)
+        return
+    metavar = {int: "N", float: "NUMBER", Path: "PATH"}.get(kind, "NAME")
+    metavar = metavar if name.startswith("-") else name.upper()
+    read = partial(_read, kind) if kind in (int, float) else kind
+    parser.add_argument(name, type=read, default=default, metavar=metavar, help=words)
+
+
+def _read(kind: type[int] | type[float], text: str) -> float:
+    try:
+        return kind(text)
+    except ValueError as error:
+        expected = "must be a whole number" if kind is int else "must be a number"
+        raise argparse.ArgumentTypeError(f"{expected}: got {text!r}") from error
+
+
+def _add_request(name: str, out: str, of_out: str, main: str, parser: argparse.ArgumentParser) -> None:
+    """Add the options of a request: its fields, and where and how it runs."""
+    what = f"YAML file of the request{f', or {main}' if main else ''}."
+    parser.add_argument("request", nargs="?", metavar="FILE", help=what)
+    option(parser, "--out", of_out, Path, Path(out))
+    option(parser, "--jobs", "Number of processes. Default: one per core.", int)
+    option(parser, "--scheduler", "Press on the workers of this Dask scheduler, tcp://HOST:PORT.", str)
+    option(parser, "--allow-python", "Let the file name objects of Python as module:object.", bool)
+    group: Any = parser.add_argument_group("keys of the request, which replace those of the file")
+    for key, schema in request_schema(name)["properties"].items():
+        words = schema.get("description", "").replace("%", "%%")
+        names, as_given = dict.fromkeys([f"--{key}", f"--{key.replace('_', '-')}"]), f"{KEY}{key}"
+        if schema.get("type") == "boolean" or {"type": "boolean"} in schema.get("anyOf", ()):
+            group.add_argument(*names, dest=as_given, action=argparse.BooleanOptionalAction, help=words)
+            continue
+        choices = schema.get("enum") or schema.get("items", {}).get("enum")
+        words += f" One of {', '.join(map(str, choices))}." if choices else ""
+        default = schema.get("default")
+        words += f" Default: {default}." if isinstance(default, str | int | float) else ""
+        group.add_argument(*names, dest=as_given, metavar="VALUE", help=words)
+
+
+def _run_request(name: str, given: argparse.Namespace, **more: Any) -> Any:
+    """Run a request, with its files in --out."""
+    schema, kind = request_schema(name), getattr(fp, KINDS[name])
+    keys = {
+        key: value if isinstance(value, bool) else plain(value, key, schema["properties"].get(key, {}))
+        for key, value in ((at.removeprefix(KEY), value) for at, value in vars(given).items() if KEY in at)
+        if value is not None
+    }
+    if schema.get("required") and given.request is None and not keys:
+        main = f", {kind.main}" if kind.main else ""
+        raise InputError(name, f"needs a file{main} or options", remedy="see --help")
+    with _blamed_on_options((*keys, "out", "jobs")):
+        request = kind.read(given.request, keys, given.allow_python)
+        return getattr(fp, name)(
+            request, out=given.out, jobs=engine(given.jobs, given.scheduler), progress=progress(),
+            command=command_line(), allow_python=given.allow_python, **more,
+        )  # fmt: skip
+
+
+@contextmanager
+def _blamed_on_options(keys: tuple[str, ...]) -> Iterator[None]:
+    """Name the option in the place of the key that it gives."""
+    try:
+        yield
+    except InputError as error:
+        for place in (tuple(key.split(".")) for key in keys):
+            if error.path[: len(place)] == place:
+                named = error.where.replace(place[0], f"--{place[0].replace('_', '-')}", 1)
+                raise error.at(error.path, named).from_source("") from error
+        raise
+
+
 def _tell(*paragraphs: object) -> None:
     print(*paragraphs, sep="\n")
 
 
-def _touch(given: argparse.Namespace, within: Options) -> None:
-    from fingerpad.export.requests import check_outputs
+def _tell_files(folder: Path, page: str, results: str) -> None:
+    if (folder / page).exists():
+        _tell(f"Report: {folder / page}")
+    _tell(f"Results: {folder / results}")
+
+
+def _touch(given: argparse.Namespace) -> None:
     from fingerpad.report.results import summary
 
-    found = _run_request("touch", given, within, further_check=check_outputs)
+    found = _run_request("touch", given)
     _tell(*summary("touch", found), *(f"Not verified: {each.text}" for each in found.skin.caveats))
-    if (given.out / "touch.html").exists():
-        _tell(f"Report: {given.out / 'touch.html'}")
-    _tell(f"Results: {given.out / 'touch.json'}")
+    _tell_files(given.out, "touch.html", "touch.json")
 
 
-def _respond(given: argparse.Namespace, within: Options) -> None:
-    _tell(_run_request("respond", given, within), f"Results: {given.out / 'spikes.csv'}")
+def _respond(given: argparse.Namespace) -> None:
+    _tell(_run_request("respond", given), f"Results: {given.out / 'spikes.csv'}")
 
 
-def _fit(given: argparse.Namespace, within: Options) -> None:
+def _fit(given: argparse.Namespace) -> None:
     from fingerpad.report.results import summary
 
-    found = _run_request("fit", given, within, "recordings")
-    if hasattr(found, "fit"):
-        _tell(*summary("fit", found), f"Report: {given.out / 'fit.html'}")
-    else:
-        _tell(*found.summary())
-    _tell(f"Results: {given.out / 'fit.json'}")
+    found = _run_request("fit", given)
+    _tell(*(summary("fit", found) if hasattr(found, "fit") else found.summary()))
+    _tell_files(given.out, "fit.html", "fit.json")
 
 
-def _discriminate(given: argparse.Namespace, within: Options) -> None:
+def _discriminate(given: argparse.Namespace) -> None:
     from fingerpad.report.results import summary
 
-    found = _run_request("discriminate", given, within)
-    _tell(
-        *summary("discriminate", found),
-        f"Report: {given.out / 'discriminate.html'}",
-        f"Results: {given.out / 'discriminate.json'}",
-    )
+    _tell(*summary("discriminate", _run_request("discriminate", given)))
+    _tell_files(given.out, "discriminate.html", "discriminate.json")
 
 
-def _validate(given: argparse.Namespace, within: Options) -> int:
+def _validate(given: argparse.Namespace) -> int:
     from fingerpad.report.results import summary
 
-    found = _run_request("validate", given, within, "observations")
-    _tell(
-        *summary("validate", found),
-        f"Report: {given.out / 'validate.html'}",
-        f"Results: {given.out / 'validate.json'}",
-    )
+    found = _run_request("validate", given)
+    _tell(*summary("validate", found))
+    _tell_files(given.out, "validate.html", "validate.json")
     return INCOMPLETE if found.n_predicted < found.n_rows else 0
 
 
-def _sweep(given: argparse.Namespace, within: Options) -> int:
-    from fingerpad.export.sweep import check_sweep
+def _add_sweep(parser: argparse.ArgumentParser) -> None:
+    _add_request("sweep", "sweep.zarr", "The data set, a folder that ends in .zarr.", "", parser)
+    option(parser, "--store", "Folder of stored indentations. Default: indentations, beside --out.")
+    option(parser, "--table", "Also write rates as a table, a .csv or .parquet file.")
+    option(parser, "--spikes", "Also write the spikes of all settings as a session, a .nwb file.")
+    option(parser, "--retry-failed", "Try settings again that failed before.", bool)
+    option(parser, "--yes", "Run a sweep of any size.", bool)
+
+
+def _sweep(given: argparse.Namespace) -> int:
     from fingerpad.export.sweep_results import check_outputs, write_sweep_spikes
 
-    def check(request: fp.SweepRequest) -> None:
-        check_sweep(request, given.out, given.yes)
-        check_outputs(given.table, given.spikes)
-
-    done = _run_request(
-        "sweep", given, within, further_check=check,
-        retry_failed=given.retry_failed, any_size=given.yes, store=given.store,
-    )  # fmt: skip
+    check_outputs(given.table, given.spikes)
+    how = {"retry_failed": given.retry_failed, "any_size": given.yes, "store": given.store}
+    done = _run_request("sweep", given, **how)
     _tell(*done.lines)
     if done.done and given.table is not None:
         _tell(f"Table: {fp.write_sweep_table(fp.open_sweep(given.out), given.table)}")
@@ -213,17 +195,8 @@ def _sweep(given: argparse.Namespace, within: Options) -> int:
     return min(10 + done.failed, MOST_FAILED) if done.failed else 0
 
 
-def _add_sweep(parser: argparse.ArgumentParser) -> None:
-    _add_request("sweep", parser, "sweep.zarr", "The data set, a folder that ends in .zarr.")
-    option(parser, "--store", "Folder of stored indentations. Default: indentations, beside --out.")
-    option(parser, "--table", "Also write rates as a table, a .csv or .parquet file.")
-    option(parser, "--spikes", "Also write the spikes of all settings as a session, a .nwb file.")
-    option(parser, "--retry-failed", "Try settings again that failed before.", bool)
-    option(parser, "--yes", "Run a sweep of any size.", bool)
-
-
-def _reduce(given: argparse.Namespace, within: Options) -> None:
-    model = _run_request("reduce", given, within)
+def _reduce(given: argparse.Namespace) -> None:
+    model = _run_request("reduce", given)
     varied = ", ".join(f"{axis.name} {axis.low:g} to {axis.high:g}" for axis in model.axes if axis.count > 1)
     _tell(
         f"{len(model.first_touch_mm)} poses, {varied or 'one place'}, up to {model.depth_mm:g} mm deep: "
@@ -236,15 +209,12 @@ def _reduce(given: argparse.Namespace, within: Options) -> None:
     _tell(f"Reduced touch: {given.out}")
 
 
-def _reproduce(given: argparse.Namespace, within: Options) -> None:
+def _reproduce(given: argparse.Namespace) -> None:
     from fingerpad.report.reproduction import count_sentence
 
-    found = _run_request("reproduce", given, within)
-    _tell(
-        f"Report: {given.out / 'report.html'}",
-        f"Results: {given.out / 'results.json'}",
-        *(count_sentence(found.statements, name) for name in ("paper", "human")),
-    )
+    found = _run_request("reproduce", given)
+    _tell_files(given.out, "report.html", "results.json")
+    _tell(*(count_sentence(found.statements, name) for name in ("paper", "human")))
 
 
 def _add_init(parser: argparse.ArgumentParser) -> None:
@@ -253,7 +223,7 @@ def _add_init(parser: argparse.ArgumentParser) -> None:
     option(parser, "--list", "List the examples, and exit.", bool)
 
 
-def _init(given: argparse.Namespace, within: Options) -> None:
+def _init(given: argparse.Namespace) -> None:
     import json
 
     from fingerpad.core.files import check_new, write_atomically
@@ -264,12 +234,12 @@ def _init(given: argparse.Namespace, within: Options) -> None:
     if given.list:
         _tell(*(f"{name}: {each.what} ({each.file})" for name, each in examples().items()))
         return
-    asked = Path(given.what)
-    name = "touch" if asked.suffix in (".yaml", ".yml") else one_of("WHAT", given.what, tuple(examples()))
+    own = Path(given.what).suffix in (".yaml", ".yml")  # a name for the file of a touch
+    name = "touch" if own else one_of("WHAT", given.what, tuple(examples()))
     example = examples()[name]
-    path = given.out / (asked if asked.suffix in (".yaml", ".yml") else example.file)
+    path = given.out / (given.what if own else example.file)
     check_new(path)
-    make_writable(path.parent)
+    make_writable(path.parent, "--out")
     write_atomically(path, example.text.encode())
     if name == "touch":
         write_atomically(path.parent / TOUCH_SCHEMA, json.dumps(request_schema("touch"), indent=1).encode())
@@ -282,10 +252,12 @@ def _add_file(parser: argparse.ArgumentParser) -> None:
     option(parser, "--allow-python", "Let the file name objects of Python as module:object.", bool)
 
 
-def _check(given: argparse.Namespace, _: Options) -> None:
+def _check(given: argparse.Namespace) -> None:
     """Check a request of any kind, which its keys tell."""
     from fingerpad.core.files import read_text
     from fingerpad.core.plain_yaml import read_yaml
+    from fingerpad.experiments.requests.touch import estimate_press
+    from fingerpad.experiments.sweep.settings import estimate_sweep
     from fingerpad.export.requests import check_outputs
 
     content = read_yaml(read_text(given.file), str(given.file)) or {}
@@ -295,14 +267,9 @@ def _check(given: argparse.Namespace, _: Options) -> None:
     request = getattr(fp, KINDS[name]).read(given.file, allow_python=given.allow_python)
     request.check()
     if name == "touch":
-        from fingerpad.experiments.requests.touch import estimate_press
-
         check_outputs(request)
         _tell(*estimate_press(request).lines)
     elif name == "sweep":
-        from fingerpad.cli.running import processes
-        from fingerpad.experiments.sweep.settings import estimate_sweep
-
         _tell(*estimate_sweep(request, processes(None)).lines)
     else:
         _tell(f"The request is possible: try fingerpad {name} {given.file}")
@@ -317,13 +284,11 @@ def _add_view(parser: argparse.ArgumentParser) -> None:
     option(parser, "--frames", "Number of pictures of a film.", int, 40)
 
 
-def _view(given: argparse.Namespace, _: Options) -> None:
+def _view(given: argparse.Namespace) -> None:
     if given.out.is_dir():
         raise InputError("--out", "must be a file", remedy=f"{given.out} is a folder")
-    (written,) = fp.save_view(
-        given.out, given.result, field=given.field, time_ms=given.time, frames=given.frames,
-        progress=progress(),
-    )  # fmt: skip
+    shown = {"field": given.field, "time_ms": given.time, "frames": given.frames}
+    (written,) = fp.save_view(given.out, given.result, **shown, progress=progress())
     _tell(f"Open: {written}")
 
 
@@ -337,7 +302,7 @@ def _add_lab(parser: argparse.ArgumentParser) -> None:
     option(parser, "--allow-python", "Let files name objects of Python as module:object.", bool)
 
 
-def _lab(given: argparse.Namespace, _: Options) -> None:
+def _lab(given: argparse.Namespace) -> None:
     from fingerpad.lab.laboratory import Laboratory
     from fingerpad.lab.server import require_panel, serve
     from fingerpad.lab.static import write_static
@@ -349,8 +314,7 @@ def _lab(given: argparse.Namespace, _: Options) -> None:
     if given.static is None:
         serve(laboratory, given.port or 0, lambda address: _tell(f"Open: {address}"))
         return
-    make_writable(given.static, "--static")
-    written = write_static(laboratory, given.static, progress())
+    written = write_static(laboratory, make_writable(given.static, "--static"), progress())
     _tell(f"Open: {written} ({written.stat().st_size / 1e6:.1f} MB)")
 
 
@@ -363,7 +327,7 @@ def _add_store(parser: argparse.ArgumentParser) -> None:
     option(parser, "--yes", "Delete; without it, only say what would be.", bool)
 
 
-def _store(given: argparse.Namespace, _: Options) -> int:
+def _store(given: argparse.Namespace) -> int:
     from fingerpad.core.values import not_negative
     from fingerpad.experiments.runner import STORE_FOLDER
     from fingerpad.skin.store import Store, pruned
@@ -373,11 +337,9 @@ def _store(given: argparse.Namespace, _: Options) -> int:
     age_s = None if given.days is None else SECONDS_PER_DAY * not_negative("--days", given.days, "days")
     most = None if given.size is None else int(1e6 * not_negative("--size", given.size, "MB"))
     inner = given.folder / STORE_FOLDER
-    found = inner if inner.is_dir() else given.folder
-    if not found.is_dir():
-        raise InputError(f"FOLDER must be a folder of stored indentations: {given.folder} is none.")
-    files = Store(found).files()
-    if found.name != STORE_FOLDER and not files:
+    folder = inner if inner.is_dir() else given.folder
+    files = Store(folder).files()
+    if not files and not (folder.name == STORE_FOLDER and folder.is_dir()):
         raise InputError(
             f"FOLDER must hold stored indentations: {given.folder} has none; name that of a run."
         )
@@ -388,9 +350,8 @@ def _store(given: argparse.Namespace, _: Options) -> int:
         _tell(f"{len(files)} indentations, {sum(file.size for file in files) / 1e6:.1f} MB")
         return 0
     if given.action == "verify":
-        faults = {file.path: fault for file in files if (fault := file.fault) is not None}
-        _tell(*(f"{path}: {fault}" for path, fault in faults.items()),
-              f"{len(files)} indentations, {len(faults)} damaged")  # fmt: skip
+        faults = [f"{file.path}: {fault}" for file in files if (fault := file.fault) is not None]
+        _tell(*faults, f"{len(files)} indentations, {len(faults)} damaged")
         return 1 if faults else 0
     chosen = pruned(files, None if age_s is None else time.time() - age_s, most)
     try:
@@ -405,15 +366,13 @@ def _store(given: argparse.Namespace, _: Options) -> int:
 
 
 def _of(name: str, of_out: str, out: str = "", main: str = "") -> Callable[[argparse.ArgumentParser], None]:
-    return lambda parser: _add_request(name, parser, out or name, of_out, main)
+    return partial(_add_request, name, out or name, of_out, main)
 
 
 FOLDER = "Folder for page, figures, results and stored indentations."
 FILE = "File of the reduced touch; presses are stored beside it."
 
-Command = tuple[
-    str, Callable[[argparse.ArgumentParser], None], Callable[[argparse.Namespace, Options], int | None]
-]
+Command = tuple[str, Callable[[argparse.ArgumentParser], None], Callable[[argparse.Namespace], int | None]]
 COMMANDS: dict[str, Command] = {
     "touch": ("Press an object into a finger, and let afferents respond.", _of("touch", FOLDER), _touch),
     "respond": ("Let afferents respond to a touch.", _of("respond", FOLDER), _respond),

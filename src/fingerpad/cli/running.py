@@ -1,4 +1,4 @@
-"""What every command needs while it runs: a writable folder, processes, progress bars, Ctrl-C."""
+"""What every command needs while it runs: processes, progress bars, Ctrl-C."""
 
 from __future__ import annotations
 
@@ -7,12 +7,10 @@ import os
 import shlex
 import signal
 import sys
-import tempfile
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 from functools import partial
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 from fingerpad.core.errors import InputError
@@ -72,17 +70,15 @@ def forget_interrupt() -> None:
 
 def processes(jobs: int | None) -> int:
     """Return what `--jobs` says, or one process per core that this process may use."""
-    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
     from fingerpad.core.values import whole  # loads NumPy, which help and version do without
 
+    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
     return cores if jobs is None else whole("jobs", jobs, at_least=1)
 
 
 def engine(jobs: int | None, scheduler: str | None) -> int | Engine:
     """Return the workers of `--scheduler` once it answers, or the number of processes here."""
     if scheduler is None:
-        if jobs is not None and jobs < 1:
-            raise InputError("jobs", "must be a whole number of at least 1", str(jobs))
         return processes(jobs)
     if jobs is not None:
         raise InputError(
@@ -97,18 +93,6 @@ def engine(jobs: int | None, scheduler: str | None) -> int | Engine:
 
 def command_line() -> str:
     return shlex.join(["fingerpad", *sys.argv[1:]])
-
-
-def make_writable(folder: Path, name: str = "--out") -> None:
-    """Create `folder` if needed, and check that a file can be written into it."""
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        with tempfile.TemporaryFile(dir=folder):
-            pass
-    except OSError as error:
-        raise InputError(
-            name, "must be a writable folder", remedy=f"{folder} is not ({error.strerror})"
-        ) from error
 
 
 def progress() -> Progress:

@@ -9,6 +9,8 @@ from collections.abc import Collection
 from itertools import count
 from typing import Any
 
+from fingerpad.core.units import name_and_unit
+
 Place = tuple[int | str, ...]  # Keys and indices from 0 that lead to a value.
 
 LONGEST_MESSAGE = 2000
@@ -67,9 +69,9 @@ def closest(wrong: Any, known: Collection[str]) -> str | None:
     names = [name for name in known if isinstance(name, str)]
     # A name without its unit, such as `depth`, means the first unit that is known, not the most similar one.
     near = [name for name in names if name == _NEW_NAMES.get(wrong)]
-    near = near or [name for name in names if wrong and name.startswith(f"{wrong}_")]
-    near = near or [name for name in names if len(wrong) >= _SHORTEST_STEM and name.startswith(wrong)]
+    near = near or [name for name in names if name_and_unit(name)[0] == wrong != name]
     near = near or difflib.get_close_matches(wrong, names, n=1, cutoff=_CLOSE)
+    near = near or [name for name in names if len(wrong) >= _SHORTEST_STEM and name.startswith(wrong)]
     return near[0] if near else None
 
 

@@ -6,6 +6,7 @@ import os
 import secrets
 import stat
 from pathlib import Path
+from tempfile import TemporaryFile
 
 from fingerpad.core.errors import InputError, StoreError, shown
 
@@ -35,6 +36,17 @@ def write_atomically(path: Path, content: bytes) -> None:
         raise StoreError(
             f"{path} cannot be written ({error.strerror or error}): free it or choose another."
         ) from error
+
+
+def make_writable(folder: Path, name: str = "out") -> Path:
+    """Create a folder if needed, and check that a file can be written into it."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        with TemporaryFile(dir=folder):
+            return folder
+    except OSError as error:
+        refused = f"{folder} is not ({error.strerror})"
+        raise InputError(name, "must be a writable folder", remedy=refused) from error
 
 
 LARGEST_TEXT_MB = 200  # Largest file of text that is read, such as a mesh or a table. [MB]

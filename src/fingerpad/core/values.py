@@ -143,7 +143,7 @@ def instance(name: str, value: _Kind, kind: type) -> _Kind:
         if isinstance(value, type) and issubclass(value, kind):
             call = f"{value.__name__}, call it: {value.__name__}()"
             raise InputError(name, "must be made from its class", call)
-        raise InputError(name, f"must be of type {kind.__name__}", shown(value))
+        raise InputError(name, f"must be of type {getattr(kind, '__name__', kind)}", shown(value))
     return value
 
 

@@ -7,15 +7,15 @@ or, in a mapping `**{"motion.depth_mm": 0.5}`, with its place.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any
+from typing import Any, Protocol, TypeVar
 
 from fingerpad.core.checked import checked
 from fingerpad.core.engine import Engine, engine_of
 from fingerpad.core.errors import InputError
+from fingerpad.core.files import make_writable
 from fingerpad.core.progress import Progress
 from fingerpad.core.signals import ResponseMap
 from fingerpad.core.values import Flag, Whole
@@ -34,22 +34,100 @@ from fingerpad.export.job import job_of
 from fingerpad.export.responses import require_pynwb
 from fingerpad.reduction.model import ReducedModel, write_reduced
 from fingerpad.report.results import write_page
-from fingerpad.skin.sampling import SkinResponse
 
-Write = Callable[[TouchResult, Path], object]
+Kind = TypeVar("Kind")
+Found = TypeVar("Found", covariant=True)
 
 
-@checked
-def touch(
-    request: Any = None,
-    *,
-    out: str | Path | None = None,
-    jobs: Whole | Engine = 1,
-    progress: Progress | None = None,
-    command: str | None = None,
-    allow_python: Flag = False,
-    **given: Any,
-) -> TouchResult:
+class Asked(Protocol[Found]):
+    """A function that takes a request, or its keywords, and returns a result."""
+
+    def __call__(
+        self,
+        request: Any = None,
+        *,
+        out: str | Path | None = None,
+        jobs: Whole | Engine = 1,
+        progress: Progress | None = None,
+        command: str | None = None,
+        allow_python: Flag = False,
+        **given: Any,
+    ) -> Found:
+        """Run the request, and write the result into `out`."""
+
+
+def runs(
+    kind: type[Request], check: Callable[[Any], None] | None = None, folder_of: Callable[[Path], Path] = Path
+) -> Callable[[Callable[[Kind, Path], None]], Asked[Kind]]:
+    """Make a function that writes a result one that takes a request, runs it, and writes if asked to.
+
+    `check` raises if the request is impossible; `folder_of` tells from `out` where presses are stored.
+    """
+
+    def runner_of(write: Callable[[Kind, Path], None]) -> Asked[Kind]:
+        def ask(
+            request: Any = None,
+            *,
+            out: str | Path | None = None,
+            jobs: Whole | Engine = 1,
+            progress: Progress | None = None,
+            command: str | None = None,
+            allow_python: Flag = False,
+            **given: Any,
+        ) -> Any:
+            asked = kind.read(request, given, allow_python)
+            engine_of(jobs)
+            (check or kind.check)(asked)
+            if out is None:
+                with TemporaryDirectory() as folder:
+                    return run(asked, Path(folder), jobs, progress, command)
+            stored = make_writable(folder_of(Path(out)))
+            found: Kind = run(asked, stored, jobs, progress, command)
+            write(found, Path(out))
+            return found
+
+        ask.__name__ = ask.__qualname__ = write.__name__
+        ask.__doc__, ask.__annotations__["return"] = write.__doc__, write.__annotations__["found"]
+        return checked(ask)
+
+    return runner_of
+
+
+def check_outputs(asked: TouchRequest) -> None:
+    """Raise `InputError` if the touch is impossible, or an output lacks a package or cannot express it."""
+    asked.check()
+    for number, name in enumerate(asked.outputs):
+        with asked.origin.located(), at("outputs", number):
+            if name in REQUIRED:
+                REQUIRED[name]()
+            if name == "nwb":
+                require_pynwb()
+            if name in DECKS and not asked.touch.stimulus.stays:
+                raise InputError(
+                    f"{name} decks move the indenter only along its axis, and this motion moves it aside or "
+                    f"turns it: leave {name} out."
+                )
+
+
+def _write_output(found: TouchResult, name: str, folder: Path) -> None:
+    skin, asked = found.skin, found.request
+    if name == "figures":
+        write_page("touch", found, folder)
+    elif name == "spikes":
+        found.response.save(folder / "spikes.csv")
+    elif name == "nwb":
+        found.response.to_nwb(folder / "touch.nwb")
+    elif name in DECKS:
+        # The depths of a press by force are known only now.
+        job = job_of(asked.touch, skin.times_ms, skin.depth_mm)
+        write_deck(folder / name, job, name, asked.elastic_moduli if name == "calculix" else None)
+    else:
+        of_response = {"response": found.response, "seed": asked.afferents.seed}
+        skin.save(folder / RESULTS[name], **(of_response if name in ("netcdf", "zarr") else {}))
+
+
+@runs(TouchRequest, check_outputs)
+def touch(found: TouchResult, folder: Path) -> None:
     """Press an object into a finger, and let afferents respond.
 
     Parameters
@@ -78,7 +156,7 @@ def touch(
     Raises
     ------
     ConvergenceError
-        If the mechanics cannot be solved.
+        If the mechanics cannot be solved; finished indentations stay stored.
     StoreError
         If the folder cannot be written.
 
@@ -89,27 +167,13 @@ def touch(
     >>> found.summary.largest_depth_mm, found.response.rate_measure
     (0.3, 'count')
     """
-    asked = TouchRequest.read(request, given, allow_python)
-    check_outputs(asked)
-    result: TouchResult = _run(asked, out, jobs, progress, command)
-    if out is not None:
-        for name in asked.outputs:
-            WRITERS[name](result, Path(out))
-        schemas.write(Path(out) / "touch.json", result.result)
-    return result
+    for name in found.request.outputs:
+        _write_output(found, name, folder)
+    schemas.write(folder / "touch.json", found.result)
 
 
-@checked
-def respond(
-    request: Any = None,
-    *,
-    out: str | Path | None = None,
-    jobs: Whole | Engine = 1,
-    progress: Progress | None = None,
-    command: str | None = None,
-    allow_python: Flag = False,
-    **given: Any,
-) -> ResponseMap:
+@runs(RespondRequest)
+def respond(found: ResponseMap, folder: Path) -> None:
     """Let afferents respond to a touch.
 
     Parameters
@@ -119,10 +183,8 @@ def respond(
         solved touch.
     out : str or Path, optional
         Folder for `spikes.csv` and the stored indentation; without it nothing is written or stored.
-    jobs, progress, command, allow_python
+    jobs, progress, command, allow_python, given
         As of `touch`.
-    **given
-        Keys of the request: `touch`, and those of the block `afferents`.
 
     Examples
     --------
@@ -131,70 +193,35 @@ def respond(
     >>> fp.respond(skin, afferent="PC", rows=1, columns=2).rate_measure
     'count'
     """
-    if isinstance(request, SkinResponse | TouchResult):
-        request, given = None, {"touch": request} | given
-    asked = RespondRequest.read(request, given, allow_python)
-    response: ResponseMap = _run(asked, out, jobs, progress, command)
-    if out is not None:
-        response.save(Path(out) / "spikes.csv")
-    return response
+    found.save(folder / "spikes.csv")
 
 
-@checked
-def fit(
-    request: Any = None,
-    *,
-    out: str | Path | None = None,
-    jobs: Whole | Engine = 1,
-    progress: Progress | None = None,
-    command: str | None = None,
-    allow_python: Flag = False,
-    **given: Any,
-) -> FitFile | ChosenNumbersFile:
+@runs(FitRequest)
+def fit(found: FitFile | ChosenNumbersFile, folder: Path) -> None:
     """Fit an afferent to recordings: firing rates or spike times under known stimuli.
 
     Parameters
     ----------
     request : str, Path, mapping or FitRequest, optional
-        A YAML file with the keys of `FitRequest` (docs/fit.md), or its content.
+        A YAML file with the keys of `FitRequest` (docs/fit.md), its content, or the recordings.
     out : str or Path, optional
         Folder for the page `fit.html`, the numbers in `fit.json` and the stored indentations; without it
         nothing is written or stored.
-    jobs, progress, command, allow_python
+    jobs, progress, command, allow_python, given
         As of `touch`.
-    **given
-        Keys of the request, such as `recordings`, `stimuli` and `method`.
 
     Returns
     -------
     FitFile or ChosenNumbersFile
         The fit of the four numbers of an SAI, in `fit`; or that of the numbers which `free` names.
-
-    Raises
-    ------
-    ConvergenceError
-        If an indentation or the fit does not converge; finished indentations stay stored.
     """
-    asked = FitRequest.read(request, given, allow_python)
-    found: FitFile | ChosenNumbersFile = _run(asked, out, jobs, progress, command)
-    if out is not None:
-        if isinstance(found, FitFile):
-            write_page("fit", found, Path(out))
-        schemas.write(Path(out) / "fit.json", found)
-    return found
+    if isinstance(found, FitFile):
+        write_page("fit", found, folder)
+    schemas.write(folder / "fit.json", found)
 
 
-@checked
-def discriminate(
-    request: Any = None,
-    *,
-    out: str | Path | None = None,
-    jobs: Whole | Engine = 1,
-    progress: Progress | None = None,
-    command: str | None = None,
-    allow_python: Flag = False,
-    **given: Any,
-) -> DiscriminationFile:
+@runs(DiscriminationRequest)
+def discriminate(found: DiscriminationFile, folder: Path) -> None:
     """Predict hit rates, psychometric curves and thresholds of a discrimination task.
 
     Parameters
@@ -204,78 +231,49 @@ def discriminate(
     out : str or Path, optional
         Folder for the page `discriminate.html`, the numbers in `discriminate.json` and the stored
         indentations; without it nothing is written or stored.
-    jobs, progress, command, allow_python
+    jobs, progress, command, allow_python, given
         As of `touch`.
-    **given
-        Keys of the request.
 
     Returns
     -------
     DiscriminationFile
         The result, in `discrimination`, with what was asked.
-
-    Raises
-    ------
-    ConvergenceError
-        If an indentation cannot be solved, or no noise gives the observed hit rates.
     """
-    asked = DiscriminationRequest.read(request, given, allow_python)
-    found: DiscriminationFile = _run(asked, out, jobs, progress, command)
-    if out is not None:
-        write_page("discriminate", found, Path(out))
-        schemas.write(Path(out) / "discriminate.json", found)
-    return found
+    write_page("discriminate", found, folder)
+    schemas.write(folder / "discriminate.json", found)
 
 
-@checked
-def validate(
-    request: Any = None,
-    *,
-    out: str | Path | None = None,
-    jobs: Whole | Engine = 1,
-    progress: Progress | None = None,
-    command: str | None = None,
-    allow_python: Flag = False,
-    **given: Any,
-) -> ValidationFile:
+@runs(ValidationRequest)
+def validate(found: ValidationFile, folder: Path) -> None:
     """Score the model against observations of force, deflection or firing rates.
 
     Parameters
     ----------
     request : str, Path, mapping or ValidationRequest, optional
-        A YAML file with the keys of `ValidationRequest` (docs/validate.md), or its content.
+        A YAML file with the keys of `ValidationRequest` (docs/validate.md), its content, or the observations.
     out : str or Path, optional
         Folder for the page `validate.html`, the numbers in `validate.json` and the stored indentations;
         without it nothing is written or stored.
-    jobs, progress, command, allow_python
+    jobs, progress, command, allow_python, given
         As of `touch`.
-    **given
-        Keys of the request, such as `observations`.
 
     Returns
     -------
     ValidationFile
         Rows whose touch cannot be solved have a reason instead of a prediction.
     """
-    asked = ValidationRequest.read(request, given, allow_python)
-    found: ValidationFile = _run(asked, out, jobs, progress, command)
-    if out is not None:
-        write_page("validate", found, Path(out))
-        schemas.write(Path(out) / "validate.json", found)
-    return found
+    write_page("validate", found, folder)
+    schemas.write(folder / "validate.json", found)
 
 
-@checked
-def reduce(
-    request: Any = None,
-    *,
-    out: str | Path | None = None,
-    jobs: Whole | Engine = 1,
-    progress: Progress | None = None,
-    command: str | None = None,
-    allow_python: Flag = False,
-    **given: Any,
-) -> ReducedModel:
+def _beside(file: Path) -> Path:
+    if file.suffix != ".npz":
+        raise InputError("out", "must be a file .npz", str(file))
+    return file.with_suffix("")
+
+
+@runs(ReductionRequest, folder_of=_beside)
+def reduce(found: ReducedModel, file: Path) -> None:
     """Press a range of poses in full, and make a reduced touch that answers within a millisecond.
 
     Parameters
@@ -284,37 +282,14 @@ def reduce(
         A YAML file with the keys of `ReductionRequest` (docs/reduced.md), or its content.
     out : str or Path, optional
         File of the reduced touch, .npz; presses are stored beside it. Without it nothing is written.
-    jobs, progress, command, allow_python
+    jobs, progress, command, allow_python, given
         As of `touch`.
-    **given
-        Keys of the request, such as `object` and `range`.
-
-    Raises
-    ------
-    ConvergenceError
-        If a press cannot be solved.
     """
-    if out is not None and Path(out).suffix != ".npz":
-        raise InputError("out", "must be a file .npz", str(out))
-    asked = ReductionRequest.read(request, given, allow_python)
-    folder = None if out is None else Path(out).with_suffix("")
-    model: ReducedModel = _run(asked, folder, jobs, progress, command)
-    if out is not None:
-        write_reduced(model, Path(out))
-    return model
+    write_reduced(found, file)
 
 
-@checked
-def reproduce(
-    request: Any = None,
-    *,
-    out: str | Path | None = None,
-    jobs: Whole | Engine = 1,
-    progress: Progress | None = None,
-    command: str | None = None,
-    allow_python: Flag = False,
-    **given: Any,
-) -> ReproductionResult:
+@runs(ReproductionRequest)
+def reproduce(found: ReproductionResult, folder: Path) -> None:
     """Reproduce Gerling et al. (2014): the paper's own system, then the set human, beside the paper.
 
     Parameters
@@ -324,82 +299,8 @@ def reproduce(
     out : str or Path, optional
         Folder for the page `report.html`, the numbers in `results.json` and the stored indentations; without
         it nothing is written or stored.
-    jobs, progress, command, allow_python
+    jobs, progress, command, allow_python, given
         As of `touch`.
-    **given
-        Keys of the request, such as `resolution`.
     """
-    asked = ReproductionRequest.read(request, given, allow_python)
-    found: ReproductionResult = _run(asked, out, jobs, progress, command)
-    if out is not None:
-        write_page("reproduction", found, Path(out))
-        schemas.write(Path(out) / "results.json", found)
-    return found
-
-
-def _run(
-    asked: Request, out: str | Path | None, jobs: int | Engine, progress: Progress | None, command: str | None
-) -> Any:
-    """Check and run a request; without a folder, its presses are stored until it ends."""
-    engine_of(jobs)
-    asked.check()
-    with _folder(out) as folder:
-        return run(asked, folder, jobs, progress, command)
-
-
-@contextmanager
-def _folder(out: str | Path | None) -> Iterator[Path]:
-    if out is not None:
-        yield Path(out)
-        return
-    with TemporaryDirectory() as folder:
-        yield Path(folder)
-
-
-def _result(name: str) -> Write:
-    return lambda pressed, folder: pressed.skin.save(folder / RESULTS[name])
-
-
-def _dataset(name: str) -> Write:
-    def write(pressed: TouchResult, folder: Path) -> None:
-        seed = pressed.request.afferents.seed
-        pressed.skin.save(folder / RESULTS[name], response=pressed.response, seed=seed)
-
-    return write
-
-
-def _deck(name: str) -> Write:
-    def write(pressed: TouchResult, folder: Path) -> None:
-        # The depths of a press by force are known only now.
-        job = job_of(pressed.request.touch, pressed.skin.times_ms, pressed.skin.depth_mm)
-        moduli = pressed.request.elastic_moduli if name == "calculix" else None
-        write_deck(folder / name, job, name, moduli)
-
-    return write
-
-
-WRITERS: dict[str, Write] = {
-    "figures": lambda pressed, folder: write_page("touch", pressed, folder),
-    "spikes": lambda pressed, folder: pressed.response.save(folder / "spikes.csv"),
-    "nwb": lambda pressed, folder: pressed.response.to_nwb(folder / "touch.nwb"),
-    **{name: _result(name) for name in RESULTS},
-    **{name: _dataset(name) for name in ("netcdf", "zarr")},
-    **{name: _deck(name) for name in DECKS},
-}
-"""What writes each output of a touch."""
-
-
-def check_outputs(asked: TouchRequest) -> None:
-    """Raise `InputError` if the touch is impossible, or an output lacks a package or cannot express it."""
-    asked.check()
-    for number, name in enumerate(asked.outputs):
-        with asked.origin.located(), at("outputs", number):
-            if name in REQUIRED:
-                REQUIRED[name]()
-            if name == "nwb":
-                require_pynwb()
-            if name in DECKS and not asked.touch.stimulus.stays:
-                raise InputError(
-                    f"{name} decks move the indenter only along its axis, and this motion moves it aside or "
-                    f"turns it: leave {name} out."
-                )
+    write_page("reproduction", found, folder)
+    schemas.write(folder / "results.json", found)

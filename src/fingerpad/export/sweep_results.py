@@ -33,12 +33,14 @@ TABLE, TABLE_VERSION = "fingerpad sweep table", 1
 
 @checked
 def open_sweep(path: str | Path) -> xarray.Dataset:
-    """Open the data set that `run_sweep` wrote; numbers are read when they are used.
+    """Open the data set that `fp.sweep` wrote; numbers are read when they are used.
 
     Returns
     -------
     xarray.Dataset
         With dimensions named by the fields that vary; `status` is 1 where a setting is done.
+        `fp.write_sweep_table(data, path)` writes its rates, `fp.setting_touch(data, **where)` describes one
+        setting, and `data.to_dataframe()` or `data.hit_rate.plot()` are those of xarray.
     """
     xarray, _ = library("xarray"), library("zarr")
     check_format(path, opened_group(path_of("path", path)).attrs.asdict())

@@ -91,6 +91,7 @@ class FitRequest(FingerRequest):
     """A fit to recordings, as `fingerpad.fit` runs it and a file or a command describes it."""
 
     word: ClassVar[str] = "fit"
+    main: ClassVar[str] = "recordings"
     python: ClassVar[tuple[str, ...]] = (*FINGER_OBJECTS, "object", "motion", "afferent")
 
     recordings: Text | Path | object_of_python(RateRecordings | SpikeRecordings | Recorded)  # type: ignore[valid-type]

@@ -235,6 +235,7 @@ class Origin:
     name: str  # Of the file: files that it names are searched beside it.
     text: str = ""  # Its content in YAML, for lines; empty where there is none.
     rows: tuple[int, ...] = ()  # Lines of the entries of `stimuli` in a table.
+    replaced: tuple[Place, ...] = ()  # Places of values that a keyword or an option gives, and not the file.
 
     @property
     def beside(self) -> Path:
@@ -263,6 +264,8 @@ class Origin:
         row = place[1] if self.rows and len(place) > 1 and place[0] == "stimuli" else None
         if isinstance(row, int):
             return f"{self.name}, line {self.rows[row]}", words.removeprefix(spelled(place[:2])).lstrip(".")
+        if self.text and any(place[: len(each)] == each for each in self.replaced):
+            return "", words
         line = line_at(self.text, place) if self.text else None
         return self.name if line is None else f"{self.name}, line {line}", words
 
@@ -374,6 +377,7 @@ class Request(Part):
 
     word: ClassVar[str] = "request"  # What an error calls a request that is from no file.
     python: ClassVar[tuple[str, ...]] = ()  # Keys at which a file may name an object of Python.
+    main: ClassVar[str] = ""  # Key that a source means which is no description, as a table of recordings.
 
     def __eq__(self, other: object) -> bool:
         """Compare values alone: where a request comes from does not matter."""
@@ -425,6 +429,10 @@ class Request(Part):
             What errors call a mapping.
         """
         given = {key: value for key, value in given.items() if value is not None}
+        described = (cls, Mapping, *_PLAIN)
+        is_file = isinstance(source, str | Path) and Path(source).suffix in (".yaml", ".yml")
+        if cls.main and not is_file and text is None and not isinstance(source, described):
+            source, given = None, {cls.main: source} | given
         if isinstance(source, cls) and not given:
             return source
         origin = Origin(name or cls.word)
@@ -436,6 +444,7 @@ class Request(Part):
             content, origin = read_yaml(text, str(source)), Origin(str(source), text)
         else:
             content = {} if source is None else source
+        origin = replace(origin, replaced=tuple(tuple(key.split(".")) for key in given))
         with origin.located():
             if content is None:
                 raise InputError(

@@ -134,6 +134,7 @@ class RespondRequest(Request, AfferentsSettings):
     """Afferents that respond to a touch, as `fingerpad.respond` lets them and a file describes it."""
 
     word: ClassVar[str] = "afferents"
+    main: ClassVar[str] = "touch"
     python: ClassVar[tuple[str, ...]] = ("afferent", "population")
 
     touch: BlockOrObject  #: A solved touch; or one that is pressed first, or loaded from where it is stored.

@@ -34,6 +34,7 @@ class ValidationRequest(FingerRequest):
     """A validation, as `fingerpad.validate` runs it and a file or a command describes it."""
 
     word: ClassVar[str] = "validation"
+    main: ClassVar[str] = "observations"
     python: ClassVar[tuple[str, ...]] = (*FINGER_OBJECTS, "afferent")
 
     observations: Text | Path | object_of_python(Observations)  # type: ignore[valid-type]
