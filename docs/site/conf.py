@@ -80,8 +80,15 @@ def anchors(app, name, source) -> None:  # type: ignore[no-untyped-def]
     source[0] = re.sub(r'<a id="([^"]+)"></a>(\[[^\]]+\]\([^)]+\)|[^|]+?)(?= \|)', r"[\2]{#\1}", source[0])
 
 
+def fields(app, what, name, value, options, lines) -> None:  # type: ignore[no-untyped-def]
+    """Begin the explanation of a field with an empty line: Napoleon takes a first line's colon for a type."""
+    if what in ("attribute", "data", "property"):
+        lines.insert(0, "")
+
+
 def setup(app) -> None:  # type: ignore[no-untyped-def]
     """Write the pages of the reference, which follow the list of public names."""
     app.connect("source-read", anchors)
+    app.connect("autodoc-process-docstring", fields, priority=400)  # before Napoleon's, 500
     app.add_html_math_renderer("mathml", (mathml, None), (mathml, None))
     write_reference(HERE.parent / "reference")
