@@ -80,15 +80,26 @@ def anchors(app, name, source) -> None:  # type: ignore[no-untyped-def]
     source[0] = re.sub(r'<a id="([^"]+)"></a>(\[[^\]]+\]\([^)]+\)|[^|]+?)(?= \|)', r"[\2]{#\1}", source[0])
 
 
-def fields(app, what, name, value, options, lines) -> None:  # type: ignore[no-untyped-def]
-    """Begin the explanation of a field with an empty line: Napoleon takes a first line's colon for a type."""
-    if what in ("attribute", "data", "property"):
-        lines.insert(0, "")
+def of_field(what: str) -> bool:
+    return what in ("attribute", "data", "property")
+
+
+def keep_field(app, what, name, value, options, lines) -> None:  # type: ignore[no-untyped-def]
+    """Keep the explanation of a field from Napoleon, which takes what stands before a colon for a type."""
+    if of_field(what):
+        app.explanations[name] = lines[:]
+
+
+def restore_field(app, what, name, value, options, lines) -> None:  # type: ignore[no-untyped-def]
+    if of_field(what):
+        lines[:] = app.explanations[name]
 
 
 def setup(app) -> None:  # type: ignore[no-untyped-def]
     """Write the pages of the reference, which follow the list of public names."""
     app.connect("source-read", anchors)
-    app.connect("autodoc-process-docstring", fields, priority=400)  # before Napoleon's, 500
+    app.explanations = {}
+    app.connect("autodoc-process-docstring", keep_field, priority=400)
+    app.connect("autodoc-process-docstring", restore_field, priority=600)  # Napoleon's is 500
     app.add_html_math_renderer("mathml", (mathml, None), (mathml, None))
     write_reference(HERE.parent / "reference")
