@@ -54,11 +54,11 @@ from fingerpad.inference.identifiable import (
 )
 from fingerpad.inference.rate_model import (
     AfferentModel,
-    ClosedFormModel,
     RateModel,
     RateProblem,
     Rates,
     Reparametrised,
+    closed_form_rates,
 )
 from fingerpad.inference.recordings import RateRecordings
 from fingerpad.neuron.afferent import PARAMETER_NAMES, AnyAfferent, type_of
@@ -229,14 +229,14 @@ class Search:
 
     def along_slopes(self) -> LeastSquares:
         """Least squares with the derivatives of the closed form; of the four numbers only."""
-        smooth = ClosedFormModel(cast(Any, self.problem.model).model)
+        stimuli = cast(Any, self.problem.model).model
 
         def slopes(numbers: FloatArray) -> Rates:
             # By the chain rule: beta/(C v) is the first number over the last, tau.
             share, _, _, tau = numbers
             four_by_numbers = np.diag([1.0 / tau, 1.0, 1.0, 1.0])
             four_by_numbers[0, 3] = -share / tau**2
-            dynamic, static = smooth.slopes(fitted_four(numbers))
+            _, (dynamic, static) = closed_form_rates(stimuli, fitted_four(numbers))
             return dynamic @ four_by_numbers, static @ four_by_numbers
 
         jacobian = self.problem.jacobian_of(slopes)

@@ -3,7 +3,7 @@
 All rate models follow one contract, `RateModel`. `AfferentModel` is the paper's model with six parameters.
 `Reparametrised` is the same model in other parameters.
 
-`ClosedFormModel` is an approximation with derivatives. In the four identifiable parameters
+`closed_form_rates` is an approximation with derivatives. In the four identifiable parameters
 (`fingerpad.inference.identifiable`) the membrane is driven by g = b + k_d U' + k_s U [1/ms], and its
 threshold is 1. Under a constant g the potential rises from 0 to the threshold in
 tau ln(x / (x - 1)), with the steady potential x = tau g. With the refractory period t_r the rate is
@@ -253,48 +253,25 @@ def _bent(excess: FloatArray, bend: float) -> tuple[FloatArray, FloatArray]:
     return bend * np.logaddexp(0.0, excess / bend), np.exp(-np.logaddexp(0.0, -excess / bend))
 
 
-@dataclass(frozen=True)
-class ClosedFormModel:
-    """Closed-form rates: the mean over each window of the rate under a constant drive;.
+def closed_form_rates(
+    stimuli: AfferentModel, four: FloatArray, bend: float = BEND
+) -> tuple[Rates, tuple[FloatArray, FloatArray]]:
+    """Mean over each window of the rate under a constant drive, and its derivatives (n_stimuli, 4).
 
-    The model neglects the charging from rest and single spikes. It is inaccurate in the ramp, but smooth, and
-    its derivatives are cheap.
+    The charging from rest and single spikes are neglected. The rates are inaccurate in the ramp, but smooth,
+    and their derivatives are cheap.
     """
-
-    stimuli: AfferentModel  # Drives, windows and refractory period.
-    bend: float = BEND  # Width over which the rate sets in. [1]
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        return IDENTIFIABLE_NAMES
-
-    @property
-    def n_stimuli(self) -> int:
-        return self.stimuli.n_stimuli
-
-    def evaluate(self, parameters: FloatArray) -> Rates:
-        dynamic, static = (self._window(parameters, window)[0] for window in self.stimuli.used_windows_ms)
-        return dynamic, static
-
-    def slopes(self, parameters: FloatArray) -> Rates:
-        """Return the derivatives of both rates along the four parameters, (n_stimuli, 4) each."""
-        dynamic, static = (self._window(parameters, window)[1] for window in self.stimuli.used_windows_ms)
-        return dynamic, static
-
-    def _window(self, parameters: FloatArray, window_ms: tuple[float, ...]) -> tuple[FloatArray, FloatArray]:
-        """Mean rate (n_stimuli,) in a window, and its derivatives (n_stimuli, 4)."""
-        intercept, dynamic_gain, static_gain, tau = parameters
-        mean, slopes = np.empty(self.n_stimuli), np.empty((self.n_stimuli, 4))
-        for driven, columns in zip(self.stimuli.drives, self.stimuli.stimuli, strict=True):
+    intercept, dynamic_gain, static_gain, tau = four
+    rates, slopes = np.empty((2, stimuli.n_stimuli)), np.empty((2, stimuli.n_stimuli, 4))
+    for phase, window_ms in enumerate(stimuli.used_windows_ms):
+        for driven, columns in zip(stimuli.drives, stimuli.stimuli, strict=True):
             speed, value = _samples(driven, window_ms)
             g = intercept + dynamic_gain * speed + static_gain * value
-            rate, per_drive, per_tau = constant_drive_rate(
-                g, float(tau), self.stimuli.refractory_ms, self.bend
-            )
-            mean[columns] = rate.mean(axis=0)
+            rate, per_drive, per_tau = constant_drive_rate(g, float(tau), stimuli.refractory_ms, bend)
+            rates[phase, columns] = rate.mean(axis=0)
             for number, slope in enumerate((per_drive, per_drive * speed, per_drive * value, per_tau)):
-                slopes[columns, number] = slope.mean(axis=0)
-        return mean, slopes
+                slopes[phase, columns, number] = slope.mean(axis=0)
+    return (rates[0], rates[1]), (slopes[0], slopes[1])
 
 
 def _samples(drive: Drive, window_ms: tuple[float, ...]) -> tuple[FloatArray, FloatArray]:
@@ -342,11 +319,9 @@ class RateProblem:
 
         r_i = sqrt(w / sum f^2) (f_i - p_i), with the weight w, observed f and predicted p of each phase.
         """
+        parts = self._recorded(chosen, self.model.evaluate(parameters))
         return np.concatenate(
-            [
-                np.sqrt(weight / (observed @ observed)) * (observed - predicted)
-                for weight, observed, predicted in self._phases(parameters, chosen)
-            ]
+            [_scale(weight, observed) * (observed - predicted) for weight, observed, predicted in parts]
         )
 
     def jacobian_of(
@@ -358,12 +333,8 @@ class RateProblem:
         """
 
         def jacobian(parameters: FloatArray, chosen: IntArray) -> FloatArray:
-            return np.concatenate(
-                [
-                    -np.sqrt(weight / (observed @ observed)) * derivatives[chosen]
-                    for weight, observed, derivatives in self._recorded(chosen, slopes(parameters))
-                ]
-            )
+            parts = self._recorded(chosen, slopes(parameters))
+            return np.concatenate([-_scale(weight, observed) * fall for weight, observed, fall in parts])
 
         return jacobian
 
@@ -379,30 +350,25 @@ class RateProblem:
 
     def _score_of(self, rates: Rates, chosen: IntArray) -> float:
         return sum(
-            weight * fractional_sum_of_squares(observed, predicted[chosen])
+            weight * fractional_sum_of_squares(observed, predicted)
             for weight, observed, predicted in self._recorded(chosen, rates)
         )
 
     def score_by_phase(self, parameters: FloatArray, chosen: IntArray) -> dict[str, float]:
         """FSS of each recorded phase, "dynamic" and "static", Eqs. 13 and 14."""
-        scores = (
-            fractional_sum_of_squares(observed, predicted)
-            for _, observed, predicted in self._phases(parameters, chosen)
-        )
+        parts = self._recorded(chosen, self.model.evaluate(parameters))
+        scores = (fractional_sum_of_squares(observed, predicted) for _, observed, predicted in parts)
         return dict(zip(self.recordings.phases, scores, strict=True))
 
-    def _phases(
-        self, parameters: FloatArray, chosen: IntArray
-    ) -> Iterator[tuple[float, FloatArray, FloatArray]]:
-        """Weight, observed and predicted rates of each recorded phase."""
-        for weight, observed, predicted in self._recorded(chosen, self.model.evaluate(parameters)):
-            yield weight, observed, predicted[chosen]
-
     def _recorded(self, chosen: IntArray, of_phases: Rates) -> Iterator[tuple[float, FloatArray, FloatArray]]:
-        """Weight, observed rates and entry of `of_phases` of each recorded phase."""
+        """Weight, observed rates and entry of `of_phases` of each recorded phase, chosen stimuli only."""
         alone = len(self.recordings.phases) == 1
         weights = (self.dynamic_weight, self.static_weight)
         observed = (self.recordings.dynamic_rate_hz, self.recordings.static_rate_hz)
         for weight, rates, given in zip(weights, observed, of_phases, strict=True):
             if rates is not None:
-                yield 1.0 if alone else weight, rates[chosen], given
+                yield 1.0 if alone else weight, rates[chosen], given[chosen]
+
+
+def _scale(weight: float, observed: FloatArray) -> float:
+    return float(np.sqrt(weight / (observed @ observed)))
