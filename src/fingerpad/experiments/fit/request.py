@@ -79,7 +79,7 @@ class FitFile:
     """The file `fit.json`."""
 
     format: Literal["fingerpad fit"] = "fingerpad fit"
-    format_version: Literal[2] = 2
+    format_version: Literal[3] = 3
     fit: FitResult
     windows_ms: tuple[tuple[float, ...], tuple[float, ...]]  # Of the dynamic and of the static rate. [ms]
     dynamic_quantity: str

@@ -15,10 +15,19 @@ from numpy.typing import ArrayLike
 from scipy import stats
 from scipy.special import ndtri
 
-from fingerpad.core.checked import checked
+from fingerpad.core.checked import checked, result_class
 from fingerpad.core.errors import InputError
 from fingerpad.core.random_streams import generator
-from fingerpad.core.values import Finite, FloatArray, IntArray, NotNegativeWhole, Several, float_array
+from fingerpad.core.values import (
+    Finite,
+    FloatArray,
+    IntArray,
+    NotNegativeWhole,
+    Number,
+    Several,
+    Vector,
+    float_array,
+)
 
 BatchObjective = Callable[[FloatArray], FloatArray]
 """Called with points (n_points, n_parameters); returns one number for each."""
@@ -26,24 +35,20 @@ BatchObjective = Callable[[FloatArray], FloatArray]
 SOBOL_RESAMPLES = 200  # Bootstrap resamples behind the confidence intervals of the indices.
 
 
-@dataclass(frozen=True)
+@result_class
 class SobolIndices:
-    """Shares of the variance of an objective for parameters that are uniform within ranges."""
+    """Shares of the variance of an objective, of parameters that are uniform within ranges."""
 
-    names: tuple[str, ...]
-    lower: FloatArray
-    upper: FloatArray  # Ranges of the parameters, (n_parameters,).
-    first: FloatArray
-    first_half_width: FloatArray
-    """First-order index, the share of the variance that the parameter explains alone, and half the width of
-    its confidence interval, (n_parameters,). [1]"""
-    total: FloatArray
-    total_half_width: FloatArray
-    """Total index: the share explained alone and in interaction with others, (n_parameters,). [1]"""
-    level: float  # Level of confidence. [0-1]
-    mean: float
-    standard_deviation: float  # Of the objective over the ranges.
-    n_evaluations: int
+    lower: Vector
+    upper: Vector  # Range of each parameter, (n_parameters,).
+    first: Vector
+    first_half_width: Vector
+    """First-order index, what a parameter explains alone, and half of its confidence interval. [1]"""
+    total: Vector
+    total_half_width: Vector  # The share explained alone and in interaction with others, likewise. [1]
+    mean: Number
+    standard_deviation: Number  # Of the objective over the ranges.
+    evaluations: int
 
 
 @checked
@@ -51,7 +56,6 @@ def sobol_indices(
     objective: BatchObjective,
     lower: ArrayLike,
     upper: ArrayLike,
-    names: Sequence[str],
     *,
     seed: NotNegativeWhole,
     n_base: Several = 512,
@@ -62,13 +66,9 @@ def sobol_indices(
     Saltelli et al. 2010. SciPy's own bootstrap of the indices takes no seed, so the points of the design are
     resampled here; a half width is that of a normal interval with the bootstrap's standard error.
     """
-    labels = tuple(names)
     low, high = float_array("lower", lower, 1), float_array("upper", upper, 1)
-    if not low.size == high.size == len(labels) or not (low < high).all() or not labels:
-        raise InputError(
-            "lower and upper must have one entry per name, and lower be below upper: "
-            f"got {low.tolist()}, {high.tolist()} for {len(labels)} names."
-        )
+    if low.shape != high.shape or not low.size or not (low < high).all():
+        raise InputError("lower", "must be below upper, entry by entry", f"{low.tolist()}, {high.tolist()}")
     if n_base & (n_base - 1):
         raise InputError("n_base", "must be a power of two", str(n_base))
     if not 0.0 < level < 1.0:
@@ -97,17 +97,15 @@ def sobol_indices(
     spread = stats.bootstrap((np.arange(n_base),), resampled, **settings).standard_error
     half_widths = ndtri(0.5 + 0.5 * level) * spread
     return SobolIndices(
-        names=labels,
         lower=low,
         upper=high,
         first=found.first_order,
         first_half_width=half_widths[0],
         total=found.total_order,
         total_half_width=half_widths[1],
-        level=level,
-        mean=float(everything.mean()),
-        standard_deviation=float(everything.std()),
-        n_evaluations=everything.size,
+        mean=everything.mean(),
+        standard_deviation=everything.std(),
+        evaluations=everything.size,
     )
 
 
