@@ -330,6 +330,16 @@ def _largest_factor(afferent: AnyAfferent, name: str) -> float:
     return LARGEST_FACTOR
 
 
+def check_free(afferent: AnyAfferent, free: Sequence[str]) -> None:
+    """Raise `InputError` unless these are numbers of an afferent, at least one and all above zero."""
+    known = tuple(getattr(afferent, "__dataclass_fields__", ()))
+    if not free:
+        words = f"must name at least one number of {type_of(afferent)}, one of {', '.join(known)}"
+        raise InputError("free", words, "none")
+    for name in free:
+        positive(one_of("free", name, known), getattr(afferent, name))
+
+
 def chosen_numbers(
     afferent: AnyAfferent,
     free: Sequence[str],
@@ -338,11 +348,7 @@ def chosen_numbers(
     windows_ms: Windows | None = None,
 ) -> Search:
     """Search the logarithms of chosen numbers of any afferent over those given."""
-    known = tuple(getattr(afferent, "__dataclass_fields__", ()))
-    for name in free:
-        positive(one_of("free", name, known), getattr(afferent, name))
-    if not free:
-        raise InputError("free", f"must name at least one number of {type_of(afferent)}", "none")
+    check_free(afferent, free)
     parts = (traces,) if isinstance(traces, Traces) else tuple(traces)
     problem = RateProblem(TypedModel(afferent, tuple(free), parts, windows_ms), recordings)
     low = np.full(len(free), -np.log(LARGEST_FACTOR))

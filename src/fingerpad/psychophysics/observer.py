@@ -141,7 +141,7 @@ class Encoder(Protocol):
         self, responses: FloatArray, seed: int, plan: Experiment, session: int
     ) -> Callable[[float], FloatArray]:
         """From a noise to mean hit rates (n_comparisons,), for fits of the noise."""
-        ...
+        return lambda sigma: discriminate_by(self, responses, sigma, seed, plan, session=session).hit_rate
 
     def of_noisy(
         self, responses: FloatArray, noise_sigma: float, seed: int, session: int, count: int
@@ -150,7 +150,7 @@ class Encoder(Protocol):
         ...
 
     def statistic(self, standard: ResponseModel, seed: int, session: int) -> Statistic:
-        """Statistic of one trial, for `code_efficiency`."""
+        """Statistic of one trial, for `Presentation.of`."""
         ...
 
 
@@ -248,11 +248,6 @@ class EuclideanDistance(Encoder):
         points = decision_point(means[:, :1], means[:, 1:], plan.criterion)
         beyond = side(means) * (values[:, 1:] - points[:, :, np.newaxis]).transpose(0, 2, 1)
         return np.heaviside(beyond, 0.5).mean(axis=1)  # (h*)
-
-    def predictor(
-        self, responses: FloatArray, seed: int, plan: Experiment, session: int
-    ) -> Callable[[float], FloatArray]:
-        return lambda sigma: discriminate_by(self, responses, sigma, seed, plan, session=session).hit_rate
 
     def of_noisy(
         self, responses: FloatArray, noise_sigma: float, seed: int, session: int, count: int

@@ -45,7 +45,7 @@ from fingerpad.inference.fitting.methods import (
 )
 from fingerpad.inference.identifiable import IDENTIFIABLE_NAMES, SPIKE_PARAMETER_NAMES, identifiable
 from fingerpad.inference.rate_model import AfferentModel, RateProblem, four_number_model
-from fingerpad.inference.recordings import PHASES, RateRecordings, SpikeRecordings
+from fingerpad.inference.recordings import PHASES, RateRecordings, SpikeRecordings, check_trains
 from fingerpad.neuron.afferent import PARAMETER_NAMES, parameter_units
 from fingerpad.neuron.spikes import Windows
 
@@ -288,19 +288,8 @@ def check_spikes(recordings: Recordings, n_motions: int) -> SpikeRecordings:
             f"needs at least {len(SPIKE_PARAMETER_NAMES)} spikes, one per parameter",
             str(recordings.trains.times_ms.size),
         )
-    for presentation, name in enumerate(recordings.stimuli):
-        train = recordings.trains[presentation]
-        if train.size and train[0] <= 0.0:
-            raise InputError(
-                "likelihood", "needs spikes after the onset", remedy=f"{name} has one at {train[0]:g} ms"
-            )
-        closest = np.diff(train).min(initial=np.inf)
-        if closest <= neuron.REFRACTORY.value:
-            raise InputError(
-                "likelihood",
-                f"needs spikes more than {neuron.REFRACTORY.value:g} ms apart, the rest after a spike",
-                remedy=f"{name} has two that are {closest:.3g} ms apart; sort the unit again, or fit rates",
-            )
+    given = recordings.trains, 0.0, recordings.duration_ms, neuron.REFRACTORY.value, recordings.stimuli
+    check_trains(*given)
     return recordings
 
 
