@@ -23,7 +23,6 @@ from fingerpad.inference.rate_posterior import (
     log_posterior,
     to_coordinates,
 )
-from fingerpad.neuron.transduction import drive
 from refusals import refusals
 
 SHIFTS = np.linspace(0.0, 2.7, 10)
@@ -35,7 +34,7 @@ COURSE = np.where(TIMES <= 50.0, (TIMES / 50.0) ** 2, 0.75 + 0.25 * np.exp(-(TIM
 def under(peaks):
     """The model under stimuli of these peaks of energy density [kPa]."""
     traces = Traces(TIMES, COURSE[:, None] * peaks, [50.0])
-    return four_number_model(AfferentModel.of_drive(drive(traces, pieces=3)))
+    return four_number_model(AfferentModel.of_traces(traces, pieces=3))
 
 
 MODEL = under(PEAKS)

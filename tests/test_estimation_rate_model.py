@@ -48,7 +48,7 @@ def test_rows_equal_single_runs_to_the_bit(model, points):
 def test_single_runs_equal_the_afferent_to_the_bit():
     windows = ((20.0, 50.0), (500.0, 900.0))
     (driven,) = MODEL.drives
-    chosen = AfferentModel.of_drive(driven, windows, 2.0)
+    chosen = AfferentModel.of_traces(SED, windows, 2.0)
     assert evaluate_rows(four_number_model(MODEL), np.empty((0, 4)))[0].shape == (0, 6)
     for point in scattered(SIX, 9):
         np.testing.assert_array_equal(MODEL.evaluate(point), sed_driven(point).rates(driven))

@@ -503,7 +503,7 @@ def test_bad_input_is_one_sentence_and_status_2_and_nothing_is_written(
 def test_the_example_prints_its_command_and_writes_recordings(run_program, tmp_path):
     status, said, errors = run_program(cli.main, "fingerpad", "init", "recordings", "--out", "try")
     assert (status, said, errors) == (0, "Try: fingerpad fit try/bar.csv\n", "")
-    assert read_recordings(tmp_path / "try/bar.csv", ShiftedBar()).recordings.n_rates == 72
+    assert read_recordings(tmp_path / "try/bar.csv", ShiftedBar()).recordings.dynamic_rate_hz.size == 36
 
 
 def test_figures_show_what_was_recorded_and_nothing_else(recovered):

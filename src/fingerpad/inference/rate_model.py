@@ -30,7 +30,7 @@ from fingerpad.core.errors import InputError
 from fingerpad.core.signals import Traces
 from fingerpad.core.threads import in_blocks
 from fingerpad.core.units import MS_PER_S
-from fingerpad.core.values import Finite, FloatArray, IntArray, Many, NotNegative, Positive
+from fingerpad.core.values import Count, Finite, FloatArray, IntArray, Many, NotNegative, Positive
 from fingerpad.data import neuron, protocol
 from fingerpad.inference.fitting.methods import fractional_sum_of_squares
 from fingerpad.inference.identifiable import IDENTIFIABLE_NAMES, six_parameters
@@ -38,7 +38,7 @@ from fingerpad.inference.recordings import RateRecordings
 from fingerpad.neuron.afferent import PARAMETER_NAMES, Afferent
 from fingerpad.neuron.exact_spikes import exact_trains
 from fingerpad.neuron.spikes import Windows, check_windows, common_rate_windows_ms, window_rates_hz
-from fingerpad.neuron.transduction import Drive, drive
+from fingerpad.neuron.transduction import PIECES_PER_INTERVAL, Drive, drive
 
 Rates = tuple[FloatArray, FloatArray]  # Dynamic and static rates, one column per stimulus. [spikes/s]
 ROWS_PER_BLOCK = 4  # Rows of parameters that a thread evaluates at a time.
@@ -112,23 +112,13 @@ class AfferentModel:
                 )
 
     @classmethod
-    def of_drive(
-        cls,
-        driven: Drive,
-        windows_ms: Windows | None = None,
-        refractory_ms: Finite = neuron.REFRACTORY.value,
-        initial_mv: Finite | None = None,
-    ) -> AfferentModel:
-        """Make the model for stimuli that share their times, one per column of a drive."""
-        return cls((driven,), (np.arange(driven.n_sites),), windows_ms, refractory_ms, initial_mv)
-
-    @classmethod
     def of_traces(
         cls,
         traces: Traces | Sequence[Traces],
         windows_ms: Windows | None = None,
         refractory_ms: Finite = neuron.REFRACTORY.value,
         initial_mv: Finite | None = None,
+        pieces: Count = PIECES_PER_INTERVAL,
     ) -> AfferentModel:
         """Make the model for what drives the afferent, stimuli grouped by their times.
 
@@ -138,6 +128,8 @@ class AfferentModel:
             One column per stimulus; the columns of several traces are numbered consecutively.
         windows_ms, refractory_ms, initial_mv
             As of the class.
+        pieces : int, optional
+            As of `drive`.
         """
         parts = [traces] if isinstance(traces, Traces) else list(traces)
         quantities = sorted({f"{part.dynamic_quantity} and {part.static_quantity}" for part in parts})
@@ -153,8 +145,9 @@ class AfferentModel:
             key = trace.times_ms.tobytes(), trace.kinks_ms.tobytes(), trace.phases, trace.onset_ms
             groups.setdefault(key, []).append((first, trace))
             first += trace.n_sites
+        joined = (Traces.joined([trace for _, trace in group]) for group in groups.values())
         return cls(
-            tuple(drive(Traces.joined([trace for _, trace in group])) for group in groups.values()),
+            tuple(drive(each, pieces=pieces) for each in joined),
             tuple(
                 np.concatenate([start + np.arange(trace.n_sites) for start, trace in group])
                 for group in groups.values()

@@ -62,11 +62,6 @@ class RateRecordings:
         """The recorded ones of "dynamic" and "static"."""
         return tuple(phase for phase in PHASES if getattr(self, f"{phase}_rate_hz") is not None)
 
-    @property
-    def n_rates(self) -> int:
-        """Number of rates in both phases."""
-        return len(self.phases) * len(self.stimuli)
-
     def check_stimuli(self, number: int) -> None:
         """Raise `InputError` unless this is the number of stimuli."""
         if len(self.stimuli) != number:

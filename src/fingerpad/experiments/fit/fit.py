@@ -219,11 +219,12 @@ def check_enough(rates: RateRecordings, memberships: IntArray, n_free: int = len
         )
     for fold in np.unique(memberships):
         training = rates.chosen(np.flatnonzero(memberships != fold))
-        if training.n_rates < n_free:
+        n_rates = len(training.phases) * len(training.stimuli)
+        if n_rates < n_free:
             raise InputError(
                 "recordings",
                 f"must leave at least {n_free} rates, one per free parameter, when a fold is left out",
-                remedy=f"without fold {fold + 1} there are {training.n_rates}, record more",
+                remedy=f"without fold {fold + 1} there are {n_rates}, record more",
             )
         for rows in (memberships == fold, memberships != fold):
             part = rates.chosen(np.flatnonzero(rows))
