@@ -228,14 +228,7 @@ def test_the_prior_is_centred_on_the_papers_start_and_silent_at_rest():
     np.testing.assert_allclose(coordinates[0], [0.72, np.log(5.0), np.log(0.03), np.log(60.0)], rtol=1e-14)
 
 
-def six_number_posterior():
-    four = np.array([0.01, 5.0, 0.03, 60.0])
-    likelihood = RateLikelihood(MODEL.model, simulated(four, np.random.default_rng(1)), alike(4.0))
-    return afferent_posterior(likelihood, four, seed=1)
-
-
 test_what_is_no_afferent_is_refused = refusals(
     (lambda: to_coordinates([0.01, -4.0, 0.014, 68.0]), "all but the first greater than 0"),
     (lambda: to_coordinates([0.01, 4.0, 0.014]), "four must hold"),
-    (six_number_posterior, "needs a model of intercept_per_ms, .*: got one of intercept_ma"),
 )  # fmt: skip

@@ -16,20 +16,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 from pydantic import SkipValidation
 
-from fingerpad.core.checked import checked, value_class
+from fingerpad.core.checked import checked
 from fingerpad.core.errors import InputError
 from fingerpad.core.signals import INTERVAL, Traces
-from fingerpad.core.values import (
-    FiniteVector,
-    FloatArray,
-    IntArray,
-    Positive,
-    finite,
-    float_array,
-    increasing,
-    one_of,
-    positive,
-)
+from fingerpad.core.values import FloatArray, IntArray, finite, float_array, increasing, one_of, positive
 from fingerpad.data import neuron
 from fingerpad.inference.fitting.methods import (
     Bounds,
@@ -415,7 +405,7 @@ WEIGHT = 2.0
 CHANCE = 0.5  # Hit rate of an observer of a silent population. [0-1]
 
 
-@value_class
+@dataclass(frozen=True)
 class RatesAndHitRates:
     """Recorded rates and hit rates h of people, to which one afferent is fitted.
 
@@ -429,12 +419,8 @@ class RatesAndHitRates:
     rates: RateProblem  # Recorded rates and the model that predicts them.
     hit_rates: Callable[[FloatArray], FloatArray]
     """From the parameters of that model to predicted hit rates (n,). [0-1]"""
-    observed: FiniteVector  # Hit rates of people, (n,). [0-1]
-    weight: Positive = WEIGHT  # Weight w of the squared differences against FSS.
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        return self.rates.names
+    observed: FloatArray  # Hit rates of people, (n,). [0-1]
+    weight: float = WEIGHT  # Weight w of the squared differences against FSS.
 
     @property
     def n_observations(self) -> int:
@@ -463,14 +449,6 @@ class SphereHitRates:
     neighbours: np.ndarray  # Pairs of the Gradient Sum, (n_pairs, 2).
     noise_sigma: float
     standard_normals: FloatArray  # Common random presentations of the Gradient Sum, (n_draws, n_receptors).
-
-    def __post_init__(self) -> None:
-        if self.model.n_stimuli % (self.n_positions * self.n_receptors):
-            raise InputError(
-                "model",
-                "must have one column per position, sphere and receptor",
-                f"{self.model.n_stimuli} for {self.n_positions} positions and {self.n_receptors} receptors",
-            )
 
     def __call__(self, parameters: FloatArray) -> FloatArray:
         """Hit rates (n,): by position Gradient Sum, then Euclidean Distance, one per comparison. [0-1]"""
@@ -503,7 +481,7 @@ class ToRatesAndHitRates:
     def fit(self, problem: Problem, chosen: IntArray) -> Fit:
         """Fit the chosen rates, and all hit rates."""
         if not (isinstance(problem, RateProblem) and isinstance(problem.model, AfferentModel)):
-            raise InputError("problem", "must have the paper's six parameters", str(", ".join(problem.names)))
+            raise InputError("problem", "must have the paper's six parameters", type(problem).__name__)
         search = four_numbers(problem.model, problem.recordings)
         both = RatesAndHitRates(
             search.problem, lambda numbers: self.hit_rates(fitted_six(numbers)), self.observed

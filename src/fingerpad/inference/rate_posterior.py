@@ -234,13 +234,6 @@ class AfferentPosterior:
 
 
 def log_posterior(likelihood: RateLikelihood, prior: AfferentPrior) -> LogDensity:
-    if likelihood.model.names != IDENTIFIABLE_NAMES:
-        raise InputError(
-            "likelihood",
-            f"needs a model of {', '.join(IDENTIFIABLE_NAMES)}, as four_number_model makes it",
-            f"one of {', '.join(likelihood.model.names)}",
-        )
-
     def log_density(points: FloatArray) -> FloatArray:
         heights = prior.log_density(points)
         possible = np.isfinite(heights)

@@ -474,7 +474,7 @@ def expected_hit_rates(
     responses: ArrayLike,
     neighbours: ArrayLike,
     noise_sigma: Finite,
-    standard_normals: ArrayLike,
+    standard_normals: FloatArray,
     criterion: Finite = psychophysics.DECISION_CRITERION.value,
 ) -> FloatArray:
     """Predict the mean hit rates of a `GradientSum` without repeating the experiment.
@@ -483,15 +483,8 @@ def expected_hit_rates(
     function of `noise_sigma`, as `fit_noise_sigma` needs.
     """
     values = checked_responses(responses)
-    draws = float_array("standard_normals", standard_normals, 2)
-    if draws.shape[1] != values.shape[1] or len(draws) < 2:
-        raise InputError(
-            "standard_normals",
-            f"needs two rows or more and {values.shape[1]} columns, one per receptor",
-            f"shape {draws.shape}",
-        )
     pairs = check_neighbours(neighbours, values.shape[1])
-    sums = shared_noise_gradient_sums(values, pairs, checked_noise(noise_sigma), draws)
+    sums = shared_noise_gradient_sums(values, pairs, checked_noise(noise_sigma), standard_normals)
     means, spreads = moments(sums)
     point = decision_point(means[0], means[1:], criterion)
     return hit_probability(point, means[1:], spreads[1:], side(means[np.newaxis]))
