@@ -183,10 +183,6 @@ def discrimination_section() -> dict:
         "criterion": {"ratio": sure(2.0), "change": sure(0.005)},
         "unsteadiness": named(("few", "many", "ratio"), (0.007, 0.002, 3.2)),
         "targets": [target, target],
-        "sweep": {
-            "noise_sigma": [0.015, 0.055, 0.085],
-            "misfit": [[sure(value + place) for value in (0.3, 0.15, 0.08)] for place in (0.0, 0.01)],
-        },
     }
     readings = {
         "static, eight neighbours (used)": 0.01,
@@ -240,22 +236,17 @@ def nail_section() -> dict:
         return 20.0 * np.exp(-np.hypot(x - 17.4, np.hypot(y + 9.85, z)) / 1.5) + 0.4 * (y > 2.0)
 
     x_faces, y_faces, z_faces = (values[:-1, :-1] for values in (along, y, z))
-    columns, rows = np.meshgrid(np.arange(0.0, 30.0, 1.0), np.arange(-9.0, 3.0, 1.0), indexing="ij")
-    corners_x = columns.ravel()[:, None] + [0.0, 1.0, 1.0, 0.0]
-    corners_y = rows.ravel()[:, None] + [0.0, 0.0, 1.0, 1.0]
+    rows = np.arange(-9.0, 3.0, 1.0)
+    corners_y = rows[:, None] + [0.0, 0.0, 1.0, 1.0]
     nail = np.array([[[17.0, 3.0, 0.0], [17.0, 2.5, 5.0]], [[17.0, 2.5, 5.0], [28.0, 1.0, 5.0]]])
     distance = np.arange(-1.75, 5.0, 0.5)
     course = [[0.2, 0.4 + 0.1 * np.exp(-abs(d)), 0.6] if abs(d) > 0.3 else [None] * 3 for d in distance]
-    across = corners_y[:12].tolist()
+    across = corners_y.tolist()
     return {
         "x_mm": along.tolist(), "y_mm": y.tolist(), "z_mm": z.tolist(),
         "von_mises_kpa": stress(x_faces, y_faces, z_faces).tolist(), "nail_mm": nail.tolist(),
         "ratio": 1.8, "ratio_range": [1.5, 3.9], "ratio_energy": 1.5, "border_kpa": 0.8,
         "profile": {"distance_mm": distance.tolist(), "surface_kpa": course, "living_epidermis_kpa": course},
-        "middle": {
-            "x_mm": corners_x.tolist(), "y_mm": corners_y.tolist(),
-            "von_mises_kpa": stress(columns, rows, 0.0).ravel().tolist(),
-        },
         "across": {
             "x_mm": 22.0, "y_mm": across, "z_mm": across,
             "von_mises_kpa": np.linspace(0.0, 0.8, 12).tolist(),

@@ -161,14 +161,11 @@ def _single_unit_uncertainty() -> dict:
 
 
 def _curvature_thresholds() -> dict:
-    steps = [0.03, 0.06, 0.12]
-
     def at(standard: float) -> dict:
         return {
             "standard_per_m": standard, "jnd_per_m": 0.1 * standard, "weber_fraction": 0.1,
-            "ideal_weber_fraction": 0.06, "step": steps, "hit_rate": [0.58, 0.66, 0.79],
+            "ideal_weber_fraction": 0.06,
             "fitted_weber_fraction": 0.101, "fitted_interval": [0.08, 0.13],
-            "curve": {"step": steps, "hit_rate": [0.57, 0.67, 0.78]},
         }  # fmt: skip
 
     population = {

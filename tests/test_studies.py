@@ -495,8 +495,7 @@ def test_stress_over_distance_holds_the_sections_that_cross_the_border(scattered
 def test_the_middle_section_is_every_face_on_the_midplane(scattered_skin):
     """A slow look at all six faces of every brick; those of a wedge's missing edge have no area."""
     still = scattered_skin.with_fields(displacement_mm=np.zeros_like(scattered_skin.displacement_mm))
-    section = level_1.nail_border(still).middle
-    mesh = still.mesh
+    section, mesh = still.section(), still.mesh
     faces = [(0, 1, 2, 3), (4, 5, 6, 7), (0, 1, 5, 4), (1, 2, 6, 5), (2, 3, 7, 6), (3, 0, 4, 7)]
     expected = []
     for element, nodes in enumerate(mesh.elements):
@@ -504,8 +503,8 @@ def test_the_middle_section_is_every_face_on_the_midplane(scattered_skin):
             corners = mesh.nodes_mm[nodes[list(face)]]
             if (np.abs(corners[:, 2]) < 1e-9).all() and _area(corners[:, 0], corners[:, 1]) > 1e-9:
                 expected.append((still.von_mises_kpa[element], _area(corners[:, 0], corners[:, 1])))
-    areas = map(_area, section.x_mm, section.y_mm)
-    found = list(zip(section.von_mises_kpa, areas, strict=True))
+    areas = (_area(*corners.T) for corners in section.corners_mm)
+    found = list(zip(still.von_mises_kpa[section.elements], areas, strict=True))
     np.testing.assert_allclose(sorted(found), sorted(expected), rtol=1e-12)
     assert sum(area for _, area in expected) > 300.0
 

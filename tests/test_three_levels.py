@@ -39,7 +39,7 @@ def test_figure_1_has_the_layers_of_the_finger_and_its_nail_on_the_back(mesh):
     assert (picture.along.up_mm[picture.along.under_nail, 0] > 0.0).all()
     assert picture.contact_mm == pytest.approx((CONTACT_X_MM, -9.85), abs=0.02)
     assert_array_equal(picture.layer, np.sort(picture.layer))
-    assert (picture.across.right_mm.min() < -5.0) == (not picture.half)
+    assert (picture.across.right_mm.min() < -5.0) == mesh.full
 
 
 @pytest.mark.parametrize("seed", range(4))

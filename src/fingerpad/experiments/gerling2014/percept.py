@@ -98,14 +98,6 @@ USED = {
 
 
 @result_class
-class NoiseSweep:
-    """Misfit of the static Gradient Sum over the noise."""
-
-    noise_sigma: Vector  # Noise sigma_1, (n_levels,).
-    misfit: tuple[tuple[Estimate, ...], ...]  # Root mean square distance to Goodwin's points. [0-1]
-
-
-@result_class
 class TargetDistances:
     """Static hit rates of one position beside people's."""
 
@@ -130,7 +122,6 @@ class DiscriminationStatistics:
     unsteadiness: dict[str, Estimate]
     """Standard deviation of the mean of "few" and of "many" hit rates when the same sums are judged again,
     and "ratio" of the two. [0-1], [1]"""
-    sweep: NoiseSweep
     targets: tuple[TargetDistances, ...]
 
 
@@ -441,13 +432,6 @@ def discrimination_statistics(observers: Observers, measures: Sequence[str]) -> 
         ten_matrices=_error_bars(observers, "ten_matrices", "static"),
         criterion=_error_bars(observers, much, little),
         unsteadiness={"few": estimate(few), "many": estimate(many), "ratio": estimate(few / many)},
-        sweep=NoiseSweep(
-            noise_sigma=np.array(SWEPT_NOISE),
-            misfit=tuple(
-                tuple(estimate(goodwin_misfit(mean[name][:, place], axis=1)) for name in swept)
-                for place in range(mean["static"].shape[1])
-            ),
-        ),
         targets=tuple(_targets(one) for one in mean["static"].swapaxes(0, 1)),
     )
 

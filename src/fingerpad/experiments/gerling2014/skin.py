@@ -184,15 +184,6 @@ class StressProfile:
 
 
 @result_class
-class MiddleSection:
-    """Deformed faces of the elements on the plane z = 0, and their stress."""
-
-    x_mm: Matrix
-    y_mm: Matrix  # Corners, (n_faces, 4). [mm]
-    von_mises_kpa: Vector  # Stress of the element, (n_faces,). [kPa]
-
-
-@result_class
 class CrossSection:
     """Deformed quadrilaterals in the middle of a section's elements, and their stress."""
 
@@ -204,7 +195,7 @@ class CrossSection:
 
 @result_class
 class NailBorder:
-    """Stress of the skin and in two sections at the end of the hold, and its concentration at the nail."""
+    """Stress of the skin and in one section at the end of the hold, and its concentration at the nail."""
 
     x_mm: Matrix
     y_mm: Matrix
@@ -216,7 +207,6 @@ class NailBorder:
     ratio_energy: Number  # The same median for strain energy density in the living epidermis.
     border_kpa: Number  # Largest stress at the border. [kPa]
     profile: StressProfile  # Stress over distance from the nail.
-    middle: MiddleSection
     across: CrossSection  # The section with the highest ratio.
 
 
@@ -251,7 +241,7 @@ def nail_border(skin: SkinResponse) -> NailBorder:
         return border, border / np.array([values[n][away[n]].mean() for n in sections])
 
     (border, ratios), (_, energies) = compared(stress_kpa[surface]), compared(skin.sed_kpa[-1][deep])
-    grid, middle = (mesh.nodes_mm + skin.displacement_mm)[mesh.skin_grid], skin.section()
+    grid = (mesh.nodes_mm + skin.displacement_mm)[mesh.skin_grid]
     crossing = np.isin(np.arange(len(distance)), sections)[:, None]
     classes = [crossing & (distance > start) & (distance <= end) for start, end in pairwise(PROFILE_MM)]
     surface_kpa, living_epidermis_kpa = (
@@ -271,11 +261,6 @@ def nail_border(skin: SkinResponse) -> NailBorder:
             distance_mm=0.5 * (PROFILE_MM[1:] + PROFILE_MM[:-1]),
             surface_kpa=surface_kpa,
             living_epidermis_kpa=living_epidermis_kpa,
-        ),
-        middle=MiddleSection(
-            x_mm=middle.corners_mm[..., 0],
-            y_mm=middle.corners_mm[..., 1],
-            von_mises_kpa=stress_kpa[middle.elements],
         ),
         across=_across(skin, numbers[sections[ratios.argmax()]].ravel()),
     )
@@ -342,8 +327,7 @@ class MeshPicture:
     z_mm: Matrix  # Nodes of the skin, (n_along + 1, n_around + 1). [mm]
     under_nail: TruthMatrix  # Whether they lie under the nail, (n_along + 1, n_around + 1).
     along: MeshPlane  # Plane z = 0, from the volar side over the tip to the back; right is x, up is y.
-    across: MeshPlane  # Proximal end, beside the middle phalanx; right is z, up is y.
-    half: bool  # Whether `across` is one half, whose other half is its mirror image.
+    across: MeshPlane  # Proximal end, beside the middle phalanx, half of a half mesh; right is z, up is y.
     contact_mm: tuple[float, float]  # x and y of the skin at the contact. [mm]
     layers: tuple[str, ...]  # From the skin inwards.
     layer: WholeVector  # Index into `layers` of each element through the skin, (n_through,).
@@ -364,7 +348,6 @@ def mesh_picture(mesh: Mesh, contact_x_mm: float) -> MeshPicture:
         under_nail=np.isin(mesh.skin_grid, mesh.nail_nodes),
         along=_plane(mesh, outline_nodes(mesh), 0),
         across=_plane(mesh, mesh.grid[0], 2),
-        half=not mesh.full,
         contact_mm=(x, y),
         layers=LAYERS,
         layer=mesh.layer[: mesh.shape[2]],

@@ -50,14 +50,6 @@ JUDGEMENTS = int(psychophysics.GOODWIN_TRIALS.value)  # Per comparison of an exp
 
 
 @result_class
-class PsychometricCurve:
-    """A psychometric function of the difference."""
-
-    step: Vector  # How much more curved than the standard, as a share of it, (n,).
-    hit_rate: Vector
-
-
-@result_class
 class CurvatureThreshold:
     """Threshold at one standard."""
 
@@ -65,11 +57,8 @@ class CurvatureThreshold:
     jnd_per_m: float  # The standard and the just noticeable difference of the model. [1/m]
     weber_fraction: float
     ideal_weber_fraction: float  # Threshold over standard; of the ideal observer by Fisher's information.
-    step: Vector
-    hit_rate: Vector  # Comparisons as shares of the standard, and hit rates, (n_comparisons,). [0-1]
     fitted_weber_fraction: Number
     fitted_interval: tuple[Number, Number]  # By a Weibull function through its counts, with 95 % interval.
-    curve: PsychometricCurve
 
 
 @result_class
@@ -167,7 +156,6 @@ def threshold_at(observer: InterpolatedObserver, standard_per_m: float) -> Curva
     hit_rate = np.array([observer.hit_rate(standard_per_m, standard_per_m * (1.0 + step)) for step in steps])
     counts = np.round(JUDGEMENTS * hit_rate)
     fit = fit_psychometric(steps, counts, np.full(steps.size, JUDGEMENTS), sigmoid="weibull", lapse=0.0)
-    at = np.linspace(0.0, 1.05 * steps[-1], 61)[1:]
     rates, slopes = observer.responses(standard_per_m), observer.slopes(standard_per_m)
     information = gaussian_information(rates, slopes, observer.noise_sigma, SMALLEST_SPREAD)
     ideal_jnd_per_m = d_prime_of_proportion(PROPORTION, yes_no) / np.sqrt(information)
@@ -176,9 +164,6 @@ def threshold_at(observer: InterpolatedObserver, standard_per_m: float) -> Curva
         jnd_per_m=jnd_per_m,
         weber_fraction=jnd_per_m / standard_per_m,
         ideal_weber_fraction=float(ideal_jnd_per_m) / standard_per_m,
-        step=steps,
-        hit_rate=hit_rate,
         fitted_weber_fraction=fit.threshold(PROPORTION),
         fitted_interval=posterior(fit).threshold_interval(PROPORTION),
-        curve=PsychometricCurve(step=at, hit_rate=fit.predict(at)),
     )
