@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from fingerpad.data import bar_firing_rates, cylinder_deflection, goodwin_hit_rates, protocol, psychophysics
+from fingerpad.data import bar_firing_rates, cylinder_deflection, protocol
 
 
 def fss(observed: np.ndarray, predicted: np.ndarray) -> float:
@@ -32,14 +32,7 @@ def test_cylinder_deflection_is_known_at_45_points_and_one_is_an_artefact() -> N
     assert observed.deflection_mm[~kept].tolist() == [0.1]
 
 
-def test_goodwin_hit_rates_are_those_of_the_parameters() -> None:
-    observed = goodwin_hit_rates()
-    assert observed.standard_per_m == psychophysics.SPHERE_287.value
-    np.testing.assert_array_equal(observed.curvature_per_m, psychophysics.GOODWIN_CURVATURES.value)
-    np.testing.assert_array_equal(observed.hit_rate, psychophysics.GOODWIN_HIT_RATES.value)
-
-
-@pytest.mark.parametrize("load", [bar_firing_rates, cylinder_deflection, goodwin_hit_rates])
+@pytest.mark.parametrize("load", [bar_firing_rates, cylinder_deflection])
 def test_observations_carry_their_story_and_cannot_be_changed(load) -> None:
     observed = load()
     assert observed.source

@@ -10,10 +10,8 @@ from fingerpad.data import afferents, tissues
 from fingerpad.data.observations import (
     BarObservations,
     DeflectionObservations,
-    HitRateObservations,
     bar_firing_rates,
     cylinder_deflection,
-    goodwin_hit_rates,
 )
 from fingerpad.data.published import STATUSES, Published, numbers_of
 
@@ -21,7 +19,6 @@ __all__ = [
     "STATUSES",
     "BarObservations",
     "DeflectionObservations",
-    "HitRateObservations",
     "Published",
     "afferents",
     "all_published",
@@ -29,7 +26,6 @@ __all__ = [
     "cylinder_deflection",
     "fingers",
     "fingertip",
-    "goodwin_hit_rates",
     "neuron",
     "paper",
     "protocol",

@@ -6,10 +6,7 @@ import csv
 from dataclasses import dataclass
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
-from fingerpad.core.values import FloatArray, float_array
+from fingerpad.core.values import FloatArray, TruthVector, Vector, float_array
 from fingerpad.data.published import packaged_text
 
 
@@ -40,20 +37,9 @@ class BarObservations:
 class DeflectionObservations:
     """Deflection of the skin's surface along the finger."""
 
-    distance_mm: FloatArray  # Along the finger from the axis of the indenter, (n,). [mm]
-    deflection_mm: FloatArray  # Towards the bone, (n,). [mm]
-    is_artefact: NDArray[np.bool_]  # Artefacts of the digitisation; leave them out of comparisons, (n,).
-    source: str
-    status: str  # Publication, and status of the numbers (see `STATUSES`).
-
-
-@dataclass(frozen=True)
-class HitRateObservations:
-    """Hit rates of participants who discriminate spheres from a standard."""
-
-    standard_per_m: float  # Curvature of the standard sphere. [1/m]
-    curvature_per_m: FloatArray  # Curvatures of the comparison spheres, (n,). [1/m]
-    hit_rate: FloatArray  # Fraction of correct trials, (n,). [0-1]
+    distance_mm: Vector  # Along the finger from the axis of the indenter, (n,). [mm]
+    deflection_mm: Vector  # Towards the bone, (n,). [mm]
+    is_artefact: TruthVector  # Artefacts of the digitisation; leave them out of comparisons, (n,).
     source: str
     status: str  # Publication, and status of the numbers (see `STATUSES`).
 
@@ -85,15 +71,3 @@ def cylinder_deflection() -> DeflectionObservations:
     is_artefact = table["is_artefact"] == 1.0
     is_artefact.setflags(write=False)
     return DeflectionObservations(**table | {"is_artefact": is_artefact})
-
-
-def goodwin_hit_rates() -> HitRateObservations:
-    """Hit rates of participants who compare spheres with a standard of 287 /m (Goodwin et al. 1991).
-
-    Examples
-    --------
-    >>> goodwin_hit_rates().hit_rate.tolist()
-    [0.58, 0.95]
-    """
-    table = packaged_table("goodwin_hit_rates")
-    return HitRateObservations(**table | {"standard_per_m": float(table["standard_per_m"][0])})

@@ -111,7 +111,6 @@ def paired(paper: Sequence[ClaimRow], human: Sequence[ClaimRow]) -> tuple[Statem
 # The rows
 
 _FILE = tomllib.loads((files(__package__) / "claims.toml").read_text(encoding="utf-8"))
-CLAIMS: list[dict[str, Any]] = _FILE["claims"]
 
 REGIONS_MM = ((0.0, 0.5), (0.5, 5.0))  # Of the paper's section 3.1, by distance from the indenter.
 MEASURES = ("static", "dynamic", "latency")
@@ -155,7 +154,7 @@ def judged(found: SetResult, trials: SkinDeflectionResult) -> tuple[ClaimRow, ..
     known = vars(found) | {"trials": trials, "line_excess_mm": _line_excess_mm(trials)}
     known |= {"data": data, "statistics": found.discrimination.statistics, **_texts(found)}
     known |= {"swept": (SWEPT_NOISE[0], SWEPT_NOISE[-1])}
-    rows = [_row(claim, found, known) for claim in CLAIMS]
+    rows = [_row(claim, found, known) for claim in _FILE["claims"]]
     return tuple(row for row in rows if row is not None)
 
 
@@ -183,7 +182,7 @@ def _row(claim: Mapping[str, Any], found: SetResult, known: Mapping[str, Any]) -
     )
 
 
-def _texts(found: SetResult) -> dict[str, Any]:
+def _texts(found: SetResult) -> dict[str, str | float]:
     """Texts that depend on the tissues and on the method that fitted the afferent."""
     texts = dict(_FILE["texts"])
     for case in _FILE["cases"]:

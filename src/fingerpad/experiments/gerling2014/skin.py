@@ -30,7 +30,7 @@ from fingerpad.core.values import (
     Vector,
     WholeVector,
 )
-from fingerpad.data import cylinder_deflection, fingertip, protocol
+from fingerpad.data import DeflectionObservations, cylinder_deflection, fingertip, protocol
 from fingerpad.experiments.conditions import RECEPTOR_X_MM, Conditions, Touch
 from fingerpad.experiments.scores import coefficient_of_determination
 from fingerpad.geometry.grading import resolution_grading
@@ -64,22 +64,13 @@ TrialDeflection = dict[str, IndenterDeflection]
 
 
 @result_class
-class ObservedDeflection:
-    """Observed deflection under the cylinder."""
-
-    distance_mm: Vector
-    deflection_mm: Vector  # (n_points,).
-    is_artefact: TruthVector  # Points that R² leaves out, (n_points,).
-
-
-@result_class
 class SkinDeflectionResult:
     """Deflections by the tissues of the paper's trials, and the observed one."""
 
     trial1: TrialDeflection
     trial2: TrialDeflection
     trial3: TrialDeflection
-    observed: ObservedDeflection
+    observed: DeflectionObservations  # Under the cylinder.
 
 
 @result_class
@@ -140,10 +131,7 @@ def deflection_result(responses: Mapping[tuple[str, str], SkinResponse]) -> Skin
         profile = responses[trial, "cylinder"].surface_profile()
         r2, mirrored = deflection_r2(profile), deflection_r2(profile, proximal_positive=False)
         trials[trial] = {"line": line, "cylinder": replace(cylinder, r2=r2, r2_mirrored=mirrored)}
-    observed = {
-        name: getattr(cylinder_deflection(), name) for name in ("distance_mm", "deflection_mm", "is_artefact")
-    }
-    return SkinDeflectionResult(**trials, observed=ObservedDeflection(**observed))
+    return SkinDeflectionResult(**trials, observed=cylinder_deflection())
 
 
 def _under_indenter(skin: SkinResponse) -> IndenterDeflection:
