@@ -199,7 +199,7 @@ def hints_of(makes: Callable[..., Any]) -> dict[str, Any]:
     return {name: _hint(text, known, unchecked) for name, text in hints.items()}
 
 
-def _hint(text: Any, known: dict[str, Any], unchecked: dict[str, Any]) -> Any:
+def _hint(text: Any, known: dict[str, object], unchecked: Mapping[str, object]) -> Any:
     """Annotation as pydantic can check it; `Any` for what the function itself converts or consumes."""
     from fingerpad.core.values import Check, like
 
@@ -331,7 +331,7 @@ def other_names(kind: type) -> dict[str, OtherName]:
 
 def _by_fields(
     spelled: Mapping[str, OtherName], given: Mapping[str, Any], before: Sequence[Parameter]
-) -> dict[str, Any]:
+) -> Mapping[str, Any]:
     """Arguments by their fields, where some were given under other names."""
     made = {name: value for name, value in given.items() if name not in spelled}
     taken = {part.name: part.name for part in before} | {name: name for name in made}

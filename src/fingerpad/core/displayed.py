@@ -24,10 +24,12 @@ if TYPE_CHECKING:
 
 Columns = dict[Any, Any]  # Columns of a table by name, the index first; names carry units.
 
-Variable = tuple[tuple[str, ...], np.ndarray, dict[str, Any]]
+Attributes = dict[str, Any]  # Of a variable or a data set, by name, as xarray takes them.
+
+Variable = tuple[tuple[str, ...], np.ndarray, Attributes]
 """Variable of a data set: dimensions, values and attributes, as xarray takes them."""
 
-Contents = tuple[dict[str, Variable], dict[str, Any]]  # Variables and attributes of a data set, by name.
+Contents = tuple[dict[str, Variable], Attributes]  # Variables and attributes of a data set, by name.
 
 _UDUNITS = {
     "": "1", "mm²": "mm2", "mm³": "mm3", "µJ": "uJ", "degrees": "degree", "spikes/s": "s-1", "Hz": "s-1",

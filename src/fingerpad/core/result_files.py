@@ -12,7 +12,7 @@ from pydantic import TypeAdapter, ValidationError
 
 from fingerpad.core.errors import InputError, StoreError
 from fingerpad.core.files import LARGEST_TEXT_MB, check_file, write_atomically
-from fingerpad.core.values import JsonSchema
+from fingerpad.core.values import JsonObject, JsonSchema
 
 _Kind = TypeVar("_Kind")
 
@@ -46,7 +46,7 @@ def write_results(path: Path, results: Any, schema: JsonSchema) -> None:
     write_atomically(path, content + b"\n")
 
 
-def check_schema(path: Path, values: dict[str, Any], schema: JsonSchema) -> None:
+def check_schema(path: Path, values: JsonObject, schema: JsonSchema) -> None:
     """Raise `StoreError` if the values of a file do not meet a JSON schema."""
     try:
         fastjsonschema.compile(schema)(values)
@@ -66,12 +66,12 @@ def read_results(path: Path, cls: type[_Kind]) -> _Kind:
         raise StoreError(f"{path} is damaged: {error} Run the command again.") from error
 
 
-def read_format(path: Path, versions: Mapping[str, int]) -> dict[str, Any]:
+def read_format(path: Path, versions: Mapping[str, int]) -> JsonObject:
     """Read the JSON values of a file whose format and version are known."""
     return _json_of_format(path, versions)[1]
 
 
-def _json_of_format(path: Path, versions: Mapping[str, int]) -> tuple[bytes, dict[str, Any]]:
+def _json_of_format(path: Path, versions: Mapping[str, int]) -> tuple[bytes, JsonObject]:
     """Content of a file and its JSON values: the classes of some fields accept texts only from JSON."""
     try:
         content = check_file(path, LARGEST_TEXT_MB).read_bytes()

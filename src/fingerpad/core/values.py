@@ -27,7 +27,8 @@ from fingerpad.core.units import unit_of
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
-JsonSchema = dict[str, Any]  # JSON schema, as `json` reads it.
+JsonObject = dict[str, Any]  # Object of a JSON file, as `json` reads it.
+JsonSchema = JsonObject
 _Kind = TypeVar("_Kind")
 _Entry = TypeVar("_Entry")
 

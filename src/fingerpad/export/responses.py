@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from fingerpad.core.checked import checked
+from fingerpad.core.displayed import Columns
 from fingerpad.core.errors import InputError
 from fingerpad.core.files import path_of, read_text, write_atomically
 from fingerpad.core.phases import Phase
@@ -67,7 +68,9 @@ def read_response_csv(path: Path) -> ResponseMap:
                 f"must have the column {column}, as a response is saved",
                 str(", ".join(have) or "no row"),
             )
-    columns: dict[str, Any] = {"type": [row["type"] for row in rows]} if "type" in have else {}
+    columns: dict[str, list[str] | list[float]] = {}
+    if "type" in have:
+        columns["type"] = [row["type"] for row in rows]
     for column in ("pitch_mm", *PLACES[3], *MEASURED):
         if column in have:
             try:
@@ -81,7 +84,7 @@ def read_response_csv(path: Path) -> ResponseMap:
     return response_of(columns, trains)
 
 
-def spikes_and_columns(result: Any) -> tuple[SpikeTrains, dict[str, Any]]:
+def spikes_and_columns(result: Any) -> tuple[SpikeTrains, Columns]:
     """Spike trains of a result, and what is known of each afferent, by name."""
     if isinstance(result, SpikeTrains):
         return result, {}

@@ -108,12 +108,14 @@ def _json(result: Result, path: Path, **options: Any) -> None:
         write_atomically(path, to_json(result) + b"\n")
         return
     variables, attributes = result.contents(**options)
-    content: dict[str, Any] = {"coords": {}, "attrs": attributes, "dims": {}, "data_vars": {}}
+    sizes: dict[str, int] = {}
+    plain: dict[str, dict[str, object]] = {}
     for name, (dims, values, about) in variables.items():
-        content["dims"] |= dict(zip(dims, values.shape, strict=True))
+        sizes |= dict(zip(dims, values.shape, strict=True))
         held = values.astype(object)
         held[values != values] = None
-        content["data_vars"][name] = {"dims": dims, "attrs": about, "data": held.tolist()}
+        plain[name] = {"dims": dims, "attrs": about, "data": held.tolist()}
+    content = {"coords": {}, "attrs": attributes, "dims": sizes, "data_vars": plain}
     write_atomically(path, (json.dumps(content, default=np.ndarray.tolist) + "\n").encode())
 
 

@@ -82,8 +82,11 @@ class SweepFile:
                 written = np.array(spelled, dtype=object) if text else np.array(values, dtype=float)
                 about = {"long_name": field, "units": "1" if text else udunits(unit_of(field))}
                 self._create(name, (axis.name,), written.shape, str if text else "f8", about)[:] = written
-        flags: dict[str, Any] = {"flag_values": [PENDING, DONE, FAILED, LEFT_OUT], "flag_meanings": MEANINGS}
-        flags["long_name"] = "what became of each setting"
+        flags = {
+            "flag_values": [PENDING, DONE, FAILED, LEFT_OUT],
+            "flag_meanings": MEANINGS,
+            "long_name": "what became of each setting",
+        }
         chunks = self._chunks(self.sweep.shape, ())
         self._create("status", self._dims, self.sweep.shape, "i1", flags, chunks)
         self._create("reason", self._dims, self.sweep.shape, str, {"long_name": "why it failed"}, chunks)

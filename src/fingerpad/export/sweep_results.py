@@ -84,7 +84,7 @@ def observe_sweep(data: xarray.Dataset, observer: Content, grid: Content | None 
     kept = [name for name in data.dims if name in {axis.name for axis in sweep.axes}]
     responses = {name: data[name].values for name in MEASURED.values() if name in data}
     values = observe(sweep, responses, data["status"].values == DONE, lambda: None)
-    coords: dict[str, Any] = {name: data[name] for name in kept if name in data.coords}
+    coords: dict[str, object] = {name: data[name] for name in kept if name in data.coords}
     coords |= {axis.name: next(iter(axis.values.values())) for axis in sweep.observer_axes}
     dims = [axis.name for axis in (*sweep.axes, *sweep.observer_axes)]
     return library("xarray").DataArray(values, dims=dims, coords=coords, name=HIT_RATE)

@@ -282,7 +282,7 @@ class TypedModel:
 
     def at(self, parameters: FloatArray) -> AnyAfferent:
         factors = zip(self.names, np.exp(parameters).tolist(), strict=True)
-        numbers: dict[str, Any] = {name: getattr(self.afferent, name) * factor for name, factor in factors}
+        numbers = {name: getattr(self.afferent, name) * factor for name, factor in factors}
         return cast(AnyAfferent, replace(cast(Any, self.afferent), **numbers))
 
     def evaluate(self, parameters: FloatArray) -> Rates:

@@ -72,11 +72,12 @@ class LabState:
 @checked
 def state_of(asked: Mapping[str, Any]) -> LabState:
     """Read a state from plain values, such as the texts in the address of the page."""
-    given: dict[str, Any] = {
-        name: number_in(name, value) if name in BOUNDS and isinstance(value, str) else value
+    numbers = {
+        name: number_in(name, value)
         for name, value in asked.items()
+        if name in BOUNDS and isinstance(value, str)
     }
-    return LabState(**given)
+    return LabState(**{**asked, **numbers})
 
 
 ABOVE_MS = 10.0  # Time to move aside above the skin, and time to approach it. [ms]

@@ -43,12 +43,13 @@ CONTROLS = (
 """What can be set: name, label and step."""
 
 
-def spec_of(laboratory: Laboratory) -> dict[str, Any]:
-    objects: dict[str, dict[str, Any]] = {}
-    for name in laboratory.names:
-        training = laboratory.described(LabState(name)).training
+def spec_of(laboratory: Laboratory) -> dict[str, object]:
+    trained = {name: laboratory.described(LabState(name)).training for name in laboratory.names}
+    sizes, objects = {}, {}
+    for name, training in trained.items():
         range_ = training.range
         way = range_.x_mm[1] - range_.x_mm[0]
+        sizes[name] = getattr(training.touch.indenter, range_.parameter) if range_.parameter else 0
         objects[name] = {
             "depth_mm": [BOUNDS["depth_mm"][0], range_.depth_mm],
             "x_mm": range_.x_mm,
@@ -57,10 +58,10 @@ def spec_of(laboratory: Laboratory) -> dict[str, Any]:
             "slide_mm": [-way, way],
             "parameter": range_.parameter,
             "values": range_.values or [0, 0],
-            "size": getattr(training.touch.indenter, range_.parameter) if range_.parameter else 0,
+            "size": sizes[name],
         }
     first = laboratory.names[0]
-    depth = min(LabState.depth_mm, objects[first]["depth_mm"][1])
+    depth = min(LabState.depth_mm, trained[first].range.depth_mm)
     return {
         "controls": [(name, label, unit_of(name), step) for name, label, step in CONTROLS],
         "objects": objects,
@@ -73,15 +74,15 @@ def spec_of(laboratory: Laboratory) -> dict[str, Any]:
             "tissues": ["", *TISSUES],
         },
         "empty": {"other": "nothing", "finger": "as in the file", "tissues": "as in the file"},
-        "start": asdict(LabState(first, size=objects[first]["size"], depth_mm=depth)),
+        "start": asdict(LabState(first, size=sizes[first], depth_mm=depth)),
         "exact": True,
     }
 
 
-def reply_to(laboratory: Laboratory, message: Any) -> dict[str, Any]:
+def reply_to(laboratory: Laboratory, message: Any) -> dict[str, object]:
     """Answer one message of the page; whatever it is, an error is one sentence."""
     asked = message if isinstance(message, dict) else {}
-    reply: dict[str, Any] = {"id": asked.get("id")}
+    reply: dict[str, object] = {"id": asked.get("id")}
     try:
         if "state" not in asked:
             raise InputError("A message to the laboratory must have the key state.")

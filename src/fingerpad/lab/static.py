@@ -8,7 +8,6 @@ import json
 from dataclasses import asdict, replace
 from importlib import resources
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -82,7 +81,9 @@ def _grid(laboratory: Laboratory, state: LabState) -> tuple[list[float], list[fl
     return depths, places
 
 
-def _spec(objects: dict[str, LabState], known: dict[str, tuple[list[float], list[float]]]) -> dict[str, Any]:
+def _spec(
+    objects: dict[str, LabState], known: dict[str, tuple[list[float], list[float]]]
+) -> dict[str, object]:
     labels = list(objects)
     depths, places = known[labels[0]]
     steps = {"depth_mm": depths[0], "x_mm": max(np.diff(places), default=0.0)}

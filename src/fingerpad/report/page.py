@@ -79,9 +79,7 @@ class Page:
         return [part for part in (*self.opening, *parts) if isinstance(part, Drawing)]
 
 
-PAGES: dict[str, dict[str, Any]] = tomllib.loads(
-    (files(__package__) / "pages.toml").read_text(encoding="utf-8")
-)
+PAGES = tomllib.loads((files(__package__) / "pages.toml").read_text(encoding="utf-8"))
 """What stands on each page; `pages.toml` says how to read it."""
 
 DRAW: dict[str, Callable[[Any], Figure]] = {}

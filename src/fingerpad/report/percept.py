@@ -27,6 +27,7 @@ from fingerpad.report.style import (
     PALE,
     PEOPLE,
     SERIES,
+    Style,
     draw_chance,
     fill_band,
     new_figure,
@@ -286,7 +287,7 @@ def draw_curves_of_measure(axes: Axes, found: TaskResult, measure: str) -> None:
     axes.set(ylim=(0.4, 1.03), ylabel="hit rate [fraction]")
 
 
-def _draw_curve(axes: Axes, found: TaskResult, decoding: Decoding, style: dict[str, Any]) -> None:
+def _draw_curve(axes: Axes, found: TaskResult, decoding: Decoding, style: Style) -> None:
     if decoding.hit_rate is None or decoding.hit_rate_sd is None:
         return
     marks: Any = style | {"linestyle": "none", "markersize": 5.0, "capsize": 3.0, "elinewidth": 1.0}

@@ -31,7 +31,8 @@ GREEN = "#3fae8a"
 GREY = "#8a8a8a"
 PALE = "#e9e9e6"
 
-SERIES: tuple[dict[str, Any], ...] = tuple(
+Style = dict[str, Any]  # How a line is drawn: keywords of matplotlib.
+SERIES: tuple[Style, ...] = tuple(
     {"color": colour, "marker": marker, "linestyle": dashes}
     for colour, marker, dashes in (
         (BLUE, "o", "-"),

@@ -23,7 +23,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from fingerpad.core.displayed import Variable, udunits
+from fingerpad.core.displayed import Attributes, Variable, udunits
 from fingerpad.core.errors import InputError
 from fingerpad.core.signals import ResponseMap
 from fingerpad.core.values import one_of
@@ -128,10 +128,10 @@ def variables(
 
 def field_variable(field: Field, values: np.ndarray, place: tuple[str, ...] | None = None) -> Variable:
     """Variable of a field, over time or at the end; `place` if its values are elsewhere than declared."""
-    attributes: dict[str, Any] = {"long_name": field.long_name, "units": udunits(field.unit)}
+    about: Attributes = {"long_name": field.long_name, "units": udunits(field.unit)}
     dims = (*(PLACES[field.place] if place is None else place), *_COMPONENTS[field.components])
     dims = ("time", *dims) if values.ndim > len(dims) else dims
-    return dims, values if field.place is Place.PRESS else values.astype(np.float32), attributes
+    return dims, values if field.place is Place.PRESS else values.astype(np.float32), about
 
 
 def dimensions_of(field: Field) -> set[tuple[str, ...]]:
@@ -187,8 +187,8 @@ def _face(body: Indenter, reach_mm: Sequence[float]) -> tuple[np.ndarray, np.nda
     return x, z, body.front(points).reshape(x.size, z.size)
 
 
-def attributes(skin: SkinResponse, response: ResponseMap | None, seed: int | None) -> dict[str, Any]:
-    found: dict[str, Any] = {
+def attributes(skin: SkinResponse, response: ResponseMap | None, seed: int | None) -> Attributes:
+    found: Attributes = {
         "Conventions": "CF-1.11",
         "title": "Touch of a fingertip",
         "source": f"fingerpad {version('fingerpad')}",

@@ -43,7 +43,7 @@ from fingerpad.experiments.requests.afferents import (
     population_of,
     respond_to,
 )
-from fingerpad.experiments.requests.parts import LevelOrName, Part, at, with_message
+from fingerpad.experiments.requests.parts import Content, LevelOrName, Part, at, with_message
 from fingerpad.experiments.requests.stimuli import (
     NamedStimulus,
     StimulusSet,
@@ -168,7 +168,7 @@ class DiscriminationRequest(StimulusSet, FingerRequest):
         return super().read(source, given, *args, **more)
 
     @classmethod
-    def named_objects(cls, content: Mapping[str, Any], beside: Path, allow_python: bool) -> dict[str, Any]:
+    def named_objects(cls, content: Content, beside: Path, allow_python: bool) -> Content:
         """Refuse the keys of the first version of the files, with how they are written now."""
         for key in ("population", "afferent", "windows_ms"):
             if key in content:

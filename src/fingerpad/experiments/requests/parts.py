@@ -103,11 +103,11 @@ class Part(BaseModel):
         return {name: value for name, value in dump(self).items() if name in self.model_fields_set}
 
     @property
-    def given(self) -> dict[str, Any]:
+    def given(self) -> Content:
         """The values in the file, without defaults."""
         return self.chosen(*type(self).model_fields)
 
-    def chosen(self, *names: str) -> dict[str, Any]:
+    def chosen(self, *names: str) -> Content:
         """Those of the names that the file gives a value, and not null, with that value."""
         values = {name: getattr(self, name) for name in names if name in self.model_fields_set}
         return {name: value for name, value in values.items() if value is not None}
@@ -459,7 +459,7 @@ class Request(Part):
         return made
 
     @classmethod
-    def named_objects(cls, content: Mapping[str, Any], beside: Path, allow_python: bool) -> dict[str, Any]:
+    def named_objects(cls, content: Mapping[str, Any], beside: Path, allow_python: bool) -> Content:
         """Return the content of a file with the objects of Python that it names."""
         found = dict(content)
         for key in cls.python:
@@ -505,7 +505,7 @@ def _object_named(text: str, key: str, beside: Path, allow_python: bool) -> Any:
     return getattr(known, name)
 
 
-def with_value(content: Mapping[str, Any], keys: Sequence[str], value: Any) -> dict[str, Any]:
+def with_value(content: Mapping[str, Any], keys: Sequence[str], value: Any) -> Content:
     """Return the content with another value at a place; a text such as `sphere` is a block of that kind."""
     first, *rest = keys
     if not rest:

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:  # the help of commands needs schemas alone
-    from fingerpad.core.values import JsonSchema
+    from fingerpad.core.values import JsonObject, JsonSchema
 
 
 TOUCH_SCHEMA = "fingerpad-touch.schema.json"  # Schema of the request of a touch, from which editors complete.
@@ -46,7 +46,7 @@ def write(path: Path, results: Any) -> None:
     write_results(path, results, schema(results.format))
 
 
-def read(path: Path, *formats: str) -> dict[str, Any]:
+def read(path: Path, *formats: str) -> JsonObject:
     """Read the values of a file of results without its types; it may have any format if none is named."""
     from fingerpad.core.result_files import check_schema, read_format
 

@@ -337,11 +337,10 @@ class SweepRequest(Request):
         files = self.described(0).input_hashes()
         return json.dumps([self.written(without=("title",)), sorted(files.values())], sort_keys=True)
 
-    def written(self, without: Sequence[str] = ()) -> dict[str, Any]:
+    def written(self, without: Sequence[str] = ()) -> Content:
         """Return the keys that are given as plain values; an object of Python as it is shown."""
         given = {name: getattr(self, name) for name in self.model_fields_set if name not in without}
-        plain: dict[str, Any] = json.loads(json.dumps(given, default=_plain))
-        return plain
+        return json.loads(json.dumps(given, default=_plain))
 
 
 def _plain(value: Any) -> Any:

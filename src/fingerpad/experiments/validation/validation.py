@@ -179,7 +179,7 @@ def predict(model: ValidationRequest, runner: Runner) -> Predictions:
     """Press what is not stored yet, and read the prediction of every row."""
     observations = model.observed
     kind, axis = observations.kind, observations.kind.axis
-    given: dict[Condition, dict[str, Any]] = {
+    given: dict[Condition, Given] = {
         row.condition: dict(zip(kind.conditions, row.condition, strict=True)) for row in observations.rows
     }
     plans = {condition: _plan(kind, values, model) for condition, values in given.items()}
@@ -199,7 +199,7 @@ def predict(model: ValidationRequest, runner: Runner) -> Predictions:
     values, reasons = read(plans)
     mirrored = None
     if axis:
-        turned = {key: _plan(kind, each | {axis: -each[axis]}, model) for key, each in given.items()}
+        turned = {key: _plan(kind, {**each, axis: -each[axis]}, model) for key, each in given.items()}
         mirrored, _ = read(turned)
     return Predictions(values, mirrored, reasons, next(iter(skins.values()), None))
 
