@@ -12,7 +12,6 @@ from fingerpad.core.random_streams import Purpose, normals
 from fingerpad.experiments.gerling2014 import percept as goodwin
 from fingerpad.experiments.gerling2014.percept import (
     SWEPT_NOISE,
-    Measured,
     Observers,
     discrepancy_analysis,
     discrimination_statistics,
@@ -22,7 +21,7 @@ from fingerpad.experiments.gerling2014.percept import (
 )
 from fingerpad.experiments.scores import Estimate, estimate, extreme
 from fingerpad.psychophysics.curve import binomial_interval
-from fingerpad.psychophysics.encoding import gradient_sum, neighbour_pairs, taking_part
+from fingerpad.psychophysics.encoding import Measured, gradient_sum, neighbour_pairs, taking_part
 from fingerpad.psychophysics.observer import (
     EuclideanDistance,
     Experiment,
@@ -180,7 +179,7 @@ def test_few_receptors_give_a_skewed_distance_that_the_closed_form_knows(sigma):
 def test_receptors_that_are_silent_once_take_no_part_in_latencies():
     latency_ms = 60.0 - bumps()
     latency_ms[3, [0, 5]] = np.nan
-    measured = Measured(*taking_part(latency_ms, PAIRS))
+    measured = taking_part(latency_ms, PAIRS)
     assert not np.isin(measured.neighbours, [0, 5]).any()
     assert len(measured.neighbours) == len(PAIRS) - 6  # two corners of the grid, three neighbours each
     without = np.delete(np.arange(18), [0, 5])
@@ -188,7 +187,7 @@ def test_receptors_that_are_silent_once_take_no_part_in_latencies():
     assert_allclose(
         gradient_sum(measured.responses, measured.neighbours), gradient_sum(latency_ms[:, without], fewer)
     )
-    assert not len(Measured(*taking_part(np.full((7, 18), np.nan), PAIRS)).neighbours)
+    assert not len(taking_part(np.full((7, 18), np.nan), PAIRS).neighbours)
 
 
 def test_one_noise_for_two_positions_is_that_of_equal_ones():
@@ -219,7 +218,7 @@ def test_the_analysis_names_every_interpretation_and_the_noise_that_fits_it():
     measures = {
         "static": static,
         "dynamic": static,
-        "latency": [Measured(*taking_part(latency, PAIRS)) for latency in latency_ms],
+        "latency": [taking_part(latency, PAIRS) for latency in latency_ms],
     }
     draws = normals(0, 1, 18, Purpose.RESPONSE, 1000)[0].T
     found = discrepancy_analysis(measures, latency_ms, GRID, 0.06, draws, seed=1)

@@ -15,7 +15,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import Annotated
+from typing import Annotated, NamedTuple
 
 import numpy as np
 from numba import njit
@@ -133,7 +133,14 @@ def _plane(positions_mm: ArrayLike) -> FloatArray:
     return positions
 
 
-def taking_part(responses: ArrayLike, neighbours: ArrayLike) -> tuple[FloatArray, np.ndarray]:
+class Measured(NamedTuple):
+    """One measure of a population under several stimuli, and the pairs of its receptors that take part."""
+
+    responses: FloatArray  # The standard in the first row, (n_stimuli, n_receptors). [any unit]
+    neighbours: IntArray  # Pairs that the Gradient Sum goes over, (n_pairs, 2).
+
+
+def taking_part(responses: ArrayLike, neighbours: ArrayLike) -> Measured:
     """Leave out the receptors that are silent under one stimulus (docs/decisions/silent-receptors.md).
 
     A receptor that is silent under one stimulus has no latency to compare with its neighbours'. It is left
@@ -142,7 +149,7 @@ def taking_part(responses: ArrayLike, neighbours: ArrayLike) -> tuple[FloatArray
     table = np.asarray(responses, dtype=np.float64)
     pairs = check_neighbours(neighbours, table.shape[-1] if table.ndim else 0)
     silent = np.asarray(np.isnan(table).any(axis=0))
-    return np.where(silent, 0.0, table), pairs[~silent[pairs].any(axis=1)]
+    return Measured(np.where(silent, 0.0, table), pairs[~silent[pairs].any(axis=1)])
 
 
 @checked

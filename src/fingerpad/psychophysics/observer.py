@@ -340,16 +340,9 @@ def compare_observers(
             for sigma, of_sigma in zip(some, drawn, strict=True):
                 for number in by_sigma[sigma]:
                     rates = encoder.hit_rates(of_sigma, seed, observers[number][1], session)
-                    found[number] = mean_and_spread(rates, seed, session)
+                    mean, spread = rates.mean(axis=0), rates.std(axis=0, ddof=1)  # over the repetitions (k)
+                    found[number] = HitRates(mean, spread, seed, session)
     return [found[number] for number in range(len(observers))]
-
-
-def hit_rates_of_sums(
-    sums: FloatArray, seed: int, experiment: Experiment | None = None, session: int = 0
-) -> HitRates:
-    """Discriminate spheres with given Gradient Sums, steps (e) and (g) to (k)."""
-    rates = GradientSum(()).hit_rates(sums, seed, experiment or Experiment(), session)
-    return mean_and_spread(rates, seed, session)
 
 
 @checked
@@ -415,11 +408,6 @@ def _picks(seed: int, trials: IntArray, shape: tuple[int, int], choices: int) ->
     """Sample from 0 ... choices - 1, `shape` times in each trial; (n_trials, *shape)."""
     numbers = uniforms(seed, trials, 1, Purpose.PICK, shape[0] * shape[1])
     return (numbers * choices).astype(np.int64).reshape(-1, *shape)
-
-
-def mean_and_spread(hit_rates: FloatArray, seed: int, session: int) -> HitRates:
-    """Return mean mu_3 and standard deviation sigma_3 over the repetitions (k)."""
-    return HitRates(hit_rates.mean(axis=0), hit_rates.std(axis=0, ddof=1), seed, session)
 
 
 def moments(answers: FloatArray) -> tuple[FloatArray, FloatArray]:

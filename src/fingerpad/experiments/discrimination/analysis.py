@@ -28,7 +28,7 @@ from fingerpad.experiments.runner import Manifest, Runner
 from fingerpad.psychophysics.curve import binomial_interval
 from fingerpad.psychophysics.curve_fit import fit_psychometric
 from fingerpad.psychophysics.curve_uncertainty import bootstrap, posterior
-from fingerpad.psychophysics.encoding import RESPONSE_MEASURES, taking_part
+from fingerpad.psychophysics.encoding import RESPONSE_MEASURES, Measured, taking_part
 from fingerpad.psychophysics.ideal_observer import (
     EFFICIENCY_TRIALS,
     SMALLEST_SPREAD,
@@ -44,7 +44,6 @@ SESSION, EFFICIENCY_SESSION = 1, 2
 SHOWN_PRESENTATIONS = 1000  # Presentations behind the mean and spread of a statistic that a figure shows.
 CURVE_POINTS = 61
 CREDIBLE = 0.95
-Encoded = tuple[FloatArray, np.ndarray]  # A measure (n_stimuli, n_receptors), and pairs of neighbours.
 
 
 @result_class
@@ -287,7 +286,7 @@ def _named(stimuli: Sequence[NamedStimulus], rows: Sequence[int] | IntArray) -> 
 
 
 def _noise(
-    task: DiscriminationRequest, encoded: Mapping[str, Encoded], silent: Mapping[str, IntArray]
+    task: DiscriminationRequest, encoded: Mapping[str, Measured], silent: Mapping[str, IntArray]
 ) -> TaskNoise:
     """Find the noise: as it is given, or as the first code and measure need it for the observed hit rates."""
     points = task.observed_comparisons
@@ -317,7 +316,7 @@ def _noise(
 
 
 def _decodings(
-    task: DiscriminationRequest, measure: str, encoded: Encoded, silent: IntArray, sigma: float
+    task: DiscriminationRequest, measure: str, encoded: Measured, silent: IntArray, sigma: float
 ) -> list[Decoding]:
     """Decode one measure by every code; there is no hit rate without responses."""
     codes, seed = task.code, task.experiment.seed
@@ -332,7 +331,7 @@ def _decoding(
     task: DiscriminationRequest,
     code: str,
     measure: str,
-    encoded: Encoded,
+    encoded: Measured,
     sigma: float,
     shown: list[Presentation],
 ) -> Decoding:

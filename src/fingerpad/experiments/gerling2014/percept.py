@@ -12,7 +12,6 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -34,10 +33,9 @@ from fingerpad.neuron.population import Population
 from fingerpad.psychophysics.curve import binomial_interval
 from fingerpad.psychophysics.encoding import (
     RESPONSE_MEASURES,
+    Measured,
     gradient_sum,
     neighbour_pairs,
-    noisy_gradient_sums,
-    session_trials,
     taking_part,
 )
 from fingerpad.psychophysics.observer import (
@@ -54,7 +52,6 @@ from fingerpad.psychophysics.observer import (
     expected_euclidean_hit_rates,
     expected_hit_rates,
     fit_noise_sigma,
-    hit_rates_of_sums,
 )
 from fingerpad.skin.sampling import SkinResponse
 
@@ -202,13 +199,6 @@ class SphereDiscrimination:
     reasons: DiscrepancyAnalysis  # Why the numbers differ from the paper's.
 
 
-class Measured(NamedTuple):
-    """One measure of the population with the spheres at one position, from `encoding.taking_part`."""
-
-    responses: FloatArray  # The standard in the first row, (n_spheres, n_receptors). [any unit]
-    neighbours: IntArray  # Pairs that the Gradient Sum goes over, (n_pairs, 2).
-
-
 HitRatesOfNoise = Callable[[float], FloatArray]
 """From a noise to the expected hit rates, (n_positions, n_comparisons)."""
 
@@ -274,9 +264,7 @@ def discriminate_spheres(
         ]
         for name, read in RESPONSE_MEASURES.items()
     }
-    encoded = {
-        name: [Measured(*taking_part(table, neighbours)) for table in both] for name, both in tables.items()
-    }
+    encoded = {name: [taking_part(table, neighbours) for table in both] for name, both in tables.items()}
     # A measure without responses has no hit rate and is left out.
     measures = {
         name: both
@@ -395,15 +383,15 @@ def _unsteady(
     measures: Mapping[str, Measured], noise_sigma: float, seed: int, session: int
 ) -> dict[int, float]:
     """How much the mean of few and of many hit rates varies (1 sd) between picks of the same sums."""
-    distributions, presentations = Experiment().sums_per_sphere
-    trials = session_trials(session, len(measures["static"].responses), distributions)
-    sums = noisy_gradient_sums(*measures["static"], noise_sigma, seed, trials, presentations)
+    code, usual = GradientSum(measures["static"].neighbours), Experiment()
+    sigmas = np.array([noise_sigma])
+    (sums,) = code.values(measures["static"].responses, sigmas, seed, code.sizes(usual), session)
     # Session numbers far beyond those of the study: no other step uses their random numbers.
     again = [session * 1000 + 1_000_000 + repeat for repeat in range(AGAIN)]
     found = {}
     for count in (FEW, MANY):
         plan = Experiment(hit_rates=count)
-        means = [hit_rates_of_sums(sums, seed, plan, number).hit_rate for number in again]
+        means = [code.hit_rates(sums, seed, plan, number).mean(axis=0) for number in again]
         found[count] = float(np.sqrt(np.var(means, axis=0, ddof=1).mean()))
     return found
 
@@ -542,7 +530,7 @@ def _readings(
         USED["dynamic"]: list(measures.get("dynamic", [])),
         USED["latency"]: list(measures.get("latency", [])),
         "latency of receptors that fire within the ramp under every sphere": [
-            Measured(*taking_part(latency, eight)) for latency in early
+            taking_part(latency, eight) for latency in early
         ],
         "latency, waiting until the ramp ends": [
             Measured(np.fmin(latency, PATIENCE_MS), eight) for latency in latency_ms
