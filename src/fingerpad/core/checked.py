@@ -52,8 +52,9 @@ _EXPECTED = {
 }
 """What must be, by pydantic's name of an error; any other error keeps pydantic's words."""
 
+UNKNOWN = "unknown_key"  # Name of the error of an unknown key of a part, as pydantic has names.
 _MISSING = ("missing", "missing_argument", "missing_keyword_only_argument")
-_UNKNOWN = ("unexpected_keyword_argument", "extra_forbidden", "invalid_key")
+_UNKNOWN = ("unexpected_keyword_argument", "extra_forbidden", "invalid_key", UNKNOWN)
 _INSTANCES = ("is_instance_of", "dataclass_type", "dataclass_exact_type")
 _CALLS = {
     "unexpected_positional_argument": "too many arguments",

@@ -7,28 +7,18 @@ from contextlib import contextmanager
 from dataclasses import field, fields
 from functools import cached_property, lru_cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, TypeAlias
+from typing import Annotated, Any
 
 from pydantic import Field
 
 from fingerpad.core.checked import value_class
 from fingerpad.core.errors import InputError, Place
 from fingerpad.core.units import unit_of
-from fingerpad.core.values import (
-    Check,
-    Finite,
-    NotNegative,
-    Positive,
-    Text,
-    choice,
-    instance,
-    number_in,
-    one_of,
-)
+from fingerpad.core.values import Check, Finite, NotNegative, Positive, choice, instance, number_in, one_of
 from fingerpad.data import protocol
 from fingerpad.data.tissues import DEFAULT_TISSUES
 from fingerpad.experiments.conditions import Conditions, straight_tilt_deg
-from fingerpad.experiments.requests.parts import Made, Part, Request, at, one_of_kinds
+from fingerpad.experiments.requests.parts import Made, OneOfKinds, Part, Request, at
 from fingerpad.geometry.edged_indenters import INDENTERS
 from fingerpad.geometry.fingertip import Finger, Fingertip
 from fingerpad.geometry.grading import RESOLUTIONS, Grading
@@ -92,17 +82,11 @@ MOTIONS: dict[str, Callable[..., Motion] | str] = {
     "trajectory": "Trajectory",
 }  # How it can move, by kind.
 
-_WITHOUT: Mapping[str, Sequence[str]] = {"trajectory": ("phases", "cycles")}
-"""Parameters that a file does not have."""
+_WITHOUT = {"trajectory": ("phases", "cycles")}  # Parameters that a file does not have.
 
-if TYPE_CHECKING:
-    FingerPart: TypeAlias = Any
-    ObjectPart: TypeAlias = Any
-    MotionPart: TypeAlias = Any
-else:
-    FingerPart = one_of_kinds(FINGERS, default=MEASURED, text=Text, instance=Finger)
-    ObjectPart = one_of_kinds(OBJECTS, text=Text, instance=Indenter)
-    MotionPart = one_of_kinds(MOTIONS, default=RAMP_AND_HOLD, without=_WITHOUT, instance=Motion)
+FingerPart = Annotated[Any, OneOfKinds(FINGERS, Finger, MEASURED, named=True)]
+ObjectPart = Annotated[Any, OneOfKinds(OBJECTS, Indenter, named=True)]
+MotionPart = Annotated[Any, OneOfKinds(MOTIONS, Motion, RAMP_AND_HOLD, without=_WITHOUT)]
 
 
 def made_of(part: Any, beside: Path = Path()) -> Any:
