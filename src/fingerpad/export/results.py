@@ -10,7 +10,7 @@ import inspect
 import io
 import json
 import shutil
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
@@ -45,6 +45,16 @@ def library(name: str, needed: str = "", extra: str = "netcdf") -> Any:
 
 def first_line(error: Exception) -> str:
     return (str(error).strip().splitlines() or [type(error).__name__])[0].strip().rstrip(".")[:200]
+
+
+def check_format(path: str | Path, found: Mapping[str, Any], written: str, version: int) -> None:
+    """Raise `InputError` unless attributes are those of a format of fingerpad, in the version of today."""
+    if found.get("format") != written:
+        what = written.removeprefix("fingerpad ")
+        raise InputError(path, f"must be a {what} that fingerpad wrote", remedy="it has another content")
+    if (came := found.get("format_version")) != version:
+        remedy = "read it with the version of fingerpad that wrote it"
+        raise InputError(path, f"must have format_version {version}", str(came), remedy)
 
 
 def frame(result: Result) -> pandas.DataFrame:

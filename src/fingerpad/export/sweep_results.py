@@ -19,8 +19,8 @@ from fingerpad.experiments.sweep.request import OBSERVER, SweepRequest
 from fingerpad.experiments.sweep.settings import MEASURED, observe
 from fingerpad.export.responses import MEASURED as MEASURED_COLUMNS
 from fingerpad.export.responses import require_pynwb, write_responses_nwb
-from fingerpad.export.results import library, table_csv
-from fingerpad.export.sweep_file import DONE, HIT_RATE, check_format, opened_group
+from fingerpad.export.results import check_format, library, table_csv
+from fingerpad.export.sweep import DONE, FORMAT, FORMAT_VERSION, HIT_RATE, opened_group
 from fingerpad.export.touch_file import spike_trains
 from fingerpad.neuron.spikes import rate_windows_ms
 
@@ -43,7 +43,7 @@ def open_sweep(path: str | Path) -> xarray.Dataset:
         setting, and `data.to_dataframe()` or `data.hit_rate.plot()` are those of xarray.
     """
     xarray, _ = library("xarray"), library("zarr")
-    check_format(path, opened_group(path_of("path", path)).attrs.asdict())
+    check_format(path, opened_group(path_of("path", path)).attrs.asdict(), FORMAT, FORMAT_VERSION)
     data = xarray.open_zarr(path, chunks=None, consolidated=False, decode_times=False)
     return data.set_coords([name for name in ("time_ms", "receptor_mm") if name in data])
 
