@@ -31,7 +31,7 @@ from fingerpad.experiments.requests.touch import (
     TouchFile,
     estimate_press,
 )
-from fingerpad.export.formats import FORMATS
+from fingerpad.export.decks import FORMATS
 from fingerpad.export.requests import check_outputs
 from fingerpad.geometry import surface_files
 from fingerpad.geometry.dots import Dots

@@ -43,6 +43,21 @@ def library(name: str, needed: str = "", extra: str = "netcdf") -> Any:
         ) from error
 
 
+NEEDED: dict[str, tuple[tuple[str, ...], ...]] = {
+    "vtu": (("vtkmodules.vtkIOXML", "VTU files need the package vtk", "vtk"),),
+    "nwb": (("pynwb", "NWB files need pynwb", "nwb"),),
+    "netcdf": (("xarray",), ("h5netcdf",), ("zarr",)),
+    "zarr": (("xarray",), ("h5netcdf",), ("zarr",)),
+}
+"""Libraries that write a format: arguments of `library`."""
+
+
+def require(format_name: str) -> None:
+    """Raise `InputError` if a library that writes a format is not installed."""
+    for needed in NEEDED.get(format_name, ()):
+        library(*needed)
+
+
 def first_line(error: Exception) -> str:
     return (str(error).strip().splitlines() or [type(error).__name__])[0].strip().rstrip(".")[:200]
 

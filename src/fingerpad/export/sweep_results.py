@@ -18,8 +18,8 @@ from fingerpad.experiments.requests.parts import Content
 from fingerpad.experiments.sweep.request import OBSERVER, SweepRequest
 from fingerpad.experiments.sweep.settings import MEASURED, observe
 from fingerpad.export.responses import MEASURED as MEASURED_COLUMNS
-from fingerpad.export.responses import require_pynwb, write_responses_nwb
-from fingerpad.export.results import check_format, library, table_csv
+from fingerpad.export.responses import write_responses_nwb
+from fingerpad.export.results import check_format, library, require, table_csv
 from fingerpad.export.sweep import DONE, FORMAT, FORMAT_VERSION, HIT_RATE, opened_group
 from fingerpad.export.touch_file import spike_trains
 from fingerpad.neuron.spikes import rate_windows_ms
@@ -256,7 +256,7 @@ def check_outputs(table: Path | None, spikes: Path | None) -> None:
     if spikes is not None:
         if spikes.suffix != ".nwb":
             raise InputError(f"Spikes of a sweep are written as .nwb: got {spikes.name}.")
-        require_pynwb()
+        require("nwb")
 
 
 def _needs_parquet(path: Path) -> None:
