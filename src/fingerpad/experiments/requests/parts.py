@@ -8,7 +8,7 @@ may stand wherever a file has a name or a block.
 from __future__ import annotations
 
 import hashlib
-import importlib.util
+import importlib
 import inspect
 import re
 import sys
@@ -422,13 +422,14 @@ class Request(Part):
             first, *rest = key.split(".")
             value = found.get(first)
             if rest and isinstance(value, Mapping) and isinstance(value.get(rest[0]), str):
-                found[first] = {**value, rest[0]: _object_named(value[rest[0]], key, beside, allow_python)}
+                named = _object_named(value[rest[0]], (first, *rest), beside, allow_python)
+                found[first] = {**value, rest[0]: named}
             elif not rest and isinstance(value, str):
-                found[first] = _object_named(value, key, beside, allow_python)
+                found[first] = _object_named(value, (first,), beside, allow_python)
         return found
 
 
-def _object_named(text: str, key: str, beside: Path, allow_python: bool) -> Any:
+def _object_named(text: str, place: Place, beside: Path, allow_python: bool) -> Any:
     """Return the object that a text names as module:object; any other text as it is."""
     module, _, name = text.partition(":")
     file = (beside / f"{module}.py").resolve()
@@ -436,28 +437,20 @@ def _object_named(text: str, key: str, beside: Path, allow_python: bool) -> Any:
         return text
     if not allow_python:
         raise InputError(
-            tuple(key.split(".")), f"names an object of {file.name}, which runs with your rights", repr(text),
+            place, f"names an object of {file.name}, which runs with your rights", repr(text),
             "allow it by --allow-python or allow_python=True, or leave it out",
         )  # fmt: skip
-    known = sys.modules.get(module)
-    if known is None:
-        spec = importlib.util.spec_from_file_location(module, file)
-        assert spec is not None
-        assert spec.loader is not None
-        sys.modules[module] = known = importlib.util.module_from_spec(spec)
-        if str(file.parent) not in sys.path:  # processes that press find the module there
-            sys.path.append(str(file.parent))
-        try:
-            spec.loader.exec_module(known)
-        except Exception as error:
-            del sys.modules[module]
-            raise InputError(tuple(key.split(".")), f"{file.name} cannot be run ({error!r})") from error
+    if str(file.parent) not in sys.path:  # processes that press find the module there, too
+        sys.path.append(str(file.parent))
+    importlib.invalidate_caches()
+    try:
+        known = importlib.import_module(module)
+    except Exception as error:
+        raise InputError(place, f"{file.name} cannot be run ({error!r})") from error
     if Path(getattr(known, "__file__", None) or "").resolve() != file:
-        raise InputError(
-            tuple(key.split(".")), f"must be of a module that has a name of its own: {module} is another one"
-        )
+        raise InputError(place, f"must be of a module that has a name of its own: {module} is another one")
     if not hasattr(known, name):
-        raise InputError(tuple(key.split(".")), f"must be an object of {file.name}", repr(name))
+        raise InputError(place, f"must be an object of {file.name}", repr(name))
     return getattr(known, name)
 
 
