@@ -35,9 +35,9 @@ from pydantic import (
     model_serializer,
     model_validator,
 )
-from pydantic_core import CoreSchema, PydanticCustomError
+from pydantic_core import CoreSchema
 
-from fingerpad.core.checked import UNKNOWN, first_of, hints_of, in_words
+from fingerpad.core.checked import UnknownKey, first_of, hints_of, in_words, raised_in
 from fingerpad.core.errors import InputError, Place, did_you_mean, shown, spelled
 from fingerpad.core.files import path_of, read_text
 from fingerpad.core.plain_yaml import line_at, read_yaml
@@ -90,8 +90,8 @@ class Part(BaseModel):
     def _known(cls, content: Any) -> Any:
         """Refuse an unknown key here, where the known ones are: pydantic does not tell them."""
         for key in content if isinstance(content, Mapping) else ():
-            if key not in cls.model_fields:
-                raise PydanticCustomError(UNKNOWN, "is unknown", {"key": key, "known": [*cls.model_fields]})
+            if isinstance(key, str) and key not in cls.model_fields:
+                raise UnknownKey(key, [*cls.model_fields])
         return content
 
     @model_serializer(mode="wrap")
@@ -311,9 +311,9 @@ def input_error(error: ValidationError) -> InputError:
     path = tuple(part for part in first["loc"] if not str(part).startswith(_FORM))
     if first["type"] == "missing":
         found = InputError(path, "must be given", remedy="it is missing")
-    elif first["type"] == UNKNOWN:
-        key, known = first["ctx"]["key"], first["ctx"]["known"]
-        found = InputError((*path, key), "is unknown", remedy=did_you_mean(key, known, spelled(path)))
+    elif isinstance(unknown := raised_in(first), UnknownKey):
+        remedy = did_you_mean(unknown.key, unknown.known, spelled(path))
+        found = InputError((*path, unknown.key), "is unknown", remedy=remedy)
     elif first["input"] is None and not path:
         found = InputError(path, "must be a mapping of keys to values", remedy="it is empty")
     else:
