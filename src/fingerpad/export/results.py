@@ -46,6 +46,7 @@ def library(name: str, needed: str = "", extra: str = "netcdf") -> Any:
 NEEDED: dict[str, tuple[tuple[str, ...], ...]] = {
     "vtu": (("vtkmodules.vtkIOXML", "VTU files need the package vtk", "vtk"),),
     "nwb": (("pynwb", "NWB files need pynwb", "nwb"),),
+    "parquet": (("pyarrow", "Parquet needs pyarrow", "tables"),),
     "netcdf": (("xarray",), ("h5netcdf",), ("zarr",)),
     "zarr": (("xarray",), ("h5netcdf",), ("zarr",)),
 }
@@ -119,12 +120,10 @@ def _csv(result: Any, path: Path) -> None:
 
 
 def _parquet(result: Result, path: Path) -> None:
-    library("pyarrow", "Parquet needs pyarrow", "tables")
-    content = io.BytesIO()
+    require("parquet")
     made = frame(result)
     made.columns = made.columns.astype(str)
-    made.to_parquet(content)
-    write_atomically(path, content.getvalue())
+    write_atomically(path, made.to_parquet())
 
 
 def _json(result: Result, path: Path, **options: Any) -> None:

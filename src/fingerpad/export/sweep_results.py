@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 import json
 from collections.abc import Iterator, Mapping
 from pathlib import Path
@@ -147,9 +146,7 @@ def write_sweep_table(data: xarray.Dataset, path: str | Path) -> Path:
     else:
         _needs_parquet(path)
         table.attrs.update(about)
-        file = io.BytesIO()
-        table.to_parquet(file, index=False)
-        content = file.getvalue()
+        content = table.to_parquet(index=False)
     write_atomically(path, content)
     return path
 
@@ -262,4 +259,4 @@ def check_outputs(table: Path | None, spikes: Path | None) -> None:
 def _needs_parquet(path: Path) -> None:
     if path.suffix != ".parquet":
         raise InputError(f"A table of a sweep is written as .csv or .parquet: got {path.name}.")
-    library("pyarrow", "Parquet needs pyarrow", "tables")
+    require("parquet")

@@ -101,12 +101,23 @@ def finger_of(part: Any, beside: Path = Path()) -> Finger:
         return finger
     if Path(part).suffix.lower() in MESH_FILES:
         return read_finger(beside / part)
-    like, *given = (word.strip() for word in part.split(":"))
-    sizes = [tuple(word.strip() for word in size.partition("=")) for size in given]
-    for _, equals, _ in sizes:
-        if not equals:
-            raise InputError("finger", "must be written like:name=mm, as adult:width_mm=18", repr(part))
-    return Fingertip.of(like, **{name: number_in(name, value, "mm") for name, _, value in sizes})
+    like, sizes = sizes_in("finger", part, "like:name=mm, as adult:width_mm=18")
+    return Fingertip.of(like, **sizes)
+
+
+def sizes_in(what: str, text: str, written: str, names: Sequence[str] = ()) -> tuple[str, dict[str, float]]:
+    """Return the name and the sizes of a text name:size:size=value; those without a name go by `names`."""
+    name, *given = (part.strip() for part in text.split(":"))
+    found: dict[str, str] = {}
+    for place, part in enumerate(given):
+        size, equals, value = (word.strip() for word in part.rpartition("="))
+        if not equals and place >= len(names):
+            raise InputError(what, f"must be written {written}", repr(text))
+        size = size if equals else names[place]
+        if size in found:
+            raise InputError(what, f"must have {size} once", repr(text))
+        found[size] = value
+    return name, {size: number_in(size, value, unit_of(size)) for size, value in found.items()}
 
 
 def object_of(part: Any, beside: Path = Path()) -> Indenter:
@@ -126,23 +137,11 @@ def named_files(part: Any, beside: Path = Path()) -> list[Path]:
 @lru_cache(maxsize=1024)
 def indenter_named(text: str) -> Indenter:
     """Make an indenter from its name and sizes, `name:size:size`."""
-    name, *given = (part.strip() for part in text.split(":"))
+    name = text.partition(":")[0].strip()
     body = INDENTERS[one_of("indenter", name, tuple(INDENTERS))]
-    sizes = [size.name for size in fields(body)]  # type: ignore[arg-type]
-    if len(given) > len(sizes):
-        raise InputError(
-            "indenter",
-            f"must be written {':'.join([name, *sizes])}, sizes from the right may be left out",
-            repr(text),
-        )
-    written: dict[str, str] = {}
-    for place, part in enumerate(given):
-        size, equals, value = (word.strip() for word in part.rpartition("="))
-        size = size if equals else sizes[place]
-        if size in written:
-            raise InputError("indenter", f"must have {size} once", repr(text))
-        written[size] = value
-    return body(**{size: number_in(size, value, unit_of(size)) for size, value in written.items()})
+    names = [size.name for size in fields(body)]  # type: ignore[arg-type]
+    written = f"{':'.join([name, *names])}, sizes from the right may be left out"
+    return body(**sizes_in("indenter", text, written, names)[1])
 
 
 _PLACES: dict[str, Place] = {
