@@ -18,7 +18,6 @@ from fingerpad.experiments.gerling2014 import nerve
 from fingerpad.inference.afferent_fit import response_surface, start_points
 from fingerpad.inference.fitting.methods import Method, cross_validate, interleaved_folds
 from fingerpad.inference.rate_model import AfferentModel, RateProblem
-from fingerpad.neuron.transduction import drive
 from fingerpad.skin.store import Store, solve_missing
 
 JOBS, REPEATS = 2, 3
@@ -61,8 +60,7 @@ def fit(traces: str) -> dict[str, Any]:
     """
     with np.load(traces) as stored:
         sed = Traces(stored["times_ms"], stored["sed_kpa"], stored["kinks_ms"])
-    driven = drive(sed)
-    model = AfferentModel.of_drive(driven)
+    model = AfferentModel.of_traces(sed)
     six = nerve.rate_problem(sed)
     folds = interleaved_folds(six.n_observations)
     cases: list[tuple[RateProblem, Method]] = [(six, response_surface())]

@@ -318,7 +318,6 @@ test_what_cannot_be_used_is_refused = refusals(
     (lambda: discriminate_by(GradientSum(PAIRS), [["a"]], 0.1, 0), "responses must be an array of numbers"),
     (lambda: discriminate_by(EuclideanDistance("maximum"), bumps(), 0.1, 0), ("norm",)),
     (lambda: discriminate_by(EuclideanDistance(), bumps(), 0.1, 0, VARIED), "criterion_sigma"),
-    (lambda: expected_hit_rates(bumps(), PAIRS, 0.1, np.ones((9, 17))), ("standard_normals",)),
     (lambda: fit_noise_sigma(lambda sigma: [0.5]), "must give 2 hit rates: got 1"),
     (lambda: fit_noise_sigma(lambda sigma: [0.5, 0.5], bounds=(0.2, 0.1)), ("bounds",)),
 )  # fmt: skip

@@ -22,7 +22,7 @@ from fingerpad.experiments.discrimination.analysis import SESSION, analyse, forc
 from fingerpad.experiments.discrimination.request import CurveSettings
 from fingerpad.experiments.examples import tasks
 from fingerpad.psychophysics.encoding import gradient_sum, neighbour_pairs, taking_part
-from fingerpad.psychophysics.ideal_observer import code_efficiency, noisy_presentations
+from fingerpad.psychophysics.ideal_observer import efficiency, noisy_presentations
 from fingerpad.psychophysics.observer import EuclideanDistance, Experiment, GradientSum, discriminate_by
 from fingerpad.report import percept as report
 from fingerpad.report.results import task_sentences
@@ -291,8 +291,8 @@ def test_no_code_beats_the_ideal_observer_and_what_it_makes_use_of_is_a_share():
 def test_where_the_ideal_observer_never_fails_there_is_no_efficiency():
     table = np.array([[50.0, 60.0], [150.0, 10.0]])
     (shown,) = noisy_presentations(table, 0.01, seed=3)
-    found = code_efficiency(shown, lambda responses: gradient_sum(responses, np.array([[0, 1]])))
-    assert np.isnan([found.efficiency, found.efficiency_error]).all()
+    found = shown.of(lambda responses: gradient_sum(responses, np.array([[0, 1]])))
+    assert np.isnan(efficiency(found, shown.ideal())).all()
 
 
 def test_a_population_that_stays_silent_has_no_hit_rate_and_no_fitted_noise():

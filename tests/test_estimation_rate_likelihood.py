@@ -6,7 +6,7 @@ from scipy.integrate import quad
 from scipy.special import gammaln, logsumexp
 
 from fingerpad import RateRecordings
-from fingerpad.inference.rate_posterior import RateLikelihood
+from fingerpad.inference.rate_posterior import CorrelatedResiduals, RateLikelihood
 from refusals import refusals
 
 PLACES = np.array([-1.0, -0.4, 0.0, 0.6, 1.5])
@@ -15,6 +15,8 @@ OBSERVED = {
     "dynamic": np.array([90.0, 140.0, 120.0, 60.0, 10.0]),
     "static": np.array([5.0, 30.0, 20.0, 8.0, 0.0]),
 }
+
+INDEPENDENT = CorrelatedResiduals(5, deviation=7.0)
 
 
 class Scaled:
@@ -52,7 +54,7 @@ def integrated(residuals, length_mm, deviation_hz):
 @pytest.mark.parametrize("phases", [("dynamic",), ("static",), ("dynamic", "static")])
 def test_differences_of_log_likelihood_are_those_of_the_integral(phases):
     lengths = (0.0, 0.5, 1.2)
-    likelihood = RateLikelihood(Scaled(), recordings(*phases), PLACES, lengths, deviation_hz=7.0)
+    likelihood = RateLikelihood(Scaled(), recordings(*phases), CorrelatedResiduals(5, PLACES, lengths, 7.0))
     heights = np.array([[0.5], [0.95], [1.3]])
     expected, independent = [], []
     for height in heights:
@@ -68,14 +70,14 @@ def test_differences_of_log_likelihood_are_those_of_the_integral(phases):
     found = likelihood.log_likelihood(heights)
     np.testing.assert_allclose(np.diff(found), np.diff(expected), rtol=1e-7)
     # The constant is the same without correlation: the difference is evidence.
-    alone = RateLikelihood(Scaled(), recordings(*phases), deviation_hz=7.0).log_likelihood(heights)
+    alone = RateLikelihood(Scaled(), recordings(*phases), INDEPENDENT).log_likelihood(heights)
     shared = len(phases) * np.log(len(lengths))
     np.testing.assert_allclose(found - alone, np.array(expected) - shared - independent, rtol=1e-6)
 
 
 def test_residual_draws_have_the_conditional_law():
     """Without correlation sigma^2 is a scaled inverse chi-square; its mean is known."""
-    likelihood = RateLikelihood(Scaled(), recordings("dynamic", "static"), deviation_hz=7.0)
+    likelihood = RateLikelihood(Scaled(), recordings("dynamic", "static"), INDEPENDENT)
     points = np.full((20000, 1), 0.95)
     draws = likelihood.residual_draws(points, np.random.default_rng(1))
     for phase, predicted in zip(("dynamic", "static"), Scaled().evaluate(points[0]), strict=True):
@@ -91,7 +93,7 @@ def test_residual_draws_have_the_conditional_law():
 
 def test_lengths_are_drawn_by_their_shares_of_the_likelihood():
     lengths = (0.0, 0.8)
-    likelihood = RateLikelihood(Scaled(), recordings("dynamic"), PLACES, lengths, deviation_hz=7.0)
+    likelihood = RateLikelihood(Scaled(), recordings("dynamic"), CorrelatedResiduals(5, PLACES, lengths, 7.0))
     draws = likelihood.residual_draws(np.full((20000, 1), 1.3), np.random.default_rng(2))["dynamic"]
     residuals = OBSERVED["dynamic"] - Scaled().evaluate(np.array([1.3]))[0]
     logarithms = np.array([integrated(residuals, length, 7.0) for length in lengths])
@@ -101,10 +103,10 @@ def test_lengths_are_drawn_by_their_shares_of_the_likelihood():
 
 
 test_what_does_not_fit_together_is_refused = refusals(
-    ({"positions_mm": PLACES[:4]}, "a different position for each of 5 stimuli: got 4 values"),
-    ({"positions_mm": np.zeros(5)}, "got 5 values, 1 of them different"),
-    ({"lengths_mm": (-1.0,)}, "lengths of at least 0"),
-    ({"deviation_hz": 0.0}, ("deviation_hz",)),
-    ({"recordings": RateRecordings(("a",), [1.0], None)}, "got 1 for 5"),
-    call=lambda changes: RateLikelihood(**{'model': Scaled(), 'recordings': recordings('dynamic')} | changes),
+    (lambda: CorrelatedResiduals(5, PLACES[:4]), "a different position for each of 5 stimuli: got 4 values"),
+    (lambda: CorrelatedResiduals(5, np.zeros(5)), "got 5 values, 1 of them different"),
+    (lambda: CorrelatedResiduals(5, lengths_mm=(-1.0,)), "lengths of at least 0"),
+    (lambda: CorrelatedResiduals(5, deviation=0.0), ("deviation",)),
+    (lambda: RateLikelihood(Scaled(), RateRecordings(("a",), [1.0], None), CorrelatedResiduals(1)),
+     "got 1 for 5"),
 )  # fmt: skip

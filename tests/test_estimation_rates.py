@@ -1,6 +1,7 @@
 """Rates to be fitted: residuals make the score, a rate in closed form has slopes, a receptor may be moved."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -12,8 +13,8 @@ from fingerpad.inference.fitting.methods import Bounds, LeastSquares, fractional
 from fingerpad.inference.identifiable import identifiable, six_parameters
 from fingerpad.inference.rate_model import (
     AfferentModel,
-    ClosedFormModel,
     RateProblem,
+    closed_form_rates,
     constant_drive_rate,
     four_number_model,
 )
@@ -113,8 +114,9 @@ def test_slopes_of_the_formula_are_those_of_its_differences(bend):
 @pytest.mark.parametrize("by_formula", [False, True])
 def test_the_truth_is_recovered_from_simulated_rates(four_numbers, by_formula):
     starts = FOUR * np.array([[0.3, 0.5, 1.6, 1.7], [1.5, 2.0, 0.5, 0.5]])
-    slopes = ClosedFormModel(AfferentModel.of_traces(traces())).slopes
-    jacobian = four_numbers.jacobian_of(slopes) if by_formula else None
+    stimuli = AfferentModel.of_traces(traces())
+    slopes = four_numbers.jacobian_of(lambda four: closed_form_rates(stimuli, four)[1])
+    jacobian = slopes if by_formula else None
     method = LeastSquares(starts, Bounds(0.3 * FOUR, 0.0 * FOUR, 10.0 * FOUR), jacobian=jacobian)
     fit = method.fit(four_numbers, EVERYTHING)
     assert fit.score > 0.995
@@ -152,8 +154,11 @@ def test_places_that_were_not_sampled_are_refused():
 
 
 def test_slopes_along_the_numbers_of_a_fit_are_the_limits_of_differences(four_numbers):
-    model = ClosedFormModel(AfferentModel.of_traces(traces()))
-    search = afferent_fit.four_numbers(AfferentModel.of_traces(traces()), four_numbers.recordings)
+    stimuli = AfferentModel.of_traces(traces())
+    model = SimpleNamespace(
+        n_stimuli=stimuli.n_stimuli, evaluate=lambda four: closed_form_rates(stimuli, four)[0]
+    )
+    search = afferent_fit.four_numbers(stimuli, four_numbers.recordings)
     fitted, bounds = search.problem, search.bounds
     numbers = np.array([FOUR[0] * FOUR[3], *FOUR[1:]])
     residuals = fitted.residuals(numbers, EVERYTHING)

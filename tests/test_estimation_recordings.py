@@ -14,7 +14,7 @@ def test_chosen_rows_keep_names_rates_and_a_phase_that_was_not_recorded():
     assert recordings.stimuli == ("c", "a")
     assert recordings.static_rate_hz.tolist() == [3.0, 1.0]
     assert recordings.dynamic_rate_hz is None
-    assert (recordings.phases, recordings.n_rates, recordings.source) == (("static",), 2, "bench")
+    assert (recordings.phases, recordings.source) == (("static",), "bench")
 
 
 def spikes(trains, duration_ms):

@@ -113,7 +113,6 @@ test_wrong_folds_and_shapes_are_refused = refusals(
     (lambda: none_scored(3, [0.5, 0, 1]), "memberships must number at least two folds"),
     (lambda: none_scored(3, [-1, 0, 1]), "memberships must number at least two folds"),
     (lambda: none_scored(4, [0, 1, 0]), "memberships needs one fold per observation: got 3 for 4"),
-    (lambda: ResponseSurface([[0.0], [1.0]], [0.1, 0.1, 0.1]), ("increments",)),
     (lambda: interleaved_folds(5, 6), "n_folds must be at most the number of stimuli"),
     (lambda: interleaved_folds(5, 1), "n_folds must be a whole number of at least 2"),
 )  # fmt: skip

@@ -13,7 +13,6 @@ from fingerpad.inference.fitting.methods import (
     LeastSquares,
     best_of,
 )
-from refusals import refusals
 
 TIMES = np.linspace(0.0, 4.0, 24)
 TRUTH = np.array([2.0, 0.8])
@@ -117,16 +116,3 @@ def test_a_seed_decides_what_the_search_tries():
     equal = [Fit(np.array([value]), 0.5, 7, 0.25, (step,)) for value in (1.0, 2.0)]
     best = best_of(tuple(equal))  # the first of equal ones
     assert (best.start, best.parameters.tolist(), best.n_evaluations, best.seconds) == (0, [1.0], 14, 0.5)
-
-
-test_wrong_settings_are_refused = refusals(
-    (lambda: Bounds([1.0, 0.0]), "Bounds need scales above 0"),
-    (lambda: Bounds([1.0], [2.0], [2.0]), "lower limits below the upper ones"),
-    (lambda: LeastSquares([[1.0, 2.0]], Bounds([1.0])), "starts must have one entry per scale: got 2"),
-    (lambda: LeastSquares([START], FREE, difference_steps=(0.0,)), ("difference_steps",)),
-    (lambda: LeastSquares([[1.0], [3.0]], Bounds([1.0], high=[2.0])), "between the bounds: row 1"),
-    (lambda: LeastSquares([START], FREE, n_refined=0), ("n_refined",)),
-    (lambda: CovarianceAdaptation([1.0, 2.0], Bounds([1.0])), ("start",)),
-    (lambda: CovarianceAdaptation(START, FREE, first_spread=0.0), ("first_spread",)),
-    (lambda: CovarianceAdaptation(START, FREE, seed=-1), ("seed",)),
-)  # fmt: skip

@@ -123,15 +123,7 @@ def round_density(**changes):
 
 
 test_what_cannot_be_sampled_is_refused = refusals(
-    (lambda: round_density(spread=[1.0, 0.0]), ("spread",)),
-    (lambda: round_density(names=("a",)), "one entry per parameter: got 2, 2 and 1"),
-    (lambda: round_density(n_walkers=6), "n_walkers must be a whole number of at least 8"),
-    (lambda: round_density(n_walkers=41), "n_walkers must be even"),
-    (lambda: round_density(n_ensembles=1), ("n_ensembles",)),
-    (lambda: round_density(seed=-1), ("seed",)),
     (lambda: round_density(log_density=lambda p: np.full(len(p), np.nan)), "must be a number or -inf"),
     (lambda: round_density(log_density=lambda p: np.full(len(p), -np.inf)), "finite near the centre"),
     (lambda: round_density(log_density=lambda p: np.zeros((len(p), 1))), "one number per point"),
-    (lambda: credible_band(np.zeros((3, 2)), 1.0), ("level",)),
-    (lambda: split_r_hat(np.zeros((1, 8, 2))), "at least 2 ensembles and 4 steps"),
 )  # fmt: skip

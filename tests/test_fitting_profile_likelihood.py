@@ -91,9 +91,6 @@ def test_several_starts_find_what_a_neighbour_does_not():
 PROFILED = {"log_likelihood": normal, "starts": CENTRE, "scales": [1.0, 2.0], "names": NAMES}
 
 test_what_cannot_be_profiled_is_refused = refusals(
-    ({"scales": [1.0, 0.0]}, "scales greater than 0"),
-    ({"names": ("a",)}, "at least two parameters"),
-    ({"level": 1.5}, ("level",)),
     ({"log_likelihood": lambda points: np.full(len(points), -np.inf)}, "must be finite at a start"),
     ({"log_likelihood": lambda points: np.full(len(points), np.nan)}, "it is NaN at"),
     call=lambda changes: profile_likelihoods(**(PROFILED | changes)),

@@ -10,7 +10,12 @@ from fingerpad import InputError, RateRecordings, Traces
 from fingerpad.experiments.fit import likelihoods
 from fingerpad.experiments.fit.fit import check_offset, fit_offset, fit_recordings
 from fingerpad.experiments.fit.likelihoods import profiled
-from fingerpad.experiments.fit.results import ParameterProfile, RatePosterior
+from fingerpad.experiments.fit.results import (
+    CredibleInterval,
+    ParameterProfile,
+    PosteriorConvergence,
+    RatePosterior,
+)
 from fingerpad.inference.afferent_fit import ReceptorOffset
 from fingerpad.inference.identifiable import IDENTIFIABLE_NAMES, identifiable
 from fingerpad.inference.rate_model import AfferentModel, RateProblem, four_number_model
@@ -167,10 +172,11 @@ def test_figures_words_and_tables_hold_what_was_found(section):
 
 
 def test_credible_intervals_are_drawn_where_there_are_some(section):
+    interval = CredibleInterval(median=2.0, low=1.5, high=2.5)
     drawn = replace(section, posterior=RatePosterior(
-        level=0.95, seed=1, n_draws=10, n_evaluations=20, largest_r_hat=1.0, smallest_effective_size=9.0,
-        median=dict.fromkeys(IDENTIFIABLE_NAMES, 2.0), interval=dict.fromkeys(IDENTIFIABLE_NAMES, (1.5, 2.5)),
-        covariance=np.eye(4), bands={},
+        level=0.95, seed=1, covariance=np.eye(4), rates={},
+        numbers=dict.fromkeys(IDENTIFIABLE_NAMES, interval),
+        convergence=PosteriorConvergence(**dict.fromkeys(PosteriorConvergence.__dataclass_fields__, 1)),
     ))  # fmt: skip
     panels = zip(report.draw_profiles(drawn).axes, report.draw_profiles(section).axes, strict=True)
     assert all(len(more.lines) == len(fewer.lines) + 1 for more, fewer in panels)

@@ -156,7 +156,7 @@ def _single_unit_uncertainty() -> dict:
         "shift_mm": SHIFT_MM.tolist(), "rates": {"dynamic": rates, "static": rates},
         "evidence_for_alike_residuals": 30.0, "profiles": [profile | {"name": name} for name in names],
         "sensitivity": {key: [0.1, 0.2, 0.3, 0.4] for key in sobol}
-        | {"mean_fss": 0.85, "deviation_fss": 0.02, "evaluations": 3072},
+        | {"mean": 0.85, "standard_deviation": 0.02, "evaluations": 3072},
     }  # fmt: skip
 
 

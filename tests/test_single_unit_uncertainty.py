@@ -12,7 +12,6 @@ from fingerpad.experiments.fit.results import UncertaintyResult
 from fingerpad.experiments.gerling2014 import nerve
 from fingerpad.inference.identifiable import IDENTIFIABLE_NAMES, identifiable
 from fingerpad.inference.rate_model import AfferentModel
-from fingerpad.neuron.transduction import drive
 from fingerpad.report import nerve as report
 from fingerpad.report.style import png
 from report_rows import caption_of, table_of
@@ -36,7 +35,7 @@ def section() -> UncertaintyResult:
         for rate, deviation in zip(AfferentModel.of_traces(SED).evaluate(TRUTH), (12.0, 2.0), strict=True)
     ]
     recordings = RateRecordings(nerve.bar_recordings().stimuli, *rates)
-    model = AfferentModel.of_drive(drive(SED, pieces=nerve.PIECES))
+    model = AfferentModel.of_traces(SED, pieces=nerve.PIECES)
     return likelihoods.uncertainty(model, recordings, TRUTH, SHIFTS, 1, **SHORT_CHAINS)
 
 

@@ -340,7 +340,7 @@ def test_human_keeps_its_rates_and_force_through_the_reference_modulus(shared_fo
     found = prediction(like_human(shares, outputs, outputs, prior, resting), outputs, times)
     responses = {key: runner.store.load(touch) for key, touch in touches(human, conditions).items()}
     (bars,) = bar_traces(responses, human, conditions)
-    dynamic, static = AfferentModel.of_drive(drive(bars, pieces=PIECES)).evaluate(six)
+    dynamic, static = AfferentModel.of_traces(bars, pieces=PIECES).evaluate(six)
     assert found.bar_hz[0, 0] == pytest.approx(dynamic, abs=1e-6)
     assert found.bar_hz[1, 0] == pytest.approx(static, abs=1e-6)
     force_n = responses["plate", 2.0, 0.0].force_mn[-1] / 1000.0

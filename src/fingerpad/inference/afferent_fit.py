@@ -16,20 +16,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 from pydantic import SkipValidation
 
-from fingerpad.core.checked import checked, value_class
+from fingerpad.core.checked import checked
 from fingerpad.core.errors import InputError
 from fingerpad.core.signals import INTERVAL, Traces
-from fingerpad.core.values import (
-    FiniteVector,
-    FloatArray,
-    IntArray,
-    Positive,
-    finite,
-    float_array,
-    increasing,
-    one_of,
-    positive,
-)
+from fingerpad.core.values import FloatArray, IntArray, finite, float_array, increasing, one_of, positive
 from fingerpad.data import neuron
 from fingerpad.inference.fitting.methods import (
     Bounds,
@@ -54,11 +44,11 @@ from fingerpad.inference.identifiable import (
 )
 from fingerpad.inference.rate_model import (
     AfferentModel,
-    ClosedFormModel,
     RateModel,
     RateProblem,
     Rates,
     Reparametrised,
+    closed_form_rates,
 )
 from fingerpad.inference.recordings import RateRecordings
 from fingerpad.neuron.afferent import PARAMETER_NAMES, AnyAfferent, type_of
@@ -229,14 +219,14 @@ class Search:
 
     def along_slopes(self) -> LeastSquares:
         """Least squares with the derivatives of the closed form; of the four numbers only."""
-        smooth = ClosedFormModel(cast(Any, self.problem.model).model)
+        stimuli = cast(Any, self.problem.model).model
 
         def slopes(numbers: FloatArray) -> Rates:
             # By the chain rule: beta/(C v) is the first number over the last, tau.
             share, _, _, tau = numbers
             four_by_numbers = np.diag([1.0 / tau, 1.0, 1.0, 1.0])
             four_by_numbers[0, 3] = -share / tau**2
-            dynamic, static = smooth.slopes(fitted_four(numbers))
+            _, (dynamic, static) = closed_form_rates(stimuli, fitted_four(numbers))
             return dynamic @ four_by_numbers, static @ four_by_numbers
 
         jacobian = self.problem.jacobian_of(slopes)
@@ -330,6 +320,16 @@ def _largest_factor(afferent: AnyAfferent, name: str) -> float:
     return LARGEST_FACTOR
 
 
+def check_free(afferent: AnyAfferent, free: Sequence[str]) -> None:
+    """Raise `InputError` unless these are numbers of an afferent, at least one and all above zero."""
+    known = tuple(getattr(afferent, "__dataclass_fields__", ()))
+    if not free:
+        words = f"must name at least one number of {type_of(afferent)}, one of {', '.join(known)}"
+        raise InputError("free", words, "none")
+    for name in free:
+        positive(one_of("free", name, known), getattr(afferent, name))
+
+
 def chosen_numbers(
     afferent: AnyAfferent,
     free: Sequence[str],
@@ -338,11 +338,7 @@ def chosen_numbers(
     windows_ms: Windows | None = None,
 ) -> Search:
     """Search the logarithms of chosen numbers of any afferent over those given."""
-    known = tuple(getattr(afferent, "__dataclass_fields__", ()))
-    for name in free:
-        positive(one_of("free", name, known), getattr(afferent, name))
-    if not free:
-        raise InputError("free", f"must name at least one number of {type_of(afferent)}", "none")
+    check_free(afferent, free)
     parts = (traces,) if isinstance(traces, Traces) else tuple(traces)
     problem = RateProblem(TypedModel(afferent, tuple(free), parts, windows_ms), recordings)
     low = np.full(len(free), -np.log(LARGEST_FACTOR))
@@ -409,7 +405,7 @@ WEIGHT = 2.0
 CHANCE = 0.5  # Hit rate of an observer of a silent population. [0-1]
 
 
-@value_class
+@dataclass(frozen=True)
 class RatesAndHitRates:
     """Recorded rates and hit rates h of people, to which one afferent is fitted.
 
@@ -423,12 +419,8 @@ class RatesAndHitRates:
     rates: RateProblem  # Recorded rates and the model that predicts them.
     hit_rates: Callable[[FloatArray], FloatArray]
     """From the parameters of that model to predicted hit rates (n,). [0-1]"""
-    observed: FiniteVector  # Hit rates of people, (n,). [0-1]
-    weight: Positive = WEIGHT  # Weight w of the squared differences against FSS.
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        return self.rates.names
+    observed: FloatArray  # Hit rates of people, (n,). [0-1]
+    weight: float = WEIGHT  # Weight w of the squared differences against FSS.
 
     @property
     def n_observations(self) -> int:
@@ -457,14 +449,6 @@ class SphereHitRates:
     neighbours: np.ndarray  # Pairs of the Gradient Sum, (n_pairs, 2).
     noise_sigma: float
     standard_normals: FloatArray  # Common random presentations of the Gradient Sum, (n_draws, n_receptors).
-
-    def __post_init__(self) -> None:
-        if self.model.n_stimuli % (self.n_positions * self.n_receptors):
-            raise InputError(
-                "model",
-                "must have one column per position, sphere and receptor",
-                f"{self.model.n_stimuli} for {self.n_positions} positions and {self.n_receptors} receptors",
-            )
 
     def __call__(self, parameters: FloatArray) -> FloatArray:
         """Hit rates (n,): by position Gradient Sum, then Euclidean Distance, one per comparison. [0-1]"""
@@ -497,7 +481,7 @@ class ToRatesAndHitRates:
     def fit(self, problem: Problem, chosen: IntArray) -> Fit:
         """Fit the chosen rates, and all hit rates."""
         if not (isinstance(problem, RateProblem) and isinstance(problem.model, AfferentModel)):
-            raise InputError("problem", "must have the paper's six parameters", str(", ".join(problem.names)))
+            raise InputError("problem", "must have the paper's six parameters", type(problem).__name__)
         search = four_numbers(problem.model, problem.recordings)
         both = RatesAndHitRates(
             search.problem, lambda numbers: self.hit_rates(fitted_six(numbers)), self.observed

@@ -3,7 +3,7 @@
 All rate models follow one contract, `RateModel`. `AfferentModel` is the paper's model with six parameters.
 `Reparametrised` is the same model in other parameters.
 
-`ClosedFormModel` is an approximation with derivatives. In the four identifiable parameters
+`closed_form_rates` is an approximation with derivatives. In the four identifiable parameters
 (`fingerpad.inference.identifiable`) the membrane is driven by g = b + k_d U' + k_s U [1/ms], and its
 threshold is 1. Under a constant g the potential rises from 0 to the threshold in
 tau ln(x / (x - 1)), with the steady potential x = tau g. With the refractory period t_r the rate is
@@ -30,7 +30,7 @@ from fingerpad.core.errors import InputError
 from fingerpad.core.signals import Traces
 from fingerpad.core.threads import in_blocks
 from fingerpad.core.units import MS_PER_S
-from fingerpad.core.values import Finite, FloatArray, IntArray, Many, NotNegative, Positive
+from fingerpad.core.values import Count, Finite, FloatArray, IntArray, Many, NotNegative, Positive
 from fingerpad.data import neuron, protocol
 from fingerpad.inference.fitting.methods import fractional_sum_of_squares
 from fingerpad.inference.identifiable import IDENTIFIABLE_NAMES, six_parameters
@@ -38,7 +38,7 @@ from fingerpad.inference.recordings import RateRecordings
 from fingerpad.neuron.afferent import PARAMETER_NAMES, Afferent
 from fingerpad.neuron.exact_spikes import exact_trains
 from fingerpad.neuron.spikes import Windows, check_windows, common_rate_windows_ms, window_rates_hz
-from fingerpad.neuron.transduction import Drive, drive
+from fingerpad.neuron.transduction import PIECES_PER_INTERVAL, Drive, drive
 
 Rates = tuple[FloatArray, FloatArray]  # Dynamic and static rates, one column per stimulus. [spikes/s]
 ROWS_PER_BLOCK = 4  # Rows of parameters that a thread evaluates at a time.
@@ -112,23 +112,13 @@ class AfferentModel:
                 )
 
     @classmethod
-    def of_drive(
-        cls,
-        driven: Drive,
-        windows_ms: Windows | None = None,
-        refractory_ms: Finite = neuron.REFRACTORY.value,
-        initial_mv: Finite | None = None,
-    ) -> AfferentModel:
-        """Make the model for stimuli that share their times, one per column of a drive."""
-        return cls((driven,), (np.arange(driven.n_sites),), windows_ms, refractory_ms, initial_mv)
-
-    @classmethod
     def of_traces(
         cls,
         traces: Traces | Sequence[Traces],
         windows_ms: Windows | None = None,
         refractory_ms: Finite = neuron.REFRACTORY.value,
         initial_mv: Finite | None = None,
+        pieces: Count = PIECES_PER_INTERVAL,
     ) -> AfferentModel:
         """Make the model for what drives the afferent, stimuli grouped by their times.
 
@@ -138,6 +128,8 @@ class AfferentModel:
             One column per stimulus; the columns of several traces are numbered consecutively.
         windows_ms, refractory_ms, initial_mv
             As of the class.
+        pieces : int, optional
+            As of `drive`.
         """
         parts = [traces] if isinstance(traces, Traces) else list(traces)
         quantities = sorted({f"{part.dynamic_quantity} and {part.static_quantity}" for part in parts})
@@ -153,8 +145,9 @@ class AfferentModel:
             key = trace.times_ms.tobytes(), trace.kinks_ms.tobytes(), trace.phases, trace.onset_ms
             groups.setdefault(key, []).append((first, trace))
             first += trace.n_sites
+        joined = (Traces.joined([trace for _, trace in group]) for group in groups.values())
         return cls(
-            tuple(drive(Traces.joined([trace for _, trace in group])) for group in groups.values()),
+            tuple(drive(each, pieces=pieces) for each in joined),
             tuple(
                 np.concatenate([start + np.arange(trace.n_sites) for start, trace in group])
                 for group in groups.values()
@@ -253,48 +246,25 @@ def _bent(excess: FloatArray, bend: float) -> tuple[FloatArray, FloatArray]:
     return bend * np.logaddexp(0.0, excess / bend), np.exp(-np.logaddexp(0.0, -excess / bend))
 
 
-@dataclass(frozen=True)
-class ClosedFormModel:
-    """Closed-form rates: the mean over each window of the rate under a constant drive;.
+def closed_form_rates(
+    stimuli: AfferentModel, four: FloatArray, bend: float = BEND
+) -> tuple[Rates, tuple[FloatArray, FloatArray]]:
+    """Mean over each window of the rate under a constant drive, and its derivatives (n_stimuli, 4).
 
-    The model neglects the charging from rest and single spikes. It is inaccurate in the ramp, but smooth, and
-    its derivatives are cheap.
+    The charging from rest and single spikes are neglected. The rates are inaccurate in the ramp, but smooth,
+    and their derivatives are cheap.
     """
-
-    stimuli: AfferentModel  # Drives, windows and refractory period.
-    bend: float = BEND  # Width over which the rate sets in. [1]
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        return IDENTIFIABLE_NAMES
-
-    @property
-    def n_stimuli(self) -> int:
-        return self.stimuli.n_stimuli
-
-    def evaluate(self, parameters: FloatArray) -> Rates:
-        dynamic, static = (self._window(parameters, window)[0] for window in self.stimuli.used_windows_ms)
-        return dynamic, static
-
-    def slopes(self, parameters: FloatArray) -> Rates:
-        """Return the derivatives of both rates along the four parameters, (n_stimuli, 4) each."""
-        dynamic, static = (self._window(parameters, window)[1] for window in self.stimuli.used_windows_ms)
-        return dynamic, static
-
-    def _window(self, parameters: FloatArray, window_ms: tuple[float, ...]) -> tuple[FloatArray, FloatArray]:
-        """Mean rate (n_stimuli,) in a window, and its derivatives (n_stimuli, 4)."""
-        intercept, dynamic_gain, static_gain, tau = parameters
-        mean, slopes = np.empty(self.n_stimuli), np.empty((self.n_stimuli, 4))
-        for driven, columns in zip(self.stimuli.drives, self.stimuli.stimuli, strict=True):
+    intercept, dynamic_gain, static_gain, tau = four
+    rates, slopes = np.empty((2, stimuli.n_stimuli)), np.empty((2, stimuli.n_stimuli, 4))
+    for phase, window_ms in enumerate(stimuli.used_windows_ms):
+        for driven, columns in zip(stimuli.drives, stimuli.stimuli, strict=True):
             speed, value = _samples(driven, window_ms)
             g = intercept + dynamic_gain * speed + static_gain * value
-            rate, per_drive, per_tau = constant_drive_rate(
-                g, float(tau), self.stimuli.refractory_ms, self.bend
-            )
-            mean[columns] = rate.mean(axis=0)
+            rate, per_drive, per_tau = constant_drive_rate(g, float(tau), stimuli.refractory_ms, bend)
+            rates[phase, columns] = rate.mean(axis=0)
             for number, slope in enumerate((per_drive, per_drive * speed, per_drive * value, per_tau)):
-                slopes[columns, number] = slope.mean(axis=0)
-        return mean, slopes
+                slopes[phase, columns, number] = slope.mean(axis=0)
+    return (rates[0], rates[1]), (slopes[0], slopes[1])
 
 
 def _samples(drive: Drive, window_ms: tuple[float, ...]) -> tuple[FloatArray, FloatArray]:
@@ -342,11 +312,9 @@ class RateProblem:
 
         r_i = sqrt(w / sum f^2) (f_i - p_i), with the weight w, observed f and predicted p of each phase.
         """
+        parts = self._recorded(chosen, self.model.evaluate(parameters))
         return np.concatenate(
-            [
-                np.sqrt(weight / (observed @ observed)) * (observed - predicted)
-                for weight, observed, predicted in self._phases(parameters, chosen)
-            ]
+            [_scale(weight, observed) * (observed - predicted) for weight, observed, predicted in parts]
         )
 
     def jacobian_of(
@@ -358,12 +326,8 @@ class RateProblem:
         """
 
         def jacobian(parameters: FloatArray, chosen: IntArray) -> FloatArray:
-            return np.concatenate(
-                [
-                    -np.sqrt(weight / (observed @ observed)) * derivatives[chosen]
-                    for weight, observed, derivatives in self._recorded(chosen, slopes(parameters))
-                ]
-            )
+            parts = self._recorded(chosen, slopes(parameters))
+            return np.concatenate([-_scale(weight, observed) * fall for weight, observed, fall in parts])
 
         return jacobian
 
@@ -379,30 +343,25 @@ class RateProblem:
 
     def _score_of(self, rates: Rates, chosen: IntArray) -> float:
         return sum(
-            weight * fractional_sum_of_squares(observed, predicted[chosen])
+            weight * fractional_sum_of_squares(observed, predicted)
             for weight, observed, predicted in self._recorded(chosen, rates)
         )
 
     def score_by_phase(self, parameters: FloatArray, chosen: IntArray) -> dict[str, float]:
         """FSS of each recorded phase, "dynamic" and "static", Eqs. 13 and 14."""
-        scores = (
-            fractional_sum_of_squares(observed, predicted)
-            for _, observed, predicted in self._phases(parameters, chosen)
-        )
+        parts = self._recorded(chosen, self.model.evaluate(parameters))
+        scores = (fractional_sum_of_squares(observed, predicted) for _, observed, predicted in parts)
         return dict(zip(self.recordings.phases, scores, strict=True))
 
-    def _phases(
-        self, parameters: FloatArray, chosen: IntArray
-    ) -> Iterator[tuple[float, FloatArray, FloatArray]]:
-        """Weight, observed and predicted rates of each recorded phase."""
-        for weight, observed, predicted in self._recorded(chosen, self.model.evaluate(parameters)):
-            yield weight, observed, predicted[chosen]
-
     def _recorded(self, chosen: IntArray, of_phases: Rates) -> Iterator[tuple[float, FloatArray, FloatArray]]:
-        """Weight, observed rates and entry of `of_phases` of each recorded phase."""
+        """Weight, observed rates and entry of `of_phases` of each recorded phase, chosen stimuli only."""
         alone = len(self.recordings.phases) == 1
         weights = (self.dynamic_weight, self.static_weight)
         observed = (self.recordings.dynamic_rate_hz, self.recordings.static_rate_hz)
         for weight, rates, given in zip(weights, observed, of_phases, strict=True):
             if rates is not None:
-                yield 1.0 if alone else weight, rates[chosen], given
+                yield 1.0 if alone else weight, rates[chosen], given[chosen]
+
+
+def _scale(weight: float, observed: FloatArray) -> float:
+    return float(np.sqrt(weight / (observed @ observed)))

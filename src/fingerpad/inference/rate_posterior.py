@@ -29,16 +29,15 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
-from pydantic import SkipValidation
 from scipy.special import logsumexp
 
 from fingerpad.core.checked import value_class
 from fingerpad.core.errors import InputError
 from fingerpad.core.random_streams import generator
-from fingerpad.core.values import Finite, FiniteVector, FloatArray, Numbers, Positive, Whole
+from fingerpad.core.values import FiniteVector, FloatArray, Numbers, Positive, Whole
 from fingerpad.inference.afferent_fit import start_points
 from fingerpad.inference.fitting.posterior import Chains, LogDensity, sample
-from fingerpad.inference.identifiable import IDENTIFIABLE_NAMES, identifiable, six_parameters
+from fingerpad.inference.identifiable import IDENTIFIABLE_NAMES, identifiable
 from fingerpad.inference.rate_model import RateModel, evaluate_rows
 from fingerpad.inference.recordings import PHASES, RateRecordings
 
@@ -112,29 +111,16 @@ class CorrelatedResiduals:
         return self._log_weights - exponent * np.log(PRIOR_OBSERVATIONS * self.deviation**2 + squares)
 
 
-@value_class
+@dataclass(frozen=True)
 class RateLikelihood:
     """Likelihood of the parameters of a rate model, given the observed rates of one afferent."""
 
-    model: SkipValidation[RateModel]  # Predicts the rates under all stimuli.
+    model: RateModel  # Predicts the rates under all stimuli.
     recordings: RateRecordings  # Observed rates, one row per stimulus.
-    positions_mm: FloatArray | None = None
-    """Position of each stimulus along a line; default: independent residuals, (n_stimuli,). [mm]"""
-    lengths_mm: Numbers = LENGTHS_MM  # Grid of correlation lengths; 0 for independence. [mm]
-    deviation_hz: Positive = DEVIATION_HZ  # Scale s of the prior of sigma. [spikes/s]
-    _residuals: CorrelatedResiduals = field(init=False, repr=False, compare=False)
+    residuals: CorrelatedResiduals  # Those of either phase, one per stimulus. [spikes/s]
 
     def __post_init__(self) -> None:
-        n = self.model.n_stimuli
-        self.recordings.check_stimuli(n)
-        residuals = CorrelatedResiduals(n, self.positions_mm, self.lengths_mm, self.deviation_hz)
-        object.__setattr__(self, "_residuals", residuals)
-        object.__setattr__(self, "lengths_mm", residuals.lengths_mm)
-
-    @property
-    def phases(self) -> tuple[str, ...]:
-        """Which of "dynamic" and "static" were recorded."""
-        return self.recordings.phases
+        self.recordings.check_stimuli(self.model.n_stimuli)
 
     def log_likelihood(self, points: FloatArray) -> FloatArray:
         """Log likelihood of parameters up to a constant, with sigma and length integrated out.
@@ -142,7 +128,7 @@ class RateLikelihood:
         The constant does not depend on the model or the lengths, so differences between them are evidence.
         """
         return sum(
-            (self._residuals.log_likelihood(residuals) for _, _, residuals in self._phases(points)),
+            (self.residuals.log_likelihood(residuals) for _, _, residuals in self._phases(points)),
             start=np.zeros(len(points)),
         )
 
@@ -150,7 +136,7 @@ class RateLikelihood:
         """Draw sigma and length of every phase for each row of parameters."""
         drawn = {}
         for phase, predicted, residuals in self._phases(points):
-            deviation, length = self._residuals.draw(residuals, random)
+            deviation, length = self.residuals.draw(residuals, random)
             # A new recording has residuals of the same size, independent of those observed.
             new = np.maximum(predicted + deviation[:, None] * random.normal(size=predicted.shape), 0.0)
             drawn[phase] = ResidualDraws(predicted, new, deviation, length)
@@ -159,7 +145,7 @@ class RateLikelihood:
     def _phases(self, points: FloatArray) -> Iterator[tuple[str, FloatArray, FloatArray]]:
         """Name, predicted rates and residuals (n_points, n_stimuli) of each recorded phase."""
         predicted = dict(zip(PHASES, evaluate_rows(self.model, points), strict=True))
-        for phase in self.phases:
+        for phase in self.recordings.phases:
             yield phase, predicted[phase], getattr(self.recordings, f"{phase}_rate_hz") - predicted[phase]
 
 
@@ -194,8 +180,6 @@ SMALLEST_MARGIN = 0.01
 
 N_PREDICTED = 1000  # Draws from which the bands of the rates are computed.
 
-_START = identifiable(start_points()[0])
-
 
 def to_coordinates(four: ArrayLike) -> FloatArray:
     numbers = np.asarray(four, dtype=np.float64)
@@ -215,43 +199,28 @@ def from_coordinates(points: ArrayLike) -> FloatArray:
     return np.concatenate([coordinates[..., :1] / positive_three[..., 2:], positive_three], axis=-1)
 
 
-@value_class
+@dataclass(frozen=True)
 class AfferentPrior:
-    """Weakly informative prior of an afferent's parameters.
+    """Prior of an afferent's parameters, normal in the coordinates.
 
-    The potential at rest is normal about 0 and stays below the threshold, so that no spike occurs without a
-    stimulus; gains and time constant are log-normal about the start point of
-    fits, the paper's first one with its gains rescaled. See docs/decisions.md#priors.
+    The potential at rest stays below the threshold, so that no spike occurs without a stimulus.
     """
 
-    resting_share_sd: Positive = 1.0  # Standard deviation of the potential at rest over the threshold. [1]
-    dynamic_gain_per_kpa: Positive = float(_START[1])
-    static_gain_per_kpa_ms: Positive = float(_START[2])
-    time_constant_ms: Positive = float(_START[3])
-    """Medians of k_d/(C v), k_s/(C v) and tau. [1/kPa, 1/(kPa ms), ms]"""
-    gain_factor: Finite = 10.0
-    time_constant_factor: Finite = 2.0
-    """Two thirds of the prior lie between the median divided and multiplied by this factor. [1]"""
-
-    def __post_init__(self) -> None:
-        for name in ("gain_factor", "time_constant_factor"):
-            if getattr(self, name) <= 1.0:
-                raise InputError(name, "must be greater than 1", repr(getattr(self, name)))
-
-    @property
-    def centre(self) -> FloatArray:
-        medians = (self.dynamic_gain_per_kpa, self.static_gain_per_kpa_ms, self.time_constant_ms)
-        return np.array([0.0, *np.log(medians)])
-
-    @property
-    def spread(self) -> FloatArray:
-        gain, time_constant = np.log(self.gain_factor), np.log(self.time_constant_factor)
-        return np.array([self.resting_share_sd, gain, gain, time_constant])
+    centre: FloatArray
+    spread: FloatArray  # Mean and standard deviation of each coordinate, (4,).
 
     def log_density(self, coordinates: FloatArray) -> FloatArray:
         """Log density of rows of coordinates, up to a constant; -inf where it is impossible."""
         logarithm = -0.5 * (((coordinates - self.centre) / self.spread) ** 2).sum(axis=-1)
         return np.where(coordinates[..., 0] >= 1.0, -np.inf, logarithm)
+
+
+WEAK_PRIOR = AfferentPrior(
+    np.array([0.0, *np.log(identifiable(start_points()[0])[1:])]),
+    np.array([1.0, np.log(10.0), np.log(10.0), np.log(2.0)]),
+)
+"""Weakly informative prior about the start point of fits, the paper's first one with its gains rescaled. Two
+thirds of it lie within a factor of 10 of the gains and of 2 of tau; docs/decisions.md#priors."""
 
 
 @dataclass(frozen=True)
@@ -263,19 +232,8 @@ class AfferentPosterior:
     rates: dict[str, ResidualDraws]
     """By phase, for some of the draws: predicted rates, new recordings, sigma and length."""
 
-    def six(self, capacitance_mf: float, threshold_mv: float) -> FloatArray:
-        """Return the draws as six parameters (n_draws, 6) with the given C [mF] and v [mV]."""
-        return six_parameters(self.four, capacitance_mf, threshold_mv)
-
 
 def log_posterior(likelihood: RateLikelihood, prior: AfferentPrior) -> LogDensity:
-    if likelihood.model.names != IDENTIFIABLE_NAMES:
-        raise InputError(
-            "likelihood",
-            f"needs a model of {', '.join(IDENTIFIABLE_NAMES)}, as four_number_model makes it",
-            f"one of {', '.join(likelihood.model.names)}",
-        )
-
     def log_density(points: FloatArray) -> FloatArray:
         heights = prior.log_density(points)
         possible = np.isfinite(heights)
@@ -290,10 +248,10 @@ def afferent_posterior(
     start: ArrayLike,
     *,
     seed: int,
-    prior: AfferentPrior | None = None,
+    prior: AfferentPrior = WEAK_PRIOR,
     **settings: Any,
 ) -> AfferentPosterior:
-    density, centre = log_posterior(likelihood, prior or AfferentPrior()), to_coordinates(start)
+    density, centre = log_posterior(likelihood, prior), to_coordinates(start)
     centre[0] = min(centre[0], 1.0 - SMALLEST_MARGIN)
 
     def unconstrained_density(points: FloatArray) -> FloatArray:

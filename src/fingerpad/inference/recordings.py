@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -10,7 +11,7 @@ from numpy.typing import ArrayLike
 from fingerpad.core.checked import value_class
 from fingerpad.core.errors import InputError
 from fingerpad.core.signals import INTERVAL, SpikeTrains
-from fingerpad.core.values import FiniteArray, FiniteVector, Many, float_array
+from fingerpad.core.values import FiniteArray, FiniteVector, FloatArray, Many, float_array
 from fingerpad.neuron.spikes import RATE_OF, Windows
 
 PHASES = ("dynamic", "static")  # The ramp and the hold.
@@ -60,11 +61,6 @@ class RateRecordings:
     def phases(self) -> tuple[str, ...]:
         """The recorded ones of "dynamic" and "static"."""
         return tuple(phase for phase in PHASES if getattr(self, f"{phase}_rate_hz") is not None)
-
-    @property
-    def n_rates(self) -> int:
-        """Number of rates in both phases."""
-        return len(self.phases) * len(self.stimuli)
 
     def check_stimuli(self, number: int) -> None:
         """Raise `InputError` unless this is the number of stimuli."""
@@ -151,3 +147,30 @@ class SpikeRecordings:
             for window in windows_ms
         )
         return RateRecordings(names, dynamic, static, self.source)
+
+
+def check_trains(
+    trains: SpikeTrains,
+    start_ms: float,
+    ends_ms: FloatArray,
+    refractory_ms: float,
+    names: Sequence[str] | None = None,
+) -> None:
+    """Raise `InputError` for a spike outside of its recording, or within the refractory period of another."""
+    for number, end in enumerate(ends_ms):
+        train, name = trains[number], f"train {number}" if names is None else names[number]
+        if train.size and not start_ms < train[0] <= train[-1] <= end:
+            outside = train[0] if train[0] <= start_ms else train[-1]
+            raise InputError(
+                "spikes",
+                f"must lie after {start_ms:g} and until {end:g} ms, where the recording ends",
+                remedy=f"{name} has one at {outside:g} ms",
+            )
+        close = np.flatnonzero(np.diff(train) <= refractory_ms)
+        if close.size:
+            raise InputError(
+                "spikes",
+                f"must be more than {refractory_ms:g} ms apart, the refractory period",
+                remedy=f"{name} has two at {train[close[0]]:g} and {train[close[0] + 1]:g} ms; sort the unit "
+                "again, fit rates, or give a shorter refractory_ms",
+            )

@@ -51,6 +51,7 @@ from fingerpad.inference.identifiable import (
     six_parameters,
 )
 from fingerpad.inference.rate_model import Rates
+from fingerpad.inference.recordings import check_trains
 from fingerpad.neuron.afferent import Afferent
 from fingerpad.neuron.escape_rate import ESCAPE_TIME_MS, EscapeRate, panels
 from fingerpad.neuron.spikes import Windows, firing_rate_hz
@@ -245,7 +246,7 @@ class SpikeLikelihood:
             raise InputError(
                 "duration_ms", f"must lie within the drive, {times[0]:g} ... {times[-1]:g} ms", str(given)
             )
-        _check_spikes(self.trains, times[0], ends, self.refractory_ms)
+        check_trains(self.trains, times[0], ends, self.refractory_ms)
         intervals = cut(
             times,
             self.drive.rate_per_ms,
@@ -355,26 +356,6 @@ def time_rescaling(recorded: SpikeLikelihood, parameters: ArrayLike) -> TimeResc
     quantiles = np.sort(-np.expm1(-intervals))
     test = kstest(quantiles, "uniform")
     return TimeRescaling(quantiles, float(test.statistic), float(test.pvalue))
-
-
-def _check_spikes(trains: SpikeTrains, start_ms: float, ends_ms: FloatArray, refractory_ms: float) -> None:
-    for number, end in enumerate(ends_ms):
-        train = trains[number]
-        if train.size and not start_ms < train[0] <= train[-1] <= end:
-            outside = train[0] if train[0] <= start_ms else train[-1]
-            raise InputError(
-                "spikes",
-                f"must lie after {start_ms:g} and until {end:g} ms, where the recording ends",
-                remedy=f"train {number} has one at {outside:g} ms",
-            )
-        close = np.flatnonzero(np.diff(train) <= refractory_ms)
-        if close.size:
-            raise InputError(
-                "spikes",
-                f"must lie further apart than refractory_ms, {refractory_ms:g} ms",
-                remedy=f"train {number} has two at {train[close[0]]:g} and {train[close[0] + 1]:g} ms; "
-                "give a shorter refractory_ms",
-            )
 
 
 NARROWEST = 1.0e-3  # Width below which the threshold is considered hard and log L unbounded.

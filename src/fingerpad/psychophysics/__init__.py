@@ -11,13 +11,11 @@ from fingerpad.psychophysics.curve_uncertainty import (
 )
 from fingerpad.psychophysics.encoding import delaunay_pairs, gradient_sum, neighbour_pairs
 from fingerpad.psychophysics.ideal_observer import (
-    CodeEfficiency,
     Discriminability,
     GaussianResponses,
     Presentation,
     ResponseModel,
     Statistic,
-    code_efficiency,
     discriminability,
     efficiency,
     gaussian_information,
@@ -44,10 +42,10 @@ from fingerpad.psychophysics.sensitivity import (
 )
 
 __all__ = [
-    "TASKS", "CodeEfficiency", "Discriminability", "EuclideanDistance", "Experiment", "FunctionCloud",
+    "TASKS", "Discriminability", "EuclideanDistance", "Experiment", "FunctionCloud",
     "GaussianResponses", "GoodnessOfFit", "GradientSum", "JudgementCounts", "Presentation",
     "PsychometricFit", "PsychometricFunction", "ResponseModel", "Sensitivity", "Statistic", "bootstrap",
-    "code_efficiency", "d_prime_of_proportion", "delaunay_pairs", "discriminability", "discriminate_by",
+    "d_prime_of_proportion", "delaunay_pairs", "discriminability", "discriminate_by",
     "efficiency", "fit_noise_sigma", "fit_psychometric", "forced_choice", "gaussian_information",
     "goodness_of_fit", "gradient_sum", "multiplied_responses", "neighbour_pairs", "noisy_presentations",
     "posterior", "present", "same_different_by_difference", "same_different_by_looks", "sensitivity",

@@ -79,6 +79,10 @@ class Model:
         guess, lapse = points[..., GUESS, None], points[..., LAPSE, None]
         return guess + (1.0 - guess - lapse) * share, share, t
 
+    def perfect(self, n_correct: FloatArray, rho: ArrayLike) -> FloatArray:
+        """Logarithm of the probability of each count if the proportion is the observed one."""
+        return log_probability(n_correct, self.n_trials, n_correct / self.n_trials, rho)
+
     def log_likelihood(self, n_correct: FloatArray, points: FloatArray) -> FloatArray:
         """Logarithm of the likelihood (...,) of counts (..., n_levels) at points (..., 5)."""
         rho = points[..., OVERDISPERSION, None] if self.upper[OVERDISPERSION] > 0.0 else 0.0
@@ -292,9 +296,7 @@ class PsychometricFit(Result):
     @property
     def deviance(self) -> float:
         """Twice the difference in log likelihood to a model that fits every proportion exactly."""
-        perfect = log_probability(
-            self.counts.n_correct, self.counts.n_trials, self.counts.proportion, self.overdispersion
-        )
+        perfect = self.model.perfect(self.counts.n_correct, self.overdispersion)
         return float(2.0 * (perfect.sum() - self.log_likelihood))
 
     def predict(self, levels: ArrayLike) -> FloatArray:

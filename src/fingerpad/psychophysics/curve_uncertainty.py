@@ -300,8 +300,7 @@ def goodness_of_fit(fit: PsychometricFit, seed: int, n_replicates: int = 1000) -
     drawn = drawn_counts(fit, seed, n_replicates)
     points, heights = maximise_likelihood(fit.model, drawn)
     rho = points[:, OVERDISPERSION, None] if fit.overdispersion > 0.0 else 0.0
-    perfect = log_probability(drawn, fit.counts.n_trials, drawn / fit.counts.n_trials, rho).sum(axis=1)
-    deviances = 2.0 * (perfect - heights)
+    deviances = 2.0 * (fit.model.perfect(drawn, rho).sum(axis=1) - heights)
     # The observed set counts as one of the sets, so p is never 0.
     p_value = (1.0 + np.count_nonzero(deviances >= fit.deviance)) / (1.0 + n_replicates)
     return GoodnessOfFit(fit.deviance, float(p_value), _residuals(fit), deviances, seed)
@@ -310,6 +309,6 @@ def goodness_of_fit(fit: PsychometricFit, seed: int, n_replicates: int = 1000) -
 def _residuals(fit: PsychometricFit) -> FloatArray:
     counts = fit.counts
     expected = fit.predict(counts.levels)
-    of_perfect = log_probability(counts.n_correct, counts.n_trials, counts.proportion, fit.overdispersion)
+    of_perfect = fit.model.perfect(counts.n_correct, fit.overdispersion)
     of_fit = log_probability(counts.n_correct, counts.n_trials, expected, fit.overdispersion)
     return np.sign(counts.proportion - expected) * np.sqrt(2.0 * np.maximum(of_perfect - of_fit, 0.0))

@@ -185,8 +185,6 @@ def distance(
     The paper uses this name for a sum of absolute differences, which is the city-block distance.
     """
     first, second = np.asarray(values_a, dtype=np.float64), np.asarray(values_b, dtype=np.float64)
-    if first.ndim == 0 or second.ndim == 0 or first.shape[-1] != second.shape[-1]:
-        raise InputError("distance", "needs the same receptors twice", f"{first.shape} and {second.shape}")
     differences = first - second
     if norm == "euclidean":
         return np.sqrt(np.square(differences).sum(axis=-1))

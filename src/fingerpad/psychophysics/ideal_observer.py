@@ -56,6 +56,12 @@ from fingerpad.core.values import (
 )
 from fingerpad.psychophysics.encoding import checked_noise, session_trials
 
+SMALLEST_SPREAD = 1.0  # Noise floor s. [spikes/s or ms]
+EFFICIENCY_TRIALS = 4000  # Presentations of either stimulus behind one efficiency.
+
+LEAST_KNOWN = 10.0
+"""Ratio of the ideal observer's d' to its standard error from which on an efficiency is reported."""
+
 
 @runtime_checkable
 class ResponseModel(Protocol):
@@ -298,24 +304,21 @@ def efficiency(code: Discriminability, ideal: Discriminability) -> tuple[float, 
     Returns
     -------
     (float, float)
-        The error assumes independence; with the same trials it is an upper bound.
-
-    Raises
-    ------
-    InputError
-        If the ideal observer is at chance or always correct.
+        The error assumes independence; with the same trials it is an upper bound. Both are NaN where the
+        ideal observer is always correct, or its d' is below `LEAST_KNOWN` standard errors.
 
     Examples
     --------
-    >>> half, ideal = Discriminability(0.69, 0.0, 0.7, 0.0), Discriminability(0.76, 0.0, 1.0, 0.0)
-    >>> round(efficiency(half, ideal)[0], 2)
-    0.49
+    Of two afferents one changes its rate. The Gradient Sum also contains the noise of the other:
+
+    >>> (shown,) = noisy_presentations([[50.0, 50.0], [50.0, 53.0]], 0.1, seed=1)
+    >>> code = shown.of(lambda responses: np.abs(responses[:, 1] - responses[:, 0]))
+    >>> efficiency(code, shown.ideal())[0] < 0.6
+    True
     """
-    if not 0.0 < ideal.d_prime < math.inf:
-        raise InputError(
-            f"The ideal observer is correct in {ideal.proportion_correct:.4f} of the trials, so the "
-            "efficiency is undefined: choose stimuli with a smaller or larger difference."
-        )
+    # Equal stimuli have a d' of 0 without any error.
+    if not max(0.0, LEAST_KNOWN * ideal.d_prime_error) <= ideal.d_prime < math.inf or ideal.d_prime == 0.0:
+        return math.nan, math.nan
     share = (code.d_prime / ideal.d_prime) ** 2
     relative = math.hypot(
         code.d_prime_error / code.d_prime if code.d_prime else 0.0, ideal.d_prime_error / ideal.d_prime
@@ -367,26 +370,6 @@ def gaussian_information(
     return float((np.square(rises) / variance + 2.0 * np.square(sigma**2 * values * rises / variance)).sum())
 
 
-SMALLEST_SPREAD = 1.0  # Noise floor s. [spikes/s or ms]
-EFFICIENCY_TRIALS = 4000  # Presentations of either stimulus behind one efficiency.
-
-LEAST_KNOWN = 10.0
-"""Ratio of the ideal observer's d' to its standard error from which on an efficiency is reported."""
-
-
-@dataclass(frozen=True)
-class CodeEfficiency:
-    """A code and the ideal observer of the same responses."""
-
-    code: Discriminability
-    ideal: Discriminability
-    """Of either."""
-    efficiency: float
-    efficiency_error: float
-    """Squared ratio of d' and its standard error. NaN where the ideal observer is always correct, or its
-    d' is below `LEAST_KNOWN` standard errors."""
-
-
 @checked
 def noisy_presentations(
     table: Matrix, noise_sigma: Finite, seed: Whole, session: Whole = 0
@@ -404,25 +387,3 @@ def noisy_presentations(
     """
     standard, *comparisons = (multiplied_responses(row, noise_sigma, SMALLEST_SPREAD) for row in table)
     return [present(standard, comparison, seed, EFFICIENCY_TRIALS, session) for comparison in comparisons]
-
-
-@checked
-def code_efficiency(shown: Presentation, statistic: Statistic) -> CodeEfficiency:
-    """Compare a code, by the statistic of an `Encoder`, with the ideal observer of the same presentations.
-
-    Examples
-    --------
-    Of two afferents one changes its rate. The Gradient Sum also contains the noise of the other:
-
-    >>> import numpy as np
-    >>> table = np.array([[50.0, 50.0], [50.0, 53.0]])
-    >>> (shown,) = noisy_presentations(table, 0.1, seed=1)
-    >>> found = code_efficiency(shown, lambda responses: np.abs(responses[:, 1] - responses[:, 0]))
-    >>> bool(found.efficiency < 0.6)
-    True
-    """
-    code, ideal = shown.of(statistic), shown.ideal()
-    # Equal stimuli have a d' of 0 without any error.
-    known = 0.0 < ideal.d_prime < math.inf and ideal.d_prime >= LEAST_KNOWN * ideal.d_prime_error
-    share, error = efficiency(code, ideal) if known else (math.nan, math.nan)
-    return CodeEfficiency(code, ideal, share, error)

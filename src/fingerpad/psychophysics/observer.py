@@ -141,7 +141,7 @@ class Encoder(Protocol):
         self, responses: FloatArray, seed: int, plan: Experiment, session: int
     ) -> Callable[[float], FloatArray]:
         """From a noise to mean hit rates (n_comparisons,), for fits of the noise."""
-        ...
+        return lambda sigma: discriminate_by(self, responses, sigma, seed, plan, session=session).hit_rate
 
     def of_noisy(
         self, responses: FloatArray, noise_sigma: float, seed: int, session: int, count: int
@@ -150,7 +150,7 @@ class Encoder(Protocol):
         ...
 
     def statistic(self, standard: ResponseModel, seed: int, session: int) -> Statistic:
-        """Statistic of one trial, for `code_efficiency`."""
+        """Statistic of one trial, for `Presentation.of`."""
         ...
 
 
@@ -248,11 +248,6 @@ class EuclideanDistance(Encoder):
         points = decision_point(means[:, :1], means[:, 1:], plan.criterion)
         beyond = side(means) * (values[:, 1:] - points[:, :, np.newaxis]).transpose(0, 2, 1)
         return np.heaviside(beyond, 0.5).mean(axis=1)  # (h*)
-
-    def predictor(
-        self, responses: FloatArray, seed: int, plan: Experiment, session: int
-    ) -> Callable[[float], FloatArray]:
-        return lambda sigma: discriminate_by(self, responses, sigma, seed, plan, session=session).hit_rate
 
     def of_noisy(
         self, responses: FloatArray, noise_sigma: float, seed: int, session: int, count: int
@@ -479,7 +474,7 @@ def expected_hit_rates(
     responses: ArrayLike,
     neighbours: ArrayLike,
     noise_sigma: Finite,
-    standard_normals: ArrayLike,
+    standard_normals: FloatArray,
     criterion: Finite = psychophysics.DECISION_CRITERION.value,
 ) -> FloatArray:
     """Predict the mean hit rates of a `GradientSum` without repeating the experiment.
@@ -488,15 +483,8 @@ def expected_hit_rates(
     function of `noise_sigma`, as `fit_noise_sigma` needs.
     """
     values = checked_responses(responses)
-    draws = float_array("standard_normals", standard_normals, 2)
-    if draws.shape[1] != values.shape[1] or len(draws) < 2:
-        raise InputError(
-            "standard_normals",
-            f"needs two rows or more and {values.shape[1]} columns, one per receptor",
-            f"shape {draws.shape}",
-        )
     pairs = check_neighbours(neighbours, values.shape[1])
-    sums = shared_noise_gradient_sums(values, pairs, checked_noise(noise_sigma), draws)
+    sums = shared_noise_gradient_sums(values, pairs, checked_noise(noise_sigma), standard_normals)
     means, spreads = moments(sums)
     point = decision_point(means[0], means[1:], criterion)
     return hit_probability(point, means[1:], spreads[1:], side(means[np.newaxis]))

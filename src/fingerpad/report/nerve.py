@@ -15,7 +15,7 @@ from fingerpad.core.signals import COUNT, CURRENT, RECEPTOR_COLUMNS, ResponseMap
 from fingerpad.core.units import unit_of
 from fingerpad.core.values import FloatArray, one_of
 from fingerpad.data import paper, protocol
-from fingerpad.experiments.fit.results import FitResult, ParameterProfile, UncertaintyResult
+from fingerpad.experiments.fit.results import CredibleInterval, FitResult, ParameterProfile, UncertaintyResult
 from fingerpad.experiments.gerling2014.nerve import PopulationMaps, SingleUnitResult
 from fingerpad.inference.spike_likelihood import SpikeFit
 from fingerpad.report.page import DRAW, DRAWINGS, ROWS, Rows, enter
@@ -244,8 +244,8 @@ def draw_phase(axes: Axes, found: FitResult, phase: str) -> None:
     order = np.argsort(places, kind="stable")
     where, rates = places[order], found.phases[phase]
     assert rates.observed_hz is not None
-    if found.posterior and phase in found.posterior.bands:
-        band, label = found.posterior.bands[phase].predicted, f"{found.posterior.level:.0%} credible"
+    if found.posterior and phase in found.posterior.rates:
+        band, label = found.posterior.rates[phase], f"{found.posterior.level:.0%} credible"
         fill_band(axes, where, band.low_hz[order], band.high_hz[order], BLUE, 0.2, label)
     without = rates.out_of_sample_hz[order]
     axes.plot(where, without, "x", color=ORANGE, zorder=3, label="predicted without its fold")
@@ -292,21 +292,22 @@ def rows_of_rates(found: FitResult) -> Rows:
 
 
 def draw_profile(
-    axes: Axes, profile: ParameterProfile, unit: str, fitted: float, credible: tuple[float, float] | None
+    axes: Axes, profile: ParameterProfile, unit: str, fitted: float, credible: CredibleInterval | None
 ) -> None:
     """Draw one profile: its points, the level of the interval, the fit, the posterior's interval."""
     axes.plot(profile.values, profile.losses, ".-", color=BLACK, linewidth=1.2)
     axes.axhline(ALLOWED_LOSS, color=GREY, linestyle="--", linewidth=1.0)
     axes.axvline(fitted, color=ORANGE, linestyle="-.", linewidth=1.4)
     if credible is not None:
-        axes.plot(credible, [-0.25, -0.25], color=BLUE, linewidth=4.0, solid_capstyle="butt")
+        ends = [credible.low, credible.high]
+        axes.plot(ends, [-0.25, -0.25], color=BLUE, linewidth=4.0, solid_capstyle="butt")
     axes.set(ylim=(-0.5, LARGEST_LOSS), xlabel=f"{IDENTIFIABLE_SYMBOLS[profile.name]} [{unit}]")
 
 
 @enter(DRAW, "profiles")
 def draw_profiles(found: FitResult) -> Figure:
     drawn, profiles = new_figure(10.0, 3.2), found.profiles or ()
-    intervals = found.posterior.interval if found.posterior else {}
+    intervals = found.posterior.numbers if found.posterior else {}
     panels = drawn.subplots(1, len(profiles), sharey=True)
     for axes, profile in zip(panels, profiles, strict=True):
         unit, fitted = found.identifiable_units[profile.name], found.identifiable[profile.name]
@@ -345,8 +346,8 @@ def draw_uncertainty(section: UncertaintyResult) -> Figure:
         axes.set(title=f"({letter}) {PHASE_LABELS[phase]}", xlabel=ALONG)
     drawn.legend(*panels[0].get_legend_handles_labels(), loc="outside upper center", ncols=4)
     for axes, letter, profile in zip(panels[2:], "cdef", section.profiles, strict=True):
-        name, found = profile.name, section.posterior[profile.name]
-        draw_profile(axes, profile, section.units[name], section.fit[name], (found.low, found.high))
+        name = profile.name
+        draw_profile(axes, profile, section.units[name], section.fit[name], section.posterior[name])
         axes.set_title(f"({letter}) {IDENTIFIABLE_SYMBOLS[name]}")
     for axes in panels[2::2]:
         axes.set_ylabel("loss of log likelihood")

@@ -153,7 +153,6 @@ FORMS: dict[str, Callable[[Any], str]] = {
     "count": lambda items: plain(len(items)),
     "percent": percent,
     "interval": lambda found: ABSENT if found is None else span((found.low, found.high), "open"),
-    "ends": span,
     # The record of what was used: nothing is rounded or left out.
     "exact": partial(plain, digits=12, longest=1000),
     "words": in_words,

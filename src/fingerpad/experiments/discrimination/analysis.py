@@ -33,7 +33,7 @@ from fingerpad.psychophysics.ideal_observer import (
     EFFICIENCY_TRIALS,
     SMALLEST_SPREAD,
     Presentation,
-    code_efficiency,
+    efficiency,
     multiplied_responses,
     noisy_presentations,
 )
@@ -360,12 +360,13 @@ def _decoding(
         if shown:
             standard = multiplied_responses(table[0], sigma, SMALLEST_SPREAD)
             statistic = encoder.statistic(standard, settings.seed, EFFICIENCY_SESSION)
-            compared = [code_efficiency(presentation, statistic) for presentation in shown]
+            found = [presentation.of(statistic) for presentation in shown]
+            shares = [efficiency(one, each.ideal()) for one, each in zip(found, shown, strict=True)]
             decoding = replace(
                 decoding,
-                d_prime=np.array([one.code.d_prime for one in compared]),
-                efficiency=np.array([one.efficiency for one in compared]),
-                efficiency_error=np.array([one.efficiency_error for one in compared]),
+                d_prime=np.array([one.d_prime for one in found]),
+                efficiency=np.array([share for share, _ in shares]),
+                efficiency_error=np.array([error for _, error in shares]),
             )
     if decoding.d_prime is not None:
         decoding = replace(decoding, forced_choice=forced_choice_of(decoding.d_prime, settings.trials))
@@ -373,8 +374,8 @@ def _decoding(
     # One comparison has no curve: what is asked of two stimuli is how well they are told apart.
     if len(levels) < 3 or decoding.hit_rate is None:
         return decoding
-    found = side_curves(levels, decoding.hit_rate, settings.trials, task.curve, settings.seed)
-    return replace(decoding, curves=found)
+    curves = side_curves(levels, decoding.hit_rate, settings.trials, task.curve, settings.seed)
+    return replace(decoding, curves=curves)
 
 
 def _observed(task: DiscriminationRequest) -> TaskObservations | None:

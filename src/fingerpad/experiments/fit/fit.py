@@ -45,7 +45,7 @@ from fingerpad.inference.fitting.methods import (
 )
 from fingerpad.inference.identifiable import IDENTIFIABLE_NAMES, SPIKE_PARAMETER_NAMES, identifiable
 from fingerpad.inference.rate_model import AfferentModel, RateProblem, four_number_model
-from fingerpad.inference.recordings import PHASES, RateRecordings, SpikeRecordings
+from fingerpad.inference.recordings import PHASES, RateRecordings, SpikeRecordings, check_trains
 from fingerpad.neuron.afferent import PARAMETER_NAMES, parameter_units
 from fingerpad.neuron.spikes import Windows
 
@@ -219,11 +219,12 @@ def check_enough(rates: RateRecordings, memberships: IntArray, n_free: int = len
         )
     for fold in np.unique(memberships):
         training = rates.chosen(np.flatnonzero(memberships != fold))
-        if training.n_rates < n_free:
+        n_rates = len(training.phases) * len(training.stimuli)
+        if n_rates < n_free:
             raise InputError(
                 "recordings",
                 f"must leave at least {n_free} rates, one per free parameter, when a fold is left out",
-                remedy=f"without fold {fold + 1} there are {training.n_rates}, record more",
+                remedy=f"without fold {fold + 1} there are {n_rates}, record more",
             )
         for rows in (memberships == fold, memberships != fold):
             part = rates.chosen(np.flatnonzero(rows))
@@ -288,19 +289,8 @@ def check_spikes(recordings: Recordings, n_motions: int) -> SpikeRecordings:
             f"needs at least {len(SPIKE_PARAMETER_NAMES)} spikes, one per parameter",
             str(recordings.trains.times_ms.size),
         )
-    for presentation, name in enumerate(recordings.stimuli):
-        train = recordings.trains[presentation]
-        if train.size and train[0] <= 0.0:
-            raise InputError(
-                "likelihood", "needs spikes after the onset", remedy=f"{name} has one at {train[0]:g} ms"
-            )
-        closest = np.diff(train).min(initial=np.inf)
-        if closest <= neuron.REFRACTORY.value:
-            raise InputError(
-                "likelihood",
-                f"needs spikes more than {neuron.REFRACTORY.value:g} ms apart, the rest after a spike",
-                remedy=f"{name} has two that are {closest:.3g} ms apart; sort the unit again, or fit rates",
-            )
+    given = recordings.trains, 0.0, recordings.duration_ms, neuron.REFRACTORY.value, recordings.stimuli
+    check_trains(*given)
     return recordings
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -17,13 +18,10 @@ from fingerpad.core.values import FloatArray, IntArray
 from fingerpad.experiments.fit.fit import Prepared, Recordings, check_spikes
 from fingerpad.experiments.fit.results import (
     CredibleInterval,
-    FssSensitivity,
     ParameterIdentifiability,
     ParameterProfile,
-    PhaseBands,
     PhasePrediction,
     PosteriorConvergence,
-    RateBand,
     RatePosterior,
     SpikeFitSummary,
     UncertaintyResult,
@@ -32,11 +30,13 @@ from fingerpad.inference.afferent_fit import spike_start, start_points
 from fingerpad.inference.fitting.methods import CrossValidation, Fit, Problem, halton
 from fingerpad.inference.fitting.posterior import credible_band
 from fingerpad.inference.fitting.profile_likelihood import ProfileLikelihood, profile_likelihoods
-from fingerpad.inference.fitting.sensitivity import identifiability, sobol_indices
+from fingerpad.inference.fitting.sensitivity import SobolIndices, identifiability, sobol_indices
 from fingerpad.inference.identifiable import IDENTIFIABLE_NAMES, identifiable, six_parameters
 from fingerpad.inference.rate_model import AfferentModel, RateProblem, four_number_model
 from fingerpad.inference.rate_posterior import (
     INDEPENDENT,
+    AfferentPosterior,
+    CorrelatedResiduals,
     RateLikelihood,
     ResidualDraws,
     afferent_posterior,
@@ -122,31 +122,19 @@ def _profile(profile: ProfileLikelihood, logarithm: bool) -> ParameterProfile:
     )
 
 
-def fss_sensitivity(problem: RateProblem, four: ArrayLike, seed: int) -> FssSensitivity:
+def fss_sensitivity(problem: RateProblem, four: ArrayLike, seed: int) -> SobolIndices:
     """Compute Sobol indices of FSS, each number within `SENSITIVITY_SHARE` below and above the fit."""
     fitted, sizes = np.asarray(four, dtype=np.float64), identifiable(start_points()[0])
     sizes[0] = 1.0 / sizes[3]  # beta tau/(C v) = 1 just fires
     reach = SENSITIVITY_SHARE * np.where(fitted == 0.0, sizes, np.abs(fitted))
-    found = sobol_indices(
+    return sobol_indices(
         problem.score_batch,
         # A gain is never negative.
         np.maximum(fitted - reach, [-np.inf, 0.0, 0.0, 0.0]),
         fitted + reach,
-        IDENTIFIABLE_NAMES,
         seed=seed,
         n_base=SENSITIVITY_POINTS,
         level=LEVEL,
-    )
-    return FssSensitivity(
-        lower=found.lower,
-        upper=found.upper,
-        first=found.first,
-        first_half_width=found.first_half_width,
-        total=found.total,
-        total_half_width=found.total_half_width,
-        mean_fss=found.mean,
-        deviation_fss=found.standard_deviation,
-        evaluations=found.n_evaluations,
     )
 
 
@@ -160,21 +148,13 @@ def rate_posterior(
 ) -> RatePosterior:
     likelihood = _likelihood(model, rates, positions_mm)
     found = afferent_posterior(likelihood, admissible(four), seed=seed, **settings)
-    ends = credible_band(found.four, LEVEL).T
     return RatePosterior(
         level=LEVEL,
         seed=seed,
-        n_draws=len(found.four),
-        n_evaluations=found.chains.n_evaluations,
-        largest_r_hat=found.chains.r_hat.max(),
-        smallest_effective_size=found.chains.effective_sizes.min(),
-        median=dict(zip(IDENTIFIABLE_NAMES, np.median(found.four, axis=0).tolist(), strict=True)),
-        interval=dict(zip(IDENTIFIABLE_NAMES, (tuple(pair) for pair in ends.tolist()), strict=True)),
+        numbers=_intervals(dict(zip(IDENTIFIABLE_NAMES, found.four.T, strict=True))),
         covariance=np.cov(found.four, rowvar=False),
-        bands={
-            phase: PhaseBands(predicted=_band(drawn.predicted_hz), new=_band(drawn.new_hz))
-            for phase, drawn in found.rates.items()
-        },
+        convergence=PosteriorConvergence.of(found.chains),
+        rates=_predictions(found, rates),
     )
 
 
@@ -188,13 +168,8 @@ def profiled(
 def _likelihood(
     model: AfferentModel, rates: RateRecordings, positions_mm: ArrayLike | None
 ) -> RateLikelihood:
-    places = None if positions_mm is None else np.asarray(positions_mm, dtype=np.float64)
-    return RateLikelihood(four_number_model(model), rates, places)
-
-
-def _band(draws_hz: FloatArray) -> RateBand:
-    low, high = credible_band(draws_hz, LEVEL)
-    return RateBand(low_hz=low, high_hz=high)
+    residuals = CorrelatedResiduals(len(rates.stimuli), positions_mm)  # type: ignore[arg-type]
+    return RateLikelihood(four_number_model(model), rates, residuals)
 
 
 def uncertainty(
@@ -208,9 +183,9 @@ def uncertainty(
     """Find what rates determine of six fitted parameters, with stimuli at places along a line."""
     model, six = four_number_model(six_model), np.asarray(fitted, dtype=np.float64)
     four, capacitance_mf, threshold_mv = identifiable(six), float(six[4]), float(six[5])
-    alike, independent = RateLikelihood(model, recordings, shift_mm), RateLikelihood(model, recordings)
+    alike, independent = (_likelihood(six_model, recordings, places_mm) for places_mm in (shift_mm, None))
     posterior = afferent_posterior(alike, four, seed=seed, **settings)
-    chains, gains = posterior.chains, posterior.six(capacitance_mf, threshold_mv)[:, :3]
+    chains, gains = posterior.chains, six_parameters(posterior.four, capacitance_mf, threshold_mv)[:, :3]
     draws = dict(zip((*IDENTIFIABLE_NAMES, *PARAMETER_NAMES[:3]), (*posterior.four.T, *gains.T), strict=True))
     draws["resting_share"] = chains.flat[:, 0]
     some = posterior.four[np.linspace(0, len(posterior.four) - 1, SEEDS_OF_PROFILES).astype(np.int64)]
@@ -225,13 +200,10 @@ def uncertainty(
         identifiability=ParameterIdentifiability(
             rank=local.rank, relative_singular_values=local.singular_values / local.singular_values[0]
         ),
-        posterior={name: _interval(values) for name, values in draws.items()},
+        posterior=_intervals(draws),
         convergence=PosteriorConvergence.of(chains),
         shift_mm=shift_mm,
-        rates={
-            phase: _prediction(drawn, getattr(recordings, f"{phase}_rate_hz"))
-            for phase, drawn in posterior.rates.items()
-        },
+        rates=_predictions(posterior, recordings),
         evidence_for_alike_residuals=(
             alike.log_likelihood(some).max() - independent.log_likelihood(some).max()
         ),
@@ -243,6 +215,17 @@ def uncertainty(
 def _interval(draws: FloatArray) -> CredibleInterval:
     low, high = credible_band(draws, LEVEL)
     return CredibleInterval(median=float(np.median(draws)), low=float(low), high=float(high))
+
+
+def _intervals(draws: Mapping[str, FloatArray]) -> dict[str, CredibleInterval]:
+    return {name: _interval(values) for name, values in draws.items()}
+
+
+def _predictions(found: AfferentPosterior, recordings: RateRecordings) -> dict[str, PhasePrediction]:
+    return {
+        phase: _prediction(drawn, getattr(recordings, f"{phase}_rate_hz"))
+        for phase, drawn in found.rates.items()
+    }
 
 
 def _prediction(drawn: ResidualDraws, observed_hz: FloatArray) -> PhasePrediction:

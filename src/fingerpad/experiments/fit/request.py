@@ -14,19 +14,7 @@ from pydantic import BeforeValidator, Strict
 from fingerpad.core.checked import result_class
 from fingerpad.core.errors import InputError
 from fingerpad.core.signals import INTERVAL
-from fingerpad.core.values import (
-    Count,
-    Flag,
-    IntArray,
-    Positive,
-    Seed,
-    Text,
-    Vector,
-    Whole,
-    choice,
-    one_of,
-    positive,
-)
+from fingerpad.core.values import Count, Flag, IntArray, Positive, Seed, Text, Vector, Whole, choice
 from fingerpad.experiments.conditions import Conditions
 from fingerpad.experiments.fit.fit import METHODS, check_enough, check_offset, check_spikes, fit_recordings
 from fingerpad.experiments.fit.results import FitResult
@@ -61,7 +49,7 @@ from fingerpad.experiments.requests.stimulus import (
 from fingerpad.experiments.runner import Manifest, Runner
 from fingerpad.geometry.grading import RESOLUTIONS
 from fingerpad.geometry.indenters import Bar
-from fingerpad.inference.afferent_fit import OFFSETS_MM, fit_afferent
+from fingerpad.inference.afferent_fit import OFFSETS_MM, check_free, fit_afferent
 from fingerpad.inference.fitting.methods import interleaved_folds
 from fingerpad.inference.identifiable import IDENTIFIABLE_NAMES
 from fingerpad.inference.recordings import RateRecordings, SpikeRecordings
@@ -79,7 +67,7 @@ class FitFile:
     """The file `fit.json`."""
 
     format: Literal["fingerpad fit"] = "fingerpad fit"
-    format_version: Literal[2] = 2
+    format_version: Literal[3] = 3
     fit: FitResult
     windows_ms: tuple[tuple[float, ...], tuple[float, ...]]  # Of the dynamic and of the static rate. [ms]
     dynamic_quantity: str
@@ -149,13 +137,7 @@ class FitRequest(FingerRequest):
 
     def _check_chosen(self) -> None:
         """Refuse a fit of chosen numbers that names none, or asks for what only the four numbers have."""
-        afferent = self.shape_of_fit
-        numbers = tuple(getattr(afferent, "__dataclass_fields__", ()))
-        if not self.free:
-            known = f"{type_of(afferent)}, one of {', '.join(numbers)}"
-            raise InputError("free", f"must name at least one number of {known}", "none")
-        for name in self.free:
-            positive(one_of("free", name, numbers), getattr(afferent, name))
+        check_free(self.shape_of_fit, self.free)
         for option in ("posterior", "profiles", "sensitivity", "offset"):
             if getattr(self, option):
                 raise InputError(

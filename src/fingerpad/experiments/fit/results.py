@@ -10,6 +10,7 @@ from fingerpad.core.checked import result_class
 from fingerpad.core.displayed import Columns, Result
 from fingerpad.core.values import Matrix, Number, Vector, WholeVector
 from fingerpad.inference.fitting.methods import FoldFit
+from fingerpad.inference.fitting.sensitivity import SobolIndices
 from fingerpad.inference.rate_model import RateProblem
 
 if TYPE_CHECKING:
@@ -30,38 +31,6 @@ class SpikeFitSummary:
 
 
 @result_class
-class RateBand:
-    """Ends of a credible band of rates, (n_stimuli,). [spikes/s]"""
-
-    low_hz: Vector
-    high_hz: Vector
-
-
-@result_class
-class PhaseBands:
-    """Bands of the predicted rates, and of new recordings with their noise."""
-
-    predicted: RateBand
-    new: RateBand
-
-
-@result_class
-class RatePosterior:
-    """Posterior of the four identifiable numbers."""
-
-    level: float  # Probability within each interval and band.
-    seed: int  # Of the random numbers.
-    n_draws: int
-    n_evaluations: int  # Draws that were kept, and evaluations of the likelihood.
-    largest_r_hat: float
-    smallest_effective_size: float  # Split R-hat and effective number of draws, the worst of four.
-    median: dict[str, float]
-    interval: dict[str, tuple[float, float]]  # Credible interval of each number.
-    covariance: Matrix  # Of the draws, (4, 4).
-    bands: dict[str, PhaseBands]
-
-
-@result_class
 class ParameterProfile:
     """Profile likelihood of one of the four identifiable numbers."""
 
@@ -70,21 +39,6 @@ class ParameterProfile:
     losses: Vector  # Loss of log likelihood there, the other three numbers fitted, (n_values,).
     low: float | None
     high: float | None  # Ends of the interval, None where the rates set none.
-
-
-@result_class
-class FssSensitivity:
-    """Sobol indices of FSS for the four identifiable numbers, in their order."""
-
-    lower: Vector
-    upper: Vector  # Range of each number, (4,).
-    first: Vector
-    first_half_width: Vector  # First-order index and half of its confidence interval, (4,). [1]
-    total: Vector
-    total_half_width: Vector  # Total index and half of its confidence interval, (4,). [1]
-    mean_fss: Number
-    deviation_fss: Number  # Mean and standard deviation of FSS over the ranges. [1]
-    evaluations: int
 
 
 @result_class
@@ -151,6 +105,18 @@ class PhasePrediction:
 
 
 @result_class
+class RatePosterior:
+    """Posterior of the four identifiable numbers."""
+
+    level: float  # Probability within each interval and band.
+    seed: int  # Of the random numbers.
+    numbers: dict[str, CredibleInterval]
+    covariance: Matrix  # Of the draws of the four numbers, (4, 4).
+    convergence: PosteriorConvergence
+    rates: dict[str, PhasePrediction]
+
+
+@result_class
 class UncertaintyResult:
     """Uncertainty of a fit to rates whose residuals may be alike where stimuli are neighbours."""
 
@@ -167,7 +133,7 @@ class UncertaintyResult:
     rates: dict[str, PhasePrediction]
     evidence_for_alike_residuals: Number  # Gain of the largest log likelihood by correlated residuals.
     profiles: tuple[ParameterProfile, ...]  # Of the four numbers.
-    sensitivity: FssSensitivity  # Of FSS to the four numbers.
+    sensitivity: SobolIndices  # Of FSS to the four numbers.
 
 
 @result_class
@@ -284,7 +250,7 @@ class FitResult(Result):
     spikes: SpikeFitSummary | None  #: Of the likelihood of spikes.
     posterior: RatePosterior | None
     profiles: tuple[ParameterProfile, ...] | None
-    sensitivity: FssSensitivity | None
+    sensitivity: SobolIndices | None
     offset: OffsetFit | None
     """Credible intervals, profile likelihoods, Sobol indices, and the fit with the receptor's offset as a
     further parameter, where they were asked for."""

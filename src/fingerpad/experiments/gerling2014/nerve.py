@@ -39,7 +39,6 @@ from fingerpad.neuron.afferent import PARAMETER_NAMES, Afferent, parameter_units
 from fingerpad.neuron.lif import membrane_potential
 from fingerpad.neuron.population import Population
 from fingerpad.neuron.spikes import PAPER_WINDOWS_MS, first_spike_latency_ms, modulation_index
-from fingerpad.neuron.transduction import drive
 from fingerpad.skin.sampling import SkinResponse
 
 RECEPTOR = ((RECEPTOR_X_MM, 0.0),)  # Position of the end organ: x and z on the skin. [mm]
@@ -258,7 +257,7 @@ def bar_uncertainty(
     traces: Traces, fitted: FloatArray, seed: int, initial_mv: float | None = None
 ) -> UncertaintyResult:
     """Find what the rates under the bar determine of the afferent; neighbouring shifts may miss alike."""
-    model = AfferentModel.of_drive(drive(traces, pieces=PIECES), initial_mv=initial_mv)
+    model = AfferentModel.of_traces(traces, initial_mv=initial_mv, pieces=PIECES)
     shift_mm = bar_firing_rates().shift_mm
     return uncertainty(model, bar_recordings(), fitted, shift_mm, seed, **CHAINS)
 

@@ -65,7 +65,7 @@ class ReproductionResult:
     """Result of a reproduction, the content of `results.json`."""
 
     format: Literal["fingerpad reproduction"] = "fingerpad reproduction"
-    format_version: Literal[5] = 5
+    format_version: Literal[6] = 6
     summary: dict[str, Summary]  # A few plain numbers of both sets, "paper" and "human".
     statements: tuple[Statement, ...]  # What can fail, with our value and verdict of both sets.
     skin_deflection: SkinDeflectionResult  # Level 1: the paper's three trials.

@@ -16,22 +16,10 @@ from numpy.typing import ArrayLike
 from scipy.optimize import least_squares
 from scipy.stats import qmc
 
-from fingerpad.core.checked import checked, value_class
+from fingerpad.core.checked import checked
 from fingerpad.core.errors import ConvergenceError, InputError
 from fingerpad.core.random_streams import published_generator
-from fingerpad.core.values import (
-    Count,
-    FloatArray,
-    IntArray,
-    NotNegative,
-    NotNegativeWhole,
-    Numbers,
-    Positive,
-    Several,
-    finite,
-    float_array,
-    positive,
-)
+from fingerpad.core.values import FloatArray, IntArray, Several, finite, float_array
 from fingerpad.data import protocol
 
 
@@ -46,15 +34,9 @@ class Bounds:
     """Limits; -inf and inf for none, (n_parameters,)."""
 
     def __post_init__(self) -> None:
-        scales = float_array("scales", self.scales, 1)
-        low, high = (np.broadcast_to(side, scales.shape) for side in (self.low, self.high))
-        if (scales <= 0.0).any() or not (low < high).all():
-            raise InputError(
-                "Bounds need scales above 0 and lower limits below the upper ones: "
-                f"got scales {scales.tolist()}, limits {low.tolist()} and {high.tolist()}."
-            )
-        for name, value in (("scales", scales), ("low", low), ("high", high)):
-            object.__setattr__(self, name, value)
+        sides = np.broadcast_arrays(self.scales, self.low, self.high)
+        for name, side in zip(("scales", "low", "high"), sides, strict=True):
+            object.__setattr__(self, name, side)
 
     def and_one(self, scale: float, low: float, high: float) -> Bounds:
         further = ((self.scales, scale), (self.low, low), (self.high, high))
@@ -63,13 +45,6 @@ class Bounds:
     def spread(self, number: int) -> FloatArray:
         """Points of a Halton sequence between the bounds, (number, n_parameters); deterministic."""
         return self.low + halton(number, self.scales.size) * (self.high - self.low)
-
-    def rows(self, name: str, points: ArrayLike) -> FloatArray:
-        """Return points (n_points, n_parameters), or raise `InputError` if they have other parameters."""
-        rows = float_array(name, points, 2)
-        if rows.shape[1:] != self.scales.shape:
-            raise InputError(name, "must have one entry per scale", f"{rows.shape[1]} for {self.scales.size}")
-        return rows
 
 
 def halton(number: int, dimensions: int) -> FloatArray:
@@ -85,11 +60,6 @@ class Problem(Protocol):
     `score = 1 - residuals @ residuals` up to round-off, so a method may maximise the score or minimise the
     residuals.
     """
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """Names of the parameters, in their order."""
-        ...
 
     @property
     def n_observations(self) -> int:
@@ -171,7 +141,7 @@ class Continued:
 Jacobian = Callable[[FloatArray, IntArray], FloatArray]
 
 
-@value_class
+@dataclass(frozen=True)
 class LeastSquares:
     """Trust-region least squares from the most promising of several starts.
 
@@ -181,29 +151,17 @@ class LeastSquares:
 
     starts: ArrayLike  # Start points; all are scored, (n_starts, n_parameters).
     bounds: Bounds  # Limits of the parameters, and the scales in which steps are taken.
-    n_refined: Count = 4  # Number of starts, the best ones, from which a fit is made.
-    difference_steps: Numbers = (0.1, 0.03, 0.01)
+    n_refined: int = 4  # Number of starts, the best ones, from which a fit is made.
+    difference_steps: tuple[float, ...] = (0.1, 0.03, 0.01)
     """Half widths of the central differences, round by round, in units of the scales."""
     jacobian: Jacobian | None = None
     """`jacobian(parameters, chosen)`: derivatives of the residuals, instead of differences."""
-    most_iterations: Count = 50  # Iterations of each round.
+    most_iterations: int = 50  # Iterations of each round.
     name: str = "least squares"
-
-    def __post_init__(self) -> None:
-        starts = self.bounds.rows("starts", self.starts)
-        outside = np.flatnonzero(((starts < self.bounds.low) | (starts > self.bounds.high)).any(axis=1))
-        if outside.size:
-            row = int(outside[0])
-            raise InputError(
-                "starts", "must lie between the bounds", remedy=f"row {row} is {starts[row].tolist()}"
-            )
-        object.__setattr__(self, "starts", starts)
-        for step in self.difference_steps:
-            positive("difference_steps", step)
 
     def fit(self, problem: Problem, chosen: IntArray) -> Fit:
         """Score all starts, fit from the best of them, and keep the best fit."""
-        clock, starts = time.perf_counter(), np.asarray(self.starts)
+        clock, starts = time.perf_counter(), np.asarray(self.starts, dtype=np.float64)
         scores = np.array([problem.score(start, chosen) for start in starts])
         scored = Fit(starts[0], -np.inf, len(starts), time.perf_counter() - clock, ())
         order = np.argsort(-scores, kind="stable")[: self.n_refined]
@@ -267,7 +225,7 @@ class _Visited:
         return residuals
 
 
-@value_class
+@dataclass(frozen=True)
 class CovarianceAdaptation:
     """CMA-ES from one start, with the package `cma`.
 
@@ -276,14 +234,11 @@ class CovarianceAdaptation:
 
     start: ArrayLike  # Mean of the first generation, (n_parameters,).
     bounds: Bounds  # Limits of the parameters, and the scales that set their units in the search.
-    first_spread: Positive = 0.5  # Standard deviation of the first generation, in units of the scales.
-    most_evaluations: Count = 2000
+    first_spread: float = 0.5  # Standard deviation of the first generation, in units of the scales.
+    most_evaluations: int = 2000
     """The search ends with the generation that reaches this number, or when it has converged."""
-    seed: NotNegativeWhole = 0  # Seed of the random numbers; the same seed gives the same bits.
+    seed: int = 0  # Seed of the random numbers; the same seed gives the same bits.
     name: str = "CMA-ES"
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "start", self.bounds.rows("start", np.atleast_2d(self.start))[0])
 
     def fit(self, problem: Problem, chosen: IntArray) -> Fit:
         """Search until convergence; the result is the best of all evaluated points."""
@@ -337,7 +292,7 @@ def regression_slopes(design: FloatArray, values: FloatArray) -> FloatArray:
     return (design.T @ values) / (design**2).sum(axis=0)
 
 
-@value_class
+@dataclass(frozen=True)
 class ResponseSurface:
     """The paper's method: response surfaces and steepest ascent from each start; the best result is taken.
 
@@ -350,30 +305,10 @@ class ResponseSurface:
     increments: ArrayLike
     """One coded unit of each parameter, for all start points or for each, (n_parameters,)."""
     lower_bounds: ArrayLike = -np.inf  # Lower limits of all evaluations; -inf for none, (n_parameters,).
-    smallest_gain: NotNegative = 1.0e-4  # A gain of at most this much ends a fit.
-    most_iterations: Count = 200
+    smallest_gain: float = 1.0e-4  # A gain of at most this much ends a fit.
+    most_iterations: int = 200
     name: str = "response surface"
     restrict: Restriction | None = None  # From a point of an ascent to the nearest one that is allowed.
-
-    def __post_init__(self) -> None:
-        starts = float_array("starts", self.starts, 2)
-        sides = [starts]
-        for name in ("increments", "lower_bounds"):
-            side = np.asarray(getattr(self, name), dtype=np.float64)
-            if side.shape not in ((), starts.shape[1:], starts.shape):
-                raise InputError(name, f"must match starts {starts.shape} or one row of it", str(side.shape))
-            sides.append(np.broadcast_to(side, starts.shape))
-        _, units, floors = sides
-        if not (units > 0.0).all():
-            raise InputError("increments", "must be greater than 0", str(units.tolist()))
-        if not (starts >= floors + units).all():
-            raise InputError(
-                "starts",
-                "must lie at least one increment above lower_bounds",
-                f"{starts.tolist()} for {floors.tolist()}",
-            )
-        for name, side in zip(("starts", "increments", "lower_bounds"), sides, strict=True):
-            object.__setattr__(self, name, side)
 
     def fit(self, problem: Problem, chosen: IntArray) -> Fit:
         """Fit from every start."""
@@ -381,9 +316,8 @@ class ResponseSurface:
         def score(parameters: FloatArray) -> float:
             return finite(f"score at {parameters.tolist()}", problem.score(parameters, chosen))
 
-        starts, units, floors = (
-            np.asarray(side) for side in (self.starts, self.increments, self.lower_bounds)
-        )
+        starts = np.asarray(self.starts, dtype=np.float64)
+        units, floors = (np.broadcast_to(side, starts.shape) for side in (self.increments, self.lower_bounds))
         rows = zip(starts, units, floors + units, strict=True)
         return best_of(tuple(self._climb(score, *row) for row in rows))
 

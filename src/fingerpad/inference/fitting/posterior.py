@@ -30,20 +30,19 @@ from threadpoolctl import threadpool_limits
 
 from fingerpad.core.errors import ConvergenceError, InputError
 from fingerpad.core.random_streams import Key, emcee_state, generator, independent_keys
-from fingerpad.core.values import FloatArray, finite, float_array, positive, whole
+from fingerpad.core.values import FloatArray
 
 TAILS = (0.025, 0.975)  # Quantiles of the effective sample size of the tails: the ends of a 95 % interval.
 
 
 def split_r_hat(draws: FloatArray) -> float:
-    """Return split R-hat: 1 if the halves of all ensembles have the same distribution, else larger.
+    """Return split R-hat of draws (n_ensembles, n_steps, n_walkers): 1 if all halves are alike, else larger.
 
     R-hat = sqrt(((n - 1)/n W + B)/W) with W the mean variance within halves of n draws, and B the variance
     of their means, both of rank-normalised draws (Vehtari, Gelman, Simpson, Carpenter & Bürkner 2021).
     """
-    values = _checked(draws)
-    distances = np.abs(values - np.median(values))
-    return max(_r_hat(_normal_scores(values)), _r_hat(_normal_scores(distances)))
+    distances = np.abs(draws - np.median(draws))
+    return max(_r_hat(_normal_scores(draws)), _r_hat(_normal_scores(distances)))
 
 
 def effective_size(draws: FloatArray) -> float:
@@ -53,19 +52,18 @@ def effective_size(draws: FloatArray) -> float:
     var (1 + 2 sum rho_t)/(n_ensembles n_steps). The sum of autocorrelations is truncated at the first pair
     that is not positive, and pairs are made monotone (Geyer 1992).
     """
-    values = _checked(draws)
-    variance = float(values.var())
+    variance = float(draws.var())
     if variance == 0.0:
-        return float(values.size)
-    series = values.mean(axis=2)
+        return float(draws.size)
+    series = draws.mean(axis=2)
     n_ensembles, n_steps = series.shape
     correlations, spread = _autocorrelations(series)
     pairs = correlations[: n_steps // 2 * 2].reshape(-1, 2).sum(axis=1)
     positive = int(np.argmax(pairs <= 0.0)) if (pairs <= 0.0).any() else pairs.size
     # An estimate above that of independent draws, as for antithetic chains, is not reliable.
-    time = max(2.0 * float(np.minimum.accumulate(pairs[:positive]).sum()) - 1.0, 1.0 / values.shape[2])
+    time = max(2.0 * float(np.minimum.accumulate(pairs[:positive]).sum()) - 1.0, 1.0 / draws.shape[2])
     variance_of_mean = spread * time / (n_ensembles * n_steps)
-    return float(min(variance / variance_of_mean, values.size))
+    return float(min(variance / variance_of_mean, draws.size))
 
 
 def effective_sizes(draws: FloatArray) -> tuple[float, float]:
@@ -73,20 +71,8 @@ def effective_sizes(draws: FloatArray) -> tuple[float, float]:
 
     Vehtari, Gelman, Simpson, Carpenter & Bürkner 2021.
     """
-    values = _checked(draws)
-    tails = (values <= end for end in np.quantile(values, TAILS))
-    return effective_size(_normal_scores(values)), min(effective_size(1.0 * tail) for tail in tails)
-
-
-def _checked(draws: FloatArray) -> FloatArray:
-    values = np.asarray(draws, dtype=np.float64)
-    if values.ndim != 3 or values.shape[0] < 2 or values.shape[1] < 4:
-        raise InputError(
-            "draws",
-            "must be of at least 2 ensembles and 4 steps, (n_ensembles, n_steps, n_walkers)",
-            f"shape {values.shape}",
-        )
-    return values
+    tails = (draws <= end for end in np.quantile(draws, TAILS))
+    return effective_size(_normal_scores(draws)), min(effective_size(1.0 * tail) for tail in tails)
 
 
 def _normal_scores(values: FloatArray) -> FloatArray:
@@ -150,14 +136,12 @@ class Chains:
 
     def spread_out(self, n_draws: int) -> FloatArray:
         """Return some of the draws (n_draws, n_parameters), evenly spaced along the chains."""
-        count = min(whole("n_draws", n_draws, at_least=1), len(self.flat))
+        count = min(n_draws, len(self.flat))
         return self.flat[np.linspace(0, len(self.flat) - 1, count).round().astype(np.int64)]
 
 
 def credible_band(draws: FloatArray, level: float = 0.95) -> FloatArray:
     """Return the central interval that contains a share `level` of the draws, for each column."""
-    if not 0.0 < finite("level", level) < 1.0:
-        raise InputError("level", "must lie between 0 and 1", repr(level))
     return np.quantile(draws, [0.5 - level / 2.0, 0.5 + level / 2.0], axis=0)
 
 
@@ -178,23 +162,9 @@ def sample(
 ) -> Chains:
     """Sample a density until the ensembles agree and the effective sample sizes suffice."""
     labels = tuple(names)
-    middle, scale = float_array("centre", centre, 1), float_array("spread", spread, 1)
-    if not middle.size == scale.size == len(labels) or not labels:
-        raise InputError(
-            "centre, spread and names must have one entry per parameter: "
-            f"got {middle.size}, {scale.size} and {len(labels)}."
-        )
-    if (scale <= 0.0).any():
-        raise InputError("spread", "must be greater than 0 for every parameter", str(scale.tolist()))
-    whole("n_ensembles", n_ensembles, at_least=2)
-    whole("n_walkers", n_walkers, at_least=4 * len(labels))
-    if n_walkers % 2:
-        raise InputError("n_walkers", "must be even", str(n_walkers))
-    whole("n_steps", n_steps, at_least=8)
-    whole("most_steps", most_steps, at_least=n_steps)
-    positive("smallest_effective_size", smallest_effective_size)
+    middle, scale = np.asarray(centre, dtype=np.float64), np.asarray(spread, dtype=np.float64)
     density = _Checked(log_density)
-    seeds = independent_keys(whole("seed", seed, at_least=0), n_ensembles)
+    seeds = independent_keys(seed, n_ensembles)
     usual = [(emcee.moves.StretchMove(), 0.5), (emcee.moves.KDEMove(bw_method=BANDWIDTH), 0.5)]
     ensembles = [_ensemble(density, middle, scale, n_walkers, one, list(moves or usual)) for one in seeds]
     history: list[str] = []

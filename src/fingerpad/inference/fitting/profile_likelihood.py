@@ -15,10 +15,9 @@ from numpy.typing import ArrayLike
 from scipy.optimize import minimize
 from scipy.stats import chi2
 
-from fingerpad.core.checked import checked
 from fingerpad.core.errors import ConvergenceError, InputError
 from fingerpad.core.threads import in_blocks
-from fingerpad.core.values import Finite, FloatArray, float_array
+from fingerpad.core.values import FloatArray
 
 LogLikelihood = Callable[[FloatArray], FloatArray]
 """From points (n_points, n_parameters) to their log likelihoods, -inf where impossible."""
@@ -47,14 +46,13 @@ class ProfileLikelihood:
     level: float  # Level of confidence. [0-1]
 
 
-@checked
 def profile_likelihoods(
     log_likelihood: LogLikelihood,
     starts: ArrayLike,
     scales: ArrayLike,
     names: Sequence[str],
     *,
-    level: Finite = 0.95,
+    level: float = 0.95,
 ) -> tuple[ProfileLikelihood, ...]:
     """Profile the likelihood of every parameter.
 
@@ -63,14 +61,7 @@ def profile_likelihoods(
     maxima.
     """
     labels = tuple(names)
-    origins, units = float_array("starts", np.atleast_2d(starts), 2), float_array("scales", scales, 1)
-    if not origins.shape[1] == units.size == len(labels) or len(labels) < 2 or (units <= 0.0).any():
-        raise InputError(
-            "starts, scales and names must have one entry for each of at least two parameters, scales "
-            f"greater than 0: got {origins.shape[1]}, {units.tolist()} and {len(labels)}."
-        )
-    if not 0.0 < level < 1.0:
-        raise InputError("level", "must lie between 0 and 1", repr(level))
+    origins, units = np.atleast_2d(starts), np.asarray(scales, dtype=np.float64)
     search = _Search(log_likelihood, units, origins)
     best, highest = search.best_of(origins)
     if not np.isfinite(highest):

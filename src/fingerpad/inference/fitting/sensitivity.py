@@ -15,10 +15,10 @@ from numpy.typing import ArrayLike
 from scipy import stats
 from scipy.special import ndtri
 
-from fingerpad.core.checked import checked
+from fingerpad.core.checked import result_class
 from fingerpad.core.errors import InputError
 from fingerpad.core.random_streams import generator
-from fingerpad.core.values import Finite, FloatArray, IntArray, NotNegativeWhole, Several, float_array
+from fingerpad.core.values import FloatArray, IntArray, Number, Vector, float_array
 
 BatchObjective = Callable[[FloatArray], FloatArray]
 """Called with points (n_points, n_parameters); returns one number for each."""
@@ -26,58 +26,42 @@ BatchObjective = Callable[[FloatArray], FloatArray]
 SOBOL_RESAMPLES = 200  # Bootstrap resamples behind the confidence intervals of the indices.
 
 
-@dataclass(frozen=True)
+@result_class
 class SobolIndices:
-    """Shares of the variance of an objective for parameters that are uniform within ranges."""
+    """Shares of the variance of an objective, of parameters that are uniform within ranges."""
 
-    names: tuple[str, ...]
-    lower: FloatArray
-    upper: FloatArray  # Ranges of the parameters, (n_parameters,).
-    first: FloatArray
-    first_half_width: FloatArray
-    """First-order index, the share of the variance that the parameter explains alone, and half the width of
-    its confidence interval, (n_parameters,). [1]"""
-    total: FloatArray
-    total_half_width: FloatArray
-    """Total index: the share explained alone and in interaction with others, (n_parameters,). [1]"""
-    level: float  # Level of confidence. [0-1]
-    mean: float
-    standard_deviation: float  # Of the objective over the ranges.
-    n_evaluations: int
+    lower: Vector
+    upper: Vector  # Range of each parameter, (n_parameters,).
+    first: Vector
+    first_half_width: Vector
+    """First-order index, what a parameter explains alone, and half of its confidence interval. [1]"""
+    total: Vector
+    total_half_width: Vector  # The share explained alone and in interaction with others, likewise. [1]
+    mean: Number
+    standard_deviation: Number  # Of the objective over the ranges.
+    evaluations: int
 
 
-@checked
 def sobol_indices(
     objective: BatchObjective,
     lower: ArrayLike,
     upper: ArrayLike,
-    names: Sequence[str],
     *,
-    seed: NotNegativeWhole,
-    n_base: Several = 512,
-    level: Finite = 0.95,
+    seed: int,
+    n_base: int = 512,
+    level: float = 0.95,
 ) -> SobolIndices:
     """Estimate first-order and total Sobol indices with `scipy.stats.sobol_indices`.
 
     Saltelli et al. 2010. SciPy's own bootstrap of the indices takes no seed, so the points of the design are
     resampled here; a half width is that of a normal interval with the bootstrap's standard error.
     """
-    labels = tuple(names)
-    low, high = float_array("lower", lower, 1), float_array("upper", upper, 1)
-    if not low.size == high.size == len(labels) or not (low < high).all() or not labels:
-        raise InputError(
-            "lower and upper must have one entry per name, and lower be below upper: "
-            f"got {low.tolist()}, {high.tolist()} for {len(labels)} names."
-        )
-    if n_base & (n_base - 1):
-        raise InputError("n_base", "must be a power of two", str(n_base))
-    if not 0.0 < level < 1.0:
-        raise InputError("level", "must lie between 0 and 1", repr(level))
+    low, high = np.asarray(lower, dtype=np.float64), np.asarray(upper, dtype=np.float64)
     random = generator(seed)
     values: list[FloatArray] = []  # at A, at B, and at A with each column of B: parts of Saltelli's design
 
     def evaluate(points: FloatArray) -> FloatArray:
-        values.append(_checked(objective(np.ascontiguousarray(points.T)), points.shape[1]))
+        values.append(float_array("objective", objective(np.ascontiguousarray(points.T)), 1))
         return values[-1].copy()  # SciPy subtracts the mean in place
 
     uniform = [stats.uniform(*side) for side in zip(low, high - low, strict=True)]
@@ -97,25 +81,16 @@ def sobol_indices(
     spread = stats.bootstrap((np.arange(n_base),), resampled, **settings).standard_error
     half_widths = ndtri(0.5 + 0.5 * level) * spread
     return SobolIndices(
-        names=labels,
         lower=low,
         upper=high,
         first=found.first_order,
         first_half_width=half_widths[0],
         total=found.total_order,
         total_half_width=half_widths[1],
-        level=level,
-        mean=float(everything.mean()),
-        standard_deviation=float(everything.std()),
-        n_evaluations=everything.size,
+        mean=everything.mean(),
+        standard_deviation=everything.std(),
+        evaluations=everything.size,
     )
-
-
-def _checked(values: ArrayLike, n_points: int) -> FloatArray:
-    numbers = float_array("objective", values, 1)
-    if numbers.size != n_points:
-        raise InputError("objective", "must return one number per point", f"{numbers.size} for {n_points}")
-    return numbers
 
 
 Answer = Callable[[FloatArray], FloatArray]
@@ -144,12 +119,9 @@ class Identifiability:
         return self.directions[self.rank :]
 
 
-@checked
 def identifiability(answer: Answer, parameters: ArrayLike, names: Sequence[str]) -> Identifiability:
     """Find the combinations of parameters on which outputs depend, and those on which they do not."""
     centre, labels = float_array("parameters", parameters, 1), tuple(names)
-    if len(labels) != centre.size:
-        raise InputError("names", f"must name {centre.size} parameters", str(len(labels)))
     if not centre.all():
         raise InputError("parameters", "must not be 0, since steps are shares of them", str(centre.tolist()))
     # The Jacobian: change of every output per share of every parameter, by central differences.
@@ -159,8 +131,6 @@ def identifiability(answer: Answer, parameters: ArrayLike, names: Sequence[str])
         for move in np.diag(JACOBIAN_STEP * np.abs(centre))
     ]
     table = np.stack(columns, axis=1)
-    if len(table) < centre.size:
-        raise InputError("answer", f"must give at least {centre.size} numbers", str(len(table)))
     _, values, directions = np.linalg.svd(table, full_matrices=False)
     rank = int((values > ZERO * values[0]).sum()) if values[0] > 0.0 else 0
     return Identifiability(labels, values, directions, rank)
