@@ -8,8 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from fingerpad.cli.commands import Command, option
-from fingerpad.cli.running import processes, progress
+from fingerpad.cli.commands import Command, option, processes, progress
 from fingerpad.core.files import make_writable, write_atomically
 from fingerpad.core.result_files import to_json
 from fingerpad.experiments.conditions import Conditions

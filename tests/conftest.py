@@ -94,11 +94,11 @@ def run_program(monkeypatch, capsys, tmp_path) -> Callable[..., tuple[int, str, 
 
     A slow computer adds no line: those on compilation and on how far a stage is are left out.
     """
-    from fingerpad.cli import running
+    from fingerpad.cli import commands
     from fingerpad.core.compilation import SHORT_NOTICE, SUBJECT
 
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(running, "Lines", partial(running.Lines, every_s=1e6))
+    monkeypatch.setattr(commands, "Lines", partial(commands.Lines, every_s=1e6))
 
     def run(main: Callable[[], None], *words: object) -> tuple[int, str, str]:
         monkeypatch.setattr(sys, "argv", [str(word) for word in words])

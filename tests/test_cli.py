@@ -25,6 +25,11 @@ from fingerpad.geometry.edged_indenters import INDENTERS
 BALL = ["touch", "--object", "sphere"]
 
 
+def of_requests():
+    """Names of the commands that run a request."""
+    return [name for name, row in commands.TABLE.items() if "request" in row]
+
+
 @pytest.fixture
 def call(monkeypatch, run_program):
     """Run the command line in this process, in an empty folder; a press or a reproduction fails the test."""
@@ -46,7 +51,7 @@ def test_the_help_of_each_command_names_every_option_with_its_unit(call):
         words = " ".join(said.split())
         assert what in words
         assert {"--quiet", "--verbose"} <= set(words.split())
-        for key, schema in request_schema(name)["properties"].items() if name in commands.KINDS else ():
+        for key, schema in request_schema(name)["properties"].items() if name in of_requests() else ():
             assert f"--{key} " in words
             assert " ".join(schema["description"].split()) in words, (name, key)
             unit = re.search(r"_(mm|ms|kpa|mn|deg)$", key)
@@ -64,7 +69,7 @@ def test_help_is_quick_because_it_loads_no_library_of_numbers():
 def test_one_set_of_tissues_is_the_default_everywhere():
     defaults = {
         name: request_schema(name)["properties"]["tissues"].get("default")
-        for name in commands.KINDS
+        for name in of_requests()
         if "tissues" in request_schema(name)["properties"]
     }
     assert defaults.pop("reproduce") == "paper"  # the first column; the default tissues are the second
@@ -181,7 +186,7 @@ def asked(call, monkeypatch):
         raise fp.FingerpadError("Enough.")
 
     def run(*words):
-        for name in commands.KINDS:
+        for name in of_requests():
             monkeypatch.setattr(fp, name, note, raising=False)
         status, said, errors = call(*words)
         assert (status, said, errors) == (2, "", "fingerpad: Enough.\n")
@@ -280,7 +285,7 @@ def test_every_example_can_be_written_and_is_possible(call):
         if command == "check":
             assert call(command, path)[::2] == (0, ""), name
         else:
-            fp_request = getattr(fp, commands.KINDS[command])
+            fp_request = getattr(fp, commands.TABLE[command]["request"])
             fp_request.read({{"fit": "recordings", "validate": "observations"}[command]: path}).check()
 
 

@@ -200,8 +200,8 @@ MALFORMED = {
     "half of the file": (_bytes(lambda content: content[: len(content) // 2]), "cannot be read"),
     "zeros": (_bytes(lambda content: content[:600] + bytes(3000) + content[3600:]), "cannot be read|mu"),
     "another ending": (_renamed, "its name has another ending"),
-    "a file of another program": (_other_program, "another program wrote this file"),
-    "an empty store": (_empty_zarr, "cannot be read|another program"),
+    "a file of another program": (_other_program, "must be a touch that fingerpad wrote"),
+    "an empty store": (_empty_zarr, "cannot be read|another content"),
     "a damaged store": (_damaged_zarr, "cannot be read"),
     "another version": (
         _changed(lambda data: data.assign_attrs(format_version=99)), "format_version 1: got 99"),

@@ -93,7 +93,7 @@ def test_a_table_that_is_no_response_is_refused(tmp_path):
     with pytest.raises(fp.InputError, match="must have the column z_mm"):
         read_response_csv(tmp_path / "other.csv")
     (tmp_path / "other.nwb").write_text("no session", encoding="utf-8")
-    with pytest.raises(fp.InputError, match="must be a session of write_responses_nwb"):
+    with pytest.raises(fp.InputError, match="cannot be read as NWB"):
         read_responses_nwb(tmp_path / "other.nwb")
     with pytest.raises(StoreError, match=r"other\.csv"):
         random_response(2).save(tmp_path / "other.csv" / "map.csv")

@@ -9,7 +9,7 @@ import pytest
 import fingerpad as fp
 from cluster import wait_until
 from fingerpad.cli import main
-from fingerpad.cli.running import progress
+from fingerpad.cli.commands import progress
 from fingerpad.core import progress as progress_module
 from fingerpad.core.logger import LOGGER
 from fingerpad.core.progress import Bars, Lines, NoProgress, share_done

@@ -10,7 +10,7 @@ from pathlib import Path
 import psutil
 import pytest
 
-from fingerpad.cli.running import Terminated, signals_raise
+from fingerpad.cli import Terminated, signals_raise
 
 LIMIT_S = 60.0
 AT_ONCE_S = 1.0
@@ -108,7 +108,7 @@ def test_a_worker_that_is_just_starting_ignores_ctrl_c(tmp_path: Path) -> None:
 def test_a_second_signal_ends_the_process_whatever_it_does(tmp_path: Path) -> None:
     script = (
         "import time\n"
-        "from fingerpad.cli.running import signals_raise\n"
+        "from fingerpad.cli import signals_raise\n"
         "with signals_raise():\n"
         "    try:\n"
         "        print('ready', flush=True)\n"

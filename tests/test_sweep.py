@@ -20,7 +20,7 @@ from fingerpad.experiments.discrimination.analysis import SESSION
 from fingerpad.experiments.runner import Runner, software
 from fingerpad.experiments.sweep.request import Constraint
 from fingerpad.experiments.sweep.settings import observe
-from fingerpad.export.sweep_file import DONE, FAILED, LEFT_OUT, SweepFile
+from fingerpad.export.sweep import DONE, FAILED, LEFT_OUT, SweepFile
 from fingerpad.export.sweep_results import observe_sweep, open_sweep, setting_response, write_sweep_spikes
 from fingerpad.psychophysics.observer import ENCODERS, Experiment, discriminate_by
 from fingerpad.skin.indentation import Touch

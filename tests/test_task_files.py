@@ -18,11 +18,11 @@ from fingerpad.experiments.conditions import RECEPTOR_X_MM, Conditions
 from fingerpad.experiments.examples import tasks
 from fingerpad.experiments.fit.request import FitFile
 from fingerpad.experiments.gerling2014.reproduction import ReproductionResult
-from fingerpad.experiments.requests.parts import parts_in
 from fingerpad.neuron.afferent import PARAMETER_NAMES
 from fingerpad.skin.unrolled_skin import NailEdge, UnrolledSkin
 from tests.mutations import CHANGES, VALUES, places
 from tests.mutations import changed as mutated
+from tools.schemas import parts_in
 
 ROOT = Path(__file__).parents[1]
 read = fp.DiscriminationRequest.read

@@ -31,7 +31,7 @@ from fingerpad.experiments.requests.touch import (
     TouchFile,
     estimate_press,
 )
-from fingerpad.export.formats import FORMATS
+from fingerpad.export.decks import FORMATS
 from fingerpad.export.requests import check_outputs
 from fingerpad.geometry import surface_files
 from fingerpad.geometry.dots import Dots
@@ -278,6 +278,8 @@ WRONG = [
     (BALL + "title: ''\n", "title must be a text: got ''"),
     (BALL + "finger: {dermis_mm: 9}\n", "line 2, finger: Bone and skin layers"),
     (BALL + "finger: baby\n", "touch.yaml, line 2, finger.like must be one of adult, "),
+    (BALL + "finger: adult:width_mm=18:width_mm=19\n", "finger must have width_mm once"),
+    (BALL + "finger: adult:18\n", "must be written like:name=mm, as adult:width_mm=18"),
     (BALL + "finger: nope.msh\n", "touch.yaml, line 2, finger: nope.msh must be a file that can be read: "),
     (BALL + "times_ms: [4000]\n", "line 2, times_ms must lie within the motion"),
     (BALL + "times_ms: 20\n", "times_ms must have 1 dimension"),

@@ -12,7 +12,7 @@ import json
 import textwrap
 import tokenize
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
 from docstring_parser import DocstringStyle, parse
 from pydantic import BaseModel
@@ -27,7 +27,7 @@ from fingerpad.experiments.discrimination.analysis import DiscriminationFile
 from fingerpad.experiments.discrimination.request import DiscriminationRequest
 from fingerpad.experiments.fit.request import ChosenNumbersFile, FitFile, FitRequest
 from fingerpad.experiments.gerling2014.reproduction import ReproductionResult
-from fingerpad.experiments.requests.parts import UNKNOWN_MODEL, Made, Part, Request, parts_in
+from fingerpad.experiments.requests.parts import Made, OneOfKinds, Part, Request
 from fingerpad.experiments.requests.stimulus import MEASURED, RAMP_AND_HOLD
 from fingerpad.experiments.requests.touch import ReductionRequest, RespondRequest, TouchFile, TouchRequest
 from fingerpad.experiments.run import ReproductionRequest
@@ -89,8 +89,6 @@ def explained_schema(kind: type[Part]) -> JsonSchema:
     """JSON schema of a description as it is written, with the explanations beside its fields."""
     made = {"$schema": "https://json-schema.org/draft/2020-12/schema"} | kind.model_json_schema()
     definitions = made.get("$defs", {})
-    for name in [name for name in definitions if name.startswith(UNKNOWN_MODEL)]:
-        del definitions[name]
     for part in _parts_of(kind):
         schema = made if part is kind else definitions.get(part.__name__)
         told: dict[str, str] = {}
@@ -169,12 +167,19 @@ def _parts_of(
     return list(found)
 
 
+def parts_in(annotation: Any) -> list[type[BaseModel]]:
+    """Parts that an annotation names."""
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        return [annotation]
+    if isinstance(annotation, OneOfKinds):
+        return [annotation.part(kind) for kind in annotation.makers]
+    return [found for inner in get_args(annotation) for found in parts_in(inner)]
+
+
 def _tidied(schema: Any) -> Any:
-    """Return a schema without titles, null as a value to write, and the form that only serves errors."""
+    """Return a schema without titles and null as a value to write."""
     if isinstance(schema, list):
-        unknown = f"#/$defs/{UNKNOWN_MODEL}"
-        said = [item for item in schema if not (isinstance(item, dict) and unknown in item.get("$ref", ""))]
-        return [_tidied(item) for item in said]
+        return [_tidied(item) for item in schema]
     if not isinstance(schema, dict):
         return schema
     kept = {

@@ -23,7 +23,7 @@ from fingerpad.experiments.requests.touch import TouchRequest as TouchRequest
 from fingerpad.experiments.run import ReproductionRequest as ReproductionRequest
 from fingerpad.experiments.sweep.request import SweepRequest as SweepRequest
 from fingerpad.experiments.validation.request import ValidationRequest as ValidationRequest
-from fingerpad.export.formats import export_touch as export_touch
+from fingerpad.export.decks import export_touch as export_touch
 from fingerpad.export.requests import discriminate as discriminate
 from fingerpad.export.requests import fit as fit
 from fingerpad.export.requests import reduce as reduce

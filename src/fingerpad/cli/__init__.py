@@ -9,20 +9,68 @@ from __future__ import annotations
 import argparse
 import logging
 import os
+import signal
 import sys
+import threading
 import warnings
-from collections.abc import Iterable, Mapping, Sequence
-from contextlib import suppress
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from typing import Any, NoReturn
 
 from fingerpad import __version__
 from fingerpad.cli import commands
-from fingerpad.cli.running import INTERRUPTED, TERMINATED, Terminated, forget_interrupt, signals_raise
 from fingerpad.core.errors import FingerpadError, InputError, closest
 from fingerpad.core.logger import LOGGER
 
 GENERAL = ("--quiet", "--verbose")  # Options of every command, before its name or after it.
+
+INTERRUPTED, TERMINATED = 130, 143  # Exit statuses after Ctrl-C and after SIGTERM, by convention.
+
+
+class Terminated(KeyboardInterrupt):
+    """SIGTERM came."""
+
+
+@contextmanager
+def signals_raise() -> Iterator[None]:
+    """Let the first Ctrl-C and the first SIGTERM raise, and let a second one end the process at once.
+
+    Modules in C turn what is raised while they are imported into an `ImportError`.
+    """
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+
+    came: list[type[KeyboardInterrupt]] = []
+
+    def raise_once(number: int, frame: object) -> None:
+        for each in before:
+            signal.signal(each, signal.SIG_DFL)
+        came.append(Terminated if number == signal.SIGTERM else KeyboardInterrupt)
+        raise came[0]
+
+    before = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)}
+    for number in before:
+        signal.signal(number, raise_once)
+    try:
+        yield
+    except Exception as error:
+        if came:
+            raise came[0] from error
+        raise
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+
+def forget_interrupt() -> None:
+    """Let this process end with its own status after a `KeyboardInterrupt`.
+
+    CPython ends `python -m` by SIGINT instead if the exception passed through `exec` of a text, as while
+    dataclasses are made, until another text is executed (`run_eval_code_obj` of its source).
+    """
+    exec("")
 
 
 class Parser(argparse.ArgumentParser):

@@ -3,19 +3,29 @@
 from __future__ import annotations
 
 import argparse
+import logging
+import os
+import shlex
+import sys
 import time
+import tomllib
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from datetime import UTC, datetime
 from functools import partial
+from importlib.resources import files
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import fingerpad as fp
-from fingerpad.cli.running import command_line, engine, processes, progress
 from fingerpad.core.errors import InputError, StoreError
 from fingerpad.core.files import make_writable
+from fingerpad.core.logger import LOGGER
+from fingerpad.core.progress import Bars, Lines, NoProgress, Progress
 from fingerpad.experiments.schemas import request_schema
+
+if TYPE_CHECKING:
+    from fingerpad.core.engine import Engine
 
 # What a command runs is imported where it runs: help and version need none of it and come at once.
 
@@ -25,17 +35,47 @@ SECONDS_PER_DAY = 86_400.0
 ENDING = "The same command continues after the last finished indentation."
 KEY = "key:"  # Begin of what argparse calls the value of a key of the request.
 
-KINDS = {
-    "touch": "TouchRequest",
-    "respond": "RespondRequest",
-    "fit": "FitRequest",
-    "discriminate": "DiscriminationRequest",
-    "validate": "ValidationRequest",
-    "sweep": "SweepRequest",
-    "reduce": "ReductionRequest",
-    "reproduce": "ReproductionRequest",
-}
-"""Public name of the request of each command."""
+TABLE: dict[str, Any] = tomllib.loads((files(__package__) / "commands.toml").read_text(encoding="utf-8"))
+"""What each command says and which options it has; `commands.toml` says how to read it."""
+
+OPTION_KINDS = {"path": Path, "name": str, "number": float, "count": int, "flag": bool}
+
+
+def processes(jobs: int | None) -> int:
+    """Return what `--jobs` says, or one process per core that this process may use."""
+    from fingerpad.core.values import whole  # loads NumPy, which help and version do without
+
+    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    return cores if jobs is None else whole("jobs", jobs, at_least=1)
+
+
+def engine(jobs: int | None, scheduler: str | None) -> int | Engine:
+    """Return the workers of `--scheduler` once it answers, or the number of processes here."""
+    if scheduler is None:
+        return processes(jobs)
+    if jobs is not None:
+        raise InputError(
+            f"--jobs is the number of processes here, and --scheduler {scheduler} has workers: leave one out."
+        )
+    from fingerpad.experiments.cluster import Cluster
+
+    cluster = Cluster(scheduler)
+    cluster.check()
+    return cluster
+
+
+def command_line() -> str:
+    return shlex.join(["fingerpad", *sys.argv[1:]])
+
+
+def progress() -> Progress:
+    """Bars on a terminal, else a line every ten seconds; nothing after `--quiet`. On standard error."""
+    from rich.console import Console
+
+    if not LOGGER.isEnabledFor(logging.WARNING):
+        return NoProgress()
+    console = Console(stderr=True)
+    return Bars(console) if console.is_terminal else Lines(partial(print, file=sys.stderr), short=False)
 
 
 def plain(text: str, option: str, schema: Mapping[str, Any]) -> Any:
@@ -53,15 +93,18 @@ def plain(text: str, option: str, schema: Mapping[str, Any]) -> Any:
 def option(
     parser: argparse.ArgumentParser, name: str, words: str, kind: Any = Path, default: Any = None
 ) -> None:
-    """Add an option, or an argument if its name has no dashes."""
-    words = words if default in (None, False) else f"{words} Default: {default}."
+    """Add an option, or an argument if its name has no dashes; one with a default may be left out."""
+    words = words if default in (None, False, []) else f"{words} Default: {default}."
     if kind is bool:
         parser.add_argument(name, action="store_true", help=words)
         return
-    metavar = {int: "N", float: "NUMBER", Path: "PATH"}.get(kind, "NAME")
-    metavar = metavar if name.startswith("-") else name.upper()
     read = partial(_read, kind) if kind in (int, float) else kind
-    parser.add_argument(name, type=read, default=default, metavar=metavar, help=words)
+    if name.startswith("-"):
+        metavar = {int: "N", float: "NUMBER", Path: "PATH"}.get(kind, "NAME")
+        parser.add_argument(name, type=read, default=default, metavar=metavar, help=words)
+        return
+    nargs = None if default is None else "*" if default == [] else "?"
+    parser.add_argument(name, type=read, default=default, nargs=nargs, metavar=name.upper(), help=words)
 
 
 def _read(kind: type[int] | type[float], text: str) -> float:
@@ -72,11 +115,22 @@ def _read(kind: type[int] | type[float], text: str) -> float:
         raise argparse.ArgumentTypeError(f"{expected}: got {text!r}") from error
 
 
-def _add_request(name: str, out: str, of_out: str, main: str, parser: argparse.ArgumentParser) -> None:
+def _add(name: str, parser: argparse.ArgumentParser) -> None:
+    """Add the options of a command."""
+    row = TABLE[name]
+    if "request" in row:
+        _add_request(name, row, parser)
+    for each in row.get("options", ()):
+        kind = OPTION_KINDS[each.get("kind", "path")]
+        option(parser, each["name"], each["help"], kind, each.get("default"))
+
+
+def _add_request(name: str, row: Mapping[str, str], parser: argparse.ArgumentParser) -> None:
     """Add the options of a request: its fields, and where and how it runs."""
-    what = f"YAML file of the request{f', or {main}' if main else ''}."
+    what = f"YAML file of the request{f', or {main}' if (main := row.get('main')) else ''}."
     parser.add_argument("request", nargs="?", metavar="FILE", help=what)
-    option(parser, "--out", of_out, Path, Path(out))
+    folder = "Folder for page, figures, results and stored indentations."
+    option(parser, "--out", row.get("of_out", folder), Path, row["out"])
     option(parser, "--jobs", "Number of processes. Default: one per core.", int)
     option(parser, "--scheduler", "Press on the workers of this Dask scheduler, tcp://HOST:PORT.", str)
     option(parser, "--allow-python", "Let the file name objects of Python as module:object.", bool)
@@ -96,7 +150,7 @@ def _add_request(name: str, out: str, of_out: str, main: str, parser: argparse.A
 
 def _run_request(name: str, given: argparse.Namespace, **more: Any) -> Any:
     """Run a request, with its files in --out."""
-    schema, kind = request_schema(name), getattr(fp, KINDS[name])
+    schema, kind = request_schema(name), getattr(fp, TABLE[name]["request"])
     keys = {
         key: value if isinstance(value, bool) else plain(value, key, schema["properties"].get(key, {}))
         for key, value in ((at.removeprefix(KEY), value) for at, value in vars(given).items() if KEY in at)
@@ -130,55 +184,29 @@ def _tell(*paragraphs: object) -> None:
     print(*paragraphs, sep="\n")
 
 
-def _tell_files(folder: Path, page: str, results: str) -> None:
-    if (folder / page).exists():
-        _tell(f"Report: {folder / page}")
-    _tell(f"Results: {folder / results}")
+def _ask(name: str, given: argparse.Namespace) -> int:
+    """Run a request, and say what came and where it is."""
+    found = _run_request(name, given)
+    _tell(*_sentences(name, found))
+    page = given.out / TABLE[name].get("page", "")
+    if page.is_file():
+        _tell(f"Report: {page}")
+    _tell(f"Results: {given.out / TABLE[name]['results']}")
+    return INCOMPLETE if name == "validate" and found.n_predicted < found.n_rows else 0
 
 
-def _touch(given: argparse.Namespace) -> None:
+def _sentences(name: str, found: Any) -> list[str]:
+    from fingerpad.report.reproduction import count_sentence
     from fingerpad.report.results import summary
 
-    found = _run_request("touch", given)
-    _tell(*summary("touch", found), *(f"Not verified: {each.text}" for each in found.skin.caveats))
-    _tell_files(given.out, "touch.html", "touch.json")
-
-
-def _respond(given: argparse.Namespace) -> None:
-    _tell(_run_request("respond", given), f"Results: {given.out / 'spikes.csv'}")
-
-
-def _fit(given: argparse.Namespace) -> None:
-    from fingerpad.report.results import summary
-
-    found = _run_request("fit", given)
-    _tell(*(summary("fit", found) if hasattr(found, "fit") else found.summary()))
-    _tell_files(given.out, "fit.html", "fit.json")
-
-
-def _discriminate(given: argparse.Namespace) -> None:
-    from fingerpad.report.results import summary
-
-    _tell(*summary("discriminate", _run_request("discriminate", given)))
-    _tell_files(given.out, "discriminate.html", "discriminate.json")
-
-
-def _validate(given: argparse.Namespace) -> int:
-    from fingerpad.report.results import summary
-
-    found = _run_request("validate", given)
-    _tell(*summary("validate", found))
-    _tell_files(given.out, "validate.html", "validate.json")
-    return INCOMPLETE if found.n_predicted < found.n_rows else 0
-
-
-def _add_sweep(parser: argparse.ArgumentParser) -> None:
-    _add_request("sweep", "sweep.zarr", "The data set, a folder that ends in .zarr.", "", parser)
-    option(parser, "--store", "Folder of stored indentations. Default: indentations, beside --out.")
-    option(parser, "--table", "Also write rates as a table, a .csv or .parquet file.")
-    option(parser, "--spikes", "Also write the spikes of all settings as a session, a .nwb file.")
-    option(parser, "--retry-failed", "Try settings again that failed before.", bool)
-    option(parser, "--yes", "Run a sweep of any size.", bool)
+    if name == "respond":
+        return [repr(found)]
+    if name == "reproduce":
+        return [count_sentence(found.statements, name) for name in ("paper", "human")]
+    if name == "fit" and not hasattr(found, "fit"):
+        return list(found.summary())
+    caveats = found.skin.caveats if name == "touch" else ()
+    return [*summary(name, found), *(f"Not verified: {each.text}" for each in caveats)]
 
 
 def _sweep(given: argparse.Namespace) -> int:
@@ -209,20 +237,6 @@ def _reduce(given: argparse.Namespace) -> None:
     _tell(f"Reduced touch: {given.out}")
 
 
-def _reproduce(given: argparse.Namespace) -> None:
-    from fingerpad.report.reproduction import count_sentence
-
-    found = _run_request("reproduce", given)
-    _tell_files(given.out, "report.html", "results.json")
-    _tell(*(count_sentence(found.statements, name) for name in ("paper", "human")))
-
-
-def _add_init(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("what", nargs="?", default="touch", metavar="WHAT", help="What it is an example of.")
-    option(parser, "--out", "Folder of the file.", Path, Path())
-    option(parser, "--list", "List the examples, and exit.", bool)
-
-
 def _init(given: argparse.Namespace) -> None:
     import json
 
@@ -247,11 +261,6 @@ def _init(given: argparse.Namespace) -> None:
     _tell(f"Try: fingerpad {verb} {path}")
 
 
-def _add_file(parser: argparse.ArgumentParser) -> None:
-    option(parser, "file", "YAML file of a request.")
-    option(parser, "--allow-python", "Let the file name objects of Python as module:object.", bool)
-
-
 def _check(given: argparse.Namespace) -> None:
     """Check a request of any kind, which its keys tell."""
     from fingerpad.core.files import read_text
@@ -264,7 +273,7 @@ def _check(given: argparse.Namespace) -> None:
     keys = {"grid": "sweep", "zip": "sweep", "sample": "sweep", "range": "reduce", "standard": "discriminate",
             "recordings": "fit", "observations": "validate"}  # fmt: skip
     name = next((kind for key, kind in keys.items() if key in content), "touch")
-    request = getattr(fp, KINDS[name]).read(given.file, allow_python=given.allow_python)
+    request = getattr(fp, TABLE[name]["request"]).read(given.file, allow_python=given.allow_python)
     request.check()
     if name == "touch":
         check_outputs(request)
@@ -275,31 +284,12 @@ def _check(given: argparse.Namespace) -> None:
         _tell(f"The request is possible: try fingerpad {name} {given.file}")
 
 
-def _add_view(parser: argparse.ArgumentParser) -> None:
-    option(parser, "result", "Touch as .nc or .zarr, or the folder that holds touch.nc or touch.zarr.")
-    option(parser, "--out", "File: .png, .gif, or .mp4 with the program ffmpeg.", Path, Path("view.png"))
-    fields = "sed, displacement, pressure, shear, slip, or another variable of RESULT."
-    option(parser, "--field", fields, str, "sed")
-    option(parser, "--time", "Time of a picture. Default: that of the largest depth. [ms]", float)
-    option(parser, "--frames", "Number of pictures of a film.", int, 40)
-
-
 def _view(given: argparse.Namespace) -> None:
     if given.out.is_dir():
         raise InputError("--out", "must be a file", remedy=f"{given.out} is a folder")
     shown = {"field": given.field, "time_ms": given.time, "frames": given.frames}
     (written,) = fp.save_view(given.out, given.result, **shown, progress=progress())
     _tell(f"Open: {written}")
-
-
-def _add_lab(parser: argparse.ArgumentParser) -> None:
-    ranges = "YAML files of `fingerpad reduce`, each an object. Default: a ball, a cylinder and a plate."
-    parser.add_argument("ranges", nargs="*", type=Path, metavar="RANGE", help=ranges)
-    option(parser, "--folder", "Where presses and reduced touches are kept.", Path, Path("lab"))
-    option(parser, "--port", "Port of the page. Default: one that is free.", int)
-    option(parser, "--static", "Write a page that needs no server into this folder.")
-    option(parser, "--jobs", "Number of processes. Default: one per core.", int)
-    option(parser, "--allow-python", "Let files name objects of Python as module:object.", bool)
 
 
 def _lab(given: argparse.Namespace) -> None:
@@ -309,7 +299,7 @@ def _lab(given: argparse.Namespace) -> None:
 
     if given.static is None:
         require_panel()
-    laboratory = Laboratory(given.folder, given.ranges, engine(given.jobs, None), given.allow_python)
+    laboratory = Laboratory(given.folder, given.range, engine(given.jobs, None), given.allow_python)
     make_writable(given.folder, "--folder")
     if given.static is None:
         serve(laboratory, given.port or 0, lambda address: _tell(f"Open: {address}"))
@@ -318,42 +308,34 @@ def _lab(given: argparse.Namespace) -> None:
     _tell(f"Open: {written} ({written.stat().st_size / 1e6:.1f} MB)")
 
 
-def _add_store(parser: argparse.ArgumentParser) -> None:
-    actions = "list, verify (exit status 1 if a file is damaged) or prune."
-    parser.add_argument("action", choices=("list", "verify", "prune"), metavar="ACTION", help=actions)
-    option(parser, "folder", "Folder of a run, or its folder `indentations`.")
-    option(parser, "--days", "Prune what is older. [days]", float)
-    option(parser, "--size", "Prune the oldest until the rest is at most so large. [MB]", float)
-    option(parser, "--yes", "Delete; without it, only say what would be.", bool)
-
-
 def _store(given: argparse.Namespace) -> int:
-    from fingerpad.core.values import not_negative
+    from fingerpad.core.values import not_negative, one_of
     from fingerpad.experiments.runner import STORE_FOLDER
     from fingerpad.skin.store import Store, pruned
 
+    one_of("ACTION", given.action, ("list", "verify", "prune"))
     if given.action == "prune" and given.days is None and given.size is None:
         raise InputError("prune", "needs --days, --size or both", "neither")
     age_s = None if given.days is None else SECONDS_PER_DAY * not_negative("--days", given.days, "days")
     most = None if given.size is None else int(1e6 * not_negative("--size", given.size, "MB"))
     inner = given.folder / STORE_FOLDER
     folder = inner if inner.is_dir() else given.folder
-    files = Store(folder).files()
-    if not files and not (folder.name == STORE_FOLDER and folder.is_dir()):
+    stored = Store(folder).files()
+    if not stored and not (folder.name == STORE_FOLDER and folder.is_dir()):
         raise InputError(
             f"FOLDER must hold stored indentations: {given.folder} has none; name that of a run."
         )
     if given.action == "list":
-        for file in files:
+        for file in stored:
             written = datetime.fromtimestamp(file.written_s, UTC).strftime("%Y-%m-%d %H:%M")
             _tell(f"{file.path.stem}  {file.size / 1e6:8.2f} MB  {written} UTC")
-        _tell(f"{len(files)} indentations, {sum(file.size for file in files) / 1e6:.1f} MB")
+        _tell(f"{len(stored)} indentations, {sum(file.size for file in stored) / 1e6:.1f} MB")
         return 0
     if given.action == "verify":
-        faults = [f"{file.path}: {fault}" for file in files if (fault := file.fault) is not None]
-        _tell(*faults, f"{len(files)} indentations, {len(faults)} damaged")
+        faults = [f"{file.path}: {fault}" for file in stored if (fault := file.fault) is not None]
+        _tell(*faults, f"{len(stored)} indentations, {len(faults)} damaged")
         return 1 if faults else 0
-    chosen = pruned(files, None if age_s is None else time.time() - age_s, most)
+    chosen = pruned(stored, None if age_s is None else time.time() - age_s, most)
     try:
         for file in chosen if given.yes else ():
             file.path.unlink(missing_ok=True)
@@ -361,46 +343,22 @@ def _store(given: argparse.Namespace) -> int:
         raise StoreError(f"{file.path} cannot be deleted: {error.strerror or error}.") from error
     verb = "deleted" if given.yes else "would be deleted; --yes deletes"
     freed = sum(file.size for file in chosen) / 1e6
-    _tell(f"{len(chosen)} of {len(files)} indentations, {freed:.1f} MB, {verb}")
+    _tell(f"{len(chosen)} of {len(stored)} indentations, {freed:.1f} MB, {verb}")
     return 0
 
 
-def _of(name: str, of_out: str, out: str = "", main: str = "") -> Callable[[argparse.ArgumentParser], None]:
-    return partial(_add_request, name, out or name, of_out, main)
-
-
-FOLDER = "Folder for page, figures, results and stored indentations."
-FILE = "File of the reduced touch; presses are stored beside it."
-
 Command = tuple[str, Callable[[argparse.ArgumentParser], None], Callable[[argparse.Namespace], int | None]]
+RUNS = {
+    "sweep": _sweep,
+    "reduce": _reduce,
+    "init": _init,
+    "check": _check,
+    "view": _view,
+    "lab": _lab,
+    "store": _store,
+}  # What runs; for any other command `_ask`.
 COMMANDS: dict[str, Command] = {
-    "touch": ("Press an object into a finger, and let afferents respond.", _of("touch", FOLDER), _touch),
-    "respond": ("Let afferents respond to a touch.", _of("respond", FOLDER), _respond),
-    "fit": (
-        "Fit an afferent to recordings: firing rates or spike times under known stimuli.",
-        _of("fit", FOLDER, main="the recordings"), _fit,
-    ),
-    "discriminate": (
-        "Predict hit rates, psychometric curves and thresholds of a discrimination task.",
-        _of("discriminate", FOLDER, main="the name of an example"), _discriminate,
-    ),
-    "validate": (
-        "Score the model against observations of force, deflection or firing rates.",
-        _of("validate", FOLDER, main="the observations"), _validate,
-    ),
-    "sweep": ("Press all settings of a sweep, and write one labelled data set.", _add_sweep, _sweep),
-    "reduce": (
-        "Press a range of poses in full, and make a reduced touch that answers within a millisecond.",
-        _of("reduce", FILE, "reduced.npz"), _reduce,
-    ),
-    "reproduce": (
-        "Reproduce Gerling et al. (2014): the paper's own system, then the set human, beside the paper.",
-        _of("reproduce", FOLDER, "reproduction"), _reproduce,
-    ),
-    "init": ("Write an example: a touch, recordings, observations or a task.", _add_init, _init),
-    "check": ("Check a request and press nothing; time and memory of a touch or a sweep.", _add_file, _check),
-    "view": ("Draw a touch in three dimensions, as a picture or a film.", _add_view, _view),
-    "lab": ("Press objects into the finger in the browser, on this computer alone.", _add_lab, _lab),
-    "store": ("List, verify or prune the stored indentations of a folder.", _add_store, _store),
-}  # fmt: skip
-"""What each command does, its options, and what runs."""
+    name: (row["what"], partial(_add, name), RUNS.get(name, partial(_ask, name)))
+    for name, row in TABLE.items()
+}
+"""What each command does, what adds its options, and what runs."""

@@ -270,20 +270,36 @@ def _in_one_sentence(
     return in_words(first, path, named(path))
 
 
+class UnknownKey(ValueError):
+    """A key that a part does not have, and those that it has."""
+
+    def __init__(self, key: str, known: Sequence[str]):
+        super().__init__("is unknown")  # without the key: pydantic cannot encode any text
+        self.key, self.known = key, known
+
+
+def raised_in(entry: Any) -> Exception | None:
+    """Return what a check raised, if that is why pydantic refused a value."""
+    found: Exception | None = entry.get("ctx", {}).get("error")
+    return found
+
+
 def first_of(entries: Sequence[Any]) -> Any:
     """First error of pydantic that matters: the kind, an unknown key, a wrong value, a missing key."""
 
     def order(each: Any) -> int:
         if each["loc"][-1:] == ("kind",):
             return 0
-        return 1 if each["type"] in _UNKNOWN else 3 if each["type"] in _MISSING else 2
+        if each["type"] in _UNKNOWN or isinstance(raised_in(each), UnknownKey):
+            return 1
+        return 3 if each["type"] in _MISSING else 2
 
     return min(entries, key=order)
 
 
 def in_words(entry: Any, path: Place, words: str) -> InputError:
     """One error of pydantic about the value at a path, which `words` spell."""
-    raised, value = entry.get("ctx", {}).get("error"), entry["input"]
+    raised, value = raised_in(entry), entry["input"]
     if isinstance(raised, InputError):
         if not raised.path or not path:
             return raised

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import warnings
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -88,7 +89,8 @@ def read_recordings(path: str | Path, stimuli: Stimuli, unit: Whole | None = Non
     """
     path = Path(path)
     if path.suffix in SUFFIXES_OF_NWB:
-        lines = _nwb_lines(path, stimuli.column, unit)
+        with nwb_session(path) as session:
+            lines = _trials(path, session, stimuli.column, unit)
     elif unit is None:
         lines = read_csv(path, (stimuli.column, *RATES, SPIKES, DURATION, FOLD))
     else:
@@ -153,7 +155,7 @@ def _spikes(
     for line, stimulus in zip(lines, presented, strict=True):
         end = stimulus.motion.end_ms
         recorded = line.number(DURATION, "ms", positive) if line.has(DURATION) else np.inf
-        times = _spike_times(line)
+        times = spike_times(line)
         if times.size and times[-1] > recorded:
             raise InputError(
                 f"{line.place}: {SPIKES} must end with {DURATION}, {recorded:g} ms: got {times[-1]:g} ms."
@@ -176,7 +178,7 @@ def _spikes(
     return recordings, after
 
 
-def _spike_times(line: TableRow) -> FloatArray:
+def spike_times(line: TableRow) -> FloatArray:
     """Spike times of a presentation, none if the entry is empty; checked for their order."""
     entry = line.entries[SPIKES]
     with line.placed():
@@ -216,8 +218,9 @@ def _memberships(path: Path, lines: Sequence[TableRow], names: Sequence[str]) ->
     return np.array(folds, dtype=np.int64) - 1
 
 
-def _nwb_lines(path: Path, column: str, unit: int | None) -> list[TableRow]:
-    """Trials of an NWB file as lines of a table, with the spikes of one unit."""
+@contextmanager
+def nwb_session(path: Path) -> Iterator[Any]:
+    """Content of an NWB file while it is open; whatever fails on it is one `InputError`."""
     check_file(path, LARGEST_NWB_MB)
     try:
         from pynwb import NWBHDF5IO
@@ -230,8 +233,7 @@ def _nwb_lines(path: Path, column: str, unit: int | None) -> list[TableRow]:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
             with NWBHDF5IO(str(path), mode="r") as file:
-                content = file.read()
-                return _trials(path, content, column, unit)
+                yield file.read()
     except InputError:
         raise
     except Exception as error:  # a file of any other kind may fail in any way
@@ -240,6 +242,7 @@ def _nwb_lines(path: Path, column: str, unit: int | None) -> list[TableRow]:
 
 
 def _trials(path: Path, content: Any, column: str, unit: int | None) -> list[TableRow]:
+    """Trials of an NWB file as lines of a table, with the spikes of one unit."""
     trials = content.trials
     if trials is None or not len(trials):
         raise InputError(

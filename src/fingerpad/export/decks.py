@@ -1,6 +1,6 @@
-"""Input files of other solvers for an indentation: Abaqus, CalculiX and FEBio.
+"""Export of one indentation: to the files of results, or to input files of Abaqus, CalculiX and FEBio.
 
-Each is a template beside this module, with gaps for what differs between indentations.
+Each deck is a template beside this module, with gaps for what differs between indentations.
 
 Abaqus/Standard: bricks are C3D8H and wedges C3D6H, with constant pressure as in the elements of fingerpad.
 The indenter is an exact rigid surface, or rigid facets where it has no outline, moved by its reference node.
@@ -21,16 +21,21 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field, replace
 from functools import cache
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
+from fingerpad.core.checked import checked
 from fingerpad.core.errors import InputError
+from fingerpad.core.files import path_of, write_atomically
 from fingerpad.core.values import FloatArray, IntArray, one_of
-from fingerpad.export.job import CONTACT_KPA_PER_MM, Job
+from fingerpad.export.job import CONTACT_KPA_PER_MM, Job, job_of
+from fingerpad.export.results import NEEDED, require
 from fingerpad.mechanics.laws import Hyperfoam, Law, Ogden, Polynomial
 from fingerpad.mechanics.materials import Material
+from fingerpad.skin.indentation import Touch
 
 PER_LINE, PER_LINE_OF_ELEMENT = 8, 16  # Most values on a data line of Abaqus and CalculiX.
 
@@ -111,6 +116,60 @@ DECKS: dict[str, tuple[str, Callable[[Job], str]]] = {
     "febio": ("touch.feb", febio_deck),
 }
 """Name of the input file of each solver, and the function that returns its text."""
+
+
+RESULTS: dict[str, str] = {
+    "vtu": "touch.pvd",
+    "csv": "touch.csv",
+    "npz": "touch.npz",
+    "netcdf": "touch.nc",
+    "zarr": "touch.zarr",
+}
+"""Name of the file that `SkinResponse.save` writes for each format."""
+
+FORMATS = (*RESULTS, *DECKS)
+
+
+@checked
+def export_touch(
+    folder: Path, touch: Touch, format_name: str, elastic_moduli: str | None = None
+) -> tuple[Path, ...]:
+    """Write an indentation for another program.
+
+    Parameters
+    ----------
+    folder : Path
+        Folder for the files; it is created if needed.
+    touch : Touch
+        The indentation to export; all but the input files of solvers also solve it.
+    format_name : str
+        One of `FORMATS`.
+    elastic_moduli : {"long_term", "instantaneous"}, optional
+        For "calculix", which has no relaxation: the moduli of the layers.
+
+    Returns
+    -------
+    tuple of Path
+        The file to open.
+    """
+    one_of("format", format_name, FORMATS)
+    if elastic_moduli is not None and format_name != "calculix":
+        raise InputError(
+            f"elastic_moduli is for calculix, which has no relaxation, not for {format_name}: leave it out."
+        )
+    require(format_name)  # first, since solving takes its time
+    if format_name in DECKS:
+        return (write_deck(folder, job_of(touch), format_name, elastic_moduli),)
+    skin = touch.solve(whole=format_name in NEEDED)
+    return (skin.save(path_of("folder", folder) / RESULTS[format_name]),)
+
+
+def write_deck(folder: Path, job: Job, format_name: str, elastic_moduli: str | None = None) -> Path:
+    """Write the input file of a solver; arguments as of `export_touch`, with what `job_of` returns."""
+    name, deck = DECKS[format_name]
+    text = deck(job) if elastic_moduli is None else calculix_deck(job, elastic_moduli)
+    write_atomically(path_of("folder", folder) / name, text.encode())
+    return path_of("folder", folder) / name
 
 
 def _rendered(template: str, **values: Any) -> str:

@@ -84,10 +84,8 @@ def outline_of(indenter: Indenter, reach_mm: Positive) -> Outline | None:
         corners, centres = _rounded_side(indenter.diameter_mm / 2, indenter.fillet_mm, reach_mm)
         return _without_empty_segments(True, ((0.0, 0.0), *corners), (None, *centres))
     if isinstance(indenter, Bar):
-        corners, centres = _rounded_side(indenter.half_width_mm, indenter.fillet_mm, reach_mm)
-        mirrored = tuple((-u, y) for u, y in reversed(corners))
-        other = tuple(None if centre is None else (-centre[0], centre[1]) for centre in reversed(centres))
-        return _without_empty_segments(False, (*mirrored, *corners), (*other, None, *centres))
+        half, fillet = indenter.half_width_mm, indenter.fillet_mm
+        return _ridges((_Ridge(-half, half, fillet, fillet),), reach_mm + fillet)
     if isinstance(indenter, Plate | Line):
         return Outline(False, ((-reach_mm, 0.0), (reach_mm, 0.0)), (None,))
     if isinstance(indenter, Edge):

@@ -29,9 +29,9 @@ from fingerpad.experiments.requests.touch import ReductionRequest, RespondReques
 from fingerpad.experiments.run import ReproductionRequest, run
 from fingerpad.experiments.validation.request import ValidationRequest
 from fingerpad.experiments.validation.validation import ValidationFile
-from fingerpad.export.formats import DECKS, REQUIRED, RESULTS, write_deck
+from fingerpad.export.decks import DECKS, RESULTS, write_deck
 from fingerpad.export.job import job_of
-from fingerpad.export.responses import require_pynwb
+from fingerpad.export.results import require
 from fingerpad.reduction.model import ReducedModel, write_reduced
 from fingerpad.report.results import write_page
 
@@ -98,10 +98,7 @@ def check_outputs(asked: TouchRequest) -> None:
     asked.check()
     for number, name in enumerate(asked.outputs):
         with asked.origin.located(), at("outputs", number):
-            if name in REQUIRED:
-                REQUIRED[name]()
-            if name == "nwb":
-                require_pynwb()
+            require(name)
             if name in DECKS and not asked.touch.stimulus.stays:
                 raise InputError(
                     f"{name} decks move the indenter only along its axis, and this motion moves it aside or "

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import io
 import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import fields, replace
@@ -18,13 +16,14 @@ import numpy as np
 from fingerpad.core.checked import checked
 from fingerpad.core.displayed import Columns
 from fingerpad.core.errors import InputError
-from fingerpad.core.files import path_of, read_text, write_atomically
+from fingerpad.core.files import path_of, write_atomically
 from fingerpad.core.phases import Phase
 from fingerpad.core.signals import PLACES, RECEPTOR_COLUMNS, ResponseMap, SpikeTrains
+from fingerpad.core.tables import read_csv
 from fingerpad.core.units import MS_PER_S
 from fingerpad.core.values import Finite, FloatArray, NotNegative, instance, positive
-from fingerpad.experiments.recording_files import SUFFIXES_OF_NWB
-from fingerpad.export.results import library
+from fingerpad.experiments.recording_files import SUFFIXES_OF_NWB, nwb_session, spike_times
+from fingerpad.export.results import library, require
 from fingerpad.neuron.afferent_types import afferent_types
 
 MEASURED = tuple(part.name for part in fields(ResponseMap) if part.name in RECEPTOR_COLUMNS)
@@ -59,29 +58,19 @@ def response_of(columns: Mapping[str, Any], spikes: Sequence[FloatArray], **know
 @checked
 def read_response_csv(path: Path) -> ResponseMap:
     """Read what `ResponseMap.save` wrote as .csv."""
-    rows = list(csv.DictReader(io.StringIO(read_text(path_of("path", path)))))
-    have = list(rows[0]) if rows else []
+    rows = read_csv(path_of("path", path), (), prefixes=("",))
+    have = rows[0].entries
     for column in ("x_mm", "z_mm", "pitch_mm", *MEASURED, "spike_times_ms"):
         if column not in have:
-            raise InputError(
-                path,
-                f"must have the column {column}, as a response is saved",
-                str(", ".join(have) or "no row"),
-            )
+            needs = f"must have the column {column}, as a response is saved"
+            raise InputError(path, needs, ", ".join(have))
     columns: dict[str, list[str] | list[float]] = {}
     if "type" in have:
-        columns["type"] = [row["type"] for row in rows]
+        columns["type"] = [row.text("type") for row in rows]
     for column in ("pitch_mm", *PLACES[3], *MEASURED):
         if column in have:
-            try:
-                columns[column] = [float(row[column] or "nan") for row in rows]
-            except (TypeError, ValueError) as error:
-                raise InputError(f"{path}: {column} must hold numbers: {error}.") from error
-    try:
-        trains = [np.array(row["spike_times_ms"].split(), dtype=float) for row in rows]
-    except (AttributeError, ValueError) as error:
-        raise InputError(f"{path}: spike_times_ms must hold times that spaces separate: {error}.") from error
-    return response_of(columns, trains)
+            columns[column] = [row.number(column) if row.has(column) else np.nan for row in rows]
+    return response_of(columns, [spike_times(row) for row in rows])
 
 
 def spikes_and_columns(result: Any) -> tuple[SpikeTrains, Columns]:
@@ -189,7 +178,9 @@ def write_responses_nwb(
     # Warnings of the library do not concern the content of the file.
     with warnings.catch_warnings(), TemporaryDirectory() as folder:
         warnings.simplefilter("ignore")
-        pynwb = require_pynwb()
+        require("nwb")
+        import pynwb
+
         session = pynwb.NWBFile(
             f"simulated by fingerpad {version('fingerpad')}",
             file.stem,
@@ -252,19 +243,8 @@ def to_nwb(result: Any, path: str | Path, touch: str, **options: Any) -> Path:
 @checked
 def read_responses_nwb(path: Path) -> dict[str, ResponseMap]:
     """Read what `write_responses_nwb` wrote."""
-    pynwb = require_pynwb()
-    try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")
-            with pynwb.NWBHDF5IO(str(path_of("path", path)), mode="r") as opened:
-                return _responses(opened.read())
-    except InputError:
-        raise
-    except Exception as error:  # a file of any other kind may fail in any way
-        said = " ".join(str(error).split()).rstrip(".")
-        raise InputError(
-            path, "must be a session of write_responses_nwb", remedy=f"it cannot be read as one ({said})"
-        ) from error
+    with nwb_session(path_of("path", path)) as session:
+        return _responses(session)
 
 
 def _responses(session: Any) -> dict[str, ResponseMap]:
@@ -326,8 +306,3 @@ def _durations(responses: Mapping[str, ResponseMap], duration_ms: float | None) 
             )
         durations_ms.append(lasts_ms)
     return np.array(durations_ms)
-
-
-def require_pynwb() -> Any:
-    """Return the package pynwb, or raise `InputError` if it is not installed."""
-    return library("pynwb", "NWB files need pynwb", "nwb")

@@ -10,7 +10,7 @@ import inspect
 import io
 import json
 import shutil
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
@@ -43,8 +43,34 @@ def library(name: str, needed: str = "", extra: str = "netcdf") -> Any:
         ) from error
 
 
+NEEDED: dict[str, tuple[tuple[str, ...], ...]] = {
+    "vtu": (("vtkmodules.vtkIOXML", "VTU files need the package vtk", "vtk"),),
+    "nwb": (("pynwb", "NWB files need pynwb", "nwb"),),
+    "parquet": (("pyarrow", "Parquet needs pyarrow", "tables"),),
+    "netcdf": (("xarray",), ("h5netcdf",), ("zarr",)),
+    "zarr": (("xarray",), ("h5netcdf",), ("zarr",)),
+}
+"""Libraries that write a format: arguments of `library`."""
+
+
+def require(format_name: str) -> None:
+    """Raise `InputError` if a library that writes a format is not installed."""
+    for needed in NEEDED.get(format_name, ()):
+        library(*needed)
+
+
 def first_line(error: Exception) -> str:
     return (str(error).strip().splitlines() or [type(error).__name__])[0].strip().rstrip(".")[:200]
+
+
+def check_format(path: str | Path, found: Mapping[str, Any], written: str, version: int) -> None:
+    """Raise `InputError` unless attributes are those of a format of fingerpad, in the version of today."""
+    if found.get("format") != written:
+        what = written.removeprefix("fingerpad ")
+        raise InputError(path, f"must be a {what} that fingerpad wrote", remedy="it has another content")
+    if (came := found.get("format_version")) != version:
+        remedy = "read it with the version of fingerpad that wrote it"
+        raise InputError(path, f"must have format_version {version}", str(came), remedy)
 
 
 def frame(result: Result) -> pandas.DataFrame:
@@ -94,12 +120,10 @@ def _csv(result: Any, path: Path) -> None:
 
 
 def _parquet(result: Result, path: Path) -> None:
-    library("pyarrow", "Parquet needs pyarrow", "tables")
-    content = io.BytesIO()
+    require("parquet")
     made = frame(result)
     made.columns = made.columns.astype(str)
-    made.to_parquet(content)
-    write_atomically(path, content.getvalue())
+    write_atomically(path, made.to_parquet())
 
 
 def _json(result: Result, path: Path, **options: Any) -> None:

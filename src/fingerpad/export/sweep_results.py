@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 import json
 from collections.abc import Iterator, Mapping
 from pathlib import Path
@@ -18,9 +17,9 @@ from fingerpad.experiments.requests.parts import Content
 from fingerpad.experiments.sweep.request import OBSERVER, SweepRequest
 from fingerpad.experiments.sweep.settings import MEASURED, observe
 from fingerpad.export.responses import MEASURED as MEASURED_COLUMNS
-from fingerpad.export.responses import require_pynwb, write_responses_nwb
-from fingerpad.export.results import library, table_csv
-from fingerpad.export.sweep_file import DONE, HIT_RATE, check_format, opened_group
+from fingerpad.export.responses import write_responses_nwb
+from fingerpad.export.results import check_format, library, require, table_csv
+from fingerpad.export.sweep import DONE, FORMAT, FORMAT_VERSION, HIT_RATE, opened_group
 from fingerpad.export.touch_file import spike_trains
 from fingerpad.neuron.spikes import rate_windows_ms
 
@@ -43,7 +42,7 @@ def open_sweep(path: str | Path) -> xarray.Dataset:
         setting, and `data.to_dataframe()` or `data.hit_rate.plot()` are those of xarray.
     """
     xarray, _ = library("xarray"), library("zarr")
-    check_format(path, opened_group(path_of("path", path)).attrs.asdict())
+    check_format(path, opened_group(path_of("path", path)).attrs.asdict(), FORMAT, FORMAT_VERSION)
     data = xarray.open_zarr(path, chunks=None, consolidated=False, decode_times=False)
     return data.set_coords([name for name in ("time_ms", "receptor_mm") if name in data])
 
@@ -147,9 +146,7 @@ def write_sweep_table(data: xarray.Dataset, path: str | Path) -> Path:
     else:
         _needs_parquet(path)
         table.attrs.update(about)
-        file = io.BytesIO()
-        table.to_parquet(file, index=False)
-        content = file.getvalue()
+        content = table.to_parquet(index=False)
     write_atomically(path, content)
     return path
 
@@ -256,10 +253,10 @@ def check_outputs(table: Path | None, spikes: Path | None) -> None:
     if spikes is not None:
         if spikes.suffix != ".nwb":
             raise InputError(f"Spikes of a sweep are written as .nwb: got {spikes.name}.")
-        require_pynwb()
+        require("nwb")
 
 
 def _needs_parquet(path: Path) -> None:
     if path.suffix != ".parquet":
         raise InputError(f"A table of a sweep is written as .csv or .parquet: got {path.name}.")
-    library("pyarrow", "Parquet needs pyarrow", "tables")
+    require("parquet")

@@ -13,7 +13,7 @@ from fingerpad.core.errors import InputError
 from fingerpad.core.files import path_of
 from fingerpad.core.signals import RECEPTOR_COLUMNS, SpikeTrains
 from fingerpad.core.units import unit_of
-from fingerpad.export.results import first_line, library
+from fingerpad.export.results import check_format, first_line, library
 from fingerpad.skin.dataset import FORMAT, FORMAT_VERSION, MESH_PARTS, OBJECT_PARTS, Part, dimensions_of
 from fingerpad.skin.fields import FIELDS, stored_fields
 
@@ -110,17 +110,7 @@ def spike_trains(data: xarray.Dataset) -> SpikeTrains:
 
 def check_touch(path: str, data: xarray.Dataset) -> None:
     """Raise `InputError` unless a data set is that of a touch; `path` says where it came from."""
-    if data.attrs.get("format") != FORMAT:
-        raise InputError(
-            path, "must be a touch that fingerpad wrote", remedy="another program wrote this file"
-        )
-    if (written := data.attrs.get("format_version")) != FORMAT_VERSION:
-        raise InputError(
-            path,
-            f"must have format_version {FORMAT_VERSION}",
-            str(written),
-            "read it with the version of fingerpad that wrote it",
-        )
+    check_format(path, data.attrs, FORMAT, FORMAT_VERSION)
     if (half := data.attrs.get("half_finger")) not in (0, 1):
         raise InputError(f"{path}, attribute half_finger must be 0 or 1: got {half}.")
     groups = [_NEEDED[0], *(names for names in _NEEDED[1:] if set(names) & set(data.variables))]

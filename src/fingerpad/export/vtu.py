@@ -16,7 +16,7 @@ import numpy as np
 from fingerpad.core.errors import InputError
 from fingerpad.core.files import path_of, write_atomically
 from fingerpad.export.job import wedge_nodes
-from fingerpad.export.results import library
+from fingerpad.export.results import require
 from fingerpad.geometry.mesh import Mesh
 from fingerpad.mechanics.press import Deformation
 from fingerpad.skin.fields import FIELDS, Place
@@ -36,7 +36,7 @@ def write_vtu(path: Path, skin: SkinResponse) -> None:
     The fields are those of `skin.fields.FIELDS` that are exported: of cells, of points, and of the whole
     press as field data.
     """
-    require_vtk()
+    require("vtu")
     path = path_of("path", path)
     if skin.deformation is None:
         raise InputError(
@@ -60,11 +60,6 @@ def write_vtu(path: Path, skin: SkinResponse) -> None:
         write_atomically(path.with_name(name), _xml(grid))
     if series:
         write_atomically(path, _index(names, times_ms))
-
-
-def require_vtk() -> None:
-    """Raise `InputError` if VTK is not installed; the parts that are used write files, none of them draws."""
-    library("vtkmodules.vtkIOXML", "VTU files need the package vtk", "vtk")
 
 
 def _exported(deformation: Deformation, mesh: Mesh) -> tuple[dict[str, np.ndarray], ...]:

@@ -8,57 +8,45 @@ may stand wherever a file has a name or a block.
 from __future__ import annotations
 
 import hashlib
-import importlib.util
+import importlib
 import inspect
 import re
 import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, is_dataclass, replace
-from functools import cached_property
+from dataclasses import dataclass, field, is_dataclass, replace
+from functools import cache
 from pathlib import Path
 from pkgutil import resolve_name
 from types import MappingProxyType
-from typing import Annotated, Any, ClassVar, Literal, TypeVar, Union, get_args
+from typing import Annotated, Any, ClassVar, Literal, TypeVar, get_args
 
 from pydantic import (
     BaseModel,
     ConfigDict,
-    Discriminator,
     Field,
     GetJsonSchemaHandler,
     PrivateAttr,
     SerializerFunctionWrapHandler,
-    Tag,
     ValidationError,
     ValidationInfo,
     WrapValidator,
     create_model,
     model_serializer,
+    model_validator,
 )
-from pydantic_core import CoreSchema, core_schema
+from pydantic_core import CoreSchema
 
-from fingerpad.core.checked import first_of, hints_of, in_words
+from fingerpad.core.checked import UnknownKey, first_of, hints_of, in_words, raised_in
 from fingerpad.core.errors import InputError, Place, did_you_mean, shown, spelled
 from fingerpad.core.files import path_of, read_text
 from fingerpad.core.plain_yaml import line_at, read_yaml
-from fingerpad.core.values import Check, JsonSchema, Text, choice, like
-from fingerpad.core.values import instance as instance_of
+from fingerpad.core.values import Check, JsonSchema, Text, instance, like, one_of, text
 
 _FORM = "form "
-LISTED, VARIED, NAMED, SPELLED, OBJECT, UNKNOWN = (
-    f"{_FORM}{form}" for form in ("listed", "varied", "named", "spelled", "object", "unknown")
-)  # Forms that a part may have; pydantic puts them into the places of errors.
-
-
-def form_of(kind: str) -> str:
-    """Form of a part of some kind."""
-    return f"{_FORM}{kind}"
-
-
-def kind_of(form: int | str) -> str | None:
-    """Kind that a form is of; None of a key or an index."""
-    return form.removeprefix(_FORM) if isinstance(form, str) and form.startswith(_FORM) else None
+LISTED, VARIED, NAMED, SPELLED, OBJECT = (
+    f"{_FORM}{form}" for form in ("listed", "varied", "named", "spelled", "object")
+)  # Forms that a value may have; pydantic puts them into the places of errors.
 
 
 def with_message(words: str) -> WrapValidator:
@@ -97,6 +85,15 @@ class Part(BaseModel):
 
     model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
 
+    @model_validator(mode="before")
+    @classmethod
+    def _known(cls, content: Any) -> Any:
+        """Refuse an unknown key here, where the known ones are: pydantic does not tell them."""
+        for key in content if isinstance(content, Mapping) else ():
+            if isinstance(key, str) and key not in cls.model_fields:
+                raise UnknownKey(key, [*cls.model_fields])
+        return content
+
     @model_serializer(mode="wrap")
     def _as_written(self, dump: SerializerFunctionWrapHandler):  # type: ignore[no-untyped-def]
         """Leave defaults out of files: a default is not always a value that the file may give."""
@@ -112,8 +109,6 @@ class Part(BaseModel):
         values = {name: getattr(self, name) for name in names if name in self.model_fields_set}
         return {name: value for name, value in values.items() if value is not None}
 
-
-UNKNOWN_MODEL = "Unknown_"  # Beginning of the name of a part that only serves the error of an unknown kind.
 
 _PLAIN = (bool, int, float, list, tuple, type(None))  # What a file may have in the place of a block.
 
@@ -135,7 +130,7 @@ class Made(Part):
 
 def made_by(kind: str, makes: Callable[..., Any], without: Sequence[str] = ()) -> type[Made]:
     """Make the part whose keys are `kind` and the parameters of a function."""
-    fields: dict[str, Any] = {"kind": (Literal[kind], kind)} if kind else {}
+    fields: dict[str, Any] = {"kind": (Literal[kind], kind)}
     files, hints = set(), hints_of(makes)
     for name, parameter in inspect.signature(makes).parameters.items():
         if name in without:
@@ -146,33 +141,10 @@ def made_by(kind: str, makes: Callable[..., Any], without: Sequence[str] = ()) -
             hint = File
         needed = parameter.default is parameter.empty
         fields[name] = (hint, ...) if needed else (hint | None, None)
-    name = "".join(word.capitalize() for word in (kind or getattr(makes, "__name__", "part")).split("_"))
+    name = "".join(word.capitalize() for word in kind.split("_"))
     made: type[Made] = create_model(name, __base__=Made, **fields)
     made.makes, made.files = staticmethod(makes), frozenset(files)
     return made
-
-
-@dataclass(frozen=True)
-class LateKind:
-    """Part of one kind, made when it is first needed: a file of spheres does not load braille."""
-
-    kind: str  # Value of the key `kind`.
-    makes: Callable[..., Any] | str  # As of `made_by`, or its name below `fingerpad`.
-    without: Sequence[str] = ()  # As of `made_by`.
-
-    @cached_property
-    def part(self) -> type[Made]:
-        makes = resolve_name(f"fingerpad.{self.makes}") if isinstance(self.makes, str) else self.makes
-        return made_by(self.kind, makes, self.without)
-
-    def __get_pydantic_core_schema__(self, *_: Any) -> CoreSchema:
-        return core_schema.no_info_plain_validator_function(
-            lambda value: self.part.model_validate(value),
-            serialization=core_schema.plain_serializer_function_ser_schema(lambda made: made.model_dump()),
-        )
-
-    def __get_pydantic_json_schema__(self, core: CoreSchema, handler: GetJsonSchemaHandler) -> JsonSchema:
-        return handler(self.part.__pydantic_core_schema__)
 
 
 def object_of_python(kind: type) -> Any:
@@ -186,42 +158,56 @@ def like_or_made(name: str, value: Any, kind: type) -> Any:
     """Return an object that is of a class, or like a protocol."""
     if getattr(kind, "_is_protocol", False):
         return like(name, value, kind)
-    return instance_of(name, value, kind)
+    return instance(name, value, kind)
 
 
-def one_of_kinds(
-    makers: Mapping[str, Callable[..., Any] | str],
-    default: str | None = None,
-    text: Any = None,
-    without: Mapping[str, Sequence[str]] = MappingProxyType({}),
-    instance: type | None = None,
-) -> Any:
-    """Type of a value that is one of several parts, by its key `kind`, or an object of Python."""
+@dataclass(frozen=True, eq=False)
+class OneOfKinds:
+    """Type of a value that is one of several parts, by its key `kind`, or an object of Python.
 
-    def tag(value: Any) -> str:
+    The part of a kind is made when it is first needed: a file of spheres does not load braille.
+    """
+
+    makers: Mapping[str, Callable[..., Any] | str]  # As of `made_by`, or its name below `fingerpad`.
+    instance: type  # Class of an object of Python.
+    default: str | None = None  # Kind of a block without one.
+    named: bool = False  # Whether a text may stand in the place of a block.
+    without: Mapping[str, Sequence[str]] = field(default_factory=dict)  # As of `made_by`, by kind.
+
+    @cache  # noqa: B019 - the few of the package live as long as it
+    def part(self, kind: str) -> type[Made]:
+        makes = self.makers[kind]
+        makes = resolve_name(f"fingerpad.{makes}") if isinstance(makes, str) else makes
+        return made_by(kind, makes, self.without.get(kind, ()))
+
+    def __call__(self, name: str, value: Any) -> Any:
         if isinstance(value, Part):
-            return form_of(str(getattr(value, "kind", default)))
-        if isinstance(value, Mapping):
-            kind = value.get("kind", default)
-            return form_of(kind) if isinstance(kind, str) and kind in makers else UNKNOWN
-        if isinstance(value, str):
-            return NAMED if text is not None else UNKNOWN
-        return UNKNOWN if instance is None or isinstance(value, _PLAIN) else OBJECT
+            return value
+        if isinstance(value, str) and self.named:
+            return text(name, value)
+        if isinstance(value, (str, *_PLAIN)):
+            raise InputError(name, "must be a mapping of keys to values", shown(value))
+        if not isinstance(value, Mapping):
+            return like_or_made(name, value, self.instance)
+        if self.default is None and "kind" not in value:
+            raise InputError(("kind",), "must be given", remedy="it is missing")
+        kind = one_of("kind", value.get("kind", self.default), self.makers)
+        return self.part(kind).model_validate(value)
 
-    # Named after its kinds: two models of one name would get longer names in a schema.
-    unknown = create_model(
-        f"{UNKNOWN_MODEL}{'_'.join(makers)}", __base__=Part, kind=(Annotated[str, choice(makers)], ...)
-    )
-    tagged: list[Any] = [
-        Annotated[Any, LateKind(kind, makes, without.get(kind, ())), Tag(form_of(kind))]
-        for kind, makes in makers.items()
-    ]
-    if text is not None:
-        tagged.append(Annotated[text, Tag(NAMED)])
-    if instance is not None:
-        tagged.append(Annotated[object_of_python(instance), Tag(OBJECT)])
-    tagged.append(Annotated[unknown, Tag(UNKNOWN)])
-    return Annotated[Union[tuple(tagged)], Discriminator(tag)]  # noqa: UP007
+    def __get_pydantic_core_schema__(self, *_: Any) -> CoreSchema:
+        return Check(self, {}, _as_written).__get_pydantic_core_schema__()
+
+    def __get_pydantic_json_schema__(self, core: CoreSchema, handler: GetJsonSchemaHandler) -> JsonSchema:
+        parts = [handler(self.part(kind).__pydantic_core_schema__) for kind in self.makers]
+        texts: list[JsonSchema] = [{"type": "string", "minLength": 1}] * self.named
+        return {"anyOf": [*parts, *texts, {"type": "string"}]}
+
+
+def _as_written(value: Any) -> Any:
+    """Return the keys of a part; an object of Python as it is shown."""
+    if isinstance(value, Part):
+        return value.model_dump()
+    return value if isinstance(value, str | Mapping) else repr(value)  # a default is not made yet
 
 
 _Kind = TypeVar("_Kind", bound=Part)
@@ -298,7 +284,7 @@ def part_from(kind: type[_Kind], content: Any) -> _Kind:
     try:
         return kind.model_validate(content)
     except ValidationError as error:
-        raise input_error(error, kind) from error
+        raise input_error(error) from error
 
 
 def merged(common: Any, own: Any, default_kind: str | None = None) -> Any:
@@ -319,50 +305,20 @@ def merged(common: Any, own: Any, default_kind: str | None = None) -> Any:
     return {**common, **own} if own.get("kind", kind) == kind else own
 
 
-def input_error(error: ValidationError, kind: type[Part]) -> InputError:
+def input_error(error: ValidationError) -> InputError:
     """Make the first error that pydantic found one of the package."""
     first = first_of(error.errors(include_url=False))
-    path = tuple(part for part in first["loc"] if kind_of(part) is None)
+    path = tuple(part for part in first["loc"] if not str(part).startswith(_FORM))
     if first["type"] == "missing":
         found = InputError(path, "must be given", remedy="it is missing")
-    elif first["type"] == "extra_forbidden":
-        known = _keys_at(first["loc"][:-1], kind)
-        found = InputError(path, "is unknown", remedy=did_you_mean(str(path[-1]), known, spelled(path[:-1])))
+    elif isinstance(unknown := raised_in(first), UnknownKey):
+        remedy = did_you_mean(unknown.key, unknown.known, spelled(path))
+        found = InputError((*path, unknown.key), "is unknown", remedy=remedy)
     elif first["input"] is None and not path:
         found = InputError(path, "must be a mapping of keys to values", remedy="it is empty")
     else:
         found = in_words(first, path, spelled(path))
     return found.at(found.path)
-
-
-def _keys_at(path: Sequence[int | str], kind: type[Part]) -> list[str]:
-    """Keys that the part at `path` may have."""
-    parts: list[type[BaseModel]] = [kind]
-    for key in path:
-        form = kind_of(key)
-        if form is not None:
-            parts = [
-                part
-                for part in parts
-                if "kind" not in part.model_fields or part.model_fields["kind"].default == form
-            ]
-        elif isinstance(key, str):
-            parts = [
-                found
-                for part in parts
-                if key in part.model_fields
-                for found in parts_in(part.model_fields[key].annotation)
-            ]
-    return list(dict.fromkeys(key for part in parts for key in part.model_fields))
-
-
-def parts_in(annotation: Any) -> list[type[BaseModel]]:
-    """Parts that an annotation names."""
-    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
-        return [annotation]
-    if isinstance(annotation, LateKind):
-        return [annotation.part]
-    return [found for inner in get_args(annotation) for found in parts_in(inner)]
 
 
 OBJECT_NAME = re.compile(r"[A-Za-z_]\w*:[A-Za-z_]\w*")
@@ -466,13 +422,14 @@ class Request(Part):
             first, *rest = key.split(".")
             value = found.get(first)
             if rest and isinstance(value, Mapping) and isinstance(value.get(rest[0]), str):
-                found[first] = {**value, rest[0]: _object_named(value[rest[0]], key, beside, allow_python)}
+                named = _object_named(value[rest[0]], (first, *rest), beside, allow_python)
+                found[first] = {**value, rest[0]: named}
             elif not rest and isinstance(value, str):
-                found[first] = _object_named(value, key, beside, allow_python)
+                found[first] = _object_named(value, (first,), beside, allow_python)
         return found
 
 
-def _object_named(text: str, key: str, beside: Path, allow_python: bool) -> Any:
+def _object_named(text: str, place: Place, beside: Path, allow_python: bool) -> Any:
     """Return the object that a text names as module:object; any other text as it is."""
     module, _, name = text.partition(":")
     file = (beside / f"{module}.py").resolve()
@@ -480,28 +437,20 @@ def _object_named(text: str, key: str, beside: Path, allow_python: bool) -> Any:
         return text
     if not allow_python:
         raise InputError(
-            tuple(key.split(".")), f"names an object of {file.name}, which runs with your rights", repr(text),
+            place, f"names an object of {file.name}, which runs with your rights", repr(text),
             "allow it by --allow-python or allow_python=True, or leave it out",
         )  # fmt: skip
-    known = sys.modules.get(module)
-    if known is None:
-        spec = importlib.util.spec_from_file_location(module, file)
-        assert spec is not None
-        assert spec.loader is not None
-        sys.modules[module] = known = importlib.util.module_from_spec(spec)
-        if str(file.parent) not in sys.path:  # processes that press find the module there
-            sys.path.append(str(file.parent))
-        try:
-            spec.loader.exec_module(known)
-        except Exception as error:
-            del sys.modules[module]
-            raise InputError(tuple(key.split(".")), f"{file.name} cannot be run ({error!r})") from error
+    if str(file.parent) not in sys.path:  # processes that press find the module there, too
+        sys.path.append(str(file.parent))
+    importlib.invalidate_caches()
+    try:
+        known = importlib.import_module(module)
+    except Exception as error:
+        raise InputError(place, f"{file.name} cannot be run ({error!r})") from error
     if Path(getattr(known, "__file__", None) or "").resolve() != file:
-        raise InputError(
-            tuple(key.split(".")), f"must be of a module that has a name of its own: {module} is another one"
-        )
+        raise InputError(place, f"must be of a module that has a name of its own: {module} is another one")
     if not hasattr(known, name):
-        raise InputError(tuple(key.split(".")), f"must be an object of {file.name}", repr(name))
+        raise InputError(place, f"must be an object of {file.name}", repr(name))
     return getattr(known, name)
 
 

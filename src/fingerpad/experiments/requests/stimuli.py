@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Annotated, Any, Protocol, runtime_checkable
+from typing import Annotated, Any
 
 import numpy as np
 from pydantic import Discriminator, Strict, Tag
@@ -277,34 +277,6 @@ BAR = "bar"  # The stimuli that are no file: the paper's bar, shifted along the 
 BLOCKS = ("object.", "motion.", "place.")  # How other columns begin.
 
 
-@runtime_checkable
-class Stimuli(Protocol):
-    """Tells which stimulus the entry of a table of recordings means, and how it is pressed."""
-
-    @property
-    def column(self) -> str:
-        """Column of the recordings that names the stimulus."""
-        ...
-
-    @property
-    def conditions(self) -> Conditions:
-        """Finger, tissues and accuracy."""
-        ...
-
-    @property
-    def finger_files(self) -> tuple[Path, ...]:
-        """Files that the finger is read from."""
-        ...
-
-    def named(self, entry: str) -> NamedStimulus:
-        """Stimulus of an entry, the same for equal ones; `InputError` if there is none."""
-        ...
-
-    def touches(self, stimuli: Sequence[NamedStimulus], conditions: Conditions) -> dict[str, Touch]:
-        """One touch per stimulus, by name; `InputError` with its name or its place if one cannot be."""
-        ...
-
-
 @dataclass(frozen=True)
 class ShiftedBar:
     """The paper's stimuli: one bar at several places along the finger."""
@@ -361,6 +333,10 @@ class ListedStimuli:
             receptor = None if wire else conditions.sphere_grading()
             found |= touches_of(same, conditions, self.reach_mm, receptor)
         return {stimulus.name: found[stimulus.name] for stimulus in stimuli}
+
+
+Stimuli = ShiftedBar | ListedStimuli
+"""Tells which stimulus the entry of a table of recordings means, and how it is pressed."""
 
 
 def along_skin(conditions: Conditions) -> float:

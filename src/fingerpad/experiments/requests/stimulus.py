@@ -7,28 +7,18 @@ from contextlib import contextmanager
 from dataclasses import field, fields
 from functools import cached_property, lru_cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, TypeAlias
+from typing import Annotated, Any
 
 from pydantic import Field
 
 from fingerpad.core.checked import value_class
 from fingerpad.core.errors import InputError, Place
 from fingerpad.core.units import unit_of
-from fingerpad.core.values import (
-    Check,
-    Finite,
-    NotNegative,
-    Positive,
-    Text,
-    choice,
-    instance,
-    number_in,
-    one_of,
-)
+from fingerpad.core.values import Check, Finite, NotNegative, Positive, choice, instance, number_in, one_of
 from fingerpad.data import protocol
 from fingerpad.data.tissues import DEFAULT_TISSUES
 from fingerpad.experiments.conditions import Conditions, straight_tilt_deg
-from fingerpad.experiments.requests.parts import Made, Part, Request, at, one_of_kinds
+from fingerpad.experiments.requests.parts import Made, OneOfKinds, Part, Request, at
 from fingerpad.geometry.edged_indenters import INDENTERS
 from fingerpad.geometry.fingertip import Finger, Fingertip
 from fingerpad.geometry.grading import RESOLUTIONS, Grading
@@ -92,17 +82,11 @@ MOTIONS: dict[str, Callable[..., Motion] | str] = {
     "trajectory": "Trajectory",
 }  # How it can move, by kind.
 
-_WITHOUT: Mapping[str, Sequence[str]] = {"trajectory": ("phases", "cycles")}
-"""Parameters that a file does not have."""
+_WITHOUT = {"trajectory": ("phases", "cycles")}  # Parameters that a file does not have.
 
-if TYPE_CHECKING:
-    FingerPart: TypeAlias = Any
-    ObjectPart: TypeAlias = Any
-    MotionPart: TypeAlias = Any
-else:
-    FingerPart = one_of_kinds(FINGERS, default=MEASURED, text=Text, instance=Finger)
-    ObjectPart = one_of_kinds(OBJECTS, text=Text, instance=Indenter)
-    MotionPart = one_of_kinds(MOTIONS, default=RAMP_AND_HOLD, without=_WITHOUT, instance=Motion)
+FingerPart = Annotated[Any, OneOfKinds(FINGERS, Finger, MEASURED, named=True)]
+ObjectPart = Annotated[Any, OneOfKinds(OBJECTS, Indenter, named=True)]
+MotionPart = Annotated[Any, OneOfKinds(MOTIONS, Motion, RAMP_AND_HOLD, without=_WITHOUT)]
 
 
 def made_of(part: Any, beside: Path = Path()) -> Any:
@@ -117,12 +101,23 @@ def finger_of(part: Any, beside: Path = Path()) -> Finger:
         return finger
     if Path(part).suffix.lower() in MESH_FILES:
         return read_finger(beside / part)
-    like, *given = (word.strip() for word in part.split(":"))
-    sizes = [tuple(word.strip() for word in size.partition("=")) for size in given]
-    for _, equals, _ in sizes:
-        if not equals:
-            raise InputError("finger", "must be written like:name=mm, as adult:width_mm=18", repr(part))
-    return Fingertip.of(like, **{name: number_in(name, value, "mm") for name, _, value in sizes})
+    like, sizes = sizes_in("finger", part, "like:name=mm, as adult:width_mm=18")
+    return Fingertip.of(like, **sizes)
+
+
+def sizes_in(what: str, text: str, written: str, names: Sequence[str] = ()) -> tuple[str, dict[str, float]]:
+    """Return the name and the sizes of a text name:size:size=value; those without a name go by `names`."""
+    name, *given = (part.strip() for part in text.split(":"))
+    found: dict[str, str] = {}
+    for place, part in enumerate(given):
+        size, equals, value = (word.strip() for word in part.rpartition("="))
+        if not equals and place >= len(names):
+            raise InputError(what, f"must be written {written}", repr(text))
+        size = size if equals else names[place]
+        if size in found:
+            raise InputError(what, f"must have {size} once", repr(text))
+        found[size] = value
+    return name, {size: number_in(size, value, unit_of(size)) for size, value in found.items()}
 
 
 def object_of(part: Any, beside: Path = Path()) -> Indenter:
@@ -142,23 +137,11 @@ def named_files(part: Any, beside: Path = Path()) -> list[Path]:
 @lru_cache(maxsize=1024)
 def indenter_named(text: str) -> Indenter:
     """Make an indenter from its name and sizes, `name:size:size`."""
-    name, *given = (part.strip() for part in text.split(":"))
+    name = text.partition(":")[0].strip()
     body = INDENTERS[one_of("indenter", name, tuple(INDENTERS))]
-    sizes = [size.name for size in fields(body)]  # type: ignore[arg-type]
-    if len(given) > len(sizes):
-        raise InputError(
-            "indenter",
-            f"must be written {':'.join([name, *sizes])}, sizes from the right may be left out",
-            repr(text),
-        )
-    written: dict[str, str] = {}
-    for place, part in enumerate(given):
-        size, equals, value = (word.strip() for word in part.rpartition("="))
-        size = size if equals else sizes[place]
-        if size in written:
-            raise InputError("indenter", f"must have {size} once", repr(text))
-        written[size] = value
-    return body(**{size: number_in(size, value, unit_of(size)) for size, value in written.items()})
+    names = [size.name for size in fields(body)]  # type: ignore[arg-type]
+    written = f"{':'.join([name, *names])}, sizes from the right may be left out"
+    return body(**sizes_in("indenter", text, written, names)[1])
 
 
 _PLACES: dict[str, Place] = {
