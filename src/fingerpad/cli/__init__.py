@@ -88,7 +88,7 @@ class Program:
     """A program of several commands."""
 
     name: str
-    what: str  # In one sentence.
+    what: str  #: In one sentence.
     commands: Mapping[str, commands.Command]
 
 

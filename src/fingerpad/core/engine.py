@@ -58,8 +58,8 @@ class Engine(Protocol):
 class Processes:
     """Engine of this computer: one process per job, or this process alone."""
 
-    jobs: Count = 1  # Number of processes. With one, or for one item, the work is done here with all threads.
-    kernels: Sequence[Any] = ()  # Those that the work calls: their compilation is announced.
+    jobs: Count = 1  #: Number of processes. With one, or for one item, work is done here with all threads.
+    kernels: Sequence[Any] = ()  #: Those that the work calls: their compilation is announced.
 
     @property
     def width(self) -> int:

@@ -17,8 +17,8 @@ class Phase:
     """A named part of a touch."""
 
     name: str
-    start_ms: Finite  # Since the start of the touch. [ms]
-    end_ms: Finite  # Since the start of the touch. [ms]
+    start_ms: Finite  #: Since the start of the touch. [ms]
+    end_ms: Finite  #: Since the start of the touch. [ms]
 
     def __post_init__(self) -> None:
         if not self.name or not 0.0 <= self.start_ms < self.end_ms:

@@ -59,9 +59,9 @@ class _Stage:
     """How far a stage is."""
 
     total: int
-    began: float  # Reading of the clock at its beginning. [s]
+    began: float  #: Reading of the clock at its beginning. [s]
     done: int = 0
-    share: float = 0.0  # Part of the present one that is done.
+    share: float = 0.0  #: Part of the present one that is done.
 
     @property
     def so_far(self) -> float:

@@ -149,9 +149,9 @@ class Purpose(IntEnum):
 class Presentations:
     """Site, trial and receptor of each spike train; trial and receptor are part of its random key."""
 
-    sites: IntArray  # Column of the current or drive, (n_trains,).
-    trials: IntArray  # Number of the presentation; trains of one receptor need different ones, (n_trains,).
-    receptors: IntArray  # Number of the end organ, (n_trains,).
+    sites: IntArray  #: Column of the current or drive, (n_trains,).
+    trials: IntArray  #: Number of the presentation; trains of one receptor need different ones, (n_trains,).
+    receptors: IntArray  #: Number of the end organ, (n_trains,).
 
     def __post_init__(self) -> None:
         for name in ("sites", "trials", "receptors"):

@@ -48,10 +48,10 @@ MOST_RECEPTORS = 1_000_000  # Upper limit, to detect a wrong unit: the whole fin
 class Layout:
     """Positions of receptors in a plane."""
 
-    places_mm: FiniteMatrix  # In the plane of the region, (n_receptors, 2). [mm]
-    pitch_mm: Positive  # Distance of neighbours in a lattice; 1/sqrt(density) in a random layout. [mm]
+    places_mm: FiniteMatrix  #: In the plane of the region, (n_receptors, 2). [mm]
+    pitch_mm: Positive  #: Distance of neighbours in a lattice; 1/sqrt(density) in a random layout. [mm]
     pattern: Annotated[str, choice(PATTERNS)]
-    seed: NotNegativeWhole | None = None  # Seed of random positions; None for a lattice.
+    seed: NotNegativeWhole | None = None  #: Seed of random positions; None for a lattice.
 
     def __post_init__(self) -> None:
         if self.places_mm.shape[1] != 2 or len(self.places_mm) == 0:
@@ -102,9 +102,9 @@ class Rectangle:
     (18.0, [True, False])
     """
 
-    length_mm: Positive  # Along the first axis. [mm]
-    width_mm: Positive  # Along the second axis. [mm]
-    centre_mm: Point = (0.0, 0.0)  # Its middle. [mm]
+    length_mm: Positive  #: Along the first axis. [mm]
+    width_mm: Positive  #: Along the second axis. [mm]
+    centre_mm: Point = (0.0, 0.0)  #: Its middle. [mm]
 
     @property
     def area_mm2(self) -> float:
@@ -133,9 +133,9 @@ class Ellipse:
     (12.566, [True, False])
     """
 
-    semi_length_mm: Positive  # Semi-axis along the first axis. [mm]
-    semi_width_mm: Positive  # Semi-axis along the second axis. [mm]
-    centre_mm: Point = (0.0, 0.0)  # Its middle. [mm]
+    semi_length_mm: Positive  #: Semi-axis along the first axis. [mm]
+    semi_width_mm: Positive  #: Semi-axis along the second axis. [mm]
+    centre_mm: Point = (0.0, 0.0)  #: Its middle. [mm]
 
     @property
     def area_mm2(self) -> float:
@@ -164,7 +164,7 @@ class Polygon:
     (4.0, [True, False])
     """
 
-    corners_mm: Pairs  # Three or more, in either direction; the last is joined to the first. [mm]
+    corners_mm: Pairs  #: Three or more, in either direction; the last is joined to the first. [mm]
 
     def __post_init__(self) -> None:
         corners = np.array(self.corners_mm)

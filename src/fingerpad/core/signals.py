@@ -110,7 +110,7 @@ class Traces(Result):
     times_ms: FiniteVector
     """In order. A current may jump: its time is repeated once, with the values before and after. The times of
     any other quantity are strictly increasing, (n_times,). [ms]"""
-    values: FiniteMatrix  # Not negative, except those of a current, (n_times, n_sites). [`unit`]
+    values: FiniteMatrix  #: Not negative, except those of a current, (n_times, n_sites). [`unit`]
     kinks_ms: TimesMs = field(default_factory=lambda: np.empty(0))
     """Those of `times_ms` at which the motion changes abruptly, as from ramp to hold: there the rate of
     change is discontinuous, and interpolation must not smooth it, (n_kinks,). [ms]"""
@@ -122,7 +122,7 @@ class Traces(Result):
     than the static term. Its kinks, phases and onset become those of these traces."""
     phases: Many[Phase] = ()
     """Named parts of the touch; by default one kink after the onset separates "ramp" and "hold"."""
-    onset_ms: Finite = None  # type: ignore[assignment]  # a number after initialisation
+    onset_ms: Finite = None  # type: ignore[assignment]  #: a number after initialisation
     """Time of first touch, from which phases and latencies count; interpolation does not smooth it either. By
     default the last time until which all values are 0. [ms]"""
 
@@ -342,8 +342,8 @@ class SpikeTrains(SpikingResult):
     [[1.0, 2.5], [], [4.0]]
     """
 
-    times_ms: FiniteVector  # Afferent by afferent, increasing within each, (n_spikes,). [ms]
-    offsets: Indices  # Afferent `i` has `times_ms[offsets[i]:offsets[i + 1]]`, (n_afferents + 1,).
+    times_ms: FiniteVector  #: Afferent by afferent, increasing within each, (n_spikes,). [ms]
+    offsets: Indices  #: Afferent `i` has `times_ms[offsets[i]:offsets[i + 1]]`, (n_afferents + 1,).
 
     def __post_init__(self) -> None:
         times, offsets = self.times_ms, self.offsets
@@ -430,20 +430,20 @@ class ResponseMap(SpikingResult):
     positions_mm: FiniteMatrix
     """x (distal positive) and z (lateral) of each end organ, or x, y and z of the skin above it,
     (n_receptors, 2 or 3). [mm]"""
-    pitch_mm: Positive  # Distance between neighbours of the layout. [mm]
-    spikes: SpikeTrains  # One train per receptor.
+    pitch_mm: Positive  #: Distance between neighbours of the layout. [mm]
+    spikes: SpikeTrains  #: One train per receptor.
     dynamic_rate_hz: Annotated[FiniteVector, Column("firing rate in the ramp")]
     static_rate_hz: Annotated[FiniteVector, Column("firing rate in the hold")]
     """Firing rates in the two windows, as `rate_measure` says, (n_receptors,). [spikes/s]"""
     first_spike_latency_ms: Annotated[Vector, Column("time from first touch to the first spike", holes=True)]
     """NaN without a spike, (n_receptors,). [ms]"""
-    duration_ms: Positive | None = None  # How long the touch lasted, if that is known. [ms]
-    phases: Many[Phase] = ()  # Named parts of the touch.
-    windows_ms: tuple[Numbers, Numbers] | None = None  # Windows of the two rates, if they are known. [ms]
+    duration_ms: Positive | None = None  #: How long the touch lasted, if that is known. [ms]
+    phases: Many[Phase] = ()  #: Named parts of the touch.
+    windows_ms: tuple[Numbers, Numbers] | None = None  #: Windows of the two rates, if they are known. [ms]
     rate_measure: Annotated[str, choice((INTERVAL, COUNT))] = INTERVAL
     """What the rates are: "interval", one over the mean interval between spikes, Eqs. 6-10, which is 0
     without an interval; or "count", spikes over the length of the window."""
-    quantity: str = STORED_ENERGY  # What the static term of the afferents follows.
+    quantity: str = STORED_ENERGY  #: What the static term of the afferents follows.
     parts: Mapping[str, ResponseMap] = field(default_factory=lambda: MappingProxyType({}))
     """Response of each type of a mixed population, in the order of the receptors; from `joined`."""
 
@@ -610,10 +610,10 @@ RECEPTOR_COLUMNS = columns_of(ResponseMap)
 class HitRates(Result):
     """Hit rate of each comparison with the standard."""
 
-    hit_rate: FiniteVector  # Mean fraction of correct judgements, mu_3, (n_comparisons,). [0-1]
-    hit_rate_sd: FiniteVector  # Its standard deviation over repetitions, sigma_3, (n_comparisons,). [0-1]
+    hit_rate: FiniteVector  #: Mean fraction of correct judgements, mu_3, (n_comparisons,). [0-1]
+    hit_rate_sd: FiniteVector  #: Its standard deviation over repetitions, sigma_3, (n_comparisons,). [0-1]
     seed: Whole | None = None
-    session: Whole = 0  # Key of the random numbers of the noise and the observer, with the seed.
+    session: Whole = 0  #: Key of the random numbers of the noise and the observer, with the seed.
 
     def __post_init__(self) -> None:
         mean, spread = self.hit_rate, self.hit_rate_sd

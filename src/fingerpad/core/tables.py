@@ -24,9 +24,9 @@ Check = Callable[[str, Any, str], float]
 class TableRow:
     """One row of a table and its position in the file."""
 
-    place: str  # File and line, for messages.
-    entries: Mapping[str, Any]  # Texts, or typed values, by column; an absent or empty entry was not given.
-    line: int = 0  # Line of the file; 0 where there are no lines.
+    place: str  #: File and line, for messages.
+    entries: Mapping[str, Any]  #: Texts, or typed values, by column; an absent or empty entry was not given.
+    line: int = 0  #: Line of the file; 0 where there are no lines.
 
     def has(self, column: str) -> bool:
         """Whether this row gives a value for `column`."""

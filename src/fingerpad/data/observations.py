@@ -26,22 +26,22 @@ def packaged_table(name: str) -> dict[str, Any]:
 class BarObservations:
     """Firing rates of one SAI afferent under a bar at several lateral positions."""
 
-    shift_mm: FloatArray  # Position of the bar relative to the centre of the receptive field, (n,). [mm]
+    shift_mm: FloatArray  #: Position of the bar relative to the centre of the receptive field, (n,). [mm]
     dynamic_rate_hz: FloatArray
-    static_rate_hz: FloatArray  # Observed rates during the ramp and the hold, (n,). [spikes/s]
+    static_rate_hz: FloatArray  #: Observed rates during the ramp and the hold, (n,). [spikes/s]
     source: str
-    status: str  # Publication, and status of the numbers (see `STATUSES`).
+    status: str  #: Publication, and status of the numbers (see `STATUSES`).
 
 
 @dataclass(frozen=True)
 class DeflectionObservations:
     """Deflection of the skin's surface along the finger."""
 
-    distance_mm: Vector  # Along the finger from the axis of the indenter, (n,). [mm]
-    deflection_mm: Vector  # Towards the bone, (n,). [mm]
-    is_artefact: TruthVector  # Artefacts of the digitisation; leave them out of comparisons, (n,).
+    distance_mm: Vector  #: Along the finger from the axis of the indenter, (n,). [mm]
+    deflection_mm: Vector  #: Towards the bone, (n,). [mm]
+    is_artefact: TruthVector  #: Artefacts of the digitisation; leave them out of comparisons, (n,).
     source: str
-    status: str  # Publication, and status of the numbers (see `STATUSES`).
+    status: str  #: Publication, and status of the numbers (see `STATUSES`).
 
 
 def bar_firing_rates() -> BarObservations:

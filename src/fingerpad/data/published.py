@@ -36,11 +36,11 @@ class Published(Generic[Value]):
     68.0
     """
 
-    name: str  # Description; unique within the package.
-    value: Value  # The number or numbers, in `unit`.
-    unit: str  # Unit of the value; "1" for pure numbers.
-    source: str  # Source of the value.
-    status: Status  # Reliability of the value; `STATUSES` defines the four words.
+    name: str  #: Description; unique within the package.
+    value: Value  #: The number or numbers, in `unit`.
+    unit: str  #: Unit of the value; "1" for pure numbers.
+    source: str  #: Source of the value.
+    status: Status  #: Reliability of the value; `STATUSES` defines the four words.
 
     def __post_init__(self) -> None:
         for field in ("name", "unit", "source"):
@@ -59,8 +59,8 @@ class Published(Generic[Value]):
 class Source:
     """A publication, and the status of the numbers that were taken from it; called, it makes one of them."""
 
-    text: str  # Where the numbers stand.
-    status: Status  # Their reliability, see `STATUSES`.
+    text: str  #: Where the numbers stand.
+    status: Status  #: Their reliability, see `STATUSES`.
 
     def __call__(self, name: str, value: Value, unit: str) -> Published[Value]:
         return Published(name, value, unit, self.text, self.status)

@@ -38,10 +38,10 @@ SUFFIXES_OF_NWB = (".nwb", ".h5", ".hdf5")
 class Recorded:
     """Recordings with the stimuli they belong to."""
 
-    recordings: RateRecordings | SpikeRecordings  # What the afferent answered.
-    stimuli: Mapping[str, NamedStimulus]  # What touched it, in the order of their first presentations.
-    memberships: NDArray[np.int64] | None  # Fold of each stimulus, from 0, if the file says so, (n_stimuli,).
-    presentations: Mapping[str, int]  # How often each was presented.
+    recordings: RateRecordings | SpikeRecordings  #: What the afferent answered.
+    stimuli: Mapping[str, NamedStimulus]  #: What touched it, in the order of their first presentations.
+    memberships: NDArray[np.int64] | None  #: Fold of each stimulus, from 0, if the file says, (n_stimuli,).
+    presentations: Mapping[str, int]  #: How often each was presented.
     spikes_after_hold: int = 0
     """Spikes that came after the motion had ended and are not used, since the model ends there."""
 

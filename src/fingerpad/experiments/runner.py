@@ -45,24 +45,24 @@ class MeshSummary:
     """Size and quality of one mesh."""
 
     nodes: int
-    elements: int  # How many.
-    smallest_gauss_jacobian_mm3: Number  # Smallest determinant of the Jacobian at a Gauss point. [mm³]
-    smallest_scaled_jacobian: Number  # Smallest scaled Jacobian of an element, 1 for a cube.
+    elements: int  #: How many.
+    smallest_gauss_jacobian_mm3: Number  #: Smallest determinant of the Jacobian at a Gauss point. [mm³]
+    smallest_scaled_jacobian: Number  #: Smallest scaled Jacobian of an element, 1 for a cube.
 
 
 @result_class
 class StageSummary:
     """One stage of a run."""
 
-    name: str  # What was done.
-    wall_s: float  # Time on the clock. [s]
+    name: str  #: What was done.
+    wall_s: float  #: Time on the clock. [s]
     indentations: int | None = None
-    computed: int | None = None  # How many indentations the stage read, and how many of them this run solved.
+    computed: int | None = None  #: How many indentations the stage read, and how many this run solved.
     largest_force_imbalance: float | None = None
     largest_energy_imbalance: float | None = None
     """Largest relative imbalance of the forces and of the energies of an indentation."""
-    linear_solvers: tuple[str, ...] = ()  # Which solvers served the Newton steps.
-    caveats: tuple[str, ...] = ()  # Where indentations lie outside of what was verified, each sentence once.
+    linear_solvers: tuple[str, ...] = ()  #: Which solvers served the Newton steps.
+    caveats: tuple[str, ...] = ()  #: Where indentations lie outside of what was verified, each sentence once.
 
 
 @result_class
@@ -72,19 +72,19 @@ class Manifest:
     version: str
     code_hash: str
     python: str
-    platform: str  # The program, the code behind stored indentations, and the machine's system.
-    packages: dict[str, str]  # Versions of the packages on which the numbers depend.
-    resolution: str  # How fine meshes and steps are.
-    materials: str  # Tissues: their name, or how they are written in Python.
-    seed: int  # Seed of all random numbers.
-    started: str  # Date and time, UTC.
+    platform: str  #: The program, the code behind stored indentations, and the machine's system.
+    packages: dict[str, str]  #: Versions of the packages on which the numbers depend.
+    resolution: str  #: How fine meshes and steps are.
+    materials: str  #: Tissues: their name, or how they are written in Python.
+    seed: int  #: Seed of all random numbers.
+    started: str  #: Date and time, UTC.
     wall_s: float
-    peak_memory_mb: float  # Time on the clock and largest resident memory of a process. [s], [MB]
-    stages: tuple[StageSummary, ...]  # In the order of the run.
-    meshes: dict[str, MeshSummary]  # By what is pressed.
-    half_model: bool | None = None  # Whether the finger is cut at its plane of symmetry.
-    command: str | None = None  # The command line.
-    inputs: dict[str, str]  # SHA-256 of the input files, by name.
+    peak_memory_mb: float  #: Time on the clock and largest resident memory of a process. [s], [MB]
+    stages: tuple[StageSummary, ...]  #: In the order of the run.
+    meshes: dict[str, MeshSummary]  #: By what is pressed.
+    half_model: bool | None = None  #: Whether the finger is cut at its plane of symmetry.
+    command: str | None = None  #: The command line.
+    inputs: dict[str, str]  #: SHA-256 of the input files, by name.
 
     @property
     def caveats(self) -> tuple[str, ...]:

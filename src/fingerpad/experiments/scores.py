@@ -42,8 +42,8 @@ class ObservedRanges:
     """Lowest and highest observation under each condition."""
 
     low: FloatArray
-    high: FloatArray  # Of the condition of each row, (n_rows,).
-    first: tuple[int, ...]  # First row of each condition.
+    high: FloatArray  #: Of the condition of each row, (n_rows,).
+    first: tuple[int, ...]  #: First row of each condition.
     repeated: np.ndarray
     """Whether the condition of a row was observed at least twice, so that its range can judge, (n_rows,)."""
 

@@ -57,10 +57,10 @@ class TissueLayer:
     """One layer of a named set of tissues."""
 
     tissues: str
-    layer: str  # Name of the set, and of the layer.
-    law: str  # Strain energy.
+    layer: str  #: Name of the set, and of the layer.
+    law: str  #: Strain energy.
     shear_kpa: float
-    shear_at_once_kpa: float  # Shear modulus for small strains, long-term and instantaneous. [kPa]
+    shear_at_once_kpa: float  #: Shear modulus for small strains, long-term and instantaneous. [kPa]
     poisson: float
     poisson_at_once: float
     """Poisson's ratio for small strains, long-term and instantaneous: only the deviator relaxes."""
@@ -69,8 +69,8 @@ class TissueLayer:
     """Shares of the instantaneous modulus that relax, and their times. [1, s]"""
     modulus_status: str
     poisson_status: str
-    prony_status: str  # Status of these numbers, see `fingerpad.data.STATUSES`; empty without relaxation.
-    source: str  # Of the moduli.
+    prony_status: str  #: Status of these numbers, see `fingerpad.data.STATUSES`; empty without relaxation.
+    source: str  #: Of the moduli.
 
 
 def tissue_layers() -> tuple[TissueLayer, ...]:

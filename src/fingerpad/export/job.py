@@ -38,31 +38,31 @@ class Phase:
     """Consecutive steps of equal length at constant speed."""
 
     start_ms: float
-    end_ms: float  # Begin and end. [ms]
+    end_ms: float  #: Begin and end. [ms]
     steps: int
-    depth_mm: float  # Depth at its end. [mm]
+    depth_mm: float  #: Depth at its end. [mm]
 
 
 @dataclass(frozen=True)
 class Support:
     """Nodes that are held."""
 
-    name: str  # Name of their set in a deck.
+    name: str  #: Name of their set in a deck.
     nodes: IntArray
-    axes: tuple[int, int]  # First and last axis along which they are held, 1 for x to 3 for z.
+    axes: tuple[int, int]  #: First and last axis along which they are held, 1 for x to 3 for z.
 
 
 @value_class
 class Job:
     """One indentation, described for another solver."""
 
-    mesh: Mesh  # The body; its bone and nail are fixed.
-    materials: tuple[Material, ...]  # One per layer of the mesh.
+    mesh: Mesh  #: The body; its bone and nail are fixed.
+    materials: tuple[Material, ...]  #: One per layer of the mesh.
     indenter: Indenter
-    placement: Placement  # Its position at first touch.
-    times_ms: TimesMs  # Steps, from 0, (n_times,). [ms]
-    depths_mm: FiniteVector  # How far the indenter has advanced at each, from 0, (n_times,). [mm]
-    friction: Finite = 0.0  # Coulomb's coefficient between skin and indenter.
+    placement: Placement  #: Its position at first touch.
+    times_ms: TimesMs  #: Steps, from 0, (n_times,). [ms]
+    depths_mm: FiniteVector  #: How far the indenter has advanced at each, from 0, (n_times,). [mm]
+    friction: Finite = 0.0  #: Coulomb's coefficient between skin and indenter.
 
     def __post_init__(self) -> None:
         times, depths = self.times_ms, self.depths_mm

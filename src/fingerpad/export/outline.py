@@ -41,8 +41,8 @@ SHELL_MM = 0.1  # Thickness of their solid elements. [mm]
 class Outline:
     """Section of a rigid indenter."""
 
-    revolved: bool  # Whether it turns about the axis of pressing; else it is swept along z.
-    corners: tuple[Point, ...]  # u and y where segments meet. [mm]
+    revolved: bool  #: Whether it turns about the axis of pressing; else it is swept along z.
+    corners: tuple[Point, ...]  #: u and y where segments meet. [mm]
     centres: tuple[Point | None, ...]
     """For each segment the centre of its arc, or None for a straight line. [mm]"""
     middles: tuple[float, ...] = (0.0,)
@@ -154,8 +154,8 @@ class RigidMesh:
 
     nodes_mm: FloatArray
     """The outer nodes, then as many inner ones, in the indenter's frame, (n_nodes, 3). [mm]"""
-    quads: IntArray  # Outer nodes, counter-clockwise seen from the skin, (n_quads, 4).
-    triangles: IntArray  # The same about the axis of a body of revolution, (n_triangles, 3).
+    quads: IntArray  #: Outer nodes, counter-clockwise seen from the skin, (n_quads, 4).
+    triangles: IntArray  #: The same about the axis of a body of revolution, (n_triangles, 3).
 
     @property
     def outer_mm(self) -> FloatArray:

@@ -220,7 +220,7 @@ class Writer:
     """How a result becomes a file."""
 
     write: Callable[..., None]
-    needs: str = "columns"  # Attribute of the results that it writes.
+    needs: str = "columns"  #: Attribute of the results that it writes.
 
 
 WRITERS: dict[str, Writer] = {

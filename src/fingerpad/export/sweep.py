@@ -70,16 +70,16 @@ _WRITE_EVERY_S, _WRITE_EVERY = 5.0, 256
 class SweepOutcome:
     """What a run of a sweep did."""
 
-    path: Path  # The data set.
+    path: Path  #: The data set.
     settings: int
     done: int
     failed: int
     left_out: int
     """Number of settings: all, those with a result, those that failed, those that `where` leaves out."""
     pressed: int
-    loaded: int  # Presses that this run solved, and those that it read from the store.
+    loaded: int  #: Presses that this run solved, and those that it read from the store.
     press_s: float
-    wall_s: float  # Time of all presses, summed over processes, and on the clock. [s]
+    wall_s: float  #: Time of all presses, summed over processes, and on the clock. [s]
 
     @property
     def lines(self) -> tuple[str, ...]:

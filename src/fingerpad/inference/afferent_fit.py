@@ -68,7 +68,7 @@ class ReceptorOffset:
 
     offsets_mm: FloatArray
     """Offsets at which the drive is sampled, distal positive, increasing, (n_offsets,). [mm]"""
-    models: Sequence[AfferentModel]  # The model at each offset, all with the same stimuli and times.
+    models: Sequence[AfferentModel]  #: The model at each offset, all with the same stimuli and times.
 
     def __post_init__(self) -> None:
         offsets = increasing("offsets_mm", float_array("offsets_mm", self.offsets_mm, 1))
@@ -302,13 +302,13 @@ class TypedModel:
 class TypedFit:
     """An afferent of any type as it was fitted to recorded rates."""
 
-    afferent: AnyAfferent  # With the fitted numbers.
+    afferent: AnyAfferent  #: With the fitted numbers.
     free: tuple[str, ...]
     fss_in_sample: float
     fss_out_of_sample: float
     """Fractional sum of squares of the fit to all stimuli, and its mean over stimuli left out of folds."""
     dynamic_rate_hz: FloatArray
-    static_rate_hz: FloatArray  # Rates of the afferent under all stimuli, (n_stimuli,). [spikes/s]
+    static_rate_hz: FloatArray  #: Rates of the afferent under all stimuli, (n_stimuli,). [spikes/s]
 
 
 def _largest_factor(afferent: AnyAfferent, name: str) -> float:
@@ -416,11 +416,11 @@ class RatesAndHitRates:
     validation leaves out rates only.
     """
 
-    rates: RateProblem  # Recorded rates and the model that predicts them.
+    rates: RateProblem  #: Recorded rates and the model that predicts them.
     hit_rates: Callable[[FloatArray], FloatArray]
     """From the parameters of that model to predicted hit rates (n,). [0-1]"""
-    observed: FloatArray  # Hit rates of people, (n,). [0-1]
-    weight: float = WEIGHT  # Weight w of the squared differences against FSS.
+    observed: FloatArray  #: Hit rates of people, (n,). [0-1]
+    weight: float = WEIGHT  #: Weight w of the squared differences against FSS.
 
     @property
     def n_observations(self) -> int:
@@ -445,10 +445,10 @@ class SphereHitRates:
     model: SkipValidation[RateModel]
     """Rates, a column per receptor, sphere and position, receptors fastest and positions slowest."""
     n_positions: int
-    n_receptors: int  # Sizes; the number of spheres, the standard first, follows.
-    neighbours: np.ndarray  # Pairs of the Gradient Sum, (n_pairs, 2).
+    n_receptors: int  #: Sizes; the number of spheres, the standard first, follows.
+    neighbours: np.ndarray  #: Pairs of the Gradient Sum, (n_pairs, 2).
     noise_sigma: float
-    standard_normals: FloatArray  # Common random presentations of the Gradient Sum, (n_draws, n_receptors).
+    standard_normals: FloatArray  #: Common random presentations of the Gradient Sum, (n_draws, n_receptors).
 
     def __call__(self, parameters: FloatArray) -> FloatArray:
         """Hit rates (n,): by position Gradient Sum, then Euclidean Distance, one per comparison. [0-1]"""
@@ -473,9 +473,9 @@ class ToRatesAndHitRates:
     `RatesAndHitRates`. The scores of the result are FSS of the rates alone.
     """
 
-    hit_rates: SphereHitRates  # Predicts hit rates from the paper's six parameters.
-    observed: FloatArray  # Hit rates of people, in the same order, (n,). [0-1]
-    seed: int = 0  # Of CMA-ES.
+    hit_rates: SphereHitRates  #: Predicts hit rates from the paper's six parameters.
+    observed: FloatArray  #: Hit rates of people, in the same order, (n,). [0-1]
+    seed: int = 0  #: Of CMA-ES.
     name: str = "rates and hit rates"
 
     def fit(self, problem: Problem, chosen: IntArray) -> Fit:

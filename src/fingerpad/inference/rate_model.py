@@ -91,11 +91,11 @@ class AfferentModel:
     [63.0, 63.0, 63.0]
     """
 
-    drives: Many[Drive]  # One per group of stimuli with the same times, so that a group is simulated at once.
-    stimuli: Many[IntArray]  # Stimulus number of each column of each drive; every stimulus once.
+    drives: Many[Drive]  #: One per group of stimuli with the same times, simulated at once.
+    stimuli: Many[IntArray]  #: Stimulus number of each column of each drive; every stimulus once.
     windows_ms: Windows | None = None
     """Windows of the dynamic and of the static rate; by default those of the phases of the stimuli. [ms]"""
-    refractory_ms: NotNegative = neuron.REFRACTORY.value  # Refractory period, which is not fitted. [ms]
+    refractory_ms: NotNegative = neuron.REFRACTORY.value  #: Refractory period, which is not fitted. [ms]
     initial_mv: Finite | None = None
     """Potential at the start, as of `Afferent`: that at rest by default. [mV]"""
 
@@ -197,7 +197,7 @@ class Reparametrised:
 
     model: SkipValidation[RateModel]
     names: tuple[str, ...]
-    transform: Callable[[FloatArray], FloatArray]  # From the new parameters to those of `model`.
+    transform: Callable[[FloatArray], FloatArray]  #: From the new parameters to those of `model`.
 
     @property
     def n_stimuli(self) -> int:
@@ -289,8 +289,8 @@ class RateProblem:
     Gerling et al. 2014, Eqs. 12-14. The sums run over the chosen stimuli.
     """
 
-    model: SkipValidation[RateModel]  # Predicts the rates under all stimuli, in the order of the recordings.
-    recordings: RateRecordings  # Observed rates. A phase that was not recorded does not enter the score.
+    model: SkipValidation[RateModel]  #: Predicts the rates under all stimuli, in the order of the recordings.
+    recordings: RateRecordings  #: Observed rates. A phase that was not recorded does not enter the score.
     dynamic_weight: NotNegative = protocol.DYNAMIC_WEIGHT.value
     static_weight: NotNegative = protocol.STATIC_WEIGHT.value
     """Weights of the two phases where both were recorded, Eq. 12. [1]"""

@@ -57,8 +57,8 @@ class CorrelatedResiduals:
     n_residuals: Whole
     positions_mm: FiniteVector | None = None
     """Their places along a line; default: independent residuals, (n_residuals,). [mm]"""
-    lengths_mm: Numbers = LENGTHS_MM  # Grid of correlation lengths; 0 for independence. [mm]
-    deviation: Positive = DEVIATION_HZ  # Scale s of the prior of sigma. [unit of the residuals]
+    lengths_mm: Numbers = LENGTHS_MM  #: Grid of correlation lengths; 0 for independence. [mm]
+    deviation: Positive = DEVIATION_HZ  #: Scale s of the prior of sigma. [unit of the residuals]
     _whitening: FloatArray = field(init=False, repr=False, compare=False)
     _log_weights: FloatArray = field(init=False, repr=False, compare=False)
 
@@ -115,9 +115,9 @@ class CorrelatedResiduals:
 class RateLikelihood:
     """Likelihood of the parameters of a rate model, given the observed rates of one afferent."""
 
-    model: RateModel  # Predicts the rates under all stimuli.
-    recordings: RateRecordings  # Observed rates, one row per stimulus.
-    residuals: CorrelatedResiduals  # Those of either phase, one per stimulus. [spikes/s]
+    model: RateModel  #: Predicts the rates under all stimuli.
+    recordings: RateRecordings  #: Observed rates, one row per stimulus.
+    residuals: CorrelatedResiduals  #: Those of either phase, one per stimulus. [spikes/s]
 
     def __post_init__(self) -> None:
         self.recordings.check_stimuli(self.model.n_stimuli)
@@ -156,8 +156,8 @@ class ResidualDraws:
     predicted_hz: FloatArray
     new_hz: FloatArray
     """Predicted rates, and rates with a random residual, not below 0, (n_points, n_stimuli). [spikes/s]"""
-    deviation_hz: FloatArray  # Standard deviation sigma, (n_points,). [spikes/s]
-    length_mm: FloatArray  # Correlation length of the residuals; 0 if they are independent, (n_points,). [mm]
+    deviation_hz: FloatArray  #: Standard deviation sigma, (n_points,). [spikes/s]
+    length_mm: FloatArray  #: Correlation length of the residuals; 0 if independent, (n_points,). [mm]
 
 
 def _whitening(distances_mm: FloatArray, length_mm: float) -> FloatArray:
@@ -207,7 +207,7 @@ class AfferentPrior:
     """
 
     centre: FloatArray
-    spread: FloatArray  # Mean and standard deviation of each coordinate, (4,).
+    spread: FloatArray  #: Mean and standard deviation of each coordinate, (4,).
 
     def log_density(self, coordinates: FloatArray) -> FloatArray:
         """Log density of rows of coordinates, up to a constant; -inf where it is impossible."""
@@ -227,8 +227,8 @@ thirds of it lie within a factor of 10 of the gains and of 2 of tau; docs/decisi
 class AfferentPosterior:
     """Posterior draws of the four identifiable parameters and of the rates that they predict."""
 
-    chains: Chains  # Draws in the coordinates, with their measures of convergence.
-    four: FloatArray  # The same draws as the four identifiable parameters, (n_draws, 4).
+    chains: Chains  #: Draws in the coordinates, with their measures of convergence.
+    four: FloatArray  #: The same draws as the four identifiable parameters, (n_draws, 4).
     rates: dict[str, ResidualDraws]
     """By phase, for some of the draws: predicted rates, new recordings, sigma and length."""
 

@@ -31,11 +31,11 @@ class RateRecordings:
     [212.0]
     """
 
-    stimuli: Many[str]  # Names of the stimuli, without repetition.
+    stimuli: Many[str]  #: Names of the stimuli, without repetition.
     dynamic_rate_hz: FiniteVector | None
     static_rate_hz: FiniteVector | None
     """Rates in the ramp and in the hold; None for a phase that was not recorded, (n_stimuli,). [spikes/s]"""
-    source: str = ""  # Origin of the recordings.
+    source: str = ""  #: Origin of the recordings.
 
     def __post_init__(self) -> None:
         twice = sorted(name for name, count in Counter(self.stimuli).items() if count > 1)
@@ -92,11 +92,11 @@ class SpikeRecordings:
     (('edge', 'flat'), [61.9, 0.0])
     """
 
-    stimuli: Many[str]  # Stimulus of each presentation, repeated if it was presented several times.
-    trains: SpikeTrains  # One train per presentation, times from the onset of the indentation. [ms]
+    stimuli: Many[str]  #: Stimulus of each presentation, repeated if it was presented several times.
+    trains: SpikeTrains  #: One train per presentation, times from the onset of the indentation. [ms]
     duration_ms: FiniteArray
     """Duration of each recording, or of all of them, from the onset, (n_presentations,). [ms]"""
-    source: str = ""  # Origin of the recordings.
+    source: str = ""  #: Origin of the recordings.
 
     def __post_init__(self) -> None:
         if len(self.trains) != len(self.stimuli):

@@ -219,13 +219,13 @@ class SpikeLikelihood:
     -9998.8
     """
 
-    drive: Drive  # Strain energy density U and its rate U' at each stimulus, one column per stimulus.
-    trains: SpikeTrains  # One train per presentation. [ms]
-    sites: Indices | None = None  # Column of the drive of each train. Default: in order, (n_trains,).
+    drive: Drive  #: Strain energy density U and its rate U' at each stimulus, one column per stimulus.
+    trains: SpikeTrains  #: One train per presentation. [ms]
+    sites: Indices | None = None  #: Column of the drive of each train. Default: in order, (n_trains,).
     duration_ms: FiniteArray | None = None
     """End of each recording. Default: the end of the drive, (n_trains,). [ms]"""
-    refractory_ms: Positive = neuron.REFRACTORY.value  # Refractory period, which is not fitted. [ms]
-    escape_ms: Positive = ESCAPE_TIME_MS  # tau_e, a convention. [ms]
+    refractory_ms: Positive = neuron.REFRACTORY.value  #: Refractory period, which is not fitted. [ms]
+    escape_ms: Positive = ESCAPE_TIME_MS  #: tau_e, a convention. [ms]
     _intervals: tuple[FloatArray, np.ndarray, np.ndarray] = field(init=False, repr=False, compare=False)
 
     def __post_init__(self) -> None:
@@ -327,7 +327,7 @@ class TimeRescaling:
 
     quantiles: FloatArray
     """1 - exp(-rescaled interval) of each interval, sorted: uniform under the model, (n_spikes,)."""
-    statistic: float  # Kolmogorov-Smirnov distance between their distribution and the uniform one.
+    statistic: float  #: Kolmogorov-Smirnov distance between their distribution and the uniform one.
     p_value: float
     """Probability of a larger distance under the true parameters; for fitted ones it is too large."""
 
@@ -369,11 +369,11 @@ _LONGEST_STEP_OF_LOG_TAU = 1.0
 class SpikeFit(Result):
     """Maximum-likelihood parameters and their covariance."""
 
-    parameters: FloatArray  # In the order of `fingerpad.inference.identifiable.SPIKE_PARAMETER_NAMES`, (5,).
-    covariance: FloatArray  # Inverse of the Fisher information, (5, 5).
-    log_likelihood: Number  # At the parameters.
-    n_spikes: Whole  # In all trains.
-    history: Numbers  # log L at the start and after each step.
+    parameters: FloatArray  #: In the order of `fingerpad.inference.identifiable.SPIKE_PARAMETER_NAMES`, (5,).
+    covariance: FloatArray  #: Inverse of the Fisher information, (5, 5).
+    log_likelihood: Number  #: At the parameters.
+    n_spikes: Whole  #: In all trains.
+    history: Numbers  #: log L at the start and after each step.
 
     def __repr__(self) -> str:
         (memory_ms, width), (memory_error, width_error) = self.parameters[3:], self.standard_errors[3:]
@@ -522,9 +522,9 @@ def soft_spikes(
 class SoftAfferent:
     """Mean rates of an afferent with a soft threshold; a `RateModel` in the five parameters of its spikes."""
 
-    drive: Drive  # One column per stimulus.
-    windows_ms: Windows  # Windows of the dynamic and of the static rate. [ms]
-    seed: int  # Seed of the simulated presentations, the same for all parameters.
+    drive: Drive  #: One column per stimulus.
+    windows_ms: Windows  #: Windows of the dynamic and of the static rate. [ms]
+    seed: int  #: Seed of the simulated presentations, the same for all parameters.
 
     @property
     def names(self) -> tuple[str, ...]:

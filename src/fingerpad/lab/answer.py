@@ -51,21 +51,21 @@ BOUNDS = {
 class LabState:
     """What is pressed, how, and by whom it is felt."""
 
-    object: Text  # Name of what is pressed in.
-    other: str = ""  # What it is compared with, pressed in the same way; empty for nothing.
+    object: Text  #: Name of what is pressed in.
+    other: str = ""  #: What it is compared with, pressed in the same way; empty for nothing.
     size: Annotated[float, limits(*BOUNDS["size"])] = 0.0
     other_size: Annotated[float, limits(*BOUNDS["other_size"])] = 0.0
     """The parameter of both that varies, such as the curvature; 0 for that of the range's middle."""
     finger: str = ""
-    tissues: str = ""  # By name; empty for those of the range.
+    tissues: str = ""  #: By name; empty for those of the range.
     afferent: Annotated[str, choice(AFFERENTS)] = "SAI"
     x_mm: Annotated[float, limits(*BOUNDS["x_mm"])] = 0.0
     z_mm: Annotated[float, limits(*BOUNDS["z_mm"])] = 0.0
     tilt_deg: Annotated[float, limits(*BOUNDS["tilt_deg"])] = 0.0
     """Pose of the object, from its place and direction. [mm, degrees]"""
-    depth_mm: Annotated[float, limits(*BOUNDS["depth_mm"])] = 1.0  # Below first touch. [mm]
-    slide_mm: Annotated[float, limits(*BOUNDS["slide_mm"])] = 0.0  # Along the finger in the hold. [mm]
-    ramp_ms: Annotated[float, limits(*BOUNDS["ramp_ms"])] = 100.0  # Of the press and of the lift. [ms]
+    depth_mm: Annotated[float, limits(*BOUNDS["depth_mm"])] = 1.0  #: Below first touch. [mm]
+    slide_mm: Annotated[float, limits(*BOUNDS["slide_mm"])] = 0.0  #: Along the finger in the hold. [mm]
+    ramp_ms: Annotated[float, limits(*BOUNDS["ramp_ms"])] = 100.0  #: Of the press and of the lift. [ms]
     hold_ms: Annotated[float, limits(*BOUNDS["hold_ms"])] = 500.0
 
 
@@ -103,11 +103,11 @@ class Answer:
     contact_area_mm2: FloatArray
     """Depth below the first touch of the range, force, what it lies within for 95 % of touches (0 in full,
     infinite if not measured), and undeformed skin in contact, (n_times,). [mm, mN, mN, mm²]"""
-    middle_mm: FloatArray  # Middle of the contact, x and z, (n_times, 2). [mm]
+    middle_mm: FloatArray  #: Middle of the contact, x and z, (n_times, 2). [mm]
     x_mm: FloatArray
-    z_mm: FloatArray  # Points of the map, (nx,). [mm]
-    sed_kpa: FloatArray  # Energy density at the end organs; NaN off the pad, (n_times, nx, nz). [kPa]
-    response: ResponseMap  # Spikes and rates of the afferents.
+    z_mm: FloatArray  #: Points of the map, (nx,). [mm]
+    sed_kpa: FloatArray  #: Energy density at the end organs; NaN off the pad, (n_times, nx, nz). [kPa]
+    response: ResponseMap  #: Spikes and rates of the afferents.
 
 
 def shape_of(described: ReductionRequest, size: float) -> tuple[float, ...]:

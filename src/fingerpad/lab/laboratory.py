@@ -43,9 +43,9 @@ KEPT_ANSWERS = 16  # Answers that are kept, so that a comparison and a second us
 class Making:
     """A computation that is under way."""
 
-    what: str  # In words.
+    what: str  #: In words.
     done: int = 0
-    total: int = 0  # Finished presses, and all of them; 0 before that is known.
+    total: int = 0  #: Finished presses, and all of them; 0 before that is known.
 
 
 @checked_class

@@ -25,33 +25,33 @@ class Shown:
     force_mn: list[float]
     error_mn: list[float]
     area_mm2: list[float]
-    largest_kpa: list[float]  # Force error: 0 if not measured; largest: strain energy density.
-    contact_mm: list[list[float]]  # Middle, half-axes and angle of an ellipse of its area. [mm, rad]
-    peak_kpa: float  # Value of the byte 254 of `frames`. [kPa]
-    frames_ms: list[float]  # Times of the map. [ms]
-    frames: str  # The map at these times, bytes (n_frames, nx, nz) in base 64.
-    spikes: list[list[float]]  # Spike times of each afferent. [ms]
+    largest_kpa: list[float]  #: Force error: 0 if not measured; largest: strain energy density.
+    contact_mm: list[list[float]]  #: Middle, half-axes and angle of an ellipse of its area. [mm, rad]
+    peak_kpa: float  #: Value of the byte 254 of `frames`. [kPa]
+    frames_ms: list[float]  #: Times of the map. [ms]
+    frames: str  #: The map at these times, bytes (n_frames, nx, nz) in base 64.
+    spikes: list[list[float]]  #: Spike times of each afferent. [ms]
 
 
 @dataclass(frozen=True)
 class View:
     """All that the page shows of a state."""
 
-    answer: Shown  # The answer of the reduced touch.
+    answer: Shown  #: The answer of the reduced touch.
     x_mm: list[float]
-    z_mm: list[float]  # Points of the map. [mm]
-    pad_mm: list[float]  # Place of the touch. [mm]
-    outline_mm: list[list[float]]  # x and half-width of the finger. [mm]
-    positions_mm: list[list[float]]  # Afferents. [mm]
-    order: list[int]  # Afferents by their distance from the contact.
-    shown_ms: float  # End of the hold. [ms]
+    z_mm: list[float]  #: Points of the map. [mm]
+    pad_mm: list[float]  #: Place of the touch. [mm]
+    outline_mm: list[list[float]]  #: x and half-width of the finger. [mm]
+    positions_mm: list[list[float]]  #: Afferents. [mm]
+    order: list[int]  #: Afferents by their distance from the contact.
+    shown_ms: float  #: End of the hold. [ms]
     said: str
-    python: str  # What is pressed, and Python lines that reproduce it.
+    python: str  #: What is pressed, and Python lines that reproduce it.
     other: Shown | None = None
-    compared: str = ""  # What observers say of both.
+    compared: str = ""  #: What observers say of both.
     exact: Shown | None = None
-    difference: str = ""  # How far the reduced answer is from it.
-    making: Making | None = None  # How far the reduced touch is, while the answer is in full.
+    difference: str = ""  #: How far the reduced answer is from it.
+    making: Making | None = None  #: How far the reduced touch is, while the answer is in full.
 
 
 def view_of(laboratory: Laboratory, state: LabState, exact: bool = False) -> View | Making:

@@ -122,17 +122,17 @@ class Afferent:
     ([217.0], [63.0])
     """
 
-    rate_measure: ClassVar[str] = INTERVAL  # What its rates are, as of `ResponseMap`: those of Eqs. 6-10.
+    rate_measure: ClassVar[str] = INTERVAL  #: What its rates are, as of `ResponseMap`: those of Eqs. 6-10.
 
-    intercept_ma: Finite = neuron.HUMAN_INTERCEPT.value  # Current without any load, beta. [mA]
+    intercept_ma: Finite = neuron.HUMAN_INTERCEPT.value  #: Current without any load, beta. [mA]
     dynamic_gain: Finite = neuron.HUMAN_DYNAMIC_GAIN.value
     """Gain on the rate of change of what the dynamic term follows, k_d. [mA ms/kPa, or per its unit]"""
     static_gain: Finite = neuron.HUMAN_STATIC_GAIN.value
     """Gain on what the static term follows, k_s. [mA/kPa, or per its unit]"""
-    time_constant_ms: Finite = neuron.HUMAN_TIME_CONSTANT.value  # Time constant of the membrane, tau. [ms]
-    capacitance_mf: Finite = neuron.CAPACITANCE.value  # Capacitance of the membrane, C. [mF]
-    threshold_mv: Finite = neuron.THRESHOLD.value  # Potential that elicits a spike, v. [mV]
-    refractory_ms: Finite = neuron.REFRACTORY.value  # Refractory period after each spike. [ms]
+    time_constant_ms: Finite = neuron.HUMAN_TIME_CONSTANT.value  #: Time constant of the membrane, tau. [ms]
+    capacitance_mf: Finite = neuron.CAPACITANCE.value  #: Capacitance of the membrane, C. [mF]
+    threshold_mv: Finite = neuron.THRESHOLD.value  #: Potential that elicits a spike, v. [mV]
+    refractory_ms: Finite = neuron.REFRACTORY.value  #: Refractory period after each spike. [ms]
     dynamic_quantity: SkinQuantity = neuron.HUMAN_QUANTITY
     static_quantity: SkinQuantity = neuron.HUMAN_QUANTITY
     """What the two terms follow, by the names of `SkinResponse.sample`: compressive stress, unless another
@@ -145,7 +145,7 @@ class Afferent:
     """Time constant tau_s of a low pass before the dynamic term, which then follows the absolute rate of S
     with tau_s dS/dt + S = Q; 0, as in the paper, for none. It makes an afferent right under vibration: the
     rate of change of a fast one would otherwise make it as sensitive at 400 Hz as at 20 Hz. [ms]"""
-    type: str = "SAI"  # Name of its type, of `fingerpad.data.afferents.TYPES` or of one's own.
+    type: str = "SAI"  #: Name of its type, of `fingerpad.data.afferents.TYPES` or of one's own.
 
     def __post_init__(self) -> None:
         # Both stages check their parameters when they are made.

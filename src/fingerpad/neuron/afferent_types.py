@@ -48,14 +48,14 @@ class RapidlyAdapting:
     threshold: Positive
     """Band-passed quantity that, if it stayed, would just bring the membrane to its threshold. [kPa, or the
     unit of the quantity]"""
-    corner_hz: Finite  # Corner frequency of the band pass. [Hz]
+    corner_hz: Finite  #: Corner frequency of the band pass. [Hz]
     rise: Whole
-    fall: Whole  # Its powers of the frequency below and above the corner.
-    retraction: Share  # Share of the response to a decreasing quantity, 0 to 1. [1]
-    membrane_ms: Finite  # Time constant of the membrane. [ms]
-    refractory_ms: Finite  # Refractory period. [ms]
-    quantity: str  # What is followed, by the names of `SkinResponse.sample`.
-    type: str = "rapidly adapting"  # Name of its type.
+    fall: Whole  #: Its powers of the frequency below and above the corner.
+    retraction: Share  #: Share of the response to a decreasing quantity, 0 to 1. [1]
+    membrane_ms: Finite  #: Time constant of the membrane. [ms]
+    refractory_ms: Finite  #: Refractory period. [ms]
+    quantity: str  #: What is followed, by the names of `SkinResponse.sample`.
+    type: str = "rapidly adapting"  #: Name of its type.
 
     def __post_init__(self) -> None:
         # Both stages check their parameters when they are made.
@@ -241,7 +241,7 @@ class OwnAfferent:
     """What the traces hold, by the names of `SkinResponse.sample`; SED, unless another one is given."""
     rate_measure: Annotated[str, choice((INTERVAL, COUNT))] = INTERVAL
     """What its rates are, as of `ResponseMap`: "interval", or "count"."""
-    type: str = "own"  # Name of the type.
+    type: str = "own"  #: Name of the type.
 
     MUST_RETURN: ClassVar[str] = "respond must return Traces of a current, or SpikeTrains, an entry per site"
 

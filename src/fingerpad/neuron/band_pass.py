@@ -34,7 +34,7 @@ _MOST_PIECES = 2**20
 class BandPass:
     """A filter that transmits a band of frequencies."""
 
-    corner_hz: Positive  # Corner frequency. [Hz]
+    corner_hz: Positive  #: Corner frequency. [Hz]
     rise: Count
     fall: Count
     """Powers of the frequency by which it increases below the corner and decreases above it. A constant input

@@ -60,8 +60,8 @@ class EscapeRate:
     [31.2, 63.4, 95.6]
     """
 
-    membrane: LeakyIntegrateAndFire  # Parameters of the membrane; at its threshold the hazard is 1/tau_e.
-    width: Positive  # Width of the threshold over the threshold, delta/v. [1]
+    membrane: LeakyIntegrateAndFire  #: Parameters of the membrane; at its threshold the hazard is 1/tau_e.
+    width: Positive  #: Width of the threshold over the threshold, delta/v. [1]
     escape_ms: Positive = ESCAPE_TIME_MS
     """tau_e. It can be absorbed in the threshold, docs/decisions.md#escape-rate. [ms]"""
 

@@ -45,10 +45,10 @@ class LeakyIntegrateAndFire:
     [31.165, 63.33, 95.495]
     """
 
-    time_constant_ms: Positive  # Time constant of the leak, tau = R C, Eq. 3. [ms]
-    capacitance_mf: Positive  # Capacitance of the membrane, C. [mF]
-    threshold_mv: Positive  # Potential that elicits a spike, v. [mV]
-    refractory_ms: Positive  # Refractory period after each spike. [ms]
+    time_constant_ms: Positive  #: Time constant of the leak, tau = R C, Eq. 3. [ms]
+    capacitance_mf: Positive  #: Capacitance of the membrane, C. [mF]
+    threshold_mv: Positive  #: Potential that elicits a spike, v. [mV]
+    refractory_ms: Positive  #: Refractory period after each spike. [ms]
     initial_mv: Finite | None = None
     """Potential at the first time. By default that at rest: the first current is taken to have flowed for
     long, so that the spikes do not depend on how long nothing happened. The paper starts at 0. [mV]"""

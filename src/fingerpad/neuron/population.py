@@ -96,7 +96,7 @@ class Population:
     positions_mm: FiniteMatrix
     """x (distal positive) and z (lateral) of each end organ on the volar side, or x, y and z of the skin
     above it on any side, (n_receptors, 2 or 3). [mm]"""
-    pitch_mm: Positive  # Distance between neighbours of the layout. [mm]
+    pitch_mm: Positive  #: Distance between neighbours of the layout. [mm]
     afferent: SkipValidation[AnyAfferent] = field(default_factory=Afferent)
     """All afferents: `Afferent()` (SAI), `RA()`, `PC()`, `SAII()` or an `OwnAfferent`."""
     sensitivity: FiniteVector | None = None

@@ -35,7 +35,7 @@ SAME_COUNT = 1e-6  # Share of a piece by which an interval may be too short for 
 class Drive:
     """A quantity, and the rate of change of it or of another one, piecewise linear between the same knots."""
 
-    times_ms: FiniteVector  # Knots; a repeated knot is a jump of the rate, (n_knots,). [ms]
+    times_ms: FiniteVector  #: Knots; a repeated knot is a jump of the rate, (n_knots,). [ms]
     values: FiniteMatrix
     """Quantity of the static term, (n_knots, n_sites). [its unit in `fingerpad.core.units.QUANTITY_UNITS`]"""
     rate_per_ms: FiniteMatrix
@@ -44,7 +44,7 @@ class Drive:
     dynamic_quantity: str = STORED_ENERGY
     static_quantity: str = STORED_ENERGY
     """What the two terms follow, by the names of `SkinResponse.sample`; "stored" is SED."""
-    phases: Many[Phase] = ()  # As of `Traces`.
+    phases: Many[Phase] = ()  #: As of `Traces`.
 
     def __post_init__(self) -> None:
         if not self.times_ms.size == len(self.values) or self.values.shape != self.rate_per_ms.shape:
@@ -79,10 +79,10 @@ class Transduction:
     ['0.0e+00', '4.0e-06', '6.0e-06', '2.0e-06', '2.0e-06']
     """
 
-    intercept_ma: Finite  # Current without any load, beta. [mA]
+    intercept_ma: Finite  #: Current without any load, beta. [mA]
     dynamic_gain: Finite
     """Gain on the rate of change of SED, or of another quantity, k_d. [mA ms/kPa, or per its unit]"""
-    static_gain: Finite  # Gain on SED itself, or on another quantity, k_s. [mA/kPa, or per its unit]
+    static_gain: Finite  #: Gain on SED itself, or on another quantity, k_s. [mA/kPa, or per its unit]
 
     def current(self, traces: Traces | Drive) -> Traces:
         """Compute the current through the membrane at every site, Eq. 1: I = beta + k_d U' + k_s U. [mA]

@@ -53,8 +53,8 @@ class Sigmoid:
 
     cumulative: Curve
     density: Curve
-    quantile: Curve  # S, its derivative and its inverse.
-    logarithmic: bool = False  # Whether the coordinate is ln x instead of x.
+    quantile: Curve  #: S, its derivative and its inverse.
+    logarithmic: bool = False  #: Whether the coordinate is ln x instead of x.
 
     def coordinate(self, levels: ArrayLike) -> FloatArray:
         """c(x)."""
@@ -141,12 +141,12 @@ class PsychometricFunction:
     320.3
     """
 
-    threshold: Finite  # Level m at which F is one half. [unit of the levels]
+    threshold: Finite  #: Level m at which F is one half. [unit of the levels]
     width: Positive
     """Distance w over which F rises from 5 to 95 %. [unit of the levels; of their logarithm for "weibull"]"""
-    guess: Finite = 0.5  # Rate gamma at levels far below the threshold. [0-1]
-    lapse: NotNegative = 0.0  # Difference lambda of psi to 1 far above the threshold. [0-1]
-    sigmoid: Annotated[str, choice(SIGMOIDS)] = "normal"  # Shape of F.
+    guess: Finite = 0.5  #: Rate gamma at levels far below the threshold. [0-1]
+    lapse: NotNegative = 0.0  #: Difference lambda of psi to 1 far above the threshold. [0-1]
+    sigmoid: Annotated[str, choice(SIGMOIDS)] = "normal"  #: Shape of F.
 
     def __post_init__(self) -> None:
         check = positive if self.shape.logarithmic else finite
@@ -232,7 +232,7 @@ class JudgementCounts:
     [0.58, 0.95]
     """
 
-    levels: FiniteVector  # Increasing, (n_levels,). [any unit]
+    levels: FiniteVector  #: Increasing, (n_levels,). [any unit]
     n_correct: FiniteVector
     n_trials: FiniteVector
     """Whole numbers, (n_levels,)."""

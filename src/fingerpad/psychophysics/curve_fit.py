@@ -62,10 +62,10 @@ class Model:
     """
 
     sigmoid: Sigmoid
-    coordinates: FloatArray  # c(x) of the levels, (n_levels,).
-    n_trials: FloatArray  # Judgements at each, (n_levels,).
+    coordinates: FloatArray  #: c(x) of the levels, (n_levels,).
+    n_trials: FloatArray  #: Judgements at each, (n_levels,).
     lower: FloatArray
-    upper: FloatArray  # Bounds in working coordinates; equal where a parameter is given, (5,).
+    upper: FloatArray  #: Bounds in working coordinates; equal where a parameter is given, (5,).
 
     @property
     def free(self) -> np.ndarray:
@@ -236,10 +236,10 @@ class PsychometricFit(Result):
     """A psychometric function fitted to counts."""
 
     counts: JudgementCounts
-    function: PsychometricFunction  # The one of maximum likelihood.
-    overdispersion: Number  # Correlation rho of judgements of one level; 0 for independent ones. [0-1]
-    log_likelihood: Number  # Natural logarithm of the probability of the counts.
-    model: Model  # Free parameters and bounds.
+    function: PsychometricFunction  #: The one of maximum likelihood.
+    overdispersion: Number  #: Correlation rho of judgements of one level; 0 for independent ones. [0-1]
+    log_likelihood: Number  #: Natural logarithm of the probability of the counts.
+    model: Model  #: Free parameters and bounds.
 
     def __repr__(self) -> str:
         return (

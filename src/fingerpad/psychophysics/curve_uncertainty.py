@@ -61,9 +61,9 @@ STEEPEST = 0.01  # Smallest width of the prior over that of the fit.
 class FunctionCloud:
     """Weighted sample of psychometric functions."""
 
-    sigmoid: str  # Shape of all of them.
-    values: FloatArray  # threshold, width, guess, lapse and overdispersion of each, (n_functions, 5).
-    weights: FloatArray  # Weights, with sum 1, (n_functions,).
+    sigmoid: str  #: Shape of all of them.
+    values: FloatArray  #: threshold, width, guess, lapse and overdispersion of each, (n_functions, 5).
+    weights: FloatArray  #: Weights, with sum 1, (n_functions,).
 
     @property
     def shape(self) -> Sigmoid:
@@ -277,8 +277,8 @@ class GoodnessOfFit:
     """Share of the simulated data sets with at least that deviance; a small one rejects the fit. [0-1]"""
     residuals: FloatArray
     """Root of each level's share of D, with the sign of observed minus predicted, (n_levels,)."""
-    drawn_deviances: FloatArray  # Of the simulated data sets, (n_replicates,).
-    seed: int  # Of the random numbers.
+    drawn_deviances: FloatArray  #: Of the simulated data sets, (n_replicates,).
+    seed: int  #: Of the random numbers.
 
 
 def goodness_of_fit(fit: PsychometricFit, seed: int, n_replicates: int = 1000) -> GoodnessOfFit:

@@ -136,8 +136,8 @@ def _plane(positions_mm: ArrayLike) -> FloatArray:
 class Measured(NamedTuple):
     """One measure of a population under several stimuli, and the pairs of its receptors that take part."""
 
-    responses: FloatArray  # The standard in the first row, (n_stimuli, n_receptors). [any unit]
-    neighbours: IntArray  # Pairs that the Gradient Sum goes over, (n_pairs, 2).
+    responses: FloatArray  #: The standard in the first row, (n_stimuli, n_receptors). [any unit]
+    neighbours: IntArray  #: Pairs that the Gradient Sum goes over, (n_pairs, 2).
 
 
 def taking_part(responses: ArrayLike, neighbours: ArrayLike) -> Measured:

@@ -92,8 +92,8 @@ class GaussianResponses:
     -0.9189
     """
 
-    mean: FiniteVector  # mu, (n_receptors,). [any unit]
-    covariance: FiniteMatrix  # S, (n_receptors, n_receptors). [unit squared]
+    mean: FiniteVector  #: mu, (n_receptors,). [any unit]
+    covariance: FiniteMatrix  #: S, (n_receptors, n_receptors). [unit squared]
 
     def __post_init__(self) -> None:
         mean, covariance = self.mean, self.covariance
@@ -181,10 +181,10 @@ Statistic = Callable[[FloatArray], FloatArray]
 class Discriminability:
     """Discriminability of two stimuli, in trials of two alternatives."""
 
-    proportion_correct: float  # Area under the ROC curve. [0-1]
-    standard_error: float  # Of that, from the number of trials.
-    d_prime: float  # sqrt 2 z(proportion); inf if every trial is correct. [standard deviations]
-    d_prime_error: float  # Its standard error.
+    proportion_correct: float  #: Area under the ROC curve. [0-1]
+    standard_error: float  #: Of that, from the number of trials.
+    d_prime: float  #: sqrt 2 z(proportion); inf if every trial is correct. [standard deviations]
+    d_prime_error: float  #: Its standard error.
 
 
 @checked
@@ -231,7 +231,7 @@ class Presentation:
     log_ratio_standard: FloatArray
     log_ratio_comparison: FloatArray
     """ln R of these responses, (n_trials,)."""
-    seed: int  # Of the random numbers.
+    seed: int  #: Of the random numbers.
 
     def ideal(self) -> Discriminability:
         """Discriminability by the ideal observer."""

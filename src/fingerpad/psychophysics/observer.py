@@ -88,7 +88,7 @@ class Experiment:
     of responses from which pairs are sampled (c*)."""
     distributions: Repetitions = _REPETITIONS
     """Pairs of mean and standard deviation per sphere, Gradient Sum only (f)."""
-    pairs: Repetitions = _REPETITIONS  # Distances per sphere behind one hit rate, Euclidean Distance (f*).
+    pairs: Repetitions = _REPETITIONS  #: Distances per sphere behind one hit rate, Euclidean Distance (f*).
     hit_rates: Repetitions = _REPETITIONS
     """Hit rates per comparison, of which mean and standard deviation are reported (i, h*)."""
     criterion: Finite = psychophysics.DECISION_CRITERION.value
@@ -158,7 +158,7 @@ class Encoder(Protocol):
 class GradientSum(Encoder):
     """Code: the sum of the differences between neighbours; steps (a) to (k)."""
 
-    neighbours: ArrayLike  # From `neighbour_pairs`, int (n_pairs, 2).
+    neighbours: ArrayLike  #: From `neighbour_pairs`, int (n_pairs, 2).
 
     def sizes(self, plan: Experiment) -> tuple[int, ...]:
         return plan.sums_per_sphere
@@ -452,9 +452,9 @@ def hit_probability(point: FloatArray, mean: FloatArray, spread: FloatArray, sid
 class NoiseFit:
     """Noise for which predicted hit rates are closest to observed ones."""
 
-    noise_sigma: float  # Standard deviation sigma_1 of the multiplicative noise.
-    hit_rates: FloatArray  # Predicted hit rates at that noise, (n_targets,). [0-1]
-    root_mean_square_error: float  # Of the predicted against the observed hit rates.
+    noise_sigma: float  #: Standard deviation sigma_1 of the multiplicative noise.
+    hit_rates: FloatArray  #: Predicted hit rates at that noise, (n_targets,). [0-1]
+    root_mean_square_error: float  #: Of the predicted against the observed hit rates.
 
 
 @checked

@@ -54,8 +54,8 @@ CORRECTIONS = ("log-linear", "half", "none")
 class Sensitivity:
     """Detectability of a signal, and criterion of the observer."""
 
-    d_prime: float  # d', or d_a where the spreads differ. [standard deviations]
-    criterion: float  # c; positive for a conservative observer. [standard deviations]
+    d_prime: float  #: d', or d_a where the spreads differ. [standard deviations]
+    criterion: float  #: c; positive for a conservative observer. [standard deviations]
     hit_rate: float
     false_alarm_rate: float
     """As corrected. [0-1]"""
@@ -260,11 +260,11 @@ class InterpolatedObserver:
     Between the levels a response is a monotone cubic in the logarithm of the level.
     """
 
-    levels: FloatArray  # Of the stimuli whose responses are known, increasing, (n_levels,).
-    table: FloatArray  # Responses to these, (n_levels, n_receptors).
-    neighbours: IntArray  # Pairs of the Gradient Sum, (n_pairs, 2).
-    noise_sigma: float  # Standard deviation of the multiplicative noise.
-    draws: FloatArray  # Common random presentations, (n_draws, n_receptors).
+    levels: FloatArray  #: Of the stimuli whose responses are known, increasing, (n_levels,).
+    table: FloatArray  #: Responses to these, (n_levels, n_receptors).
+    neighbours: IntArray  #: Pairs of the Gradient Sum, (n_pairs, 2).
+    noise_sigma: float  #: Standard deviation of the multiplicative noise.
+    draws: FloatArray  #: Common random presentations, (n_draws, n_receptors).
 
     @cached_property
     def _curve(self) -> PchipInterpolator:

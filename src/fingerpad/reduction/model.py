@@ -124,8 +124,8 @@ def slope_changes(levels: FloatArray, deepest_mm: float, values: FloatArray) -> 
 class Springs:
     """Ways of the springs, and what their branches have relaxed."""
 
-    way_mm: FloatArray  # u, at most 0 before the first touch of a level, (n_levels,). [mm]
-    relaxed_mm: FloatArray  # m, (n_branches, n_levels). [mm]
+    way_mm: FloatArray  #: u, at most 0 before the first touch of a level, (n_levels,). [mm]
+    relaxed_mm: FloatArray  #: m, (n_branches, n_levels). [mm]
 
     @classmethod
     def at_rest(cls, n_branches: int) -> Springs:
@@ -152,21 +152,21 @@ class Springs:
 class ReducedModel:
     """What a reduced touch is evaluated from, of `reduce_touch` or `read_reduced`."""
 
-    axes: Many[Axis]  # Axes of the range: x, z, tilt and perhaps a parameter of the indenter.
-    depth_mm: Finite  # Largest depth below first touch. [mm]
-    at_mm: Pair  # Place of the touch. [mm]
-    times_ms: FloatArray  # Time constants of the tissues, (n_branches,). [ms]
-    quantities: Many[str]  # Quantities of the fields, names of `SkinResponse.sample`.
-    first_touch_mm: FloatArray  # Depth of first touch at each pose, (n_poses,). [mm]
-    middle_mm: FloatArray  # x and z of the middle of the contact, (n_poses, 2). [mm]
+    axes: Many[Axis]  #: Axes of the range: x, z, tilt and perhaps a parameter of the indenter.
+    depth_mm: Finite  #: Largest depth below first touch. [mm]
+    at_mm: Pair  #: Place of the touch. [mm]
+    times_ms: FloatArray  #: Time constants of the tissues, (n_branches,). [ms]
+    quantities: Many[str]  #: Quantities of the fields, names of `SkinResponse.sample`.
+    first_touch_mm: FloatArray  #: Depth of first touch at each pose, (n_poses,). [mm]
+    middle_mm: FloatArray  #: x and z of the middle of the contact, (n_poses, 2). [mm]
     totals: FloatArray
     """Coefficients of the force [mN] and of the contact area [mm²], (n_poses, n_terms, 2).
 
     The terms are those of the response at once, then those of each branch."""
-    coefficients: FloatArray  # Coefficients of the modes, (n_poses, n_terms, n_modes).
+    coefficients: FloatArray  #: Coefficients of the modes, (n_poses, n_terms, n_modes).
     modes: FloatArray
     """Fields about the middle of the contact, (n_modes, n_quantities, n_grid, n_grid). [each in its unit]"""
-    reach_mm: FloatArray  # Half-extent of the fields along and across, (2,). [mm]
+    reach_mm: FloatArray  #: Half-extent of the fields along and across, (2,). [mm]
     largest: FloatArray
     """Largest values of the quantities [each in its unit] and of the force [mN] in the training,
     (n_quantities + 1,)."""
@@ -175,7 +175,7 @@ class ReducedModel:
     (n_quantities + 1,). Infinite before that is measured."""
     exponents: FloatArray
     """Powers of the depth that scale what has relaxed, of quantities and force, (n_quantities + 1,)."""
-    origin: Mapping[str, str]  # What was pressed: for people, and to refuse another finger.
+    origin: Mapping[str, str]  #: What was pressed: for people, and to refuse another finger.
 
     def __repr__(self) -> str:
         ranges = ", ".join(

@@ -46,12 +46,12 @@ class ReducedSample(Result):
     """A touch at one time."""
 
     time_ms: Number
-    depth_mm: Number  # Advance since first touch at the place of the touch. [mm]
-    force_mn: Number  # Force along the direction of pressing. [mN]
-    contact_area_mm2: Number  # Undeformed skin in contact. [mm²]
-    fields: dict[str, FloatArray]  # Quantities at the receptors, (n_receptors,). [each in its unit]
-    force_error_mn: Number  # The force of a full solution lies within it for 95 % of touches. [mN]
-    field_errors: dict[str, float]  # The same of each quantity, at all receptors. [its unit]
+    depth_mm: Number  #: Advance since first touch at the place of the touch. [mm]
+    force_mn: Number  #: Force along the direction of pressing. [mN]
+    contact_area_mm2: Number  #: Undeformed skin in contact. [mm²]
+    fields: dict[str, FloatArray]  #: Quantities at the receptors, (n_receptors,). [each in its unit]
+    force_error_mn: Number  #: The force of a full solution lies within it for 95 % of touches. [mN]
+    field_errors: dict[str, float]  #: The same of each quantity, at all receptors. [its unit]
 
     def columns(self) -> Columns:
         """Each quantity, and the error within which that of a full solution lies, by receptor."""
@@ -226,12 +226,12 @@ class _Press:
     """One step at a pose, to any depth."""
 
     model: ReducedModel
-    totals: FloatArray  # Coefficients of force and area at the pose, (n_terms, 2).
-    amounts: FloatArray  # Those of the modes, (n_terms, n_modes).
-    sheet_places: FloatArray  # Places of the sheet, in steps of the grid, (n_sheet, 2).
+    totals: FloatArray  #: Coefficients of force and area at the pose, (n_terms, 2).
+    amounts: FloatArray  #: Those of the modes, (n_terms, n_modes).
+    sheet_places: FloatArray  #: Places of the sheet, in steps of the grid, (n_sheet, 2).
     springs: Springs
-    sheet: _Filters  # State before the step.
-    kept: float  # Part of the skin below the contact that is still there after the way aside.
+    sheet: _Filters  #: State before the step.
+    kept: float  #: Part of the skin below the contact that is still there after the way aside.
     step_ms: float
 
     @cached_property

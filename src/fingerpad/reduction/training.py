@@ -97,10 +97,10 @@ def weighted(weights: FloatArray, values: FloatArray) -> FloatArray:
 class Axis:
     """One quantity that varies over the range of a reduced touch."""
 
-    name: str  # "x_mm", "z_mm", "tilt_deg", or a parameter of the indenter.
+    name: str  #: "x_mm", "z_mm", "tilt_deg", or a parameter of the indenter.
     low: Finite
-    high: Finite  # Its range; equal if it does not vary.
-    count: Count  # Number of Chebyshev's points, 1 if it does not vary.
+    high: Finite  #: Its range; equal if it does not vary.
+    count: Count  #: Number of Chebyshev's points, 1 if it does not vary.
 
     def __post_init__(self) -> None:
         if self.high < self.low:
@@ -145,14 +145,14 @@ class ReducedRange:
     ['x_mm']
     """
 
-    depth_mm: Positive  # Largest depth below first touch at any pose. [mm]
+    depth_mm: Positive  #: Largest depth below first touch at any pose. [mm]
     x_mm: Pair = (0.0, 0.0)
     z_mm: Pair = (0.0, 0.0)
     """Ways of the indenter along and across the finger, from the place of the touch. [mm]"""
-    tilt_deg: Pair = (0.0, 0.0)  # Tilt, added to that of the touch. [degrees]
+    tilt_deg: Pair = (0.0, 0.0)  #: Tilt, added to that of the touch. [degrees]
     parameter: str | None = None
     """A parameter of the indenter that varies, such as "curvature_per_m" of a `Sphere`."""
-    values: Pair | None = None  # Its range.
+    values: Pair | None = None  #: Its range.
 
     def __post_init__(self) -> None:
         for name in SPACING:
@@ -189,11 +189,11 @@ class ReducedRange:
 class TrainingPose:
     """One pose, and the presses there."""
 
-    values: tuple[float, ...]  # Its place on each axis of the range.
+    values: tuple[float, ...]  #: Its place on each axis of the range.
     first_touch_mm: float
     """Depth at which the indenter meets undeformed skin, from the first touch of the touch. [mm]"""
-    meets_mm: float  # The same from the first touch at this place, before the indenter tilts. [mm]
-    touches: tuple[Touch, ...]  # One per depth.
+    meets_mm: float  #: The same from the first touch at this place, before the indenter tilts. [mm]
+    touches: tuple[Touch, ...]  #: One per depth.
 
 
 @value_class
@@ -202,9 +202,9 @@ class ReducedTraining:
 
     touch: Touch
     """What is reduced: its finger, indenter, tissues, place, direction and friction, not its motion."""
-    range: ReducedRange  # The poses.
+    range: ReducedRange  #: The poses.
     resolution: Annotated[str, choice(RESOLUTIONS)] = "quick"
-    grading: Grading | None = None  # Mesh instead of that which the resolution grades over the range.
+    grading: Grading | None = None  #: Mesh instead of that which the resolution grades over the range.
 
     def __post_init__(self) -> None:
         touch = instance("touch", self.touch, Touch)

@@ -28,10 +28,10 @@ SETS = ("paper", "human")  # Sets of tissues of a reproduction, in the order of 
 class Drawing:
     """A figure with its caption."""
 
-    title: str  # A few words.
-    images: Mapping[str, Callable[[], Figure]]  # What draws it by the name of the file; two are two sets.
+    title: str  #: A few words.
+    images: Mapping[str, Callable[[], Figure]]  #: What draws it by the name of the file; two are two sets.
     caption: str
-    number: int | None = None  # Up to 9 in a reproduction the paper's numbers; others from 10.
+    number: int | None = None  #: Up to 9 in a reproduction the paper's numbers; others from 10.
 
     @property
     def label(self) -> str:
@@ -47,9 +47,9 @@ Part = str | Table | Drawing  # Text is a paragraph, with code in backticks.
 class Chapter:
     """A heading and what stands below it."""
 
-    title: str  # The heading; empty for parts that follow the introduction directly.
+    title: str  #: The heading; empty for parts that follow the introduction directly.
     parts: Sequence[Part]
-    folded: Sequence[Table | Drawing] = ()  # What stands below them behind a fold.
+    folded: Sequence[Table | Drawing] = ()  #: What stands below them behind a fold.
 
     @property
     def anchor(self) -> str:
@@ -67,11 +67,11 @@ class Page:
     """A page."""
 
     heading: str
-    subtitle: str  # Title, and what the page is about.
+    subtitle: str  #: Title, and what the page is about.
     paragraphs: Sequence[str]
     chapters: Sequence[Chapter]
-    opening: Sequence[Part] = ()  # Small figures after the summary, each with one sentence as its caption.
-    verdicts: Sequence[Part] = ()  # What stands beside them.
+    opening: Sequence[Part] = ()  #: Small figures after the summary, each with one sentence as its caption.
+    verdicts: Sequence[Part] = ()  #: What stands beside them.
 
     @property
     def drawings(self) -> list[Drawing]:

@@ -120,8 +120,8 @@ Kind = Literal["", "assumed", "final"]  # An assumed input, or the row that is t
 class Row(NamedTuple):
     """A row of a table."""
 
-    cells: Sequence[str]  # Finished texts, the first is the row's heading.
-    kind: Kind = ""  # How the row is marked.
+    cells: Sequence[str]  #: Finished texts, the first is the row's heading.
+    kind: Kind = ""  #: How the row is marked.
 
 
 @dataclass(frozen=True)
@@ -129,9 +129,9 @@ class Table:
     """A table."""
 
     title: str
-    columns: Sequence[str]  # Headings with units; all empty where the table lists names and values.
-    rows: Sequence[Row]  # One cell per column.
-    note: str = ""  # A sentence below it.
+    columns: Sequence[str]  #: Headings with units; all empty where the table lists names and values.
+    rows: Sequence[Row]  #: One cell per column.
+    note: str = ""  #: A sentence below it.
 
 
 def at(found: Any, path: str) -> Any:

@@ -33,10 +33,10 @@ presses whose meshes docs/presses.md compares. Skin that snaps round an edge wit
 class Caveat:
     """One quantity of a result that lies outside of what was verified."""
 
-    name: str  # The quantity, such as "strain".
+    name: str  #: The quantity, such as "strain".
     value: float
-    limit: float  # What it is, and up to where results were verified.
-    text: str  # A sentence with both.
+    limit: float  #: What it is, and up to where results were verified.
+    text: str  #: A sentence with both.
 
 
 def strain(skin: SkinResponse) -> Caveat | None:

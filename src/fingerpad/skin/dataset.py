@@ -59,12 +59,12 @@ _OBJECT_REACH_MM, _OBJECT_STEPS = (14.0, 10.0), 240
 class Part:
     """One variable of the mesh or the object."""
 
-    unit: str  # Unit, "1" for a pure number; empty for numbers of nodes or elements, which have none.
+    unit: str  #: Unit, "1" for a pure number; empty for numbers of nodes or elements, which have none.
     dims: tuple[str, ...]
     long_name: str
-    of: Callable[[Mesh], np.ndarray] | None = None  # Reads it from a mesh.
-    points_into: str = ""  # Dimension of which it holds numbers, from 0.
-    holes: bool = False  # Whether it may be NaN.
+    of: Callable[[Mesh], np.ndarray] | None = None  #: Reads it from a mesh.
+    points_into: str = ""  #: Dimension of which it holds numbers, from 0.
+    holes: bool = False  #: Whether it may be NaN.
 
     def variable(self, values: np.ndarray) -> Variable:
         stored = values.astype(np.int32) if values.dtype.kind in "iu" else values

@@ -42,9 +42,9 @@ _LARGEST_WEIGHT = 1e3
 class Interpolation:
     """Elements near each site and their weights."""
 
-    elements: IntArray  # Elements near the end organs, nearest first, by rows of a sheet, (n_sites, n_near).
-    weights: FloatArray  # Their sum is 1, (n_sites, n_near).
-    points_mm: FloatArray  # Where values that are linear in space are read, (n_sites, 3). [mm]
+    elements: IntArray  #: Elements near the end organs, nearest first, by rows of a sheet, (n_sites, n_near).
+    weights: FloatArray  #: Their sum is 1, (n_sites, n_near).
+    points_mm: FloatArray  #: Where values that are linear in space are read, (n_sites, 3). [mm]
 
     def of(self, organs: IntArray) -> Interpolation:
         return Interpolation(self.elements[organs], self.weights[organs], self.points_mm[organs])

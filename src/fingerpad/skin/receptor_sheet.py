@@ -175,10 +175,10 @@ Surface = Callable[[FloatArray], FloatArray]
 class Part:
     """Some of the end organs, and what they read in some of the elements."""
 
-    elements: IntArray  # Elements whose values `places` read.
-    organs: IntArray | slice  # Rows of the sites.
-    places: Any  # Places in these elements, of `ReceptorSheet.below` for example.
-    weights: FloatArray | float  # Share of these elements in the value of each end organ.
+    elements: IntArray  #: Elements whose values `places` read.
+    organs: IntArray | slice  #: Rows of the sites.
+    places: Any  #: Places in these elements, of `ReceptorSheet.below` for example.
+    weights: FloatArray | float  #: Share of these elements in the value of each end organ.
 
 
 def refuse_beside_skin(sites_mm: FloatArray, missed: np.ndarray, away_mm: FloatArray) -> None:

@@ -97,26 +97,26 @@ def _stored(name: str) -> property:
 class SkinResponse(Result):
     """Response of the skin to one indentation; the end of the mechanical half of the chain."""
 
-    mesh: Mesh  # The undeformed body.
-    kinks_ms: Numbers  # Times at which the speed of the motion jumps: the end of the ramp. [ms]
-    axis_x_mm: Number  # x at which the indenter's axis meets the midline. [mm]
-    direction: FloatArray  # Unit direction of pressing, (3,).
-    fields: Mapping[str, FloatArray]  # Stored fields by their names in `skin.fields.FIELDS`.
+    mesh: Mesh  #: The undeformed body.
+    kinks_ms: Numbers  #: Times at which the speed of the motion jumps: the end of the ramp. [ms]
+    axis_x_mm: Number  #: x at which the indenter's axis meets the midline. [mm]
+    direction: FloatArray  #: Unit direction of pressing, (3,).
+    fields: Mapping[str, FloatArray]  #: Stored fields by their names in `skin.fields.FIELDS`.
     force_imbalance: Number
     """Largest difference of the indenter's force to the reaction of bone and nail, over that force."""
     energy_imbalance: Number
     """Largest difference at any time between the indenter's work and what was stored, dissipated and held by
     the contact, over that work."""
-    penetration_mm: Number  # Deepest penetration of the indenter by any node at any time. [mm]
+    penetration_mm: Number  #: Deepest penetration of the indenter by any node at any time. [mm]
     newton_steps: Whole
     factorisations: Whole
-    linear_solver: str  # The linear solver, and why it was chosen.
+    linear_solver: str  #: The linear solver, and why it was chosen.
     deformation: Deformation | None = None
     """All nodes and elements over time, of `Touch.solve(whole=True)`; stored files do not hold it."""
-    phases: Many[Phase] = ()  # Named phases of the motion.
-    pose: Pose = STILL  # How far the indenter has moved aside and turned since first touch, at the last time.
-    touch: Touch | None = None  # What was solved: indenter, motion, tissues.
-    onset_ms: Number = 0.0  # Time of first touch. [ms]
+    phases: Many[Phase] = ()  #: Named phases of the motion.
+    pose: Pose = STILL  #: How far the indenter has moved aside and turned since first touch, at the end.
+    touch: Touch | None = None  #: What was solved: indenter, motion, tissues.
+    onset_ms: Number = 0.0  #: Time of first touch. [ms]
     receptor_depths_mm: Numbers = ()
     """Depths at which all quantities are kept beside the border of epidermis and dermis. [mm]"""
 

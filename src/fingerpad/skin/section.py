@@ -23,7 +23,7 @@ class SurfaceMotion:
     """How the faces of the skin move and deform: arrays (n_times, n_faces), never negative."""
 
     mesh: Mesh
-    displacement_mm: FloatArray  # Displacement of `mesh.skin_nodes`, (n_times, n_skin_nodes, 3). [mm]
+    displacement_mm: FloatArray  #: Displacement of `mesh.skin_nodes`, (n_times, n_skin_nodes, 3). [mm]
 
     @cached_property
     def skin_displacement(self) -> FloatArray:
@@ -109,8 +109,8 @@ _ON_PLANE_MM = 1e-9
 class Section:
     """Faces of elements on the plane z = 0, as they lie after the deformation."""
 
-    corners_mm: FloatArray  # x and y of the corners, in order around each face, (n_faces, 4, 2). [mm]
-    elements: IntArray  # The element of each face, (n_faces,).
+    corners_mm: FloatArray  #: x and y of the corners, in order around each face, (n_faces, 4, 2). [mm]
+    elements: IntArray  #: The element of each face, (n_faces,).
     skin_mm: FloatArray
     nail_mm: FloatArray
     bone_mm: FloatArray

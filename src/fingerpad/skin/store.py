@@ -172,9 +172,9 @@ class Store:
 class StoredFile:
     """A file of a store."""
 
-    path: Path  # The file; its name is the key of the indentation.
+    path: Path  #: The file; its name is the key of the indentation.
     size: int
-    written_s: float  # When it was written, in seconds since 1970.
+    written_s: float  #: When it was written, in seconds since 1970.
 
     @property
     def fault(self) -> str | None:

@@ -68,10 +68,10 @@ class _Quarter:
     """A quarter of each of some sections, volar or dorsal, and its element of area."""
 
     a: FloatArray
-    a_slope: FloatArray  # Volar depth or dorsal height and its derivative by s. [mm]
+    a_slope: FloatArray  #: Volar depth or dorsal height and its derivative by s. [mm]
     c: FloatArray
-    c_slope: FloatArray  # Half-width and its derivative by s. [mm]
-    x_slope: FloatArray  # |dx/ds|. [mm]
+    c_slope: FloatArray  #: Half-width and its derivative by s. [mm]
+    x_slope: FloatArray  #: |dx/ds|. [mm]
 
     def area_element(self, phi: FloatArray) -> FloatArray:
         """|dP/ds x dP/dphi|. [mm²]"""
@@ -119,7 +119,7 @@ class UnrolledSkin:
     """
 
     finger: Fingertip = field(default_factory=Fingertip)
-    origin_x_mm: Finite = None  # type: ignore[assignment]  # a number after initialisation
+    origin_x_mm: Finite = None  # type: ignore[assignment]  #: a number after initialisation
     """x of the point of the volar midline at which `along` is 0, distal positive; by default the middle of
     the pad. [mm]"""
 
@@ -291,7 +291,7 @@ class NailEdge:
     """
 
     finger: Fingertip = field(default_factory=Fingertip)
-    reach_mm: Positive = REACH_MM  # Largest distance from the nail's edge. [mm]
+    reach_mm: Positive = REACH_MM  #: Largest distance from the nail's edge. [mm]
 
     def __post_init__(self) -> None:
         narrowest = float(np.min(self.finger.section(np.array(self.finger.nail_x_mm))[2]))

@@ -50,12 +50,12 @@ CREDIBLE = 0.95
 class TaskPopulation:
     """The population of a task."""
 
-    layout: str  # How the afferents are laid out.
+    layout: str  #: How the afferents are laid out.
     n_receptors: int
-    pitch_mm: float  # Distance between neighbours. [mm]
-    density_per_cm2: float  # Afferents per area of skin. [1/cm2]
-    positions_mm: Matrix  # x and z, or x, y and z, (n_receptors, 2 or 3). [mm]
-    sensitivity: Vector | None  # Factor on the gains of each afferent, (n_receptors,).
+    pitch_mm: float  #: Distance between neighbours. [mm]
+    density_per_cm2: float  #: Afferents per area of skin. [1/cm2]
+    positions_mm: Matrix  #: x and z, or x, y and z, (n_receptors, 2 or 3). [mm]
+    sensitivity: Vector | None  #: Factor on the gains of each afferent, (n_receptors,).
 
 
 @result_class
@@ -63,26 +63,26 @@ class FittedNoise:
     """What the noise was fitted to."""
 
     code: str
-    measure: str  # The decoding that was brought closest to the observed hit rates.
-    stimulus: tuple[str, ...]  # The comparisons that were observed.
+    measure: str  #: The decoding that was brought closest to the observed hit rates.
+    stimulus: tuple[str, ...]  #: The comparisons that were observed.
     observed: Vector
-    hit_rate: Vector  # Hit rates of people and of the model, (n_observed,). [0-1]
+    hit_rate: Vector  #: Hit rates of people and of the model, (n_observed,). [0-1]
 
 
 @result_class
 class TaskNoise:
     """The noise of a task."""
 
-    sigma: float  # Standard deviation of the multiplicative noise.
-    fitted_to: FittedNoise | None = None  # Absent where the noise was given.
-    root_mean_square_error: float | None = None  # Of the fitted hit rates.
+    sigma: float  #: Standard deviation of the multiplicative noise.
+    fitted_to: FittedNoise | None = None  #: Absent where the noise was given.
+    root_mean_square_error: float | None = None  #: Of the fitted hit rates.
 
 
 @result_class
 class ForcedChoice:
     """Two presentations per trial, one of them the comparison: how often it is identified."""
 
-    trials: int  # Trials per comparison behind the intervals, those of the task.
+    trials: int  #: Trials per comparison behind the intervals, those of the task.
     proportions: Matrix
     """Proportion correct, and the ends of the exact 95 % interval that so many trials leave about it, (3,
     n_comparisons). [0-1]"""
@@ -103,10 +103,10 @@ class TaskStatistic:
 class CurveThreshold:
     """Threshold of a psychometric curve."""
 
-    proportion: float  # Hit rate at the threshold. [0-1]
+    proportion: float  #: Hit rate at the threshold. [0-1]
     difference: Number
-    level: Number  # From the standard, and on the axis. [unit of what varies]
-    over_standard: float | None  # Difference over standard (Weber fraction); absent where that is 0.
+    level: Number  #: From the standard, and on the axis. [unit of what varies]
+    over_standard: float | None  #: Difference over standard (Weber fraction); absent where that is 0.
     bootstrap_interval: tuple[Number, Number] | None
     posterior_interval: tuple[Number, Number]
     """Confidence and credible interval of the difference; the former is absent where no comparison lies on
@@ -129,11 +129,11 @@ class CurveFit:
     """A fitted psychometric curve."""
 
     sigmoid: str
-    trials: int  # Judgements per comparison behind the intervals.
-    threshold: CurveThreshold  # At the proportion that the task asks for.
-    slope: Number  # Of the hit rate at the threshold; NaN where no comparison lies on the rise.
-    lapse: float  # What is missing to 1 far above the threshold. [0-1]
-    at_bounds: tuple[str, ...]  # Parameters that ended at a bound.
+    trials: int  #: Judgements per comparison behind the intervals.
+    threshold: CurveThreshold  #: At the proportion that the task asks for.
+    slope: Number  #: Of the hit rate at the threshold; NaN where no comparison lies on the rise.
+    lapse: float  #: What is missing to 1 far above the threshold. [0-1]
+    at_bounds: tuple[str, ...]  #: Parameters that ended at a bound.
     curve: CurvePoints
 
 
@@ -141,11 +141,11 @@ class CurveFit:
 class SideCurve:
     """Hit rates on one side of the standard, with their curve or the reason why there is none."""
 
-    side: str  # Of the standard.
+    side: str  #: Of the standard.
     difference: Vector
-    hit_rate: Vector  # Distance from the standard, and hit rate, (n_comparisons,).
+    hit_rate: Vector  #: Distance from the standard, and hit rate, (n_comparisons,).
     fit: CurveFit | None = None
-    why_not: str | None = None  # Why there is no curve.
+    why_not: str | None = None  #: Why there is no curve.
 
 
 @result_class
@@ -153,27 +153,27 @@ class Decoding:
     """One measure of the population, decoded by one code."""
 
     code: str
-    measure: str  # By the names of `CODES` and `MEASURES`.
-    silent: tuple[str, ...] = ()  # Stimuli under which no afferent responds; there is no hit rate then.
+    measure: str  #: By the names of `CODES` and `MEASURES`.
+    silent: tuple[str, ...] = ()  #: Stimuli under which no afferent responds; there is no hit rate then.
     hit_rate: Vector | None = None
-    hit_rate_sd: Vector | None = None  # Mean and standard deviation over repetitions, (n_comparisons,). [0-1]
-    statistic: TaskStatistic | None = None  # What the code computes; absent for the ideal observer.
-    d_prime: Vector | None = None  # Discriminability; NaN where it is infinite, (n_comparisons,).
-    forced_choice: ForcedChoice | None = None  # As proportion correct; absent without noise.
+    hit_rate_sd: Vector | None = None  #: Mean and standard deviation of repetitions, (n_comparisons,). [0-1]
+    statistic: TaskStatistic | None = None  #: What the code computes; absent for the ideal observer.
+    d_prime: Vector | None = None  #: Discriminability; NaN where it is infinite, (n_comparisons,).
+    forced_choice: ForcedChoice | None = None  #: As proportion correct; absent without noise.
     efficiency: Vector | None = None
-    efficiency_error: Vector | None = None  # NaN where it cannot be estimated, (n_comparisons,).
-    curves: tuple[SideCurve, ...] = ()  # Psychometric curves above and below the standard.
+    efficiency_error: Vector | None = None  #: NaN where it cannot be estimated, (n_comparisons,).
+    curves: tuple[SideCurve, ...] = ()  #: Psychometric curves above and below the standard.
 
 
 @result_class
 class TaskObservation:
     """A hit rate of people."""
 
-    at: float | str  # Level or name of the stimulus, as the task gives it.
-    level: float | None  # On the axis of the psychometric curve.
-    hit_rate: float  # Fraction of trials. [0-1]
+    at: float | str  #: Level or name of the stimulus, as the task gives it.
+    level: float | None  #: On the axis of the psychometric curve.
+    hit_rate: float  #: Fraction of trials. [0-1]
     trials: int | None
-    interval: tuple[float, float] | None  # Binomial interval, where the trials are known. [0-1]
+    interval: tuple[float, float] | None  #: Binomial interval, where the trials are known. [0-1]
 
 
 @result_class
@@ -488,8 +488,8 @@ class DiscriminationFile:
     format: Literal["fingerpad discrimination"] = "fingerpad discrimination"
     format_version: Literal[3] = 3
     discrimination: TaskResult
-    task: DiscriminationRequest  # What was asked, defaults included.
-    afferent: dict[str, float | str]  # By name; in a mixed population with the type, "RA.threshold".
+    task: DiscriminationRequest  #: What was asked, defaults included.
+    afferent: dict[str, float | str]  #: By name; in a mixed population with the type, "RA.threshold".
     manifest: Manifest
 
 

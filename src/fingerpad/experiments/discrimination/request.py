@@ -70,16 +70,16 @@ _REPETITIONS = int(psychophysics.REPETITIONS.value)
 class ExperimentSettings(Part):
     """Repetitions, decision criterion and seed."""
 
-    seed: Seed = 0  # Of every random number.
+    seed: Seed = 0  #: Of every random number.
     criterion: Share = psychophysics.DECISION_CRITERION.value
     """Decision point, as a fraction of the way from the standard to the comparison."""
-    criterion_sigma: NotNegative = 0.0  # Spread of the criterion from one hit rate to the next.
+    criterion_sigma: NotNegative = 0.0  #: Spread of the criterion from one hit rate to the next.
     criterion_moves: Annotated[str, choice(CRITERION_MOVES)] = CRITERION_MOVES[0]
     """What that spread multiplies: the decision point itself, or the fraction."""
     presentations: Several = _REPETITIONS
     distributions: Several = _REPETITIONS
     pairs: Several = _REPETITIONS
-    hit_rates: Several = _REPETITIONS  # As of `fingerpad.psychophysics.observer.Experiment`.
+    hit_rates: Several = _REPETITIONS  #: As of `fingerpad.psychophysics.observer.Experiment`.
     presentations_varied: Several = int(psychophysics.REPETITIONS_VARIED_CRITERION.value)
     """Presentations of each stimulus when the criterion varies."""
     trials: Count = _REPETITIONS
@@ -100,7 +100,7 @@ class CurveSettings(Part):
     lapse: Annotated[
         Annotated[float, Field(ge=0, lt=0.5)] | Annotated[str, choice((FREE,))],
         with_message(f"a number within 0 ... 0.5, or {FREE}"),
-    ] = 0.0  # What is missing to 1 far above threshold, or that it shall be fitted. [0-1]
+    ] = 0.0  #: What is missing to 1 far above threshold, or that it shall be fitted. [0-1]
     proportion: Annotated[float, Field(gt=0.5, lt=1.0), with_message("a number between 0.5 and 1")] = 0.75
     """Where the threshold is read. [0-1]"""
 
@@ -108,16 +108,16 @@ class CurveSettings(Part):
 class ObservedPoint(Part):
     """How often people discriminated one stimulus from the standard."""
 
-    at: LevelOrName  # Level or name of the stimulus; a level may lie between those that are pressed.
-    hit_rate: Share  # Fraction of trials. [0-1]
-    trials: Count | None = None  # How many there were, for the interval.
+    at: LevelOrName  #: Level or name of the stimulus; a level may lie between those that are pressed.
+    hit_rate: Share  #: Fraction of trials. [0-1]
+    trials: Count | None = None  #: How many there were, for the interval.
 
 
 class ObservedSettings(Part):
     """Observations in people."""
 
-    points: Annotated[tuple[ObservedPoint, ...], Strict(False), Field(min_length=1)]  # One per stimulus.
-    source: Text = "people"  # Who observed it.
+    points: Annotated[tuple[ObservedPoint, ...], Strict(False), Field(min_length=1)]  #: One per stimulus.
+    source: Text = "people"  #: Who observed it.
 
 
 class DiscriminationRequest(StimulusSet, FingerRequest):

@@ -13,8 +13,8 @@ from fingerpad.core.plain_yaml import read_yaml
 class Example:
     """An example of a file."""
 
-    what: str  # What it is, in words.
-    file: str  # Its name.
+    what: str  #: What it is, in words.
+    file: str  #: Its name.
     text: str
 
 

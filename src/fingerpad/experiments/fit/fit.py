@@ -61,9 +61,9 @@ OFFSET_METHODS = ("least_squares", "cma_es")  # Methods that an offset can be ad
 class Prepared:
     """A problem, the method that fits it, and the meaning of its parameters."""
 
-    problem: RateProblem  # What is fitted, in the parameters of the method.
+    problem: RateProblem  #: What is fitted, in the parameters of the method.
     method: Method
-    six: Callable[[FloatArray], FloatArray]  # From those parameters to the paper's six.
+    six: Callable[[FloatArray], FloatArray]  #: From those parameters to the paper's six.
 
     def covariance(self, fit: Fit, folds: CrossValidation) -> FloatArray | None:
         """Covariance (4, 4) of the identifiable numbers, from the fits of the folds; None for few folds."""

@@ -249,9 +249,9 @@ def _prediction(drawn: ResidualDraws, observed_hz: FloatArray) -> PhasePredictio
 class MaximumLikelihood:
     """Fit the soft threshold under which the spikes of the chosen stimuli are most likely."""
 
-    drive: Drive  # One column per stimulus.
-    recordings: SpikeRecordings  # Spikes of all presentations.
-    sites: IntArray  # Column of the drive that each presentation belongs to, (n_presentations,).
+    drive: Drive  #: One column per stimulus.
+    recordings: SpikeRecordings  #: Spikes of all presentations.
+    sites: IntArray  #: Column of the drive that each presentation belongs to, (n_presentations,).
     name: str = "likelihood"
 
     def of(self, chosen: IntArray) -> SpikeLikelihood:
@@ -281,7 +281,7 @@ class PreparedSpikes(Prepared):
     """The likelihood of spikes, the method that maximises it, and the meaning of its parameters."""
 
     method: MaximumLikelihood
-    everything: SpikeLikelihood  # Likelihood of all spikes.
+    everything: SpikeLikelihood  #: Likelihood of all spikes.
 
     def covariance(self, fit: Fit, folds: CrossValidation) -> FloatArray:
         """Covariance (4, 4) of the identifiable numbers: part of the inverse of the Fisher information."""

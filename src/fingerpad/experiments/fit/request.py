@@ -69,9 +69,9 @@ class FitFile:
     format: Literal["fingerpad fit"] = "fingerpad fit"
     format_version: Literal[3] = 3
     fit: FitResult
-    windows_ms: tuple[tuple[float, ...], tuple[float, ...]]  # Of the dynamic and of the static rate. [ms]
+    windows_ms: tuple[tuple[float, ...], tuple[float, ...]]  #: Of the dynamic and of the static rate. [ms]
     dynamic_quantity: str
-    static_quantity: str  # Quantities of the two terms.
+    static_quantity: str  #: Quantities of the two terms.
     manifest: Manifest
 
 
@@ -297,10 +297,10 @@ class ChosenNumbersFile:
     format: Literal["fingerpad fit of chosen numbers"] = "fingerpad fit of chosen numbers"
     format_version: Literal[1] = 1
     type: str
-    fitted: dict[str, float]  # Numbers by their names, in the units of the type.
+    fitted: dict[str, float]  #: Numbers by their names, in the units of the type.
     stimulus: tuple[str, ...]
     dynamic_rate_hz: Vector
-    static_rate_hz: Vector  # Rates of the fitted afferent. [spikes/s]
+    static_rate_hz: Vector  #: Rates of the fitted afferent. [spikes/s]
     observed_dynamic_rate_hz: Vector | None
     observed_static_rate_hz: Vector | None
     fss_in_sample: float

@@ -21,13 +21,13 @@ if TYPE_CHECKING:
 class SpikeFitSummary:
     """Maximum likelihood of spike trains under a soft threshold."""
 
-    n_spikes: int  # How many were fitted.
+    n_spikes: int  #: How many were fitted.
     log_likelihood: float
-    log_likelihood_out_of_sample: float  # Of all spikes, and of each fold's spikes fitted without it.
+    log_likelihood_out_of_sample: float  #: Of all spikes, and of each fold's spikes fitted without it.
     escape_width: float
-    escape_width_standard_error: Number  # Width of the threshold over the threshold.
+    escape_width_standard_error: Number  #: Width of the threshold over the threshold.
     time_rescaling_distance: float
-    time_rescaling_p_value: float  # Kolmogorov-Smirnov test of the rescaled intervals.
+    time_rescaling_p_value: float  #: Kolmogorov-Smirnov test of the rescaled intervals.
 
 
 @result_class
@@ -35,10 +35,10 @@ class ParameterProfile:
     """Profile likelihood of one of the four identifiable numbers."""
 
     name: str
-    values: Vector  # Where it was held, (n_values,).
-    losses: Vector  # Loss of log likelihood there, the other three numbers fitted, (n_values,).
+    values: Vector  #: Where it was held, (n_values,).
+    losses: Vector  #: Loss of log likelihood there, the other three numbers fitted, (n_values,).
     low: float | None
-    high: float | None  # Ends of the interval, None where the rates set none.
+    high: float | None  #: Ends of the interval, None where the rates set none.
 
 
 @result_class
@@ -54,8 +54,8 @@ class CredibleInterval:
 class ParameterIdentifiability:
     """Directions of the six parameters that the rates determine."""
 
-    rank: int  # Singular values of the Jacobian of the rates that are not zero.
-    relative_singular_values: Vector  # Over the largest, (6,). [1]
+    rank: int  #: Singular values of the Jacobian of the rates that are not zero.
+    relative_singular_values: Vector  #: Over the largest, (6,). [1]
 
 
 @result_class
@@ -63,14 +63,14 @@ class PosteriorConvergence:
     """Size and convergence of the MCMC ensembles."""
 
     ensembles: int
-    walkers: int  # Independent ensembles, and walkers of each.
+    walkers: int  #: Independent ensembles, and walkers of each.
     draws: int
-    evaluations: int  # Draws kept, and evaluations of the likelihood.
-    acceptance: Number  # Share of accepted proposals. [1]
-    r_hat: Number  # Largest split R-hat. [1]
+    evaluations: int  #: Draws kept, and evaluations of the likelihood.
+    acceptance: Number  #: Share of accepted proposals. [1]
+    r_hat: Number  #: Largest split R-hat. [1]
     effective_draws: Number
-    effective_draws_of_tails: Number  # Smallest effective sample sizes.
-    draws_per_effective_draw: Number  # Largest autocorrelation time, in draws.
+    effective_draws_of_tails: Number  #: Smallest effective sample sizes.
+    draws_per_effective_draw: Number  #: Largest autocorrelation time, in draws.
 
     @classmethod
     def of(cls, chains: Chains) -> PosteriorConvergence:
@@ -95,23 +95,23 @@ class PhasePrediction:
     observed_hz: Vector
     median_hz: Vector
     low_hz: Vector
-    high_hz: Vector  # Observed; median and credible band of predicted rates, (n_stimuli,). [spikes/s]
+    high_hz: Vector  #: Observed; median and credible band of predicted rates, (n_stimuli,). [spikes/s]
     new_low_hz: Vector
-    new_high_hz: Vector  # Credible band of a new recording, (n_stimuli,). [spikes/s]
-    share_within_new: Number  # Share of the observed rates within that band. [1]
+    new_high_hz: Vector  #: Credible band of a new recording, (n_stimuli,). [spikes/s]
+    share_within_new: Number  #: Share of the observed rates within that band. [1]
     residual_deviation_hz: CredibleInterval
-    residual_length_mm: CredibleInterval  # Of the residuals; length: of their correlation.
-    probability_of_independence: Number  # That residuals of neighbouring shifts are independent. [1]
+    residual_length_mm: CredibleInterval  #: Of the residuals; length: of their correlation.
+    probability_of_independence: Number  #: That residuals of neighbouring shifts are independent. [1]
 
 
 @result_class
 class RatePosterior:
     """Posterior of the four identifiable numbers."""
 
-    level: float  # Probability within each interval and band.
-    seed: int  # Of the random numbers.
+    level: float  #: Probability within each interval and band.
+    seed: int  #: Of the random numbers.
     numbers: dict[str, CredibleInterval]
-    covariance: Matrix  # Of the draws of the four numbers, (4, 4).
+    covariance: Matrix  #: Of the draws of the four numbers, (4, 4).
     convergence: PosteriorConvergence
     rates: dict[str, PhasePrediction]
 
@@ -120,20 +120,20 @@ class RatePosterior:
 class UncertaintyResult:
     """Uncertainty of a fit to rates whose residuals may be alike where stimuli are neighbours."""
 
-    level: Number  # Probability within each interval and band.
-    seed: int  # Of the random numbers.
+    level: Number  #: Probability within each interval and band.
+    seed: int  #: Of the random numbers.
     units: dict[str, str]
-    fit: dict[str, Number]  # By the names of the four identifiable numbers.
+    fit: dict[str, Number]  #: By the names of the four identifiable numbers.
     capacitance_mf: Number
-    threshold_mv: Number  # Of the fit; they set the common scale of the gains in `posterior`. [mF], [mV]
-    identifiability: ParameterIdentifiability  # Of the six parameters.
-    posterior: dict[str, CredibleInterval]  # Of numbers, gains, and resting potential over threshold.
+    threshold_mv: Number  #: Of the fit; they set the common scale of the gains in `posterior`. [mF], [mV]
+    identifiability: ParameterIdentifiability  #: Of the six parameters.
+    posterior: dict[str, CredibleInterval]  #: Of numbers, gains, and resting potential over threshold.
     convergence: PosteriorConvergence
-    shift_mm: Vector  # Places of the stimuli along a line, (n_stimuli,). [mm]
+    shift_mm: Vector  #: Places of the stimuli along a line, (n_stimuli,). [mm]
     rates: dict[str, PhasePrediction]
-    evidence_for_alike_residuals: Number  # Gain of the largest log likelihood by correlated residuals.
-    profiles: tuple[ParameterProfile, ...]  # Of the four numbers.
-    sensitivity: SobolIndices  # Of FSS to the four numbers.
+    evidence_for_alike_residuals: Number  #: Gain of the largest log likelihood by correlated residuals.
+    profiles: tuple[ParameterProfile, ...]  #: Of the four numbers.
+    sensitivity: SobolIndices  #: Of FSS to the four numbers.
 
 
 @result_class
@@ -149,25 +149,25 @@ class OffsetFit:
     """Fit of the four numbers and the receptor's offset."""
 
     offset_mm: float
-    standard_error_mm: Number  # Distal positive; its error is NaN where not known. [mm]
-    folds_mm: Vector  # Offsets that the folds give, (n_folds,). [mm]
+    standard_error_mm: Number  #: Distal positive; its error is NaN where not known. [mm]
+    folds_mm: Vector  #: Offsets that the folds give, (n_folds,). [mm]
     identifiable: dict[str, float]
     fss_in_sample: float
-    fss_out_of_sample: float  # Fractional sum of squares over all stimuli, and mean over the folds.
-    fss_by_phase: dict[str, float]  # In sample, "dynamic" and "static".
-    n_evaluations: int  # Evaluations of the model.
-    seconds: float  # Time on the clock. [s]
-    held: HeldOffset  # Fits with the receptor held.
+    fss_out_of_sample: float  #: Fractional sum of squares over all stimuli, and mean over the folds.
+    fss_by_phase: dict[str, float]  #: In sample, "dynamic" and "static".
+    n_evaluations: int  #: Evaluations of the model.
+    seconds: float  #: Time on the clock. [s]
+    held: HeldOffset  #: Fits with the receptor held.
 
 
 @result_class
 class PhaseRates:
     """Rates of one phase, in the ramp or in the hold."""
 
-    fss_in_sample: float | None  # Over all stimuli; absent where the phase was not recorded.
-    observed_hz: Vector | None  # Recorded rates, (n_stimuli,). [spikes/s]
-    fitted_hz: Vector  # Rates of the afferent that is fitted to all stimuli, (n_stimuli,). [spikes/s]
-    out_of_sample_hz: Vector  # Rates predicted by the fit without its fold, (n_stimuli,). [spikes/s]
+    fss_in_sample: float | None  #: Over all stimuli; absent where the phase was not recorded.
+    observed_hz: Vector | None  #: Recorded rates, (n_stimuli,). [spikes/s]
+    fitted_hz: Vector  #: Rates of the afferent that is fitted to all stimuli, (n_stimuli,). [spikes/s]
+    out_of_sample_hz: Vector  #: Rates predicted by the fit without its fold, (n_stimuli,). [spikes/s]
 
 
 @result_class
@@ -175,33 +175,33 @@ class FittedFold:
     """One fold of the cross validation."""
 
     fold: int
-    stimuli: tuple[str, ...]  # Left out of the fit.
+    stimuli: tuple[str, ...]  #: Left out of the fit.
     fss_train: float
-    fss_test: float  # Fractional sum of squares over the other stimuli and over these.
-    n_evaluations: int  # Evaluations of the model.
-    seconds: float  # Time on the clock. [s]
+    fss_test: float  #: Fractional sum of squares over the other stimuli and over these.
+    n_evaluations: int  #: Evaluations of the model.
+    seconds: float  #: Time on the clock. [s]
     parameters: dict[str, float]
-    identifiable: dict[str, float]  # The paper's six parameters, and the four that rates identify.
+    identifiable: dict[str, float]  #: The paper's six parameters, and the four that rates identify.
 
 
 @result_class
 class SearchStep:
     """One step of a search."""
 
-    iteration: int  # From 0, the start point.
-    fss: Number  # Fractional sum of squares of the training set. [1]
-    parameters: dict[str, Number]  # By name.
+    iteration: int  #: From 0, the start point.
+    fss: Number  #: Fractional sum of squares of the training set. [1]
+    parameters: dict[str, Number]  #: By name.
 
 
 @result_class
 class Search:
     """Search of one fold from one start point."""
 
-    start: int  # Number of the start point, from 1.
+    start: int  #: Number of the start point, from 1.
     fss_train: Number
-    fss_test: Number  # Fractional sum of squares of the training and of the testing set. [1]
-    runs: int  # Evaluations of the model.
-    history: tuple[SearchStep, ...]  # Steps from the start point to the end.
+    fss_test: Number  #: Fractional sum of squares of the training and of the testing set. [1]
+    runs: int  #: Evaluations of the model.
+    history: tuple[SearchStep, ...]  #: Steps from the start point to the end.
 
     @classmethod
     def of(cls, problem: RateProblem, fold: FoldFit) -> tuple[Search, ...]:

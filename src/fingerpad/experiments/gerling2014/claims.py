@@ -57,13 +57,13 @@ class ClaimRow:
     """A claim of the paper beside this run."""
 
     group: Group
-    section: str = ""  # Section of the paper; empty for our own additions.
+    section: str = ""  #: Section of the paper; empty for our own additions.
     quantity: str
     paper: str
-    ours: str  # As they are printed.
-    status: str = ""  # How far the inputs can be trusted.
+    ours: str  #: As they are printed.
+    status: str = ""  #: How far the inputs can be trusted.
     verdict: Verdict
-    fitted_to: str = ""  # What was fitted to the number or chosen by it; in the group `FITTED` alone.
+    fitted_to: str = ""  #: What was fitted to the number or chosen by it; in the group `FITTED` alone.
     note: str = ""
 
 
@@ -73,13 +73,13 @@ class Statement:
 
     section: str
     statement: str
-    published: str  # Where the paper says it, what it says, and the number that it prints.
+    published: str  #: Where the paper says it, what it says, and the number that it prints.
     paper: str
-    human: str  # Ours, by the set.
+    human: str  #: Ours, by the set.
     verdict_paper: Verdict
     verdict_human: Verdict
     fitted_paper: str
-    fitted_human: str  # What was fitted to it; empty where nothing was.
+    fitted_human: str  #: What was fitted to it; empty where nothing was.
 
 
 Summary = dict[str, Number | tuple[Number, ...]]

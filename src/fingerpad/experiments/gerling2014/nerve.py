@@ -49,9 +49,9 @@ class Modulation:
     """Modulation of the rate at the edge of the bar (Eq. 11)."""
 
     maximum_hz: Number
-    minimum_hz: Number  # Smallest rate with the flat face of the bar over the receptor. [spikes/s]
+    minimum_hz: Number  #: Smallest rate with the flat face of the bar over the receptor. [spikes/s]
     difference_hz: Number
-    index: Number  # Modulation index; NaN if there are no spikes. [1]
+    index: Number  #: Modulation index; NaN if there are no spikes. [1]
 
 
 @result_class
@@ -59,11 +59,11 @@ class FoldResult:
     """One fold of the cross-validation."""
 
     fold: int
-    start: int  # Number of the fold and of the better start point, from 1.
-    testing_shift_mm: Vector  # Shifts left out, (n_testing,). [mm]
+    start: int  #: Number of the fold and of the better start point, from 1.
+    testing_shift_mm: Vector  #: Shifts left out, (n_testing,). [mm]
     fss_train: Number
-    fss_test: Number  # Of the better search. [1]
-    climbs: tuple[Search, ...]  # One per start point.
+    fss_test: Number  #: Of the better search. [1]
+    climbs: tuple[Search, ...]  #: One per start point.
 
 
 @result_class
@@ -72,22 +72,22 @@ class SingleUnitResult:
 
     fss_in_sample: Number
     fss_in_sample_dynamic: Number
-    fss_in_sample_static: Number  # Fractional sum of squares over all shifts, weighted and by phase. [1]
-    fss_out_of_sample: Number  # Mean over the testing sets of the folds. [1]
+    fss_in_sample_static: Number  #: Fractional sum of squares over all shifts, weighted and by phase. [1]
+    fss_out_of_sample: Number  #: Mean over the testing sets of the folds. [1]
     method: str
     dynamic_quantity: str
-    static_quantity: str  # What the two terms of the current follow, see `SkinResponse.sample`.
+    static_quantity: str  #: What the two terms of the current follow, see `SkinResponse.sample`.
     parameters: dict[str, Number]
-    units: dict[str, str]  # Six parameters fitted to all shifts, and their units, by name.
-    shift_mm: Vector  # Shifts of the bar, proximal positive, (n_shifts,). [mm]
+    units: dict[str, str]  #: Six parameters fitted to all shifts, and their units, by name.
+    shift_mm: Vector  #: Shifts of the bar, proximal positive, (n_shifts,). [mm]
     dynamic_rate_hz: Vector
-    static_rate_hz: Vector  # Predicted rates, (n_shifts,). [spikes/s]
+    static_rate_hz: Vector  #: Predicted rates, (n_shifts,). [spikes/s]
     observed_dynamic_rate_hz: Vector
-    observed_static_rate_hz: Vector  # Recorded rates, (n_shifts,). [spikes/s]
-    start_points: tuple[dict[str, Number], ...]  # Both start points, by name of the parameter.
+    observed_static_rate_hz: Vector  #: Recorded rates, (n_shifts,). [spikes/s]
+    start_points: tuple[dict[str, Number], ...]  #: Both start points, by name of the parameter.
     folds: tuple[FoldResult, ...]
-    modulation: dict[str, dict[str, Modulation]]  # By phase: "observed", and predicted, "ours".
-    initial_mv: Number | None = None  # Potential of the membrane at the start; by default at rest. [mV]
+    modulation: dict[str, dict[str, Modulation]]  #: By phase: "observed", and predicted, "ours".
+    initial_mv: Number | None = None  #: Potential of the membrane at the start; by default at rest. [mV]
 
 
 def traces_at_receptor(
@@ -191,13 +191,13 @@ def _modulation(shift_mm: FloatArray, rate_hz: FloatArray) -> Modulation:
 class FiringCourse:
     """Course of the firing and of the current under the bar, shift by shift, and rates by depth."""
 
-    peak_ms: Vector  # End of the shortest interval, (n_shifts,); NaN with fewer than two spikes. [ms]
-    window_ms: tuple[float, float]  # The paper's window of the dynamic rate. [ms]
-    dynamic_share_ramp: Vector  # Share of the dynamic term in the charge in the ramp, (n_shifts,). [1]
-    dynamic_share_hold: Vector  # The same in the hold, (n_shifts,). [1]
-    sed_r2: Number  # R² of the line from SED in the static window to the observed static rates. [1]
-    depth_mm: Vector  # Depths of a flat plate, (n_depths,). [mm]
-    static_rate_by_depth_hz: Vector  # At these depths, mean of the population, (n_depths,). [spikes/s]
+    peak_ms: Vector  #: End of the shortest interval, (n_shifts,); NaN with fewer than two spikes. [ms]
+    window_ms: tuple[float, float]  #: The paper's window of the dynamic rate. [ms]
+    dynamic_share_ramp: Vector  #: Share of the dynamic term in the charge in the ramp, (n_shifts,). [1]
+    dynamic_share_hold: Vector  #: The same in the hold, (n_shifts,). [1]
+    sed_r2: Number  #: R² of the line from SED in the static window to the observed static rates. [1]
+    depth_mm: Vector  #: Depths of a flat plate, (n_depths,). [mm]
+    static_rate_by_depth_hz: Vector  #: At these depths, mean of the population, (n_depths,). [spikes/s]
 
     @property
     def fires(self) -> np.ndarray:
@@ -277,26 +277,26 @@ UNTIL_MS, POTENTIAL_STEP_MS = 200.0, 0.5
 class ThreeLevels:
     """Skin, one afferent and three afferents under the standard sphere (Figure 2)."""
 
-    curvature_per_m: float  # Of the sphere. [1/m]
-    centre_mm: tuple[float, float]  # x and y of its centre at the end of the hold. [mm]
-    ramp_ms: float  # Duration of the ramp. [ms]
+    curvature_per_m: float  #: Of the sphere. [1/m]
+    centre_mm: tuple[float, float]  #: x and y of its centre at the end of the hold. [mm]
+    ramp_ms: float  #: Duration of the ramp. [ms]
     x_mm: Matrix
     y_mm: Matrix
     """Nodes of the plane z = 0 at the end of the hold, through from the skin to the bone, (n_outline + 1,
     n_through + 1). [mm]"""
-    pressed: str  # Name of what the afferent follows, as it is known in all elements.
-    pressed_kpa: Matrix  # Its values in the elements beside that plane, (n_outline, n_through). [kPa]
-    end_ms: float  # End of the hold. [ms]
-    offset_mm: Vector  # Positions of the afferents relative to the contact, (3,). [mm]
-    spikes_ms: tuple[Vector, ...]  # Spike times of each afferent. [ms]
+    pressed: str  #: Name of what the afferent follows, as it is known in all elements.
+    pressed_kpa: Matrix  #: Its values in the elements beside that plane, (n_outline, n_through). [kPa]
+    end_ms: float  #: End of the hold. [ms]
+    offset_mm: Vector  #: Positions of the afferents relative to the contact, (3,). [mm]
+    spikes_ms: tuple[Vector, ...]  #: Spike times of each afferent. [ms]
     dynamic_rate_hz: Vector
-    static_rate_hz: Vector  # Their rates, (3,). [spikes/s]
+    static_rate_hz: Vector  #: Their rates, (3,). [spikes/s]
     times_ms: Vector
-    until_ms: float  # Times of the next two, and their end, (n_times,). [ms]
+    until_ms: float  #: Times of the next two, and their end, (n_times,). [ms]
     current_ma: Vector
-    potential_mv: Vector  # Current and potential of the first afferent, (n_times,). [mA, mV]
+    potential_mv: Vector  #: Current and potential of the first afferent, (n_times,). [mA, mV]
     rheobase_ma: float
-    threshold_mv: float  # Smallest constant current, and potential, that elicit spikes. [mA, mV]
+    threshold_mv: float  #: Smallest constant current, and potential, that elicit spikes. [mA, mV]
 
 
 def three_levels(standard: SkinResponse, afferent: Afferent) -> ThreeLevels:
@@ -343,8 +343,8 @@ class RestingResponse:
     """Response of an afferent without any touch."""
 
     dynamic_rate_hz: float
-    static_rate_hz: float  # Rates in the windows of the ramp and the hold. [spikes/s]
-    first_spike_latency_ms: Number  # NaN without a spike. [ms]
+    static_rate_hz: float  #: Rates in the windows of the ramp and the hold. [spikes/s]
+    first_spike_latency_ms: Number  #: NaN without a spike. [ms]
 
 
 @result_class
@@ -352,13 +352,13 @@ class PopulationMaps:
     """Responses of a dense sheet of afferents under the standard sphere (Figure 6), over x and z."""
 
     x_mm: Vector
-    z_mm: Vector  # Places of the afferents, (n_x,). [mm]
+    z_mm: Vector  #: Places of the afferents, (n_x,). [mm]
     dynamic_rate_hz: Matrix
-    static_rate_hz: Matrix  # Rates, (n_x, n_z). [spikes/s]
-    first_spike_latency_ms: Matrix  # NaN without a spike, (n_x, n_z). [ms]
-    curvature_per_m: float  # Of the sphere. [1/m]
-    at_rest: RestingResponse  # Of the same afferent.
-    receptors_mm: Matrix  # Places of the paper's receptors, (18, 2). [mm]
+    static_rate_hz: Matrix  #: Rates, (n_x, n_z). [spikes/s]
+    first_spike_latency_ms: Matrix  #: NaN without a spike, (n_x, n_z). [ms]
+    curvature_per_m: float  #: Of the sphere. [1/m]
+    at_rest: RestingResponse  #: Of the same afferent.
+    receptors_mm: Matrix  #: Places of the paper's receptors, (18, 2). [mm]
 
 
 def population_maps(standard: Skin, afferent: Afferent) -> PopulationMaps:

@@ -98,8 +98,8 @@ USED = {
 class TargetDistances:
     """Static hit rates of one position beside people's."""
 
-    at_goodwin: tuple[Estimate, ...]  # Hit rates at Goodwin's spheres. [0-1]
-    largest_from_line: Estimate  # Largest distance from the line in z between Goodwin's points. [0-1]
+    at_goodwin: tuple[Estimate, ...]  #: Hit rates at Goodwin's spheres. [0-1]
+    largest_from_line: Estimate  #: Largest distance from the line in z between Goodwin's points. [0-1]
 
 
 @result_class
@@ -107,11 +107,11 @@ class DiscriminationStatistics:
     """Statistics behind the paper's statements; dictionaries go by code."""
 
     misfit: dict[str, Estimate]
-    misfit_above_static: dict[str, Estimate]  # Distance to Goodwin's points (rms). [0-1]
+    misfit_above_static: dict[str, Estimate]  #: Distance to Goodwin's points (rms). [0-1]
     shift: dict[str, Estimate]
-    shift_above_static: dict[str, Estimate]  # Largest change of a hit rate by the shift. [0-1]
-    smallest_rise: dict[str, tuple[Estimate, ...]]  # Smallest step from one sphere to the next. [0-1]
-    noise_lowers: dict[str, Estimate]  # "smallest_fall" of the mean hit rate to the next noise. [0-1]
+    shift_above_static: dict[str, Estimate]  #: Largest change of a hit rate by the shift. [0-1]
+    smallest_rise: dict[str, tuple[Estimate, ...]]  #: Smallest step from one sphere to the next. [0-1]
+    noise_lowers: dict[str, Estimate]  #: "smallest_fall" of the mean hit rate to the next noise. [0-1]
     ten_matrices: dict[str, Estimate]
     criterion: dict[str, Estimate]
     """Noise matrices are fewer, or the criterion varies more: "ratio" of the mean error bars, and largest
@@ -127,9 +127,9 @@ class Interpretation:
     """One interpretation of the steps that the paper leaves open, and its hit rates."""
 
     reading: str
-    receptors: WholeVector  # Receptors that take part, (n_positions,).
-    rise: Vector  # Rise of the Gradient Sum from the standard to the farthest sphere, (n_positions,).
-    largest_shift: Number  # Largest change of a hit rate by the shift, at the noise of the study. [0-1]
+    receptors: WholeVector  #: Receptors that take part, (n_positions,).
+    rise: Vector  #: Rise of the Gradient Sum from the standard to the farthest sphere, (n_positions,).
+    largest_shift: Number  #: Largest change of a hit rate by the shift, at the noise of the study. [0-1]
     noise_sigma: Number
     misfit: Number
     own_largest_shift: Number
@@ -141,8 +141,8 @@ class Interpretation:
 class MisfitCurve:
     """Expected root mean square distance to Goodwin's points over the noise."""
 
-    noise_sigma: Vector  # Noise sigma_1, (n_levels,).
-    misfit: dict[str, Vector]  # By code, (n_levels,). [0-1]
+    noise_sigma: Vector  #: Noise sigma_1, (n_levels,).
+    misfit: dict[str, Vector]  #: By code, (n_levels,). [0-1]
 
 
 @result_class
@@ -152,23 +152,23 @@ class DiscrepancyAnalysis:
     rise_for_paper_noise: dict[str, Vector]
     """Rise of the Gradient Sum to the farthest sphere with which the paper's noise meets people's hit rate,
     by measure, (n_positions,); NaN where none does."""
-    readings: tuple[Interpretation, ...]  # Interpretations of the steps that the paper leaves open.
+    readings: tuple[Interpretation, ...]  #: Interpretations of the steps that the paper leaves open.
     criterion: dict[str, Vector]
     """Mean error bar by the spread of the criterion, "criterion_sigma", for each of `CRITERION_MOVES`: what
     varies with it, (n_spreads,). [0-1]"""
     misfit_curve: MisfitCurve
-    euclidean: dict[str, Number]  # Noise that fits the Euclidean Distance to people, as of `readings`.
+    euclidean: dict[str, Number]  #: Noise that fits the Euclidean Distance to people, as of `readings`.
 
 
 @result_class
 class GoodwinHitRates:
     """Hit rates of people."""
 
-    curvature_per_m: Vector  # Comparison spheres, (2,). [1/m]
+    curvature_per_m: Vector  #: Comparison spheres, (2,). [1/m]
     hit_rate: Vector
-    trials: int  # Trials behind each fraction (assumed).
+    trials: int  #: Trials behind each fraction (assumed).
     low: Vector
-    high: Vector  # Observed fractions and their binomial 95 % intervals, (2,). [0-1]
+    high: Vector  #: Observed fractions and their binomial 95 % intervals, (2,). [0-1]
 
 
 @result_class
@@ -177,8 +177,8 @@ class ObserverHitRates:
 
     hit_rate: Vector
     hit_rate_sd: Vector
-    hit_rate_shifted: Vector  # Means with the spheres at 0.0 and at 0.2 mm, (n_comparisons,). [0-1]
-    hit_rate_shifted_sd: Vector  # Standard deviations, (n_comparisons,). [0-1]
+    hit_rate_shifted: Vector  #: Means with the spheres at 0.0 and at 0.2 mm, (n_comparisons,). [0-1]
+    hit_rate_shifted_sd: Vector  #: Standard deviations, (n_comparisons,). [0-1]
 
 
 @result_class
@@ -186,17 +186,17 @@ class SphereDiscrimination:
     """Hit rates of all observers at the noise that fits Goodwin's two points best."""
 
     seed: int
-    sessions: int  # Of all noise; repetitions of the protocol.
-    curvature_per_m: Vector  # The spheres, the standard first, (7,). [1/m]
+    sessions: int  #: Of all noise; repetitions of the protocol.
+    curvature_per_m: Vector  #: The spheres, the standard first, (7,). [1/m]
     noise_sigma: float
-    noise_sigma_paper: float  # Fitted noise, and the paper's.
-    goodwin: GoodwinHitRates  # Of people.
+    noise_sigma_paper: float  #: Fitted noise, and the paper's.
+    goodwin: GoodwinHitRates  #: Of people.
     gradient_sum: dict[str, ObserverHitRates]
     euclidean: dict[str, ObserverHitRates]
-    variants: dict[str, ObserverHitRates]  # First session; variants of the static Gradient Sum by name.
-    silent: tuple[str, ...]  # Measures that are left out because the population stays silent.
-    statistics: DiscriminationStatistics  # Behind the paper's statements.
-    reasons: DiscrepancyAnalysis  # Why the numbers differ from the paper's.
+    variants: dict[str, ObserverHitRates]  #: First session; variants of the static Gradient Sum by name.
+    silent: tuple[str, ...]  #: Measures that are left out because the population stays silent.
+    statistics: DiscriminationStatistics  #: Behind the paper's statements.
+    reasons: DiscrepancyAnalysis  #: Why the numbers differ from the paper's.
 
 
 HitRatesOfNoise = Callable[[float], FloatArray]

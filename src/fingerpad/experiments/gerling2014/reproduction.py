@@ -48,16 +48,16 @@ class SetResult:
 
     tissues: str
     mesh: MeshPicture
-    levels: ThreeLevels  # The mesh under the standard sphere, and that indentation on all levels.
-    skin_force: SkinForce  # Level 1: deflection and force.
+    levels: ThreeLevels  #: The mesh under the standard sphere, and that indentation on all levels.
+    skin_force: SkinForce  #: Level 1: deflection and force.
     single_unit: SingleUnitResult
-    firing: FiringCourse  # Level 2: rates under the bar and their fit; when it fires, what drives it.
+    firing: FiringCourse  #: Level 2: rates under the bar and their fit; when it fires, what drives it.
     discrimination: SphereDiscrimination
     population: PopulationMaps
     nail: NailBorder
     single_unit_uncertainty: UncertaintyResult | None = None
-    curvature_thresholds: CurvatureThresholds | None = None  # Beyond the paper, where asked for.
-    comparison: tuple[ClaimRow, ...]  # The paper's numbers beside ours.
+    curvature_thresholds: CurvatureThresholds | None = None  #: Beyond the paper, where asked for.
+    comparison: tuple[ClaimRow, ...]  #: The paper's numbers beside ours.
 
 
 @result_class
@@ -66,13 +66,13 @@ class ReproductionResult:
 
     format: Literal["fingerpad reproduction"] = "fingerpad reproduction"
     format_version: Literal[6] = 6
-    summary: dict[str, Summary]  # A few plain numbers of both sets, "paper" and "human".
-    statements: tuple[Statement, ...]  # What can fail, with our value and verdict of both sets.
-    skin_deflection: SkinDeflectionResult  # Level 1: the paper's three trials.
+    summary: dict[str, Summary]  #: A few plain numbers of both sets, "paper" and "human".
+    statements: tuple[Statement, ...]  #: What can fail, with our value and verdict of both sets.
+    skin_deflection: SkinDeflectionResult  #: Level 1: the paper's three trials.
     paper: SetResult
-    human: SetResult  # The paper's own system, and the set that serves all three levels.
-    tissues: tuple[TissueLayer, ...]  # Every named set of tissues, those of run and trials among them.
-    inputs: tuple[Published, ...]  # Published numbers on which all of it rests.
+    human: SetResult  #: The paper's own system, and the set that serves all three levels.
+    tissues: tuple[TissueLayer, ...]  #: Every named set of tissues, those of run and trials among them.
+    inputs: tuple[Published, ...]  #: Published numbers on which all of it rests.
     manifest: Manifest
 
 

@@ -51,8 +51,8 @@ class IndenterDeflection:
     """Deflection of the skin under one indenter."""
 
     distance_mm: Vector
-    deflection_mm: Vector  # Along the midline; distance from the axis, proximal positive, (n_nodes,). [mm]
-    force_mn: Number  # At the end of the hold. [mN]
+    deflection_mm: Vector  #: Along the midline; distance from the axis, proximal positive, (n_nodes,). [mm]
+    force_mn: Number  #: At the end of the hold. [mN]
     r2: Number = np.nan
     r2_mirrored: Number = np.nan
     """Coefficient of determination, see `deflection_r2`, and the same with proximal and distal exchanged; NaN
@@ -70,17 +70,17 @@ class SkinDeflectionResult:
     trial1: TrialDeflection
     trial2: TrialDeflection
     trial3: TrialDeflection
-    observed: DeflectionObservations  # Under the cylinder.
+    observed: DeflectionObservations  #: Under the cylinder.
 
 
 @result_class
 class SkinForce:
     """Deflection and force with the tissues of the run."""
 
-    deflection_r2: Number  # R² of the deflection under the cylinder, see `deflection_r2`.
+    deflection_r2: Number  #: R² of the deflection under the cylinder, see `deflection_r2`.
     plate_1mm_n: Number
-    plate_2mm_n: Number  # Force of a flat plate at the end of the hold, 1.0 and 2.0 mm deep. [N]
-    disc_1mm_n: Number  # Force of a flat disc of 6.35 mm diameter at the end of the hold, 1.0 mm deep. [N]
+    plate_2mm_n: Number  #: Force of a flat plate at the end of the hold, 1.0 and 2.0 mm deep. [N]
+    disc_1mm_n: Number  #: Force of a flat disc of 6.35 mm diameter at the end of the hold, 1.0 mm deep. [N]
 
 
 def deflection_touches(conditions: Conditions) -> dict[tuple[str, str], Touch]:
@@ -166,19 +166,19 @@ PROFILE_MM = np.arange(-2.0, 5.01, 0.5)  # Edges of the classes of distance of a
 class StressProfile:
     """Stress over distance from the nail, over the sections that cross its border."""
 
-    distance_mm: Vector  # From the nail, negative under it, (n,). [mm]
+    distance_mm: Vector  #: From the nail, negative under it, (n,). [mm]
     surface_kpa: Matrix
-    living_epidermis_kpa: Matrix  # Quantiles 0.1, 0.5 and 0.9; NaN without an element, (n, 3). [kPa]
+    living_epidermis_kpa: Matrix  #: Quantiles 0.1, 0.5 and 0.9; NaN without an element, (n, 3). [kPa]
 
 
 @result_class
 class CrossSection:
     """Deformed quadrilaterals in the middle of a section's elements, and their stress."""
 
-    x_mm: float  # Where the section lies. [mm]
+    x_mm: float  #: Where the section lies. [mm]
     y_mm: Matrix
-    z_mm: Matrix  # Corners, (n_elements, 4). [mm]
-    von_mises_kpa: Vector  # Stress, (n_elements,). [kPa]
+    z_mm: Matrix  #: Corners, (n_elements, 4). [mm]
+    von_mises_kpa: Vector  #: Stress, (n_elements,). [kPa]
 
 
 @result_class
@@ -187,15 +187,15 @@ class NailBorder:
 
     x_mm: Matrix
     y_mm: Matrix
-    z_mm: Matrix  # Deformed corners of the faces of the skin, (n_along + 1, n_around + 1). [mm]
-    von_mises_kpa: Matrix  # Stress of the element below each face, (n_along, n_around). [kPa]
-    nail_mm: Stack  # Outline of the nail, (n_edges, 2, 3). [mm]
+    z_mm: Matrix  #: Deformed corners of the faces of the skin, (n_along + 1, n_around + 1). [mm]
+    von_mises_kpa: Matrix  #: Stress of the element below each face, (n_along, n_around). [kPa]
+    nail_mm: Stack  #: Outline of the nail, (n_edges, 2, 3). [mm]
     ratio: Number
-    ratio_range: tuple[Number, Number]  # Stress at the border over that away from it, median and range.
-    ratio_energy: Number  # The same median for strain energy density in the living epidermis.
-    border_kpa: Number  # Largest stress at the border. [kPa]
-    profile: StressProfile  # Stress over distance from the nail.
-    across: CrossSection  # The section with the highest ratio.
+    ratio_range: tuple[Number, Number]  #: Stress at the border over that away from it, median and range.
+    ratio_energy: Number  #: The same median for strain energy density in the living epidermis.
+    border_kpa: Number  #: Largest stress at the border. [kPa]
+    profile: StressProfile  #: Stress over distance from the nail.
+    across: CrossSection  #: The section with the highest ratio.
 
 
 def nail_touch(conditions: Conditions) -> Touch:
@@ -302,8 +302,8 @@ class MeshPlane:
     """Nodes of a mesh in one plane, in grid order."""
 
     right_mm: Matrix
-    up_mm: Matrix  # In the plane, through from the skin to the bone, (n_outline, n_through + 1). [mm]
-    under_nail: TruthVector  # Whether the node on the skin lies under the nail, (n_outline,).
+    up_mm: Matrix  #: In the plane, through from the skin to the bone, (n_outline, n_through + 1). [mm]
+    under_nail: TruthVector  #: Whether the node on the skin lies under the nail, (n_outline,).
 
 
 @result_class
@@ -312,16 +312,16 @@ class MeshPicture:
 
     x_mm: Matrix
     y_mm: Matrix
-    z_mm: Matrix  # Nodes of the skin, (n_along + 1, n_around + 1). [mm]
-    under_nail: TruthMatrix  # Whether they lie under the nail, (n_along + 1, n_around + 1).
-    along: MeshPlane  # Plane z = 0, from the volar side over the tip to the back; right is x, up is y.
-    across: MeshPlane  # Proximal end, beside the middle phalanx, half of a half mesh; right is z, up is y.
-    contact_mm: tuple[float, float]  # x and y of the skin at the contact. [mm]
-    layers: tuple[str, ...]  # From the skin inwards.
-    layer: WholeVector  # Index into `layers` of each element through the skin, (n_through,).
-    receptor_depth_mm: float  # Of the end organs below the skin. [mm]
+    z_mm: Matrix  #: Nodes of the skin, (n_along + 1, n_around + 1). [mm]
+    under_nail: TruthMatrix  #: Whether they lie under the nail, (n_along + 1, n_around + 1).
+    along: MeshPlane  #: Plane z = 0, from the volar side over the tip to the back; right is x, up is y.
+    across: MeshPlane  #: Proximal end, beside the middle phalanx, half of a half mesh; right is z, up is y.
+    contact_mm: tuple[float, float]  #: x and y of the skin at the contact. [mm]
+    layers: tuple[str, ...]  #: From the skin inwards.
+    layer: WholeVector  #: Index into `layers` of each element through the skin, (n_through,).
+    receptor_depth_mm: float  #: Of the end organs below the skin. [mm]
     nodes: int
-    elements: int  # Of the whole mesh.
+    elements: int  #: Of the whole mesh.
 
 
 def mesh_picture(mesh: Mesh, contact_x_mm: float) -> MeshPicture:

@@ -54,18 +54,18 @@ class CurvatureThreshold:
     """Threshold at one standard."""
 
     standard_per_m: float
-    jnd_per_m: float  # The standard and the just noticeable difference of the model. [1/m]
+    jnd_per_m: float  #: The standard and the just noticeable difference of the model. [1/m]
     weber_fraction: float
-    ideal_weber_fraction: float  # Threshold over standard; of the ideal observer by Fisher's information.
+    ideal_weber_fraction: float  #: Threshold over standard; of the ideal observer by Fisher's information.
     fitted_weber_fraction: Number
-    fitted_interval: tuple[Number, Number]  # By a Weibull function through its counts, with 95 % interval.
+    fitted_interval: tuple[Number, Number]  #: By a Weibull function through its counts, with 95 % interval.
 
 
 @result_class
 class MissingThreshold:
     """A standard without a threshold."""
 
-    standard_per_m: float | None  # None stands for all standards. [1/m]
+    standard_per_m: float | None  #: None stands for all standards. [1/m]
     why_not: str
 
 
@@ -75,9 +75,9 @@ class PopulationThresholds:
 
     layout: str
     rows: int
-    columns: int  # Receptors along the finger and across.
-    noise_sigma: Number  # Standard deviation of the multiplicative noise; NaN if none fits people.
-    standards: tuple[CurvatureThreshold, ...]  # Standards with a threshold.
+    columns: int  #: Receptors along the finger and across.
+    noise_sigma: Number  #: Standard deviation of the multiplicative noise; NaN if none fits people.
+    standards: tuple[CurvatureThreshold, ...]  #: Standards with a threshold.
     without_threshold: tuple[MissingThreshold, ...]
 
 
@@ -85,11 +85,11 @@ class PopulationThresholds:
 class CurvatureThresholds:
     """Thresholds of the static Gradient Sum at several standards."""
 
-    seed: int  # Of the random numbers.
-    proportion: float  # Hit rate at threshold. [0-1]
-    judgements: int  # Per comparison of an experiment.
-    pressed_per_m: Vector  # Pressed spheres, (n_spheres,). [1/m]
-    populations: tuple[PopulationThresholds, ...]  # By layout, the paper's first.
+    seed: int  #: Of the random numbers.
+    proportion: float  #: Hit rate at threshold. [0-1]
+    judgements: int  #: Per comparison of an experiment.
+    pressed_per_m: Vector  #: Pressed spheres, (n_spheres,). [1/m]
+    populations: tuple[PopulationThresholds, ...]  #: By layout, the paper's first.
 
 
 def threshold_touches(

@@ -50,9 +50,9 @@ SHAPES = ("rectangle", "ellipse", "polygon", PAD)
 class RegionSettings(Part):
     """Part of the skin that afferents lie in, unrolled; an area there is the same area of skin."""
 
-    shape: Annotated[str, choice(SHAPES)]  # Kind of shape.
+    shape: Annotated[str, choice(SHAPES)]  #: Kind of shape.
     length_mm: Positive | None = None
-    width_mm: Positive | None = None  # Extent of a rectangle or an ellipse along the finger and across. [mm]
+    width_mm: Positive | None = None  #: Extent of a rectangle or an ellipse along the finger and across. [mm]
     corners_mm: Annotated[tuple[Pair, ...], Strict(False)] | None = None
     """Of a polygon: along the finger, distal positive, and across, from the middle of the pad. [mm]"""
 
@@ -63,7 +63,7 @@ class PopulationSettings(Part):
     layout: Annotated[str, choice(LAYOUT_NAMES)] = GRID
     """"grid": the paper's rows and columns; a pattern that fills a region; or "nail rows", along the edge of
     the nail."""
-    density_per_cm2: Positive = psychophysics.RECEPTOR_DENSITY.value  # Afferents per area of skin. [1/cm2]
+    density_per_cm2: Positive = psychophysics.RECEPTOR_DENSITY.value  #: Afferents per area of skin. [1/cm2]
     densities_per_cm2: (
         Annotated[
             dict[Annotated[str, choice(TYPES)], Positive],
@@ -76,15 +76,15 @@ class PopulationSettings(Part):
     rows: Count | None = None
     columns: Count | None = None
     """Of a grid: along the finger and across, the paper's by default; or how many rows along the nail."""
-    region: RegionSettings | None = None  # What any other layout fills.
+    region: RegionSettings | None = None  #: What any other layout fills.
     depth_mm: Positive | None = None
     """Depth of the end organs below the skin; the border of epidermis and dermis by default. [mm]"""
     offset_mm: Pair = (0.0, 0.0)
     """Middle of grid, rectangle or ellipse from the middle of the pad, along the finger and across. [mm]"""
     jitter: NotNegative | None = None
     """Displacement of afferents in a jittered layout: standard deviation over the pitch."""
-    separation: NotNegative | None = None  # Least distance in a Poisson-disc layout over 1/sqrt(density).
-    seed: Seed = 0  # Of random places and sensitivities; another one is another finger.
+    separation: NotNegative | None = None  #: Least distance in a Poisson-disc layout over 1/sqrt(density).
+    seed: Seed = 0  #: Of random places and sensitivities; another one is another finger.
     sensitivity_spread: NotNegative = 0.0
     """How much afferents differ in their gains, as of `fingerpad.neuron.population.sensitivities`."""
 
@@ -97,10 +97,10 @@ class AfferentSettings(Part):
     static_gain: Finite | None = None
     time_constant_ms: Positive | None = None
     capacitance_mf: Positive | None = None
-    threshold_mv: Positive | None = None  # As of `fingerpad.Afferent`.
-    refractory_ms: NotNegative | None = None  # Rest after each spike. [ms]
+    threshold_mv: Positive | None = None  #: As of `fingerpad.Afferent`.
+    refractory_ms: NotNegative | None = None  #: Rest after each spike. [ms]
     dynamic_quantity: Annotated[str, choice(sampled_fields())] | None = None
-    static_quantity: Annotated[str, choice(sampled_fields())] | None = None  # What the two terms follow.
+    static_quantity: Annotated[str, choice(sampled_fields())] | None = None  #: What the two terms follow.
 
 
 def _form_of_afferent(value: Any) -> str:
@@ -147,7 +147,7 @@ class AfferentsSettings(PopulationSettings):
     noise: NotNegative = 0.0
     """Width of a soft threshold over the threshold: spikes are random, drawn with `seed`. 0 is a sharp
     threshold without randomness."""
-    windows_ms: RateWindowSettings = RateWindowSettings()  # When spikes count.
+    windows_ms: RateWindowSettings = RateWindowSettings()  #: When spikes count.
 
 
 def as_settings(value: Any) -> Any:

@@ -119,7 +119,7 @@ class Made(Part):
     """Part that a function makes from its keys."""
 
     makes: ClassVar[Callable[..., Any]]
-    files: ClassVar[frozenset[str]]  # Keys that name files.
+    files: ClassVar[frozenset[str]]  #: Keys that name files.
 
     def made(self, beside: Path = Path()) -> Any:
         """Return what the function makes."""
@@ -168,11 +168,11 @@ class OneOfKinds:
     The part of a kind is made when it is first needed: a file of spheres does not load braille.
     """
 
-    makers: Mapping[str, Callable[..., Any] | str]  # As of `made_by`, or its name below `fingerpad`.
-    instance: type  # Class of an object of Python.
-    default: str | None = None  # Kind of a block without one.
-    named: bool = False  # Whether a text may stand in the place of a block.
-    without: Mapping[str, Sequence[str]] = field(default_factory=dict)  # As of `made_by`, by kind.
+    makers: Mapping[str, Callable[..., Any] | str]  #: As of `made_by`, or its name below `fingerpad`.
+    instance: type  #: Class of an object of Python.
+    default: str | None = None  #: Kind of a block without one.
+    named: bool = False  #: Whether a text may stand in the place of a block.
+    without: Mapping[str, Sequence[str]] = field(default_factory=dict)  #: As of `made_by`, by kind.
 
     @cache  # noqa: B019 - the few of the package live as long as it
     def part(self, kind: str) -> type[Made]:
@@ -218,10 +218,10 @@ _Request = TypeVar("_Request", bound="Request")
 class Origin:
     r"""Where a description comes from: errors begin with its name and line."""
 
-    name: str  # Of the file: files that it names are searched beside it.
-    text: str = ""  # Its content in YAML, for lines; empty where there is none.
-    rows: tuple[int, ...] = ()  # Lines of the entries of `stimuli` in a table.
-    replaced: tuple[Place, ...] = ()  # Places of values that a keyword or an option gives, and not the file.
+    name: str  #: Of the file: files that it names are searched beside it.
+    text: str = ""  #: Its content in YAML, for lines; empty where there is none.
+    rows: tuple[int, ...] = ()  #: Lines of the entries of `stimuli` in a table.
+    replaced: tuple[Place, ...] = ()  #: Places of values that a keyword or an option gives, and not the file.
 
     @property
     def beside(self) -> Path:
@@ -331,9 +331,9 @@ class Request(Part):
     _origin: Origin = PrivateAttr(default=Origin("request"))
     _allow_python: bool = PrivateAttr(default=False)
 
-    word: ClassVar[str] = "request"  # What an error calls a request that is from no file.
-    python: ClassVar[tuple[str, ...]] = ()  # Keys at which a file may name an object of Python.
-    main: ClassVar[str] = ""  # Key that a source means which is no description, as a table of recordings.
+    word: ClassVar[str] = "request"  #: What an error calls a request that is from no file.
+    python: ClassVar[tuple[str, ...]] = ()  #: Keys at which a file may name an object of Python.
+    main: ClassVar[str] = ""  #: Key that a source means which is no description, as a table of recordings.
 
     def __eq__(self, other: object) -> bool:
         """Compare values alone: where a request comes from does not matter."""

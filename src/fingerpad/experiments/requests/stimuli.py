@@ -62,14 +62,14 @@ class StimulusBlocks(Part):
     motion: BlockOrObject = None
     place: Block | None = None
     """As in the file of a touch. A stimulus has the keys of its own block, then those that all have."""
-    friction: Finite | None = None  # Coulomb's coefficient.
+    friction: Finite | None = None  #: Coulomb's coefficient.
 
 
 class ListedStimulus(StimulusBlocks):
     """One stimulus by name."""
 
-    name: Text  # How it is called.
-    level: Finite | None = None  # Where it stands on the axis of the psychometric curve.
+    name: Text  #: How it is called.
+    level: Finite | None = None  #: Where it stands on the axis of the psychometric curve.
 
 
 class VariedStimuli(Part):
@@ -77,7 +77,7 @@ class VariedStimuli(Part):
 
     vary: Text
     """Block and key, such as "object.radius_mm", "motion.force_mn" or "place.spin_deg"; or "friction"."""
-    values: Annotated[tuple[LevelOrName, ...], Strict(False)]  # One per stimulus.
+    values: Annotated[tuple[LevelOrName, ...], Strict(False)]  #: One per stimulus.
 
 
 class StimulusSet(StimulusBlocks, FingerDescription):
@@ -92,19 +92,19 @@ class StimulusSet(StimulusBlocks, FingerDescription):
         Annotated[tuple[ListedStimulus, ...], Strict(False), Tag(LISTED)]
         | Annotated[VariedStimuli, Tag(VARIED)],
         Discriminator(lambda value: LISTED if isinstance(value, list | tuple) else VARIED),
-    ]  # Which they are.
+    ]  #: Which they are.
 
 
 @dataclass(frozen=True, kw_only=True)
 class NamedStimulus(TactileStimulus):
     """One of several stimuli."""
 
-    name: str  # How it is called.
-    level: float | None = None  # Where it stands on the axis of a psychometric curve.
-    files: tuple[Path, ...] = field(default=(), compare=False)  # Those that its object and motion name.
+    name: str  #: How it is called.
+    level: float | None = None  #: Where it stands on the axis of a psychometric curve.
+    files: tuple[Path, ...] = field(default=(), compare=False)  #: Those that its object and motion name.
     in_file: Callable[[Place], tuple[Place, str]] = field(
         default=lambda place: (place, spelled(place)), compare=False, repr=False
-    )  # From a place in its description to that in the file of all, and the words for it.
+    )  #: From a place in its description to that in the file of all, and the words for it.
 
 
 def named_stimuli(described: StimulusSet, beside: Path = Path()) -> list[NamedStimulus]:
@@ -281,11 +281,11 @@ BLOCKS = ("object.", "motion.", "place.")  # How other columns begin.
 class ShiftedBar:
     """The paper's stimuli: one bar at several places along the finger."""
 
-    bar: Bar = field(default_factory=Bar)  # Width and fillets.
-    motion: Motion = field(default_factory=RampAndHold)  # The same at all shifts.
-    column: str = "shift_mm"  # Column of the recordings with the shifts.
-    conditions: Conditions = field(default_factory=Conditions)  # Finger, tissues and accuracy.
-    finger_files: tuple[Path, ...] = ()  # Those that the finger is read from.
+    bar: Bar = field(default_factory=Bar)  #: Width and fillets.
+    motion: Motion = field(default_factory=RampAndHold)  #: The same at all shifts.
+    column: str = "shift_mm"  #: Column of the recordings with the shifts.
+    conditions: Conditions = field(default_factory=Conditions)  #: Finger, tissues and accuracy.
+    finger_files: tuple[Path, ...] = ()  #: Those that the finger is read from.
 
     def named(self, entry: str) -> NamedStimulus:
         """Return the bar at a shift."""
@@ -309,11 +309,11 @@ class ListedStimuli:
     """Stimuli of your own, each with a name."""
 
     stimuli: Mapping[str, NamedStimulus]
-    source: str = "stimuli"  # Where they are listed, for errors.
-    column: str = "stimulus"  # Column of the recordings with the names.
-    conditions: Conditions = field(default_factory=Conditions)  # Finger, tissues and accuracy.
-    reach_mm: float | None = None  # As of `StimulusSet`. [mm]
-    finger_files: tuple[Path, ...] = ()  # Those that the finger is read from.
+    source: str = "stimuli"  #: Where they are listed, for errors.
+    column: str = "stimulus"  #: Column of the recordings with the names.
+    conditions: Conditions = field(default_factory=Conditions)  #: Finger, tissues and accuracy.
+    reach_mm: float | None = None  #: As of `StimulusSet`. [mm]
+    finger_files: tuple[Path, ...] = ()  #: Those that the finger is read from.
 
     def named(self, entry: str) -> NamedStimulus:
         """Return the stimulus of that name."""

@@ -165,7 +165,7 @@ class PlaceSettings(Part):
     and across. [mm]"""
     tilt_deg: Finite | None = None
     """0 is perpendicular to the long axis of the finger; without it, perpendicular to the skin. [degrees]"""
-    spin_deg: Finite = 0.0  # Turn about the direction of pressing. [degrees]
+    spin_deg: Finite = 0.0  #: Turn about the direction of pressing. [degrees]
 
 
 def tissues_of(name: str, value: Any) -> str | Tissues:
@@ -206,13 +206,13 @@ FINGER_OBJECTS: tuple[str, ...] = (
 class FingerDescription(Part):
     """The finger that is pressed."""
 
-    resolution: Annotated[str, choice(RESOLUTIONS)] = "quick"  # How fine mesh and steps are.
+    resolution: Annotated[str, choice(RESOLUTIONS)] = "quick"  #: How fine mesh and steps are.
     finger: FingerPart = Field(default={}, validate_default=True)
     """Whose: a preset such as "child", the sizes of `fingerpad.Fingertip.of`, `kind: outline` with those of
     `fingerpad.Fingertip`, or `kind: mesh` with the parameters of `fingerpad.read_finger`."""
     tissues: TissuesPart = DEFAULT_TISSUES
     """A set of tissues by name, as of `fingerpad.indent`; in Python also tissues of one's own."""
-    stiffness: Positive = 1.0  # Factor of the moduli of all tissues.
+    stiffness: Positive = 1.0  #: Factor of the moduli of all tissues.
     grading: Annotated[Any, Check(grading_of, {"type": "object"}, dict_of)] = None
     """Mesh instead of that which `resolution` grades about the objects: the fields of `fingerpad.Grading`."""
 
@@ -250,11 +250,11 @@ class FingerRequest(Request, FingerDescription):
 class StimulusDescription(Part):
     """What is pressed in, and how."""
 
-    object: ObjectPart  # What is pressed in: `kind` and its sizes, or a text such as "sphere:radius_mm=3.5".
+    object: ObjectPart  #: What is pressed in: `kind` and its sizes, or a text such as "sphere:radius_mm=3.5".
     motion: MotionPart = Field(default={}, validate_default=True)
     """How: `kind` and its numbers; a ramp and hold by default."""
-    place: PlaceSettings = PlaceSettings()  # Where, and in which direction.
-    friction: NotNegative = 0.0  # Coulomb's coefficient between skin and object.
+    place: PlaceSettings = PlaceSettings()  #: Where, and in which direction.
+    friction: NotNegative = 0.0  #: Coulomb's coefficient between skin and object.
 
     def stimulus(self, beside: Path = Path(), made: MadeObjects | None = None) -> TactileStimulus:
         """Make what is described."""
@@ -277,8 +277,8 @@ class StimulusDescription(Part):
 class TactileStimulus:
     """An indenter, its motion, its place from the middle of the pad, and friction."""
 
-    indenter: Indenter  # The rigid body.
-    motion: Motion = field(default_factory=RampAndHold)  # How it is pressed.
+    indenter: Indenter  #: The rigid body.
+    motion: Motion = field(default_factory=RampAndHold)  #: How it is pressed.
     x_mm: Finite = 0.0
     z_mm: Finite = 0.0
     """Where its axis meets the skin, from the middle of the pad: along the finger, distal positive, and
@@ -287,7 +287,7 @@ class TactileStimulus:
     """As in `fingerpad.Touch`; by default it presses perpendicular to the skin in the middle. [degrees]"""
     spin_deg: Finite = 0.0
     """As in `fingerpad.Touch`: the orientation of a bar, an edge, a gap or a grating. [degrees]"""
-    friction: Finite = 0.0  # Coulomb's coefficient.
+    friction: Finite = 0.0  #: Coulomb's coefficient.
 
     def tilt_on(self, finger: Finger) -> float:
         """Tilt of the indenter on a finger. [degrees]"""

@@ -172,15 +172,15 @@ class TouchSummary:
     """What a touch did, in a few numbers."""
 
     nodes: int
-    times: int  # Size of the mesh, and number of times.
-    end_ms: Number  # End of the motion. [ms]
+    times: int  #: Size of the mesh, and number of times.
+    end_ms: Number  #: End of the motion. [ms]
     largest_force_mn: Number
     largest_depth_mm: Number
-    largest_contact_mm2: Number  # Over time. [mN], [mm], [mm²]
+    largest_contact_mm2: Number  #: Over time. [mN], [mm], [mm²]
     afferents: int
-    firing: int  # How many, and how many fire at all.
+    firing: int  #: How many, and how many fire at all.
     dynamic_rate_hz: Number
-    static_rate_hz: Number  # Largest firing rates in the two windows. [spikes/s]
+    static_rate_hz: Number  #: Largest firing rates in the two windows. [spikes/s]
 
 
 @result_class
@@ -188,20 +188,20 @@ class TouchFile:
     """The file `touch.json`."""
 
     format: Literal["fingerpad touch result"] = "fingerpad touch result"
-    format_version: Literal[1] = 1  # By which a reader knows the file.
-    touch: TouchRequest  # What was described.
-    summary: TouchSummary  # What it did.
-    manifest: Manifest  # What ran.
+    format_version: Literal[1] = 1  #: By which a reader knows the file.
+    touch: TouchRequest  #: What was described.
+    summary: TouchSummary  #: What it did.
+    manifest: Manifest  #: What ran.
 
 
 @dataclass(frozen=True)
 class TouchResult:
     """What became of a touch: the responses of skin and afferents."""
 
-    request: TouchRequest  # What was asked.
-    skin: SkinResponse  # Response of the skin; with all nodes and elements if it was pressed `whole`.
-    response: ResponseMap  # Responses of the afferents.
-    manifest: Manifest  # What ran.
+    request: TouchRequest  #: What was asked.
+    skin: SkinResponse  #: Response of the skin; with all nodes and elements if it was pressed `whole`.
+    response: ResponseMap  #: Responses of the afferents.
+    manifest: Manifest  #: What ran.
 
     @property
     def summary(self) -> TouchSummary:
@@ -233,13 +233,13 @@ NO_WAY = (0.0, 0.0)
 class RangeSettings(Part):
     """Poses that the reduced touch serves."""
 
-    depth_mm: Positive  # Largest depth below first touch at any pose. [mm]
+    depth_mm: Positive  #: Largest depth below first touch at any pose. [mm]
     x_mm: Pair = NO_WAY
-    z_mm: Pair = NO_WAY  # Ways of the object along and across the finger, from its place. [mm]
-    tilt_deg: Pair = NO_WAY  # Tilt, added to that of the place. [degrees]
+    z_mm: Pair = NO_WAY  #: Ways of the object along and across the finger, from its place. [mm]
+    tilt_deg: Pair = NO_WAY  #: Tilt, added to that of the place. [degrees]
     parameter: Text | None = None
     """A parameter of the object that varies, such as `curvature_per_m` of a sphere."""
-    values: Pair | None = None  # Its range.
+    values: Pair | None = None  #: Its range.
 
 
 class ReductionRequest(StimulusDescription, FingerRequest):
@@ -333,10 +333,10 @@ class PressEstimate:
 
     nodes: int
     elements: int
-    steps: int  # Size of the mesh, and number of steps that are solved at least.
+    steps: int  #: Size of the mesh, and number of steps that are solved at least.
     time_s: float
-    memory_mb: float  # Time on two cores with compiled kernels, and memory of the process. [s], [MB]
-    by_force: bool = False  # Whether the force is given, so that the depth is not known before the press.
+    memory_mb: float  #: Time on two cores with compiled kernels, and memory of the process. [s], [MB]
+    by_force: bool = False  #: Whether the force is given, so that the depth is not known before the press.
 
     @property
     def lines(self) -> tuple[str, ...]:

@@ -53,8 +53,8 @@ class EvenValues(Part):
     """Evenly spaced values of a field."""
 
     start: Finite
-    stop: Finite  # First and last value. [unit of the field]
-    count: Count  # How many.
+    stop: Finite  #: First and last value. [unit of the field]
+    count: Count  #: How many.
     spacing: Annotated[str, choice((LINEAR, LOGARITHMIC))] = LINEAR
     """Whether differences or ratios are equal."""
 
@@ -75,9 +75,9 @@ class SampleSettings(Part):
 
     method: Annotated[str, choice((SOBOL, LATIN_HYPERCUBE))] = SOBOL
     """How: a scrambled Sobol sequence, or a Latin hypercube."""
-    count: Count  # Number of points; powers of two suit Sobol.
-    seed: Seed = 0  # Of the random numbers.
-    fields: dict[str, Pair]  # Lower and upper bound by field. [unit of the field]
+    count: Count  #: Number of points; powers of two suit Sobol.
+    seed: Seed = 0  #: Of the random numbers.
+    fields: dict[str, Pair]  #: Lower and upper bound by field. [unit of the field]
 
     @property
     def values(self) -> dict[str, list[float]]:
@@ -101,15 +101,15 @@ class SampleSettings(Part):
 class ObserverSettings(Part):
     """An observer who discriminates the stimuli along one dimension of a sweep from one of them."""
 
-    along: Text  # Field of the touch that varies from stimulus to stimulus, such as "object.curvature_per_m".
-    standard: LevelOrName  # Its value under the standard, that all others are discriminated from.
+    along: Text  #: Field of the touch that varies from stimulus to stimulus, as "object.curvature_per_m".
+    standard: LevelOrName  #: Its value under the standard, that all others are discriminated from.
     code: Annotated[str, choice(tuple(code for code in CODES if code != IDEAL))] = CODES[0]
     """How the population is decoded."""
-    measure: Annotated[str, choice(MEASURES)] = MEASURES[0]  # What is measured of each afferent.
+    measure: Annotated[str, choice(MEASURES)] = MEASURES[0]  #: What is measured of each afferent.
     latest_ms: Positive | None = None
     """Latest first spike that counts, as `windows_ms.latency` of a task. [ms]"""
-    noise: Annotated[NotNegative, Field(le=LARGEST_NOISE)]  # Standard deviation of the multiplicative noise.
-    experiment: ExperimentSettings = ExperimentSettings()  # Repetitions, criterion and seed.
+    noise: Annotated[NotNegative, Field(le=LARGEST_NOISE)]  #: Standard deviation of the multiplicative noise.
+    experiment: ExperimentSettings = ExperimentSettings()  #: Repetitions, criterion and seed.
 
 
 def _as_block(value: Any) -> Any:
@@ -123,8 +123,8 @@ def _as_block(value: Any) -> Any:
 class Axis:
     """One dimension of a sweep."""
 
-    name: str  # Of the dimension: that of its field with underscores, "zip" or "sample".
-    values: Mapping[str, list[Any]]  # Values by field, all of one length.
+    name: str  #: Of the dimension: that of its field with underscores, "zip" or "sample".
+    values: Mapping[str, list[Any]]  #: Values by field, all of one length.
 
     def __len__(self) -> int:
         return len(next(iter(self.values.values())))

@@ -44,10 +44,10 @@ PLACES_MM: dict[Place, tuple[str, Callable[[SkinResponse], np.ndarray]]] = {
 class Case:
     """One press with the settings that are wanted of it."""
 
-    sweep: bytes  # The pickled request.
+    sweep: bytes  #: The pickled request.
     press: int
-    settings: tuple[int, ...]  # Numbers of the settings, all of this press.
-    store: Path  # Folder of stored indentations.
+    settings: tuple[int, ...]  #: Numbers of the settings, all of this press.
+    store: Path  #: Folder of stored indentations.
 
 
 @dataclass(frozen=True)
@@ -55,11 +55,11 @@ class Settled:
     """What became of a case."""
 
     press: int
-    pressed: bool  # Whether it was pressed, and not loaded.
-    seconds: float  # Time of the press. [s]
-    skin: Mapping[str, np.ndarray] = field(default_factory=dict)  # By name; empty if it failed.
-    responses: Mapping[int, ResponseMap] = field(default_factory=dict)  # By number of the setting.
-    failures: Mapping[int, str] = field(default_factory=dict)  # Why there is no response, by setting.
+    pressed: bool  #: Whether it was pressed, and not loaded.
+    seconds: float  #: Time of the press. [s]
+    skin: Mapping[str, np.ndarray] = field(default_factory=dict)  #: By name; empty if it failed.
+    responses: Mapping[int, ResponseMap] = field(default_factory=dict)  #: By number of the setting.
+    failures: Mapping[int, str] = field(default_factory=dict)  #: Why there is no response, by setting.
 
 
 def settle(case: Case, threads: int | None = None) -> Settled:
@@ -189,12 +189,12 @@ class SweepEstimate:
     """What a sweep will take if nothing of it is stored yet."""
 
     settings: int
-    presses: int  # How many, without those that are left out.
-    looked_at: int  # Presses that the estimate is from.
+    presses: int  #: How many, without those that are left out.
+    looked_at: int  #: Presses that the estimate is from.
     time_s: float
     memory_mb: float
-    disk_mb: float  # Time on the clock, memory of all processes, and stored indentations. [s], [MB], [MB]
-    processes: int  # How many press at a time.
+    disk_mb: float  #: Time on the clock, memory of all processes, and stored indentations. [s], [MB], [MB]
+    processes: int  #: How many press at a time.
 
     @property
     def lines(self) -> tuple[str, ...]:

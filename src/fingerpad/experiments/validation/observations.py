@@ -56,8 +56,8 @@ class Kind:
     """A kind of observation."""
 
     name: str
-    conditions: tuple[str, ...]  # Columns that say under what was observed.
-    observed: str  # Column of what was observed.
+    conditions: tuple[str, ...]  #: Columns that say under what was observed.
+    observed: str  #: Column of what was observed.
 
     @property
     def columns(self) -> tuple[str, ...]:
@@ -95,7 +95,7 @@ class Observation:
     """One row of a file."""
 
     line: int
-    condition: tuple[Value, ...]  # Values of the kind's conditions; an indenter as it is written.
+    condition: tuple[Value, ...]  #: Values of the kind's conditions; an indenter as it is written.
     observed: float
 
 
@@ -106,7 +106,7 @@ class Observations:
     kind: Kind
     rows: tuple[Observation, ...]
     source: str
-    objects: Mapping[str, Indenter] = field(default_factory=dict)  # Objects by the names that rows give.
+    objects: Mapping[str, Indenter] = field(default_factory=dict)  #: Objects by the names that rows give.
 
     @cached_property
     def observed(self) -> FloatArray:

@@ -41,20 +41,20 @@ class Prediction:
     """One row of the file with its prediction. Conditions that the kind does not have are null."""
 
     line: int
-    indenter: str | None = None  # As it is written in the file.
+    indenter: str | None = None  #: As it is written in the file.
     depth_mm: float | None = None
-    distance_mm: float | None = None  # Depth, and distance from the indenter's axis, proximal positive. [mm]
-    force_n: float | None = None  # Force that presses. [N]
-    curvature_per_m: float | None = None  # Of the sphere. [1/m]
+    distance_mm: float | None = None  #: Depth, and distance from the indenter's axis, proximal positive. [mm]
+    force_n: float | None = None  #: Force that presses. [N]
+    curvature_per_m: float | None = None  #: Of the sphere. [1/m]
     ridge_mm: float | None = None
-    groove_mm: float | None = None  # Of the grating. [mm]
-    position_mm: float | None = None  # Of the receptor from the middle of the touch, proximal positive. [mm]
+    groove_mm: float | None = None  #: Of the grating. [mm]
+    position_mm: float | None = None  #: Of the receptor from the middle of the touch, proximal positive. [mm]
     observed: float
-    predicted: Number  # In the unit of the kind; no prediction where a touch failed.
+    predicted: Number  #: In the unit of the kind; no prediction where a touch failed.
     observed_low: float
-    observed_high: float  # Lowest and highest observation of this condition.
-    inside_range: bool | None  # Whether the prediction lies between them; null with fewer than two.
-    reason: str | None = None  # Why there is no prediction.
+    observed_high: float  #: Lowest and highest observation of this condition.
+    inside_range: bool | None  #: Whether the prediction lies between them; null with fewer than two.
+    reason: str | None = None  #: Why there is no prediction.
 
 
 @result_class
@@ -64,25 +64,25 @@ class ValidationFile:
     format: Literal["fingerpad validation"] = "fingerpad validation"
     format_version: Literal[1] = 1
     kind: str
-    unit: str  # What was observed, and its unit.
+    unit: str  #: What was observed, and its unit.
     resolution: str
-    tissues: str  # Accuracy and tissues of the prediction.
-    loading: str | None = None  # How depths were reached, for force and deflection.
-    afferent: dict[str, float | str | None] | None = None  # Parameters of the afferent, for rates.
+    tissues: str  #: Accuracy and tissues of the prediction.
+    loading: str | None = None  #: How depths were reached, for force and deflection.
+    afferent: dict[str, float | str | None] | None = None  #: Parameters of the afferent, for rates.
     ramp_ms: float | None = None
-    hold_ms: float | None = None  # Motion of the force, for rates. [ms]
-    static_window_ms: tuple[float, ...] | None = None  # Window of the rates. [ms]
-    receptor_depth_mm: float | None = None  # Depth of the receptor below the skin, for rates. [mm]
+    hold_ms: float | None = None  #: Motion of the force, for rates. [ms]
+    static_window_ms: tuple[float, ...] | None = None  #: Window of the rates. [ms]
+    receptor_depth_mm: float | None = None  #: Depth of the receptor below the skin, for rates. [mm]
     n_rows: int
-    n_predicted: int  # Rows of the file, and those with a prediction. Scores are over the latter.
-    r2: Number  # 1 - sum (o - p)² / sum (o - mean of o)², with observations o and predictions p.
-    correlation: Number  # Pearson's correlation of o and p.
-    gain: Number  # sum o p / sum p², the factor on p with the least squares.
-    r2_after_gain: Number  # r2 of gain times p.
-    r2_mirrored: Number  # r2 with distances or positions reversed; null for kinds without either.
-    inside_range: bool | None  # Whether all that can be judged lie in their observed range.
-    n_judged: int  # Conditions with a prediction and at least two observations.
-    share_inside: Number  # Share of these with a prediction inside the observed range.
+    n_predicted: int  #: Rows of the file, and those with a prediction. Scores are over the latter.
+    r2: Number  #: 1 - sum (o - p)² / sum (o - mean of o)², with observations o and predictions p.
+    correlation: Number  #: Pearson's correlation of o and p.
+    gain: Number  #: sum o p / sum p², the factor on p with the least squares.
+    r2_after_gain: Number  #: r2 of gain times p.
+    r2_mirrored: Number  #: r2 with distances or positions reversed; null for kinds without either.
+    inside_range: bool | None  #: Whether all that can be judged lie in their observed range.
+    n_judged: int  #: Conditions with a prediction and at least two observations.
+    share_inside: Number  #: Share of these with a prediction inside the observed range.
     predictions: tuple[Prediction, ...]
     manifest: Manifest
 
@@ -156,8 +156,8 @@ def validate(request: ValidationRequest, runner: Runner) -> ValidationFile:
 class Reading:
     """How the prediction of one row is obtained."""
 
-    touch: Touch | None  # What is pressed; None if nothing is, at depth or force 0.
-    of: Callable[[SkinResponse | None], float]  # Reads the prediction; None without a touch.
+    touch: Touch | None  #: What is pressed; None if nothing is, at depth or force 0.
+    of: Callable[[SkinResponse | None], float]  #: Reads the prediction; None without a touch.
 
 
 Plan = Reading | InputError  # How a condition is predicted, or why it cannot be pressed.
@@ -169,10 +169,10 @@ Given = Mapping[str, Any]  # Values of a condition by their columns.
 class Predictions:
     """Predictions row by row."""
 
-    values: FloatArray  # In the unit of the observations; NaN where there is none, (n_rows,).
-    mirrored: FloatArray | None  # With proximal and distal exchanged, for kinds with an axis, (n_rows,).
-    reasons: Mapping[int, str]  # Why a row has no prediction.
-    meshed: SkinResponse | None  # One of the responses, for its mesh.
+    values: FloatArray  #: In the unit of the observations; NaN where there is none, (n_rows,).
+    mirrored: FloatArray | None  #: With proximal and distal exchanged, for kinds with an axis, (n_rows,).
+    reasons: Mapping[int, str]  #: Why a row has no prediction.
+    meshed: SkinResponse | None  #: One of the responses, for its mesh.
 
 
 def predict(model: ValidationRequest, runner: Runner) -> Predictions:

@@ -80,7 +80,7 @@ class FitStep:
     """One step of a fit."""
 
     parameters: FloatArray
-    score: float  # Score of the chosen observations.
+    score: float  #: Score of the chosen observations.
 
 
 @dataclass(frozen=True)
@@ -88,11 +88,11 @@ class Fit:
     """Result of a method: parameters, score, effort and history."""
 
     parameters: FloatArray
-    score: float  # Their score over the chosen observations.
-    n_evaluations: int  # Evaluations of the model, over all starts.
-    seconds: float  # Elapsed time, over all starts. [s]
-    history: tuple[FitStep, ...]  # Steps of the best fit; the first is its start, the last the result.
-    start: int = 0  # Number of its start, from 0; the first one of equals.
+    score: float  #: Their score over the chosen observations.
+    n_evaluations: int  #: Evaluations of the model, over all starts.
+    seconds: float  #: Elapsed time, over all starts. [s]
+    history: tuple[FitStep, ...]  #: Steps of the best fit; the first is its start, the last the result.
+    start: int = 0  #: Number of its start, from 0; the first one of equals.
     attempts: tuple[Fit, ...] = ()
     """The fit from each start, in their order; empty for a method with one start."""
 
@@ -121,8 +121,8 @@ def best_of(attempts: tuple[Fit, ...]) -> Fit:
 class Continued:
     """Two methods in sequence: a cheap one for the start of the second."""
 
-    first: Method  # Finds the start of the second.
-    second: Callable[[FloatArray], Method]  # `second(parameters)`: the method that starts there.
+    first: Method  #: Finds the start of the second.
+    second: Callable[[FloatArray], Method]  #: `second(parameters)`: the method that starts there.
     first_problem: Problem | None = None
     """Problem of the first method, if it is a simpler one with the same observations."""
     name: str = "continued"
@@ -149,14 +149,14 @@ class LeastSquares:
     all evaluated points. The method is deterministic.
     """
 
-    starts: ArrayLike  # Start points; all are scored, (n_starts, n_parameters).
-    bounds: Bounds  # Limits of the parameters, and the scales in which steps are taken.
-    n_refined: int = 4  # Number of starts, the best ones, from which a fit is made.
+    starts: ArrayLike  #: Start points; all are scored, (n_starts, n_parameters).
+    bounds: Bounds  #: Limits of the parameters, and the scales in which steps are taken.
+    n_refined: int = 4  #: Number of starts, the best ones, from which a fit is made.
     difference_steps: tuple[float, ...] = (0.1, 0.03, 0.01)
     """Half widths of the central differences, round by round, in units of the scales."""
     jacobian: Jacobian | None = None
     """`jacobian(parameters, chosen)`: derivatives of the residuals, instead of differences."""
-    most_iterations: int = 50  # Iterations of each round.
+    most_iterations: int = 50  #: Iterations of each round.
     name: str = "least squares"
 
     def fit(self, problem: Problem, chosen: IntArray) -> Fit:
@@ -232,12 +232,12 @@ class CovarianceAdaptation:
     Hansen & Ostermeier 2001.
     """
 
-    start: ArrayLike  # Mean of the first generation, (n_parameters,).
-    bounds: Bounds  # Limits of the parameters, and the scales that set their units in the search.
-    first_spread: float = 0.5  # Standard deviation of the first generation, in units of the scales.
+    start: ArrayLike  #: Mean of the first generation, (n_parameters,).
+    bounds: Bounds  #: Limits of the parameters, and the scales that set their units in the search.
+    first_spread: float = 0.5  #: Standard deviation of the first generation, in units of the scales.
     most_evaluations: int = 2000
     """The search ends with the generation that reaches this number, or when it has converged."""
-    seed: int = 0  # Seed of the random numbers; the same seed gives the same bits.
+    seed: int = 0  #: Seed of the random numbers; the same seed gives the same bits.
     name: str = "CMA-ES"
 
     def fit(self, problem: Problem, chosen: IntArray) -> Fit:
@@ -301,14 +301,14 @@ class ResponseSurface:
     has no gain. The method is deterministic.
     """
 
-    starts: ArrayLike  # Start points, (n_starts, n_parameters).
+    starts: ArrayLike  #: Start points, (n_starts, n_parameters).
     increments: ArrayLike
     """One coded unit of each parameter, for all start points or for each, (n_parameters,)."""
-    lower_bounds: ArrayLike = -np.inf  # Lower limits of all evaluations; -inf for none, (n_parameters,).
-    smallest_gain: float = 1.0e-4  # A gain of at most this much ends a fit.
+    lower_bounds: ArrayLike = -np.inf  #: Lower limits of all evaluations; -inf for none, (n_parameters,).
+    smallest_gain: float = 1.0e-4  #: A gain of at most this much ends a fit.
     most_iterations: int = 200
     name: str = "response surface"
-    restrict: Restriction | None = None  # From a point of an ascent to the nearest one that is allowed.
+    restrict: Restriction | None = None  #: From a point of an ascent to the nearest one that is allowed.
 
     def fit(self, problem: Problem, chosen: IntArray) -> Fit:
         """Fit from every start."""
@@ -409,9 +409,9 @@ class FoldFit:
 
     fold: int
     fit: Fit
-    score_test: float  # Score of its parameters on the observations left out.
+    score_test: float  #: Score of its parameters on the observations left out.
     training: IntArray
-    testing: IntArray  # Observations used for fitting, and those left out, (n_training,).
+    testing: IntArray  #: Observations used for fitting, and those left out, (n_training,).
 
     @property
     def score_train(self) -> float:
@@ -422,7 +422,7 @@ class FoldFit:
 class CrossValidation:
     """Results of all folds."""
 
-    folds: tuple[FoldFit, ...]  # In the order of their numbers.
+    folds: tuple[FoldFit, ...]  #: In the order of their numbers.
 
     @property
     def score_train(self) -> float:

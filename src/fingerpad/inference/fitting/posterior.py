@@ -117,17 +117,17 @@ class Chains:
     """Converged draws from a density, and the measures of convergence."""
 
     names: tuple[str, ...]
-    draws: FloatArray  # The second half of all steps, (n_ensembles, n_steps, n_walkers, n_parameters).
-    log_densities: FloatArray  # Up to a constant, (n_ensembles, n_steps, n_walkers).
-    r_hat: FloatArray  # Split R-hat over the ensembles, (n_parameters,). [1]
+    draws: FloatArray  #: The second half of all steps, (n_ensembles, n_steps, n_walkers, n_parameters).
+    log_densities: FloatArray  #: Up to a constant, (n_ensembles, n_steps, n_walkers).
+    r_hat: FloatArray  #: Split R-hat over the ensembles, (n_parameters,). [1]
     effective_sizes: FloatArray
     tail_effective_sizes: FloatArray
     """Effective sample sizes for the middle and for the ends of a 95 % interval, (n_parameters,). [1]"""
-    autocorrelation_steps: FloatArray  # Draws made per effective one, (n_parameters,). [1]
-    acceptance: float  # Accepted share of the proposals. [0-1]
-    n_evaluations: int  # Evaluations of the density, those of the discarded first half included.
-    seed: int  # Of the random numbers; the same seed gives the same bits.
-    history: tuple[str, ...]  # One line per check of convergence.
+    autocorrelation_steps: FloatArray  #: Draws made per effective one, (n_parameters,). [1]
+    acceptance: float  #: Accepted share of the proposals. [0-1]
+    n_evaluations: int  #: Evaluations of the density, those of the discarded first half included.
+    seed: int  #: Of the random numbers; the same seed gives the same bits.
+    history: tuple[str, ...]  #: One line per check of convergence.
 
     @property
     def flat(self) -> FloatArray:

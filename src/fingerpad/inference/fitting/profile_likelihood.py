@@ -39,11 +39,11 @@ class ProfileLikelihood:
     """Profile likelihood of one parameter."""
 
     name: str
-    values: FloatArray  # Its fixed values, increasing, (n_values,).
-    losses: FloatArray  # Largest log likelihood of all minus the largest one for this value, (n_values,). [1]
-    points: FloatArray  # The best parameters for each value, (n_values, n_parameters).
-    interval: tuple[float, float]  # Ends of the confidence interval; infinite where the data set no bound.
-    level: float  # Level of confidence. [0-1]
+    values: FloatArray  #: Its fixed values, increasing, (n_values,).
+    losses: FloatArray  #: Largest log likelihood of all minus the largest for this value, (n_values,). [1]
+    points: FloatArray  #: The best parameters for each value, (n_values, n_parameters).
+    interval: tuple[float, float]  #: Ends of the confidence interval; infinite where the data set no bound.
+    level: float  #: Level of confidence. [0-1]
 
 
 def profile_likelihoods(

@@ -31,14 +31,14 @@ class SobolIndices:
     """Shares of the variance of an objective, of parameters that are uniform within ranges."""
 
     lower: Vector
-    upper: Vector  # Range of each parameter, (n_parameters,).
+    upper: Vector  #: Range of each parameter, (n_parameters,).
     first: Vector
     first_half_width: Vector
     """First-order index, what a parameter explains alone, and half of its confidence interval. [1]"""
     total: Vector
-    total_half_width: Vector  # The share explained alone and in interaction with others, likewise. [1]
+    total_half_width: Vector  #: The share explained alone and in interaction with others, likewise. [1]
     mean: Number
-    standard_deviation: Number  # Of the objective over the ranges.
+    standard_deviation: Number  #: Of the objective over the ranges.
     evaluations: int
 
 
@@ -111,7 +111,7 @@ class Identifiability:
     """Change of the outputs per unit step along each direction, largest first, (n_parameters,)."""
     directions: FloatArray
     """One unit direction per row, in shares, singular value 0 last, (n_parameters, n_parameters)."""
-    rank: int  # Number of singular values above zero, the number of identifiable combinations.
+    rank: int  #: Number of singular values above zero, the number of identifiable combinations.
 
     @property
     def silent_directions(self) -> FloatArray:
