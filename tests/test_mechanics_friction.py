@@ -9,8 +9,7 @@ from fingerpad.core.errors import InputError
 from fingerpad.geometry.fingertip import Fingertip
 from fingerpad.geometry.indenters import Bar, Cylinder, FlatPunch, Indenter, Line, Plate, Sphere
 from fingerpad.geometry.mesh import block_mesh
-from fingerpad.geometry.motion import ForceRampAndHold, RampAndHold
-from fingerpad.geometry.trajectory import Trajectory
+from fingerpad.geometry.motion import ForceRampAndHold, RampAndHold, Trajectory
 from fingerpad.mechanics import press as press_module
 from fingerpad.mechanics.contact import Contact, Placement
 from fingerpad.mechanics.friction import Anchors, Approach, dragged, friction, slid_mm

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 import fingerpad as fp
 from fingerpad.core.phases import Phase
-from fingerpad.geometry.paths import check_path
+from fingerpad.geometry.motion import check_path
 from refusals import refusals
 
 AT_MM = (17.37, 0.0)
@@ -45,6 +45,41 @@ def test_a_stroke_goes_to_and_fro_at_its_speed():
     assert motion.phases[-1].window_ms == (650.0, 900.0)
     at_once = fp.stroke(0.5, speed_mm_per_s=20.0, z_mm=5.0, hold_ms=0.0)
     assert [phase.name for phase in at_once.phases] == ["ramp", "stroke"]
+
+
+def test_a_stroke_along_corners_keeps_its_speed_and_comes_back_the_same_way():
+    """A circle of 24 corners at constant force, there and back, and a triangle."""
+    angle = np.linspace(0.0, 2.0 * np.pi, 25)[1:]
+    x_mm, z_mm = np.sin(angle), 1.0 - np.cos(angle)
+    motion = fp.stroke(force_mn=100.0, speed_mm_per_s=8.0, x_mm=x_mm, z_mm=z_mm, strokes=2, hold_ms=100.0)
+    assert set(motion.force_mn[1:]) == {100.0}
+    times, way = np.array(motion.times_ms[2:]), np.array([motion.x_mm, motion.z_mm])[:, 2:]
+    np.testing.assert_allclose(np.hypot(*np.diff(way)) / np.diff(times), 0.008)
+    np.testing.assert_allclose(way[:, 25:], way[:, 23::-1], atol=1e-15)
+    assert [phase.name for phase in motion.phases] == ["ramp", "hold", "stroke", "stroke 2"]
+    assert motion.phases[2].end_ms == motion.times_ms[2 + 24]
+    # A polygon of 24 corners turns by 15 degrees at each: smooth. That of a triangle is not.
+    assert motion.corners_ms == (50.0, 150.0, motion.phases[2].end_ms)
+    triangle = fp.stroke(0.5, speed_mm_per_s=10.0, x_mm=[3.0, 3.0, 0.0], z_mm=[0.0, 4.0, 0.0])
+    assert triangle.corners_ms == triangle.times_ms[1:-1] == (50.0, 1000.0, 1300.0, 1700.0)
+
+
+def test_a_rotation_turns_at_its_speed_and_is_looked_at_on_its_way():
+    motion = fp.rotation(force_mn=100.0, spin_deg=90.0, tilt_deg=0.0, speed_deg_per_s=45.0, turns=2)
+    assert motion.spin_deg == (0.0, 0.0, 0.0, 90.0, 0.0)
+    assert motion.tilt_deg == (0.0,) * 5
+    assert np.diff(motion.times_ms).tolist() == [50.0, 950.0, 2000.0, 2000.0]
+    assert [phase.name for phase in motion.phases] == ["ramp", "hold", "turn", "turn 2"]
+    turned = [pose.spin_deg for pose in motion.poses]
+    np.testing.assert_allclose(turned, [0.0, 0.0, *range(0, 91, 10), *range(80, -1, -10)], atol=1e-12)
+    rocked = fp.rotation(0.5, tilt_deg=[10.0, -10.0, 0.0], speed_deg_per_s=20.0, hold_ms=0.0)
+    assert rocked.times_ms == (0.0, 50.0, 550.0, 1550.0, 2050.0)
+
+
+def test_touches_can_be_repeated_by_force():
+    taps = fp.repeated(force_mn=80.0, touches=2, ramp_ms=20.0, hold_ms=100.0, pause_ms=50.0)
+    assert taps.force_mn == (0.0, 80.0, 80.0, 0.0, 0.0, 80.0, 80.0, 0.0, 0.0)
+    assert [phase.name for phase in taps.phases][3:6] == ["pause", "ramp 2", "hold 2"]
 
 
 @given(st.floats(1.0, 100.0), st.floats(1.0, 100.0))
@@ -98,6 +133,12 @@ test_motions_that_cannot_be_are_refused = refusals(
     (lambda: fp.sampled(0.0, lambda t: t), ("end_ms",)),
     (lambda: fp.staircase([0.5], [50.0]), "either depth_mm or force_mn"),
     (lambda: fp.stroke(0.5, speed_mm_per_s=20.0), "a stroke needs a way"),
+    (lambda: fp.stroke(0.5, speed_mm_per_s=20.0, x_mm=[1.0, 1.0]), "change from corner to corner"),
+    (lambda: fp.stroke(0.5, speed_mm_per_s=20.0, x_mm=[1.0, 2.0], z_mm=1.0), "must have as many corners"),
+    (lambda: fp.stroke(0.5, speed_mm_per_s=20.0, x_mm=[1.0, math.nan]), "x_mm must hold finite numbers"),
+    (lambda: fp.stroke(0.5, speed_mm_per_s=20.0, x_mm="a"), "x_mm must be a finite number .mm.: got 'a'"),
+    (lambda: fp.rotation(0.5, speed_deg_per_s=20.0), "a rotation needs an angle"),
+    (lambda: fp.repeated(0.5, force_mn=50.0), "either depth_mm or force_mn"),
     (lambda: fp.chirp(0.8, 0.05, (5.0, 10.0), 100.0), "must leave time for a cycle"),
     (lambda: fp.Trajectory((0.0, 1.0, 0.5), (0.0, 1.0, 1.0)), "strictly: got 0.5 after 1, number 3"),
     (lambda: fp.Trajectory((0.0, 1.0), (0.0, math.nan)), "only: 1 are not, first number 2"),
@@ -236,12 +277,12 @@ def test_the_fastest_ramp_force_and_vibration_are_allowed():
     ("motion", "said"),
     [
         (fp.Trajectory((0, 50, 500), (0, 0.5, 0.5), x_mm=(0, 0, 20)),
-         r"must not leave the finger at \d+(\.\d+)? ms, sample 3: position must lie on the finger"),
+         r"must not leave the finger at \d+(\.\d+)? ms: position must lie on the finger"),
         (fp.Trajectory((0, 50, 500), force_mn=(0, 50, 50), z_mm=(0, 0, -12)),
-         "The indenter must not leave the finger at .* ms, sample 3"),
+         "The indenter must not leave the finger at .* ms: position"),
         (fp.Trajectory((0, 50, 100, 500), (0, 0.5, 4.6, 0.5)),
-         r"below 4\.44 mm at x = 17\.37, z = 0 mm, because of the bone: got 4\.6 mm at 100 ms, sample 3"),
-        (fp.RampAndHold(4.6), r"because of the bone: got 4\.6 mm\."),
+         r"below 4\.44 mm at x = 17\.37, z = 0 mm, because of the bone: got 4\.6 mm at 100 ms\."),
+        (fp.RampAndHold(4.6), r"because of the bone: got 4\.6 mm at 50 ms\."),
     ],
     ids=["off the tip", "off the side", "bone", "ramp"],
 )  # fmt: skip
@@ -260,7 +301,7 @@ def test_the_skin_falls_away_along_a_path_and_rises_again():
     # Towards the tip the volar skin is higher, so that the indenter reaches less deep.
     deep = 3.0 + float(lies[1] - lies[0])
     tip = fp.Trajectory((0, 50, 100, 900), (0, 3.0, 3.0, 9.0), x_mm=(0, 0, 0, distal - proximal))
-    with pytest.raises(fp.InputError, match=r"got .* mm at .* sample 4"):
+    with pytest.raises(fp.InputError, match=r"because of the bone: got .* mm at .* ms"):
         check_path(finger, tip, (proximal, 0.0))
     check_path(finger, fp.Trajectory((0, 50, 900), (0, 3.0, deep), x_mm=(0, 0, 13.0)), (proximal, 0.0))
     # Between two samples that are both shallow enough, a bone can still be in the way.

@@ -3,7 +3,18 @@
 import numpy as np
 import pytest
 
-from fingerpad import Bar, Cylinder, Fingertip, InputError, Line, PressSettings, Sphere, Trajectory, touch_of
+from fingerpad import (
+    Bar,
+    Cylinder,
+    Fingertip,
+    InputError,
+    Line,
+    PressSettings,
+    Sphere,
+    Trajectory,
+    rotation,
+    touch_of,
+)
 from fingerpad.geometry.mesh import block_mesh
 from fingerpad.geometry.motion import Pose
 from fingerpad.mechanics.contact import Placement, place, rotation_of
@@ -94,6 +105,12 @@ def test_half_a_finger_and_a_wire_are_refused_what_they_cannot_do_and_bone_on_th
     half = touch_of(Fingertip(), Sphere()).grading
     with pytest.raises(InputError, match="z_mm = 1 mm of the motion needs a grading with full=True"):
         touch_of(Fingertip(), Sphere(), aside, grading=half)
+    # A bar mirrors itself at 0 and at 90 degrees, and not between; skin under a ball is twisted by friction.
+    for body in (Bar(1.7, 0.3), Sphere()):
+        turned = rotation(0.5, spin_deg=90.0, speed_deg_per_s=90.0)
+        assert touch_of(Fingertip(), body, turned).grading.full
+        with pytest.raises(InputError, match="spin_deg of the motion needs a grading with full=True"):
+            touch_of(Fingertip(), body, turned, grading=half)
     along = Trajectory((0.0, 50.0, 100.0), (0.0, 0.5, 0.5), x_mm=(0.0, 0.0, 1.0))
     with pytest.raises(InputError, match="Line may only be moved up and down"):
         touch_of(Fingertip(), Line(), along)
@@ -119,3 +136,16 @@ def test_force_slides_a_sphere_whose_first_touch_is_off_its_axis():
     np.testing.assert_allclose(done.force_mn[done.times_ms >= 50.0], 10.0, rtol=1e-4)
     aside = np.linalg.norm(done.contact_force_mn[-1, [0, 2]])
     assert 0.35 < aside / done.contact_force_mn[-1, 1] < 0.6
+
+
+def test_a_ball_that_spins_under_constant_force_meets_the_torque_of_a_sliding_hertz_contact():
+    """M = 3 pi / 16 mu F a, with a from the area of contact."""
+    mesh, indenter, mu = block(), Sphere(curvature_per_m=250.0), 0.3
+    motion = rotation(force_mn=40.0, spin_deg=60.0, speed_deg_per_s=600.0, hold_ms=0.0)
+    first = touching(indenter, mesh)
+    done = press(mesh, ELASTIC, indenter, first, motion, PressSettings(4, 2), friction=mu)
+    work_uj = np.diff(done.energy.external_uj)[-3:]
+    torque = work_uj / np.deg2rad(np.diff(np.interp(done.times_ms, motion.times_ms, motion.spin_deg))[-3:])
+    radius_mm = np.sqrt(done.contact.area_mm2[-1] / np.pi)
+    np.testing.assert_allclose(done.force_mn[done.times_ms >= 50.0], 40.0, rtol=1e-4)
+    assert torque == pytest.approx(3.0 * np.pi / 16.0 * mu * 40.0 * radius_mm, rel=0.03)

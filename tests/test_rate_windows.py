@@ -10,9 +10,8 @@ from fingerpad.core.phases import Phase, phase_named
 from fingerpad.core.signals import Traces
 from fingerpad.data import protocol
 from fingerpad.experiments.discrimination.request import DiscriminationRequest
-from fingerpad.geometry.motion import ForceRampAndHold, RampAndHold
+from fingerpad.geometry.motion import ForceRampAndHold, RampAndHold, Trajectory
 from fingerpad.geometry.motions import repeated, sine
-from fingerpad.geometry.trajectory import Trajectory
 from fingerpad.inference.afferent_fit import ReceptorOffset
 from fingerpad.inference.rate_model import AfferentModel
 from fingerpad.neuron.population import Population

@@ -253,7 +253,7 @@ WRONG = [
     (BALL + "motion: {depth_mm: 9}\n", "touch.yaml, line 2, motion.depth_mm must stay below"),
     (BALL + "motion: {kind: sine, depth_mm: 0.5}\n", "line 2, motion.sine needs frequency_hz, cycles"),
     (BALL + "motion: {kind: sine, depth_mm: 0.5, amplitude_mm: 0.1, frequency_hz: 20, cycles: 2.5}\n",
-     "motion.cycles must be a whole number: got 2.5"),
+     "motion.cycles must be a whole number of at least 1: got 2.5"),
     (BALL + "motion: {kind: chirp, depth_mm: 0.5, amplitude_mm: 0.1, frequencies_hz: [5], sweep_ms: 100}\n",
      "line 2, motion.frequencies_hz must be a pair"),
     (BALL + "motion: {kind: staircase}\n", "line 2, motion"),

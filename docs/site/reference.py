@@ -53,7 +53,7 @@ FURTHER = {
     "geometry.free_mesh": ("FingerMesh",),
     "geometry.motion": ("Cycles",),
     "geometry.surface": ("Surface",),
-    "geometry.trajectory_files": ("recorded",),
+    "geometry.motions": ("recorded",),
     "inference.rate_model": ("AfferentModel",),
     "inference.recordings": ("SpikeRecordings",),
     "inference.spike_likelihood": ("SpikeFit", "SpikeLikelihood", "fit_spikes", "time_rescaling"),

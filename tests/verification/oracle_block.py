@@ -18,8 +18,7 @@ from fingerpad.export.job import Job
 from fingerpad.geometry.grading import graded_lines
 from fingerpad.geometry.indenters import Sphere
 from fingerpad.geometry.mesh import block_mesh
-from fingerpad.geometry.motion import RampAndHold
-from fingerpad.geometry.trajectory import Trajectory
+from fingerpad.geometry.motion import RampAndHold, Trajectory
 from fingerpad.mechanics.contact import place
 from fingerpad.mechanics.materials import Material
 from fingerpad.mechanics.newton import NewtonSettings

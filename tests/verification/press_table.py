@@ -33,8 +33,7 @@ from fingerpad.geometry.fingertip import Fingertip
 from fingerpad.geometry.grading import Grading, Strip
 from fingerpad.geometry.indenters import Bar, Cylinder, FlatPunch, Indenter, Line, Sphere
 from fingerpad.geometry.mesh import LAYERS, Mesh
-from fingerpad.geometry.motion import RampAndHold
-from fingerpad.geometry.trajectory import Trajectory
+from fingerpad.geometry.motion import RampAndHold, Trajectory
 from fingerpad.mechanics.press_settings import PressSettings
 from fingerpad.skin.code_hash import code_hash
 from fingerpad.skin.indentation import CONTACT_POINT_MM, touch_of

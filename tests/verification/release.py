@@ -10,9 +10,8 @@ from scipy.optimize import brentq
 
 from fingerpad.geometry.indenters import Plate, Sphere
 from fingerpad.geometry.mesh import block_mesh
-from fingerpad.geometry.motion import Motion
+from fingerpad.geometry.motion import Motion, Trajectory
 from fingerpad.geometry.motions import repeated
-from fingerpad.geometry.trajectory import Trajectory
 from fingerpad.mechanics.contact import place
 from fingerpad.mechanics.materials import Material, Prony
 from fingerpad.mechanics.newton import NewtonSettings

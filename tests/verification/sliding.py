@@ -8,7 +8,7 @@ import numpy as np
 
 from fingerpad.geometry.indenters import Sphere
 from fingerpad.geometry.mesh import block_mesh
-from fingerpad.geometry.trajectory import Trajectory
+from fingerpad.geometry.motion import Trajectory
 from fingerpad.mechanics.contact import place
 from fingerpad.mechanics.materials import Material
 from fingerpad.mechanics.newton import NewtonSettings

@@ -209,6 +209,8 @@ def grading_along(
         for x, z, spin in outermost
     ]
     joint = covering(gradings)
+    if any(spin for _, _, spin in outermost):  # skin that is twisted has no mirror image
+        joint = replace(joint, full=True)
     if joint.finer_along or joint.finer_across:
         joint = replace(
             joint,

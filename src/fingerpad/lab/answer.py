@@ -19,8 +19,7 @@ from fingerpad.data import psychophysics
 from fingerpad.data.afferents import TYPES
 from fingerpad.experiments.requests.touch import ReductionRequest
 from fingerpad.geometry.fingertip import Fingertip
-from fingerpad.geometry.motion import Pose
-from fingerpad.geometry.trajectory import Trajectory
+from fingerpad.geometry.motion import Pose, Trajectory
 from fingerpad.neuron.afferent import Afferent, AnyAfferent, type_of
 from fingerpad.neuron.afferent_types import afferent_of
 from fingerpad.neuron.population import Population

@@ -15,7 +15,7 @@ from fingerpad.core.values import FloatArray
 from fingerpad.geometry.indenters import Indenter
 from fingerpad.geometry.mesh import Mesh
 from fingerpad.geometry.mesh_checks import check_mesh, element_place, squeezed_most
-from fingerpad.geometry.motion import STILL, Stimulus
+from fingerpad.geometry.motion import STILL, Motion
 from fingerpad.mechanics.assembly import Sparsity
 from fingerpad.mechanics.balance import (
     EnergyBalance,
@@ -127,7 +127,7 @@ class _Press:
 
     body: Body
     contact: Contact
-    stimulus: Stimulus
+    stimulus: Motion
     solver: LinearSolver
     newton: NewtonSettings
     watched: Watched
@@ -360,7 +360,7 @@ def press(
     materials: tuple[Material, ...],
     indenter: Indenter,
     placement: Placement,
-    stimulus: Stimulus,
+    stimulus: Motion,
     settings: PressSettings | None = None,
     deepest_mm: float = np.inf,
     watched: np.ndarray | None = None,
@@ -451,11 +451,11 @@ def _from_rest(values: Iterable[FloatArray | float]) -> FloatArray:
     return np.stack([np.zeros_like(later[0]), *later])
 
 
-def _check_bone(mesh: Mesh, indenter: Indenter, placement: Placement, stimulus: Stimulus) -> None:
+def _check_bone(mesh: Mesh, indenter: Indenter, placement: Placement, stimulus: Motion) -> None:
     """Bone does not move, so no mesh survives an indenter that reaches it or, under a force, starts in it."""
     bone_mm = mesh.nodes_mm[mesh.bone_nodes]
     depths = np.zeros(len(stimulus.poses)) if stimulus.by_force else stimulus.depths_mm
-    for number, (pose, depth_mm) in enumerate(zip(stimulus.poses, depths, strict=True), 1):
+    for time_ms, pose, depth_mm in zip(stimulus.looks_ms, stimulus.poses, depths, strict=False):
         there = placement.moved(pose)
 
         def clearance_mm(depth_mm: float, there: Placement = there) -> float:
@@ -465,7 +465,7 @@ def _check_bone(mesh: Mesh, indenter: Indenter, placement: Placement, stimulus: 
             continue
         reaches = clearance_mm(0.0) > 0.0
         deepest_mm = brentq(clearance_mm, 0.0, depth_mm, xtol=1e-6) if reaches else 0.0
-        at = "" if stimulus.stays else f" at sample {number}"
+        at = "" if stimulus.stays else f" at {time_ms:.4g} ms"
         raise InputError(
             "depth_mm",
             f"must stay below {deepest_mm:.4g} mm{at}, where the {type(indenter).__name__} meets the bone",

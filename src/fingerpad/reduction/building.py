@@ -24,7 +24,7 @@ from fingerpad.core.signals import STORED_ENERGY
 from fingerpad.core.values import FloatArray, NotNegativeWhole
 from fingerpad.data import neuron
 from fingerpad.geometry.fingertip import Fingertip
-from fingerpad.geometry.trajectory import Trajectory
+from fingerpad.geometry.motion import Trajectory
 from fingerpad.reduction.model import (
     AT_ONCE,
     GRID_POINTS,

@@ -31,8 +31,7 @@ from fingerpad.core.values import Count, Finite, FloatArray, Pair, Positive, cho
 from fingerpad.geometry.fingertip import Fingertip
 from fingerpad.geometry.grading import RESOLUTIONS, Grading
 from fingerpad.geometry.indenter_grading import grading_along
-from fingerpad.geometry.motion import STILL, Pose
-from fingerpad.geometry.trajectory import Trajectory
+from fingerpad.geometry.motion import STILL, Pose, Trajectory
 from fingerpad.mechanics.press_settings import PressSettings
 from fingerpad.skin.indentation import LARGEST_TILT_DEG, Touch, settings_of
 

@@ -40,8 +40,7 @@ from fingerpad.geometry.grading import RESOLUTIONS, Grading
 from fingerpad.geometry.indenter_grading import FEWEST_ACROSS_GROOVE, grading_along, sizes_across
 from fingerpad.geometry.indenters import Indenter
 from fingerpad.geometry.mesh import Mesh, finger_mesh
-from fingerpad.geometry.motion import STILL, Motion, RampAndHold, Stimulus
-from fingerpad.geometry.paths import CLEARANCE_TO_BONE, check_path
+from fingerpad.geometry.motion import CLEARANCE_TO_BONE, STILL, Motion, RampAndHold, check_path
 from fingerpad.geometry.probing import check_gap
 from fingerpad.mechanics.contact import Placement, check_friction, place, rotation_of
 from fingerpad.mechanics.inertia import warn_of_inertia
@@ -116,7 +115,7 @@ class Touch:
 
     finger: Finger
     indenter: Indenter
-    stimulus: Stimulus
+    stimulus: Motion
     tissues: Tissues
     grading: Grading
     settings: PressSettings = field(default_factory=PressSettings)
@@ -148,11 +147,12 @@ class Touch:
                 break
             if pose.z_mm != 0.0:
                 raise InputError(f"z_mm = {pose.z_mm:g} mm of the motion needs a grading with full=True.")
-            turned = self.spin_deg + pose.spin_deg
-            if not self.indenter.mirrors(turned):
+            if pose.spin_deg != 0.0:  # friction twists the skin, which then has no mirror image
+                raise InputError("spin_deg of the motion needs a grading with full=True.")
+            if not self.indenter.mirrors(self.spin_deg):
                 raise InputError(
-                    f"spin_deg = {turned:g} degrees leaves {body} without symmetry across the midline, so "
-                    "half a finger is not enough: give a grading with full=True."
+                    f"spin_deg = {self.spin_deg:g} degrees leaves {body} without symmetry across the "
+                    "midline, so half a finger is not enough: give a grading with full=True."
                 )
         self._check_sizes()
         check_friction(self.friction, self.indenter)
@@ -325,7 +325,7 @@ def _mesh(finger: Finger, grading: Grading) -> Mesh:
 def touch_of(
     finger: Finger,
     indenter: Indenter,
-    stimulus: Stimulus | None = None,
+    stimulus: Motion | None = None,
     tissues: str | Tissues = DEFAULT_TISSUES,
     resolution: Annotated[str, choice(RESOLUTIONS)] = "quick",
     at_mm: Pair | None = None,

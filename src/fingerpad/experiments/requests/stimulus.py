@@ -25,7 +25,7 @@ from fingerpad.geometry.grading import RESOLUTIONS, Grading
 from fingerpad.geometry.indenters import Indenter
 from fingerpad.geometry.mesh_files import MESH_FILES, read_finger
 from fingerpad.geometry.motion import ForceRampAndHold, Motion, RampAndHold
-from fingerpad.geometry.trajectory_files import recorded
+from fingerpad.geometry.motions import recorded
 from fingerpad.mechanics.materials import Tissues
 from fingerpad.mechanics.tissues import TISSUES, named_tissues
 from fingerpad.skin.indentation import Touch, touch_of
@@ -77,7 +77,7 @@ OBJECTS: dict[str, Callable[..., Indenter] | str] = {
 
 MOTIONS: dict[str, Callable[..., Motion] | str] = {
     RAMP_AND_HOLD: ramp_and_hold,
-    **{kind: kind for kind in ("sine", "chirp", "repeated", "staircase", "stroke")},
+    **{kind: kind for kind in ("sine", "chirp", "repeated", "staircase", "stroke", "rotation")},
     "recorded": recorded,
     "trajectory": "Trajectory",
 }  # How it can move, by kind.
