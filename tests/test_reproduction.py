@@ -104,7 +104,7 @@ def test_a_run_ends_with_status_0_and_whole_files_and_the_numbers_of_the_pages(f
     # The kernels may be compiled only now.
     assert told(first)
     assert all(PROGRESS.fullmatch(line) for line in told(first))
-    report, results, *verdicts = first.said.splitlines()
+    *verdicts, report, results = first.said.splitlines()
     assert report == f"Report: {first.folder / 'report.html'}"
     assert results == f"Results: {first.folder / 'results.json'}"
     for name, verdict in zip(SETS, verdicts, strict=True):

@@ -60,7 +60,7 @@ TWO = ramps("compressive_stress", [5.0, 9.0]), fp.RateRecordings(NAMES[:2], [10.
 
 test_numbers_that_cannot_be_fitted_are_refused = refusals(
     ((fp.RA(), ["treshold"]), r"free must be one of .*did you mean threshold"),
-    ((fp.RA(), []), "free must name at least one number of RA: got none"),
+    ((fp.RA(), []), "free must name at least one number of RA, one of .*: got none"),
     ((fp.RA(), ["quantity"]), r"quantity must be greater than 0|must be a finite number"),
     ((fp.Afferent(), ["intercept_ma"]), "intercept_ma must be greater than 0"),
     ((len, ["threshold"]), "afferent must be like AnyAfferent, with"),
