@@ -198,8 +198,9 @@ def embossed_text(
     # Seen from the skin, z runs to the right where x, to the tip, runs up.
     turned = [line * [1.0, -1.0] if along_finger else line[:, ::-1] for line in placed]
     # Corners to 1e-9 mm, without a second one at the same place.
-    corners = [np.array(shapely.remove_repeated_points(ring).coords) for ring in _rings(turned, 9).geoms]
-    if not _rings(corners).is_simple:
+    rings = shapely.remove_repeated_points(_rings([line.round(9) + 0.0 for line in turned]))
+    corners = [np.array(ring.coords) for ring in rings.geoms]
+    if not rings.is_simple:
         corners = joined_outlines(corners)
     return Embossed(tuple(tuple(map(tuple, line.tolist())) for line in corners), height_mm, edge_radius_mm)
 
@@ -217,9 +218,8 @@ def joined_outlines(outlines: Sequence[FloatArray]) -> list[FloatArray]:
     return _outlines(shapely.union_all(whole))
 
 
-def _rings(outlines: Sequence[FloatArray | Sequence[tuple[float, float]]], digits: int | None = None) -> Any:
-    lines = [np.array(line) if digits is None else np.array(line).round(digits) + 0.0 for line in outlines]
-    return shapely.MultiLineString([np.concatenate([line, line[:1]]) for line in lines])
+def _rings(outlines: Sequence[FloatArray | Sequence[tuple[float, float]]]) -> Any:
+    return shapely.MultiLineString([[*line, line[0]] for line in outlines])
 
 
 def _outlines(area: Any) -> list[FloatArray]:

@@ -178,24 +178,21 @@ class Surface(Indenter):
 
     @cached_property
     def _border(self) -> IntArray:
-        """Edges of one triangle alone: the triangle and its two corners, (n, 3)."""
-        return border_of(self.faces)
+        """Edges where the surface ends: the triangle and its two corners, (n, 3)."""
+        border = border_of(self.faces)
+        return border[~is_crack(self.vertices_mm, self.faces, border)]
 
     @cached_property
     def _layers(self) -> tuple[Triangles, ...]:
         """Triangles and the walls below the border; parts that overlap are in different ones."""
-        layers, border, n_vertices = (
-            layers_of(self.vertices_mm, self.faces),
-            self._border,
-            len(self.vertices_mm),
-        )
-        _, a, b = border[~is_crack(self.vertices_mm, self.faces, border)].T
+        layers, n_vertices = layers_of(self.vertices_mm, self.faces), len(self.vertices_mm)
+        _, a, b = self._border.T
         walls = np.column_stack([b, a, a + n_vertices, b, a + n_vertices, b + n_vertices]).reshape(-1, 3)
         vertices = np.concatenate([self.vertices_mm, self.vertices_mm - [0.0, SKIRT_MM, 0.0]])
         found = []
         for layer in range(int(layers.max()) + 1):
-            faces = np.concatenate([self.faces[layers == layer], walls[: len(walls) * (layer == 0)]])
-            faces = with_area(vertices, faces)
+            faces = self.faces[layers == layer]
+            faces = with_area(vertices, faces if layer else np.concatenate([faces, walls]))
             found.append(Triangles.of(vertices, faces, self.smooth_below_deg, HOLLOW_MM))
         return tuple(found)
 
@@ -207,7 +204,7 @@ class Surface(Indenter):
         lowest = corners[own, :, 1].min(axis=1)
         hangs = lowest < np.minimum(self.vertices_mm[a, 1], self.vertices_mm[b, 1])
         upright = np.abs(normals[own, 1]) <= 1e-6 * np.linalg.norm(normals[own], axis=1)
-        if (hangs & upright & ~is_crack(self.vertices_mm, self.faces, self._border)).any():
+        if (hangs & upright).any():
             return True  # walls below the border would be its other side
         seen = self._face[1] < 0.0
         return bool((seen[1:, 1:] & seen[1:, :-1] & seen[:-1, 1:] & seen[:-1, :-1]).any())
@@ -232,12 +229,11 @@ class Surface(Indenter):
     def _top(self, points_mm: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Height of the highest triangle above or below each point, -inf beside all, and its normal's y."""
         heights, slots = zip(*(layer.top(points_mm) for layer in self._layers), strict=True)
-        normals = [
-            np.where(slot < 0, 1.0, layer.normals[slot, 6, 1])
-            for layer, slot in zip(self._layers, slots, strict=True)
-        ]
-        highest = np.argmax(heights, axis=0)[None]
-        return tuple(np.take_along_axis(np.array(each), highest, axis=0)[0] for each in (heights, normals))
+        highest, point = np.argmax(heights, axis=0), np.arange(len(points_mm))
+        slot = np.array(slots)[highest, point]
+        normals = [layer.normals[np.maximum(slot, 0) % len(layer.normals), 6, 1] for layer in self._layers]
+        normal_y = np.where(slot < 0, 1.0, np.array(normals)[highest, point])
+        return np.array(heights)[highest, point], normal_y
 
     def front(self, points_mm: PointsMm) -> FloatArray:
         height = self._top(points_mm)[0]

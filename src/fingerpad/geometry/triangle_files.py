@@ -8,8 +8,6 @@ from __future__ import annotations
 
 import re
 import struct
-from collections.abc import Callable
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -157,8 +155,6 @@ def _fans(polygons: list[list[int]], vertices: FloatArray) -> IntArray:
 _Element = tuple[str, int, list[tuple[str, str, str]]]
 """Name, count and properties of an element: name, type of the count of a list or "", type."""
 
-_Take = Callable[[int, str], tuple[Any, ...]]  # So many numbers of one type, in the order of the file.
-
 
 def _ply(content: bytes) -> Mesh:
     """Vertices and faces of a PLY file, text or binary of either order."""
@@ -166,9 +162,7 @@ def _ply(content: bytes) -> Mesh:
     if not content.startswith(b"ply") or end is None:
         raise InputError("a PLY file must begin with 'ply' and have an end_header: it does not.")
     order, elements = _ply_header(_text(content[: end.start()]))
-    body = content[end.end() :]
-    promise = " and ".join(f"{count:,} of {name}" for name, count, _ in elements)
-    read = _ply_binary(body, elements, order, promise) if order else _ply_text(_text(body), elements, promise)
+    read = _ply_columns(content[end.end() :], elements, order)
     vertices, faces = read.get("vertex", {}), read.get("face", {})
     if not {"x", "y", "z"} <= set(vertices):
         raise InputError("a PLY file must have vertices with x, y and z: it has none.")
@@ -206,47 +200,17 @@ def _ply_header(text: str) -> tuple[str, list[_Element]]:
     return order, elements
 
 
-def _ply_row(properties: list[tuple[str, str, str]], columns: dict[str, list[Any]], take: _Take) -> None:
-    for column, size, kind in properties:
-        columns[column].append(take(int(take(1, size)[0]) if size else 1, kind))
-
-
-def _popped(words: list[str], count: int, _: str) -> tuple[str, ...]:
-    return tuple(words.pop() for _ in range(count))
-
-
-def _ply_text(text: str, elements: list[_Element], promise: str) -> dict[str, dict[str, Any]]:
-    """Columns of each element of a PLY file of text, one row a line."""
-    lines = [line for line in text.splitlines() if line.strip()]
-    expected = sum(count for _, count, _ in elements)
-    if len(lines) != expected:
-        raise InputError(
-            f"it must have {expected:,} lines after its header, which promises {promise}: got "
-            f"{len(lines):,}; save it again as PLY."
-        )
-    read: dict[str, dict[str, Any]] = {}
-    for name, count, properties in elements:
-        read[name] = {column: [] for column, _, _ in properties}
-        for line in lines[:count]:
-            words = line.split()[::-1]
-            try:
-                _ply_row(properties, read[name], partial(_popped, words))
-                # MeshLab writes more numbers behind the vertices of a face than its header says.
-                whole = not words or (name == "face" and not properties[-1][1])
-            except (IndexError, ValueError):
-                whole = False
-            if not whole:
-                raise InputError(f"a {name} must have as many numbers as the header says: got {shown(line)}.")
-        lines = lines[count:]
-    return read
-
-
-def _ply_binary(body: bytes, elements: list[_Element], order: str, promise: str) -> dict[str, dict[str, Any]]:
-    """Columns of each element of a binary PLY file, which must be as long as its counts say."""
+def _ply_columns(body: bytes, elements: list[_Element], order: str) -> dict[str, dict[str, Any]]:
+    """Columns of each element of a PLY file, text (one row a line) or binary, as many as its header says."""
+    lines = [] if order else [line.split() for line in _text(body).splitlines() if line.strip()]
+    lines.reverse()
+    words: list[str] = []
     used = 0
 
     def take(count: int, kind: str) -> tuple[Any, ...]:
         nonlocal used
+        if not order:
+            return tuple(words.pop(0) for _ in range(count))
         form = f"{order}{count}{kind}"
         used += struct.calcsize(form)
         return struct.unpack_from(form, body, used - struct.calcsize(form))
@@ -255,23 +219,27 @@ def _ply_binary(body: bytes, elements: list[_Element], order: str, promise: str)
     try:
         for name, count, properties in elements:
             columns: dict[str, Any] = {column: [] for column, _, _ in properties}
-            if any(size for _, size, _ in properties):
-                for _ in range(count):
-                    _ply_row(properties, columns, take)
-                read[name] = columns
-            else:
+            read[name] = columns
+            if order and not any(size for _, size, _ in properties):
                 row = np.dtype([(column, order + kind) for column, _, kind in properties])
                 table = np.frombuffer(body, row, count, used)
-                read[name] = {column: table[column] for column in columns}
+                columns.update((column, table[column]) for column in columns)
                 used += table.nbytes
-    except (struct.error, ValueError) as error:
+                continue
+            for _ in range(count):
+                words = words if order else lines.pop()
+                for column, size, kind in properties:
+                    columns[column].append(take(int(take(1, size)[0]) if size else 1, kind))
+                # MeshLab writes more numbers behind the vertices of a face than its header says.
+                if words and (name != "face" or properties[-1][1]):
+                    raise IndexError
+        fits = not (body[used:].strip() if order else lines)
+    except (IndexError, ValueError, struct.error):
+        fits = False
+    if not fits:
+        promise = " and ".join(f"{count:,} of {name}" for name, count, _ in elements)
         raise InputError(
             f"it must hold {promise}, as its header says: it is cut off or its counts are wrong; save it "
             "again as PLY."
-        ) from error
-    if body[used:].strip():
-        raise InputError(
-            f"it must have {used:,} bytes after its header, which promises {promise}: got {len(body):,}; "
-            "save it again as PLY."
         )
     return read
