@@ -13,11 +13,11 @@ import fingerpad as fp
 from fingerpad.geometry.composed import ridges
 from fingerpad.geometry.dots import Dots
 from fingerpad.geometry.grading import resolution_grading
+from fingerpad.geometry.height_maps import MOST_HEIGHTS
 from fingerpad.geometry.indenter_grading import grading_about
 from fingerpad.geometry.probing import check_gap
 from fingerpad.geometry.relief import narrowest_relief
 from fingerpad.geometry.surface import Surface
-from fingerpad.geometry.surface_files import MOST_HEIGHTS
 from fingerpad.geometry.triangles import Triangles
 from fingerpad.skin.store import touch_key
 from refusals import refusals

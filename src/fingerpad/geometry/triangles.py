@@ -254,8 +254,11 @@ def _gaps(
         nearest = np.inf
         if number > begin:  # a neighbour's distance bounds this one
             apart = np.sqrt(((p - points[number - 1]) ** 2).sum())
-            nearest = (last + apart) ** 2 * (1.0 + 1e-9) + 1e-18
+            bound = (last + apart) ** 2 * (1.0 + 1e-9) + 1e-18
+            if bound < nearest:  # not if one of them is no number
+                nearest = bound
         found, feature = 0, 6
+        n[0], n[1], n[2] = 0.0, 1.0, 0.0
         stack[0], top = 1, 1
         while top:
             top -= 1
