@@ -1,7 +1,6 @@
 """Surfaces of triangles and height maps as rigid bodies, by the exact distance to their triangles.
 
-The width of the narrowest ridge, groove or dot of a surface is measured, and a mesh must resolve it. Why the
-distance is exact and not interpolated: docs/decisions/surfaces.md.
+Why the distance is exact and not interpolated: docs/decisions/surfaces.md.
 """
 
 from __future__ import annotations
@@ -11,7 +10,6 @@ from functools import cached_property, partial
 from typing import Annotated
 
 import numpy as np
-from numba import njit
 
 from fingerpad.core.checked import checked, value_class
 from fingerpad.core.errors import InputError
@@ -29,7 +27,6 @@ from fingerpad.core.values import (
     int_array,
     limits,
 )
-from fingerpad.geometry.closest_point import Triangles
 from fingerpad.geometry.indenters import Indenter
 from fingerpad.geometry.probing import traced_front
 from fingerpad.geometry.relief import (
@@ -39,7 +36,8 @@ from fingerpad.geometry.relief import (
     narrowest_relief,
     with_rounded_edges,
 )
-from fingerpad.geometry.surface_repair import border_of, is_crack, layers_of, repaired
+from fingerpad.geometry.surface_repair import border_of, is_crack, layers_of, repaired, with_area
+from fingerpad.geometry.triangles import Triangles
 
 MOST_HEIGHTS = 2_000_000  # Heights of a map that become a body within about 20 s.
 
@@ -56,9 +54,6 @@ LARGEST_SMOOTH_DEG = 90.0
 HOLLOW_MM = 0.1
 """Distance from hollow creases over which they are rounded; less where triangles are small. [mm]"""
 
-FAR_MM = 2.0
-"""Beyond this distance above a surface its gap is this number: in a hollow all triangles are as far. [mm]"""
-
 
 @value_class(eq=False)
 class Surface(Indenter):
@@ -71,8 +66,9 @@ class Surface(Indenter):
         until its highest point is at y = 0. [mm]
     faces : int array (m, 3)
         Three corners each, counter-clockwise seen from outside. From the border of an open surface walls go
-        down. Edges and walls within 0.01 mm of each other are joined, closed parts that are inside out are
-        turned, and parts that overlap count as one body; `repairs` says what was done.
+        down. Vertices within 0.01 mm of each other are joined, triangles turned as their neighbours, closed
+        parts that are inside out turned, and walls between parts left out; parts that overlap count as one
+        body. `repairs` says what was done.
     smooth_below_deg : float
         Hollow creases at which the normals of two triangles differ by less are rounded over 0.1 mm to either
         side at most; 0 keeps all. Edges of a larger angle, and all ridges, stay as they are. [degrees]
@@ -83,9 +79,9 @@ class Surface(Indenter):
     ------
     InputError
         If vertices are not finite, faces name no vertex, no triangle has an area, the surface is larger than
-        1000 mm or smaller than 0.1 mm (a wrong unit), neighbouring triangles turn different sides out, more
-        than two share an edge, it shows the skin its inner side, parts touch along walls that do not match,
-        the angle is not from 0 to 90 degrees, or the radius does not fit.
+        1000 mm or smaller than 0.1 mm (a wrong unit), more than two triangles of a part share an edge, it
+        shows the skin its inner side, parts touch along walls that do not match, the angle is not from 0 to
+        90 degrees, or the radius does not fit.
 
     Examples
     --------
@@ -177,7 +173,8 @@ class Surface(Indenter):
     def relief_mm(self) -> float:
         """Width of the narrowest ridge, groove or dot of its face, 2 mm if all are wider. [mm]"""
         # Beside a closed body is nothing; an open one is thought to go on at its lowest height.
-        return narrowest_relief(*self._face, beside_mm=float(self.vertices_mm[self.faces, 1].min()))
+        height, _, spacing = self._face
+        return narrowest_relief(height, spacing, beside_mm=float(self.vertices_mm[self.faces, 1].min()))
 
     @cached_property
     def _border(self) -> IntArray:
@@ -187,22 +184,19 @@ class Surface(Indenter):
     @cached_property
     def _layers(self) -> tuple[Triangles, ...]:
         """Triangles and the walls below the border; parts that overlap are in different ones."""
-        layers = layers_of(self.vertices_mm, self.faces, self._border)
-        _, a, b = self._border[~is_crack(self.vertices_mm, self.faces, self._border)].T
-        n_vertices = len(self.vertices_mm)
-        walls = np.concatenate([
-            np.stack([b, a, a + n_vertices], axis=1),
-            np.stack([b, a + n_vertices, b + n_vertices], axis=1),
-        ])  # fmt: skip
-        below = self.vertices_mm - [0.0, SKIRT_MM, 0.0]
-        vertices = np.concatenate([self.vertices_mm, below])
+        layers, border, n_vertices = (
+            layers_of(self.vertices_mm, self.faces),
+            self._border,
+            len(self.vertices_mm),
+        )
+        _, a, b = border[~is_crack(self.vertices_mm, self.faces, border)].T
+        walls = np.column_stack([b, a, a + n_vertices, b, a + n_vertices, b + n_vertices]).reshape(-1, 3)
+        vertices = np.concatenate([self.vertices_mm, self.vertices_mm - [0.0, SKIRT_MM, 0.0]])
         found = []
         for layer in range(int(layers.max()) + 1):
-            faces = self.faces[layers == layer]
-            corners = vertices[faces := np.concatenate([faces, walls]) if layer == 0 else faces]
-            normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-            faces = faces[(normal != 0.0).any(axis=1)]
-            found.append(Triangles.of(vertices, faces, self.smooth_below_deg, HOLLOW_MM, FAR_MM))
+            faces = np.concatenate([self.faces[layers == layer], walls[: len(walls) * (layer == 0)]])
+            faces = with_area(vertices, faces)
+            found.append(Triangles.of(vertices, faces, self.smooth_below_deg, HOLLOW_MM))
         return tuple(found)
 
     def _shows_inner_side(self) -> bool:
@@ -215,35 +209,38 @@ class Surface(Indenter):
         upright = np.abs(normals[own, 1]) <= 1e-6 * np.linalg.norm(normals[own], axis=1)
         if (hangs & upright & ~is_crack(self.vertices_mm, self.faces, self._border)).any():
             return True  # walls below the border would be its other side
-        normal = normals[:, 1]
-        outer, inner = (self._heights_of(corners[side])[0] for side in (normal > 0.0, normal < 0.0))
-        seen = inner > outer + 1e-6
+        seen = self._face[1] < 0.0
         return bool((seen[1:, 1:] & seen[1:, :-1] & seen[:-1, 1:] & seen[:-1, :-1]).any())
 
-    @property
-    def _face(self) -> tuple[FloatArray, float]:
-        """Heights of the face over a grid of x and z, the lowest beside it, and their spacing. [mm]"""
+    @cached_property
+    def _face(self) -> tuple[FloatArray, FloatArray, float]:
+        """Heights of the face over a grid of x and z, the lowest beside it; y of normals; spacing. [mm]"""
         corners = self.vertices_mm[self.faces]
-        height, spacing = self._heights_of(corners)
-        return np.maximum(height, corners[..., 1].min()), spacing
-
-    def _heights_of(self, triangles: FloatArray) -> tuple[FloatArray, float]:
-        """Heights of some triangles over a grid of x and z below the whole body, -inf beside them. [mm]"""
-        corners = self.vertices_mm[self.faces]
-        low = np.maximum(corners.min(axis=(0, 1))[[0, 2]], -REACH_MM)
-        high = np.minimum(corners.max(axis=(0, 1))[[0, 2]], REACH_MM)
-        if (high <= low).any():
+        low, high = corners.min(axis=(0, 1)), corners.max(axis=(0, 1))
+        (x0, _, z0), (x1, _, z1) = np.maximum(low, -REACH_MM), np.minimum(high, REACH_MM)
+        if x1 <= x0 or z1 <= z0:
             raise InputError(
                 f"A surface must lie within {REACH_MM:g} mm of the indenter's axis: it does not."
             )
-        spacing = float((high - low).max()) / (PIXELS - 1)
-        counts = np.floor((high - low) / spacing).astype(int) + 1
-        height = np.full(tuple(counts), -np.inf)
-        _raise_to_triangles(triangles, low, spacing, height)
-        return height, spacing
+        spacing = max(x1 - x0, z1 - z0) / (PIXELS - 1)
+        x, z = np.arange(x0, x1 + 1e-9, spacing), np.arange(z0, z1 + 1e-9, spacing)
+        points = np.stack(np.broadcast_arrays(x[:, None], 0.0, z), axis=-1)
+        height, normal_y = self._top(points.reshape(-1, 3))
+        shape = x.size, z.size
+        return np.maximum(height, low[1]).reshape(shape), normal_y.reshape(shape), float(spacing)
+
+    def _top(self, points_mm: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Height of the highest triangle above or below each point, -inf beside all, and its normal's y."""
+        heights, slots = zip(*(layer.top(points_mm) for layer in self._layers), strict=True)
+        normals = [
+            np.where(slot < 0, 1.0, layer.normals[slot, 6, 1])
+            for layer, slot in zip(self._layers, slots, strict=True)
+        ]
+        highest = np.argmax(heights, axis=0)[None]
+        return tuple(np.take_along_axis(np.array(each), highest, axis=0)[0] for each in (heights, normals))
 
     def front(self, points_mm: PointsMm) -> FloatArray:
-        height = np.max([layer.heights(points_mm) for layer in self._layers], axis=0)
+        height = self._top(points_mm)[0]
         return traced_front(self.gap, points_mm, np.where(np.isfinite(height), height + HOLLOW_MM, -np.inf))
 
     def gap(self, points_mm: PointsMm) -> tuple[FloatArray, FloatArray]:
@@ -259,29 +256,6 @@ class Surface(Indenter):
             normal = np.where((other < gap)[:, None], direction, normal)
             gap = np.minimum(gap, other)
         return gap, normal
-
-
-@njit(cache=True, nogil=True)
-def _raise_to_triangles(
-    corners: FloatArray, low: FloatArray, spacing: float, height: FloatArray
-) -> None:  # pragma: no cover (compiled)
-    """Raise heights over a grid of x and z to the triangles above them."""
-    for a, b, c in corners:
-        abx, abz, acx, acz = b[0] - a[0], b[2] - a[2], c[0] - a[0], c[2] - a[2]
-        area = abx * acz - abz * acx
-        if area == 0.0:
-            continue
-        first_x = max(0, int(np.ceil((min(a[0], b[0], c[0]) - low[0]) / spacing - 1e-9)))
-        last_x = min(height.shape[0] - 1, int(np.floor((max(a[0], b[0], c[0]) - low[0]) / spacing + 1e-9)))
-        first_z = max(0, int(np.ceil((min(a[2], b[2], c[2]) - low[1]) / spacing - 1e-9)))
-        last_z = min(height.shape[1] - 1, int(np.floor((max(a[2], b[2], c[2]) - low[1]) / spacing + 1e-9)))
-        for i in range(first_x, last_x + 1):
-            for k in range(first_z, last_z + 1):
-                x, z = low[0] + i * spacing - a[0], low[1] + k * spacing - a[2]
-                v, w = (x * acz - z * acx) / area, (abx * z - abz * x) / area
-                if v >= -1e-9 and w >= -1e-9 and v + w <= 1.0 + 1e-9:
-                    y = a[1] + v * (b[1] - a[1]) + w * (c[1] - a[1])
-                    height[i, k] = max(height[i, k], y)
 
 
 def check_heights(name: str, heights: int) -> None:

@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import re
 import struct
-from collections.abc import Sequence
-from itertools import islice
+from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -24,13 +24,10 @@ _FACET = "facet normal . . . outer loop vertex . . . vertex . . . vertex . . . e
 """Words of a facet in an STL file of text; a point stands for a number."""
 
 _PLY_NUMBERS = {
-    **{"char": "i1", "uchar": "u1", "short": "i2", "ushort": "u2", "int": "i4", "uint": "u4"},
-    **{"int8": "i1", "uint8": "u1", "int16": "i2", "uint16": "u2", "int32": "i4", "uint32": "u4"},
-    **{"float": "f4", "double": "f8", "float32": "f4", "float64": "f8"},
+    **{"char": "b", "uchar": "B", "short": "h", "ushort": "H", "int": "i", "uint": "I"},
+    **{"int8": "b", "uint8": "B", "int16": "h", "uint16": "H", "int32": "i", "uint32": "I"},
+    **{"float": "f", "double": "d", "float32": "f", "float64": "d"},
 }
-
-_CODES = {"i1": "b", "u1": "B", "i2": "h", "u2": "H", "i4": "i", "u4": "I", "f4": "f", "f8": "d"}
-"""The same for `struct`."""
 
 
 def read_triangles(file: Path) -> Mesh:
@@ -53,11 +50,11 @@ def _text(content: bytes) -> str:
     return content.decode("utf-8-sig", errors="replace")
 
 
-def _numbers(words: Any, place: str) -> FloatArray:
+def _points(words: Any) -> FloatArray:
     try:
-        return np.array(words, dtype=np.float64)
+        return np.array(words, dtype=np.float64).reshape(-1, 3)
     except ValueError as error:
-        raise InputError(place, "must have three numbers each", remedy=str(error)) from error
+        raise InputError("vertices", "must have three numbers each", remedy=str(error)) from error
 
 
 def _stl(content: bytes) -> Mesh:
@@ -79,31 +76,29 @@ def _stl(content: bytes) -> Mesh:
                 f"got {size:,} bytes; {fault}, save it again as STL."
             )
         facets = np.frombuffer(content, np.dtype([("numbers", "<f4", (4, 3)), ("_", "<u2")]), offset=84)
-        vertices = facets["numbers"][:, 1:].astype(np.float64)
-    return vertices.reshape(-1, 3), np.arange(3 * len(vertices)).reshape(-1, 3)
+        vertices = facets["numbers"][:, 1:].astype(np.float64).reshape(-1, 3)
+    return vertices, np.arange(len(vertices)).reshape(-1, 3)
 
 
 def _text_stl(text: str) -> FloatArray:
-    solids = re.findall(r"(?im)^[ \t]*(end)?solid\b.*$", text)
-    words = re.sub(r"(?im)^[ \t]*(end)?solid\b.*$", "", text).split()
+    solid = r"(?im)^[ \t]*(end)?solid\b.*$"
+    ends, words = re.findall(solid, text), re.sub(solid, "", text).split()
     pattern = _FACET.split()
     whole = len(words) // len(pattern)
     table = np.array(words[: whole * len(pattern)], dtype=object).reshape(whole, len(pattern))
     for column, expected in enumerate(pattern):
-        wrong = (
-            [] if expected == "." else [row for row in range(whole) if table[row, column].lower() != expected]
-        )
+        wrong = [row for row in range(whole) if expected not in (".", table[row, column].lower())]
         if wrong:
             raise InputError(
                 f"facet {wrong[0] + 1} must have a normal and three vertices of three numbers: got "
                 f"{shown(table[wrong[0], column])} instead of {expected!r}."
             )
-    if len(words) % len(pattern) or solids.count("end") != len(solids) - solids.count("end"):
+    if len(words) % len(pattern) or 2 * ends.count("end") != len(ends):
         raise InputError(
             f"it must end with 'endsolid' after a whole facet: it is cut off after {whole:,} facets; save it "
             "again as STL."
         )
-    return _numbers(table[:, [8, 9, 10, 12, 13, 14, 16, 17, 18]], "vertices").reshape(-1, 3, 3)
+    return _points(table[:, [8, 9, 10, 12, 13, 14, 16, 17, 18]])
 
 
 def _obj(content: bytes) -> Mesh:
@@ -111,25 +106,25 @@ def _obj(content: bytes) -> Mesh:
     vertices: list[list[str]] = []
     polygons: list[list[int]] = []
     for number, line in enumerate(re.sub(r"\\\r?\n", " ", _text(content)).split("\n"), 1):
-        words = line.split()
-        if not words or words[0] not in ("v", "f"):
-            continue
-        if words[0] == "v":
-            if len(words) < 4:
+        kind, *words = line.partition("#")[0].split() or [""]
+        if kind == "v":
+            if len(words) < 3:
                 raise InputError(f"line {number}: a vertex must have three numbers: got {shown(line)}.")
-            vertices.append(words[1:4])
-            continue
-        try:
-            named = [int(word.partition("/")[0]) for word in line.partition("#")[0].split()[1:]]
-        except ValueError as error:
-            raise InputError(f"line {number}: a face must name its vertices: got {shown(line)}.") from error
-        if 0 in named or len(named) < 3:
-            raise InputError(
-                f"line {number}: a face must name three vertices or more, the first vertex as 1: got "
-                f"{shown(line)}."
-            )
-        polygons.append([each - 1 if each > 0 else len(vertices) + each for each in named])
-    points = _numbers(vertices, "vertices").reshape(-1, 3)
+            vertices.append(words[:3])
+        elif kind == "f":
+            try:
+                named = [int(word.partition("/")[0]) for word in words]
+            except ValueError as error:
+                raise InputError(
+                    f"line {number}: a face must name its vertices: got {shown(line)}."
+                ) from error
+            if 0 in named or len(named) < 3:
+                raise InputError(
+                    f"line {number}: a face must name three vertices or more, the first vertex as 1: got "
+                    f"{shown(line)}."
+                )
+            polygons.append([each - 1 if each > 0 else len(vertices) + each for each in named])
+    points = _points(vertices)
     return points, _fans(polygons, points)
 
 
@@ -159,6 +154,12 @@ def _fans(polygons: list[list[int]], vertices: FloatArray) -> IntArray:
     return np.concatenate(faces)
 
 
+_Element = tuple[str, int, list[tuple[str, str, str]]]
+"""Name, count and properties of an element: name, type of the count of a list or "", type."""
+
+_Take = Callable[[int, str], tuple[Any, ...]]  # So many numbers of one type, in the order of the file.
+
+
 def _ply(content: bytes) -> Mesh:
     """Vertices and faces of a PLY file, text or binary of either order."""
     end = re.search(rb"end_header[ \t]*(\r\n|\n|\r)", content)
@@ -166,28 +167,25 @@ def _ply(content: bytes) -> Mesh:
         raise InputError("a PLY file must begin with 'ply' and have an end_header: it does not.")
     order, elements = _ply_header(_text(content[: end.start()]))
     body = content[end.end() :]
-    read = _ply_text(_text(body), elements) if order is None else _ply_binary(body, elements, order)
+    promise = " and ".join(f"{count:,} of {name}" for name, count, _ in elements)
+    read = _ply_binary(body, elements, order, promise) if order else _ply_text(_text(body), elements, promise)
     vertices, faces = read.get("vertex", {}), read.get("face", {})
     if not {"x", "y", "z"} <= set(vertices):
         raise InputError("a PLY file must have vertices with x, y and z: it has none.")
-    points = _numbers([vertices[axis] for axis in "xyz"], "vertices").T
-    polygons = faces.get("vertex_indices", faces.get("vertex_index", []))
+    points = _points(np.transpose([np.ravel(vertices[axis]) for axis in "xyz"]))
     try:
-        numbers = [[int(corner) for corner in polygon] for polygon in polygons]
-    except (TypeError, ValueError) as error:
+        polygons = faces.get("vertex_indices", faces.get("vertex_index", []))
+        return points, _fans([[int(corner) for corner in polygon] for polygon in polygons], points)
+    except ValueError as error:
         raise InputError(
             "faces", "must be lists of whole numbers, their vertices", remedy=str(error)
         ) from error
-    return points, _fans(numbers, points)
 
 
-_Element = tuple[str, int, list[tuple[str, str, str]]]
-"""Name, count and properties of an element: name, type of the count of a list or "", type."""
-
-
-def _ply_header(text: str) -> tuple[str | None, list[_Element]]:
-    orders = {"ascii": None, "binary_little_endian": "<", "binary_big_endian": ">"}
-    order: str | None = ""
+def _ply_header(text: str) -> tuple[str, list[_Element]]:
+    """Order of the bytes, "" for text, and the elements."""
+    orders = {"ascii": "", "binary_little_endian": "<", "binary_big_endian": ">"}
+    order: str | None = None
     elements: list[_Element] = []
     for line in text.splitlines()[1:]:
         match line.split():
@@ -195,9 +193,7 @@ def _ply_header(text: str) -> tuple[str | None, list[_Element]]:
                 order = orders[kind]
             case ["element", name, count] if count.isdecimal():
                 elements.append((name, int(count), []))
-            case ["property", "list", size, kind, name] if (
-                size in _PLY_NUMBERS and kind in _PLY_NUMBERS and elements
-            ):
+            case ["property", "list", size, kind, name] if {size, kind} <= set(_PLY_NUMBERS) and elements:
                 elements[-1][2].append((name, _PLY_NUMBERS[size], _PLY_NUMBERS[kind]))
             case ["property", kind, name] if kind in _PLY_NUMBERS and elements:
                 elements[-1][2].append((name, "", _PLY_NUMBERS[kind]))
@@ -205,76 +201,77 @@ def _ply_header(text: str) -> tuple[str | None, list[_Element]]:
                 pass
             case _:
                 raise InputError(f"the header of a PLY file must not have the line {shown(line)}.")
-    if order == "":
+    if order is None:
         raise InputError(f"a PLY file must have a format, {', '.join(orders)}: it has none.")
     return order, elements
 
 
-def _counts(elements: Sequence[_Element]) -> str:
-    return " and ".join(f"{count:,} of {name}" for name, count, _ in elements)
+def _ply_row(properties: list[tuple[str, str, str]], columns: dict[str, list[Any]], take: _Take) -> None:
+    for column, size, kind in properties:
+        columns[column].append(take(int(take(1, size)[0]) if size else 1, kind))
 
 
-def _ply_text(text: str, elements: Sequence[_Element]) -> dict[str, dict[str, Any]]:
+def _popped(words: list[str], count: int, _: str) -> tuple[str, ...]:
+    return tuple(words.pop() for _ in range(count))
+
+
+def _ply_text(text: str, elements: list[_Element], promise: str) -> dict[str, dict[str, Any]]:
     """Columns of each element of a PLY file of text, one row a line."""
     lines = [line for line in text.splitlines() if line.strip()]
     expected = sum(count for _, count, _ in elements)
     if len(lines) != expected:
         raise InputError(
-            f"it must have {expected:,} lines after its header, which promises {_counts(elements)}: got "
+            f"it must have {expected:,} lines after its header, which promises {promise}: got "
             f"{len(lines):,}; save it again as PLY."
         )
-    read, rows = {}, iter(lines)
+    read: dict[str, dict[str, Any]] = {}
     for name, count, properties in elements:
-        columns: dict[str, Any] = {column: [] for column, _, _ in properties}
-        for line in islice(rows, count):
-            words = line.split()
-            used = 0
-            for column, size, _ in properties:
-                length = 1
-                if size:
-                    length = int(words[used]) if used < len(words) and words[used].isdecimal() else len(words)
-                    used += 1
-                entry = words[used : used + length]
-                columns[column].append(entry if size else "".join(entry))
-                used += length
-            # MeshLab writes more numbers behind the vertices of a face than its header says.
-            if used > len(words) or (used < len(words) and not (name == "face" and not properties[-1][1])):
+        read[name] = {column: [] for column, _, _ in properties}
+        for line in lines[:count]:
+            words = line.split()[::-1]
+            try:
+                _ply_row(properties, read[name], partial(_popped, words))
+                # MeshLab writes more numbers behind the vertices of a face than its header says.
+                whole = not words or (name == "face" and not properties[-1][1])
+            except (IndexError, ValueError):
+                whole = False
+            if not whole:
                 raise InputError(f"a {name} must have as many numbers as the header says: got {shown(line)}.")
-        read[name] = columns
+        lines = lines[count:]
     return read
 
 
-def _ply_binary(body: bytes, elements: Sequence[_Element], order: str) -> dict[str, dict[str, Any]]:
+def _ply_binary(body: bytes, elements: list[_Element], order: str, promise: str) -> dict[str, dict[str, Any]]:
     """Columns of each element of a binary PLY file, which must be as long as its counts say."""
-    read, used = {}, 0
+    used = 0
+
+    def take(count: int, kind: str) -> tuple[Any, ...]:
+        nonlocal used
+        form = f"{order}{count}{kind}"
+        used += struct.calcsize(form)
+        return struct.unpack_from(form, body, used - struct.calcsize(form))
+
+    read: dict[str, dict[str, Any]] = {}
     try:
         for name, count, properties in elements:
             columns: dict[str, Any] = {column: [] for column, _, _ in properties}
-            if not any(size for _, size, _ in properties):
+            if any(size for _, size, _ in properties):
+                for _ in range(count):
+                    _ply_row(properties, columns, take)
+                read[name] = columns
+            else:
                 row = np.dtype([(column, order + kind) for column, _, kind in properties])
                 table = np.frombuffer(body, row, count, used)
-                columns = {column: table[column] for column in columns}
-                used += count * row.itemsize
-                read[name] = columns
-                continue
-            for _ in range(count):
-                for column, size, kind in properties:
-                    length = 1
-                    if size:
-                        (length,) = struct.unpack_from(order + _CODES[size], body, used)
-                        used += int(size[1])
-                    entry = struct.unpack_from(f"{order}{length}{_CODES[kind]}", body, used)
-                    used += length * int(kind[1])
-                    columns[column].append(entry if size else entry[0])
-            read[name] = columns
+                read[name] = {column: table[column] for column in columns}
+                used += table.nbytes
     except (struct.error, ValueError) as error:
         raise InputError(
-            f"it must hold {_counts(elements)}, as its header says: it is cut off or its counts are wrong; "
-            "save it again as PLY."
+            f"it must hold {promise}, as its header says: it is cut off or its counts are wrong; save it "
+            "again as PLY."
         ) from error
     if body[used:].strip():
         raise InputError(
-            f"it must have {used:,} bytes after its header, which promises {_counts(elements)}: got "
-            f"{len(body):,}; save it again as PLY."
+            f"it must have {used:,} bytes after its header, which promises {promise}: got {len(body):,}; "
+            "save it again as PLY."
         )
     return read
