@@ -1,4 +1,4 @@
-"""A body of a million triangles from a file: reading and pressing it, beside its analytic twin."""
+"""Surfaces from files: a million triangles beside their analytic twin, and presses of foreign surfaces."""
 
 from __future__ import annotations
 
@@ -11,11 +11,13 @@ from typing import Any
 import numpy as np
 
 import fingerpad as fp
+from benchmarks.foreign_surfaces import BODIES, read
 from benchmarks.measuring import run_job
 from benchmarks.results import Report, Table
 from fingerpad.geometry.surface import Surface
 
 HEIGHTS, HALF_MM, THREADS, DEPTH_MM = 708, 3.0, 2, 1.0
+FOREIGN_DEPTH_MM = 0.6
 BALL = fp.Sphere(curvature_per_m=287.0)
 
 
@@ -52,8 +54,30 @@ def answer(from_file: bool) -> dict[str, Any]:
     }
 
 
+def press(name: str) -> dict[str, Any]:
+    """Press one of the foreign surfaces at `quick`: nodes, seconds and force, or why it was refused."""
+    touch = fp.touch_of(fp.Fingertip(), fp.Plate(), fp.RampAndHold(depth_mm=FOREIGN_DEPTH_MM))
+    touch.solve(threads=THREADS)  # loads kernels
+    found: dict[str, Any] = {"nodes": None, "press_s": None, "force_mn": None, "said": ""}
+    started = perf_counter()
+    try:
+        with TemporaryDirectory() as folder:
+            body = read(name, Path(folder))
+        touch = fp.touch_of(fp.Fingertip(), body, touch.stimulus)
+        found["nodes"] = len(touch.mesh.nodes_mm)
+        skin = touch.solve(threads=THREADS)
+        found |= {
+            "press_s": round(perf_counter() - started, 1),
+            "force_mn": float(skin.force_mn.max().round(1)),
+        }
+    except (fp.InputError, fp.ConvergenceError) as error:
+        found["said"] = str(error)
+    return found
+
+
 def measure() -> Report:
-    """Press both once, each in a fresh process."""
+    """Press each once in a fresh process."""
+    foreign = {name: run_job("surfaces", "press", THREADS, name=name).answer for name in BODIES}
     runs = {
         name: run_job("surfaces", "answer", THREADS, from_file=from_file)
         for name, from_file in (("triangles of a binary STL", True), ("analytic sphere", False))
@@ -83,7 +107,12 @@ def measure() -> Report:
                     ]
                     for name, run in runs.items()
                 ],
-            )
+            ),
+            Table(
+                f"Foreign surfaces (benchmarks/foreign_surfaces.py), pressed {FOREIGN_DEPTH_MM:g} mm:",
+                ["body", "nodes", "read and press, s", "force, mN", "refused"],
+                [[name, *found.values()] for name, found in foreign.items()],
+            ),
         ],
         measured={"million_triangles_s": read["read_s"] + read["press_s"] - exact["press_s"]},
     )

@@ -33,7 +33,7 @@ from fingerpad.experiments.requests.touch import (
 )
 from fingerpad.export.decks import FORMATS
 from fingerpad.export.requests import check_outputs
-from fingerpad.geometry import surface_files
+from fingerpad.geometry import height_maps
 from fingerpad.geometry.dots import Dots
 from fingerpad.geometry.embossed import Embossed
 from fingerpad.neuron.afferent_types import afferent_types
@@ -142,8 +142,8 @@ def test_hashes_name_every_file_of_a_description(tmp_path):
 def test_a_surface_of_several_stimuli_is_read_once(tmp_path, monkeypatch):
     np.savetxt(tmp_path / "map.csv", np.eye(4), delimiter=",")
     made_of = []
-    original = surface_files.height_surface
-    monkeypatch.setattr(surface_files, "height_surface", lambda *sizes: made_of.append(1) or original(*sizes))
+    original = height_maps.height_surface
+    monkeypatch.setattr(height_maps, "height_surface", lambda *sizes: made_of.append(1) or original(*sizes))
     asked = part_from(
         StimulusSet,
         {

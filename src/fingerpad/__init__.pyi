@@ -46,6 +46,8 @@ from fingerpad.geometry.edged_indenters import Grating as Grating
 from fingerpad.geometry.embossed import embossed_text as embossed_text
 from fingerpad.geometry.fingertip import Fingertip as Fingertip
 from fingerpad.geometry.grading import Grading as Grading
+from fingerpad.geometry.height_maps import height_surface as height_surface
+from fingerpad.geometry.height_maps import read_height_map as read_height_map
 from fingerpad.geometry.indenters import Bar as Bar
 from fingerpad.geometry.indenters import Cylinder as Cylinder
 from fingerpad.geometry.indenters import FlatPunch as FlatPunch
@@ -66,8 +68,6 @@ from fingerpad.geometry.motions import sampled as sampled
 from fingerpad.geometry.motions import sine as sine
 from fingerpad.geometry.motions import staircase as staircase
 from fingerpad.geometry.motions import stroke as stroke
-from fingerpad.geometry.surface import height_surface as height_surface
-from fingerpad.geometry.surface_files import read_height_map as read_height_map
 from fingerpad.geometry.surface_files import read_surface as read_surface
 from fingerpad.inference.afferent_fit import fit_afferent as fit_afferent
 from fingerpad.inference.recordings import RateRecordings as RateRecordings

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import cached_property
-from itertools import pairwise
-from typing import Annotated
+from typing import Annotated, Any
 
 import numpy as np
+import shapely
 from numba import njit
 
 from fingerpad.core.checked import checked, value_class
@@ -67,7 +67,7 @@ class Embossed(Indenter):
                 "take fewer letters or coarser outlines",
             )
         object.__setattr__(self, "outlines_mm", tuple(tuple(map(tuple, line.tolist())) for line in outlines))
-        if _cross(self._pieces):
+        if not _rings(outlines).is_simple:
             raise InputError("Outlines must not touch or cross, each other or themselves: they do.")
         sizes = {"height_mm": self.height_mm, "half of the narrowest stroke": self.stroke_mm / 2}
         for name, most in sizes.items():
@@ -105,20 +105,15 @@ class Embossed(Indenter):
 
     @cached_property
     def _pieces(self) -> FloatArray:
-        """Straight pieces of all outlines: begin and end, x and z, (n, 2, 2). [mm]"""
-        return _pieces(self.outlines_mm)
+        """Pieces of all outlines, the shape on their left: begin and end, x and z, (n, 2, 2). [mm]"""
+        lines = _outlines(shapely.build_area(_rings(self.outlines_mm)))
+        return np.concatenate([np.stack([line, np.roll(line, -1, axis=0)], axis=1) for line in lines])
 
     @cached_property
     def _normals(self) -> FloatArray:
         """Direction out of the shape at each piece, x and z, (n, 2)."""
-        begin, end = self._pieces[:, 0], self._pieces[:, 1]
-        along = end - begin
-        length = np.linalg.norm(along, axis=1)[:, None]
-        normal = np.column_stack([along[:, 1], -along[:, 0]]) / length
-        # A point beside the middle of each piece, much nearer to it than any other piece is.
-        beside = 0.5 * (begin + end) + 1e-6 * length * normal
-        inside = _crossings(beside, self._pieces) % 2 == 1
-        return np.where(inside[:, None], -normal, normal)
+        along = self._pieces[:, 1] - self._pieces[:, 0]
+        return np.column_stack([along[:, 1], -along[:, 0]]) / np.linalg.norm(along, axis=1)[:, None]
 
     @cached_property
     def _widths_mm(self) -> FloatArray:
@@ -202,23 +197,35 @@ def embossed_text(
     placed = [scale * (outline - middle) for outline in outlines]
     # Seen from the skin, z runs to the right where x, to the tip, runs up.
     turned = [line * [1.0, -1.0] if along_finger else line[:, ::-1] for line in placed]
-    corners = list(map(_corners, turned))
-    if _cross(_pieces(corners)):
-        corners = list(map(_corners, joined_outlines([np.array(line) for line in corners])))
-    return Embossed(tuple(corners), height_mm, edge_radius_mm)
+    # Corners to 1e-9 mm, without a second one at the same place.
+    rings = shapely.remove_repeated_points(_rings([line.round(9) + 0.0 for line in turned]))
+    corners = [np.array(ring.coords) for ring in rings.geoms]
+    if not rings.is_simple:
+        corners = joined_outlines(corners)
+    return Embossed(tuple(tuple(map(tuple, line.tolist())) for line in corners), height_mm, edge_radius_mm)
 
 
-def _pieces(outlines: Sequence[Sequence[tuple[float, float]] | FloatArray]) -> FloatArray:
-    """Straight pieces of closed outlines: begin and end, (n, 2, 2)."""
-    lines = [np.array(line) for line in outlines]
-    return np.concatenate([np.stack([line, np.roll(line, -1, axis=0)], axis=1) for line in lines])
+def joined_outlines(outlines: Sequence[FloatArray]) -> list[FloatArray]:
+    """Boundary of what closed outlines enclose, where those that turn as the largest do not cut out holes."""
+    parts = [shapely.Polygon(line) for line in outlines]
+    largest = max(parts, key=lambda part: part.area).exterior.is_ccw
+    holes = [part for part in parts if part.exterior.is_ccw != largest]
+    whole = [
+        part.difference(shapely.union_all([hole for hole in holes if part.contains(hole)]))
+        for part in parts
+        if part.exterior.is_ccw == largest
+    ]
+    return _outlines(shapely.union_all(whole))
 
 
-def _corners(outline: FloatArray) -> tuple[tuple[float, float], ...]:
-    """Corners of an outline to 1e-9 mm, without a second one at the same place. [mm]"""
-    corners = list(map(tuple, (outline.round(9) + 0.0).tolist()))
-    kept = [corners[0], *(after for before, after in pairwise(corners) if after != before)]
-    return tuple(kept[:-1] if kept[0] == kept[-1] else kept)
+def _rings(outlines: Sequence[FloatArray | Sequence[tuple[float, float]]]) -> Any:
+    return shapely.MultiLineString([[*line, line[0]] for line in outlines])
+
+
+def _outlines(area: Any) -> list[FloatArray]:
+    """Corners of the outlines of an area, which lies on their left."""
+    polygons = shapely.get_parts(shapely.orient_polygons(area))
+    return [np.array(ring.coords)[:-1] for each in polygons for ring in (each.exterior, *each.interiors)]
 
 
 def _closed(name: str, outline: Sequence[tuple[float, float]]) -> FloatArray:
@@ -232,38 +239,6 @@ def _closed(name: str, outline: Sequence[tuple[float, float]]) -> FloatArray:
     if (corners == ahead).all(axis=1).any():
         raise InputError(name, "must not have one corner twice in a row", remedy="it has")
     return corners
-
-
-def _crossings(points: FloatArray, pieces: FloatArray) -> np.ndarray:
-    """Count the pieces that each point (n, 2) sees along x; it is inside if the number is odd."""
-    (x0, z0), (x1, z1) = pieces[:, 0].T, pieces[:, 1].T
-    x, z = points[:, :1], points[:, 1:]
-    passes = (z0 > z) != (z1 > z)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        seen = x < x0 + (z - z0) / (z1 - z0) * (x1 - x0)
-    return (passes & seen).sum(axis=1)
-
-
-def _cross(pieces: FloatArray) -> bool:
-    """Whether any two pieces that are not neighbours meet, or neighbours fold back."""
-    begin, end = pieces[:, 0], pieces[:, 1]
-
-    def side(of: FloatArray) -> FloatArray:
-        """Side of each piece (row) on which each point (column) lies, 0 on its line."""
-        along, to = (end - begin)[:, None], of[None] - begin[:, None]
-        turn = along[..., 0] * to[..., 1] - along[..., 1] * to[..., 0]
-        scale = np.linalg.norm(along, axis=2) * np.abs(pieces).max()
-        return np.where(np.abs(turn) > 1e-12 * scale, np.sign(turn), 0.0)
-
-    of_begin, of_end = side(begin), side(end)
-    apart = of_begin * of_end
-    meets = (apart <= 0.0) & (apart.T <= 0.0)
-    low, high = pieces.min(axis=1), pieces.max(axis=1)
-    meets &= ((low[:, None] <= high[None]) & (low[None] <= high[:, None])).all(axis=2)
-    shares = (begin[:, None] == end[None]).all(axis=2)
-    neighbours = shares | shares.T | np.eye(len(pieces), dtype=bool)
-    # Neighbours share one corner; an outline that comes back to a corner has more than one before it.
-    return bool((meets & ~neighbours).any() or (shares.sum(axis=1) != 1).any())
 
 
 @njit(cache=True, nogil=True)
@@ -291,78 +266,3 @@ def _beyond_outline(
             outward[number, 0], outward[number, 2] = sign * to_x / length, sign * to_z / length
         else:
             outward[number, 0], outward[number, 2] = normals[piece, 0], normals[piece, 1]
-
-
-_BESIDE = 1e-6  # Distance from a piece at which its sides are looked at, over the extent of all.
-_SAME = 1e-9  # Distance of places that are one, over the extent of all.
-
-
-def joined_outlines(outlines: Sequence[FloatArray]) -> list[FloatArray]:
-    """Boundary of what closed outlines enclose, where those that turn the other way cut out."""
-    whole = _pieces(outlines)
-    extent = float(np.ptp(whole, axis=(0, 1)).max())
-    parts = _parted(whole, _SAME * extent)
-    along = parts[:, 1] - parts[:, 0]
-    left = np.column_stack([-along[:, 1], along[:, 0]]) / np.linalg.norm(along, axis=1)[:, None]
-    middle = parts.mean(axis=1)
-    inside, outside = (_turns(middle + side * _BESIDE * extent * left, whole) != 0 for side in (1.0, -1.0))
-    kept = inside != outside
-    directed = np.where(inside[kept][:, None, None], parts[kept], parts[kept][:, ::-1])
-    return _chained(directed, _SAME * extent)
-
-
-def _parted(pieces: FloatArray, same: float) -> FloatArray:
-    """Pieces, parted where they cross each other, (n, 2, 2)."""
-    begin, along = pieces[:, 0], pieces[:, 1] - pieces[:, 0]
-    turn = along[:, None, 0] * along[None, :, 1] - along[:, None, 1] * along[None, :, 0]
-    apart = begin[None] - begin[:, None]
-    with np.errstate(divide="ignore", invalid="ignore"):
-        share = (apart[..., 0] * along[None, :, 1] - apart[..., 1] * along[None, :, 0]) / turn
-    length = np.linalg.norm(along, axis=1)
-    margin = same / length
-    crossed = (
-        (np.abs(turn) > 1e-12 * np.outer(length, length))
-        & (share > margin[:, None])
-        & (share < 1.0 - margin[:, None])
-    )
-    crossed &= ((-margin[None] <= share.T) & (1.0 + margin[None] >= share.T)) | ~np.isfinite(share.T)
-    found = []
-    for number, (start, way) in enumerate(zip(begin, along, strict=True)):
-        shares = np.unique(np.concatenate([[0.0, 1.0], share[number, crossed[number]]]))
-        shares = shares[np.concatenate([[True], np.diff(shares) > margin[number]])]
-        points = start + shares[:, None] * way
-        found.append(np.stack([points[:-1], points[1:]], axis=1))
-    return np.concatenate(found)
-
-
-def _turns(points: FloatArray, pieces: FloatArray) -> np.ndarray:
-    """How often outlines go around each point (n, 2), counter-clockwise less clockwise."""
-    (x0, y0), (x1, y1) = pieces[:, 0].T, pieces[:, 1].T
-    x, y = points[:, :1], points[:, 1:]
-    upwards, downwards = (y0 <= y) & (y1 > y), (y1 <= y) & (y0 > y)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        seen = x < x0 + (y - y0) / (y1 - y0) * (x1 - x0)
-    return (upwards & seen).sum(axis=1) - (downwards & seen).sum(axis=1)
-
-
-def _chained(pieces: FloatArray, same: float) -> list[FloatArray]:
-    """Join directed pieces end to begin into closed outlines."""
-    keys = np.round(pieces / (4.0 * same)).astype(np.int64)
-    following: dict[tuple[int, int], dict[tuple[int, int], FloatArray]] = {}
-    for piece, (begin, end) in zip(pieces, keys.tolist(), strict=True):
-        following.setdefault(tuple(begin), {})[tuple(end)] = piece[0]
-    found = []
-    while following:
-        first = here = next(iter(following))
-        corners = []
-        while here in following:
-            ends = following[here]
-            there, corner = ends.popitem()
-            if not ends:
-                del following[here]
-            corners.append(corner)
-            here = there
-            if here == first:
-                break
-        found.append(np.array(corners))
-    return found

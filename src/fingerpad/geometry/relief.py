@@ -187,72 +187,32 @@ def with_rounded_edges(sharp: Gap, points_mm: FloatArray, radius_mm: float) -> t
 def _nearest_below(
     points: FloatArray, planes: FloatArray, depths: FloatArray, nearest: FloatArray, fits: np.ndarray
 ) -> None:  # pragma: no cover (compiled)
-    """Closest point below all planes; one, two or three of them touch it."""
+    """Closest point below all planes: the nearest foot on one, two or three that is below all."""
     count = depths.shape[1]
-    chosen, weights = np.empty(3, dtype=np.int64), np.zeros(3)
     for row in range(len(points)):
         p, n, d = points[row], planes[row], depths[row]
-        scale = 1e-9 * (1.0 + np.abs(p).max())
+        most = d + 1e-9 * (1.0 + np.abs(p).max())
         best = np.inf
         for i in range(count):
             for j in range(i, count):
                 for k in range(j, count):
                     if i == j and j != k:
                         continue  # (i, i, i) is one plane, (i, j, j) are two, (i, j, k) three
-                    chosen[0], chosen[1], chosen[2] = i, j, k
-                    size = 1 if i == k else 2 if j == k else 3
-                    if not _weights(p, n, d, chosen, size, weights):
-                        continue
-                    x, y, z = p[0], p[1], p[2]
-                    for m in range(size):
-                        x -= weights[m] * n[chosen[m], 0]
-                        y -= weights[m] * n[chosen[m], 1]
-                        z -= weights[m] * n[chosen[m], 2]
-                    apart = (x - p[0]) ** 2 + (y - p[1]) ** 2 + (z - p[2]) ** 2
-                    if apart >= best:
-                        continue
-                    above = False
-                    for m in range(count):
-                        above = above or n[m, 0] * x + n[m, 1] * y + n[m, 2] * z > d[m] + scale
-                    if not above:
+                    if i == k:
+                        foot = p - ((n[i] * p).sum() - d[i]) * n[i]
+                    else:
+                        third, at = n[k], d[k]
+                        if j == k:  # the plane through p at right angles to both
+                            third = np.cross(n[i], n[j])
+                            third /= max(1e-300, np.sqrt((third**2).sum()))
+                            at = (third * p).sum()
+                        line = np.cross(n[j], third)
+                        det = (n[i] * line).sum()
+                        if det * det < 1e-12:
+                            continue
+                        foot = d[i] * line + d[j] * np.cross(third, n[i]) + at * np.cross(n[i], n[j])
+                        foot /= det
+                    apart = ((foot - p) ** 2).sum()
+                    if apart < best and (np.dot(n, foot) <= most).all():
                         best, fits[row] = apart, True
-                        nearest[row, 0], nearest[row, 1], nearest[row, 2] = x, y, z
-
-
-@njit(cache=True, nogil=True)
-def _weights(
-    p: FloatArray, n: FloatArray, d: FloatArray, chosen: np.ndarray, size: int, weights: FloatArray
-) -> bool:  # pragma: no cover (compiled)
-    """Find the steps along normals to a point on all planes; return whether all lead inwards."""
-    gram, above = np.zeros((3, 3)), np.zeros(3)
-    for a in range(size):
-        above[a] = -d[chosen[a]]
-        for axis in range(3):
-            above[a] += n[chosen[a], axis] * p[axis]
-        for b in range(size):
-            for axis in range(3):
-                gram[a, b] += n[chosen[a], axis] * n[chosen[b], axis]
-    for a in range(size, 3):
-        gram[a, a] = 1.0
-    c0 = gram[1, 1] * gram[2, 2] - gram[1, 2] * gram[2, 1]
-    c1 = gram[1, 2] * gram[2, 0] - gram[1, 0] * gram[2, 2]
-    c2 = gram[1, 0] * gram[2, 1] - gram[1, 1] * gram[2, 0]
-    det = gram[0, 0] * c0 + gram[0, 1] * c1 + gram[0, 2] * c2
-    if det < 1e-12:
-        return False
-    weights[0] = (
-        above[0] * c0
-        + gram[0, 1] * (gram[1, 2] * above[2] - above[1] * gram[2, 2])
-        + gram[0, 2] * (above[1] * gram[2, 1] - gram[1, 1] * above[2])
-    ) / det
-    weights[1] = (
-        gram[0, 0] * (above[1] * gram[2, 2] - gram[1, 2] * above[2])
-        + above[0] * c1
-        + gram[0, 2] * (gram[1, 0] * above[2] - above[1] * gram[2, 0])
-    ) / det
-    weights[2] = (
-        gram[0, 0] * (gram[1, 1] * above[2] - above[1] * gram[2, 1])
-        + gram[0, 1] * (above[1] * gram[2, 0] - gram[1, 0] * above[2])
-        + above[0] * c2
-    ) / det
-    return min(weights[0], weights[1], weights[2]) >= -1e-12
+                        nearest[row] = foot

@@ -1,7 +1,7 @@
-"""Surfaces of triangles and height maps as rigid bodies, by the exact distance to their triangles.
+"""Surfaces of triangles as rigid bodies, by the exact distance to them (docs/decisions/surfaces.md).
 
-The width of the narrowest ridge, groove or dot of a surface is measured, and a mesh must resolve it. Why the
-distance is exact and not interpolated: docs/decisions/surfaces.md.
+Their triangles are made one body: vertices joined, triangles and parts turned, walls between parts left out.
+What is done is told in sentences; what cannot be done is refused.
 """
 
 from __future__ import annotations
@@ -11,9 +11,11 @@ from functools import cached_property, partial
 from typing import Annotated
 
 import numpy as np
-from numba import njit
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components
+from scipy.spatial import cKDTree
 
-from fingerpad.core.checked import checked, value_class
+from fingerpad.core.checked import value_class
 from fingerpad.core.errors import InputError
 from fingerpad.core.logger import LOGGER
 from fingerpad.core.values import (
@@ -24,12 +26,9 @@ from fingerpad.core.values import (
     IntArray,
     NotNegative,
     PointsMm,
-    Positive,
-    float_array,
     int_array,
     limits,
 )
-from fingerpad.geometry.closest_point import Triangles
 from fingerpad.geometry.indenters import Indenter
 from fingerpad.geometry.probing import traced_front
 from fingerpad.geometry.relief import (
@@ -39,9 +38,7 @@ from fingerpad.geometry.relief import (
     narrowest_relief,
     with_rounded_edges,
 )
-from fingerpad.geometry.surface_repair import border_of, is_crack, layers_of, repaired
-
-MOST_HEIGHTS = 2_000_000  # Heights of a map that become a body within about 20 s.
+from fingerpad.geometry.triangles import Triangles
 
 SMALLEST_MM, LARGEST_MM = 0.1, 1000.0
 """Extents beyond which a surface is refused: its unit must be wrong. [mm]"""
@@ -56,8 +53,12 @@ LARGEST_SMOOTH_DEG = 90.0
 HOLLOW_MM = 0.1
 """Distance from hollow creases over which they are rounded; less where triangles are small. [mm]"""
 
-FAR_MM = 2.0
-"""Beyond this distance above a surface its gap is this number: in a hollow all triangles are as far. [mm]"""
+
+JOIN_MM = 0.01
+"""Vertices and walls that are as near as this become one; the skin does not get between them. [mm]"""
+
+_STEEP = 0.7
+"""Component towards the skin below which a wall is steep, so that a crack along it opens to the skin."""
 
 
 @value_class(eq=False)
@@ -71,8 +72,9 @@ class Surface(Indenter):
         until its highest point is at y = 0. [mm]
     faces : int array (m, 3)
         Three corners each, counter-clockwise seen from outside. From the border of an open surface walls go
-        down. Edges and walls within 0.01 mm of each other are joined, closed parts that are inside out are
-        turned, and parts that overlap count as one body; `repairs` says what was done.
+        down. Vertices within 0.01 mm of each other are joined, triangles turned as their neighbours, closed
+        parts that are inside out turned, and walls between parts left out; parts that overlap count as one
+        body. `repairs` says what was done.
     smooth_below_deg : float
         Hollow creases at which the normals of two triangles differ by less are rounded over 0.1 mm to either
         side at most; 0 keeps all. Edges of a larger angle, and all ridges, stay as they are. [degrees]
@@ -83,9 +85,9 @@ class Surface(Indenter):
     ------
     InputError
         If vertices are not finite, faces name no vertex, no triangle has an area, the surface is larger than
-        1000 mm or smaller than 0.1 mm (a wrong unit), neighbouring triangles turn different sides out, more
-        than two share an edge, it shows the skin its inner side, parts touch along walls that do not match,
-        the angle is not from 0 to 90 degrees, or the radius does not fit.
+        1000 mm or smaller than 0.1 mm (a wrong unit), more than two triangles of a part share an edge, it
+        shows the skin its inner side, parts touch along walls that do not match, the angle is not from 0 to
+        90 degrees, or the radius does not fit.
 
     Examples
     --------
@@ -127,7 +129,7 @@ class Surface(Indenter):
                 f"A surface must be {SMALLEST_MM:g} to {LARGEST_MM:g} mm large: got {extent:.4g} mm; check "
                 "the unit of its file."
             )
-        vertices, faces, told = repaired(vertices, faces[area > 1e-12 * extent**2])
+        vertices, faces, told = _repaired(vertices, faces[area > 1e-12 * extent**2])
         vertices = vertices - [0.0, vertices[faces, 1].max(), 0.0]
         self.__dict__["repairs"] = told
         for name, value in (("vertices_mm", vertices), ("faces", faces)):
@@ -177,32 +179,27 @@ class Surface(Indenter):
     def relief_mm(self) -> float:
         """Width of the narrowest ridge, groove or dot of its face, 2 mm if all are wider. [mm]"""
         # Beside a closed body is nothing; an open one is thought to go on at its lowest height.
-        return narrowest_relief(*self._face, beside_mm=float(self.vertices_mm[self.faces, 1].min()))
+        height, _, spacing = self._face
+        return narrowest_relief(height, spacing, beside_mm=float(self.vertices_mm[self.faces, 1].min()))
 
     @cached_property
     def _border(self) -> IntArray:
-        """Edges of one triangle alone: the triangle and its two corners, (n, 3)."""
-        return border_of(self.faces)
+        """Edges where the surface ends: the triangle and its two corners, (n, 3)."""
+        border = _border_of(self.faces)
+        return border[~_is_crack(self.vertices_mm, self.faces, border)]
 
     @cached_property
     def _layers(self) -> tuple[Triangles, ...]:
         """Triangles and the walls below the border; parts that overlap are in different ones."""
-        layers = layers_of(self.vertices_mm, self.faces, self._border)
-        _, a, b = self._border[~is_crack(self.vertices_mm, self.faces, self._border)].T
-        n_vertices = len(self.vertices_mm)
-        walls = np.concatenate([
-            np.stack([b, a, a + n_vertices], axis=1),
-            np.stack([b, a + n_vertices, b + n_vertices], axis=1),
-        ])  # fmt: skip
-        below = self.vertices_mm - [0.0, SKIRT_MM, 0.0]
-        vertices = np.concatenate([self.vertices_mm, below])
+        layers, n_vertices = _layers_of(self.vertices_mm, self.faces), len(self.vertices_mm)
+        _, a, b = self._border.T
+        walls = np.column_stack([b, a, a + n_vertices, b, a + n_vertices, b + n_vertices]).reshape(-1, 3)
+        vertices = np.concatenate([self.vertices_mm, self.vertices_mm - [0.0, SKIRT_MM, 0.0]])
         found = []
         for layer in range(int(layers.max()) + 1):
             faces = self.faces[layers == layer]
-            corners = vertices[faces := np.concatenate([faces, walls]) if layer == 0 else faces]
-            normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-            faces = faces[(normal != 0.0).any(axis=1)]
-            found.append(Triangles.of(vertices, faces, self.smooth_below_deg, HOLLOW_MM, FAR_MM))
+            faces = _with_area(vertices, faces if layer else np.concatenate([faces, walls]))
+            found.append(Triangles.of(vertices, faces, self.smooth_below_deg, HOLLOW_MM))
         return tuple(found)
 
     def _shows_inner_side(self) -> bool:
@@ -213,37 +210,39 @@ class Surface(Indenter):
         lowest = corners[own, :, 1].min(axis=1)
         hangs = lowest < np.minimum(self.vertices_mm[a, 1], self.vertices_mm[b, 1])
         upright = np.abs(normals[own, 1]) <= 1e-6 * np.linalg.norm(normals[own], axis=1)
-        if (hangs & upright & ~is_crack(self.vertices_mm, self.faces, self._border)).any():
+        if (hangs & upright).any():
             return True  # walls below the border would be its other side
-        normal = normals[:, 1]
-        outer, inner = (self._heights_of(corners[side])[0] for side in (normal > 0.0, normal < 0.0))
-        seen = inner > outer + 1e-6
+        seen = self._face[1] < 0.0
         return bool((seen[1:, 1:] & seen[1:, :-1] & seen[:-1, 1:] & seen[:-1, :-1]).any())
 
-    @property
-    def _face(self) -> tuple[FloatArray, float]:
-        """Heights of the face over a grid of x and z, the lowest beside it, and their spacing. [mm]"""
+    @cached_property
+    def _face(self) -> tuple[FloatArray, FloatArray, float]:
+        """Heights of the face over a grid of x and z, the lowest beside it; y of normals; spacing. [mm]"""
         corners = self.vertices_mm[self.faces]
-        height, spacing = self._heights_of(corners)
-        return np.maximum(height, corners[..., 1].min()), spacing
-
-    def _heights_of(self, triangles: FloatArray) -> tuple[FloatArray, float]:
-        """Heights of some triangles over a grid of x and z below the whole body, -inf beside them. [mm]"""
-        corners = self.vertices_mm[self.faces]
-        low = np.maximum(corners.min(axis=(0, 1))[[0, 2]], -REACH_MM)
-        high = np.minimum(corners.max(axis=(0, 1))[[0, 2]], REACH_MM)
-        if (high <= low).any():
+        low, high = corners.min(axis=(0, 1)), corners.max(axis=(0, 1))
+        (x0, _, z0), (x1, _, z1) = np.maximum(low, -REACH_MM), np.minimum(high, REACH_MM)
+        if x1 <= x0 or z1 <= z0:
             raise InputError(
                 f"A surface must lie within {REACH_MM:g} mm of the indenter's axis: it does not."
             )
-        spacing = float((high - low).max()) / (PIXELS - 1)
-        counts = np.floor((high - low) / spacing).astype(int) + 1
-        height = np.full(tuple(counts), -np.inf)
-        _raise_to_triangles(triangles, low, spacing, height)
-        return height, spacing
+        spacing = max(x1 - x0, z1 - z0) / (PIXELS - 1)
+        x, z = np.arange(x0, x1 + 1e-9, spacing), np.arange(z0, z1 + 1e-9, spacing)
+        points = np.stack(np.broadcast_arrays(x[:, None], 0.0, z), axis=-1)
+        height, normal_y = self._top(points.reshape(-1, 3))
+        shape = x.size, z.size
+        return np.maximum(height, low[1]).reshape(shape), normal_y.reshape(shape), float(spacing)
+
+    def _top(self, points_mm: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Height of the highest triangle above or below each point, -inf beside all, and its normal's y."""
+        heights, slots = zip(*(layer.top(points_mm) for layer in self._layers), strict=True)
+        highest, point = np.argmax(heights, axis=0), np.arange(len(points_mm))
+        slot = np.array(slots)[highest, point]
+        normals = [layer.normals[np.maximum(slot, 0) % len(layer.normals), 6, 1] for layer in self._layers]
+        normal_y = np.where(slot < 0, 1.0, np.array(normals)[highest, point])
+        return np.array(heights)[highest, point], normal_y
 
     def front(self, points_mm: PointsMm) -> FloatArray:
-        height = np.max([layer.heights(points_mm) for layer in self._layers], axis=0)
+        height = self._top(points_mm)[0]
         return traced_front(self.gap, points_mm, np.where(np.isfinite(height), height + HOLLOW_MM, -np.inf))
 
     def gap(self, points_mm: PointsMm) -> tuple[FloatArray, FloatArray]:
@@ -261,76 +260,226 @@ class Surface(Indenter):
         return gap, normal
 
 
-@njit(cache=True, nogil=True)
-def _raise_to_triangles(
-    corners: FloatArray, low: FloatArray, spacing: float, height: FloatArray
-) -> None:  # pragma: no cover (compiled)
-    """Raise heights over a grid of x and z to the triangles above them."""
-    for a, b, c in corners:
-        abx, abz, acx, acz = b[0] - a[0], b[2] - a[2], c[0] - a[0], c[2] - a[2]
-        area = abx * acz - abz * acx
-        if area == 0.0:
-            continue
-        first_x = max(0, int(np.ceil((min(a[0], b[0], c[0]) - low[0]) / spacing - 1e-9)))
-        last_x = min(height.shape[0] - 1, int(np.floor((max(a[0], b[0], c[0]) - low[0]) / spacing + 1e-9)))
-        first_z = max(0, int(np.ceil((min(a[2], b[2], c[2]) - low[1]) / spacing - 1e-9)))
-        last_z = min(height.shape[1] - 1, int(np.floor((max(a[2], b[2], c[2]) - low[1]) / spacing + 1e-9)))
-        for i in range(first_x, last_x + 1):
-            for k in range(first_z, last_z + 1):
-                x, z = low[0] + i * spacing - a[0], low[1] + k * spacing - a[2]
-                v, w = (x * acz - z * acx) / area, (abx * z - abz * x) / area
-                if v >= -1e-9 and w >= -1e-9 and v + w <= 1.0 + 1e-9:
-                    y = a[1] + v * (b[1] - a[1]) + w * (c[1] - a[1])
-                    height[i, k] = max(height[i, k], y)
+def _repaired(vertices_mm: FloatArray, faces: IntArray) -> tuple[FloatArray, IntArray, tuple[str, ...]]:
+    """Vertices and faces of one body, and what was done to make it one."""
+    told: list[str] = []
 
+    def tell(what: str, count: int) -> None:
+        if count:
+            told.append(f"{what}: {count:,}")
 
-def check_heights(name: str, heights: int) -> None:
-    """Raise `InputError` if a map has more heights than become a body in reasonable time."""
-    if heights > MOST_HEIGHTS:
+    vertices_mm, faces, joined, moved_mm = _joined(vertices_mm, faces)
+    tell(
+        f"vertices joined within {JOIN_MM:g} mm, moved by up to {moved_mm:.2g} mm", joined * (moved_mm > 0.0)
+    )
+    twice, wall = _on_equal_ones(faces)
+    tell("triangles that lay on equal ones, left out", int((twice & ~wall).sum()))
+    tell("triangles of walls between parts, left out", int(wall.sum()))
+    faces = faces[~twice & ~wall]
+    if not len(faces):
         raise InputError(
-            name,
-            f"must have at most {MOST_HEIGHTS:,} heights",
-            f"{heights:,}",
-            "crop it or take every second row and column with twice the pitch",
+            "A surface must have one side out: each of its triangles lies on one that is reversed."
         )
+    vertices_mm, faces = _parted(vertices_mm, faces)
+    faces, turned = _turned_alike(faces)
+    tell("triangles turned as their neighbours", turned)
+    part, closed = _parts_of(faces)
+    first, second, third = (vertices_mm - vertices_mm.mean(axis=0))[faces].transpose(1, 0, 2)
+    volume = np.bincount(part, (np.cross(first, second) * third).sum(axis=1), len(closed))
+    inwards = closed & (volume < 0.0)
+    tell("closed parts whose normals pointed inwards, turned", int(inwards.sum()))
+    faces = np.where(inwards[part][:, None], faces[:, ::-1], faces)
+    _check_walls(vertices_mm, faces)
+    return vertices_mm, faces, tuple(told)
 
 
-@checked
-def height_surface(
-    heights_mm: FloatArray,
-    pitch_mm: Positive,
-    smooth_below_deg: Finite = SMOOTH_BELOW_DEG,
-    edge_radius_mm: Finite = 0.0,
-) -> Surface:
-    """Surface through heights on a regular grid, centred on the indenter's axis.
+def _border_of(faces: IntArray) -> IntArray:
+    """Edges of one triangle alone: the triangle and its two corners in their order, (n, 3)."""
+    a, b, edge, count = _half_edges(faces)
+    alone = np.flatnonzero(count[edge] == 1)
+    return np.column_stack([alone % len(faces), a[alone], b[alone]])
 
-    Parameters
-    ----------
-    heights_mm : array (n_rows, n_columns)
-        Heights towards the skin; rows run across the finger (z), columns along it (x). [mm]
-    pitch_mm : float
-        Distance between neighbouring heights. [mm]
-    smooth_below_deg, edge_radius_mm : float
-        As of `Surface`. [degrees], [mm]
 
-    Examples
-    --------
-    >>> ripples = 0.2 * np.cos(np.arange(-5, 5.01, 0.1) * 2 * np.pi / 2.5) * np.ones((101, 1))
-    >>> rippled = height_surface(ripples, pitch_mm=0.1)
-    >>> rippled.front(np.array([[0.0, 0.0, 0.0], [1.25, 0.0, 3.0]])).round(2).tolist()
-    [0.0, -0.4]
-    """
-    heights = float_array("heights_mm", heights_mm, 2)
-    rows, columns = heights.shape
-    if min(rows, columns) < 2:
-        raise InputError("heights_mm", "must have at least 2 rows and 2 columns", f"{rows} and {columns}")
-    check_heights("heights_mm", heights.size)
-    z, x = ((np.arange(count) - (count - 1) / 2) * pitch_mm for count in (rows, columns))
-    vertices = np.stack([*np.broadcast_arrays(x[None, :], heights, z[:, None])], axis=-1).reshape(-1, 3)
-    corner = np.arange(rows * columns).reshape(rows, columns)
-    # Diagonals alternate, so that a symmetric map has symmetric triangles.
-    a, b, c, d = corner[:-1, :-1], corner[1:, :-1], corner[1:, 1:], corner[:-1, 1:]
-    even = np.add.outer(np.arange(rows - 1), np.arange(columns - 1)) % 2 == 0
-    one, other = np.where(even, [a, b, c], [a, b, d]), np.where(even, [a, c, d], [b, c, d])
-    faces = np.concatenate([each.reshape(3, -1).T for each in (one, other)])
-    return Surface(vertices, faces, smooth_below_deg, edge_radius_mm)
+def _parts_of(faces: IntArray) -> tuple[IntArray, np.ndarray]:
+    """Part of each triangle, joined along edges, and whether each part is closed."""
+    _, _, edge, count = _half_edges(faces)
+    order = np.argsort(edge, kind="stable")
+    same = np.flatnonzero(np.diff(edge[order]) == 0)
+    part = _labels(order[same] % len(faces), order[same + 1] % len(faces), len(faces))
+    closed = np.ones(int(part.max(initial=-1)) + 1, dtype=bool)
+    closed[part[np.flatnonzero(count[edge] == 1) % len(faces)]] = False
+    return part, closed
+
+
+def _layers_of(vertices_mm: FloatArray, faces: IntArray) -> IntArray:
+    """Layer of each triangle: closed parts whose boxes overlap are in different ones, others in the first."""
+    part, closed = _parts_of(faces)
+    order = np.argsort(part, kind="stable")
+    begin = np.flatnonzero(np.diff(part[order], prepend=-1))
+    corners = vertices_mm[faces[order]]
+    low = np.minimum.reduceat(corners.min(axis=1), begin)
+    high = np.maximum.reduceat(corners.max(axis=1), begin)
+    low[~closed, 1] = -np.inf  # walls go down from a border
+    layer = np.where(closed & (len(closed) > 1), -1, 0)
+    for number in np.flatnonzero(layer < 0):
+        meets = ((low <= high[number] + JOIN_MM) & (high >= low[number] - JOIN_MM)).all(axis=1)
+        taken = set(layer[meets].tolist())
+        layer[number] = next(free for free in range(len(taken) + 1) if free not in taken)
+    return layer[part]
+
+
+def _is_crack(vertices_mm: FloatArray, faces: IntArray, border: IntArray) -> np.ndarray:
+    """Whether another triangle goes on beyond an edge of a border, without corners in common, (n,)."""
+    own, a, b = border.T
+    if not len(own):
+        return np.zeros(0, dtype=bool)
+    first, second, third = vertices_mm[faces[own]].transpose(1, 0, 2)
+    normal = np.cross(second - first, third - first)
+    area = np.linalg.norm(normal, axis=1)
+    height = area / np.linalg.norm([second - first, third - second, first - third], axis=2).max(axis=0)
+    normal /= area[:, None]
+    along = vertices_mm[b] - vertices_mm[a]
+    beyond = np.cross(along / np.linalg.norm(along, axis=1)[:, None], normal)
+    step = np.minimum(2 * JOIN_MM, 0.2 * height)
+    others = Triangles.of(vertices_mm, faces[np.unique(own)])
+    middle = 0.5 * (vertices_mm[a] + vertices_mm[b])
+    gaps = [np.abs(others.gap(middle + step[:, None] * way)[0]) for way in (beyond, normal, -normal)]
+    # This triangle is a step away; another one at up to 45 degrees is nearer.
+    return (np.array(gaps) < 0.72 * step).any(axis=0)
+
+
+def _with_area(vertices_mm: FloatArray, faces: IntArray) -> IntArray:
+    """Triangles that are no lines or points."""
+    first, second, third = vertices_mm[faces].transpose(1, 0, 2)
+    return faces[(np.cross(second - first, third - first) != 0.0).any(axis=1)]
+
+
+def _half_edges(faces: IntArray) -> tuple[IntArray, IntArray, IntArray, IntArray]:
+    """Begin and end of all sides of all triangles, the number of their edge, and the sides of each edge."""
+    a, b = faces.T.ravel(), faces[:, [1, 2, 0]].T.ravel()
+    keys = np.minimum(a, b) * (int(faces.max(initial=0)) + 1) + np.maximum(a, b)
+    _, edge, count = np.unique(keys, return_inverse=True, return_counts=True)
+    return a, b, edge, count
+
+
+def _labels(a: IntArray, b: IntArray, count: int) -> IntArray:
+    """Group of each of `count` things, where pairs a, b are in one."""
+    links = coo_matrix((np.ones(len(a), dtype=np.int8), (a, b)), shape=(count, count))
+    return connected_components(links, directed=False)[1].astype(np.int64)
+
+
+def _joined(vertices: FloatArray, faces: IntArray) -> tuple[FloatArray, IntArray, int, float]:
+    """Join near vertices of borders, and of walls that face each other; how many are gone, largest move."""
+    loose = np.zeros(len(vertices), dtype=bool)
+    loose[_border_of(faces)[:, 1:]] = True
+    part = _labels(faces[:, [0, 1]].ravel(), faces[:, [1, 2]].ravel(), len(vertices))
+    # Vertices within one part are far from each other, and may be many.
+    used = np.flatnonzero(loose) if (part[faces] == part[faces[0, 0]]).all() else np.unique(faces)
+    if not used.size:
+        return vertices, faces, 0, 0.0
+    shortest = np.full(len(vertices), np.inf)
+    for ahead in (1, 2):
+        to = np.roll(faces, ahead, axis=1)
+        np.minimum.at(shortest, faces, np.linalg.norm(vertices[faces] - vertices[to], axis=2))
+    within = min(JOIN_MM, 0.1 * float(shortest[used].max()))
+    i, j = used[cKDTree(vertices[used]).query_pairs(within, output_type="ndarray")].T
+    # A short side must not shrink to a point.
+    apart = np.linalg.norm(vertices[i] - vertices[j], axis=1)
+    near = (part[i] != part[j]) | (loose[i] & loose[j])
+    near &= apart <= 0.1 * np.minimum(shortest[i], shortest[j])
+    i, j = i[near], j[near]
+    walls = _on_equal_ones(_labels(i, j, len(vertices))[faces])[1]
+    loose[faces[walls]] = True
+    label = _labels(i[loose[i] & loose[j]], j[loose[i] & loose[j]], len(vertices))
+    count = np.bincount(label)
+    # Sums about one of them, so that equal ones stay where they are.
+    about = np.empty((len(count), 3))
+    about[label] = vertices
+    away = vertices - about[label]
+    mean = about + np.column_stack([np.bincount(label, away[:, axis]) / count for axis in range(3)])
+    moved = float(np.linalg.norm(mean[label] - vertices, axis=1).max())
+    faces = label[faces]
+    return mean, faces[(faces != np.roll(faces, 1, axis=1)).all(axis=1)], len(vertices) - len(count), moved
+
+
+def _on_equal_ones(faces: IntArray) -> tuple[np.ndarray, np.ndarray]:
+    """Whether each triangle has the corners of an earlier one, and whether of one with the other side out."""
+    # From the lowest corner on, two triangles of one side have the same order of corners.
+    turned = np.take_along_axis(faces, (faces.argmin(axis=1)[:, None] + np.arange(3)) % 3, axis=1)
+    left = turned[:, 1] < turned[:, 2]
+    corners = np.column_stack([turned[:, 0], np.sort(turned[:, 1:], axis=1)])
+    order = np.lexsort(corners.T)
+    again = np.r_[False, (np.diff(corners[order], axis=0) == 0).all(axis=1)]
+    group = np.cumsum(~again) - 1
+    both = (np.bincount(group, left[order]) > 0) & (np.bincount(group, ~left[order]) > 0)
+    twice, wall = np.empty((2, len(faces)), dtype=bool)
+    twice[order], wall[order] = again, both[group]
+    return twice, wall
+
+
+def _parted(vertices: FloatArray, faces: IntArray) -> tuple[FloatArray, IntArray]:
+    """Give closed parts that meet along an edge vertices of their own; raise an error if others meet."""
+    a, b, edge, count = _half_edges(faces)
+    if count.max() <= 2:
+        return vertices, faces
+    order = np.argsort(edge, kind="stable")
+    pair = order[count[edge[order]] == 2] % len(faces)
+    part = _labels(pair[::2], pair[1::2], len(faces))
+    _, sides = np.unique(np.tile(part, 3) * len(count) + edge, return_inverse=True)
+    wrong = np.flatnonzero((count[edge] > 2) & (np.bincount(sides)[sides] != 2))
+    if wrong.size:
+        x, y, z = 0.5 * (vertices[a[wrong[0]]] + vertices[b[wrong[0]]])
+        raise InputError(
+            "A surface must have two triangles at most along each edge: "
+            f"{len(np.unique(edge[wrong])):,} edges have more, one at ({x:.4g}, {y:.4g}, {z:.4g}) mm; leave "
+            "out inner walls, for example by the Boolean union of a CAD program."
+        )
+    corner, number = np.unique(part[:, None] * len(vertices) + faces, return_inverse=True)
+    return vertices[corner % len(vertices)], number.reshape(faces.shape)
+
+
+def _turned_alike(faces: IntArray) -> tuple[IntArray, int]:
+    """Triangles turned so that neighbours have the same side out, as most of their part, and how many."""
+    a, _, edge, count = _half_edges(faces)
+    order = np.argsort(edge, kind="stable")
+    one, other = order[count[edge[order]] == 2].reshape(-1, 2).T
+    against = (a[one] == a[other]).astype(np.int64)
+    if not against.any():
+        return faces, 0
+    # Each triangle is there twice, as it is and turned; links join those of one side.
+    n = len(faces)
+    one, other = one % n, other % n
+    label = _labels(np.r_[one, one + n], np.r_[other + n * against, other + n * (1 - against)], 2 * n)
+    if (label[:n] == label[n:]).any():
+        raise InputError(
+            "A surface must have two sides: a strip of its triangles has one, as a Möbius strip."
+        )
+    turned = label[:n] > label[n:]
+    part = np.unique(np.minimum(label[:n], label[n:]), return_inverse=True)[1]
+    turned ^= (np.bincount(part, turned) > 0.5 * np.bincount(part))[part]
+    return np.where(turned[:, None], faces[:, ::-1], faces), int(turned.sum())
+
+
+def _check_walls(vertices: FloatArray, faces: IntArray) -> None:
+    """Raise an error if steep walls of two parts face each other within `JOIN_MM`."""
+    layer = _layers_of(vertices, faces)
+    if not layer.any():
+        return
+    corners = vertices[faces]
+    middle = corners.mean(axis=1)
+    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    length = np.linalg.norm(normal, axis=1)
+    normal /= np.where(length > 0.0, length, 1.0)[:, None]
+    steep = np.abs(normal[:, 1]) < _STEEP
+    for number in range(int(layer.max()) + 1):
+        tree = Triangles.of(vertices, _with_area(vertices, faces[layer == number]))
+        others = np.flatnonzero((layer != number) & (length > 0.0) & steep)
+        gap, facing = tree.gap(middle[others])
+        meets = np.flatnonzero((np.abs(gap) <= JOIN_MM) & ((facing * normal[others]).sum(axis=1) < -0.9))
+        if meets.size:
+            place = ", ".join(f"{at:.4g}" for at in middle[others[meets[0]]])
+            raise InputError(
+                f"Parts of a surface must overlap or stand apart by more than {JOIN_MM:g} mm: walls of two "
+                f"are {np.abs(gap[meets]).max():.2g} mm apart at ({place}) mm; unite them, for example by "
+                "the Boolean union of a CAD program."
+            )

@@ -1,38 +1,35 @@
-"""Surfaces from STL, OBJ and PLY, and height maps from PNG, TIFF, NPY and CSV."""
+"""Surfaces from STL, OBJ and PLY; polygons become fans of triangles.
+
+What does not hold together is refused: a file that is cut off, counts that do not fit, vertices that do not
+exist. Other files that a file names, such as materials, are never opened.
+"""
 
 from __future__ import annotations
 
-import warnings
+import re
+import struct
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import numpy as np
 
 from fingerpad.core.checked import checked
-from fingerpad.core.errors import InputError
+from fingerpad.core.errors import InputError, shown
 from fingerpad.core.files import LARGEST_TEXT_MB, check_file, path_of
 from fingerpad.core.units import LENGTHS_MM
 from fingerpad.core.values import Finite, FloatArray, IntArray, Pair, Positive, choice, float_array
-from fingerpad.geometry.surface import (
-    LARGEST_MM,
-    MOST_HEIGHTS,
-    SMALLEST_MM,
-    SMOOTH_BELOW_DEG,
-    Surface,
-    check_heights,
-    height_surface,
-)
-from fingerpad.geometry.triangle_files import read_triangles
+from fingerpad.geometry.surface import SMOOTH_BELOW_DEG, Surface
 
-MESHES = (".stl", ".obj", ".ply")
-IMAGES = (".png", ".tif", ".tiff")
-MAPS = (*IMAGES, ".npy", ".csv")
+Mesh = tuple[FloatArray, IntArray]
 
-_END_OF_PNG = b"IEND\xaeB`\x82"
-_BITS, _PHOTOMETRIC, _SAMPLE_FORMAT = 258, 262, 339
-"""Tags of a TIFF image: bits of a sample; 0 for white as zero; 2 for signed numbers."""
+_FACET = "facet normal . . . outer loop vertex . . . vertex . . . vertex . . . endloop endfacet"
+"""Words of a facet in an STL file of text; a point stands for a number."""
 
-LEAST_POINTS = 50  # From this length on a table of three columns is taken for points.
+_PLY_NUMBERS = {
+    **{"char": "b", "uchar": "B", "short": "h", "ushort": "H", "int": "i", "uint": "I"},
+    **{"int8": "b", "uint8": "B", "int16": "h", "uint16": "H", "int32": "i", "uint32": "I"},
+    **{"float": "f", "double": "d", "float32": "f", "float64": "d"},
+}
 
 _AXES = {
     sign + axis: (number, 1.0 if sign == "+" else -1.0)
@@ -77,7 +74,7 @@ def read_surface(
     at = float_array("at_mm", at_mm, 1)
     if at.shape != (2,):
         raise InputError("at_mm", "must be two numbers, along and across the finger in mm", repr(at_mm))
-    _check_file(file, MESHES)
+    check_ending(file, (".stl", ".obj", ".ply"))
     try:
         vertices, faces = read_triangles(file)
     except InputError as error:
@@ -113,182 +110,7 @@ def _welded(vertices: FloatArray, faces: IntArray) -> tuple[FloatArray, IntArray
     return ahead[is_new], number[faces]
 
 
-@checked
-def read_height_map(
-    path: str | Path,
-    pitch_mm: Positive,
-    height_mm: Positive = 1.0,
-    smooth_below_deg: Finite = SMOOTH_BELOW_DEG,
-    edge_radius_mm: Finite = 0.0,
-) -> Surface:
-    """Read a map of heights towards the skin, without sides or back, centred on the indenter's axis.
-
-    Rows run across the finger and columns along it.
-
-    Parameters
-    ----------
-    path : str or Path
-        PNG or one-page TIFF, grey of up to 16 bits or of signed or float numbers; NPY or CSV with numbers.
-    pitch_mm : float
-        Distance between neighbouring heights. [mm]
-    height_mm : float
-        Height of one unit of NPY, CSV, and TIFF of signed or float numbers; of white above black in the other
-        images, whichever of them is stored as 0. [mm]
-    smooth_below_deg : float
-        Hollow creases between triangles of a smaller angle are rounded; see `Surface`. [degrees]
-    """
-    file = path_of("path", path)
-    _check_file(file, MAPS)
-    try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")
-            heights = _heights(file)
-    except InputError:
-        raise
-    except Exception as error:  # a file of unknown content may fail in any way
-        raise InputError(f"{file.name} cannot be read as a height map: {_said(error)}.") from error
-    if heights.ndim != 2:
-        raise InputError(f"{file.name} must hold rows and columns of heights: got shape {heights.shape}.")
-    check_heights(file.name, heights.size)
-    side_mm = pitch_mm * (max(heights.shape) - 1)
-    if side_mm and not SMALLEST_MM <= side_mm <= LARGEST_MM:
-        raise InputError(
-            f"{file.name} must be {SMALLEST_MM:g} to {LARGEST_MM:g} mm long or wide: got {side_mm:.4g} mm; "
-            "check pitch_mm."
-        )
-    wrong = np.argwhere(~np.isfinite(heights))
-    if len(wrong):
-        raise InputError(
-            f"{file.name} must hold finite heights: {len(wrong)} are not, first in row {wrong[0][0] + 1} and "
-            f"column {wrong[0][1] + 1}."
-        )
-    if heights.size > 1 and not np.ptp(heights):
-        raise InputError(
-            f"{file.name} must have heights that differ: all are equal; for a flat body take a FlatPunch or "
-            "a Bar."
-        )
-    _check_no_points(file, heights)
-    if np.abs(heights).max(initial=0.0) * height_mm > LARGEST_MM:
-        raise InputError(
-            f"{file.name} must have heights within {LARGEST_MM:g} mm: the largest is "
-            f"{np.abs(heights).max():.4g} times {height_mm:g} mm; check height_mm."
-        )
-    try:
-        return height_surface(height_mm * heights, pitch_mm, smooth_below_deg, edge_radius_mm)
-    except InputError as error:
-        raise InputError(f"{file.name}: {error}") from error
-
-
-def _heights(file: Path) -> FloatArray:
-    """Numbers of a file, from 0 to 1 for the shades of an image."""
-    if file.suffix.lower() == ".npy":
-        with file.open("rb") as content:
-            if content.read(6) != b"\x93NUMPY":
-                raise InputError(f"{file.name} must be an array that numpy.save wrote: it is not.")
-        stored = np.load(file, mmap_mode="r", allow_pickle=False)
-        check_heights(file.name, stored.size)
-        if stored.dtype.kind not in "buif":
-            raise InputError(f"{file.name} must hold real numbers: got {stored.dtype}.")
-        return np.array(stored, dtype=np.float64)
-    if file.suffix.lower() == ".csv":
-        try:
-            return np.loadtxt(
-                file, delimiter=",", ndmin=2, dtype=np.float64, comments=None, encoding="utf-8-sig"
-            )
-        except ValueError as error:
-            raise InputError(
-                f"{file.name} must hold rows of numbers with commas between: {_fault(file)}."
-            ) from error
-    return _image(file)
-
-
-def _image(file: Path) -> FloatArray:
-    """Heights of an image: shades from 0 to 1 for white; signed whole numbers and floats as they are."""
-    from PIL import Image, ImageOps, UnidentifiedImageError
-
-    try:
-        opened = Image.open(file, formats=("PNG", "TIFF"))
-    except UnidentifiedImageError as error:
-        raise InputError(
-            f"{file.name} cannot be read as a PNG or TIFF image: its content is of no known kind."
-        ) from error
-    except Image.DecompressionBombError as error:
-        raise InputError(
-            f"{file.name} must have at most {MOST_HEIGHTS:,} heights: got far more; crop it."
-        ) from error
-    with opened as image:
-        check_heights(file.name, image.width * image.height)
-        pages = getattr(image, "n_frames", 1)
-        if pages > 1:
-            raise InputError(f"{file.name} must have one page: got {pages}; save the one with the heights.")
-        if image.format == "PNG" and _END_OF_PNG not in file.read_bytes():
-            raise InputError(f"{file.name} must end as a PNG image does: it is cut off, save it again.")
-        layout = image.tile[0].args
-        stored = layout if isinstance(layout, str) else str((layout or ("",))[0])
-        if "16" in stored and image.mode[0] != "I":
-            raise InputError(
-                f"{file.name} must be grey without opacity to have 16 bits: it is {stored.split(';')[0]}, of "
-                "which 8 bits would be lost; save it as grey of 16 bits."
-            )
-        tags = getattr(image, "tag_v2", {})
-        signed, bits = 2 in tags.get(_SAMPLE_FORMAT, ()), tags.get(_BITS, (16,))[0]
-        turned = ImageOps.exif_transpose(image)
-        pixels = np.array(turned)
-        if signed and turned.mode == "L":
-            pixels = pixels.view(np.int8)
-        if signed or turned.mode == "F":
-            return pixels.astype(np.float64)
-        if turned.mode[0] != "I":
-            return _shades(file, np.array(turned.convert("RGBA"), dtype=np.float64)) / 255.0
-        shares = (pixels.astype(np.uint32) if bits == 32 else pixels) / (2.0**bits - 1.0)
-        # Pillow turns white as zero only where a pixel has 8 bits or less.
-        return 1.0 - shares if tags.get(_PHOTOMETRIC) == 0 else shares
-
-
-def _shades(file: Path, pixels: FloatArray) -> FloatArray:
-    """Shades of pixels (n_rows, n_columns, 4) that are red, green, blue and opacity, if they are grey."""
-    for what, wrong in (("opaque", pixels[..., 3] < 255.0), ("grey", np.ptp(pixels[..., :3], axis=2) > 0.0)):
-        if wrong.any():
-            row, column = np.argwhere(wrong)[0] + 1
-            raise InputError(
-                f"{file.name} must have {what} pixels, whose shades are heights: {wrong.sum():,} are not, "
-                f"first in row {row} and column {column}."
-            )
-    return pixels[..., 0]
-
-
-def _fault(file: Path) -> str:
-    """Say what is wrong in the first bad line of a CSV file."""
-    columns = 0
-    for number, line in enumerate(file.read_text(encoding="utf-8-sig", errors="replace").splitlines(), 1):
-        cells = line.split(",") if line.strip() else []
-        for column, cell in enumerate(cells, 1):
-            try:
-                float(cell)
-            except ValueError:
-                return f"got {cell[:40]!r} in line {number} and column {column}"
-        columns = columns or len(cells)
-        if cells and len(cells) != columns:
-            return f"line {number} has {len(cells)} of them instead of {columns}"
-    return "it does not"
-
-
-def _check_no_points(file: Path, heights: FloatArray) -> None:
-    """Raise an error if the rows, or the columns, look like points x, y, z instead of heights on a grid."""
-    for table in (heights, heights.T):
-        if table.shape[1] != 3:
-            continue
-        x, y = (len(np.unique(table[:, axis])) for axis in (0, 1))
-        is_grid = x * y == len(table) == len(np.unique(table[:, :2], axis=0)) and min(x, y) > 1
-        if is_grid or len(table) >= LEAST_POINTS:
-            raise InputError(
-                f"{file.name} must hold heights on a grid, row by row: {len(table):,} times 3 numbers look "
-                "like points x, y, z; write their z as rows and columns (a map that is so narrow can go "
-                "to fp.height_surface)."
-            )
-
-
-def _check_file(file: Path, endings: tuple[str, ...]) -> None:
+def check_ending(file: Path, endings: tuple[str, ...]) -> None:
     if file.suffix.lower() not in endings:
         raise InputError(f"The file must end in {', '.join(endings)}: got {file.name}.")
     check_file(file, LARGEST_TEXT_MB)
@@ -296,5 +118,218 @@ def _check_file(file: Path, endings: tuple[str, ...]) -> None:
         raise InputError(f"{file.name} is empty.")
 
 
-def _said(error: Exception) -> str:
-    return " ".join(str(error).split())[:200].rstrip(".") or type(error).__name__
+def read_triangles(file: Path) -> Mesh:
+    """Vertices (n, 3) and corners of triangles (m, 3) of a file that ends in .stl, .obj or .ply."""
+    content = file.read_bytes()
+    vertices, faces = {".stl": _stl, ".obj": _obj, ".ply": _ply}[file.suffix.lower()](content)
+    if not len(faces):
+        raise InputError("it must hold at least one triangle: got none.")
+    if faces.min() < 0 or faces.max() >= len(vertices):
+        raise InputError(
+            f"it must have triangles of its vertices, 0 to {len(vertices) - 1}: got numbers {faces.min()} to "
+            f"{faces.max()}."
+        )
+    return vertices, faces
+
+
+def _text(content: bytes) -> str:
+    if b"\0" in content:
+        raise InputError("it must be text in UTF-8: it has zero bytes, as in UTF-16; save it as UTF-8.")
+    return content.decode("utf-8-sig", errors="replace")
+
+
+def _points(words: Any) -> FloatArray:
+    try:
+        return np.array(words, dtype=np.float64).reshape(-1, 3)
+    except ValueError as error:
+        raise InputError("vertices", "must have three numbers each", remedy=str(error)) from error
+
+
+def _stl(content: bytes) -> Mesh:
+    """Triangles of an STL file, each with vertices of its own."""
+    # Any binary file has a zero byte up to its count, unless it has 16 million triangles.
+    if content.lstrip()[:5].lower() == b"solid" and b"\0" not in content[:84]:
+        vertices = _text_stl(_text(content))
+    else:
+        size, count = len(content), int.from_bytes(content[80:84], "little")
+        if size < 84:
+            raise InputError(
+                "it is no STL file: one of text begins with 'solid', any other has 84 bytes or more; got "
+                f"{size} bytes, save it again as STL."
+            )
+        if size != 84 + 50 * count:
+            fault = "it is cut off" if size < 84 + 50 * count else "its count is wrong"
+            raise InputError(
+                f"an STL file that is no text must have {84 + 50 * count:,} bytes for {count:,} triangles: "
+                f"got {size:,} bytes; {fault}, save it again as STL."
+            )
+        facets = np.frombuffer(content, np.dtype([("numbers", "<f4", (4, 3)), ("_", "<u2")]), offset=84)
+        vertices = facets["numbers"][:, 1:].astype(np.float64).reshape(-1, 3)
+    return vertices, np.arange(len(vertices)).reshape(-1, 3)
+
+
+def _text_stl(text: str) -> FloatArray:
+    solid = r"(?im)^[ \t]*(end)?solid\b.*$"
+    ends, words = re.findall(solid, text), re.sub(solid, "", text).split()
+    pattern = _FACET.split()
+    whole = len(words) // len(pattern)
+    table = np.array(words[: whole * len(pattern)], dtype=object).reshape(whole, len(pattern))
+    for column, expected in enumerate(pattern):
+        wrong = [row for row in range(whole) if expected not in (".", table[row, column].lower())]
+        if wrong:
+            raise InputError(
+                f"facet {wrong[0] + 1} must have a normal and three vertices of three numbers: got "
+                f"{shown(table[wrong[0], column])} instead of {expected!r}."
+            )
+    if len(words) % len(pattern) or 2 * ends.count("end") != len(ends):
+        raise InputError(
+            f"it must end with 'endsolid' after a whole facet: it is cut off after {whole:,} facets; save it "
+            "again as STL."
+        )
+    return _points(table[:, [8, 9, 10, 12, 13, 14, 16, 17, 18]])
+
+
+def _obj(content: bytes) -> Mesh:
+    """Vertices and faces of an OBJ file; textures, normals, materials and lines are passed over."""
+    vertices: list[list[str]] = []
+    polygons: list[list[int]] = []
+    for number, line in enumerate(re.sub(r"\\\r?\n", " ", _text(content)).split("\n"), 1):
+        kind, *words = line.partition("#")[0].split() or [""]
+        if kind == "v":
+            if len(words) < 3:
+                raise InputError(f"line {number}: a vertex must have three numbers: got {shown(line)}.")
+            vertices.append(words[:3])
+        elif kind == "f":
+            try:
+                named = [int(word.partition("/")[0]) for word in words]
+            except ValueError as error:
+                raise InputError(
+                    f"line {number}: a face must name its vertices: got {shown(line)}."
+                ) from error
+            if 0 in named or len(named) < 3:
+                raise InputError(
+                    f"line {number}: a face must name three vertices or more, the first vertex as 1: got "
+                    f"{shown(line)}."
+                )
+            polygons.append([each - 1 if each > 0 else len(vertices) + each for each in named])
+    points = _points(vertices)
+    return points, _fans(polygons, points)
+
+
+def _fans(polygons: list[list[int]], vertices: FloatArray) -> IntArray:
+    """Triangles of polygons, as fans from their first corner whose triangles all turn the same side out."""
+    faces = [np.zeros((0, 3), dtype=np.int64)]
+    for size in sorted(set(map(len, polygons))):
+        corners = np.array([polygon for polygon in polygons if len(polygon) == size], dtype=np.int64)
+        if size < 3:
+            raise InputError(f"a face must have three vertices or more: one has {size}.")
+        if size > 3 and corners.min() >= 0 and corners.max() < len(vertices):
+            todo = np.arange(len(corners))
+            for _ in range(size):
+                at = vertices[corners[todo]]
+                normal = np.cross(at[:, 1:-1] - at[:, :1], at[:, 2:] - at[:, :1])
+                total = normal.sum(axis=1, keepdims=True)
+                folded = ((normal * total).sum(axis=2) < -1e-9 * (total * total).sum(axis=2)).any(axis=1)
+                todo = todo[folded]
+                corners[todo] = np.roll(corners[todo], 1, axis=1)
+            if todo.size:
+                raise InputError(
+                    "faces",
+                    "must be triangles, or polygons that a fan of triangles fills",
+                    remedy=f"{todo.size:,} of {size} vertices are not; divide them into triangles",
+                )
+        faces.extend(corners[:, [0, k, k + 1]] for k in range(1, size - 1))
+    return np.concatenate(faces)
+
+
+_Element = tuple[str, int, list[tuple[str, str, str]]]
+"""Name, count and properties of an element: name, type of the count of a list or "", type."""
+
+
+def _ply(content: bytes) -> Mesh:
+    """Vertices and faces of a PLY file, text or binary of either order."""
+    end = re.search(rb"end_header[ \t]*(\r\n|\n|\r)", content)
+    if not content.startswith(b"ply") or end is None:
+        raise InputError("a PLY file must begin with 'ply' and have an end_header: it does not.")
+    order, elements = _ply_header(_text(content[: end.start()]))
+    read = _ply_columns(content[end.end() :], elements, order)
+    vertices, faces = read.get("vertex", {}), read.get("face", {})
+    if not {"x", "y", "z"} <= set(vertices):
+        raise InputError("a PLY file must have vertices with x, y and z: it has none.")
+    points = _points(np.transpose([np.ravel(vertices[axis]) for axis in "xyz"]))
+    try:
+        polygons = faces.get("vertex_indices", faces.get("vertex_index", []))
+        return points, _fans([[int(corner) for corner in polygon] for polygon in polygons], points)
+    except ValueError as error:
+        raise InputError(
+            "faces", "must be lists of whole numbers, their vertices", remedy=str(error)
+        ) from error
+
+
+def _ply_header(text: str) -> tuple[str, list[_Element]]:
+    """Order of the bytes, "" for text, and the elements."""
+    orders = {"ascii": "", "binary_little_endian": "<", "binary_big_endian": ">"}
+    order: str | None = None
+    elements: list[_Element] = []
+    for line in text.splitlines()[1:]:
+        match line.split():
+            case ["format", kind, _] if kind in orders:
+                order = orders[kind]
+            case ["element", name, count] if count.isdecimal():
+                elements.append((name, int(count), []))
+            case ["property", "list", size, kind, name] if {size, kind} <= set(_PLY_NUMBERS) and elements:
+                elements[-1][2].append((name, _PLY_NUMBERS[size], _PLY_NUMBERS[kind]))
+            case ["property", kind, name] if kind in _PLY_NUMBERS and elements:
+                elements[-1][2].append((name, "", _PLY_NUMBERS[kind]))
+            case [] | ["comment" | "obj_info", *_]:
+                pass
+            case _:
+                raise InputError(f"the header of a PLY file must not have the line {shown(line)}.")
+    if order is None:
+        raise InputError(f"a PLY file must have a format, {', '.join(orders)}: it has none.")
+    return order, elements
+
+
+def _ply_columns(body: bytes, elements: list[_Element], order: str) -> dict[str, dict[str, Any]]:
+    """Columns of each element of a PLY file, text (one row a line) or binary, as many as its header says."""
+    lines = [] if order else [line.split() for line in _text(body).splitlines() if line.strip()]
+    lines.reverse()
+    words: list[str] = []
+    used = 0
+
+    def take(count: int, kind: str) -> tuple[Any, ...]:
+        nonlocal used
+        if not order:
+            return tuple(words.pop(0) for _ in range(count))
+        form = f"{order}{count}{kind}"
+        used += struct.calcsize(form)
+        return struct.unpack_from(form, body, used - struct.calcsize(form))
+
+    read: dict[str, dict[str, Any]] = {}
+    try:
+        for name, count, properties in elements:
+            columns: dict[str, Any] = {column: [] for column, _, _ in properties}
+            read[name] = columns
+            if order and not any(size for _, size, _ in properties):
+                row = np.dtype([(column, order + kind) for column, _, kind in properties])
+                table = np.frombuffer(body, row, count, used)
+                columns.update((column, table[column]) for column in columns)
+                used += table.nbytes
+                continue
+            for _ in range(count):
+                words = words if order else lines.pop()
+                for column, size, kind in properties:
+                    columns[column].append(take(int(take(1, size)[0]) if size else 1, kind))
+                # MeshLab writes more numbers behind the vertices of a face than its header says.
+                if words and (name != "face" or properties[-1][1]):
+                    raise IndexError
+        fits = not (body[used:].strip() if order else lines)
+    except (IndexError, ValueError, struct.error):
+        fits = False
+    if not fits:
+        promise = " and ".join(f"{count:,} of {name}" for name, count, _ in elements)
+        raise InputError(
+            f"it must hold {promise}, as its header says: it is cut off or its counts are wrong; save it "
+            "again as PLY."
+        )
+    return read
