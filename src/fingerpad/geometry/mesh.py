@@ -59,6 +59,11 @@ class Mesh:
             if isinstance(value, np.ndarray):
                 value.setflags(write=False)
 
+    @property
+    def numbers(self) -> IntArray | None:
+        """Numbers of the elements in a file, where it counts them otherwise."""
+        return None
+
     @cached_property
     def grid(self) -> IntArray:
         """Nodes in grid order, (n_along + 1, n_around + 1, n_through + 1), through from the skin downwards.
