@@ -73,13 +73,13 @@ UNFIT = {
         "layer must be an index below 2, the number of materials: element 4 (subcutis, about x = 1.5, "
         "y = 0.5, z = 0.5 mm) has 3."),
     "pyramid": ({"elements": changed(BLOCK.elements, (0, [5, 6, 7]), BLOCK.elements[0, 4])},
-        "An element may repeat nodes only as a wedge, a brick with one side collapsed to an edge: element 0 "
+        "elements may repeat nodes only as a wedge, a brick with one side collapsed to an edge: element 0 "
         "(stratum corneum, about"),
     "node in no element": ({"nodes_mm": np.vstack([BLOCK.nodes_mm, [[7.0, 8.0, 9.0]]])},
-        "Every node must belong to an element: node 36 (x = 7, y = 8, z = 9 mm) does not, one of 1 such"),
+        "nodes_mm must each belong to an element: node 36 (x = 7, y = 8, z = 9 mm) does not, one of 1 such"),
     "inside out": ({"elements": np.where(np.arange(12)[:, None] == 2, TWISTED, BLOCK.elements)},
-        "The Jacobian of an element must be above 0 at its Gauss points: that of element 2 (stratum "
-        "corneum, about x = 0.5, y = 0.5, z = 1.5 mm) is -0.125 mm³, one of 1 such elements; move its nodes"),
+        "elements must have a Jacobian above 0 at their Gauss points: element 2 (stratum corneum, about x = "
+        "0.5, y = 0.5, z = 1.5 mm) is turned inside out (-0.125 mm³), one of 1 such elements; move its"),
     "no skin": ({"skin_grid": np.empty((0, 0), dtype=np.int64)},
         "skin_grid must name the nodes of the skin, where the indenter touches: it is empty."),
     "no bone": ({"bone_nodes": NONE},
@@ -89,12 +89,12 @@ UNFIT = {
     "plane of symmetry of a whole body": ({"full": True},
         "symmetry_nodes must be given for half a body and only then: got full=True with 12 of them."),
     "node off the plane": ({"symmetry_nodes": np.append(BLOCK.symmetry_nodes, node_at(3, 0, 2))},
-        f"symmetry_nodes must lie at z = 0: node {node_at(3, 0, 2)} (x = 3, y = 0, z = 2 mm) does not."),
+        f"symmetry_nodes must lie at z = 0: node {node_at(3, 0, 2)} (x = 3, y = 0, z = 2 mm) does not fit."),
     "node missing in the plane": (
         {"symmetry_nodes": BLOCK.symmetry_nodes[BLOCK.symmetry_nodes != node_at(2, 1, 0)]},
-        f"symmetry_nodes must hold every node at z = 0: node {node_at(2, 1, 0)} (x = 2, y = 1, z = 0 mm) is"),
+        f"symmetry_nodes must hold every node at z = 0: node {node_at(2, 1, 0)} (x = 2, y = 1, z = 0 mm)"),
     "half a body on the wrong side": ({"nodes_mm": BLOCK.nodes_mm * [1.0, 1.0, -1.0]},
-        "Half a body must lie at z >= 0: node 3 (x = 0, y = 0,"),
+        "nodes_mm of half a body must lie at z >= 0: node 3 (x = 0, y = 0,"),
     "held along a line": (
         {"bone_nodes": np.array([node_at(x, 2, 0) for x in range(4)]), "symmetry_nodes": NONE, "full": True},
         "A part of the body must be held in all directions: 12 element(s) with element 0 (stratum corneum, "

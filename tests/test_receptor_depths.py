@@ -8,9 +8,9 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 import fingerpad as fp
 from fingerpad.core.signals import traces_below
+from fingerpad.geometry.free_mesh import MeshParts, finger_from
 from fingerpad.geometry.grading import resolution_grading
 from fingerpad.geometry.mesh import finger_mesh
-from fingerpad.geometry.mesh_parts import MeshParts, finger_from
 from fingerpad.skin.fields import FIELDS, watched_elements
 from fingerpad.skin.store import Store, solve_missing
 from sections import SphereSkin, layered_block

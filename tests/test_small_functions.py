@@ -54,7 +54,7 @@ WORDS = [
     ("experiments.requests.parts:merged", ("bar", {"width_mm": 3}), {"kind": "bar", "width_mm": 3}),
     ("experiments.requests.parts:merged", ({"kind": "bar"}, {"kind": "sphere"}), {"kind": "sphere"}),
     ("core.displayed:udunits", ("spikes/s",), "s-1"),
-    ("geometry.mesh_parts:plain_name", ("LIVING-EPIDERMIS",), "living epidermis"),
+    ("geometry.free_mesh:plain_name", ("LIVING-EPIDERMIS",), "living epidermis"),
     ("geometry.mesh_checks:element_place", (block_mesh([0, 1], [0, 1], [0, 1], layers=[2]), 0),
      "element 0 (dermis, about x = 0.5, y = 0.5, z = 0.5 mm)"),
     ("mechanics.tissues:name_of_tissues", (named_tissues("paper"),), "paper"),

@@ -34,35 +34,21 @@ from fingerpad.core.values import (
     increasing,
     limits,
 )
-from fingerpad.data import fingers
+from fingerpad.data import Published, fingers
 from fingerpad.data import fingertip as published
 
 if TYPE_CHECKING:
     from fingerpad.geometry.grading import Grading
     from fingerpad.geometry.mesh import Mesh
 
-# Readings have two decimals. Interpolation of this rounding would tilt the skin's normals by degrees. This
-# smoothing moves the profiles by about 0.01 mm; on the pad slopes are accurate to a quarter of a degree.
-SMOOTHING = 5e-7
-_MOST_RAY_STEPS = 60
-
 SIZES_MM = 2.0, 100.0
 """Smallest and largest length, width or height of a fingertip: other values are in another unit. [mm]"""
 
-_CREASE_SHARE = 1.0 - fingers.CREASE_TO_TIP.value / published.LENGTH.value
-_STATIONS_OF_SIZE = 401
-
-Readings = Pairs
 ExtentMm = Annotated[float, limits(*SIZES_MM)]  # Of a whole fingertip.
 
 
-def _readings(stations: tuple[float, ...], values: tuple[float, ...]) -> Readings:
-    return tuple(zip(stations, (abs(value) for value in values), strict=True))
-
-
-VOLAR_READINGS = _readings(published.STATIONS_X.value, published.VOLAR_Y.value)
-DORSAL_READINGS = _readings(published.STATIONS_X.value, published.DORSAL_Y.value)
-HALF_WIDTH_READINGS = _readings(published.HALF_WIDTH_X.value, published.HALF_WIDTH_Z.value)
+def _readings(stations: Published[tuple[float, ...]], values: Published[tuple[float, ...]]) -> Pairs:
+    return tuple(zip(stations.value, (abs(value) for value in values.value), strict=True))
 
 
 @value_class
@@ -73,7 +59,7 @@ class Profile:
     linearly beyond them.
     """
 
-    readings_mm: Readings
+    readings_mm: Pairs
     """At least five readings, x increasing from 0 or more to less than `length_mm`, values above 0. [mm]"""
     length_mm: Positive  # x of the tip, L. [mm]
 
@@ -96,7 +82,9 @@ class Profile:
     def _spline(self) -> tuple[BSpline, BSpline, float, float]:
         x, value = np.array(self.readings_mm)[::-1].T
         s = np.sqrt(1.0 - x / self.length_mm)
-        spline = make_smoothing_spline(s, value / s, w=s**2, lam=SMOOTHING)
+        # Readings have two decimals. Interpolation of this rounding would tilt the skin's normals by degrees.
+        # This smoothing moves the profiles by about 0.01 mm; on the pad slopes are accurate to 0.25 degrees.
+        spline = make_smoothing_spline(s, value / s, w=s**2, lam=5e-7)
         return spline, spline.derivative(), s[0], s[-1]
 
     def over_s(self, s: ArrayLike) -> tuple[FloatArray, FloatArray]:
@@ -182,9 +170,9 @@ class Fingertip(Displayed, Finger):
     """
 
     length_mm: ExtentMm = published.LENGTH.value
-    volar_readings_mm: Readings = VOLAR_READINGS
-    dorsal_readings_mm: Readings = DORSAL_READINGS
-    half_width_readings_mm: Readings = HALF_WIDTH_READINGS
+    volar_readings_mm: Pairs = _readings(published.STATIONS_X, published.VOLAR_Y)
+    dorsal_readings_mm: Pairs = _readings(published.STATIONS_X, published.DORSAL_Y)
+    half_width_readings_mm: Pairs = _readings(published.HALF_WIDTH_X, published.HALF_WIDTH_Z)
     stratum_corneum_mm: Positive = published.STRATUM_CORNEUM.value
     living_epidermis_mm: Positive = published.LIVING_EPIDERMIS.value
     dermis_mm: Positive = published.DERMIS.value
@@ -281,20 +269,17 @@ class Fingertip(Displayed, Finger):
         True
         """
         preset = FINGERS[like]()
-        given = {"length_mm": length_mm, "width_mm": width_mm, "height_mm": height_mm}
-        factors = {
-            name: size / own
-            for (name, size), own in zip(given.items(), preset.measures_mm, strict=True)
-            if size is not None
-        }
-        mean = float(np.prod(list(factors.values())) ** (1.0 / len(factors))) if factors else 1.0
+        sizes = zip((length_mm, width_mm, height_mm), preset.measures_mm, strict=True)
+        factors = [None if size is None else size / own for size, own in sizes]
+        known = [factor for factor in factors if factor is not None]
+        mean = float(np.prod(known) ** (1.0 / len(known))) if known else 1.0
         layers = {
             "stratum_corneum_mm": stratum_corneum_mm,
             "living_epidermis_mm": living_epidermis_mm,
             "dermis_mm": dermis_mm,
         }
         return preset._stretched(
-            *(factors.get(name, mean) for name in given),
+            *(mean if factor is None else factor for factor in factors),
             **{name: size for name, size in layers.items() if size is not None},
         )
 
@@ -313,7 +298,7 @@ class Fingertip(Displayed, Finger):
     def _stretched(self, along: float, across: float, up: float, **layers: float) -> Fingertip:
         """Return the finger with outline, bone and nail stretched each way, and other layers."""
 
-        def readings(table: Readings, by: float) -> Readings:
+        def readings(table: Pairs, by: float) -> Pairs:
             return tuple((along * x, by * value) for x, value in table)
 
         return replace(
@@ -335,8 +320,9 @@ class Fingertip(Displayed, Finger):
     @cached_property
     def measures_mm(self) -> tuple[float, float, float]:
         """Length, width and height as of `Fingertip.of` [mm]."""
-        crease = _CREASE_SHARE * self.length_mm
-        volar, dorsal, half_width = self.section(np.linspace(crease, self.length_mm, _STATIONS_OF_SIZE))
+        share = fingers.CREASE_TO_TIP.value / published.LENGTH.value
+        x_mm = np.linspace((1.0 - share) * self.length_mm, self.length_mm, 401)
+        volar, dorsal, half_width = self.section(x_mm)
         return (
             fingers.CREASE_TO_TIP.value * (self.length_mm / published.LENGTH.value),
             2.0 * float(half_width.max()),
@@ -351,21 +337,15 @@ class Fingertip(Displayed, Finger):
 
     @property
     def contact_mm(self) -> tuple[float, float]:
-        """X and z of the middle of the pad, where an indenter presses by default [mm].
-
-        On the paper's finger it is the point that the laboratory indented, and on others the same share of
-        the length.
-        """
+        # On the paper's finger it is the point that the laboratory indented.
         return published.CONTACT_POINT.value[0] * (self.length_mm / published.LENGTH.value), 0.0
 
     @cached_property
     def profiles(self) -> tuple[Profile, Profile, Profile]:
         """Volar depth, dorsal height and half-width as functions of x."""
-        return (
-            Profile(self.volar_readings_mm, self.length_mm),
-            Profile(self.dorsal_readings_mm, self.length_mm),
-            Profile(self.half_width_readings_mm, self.length_mm),
-        )
+        readings = self.volar_readings_mm, self.dorsal_readings_mm, self.half_width_readings_mm
+        volar, dorsal, half_width = (Profile(table, self.length_mm) for table in readings)
+        return volar, dorsal, half_width
 
     @property
     def layer_depths_mm(self) -> tuple[float, float, float]:
@@ -453,19 +433,13 @@ class Fingertip(Displayed, Finger):
         return np.where(square > 0.0, bone_y - y, through)
 
     def skin_distance_mm(self, origins_mm: FloatArray, directions: FloatArray) -> FloatArray:
-        """Distance (...) from points inside to the skin along unit directions, by Newton's method. [mm]
-
-        Parameters
-        ----------
-        origins_mm, directions : array (..., 3)
-            Rays; every origin lies inside the skin. [mm], [1]
-        """
+        """Distance (...) from points inside to the skin along unit directions, by Newton's method. [mm]"""
         if (self.level(origins_mm) >= 0.0).any():
             raise InputError("Every origin of a ray must lie inside the skin: at least one does not.")
         near = np.zeros(directions.shape[:-1])
         far = np.full_like(near, 2.0 * self.length_mm)
         distance = np.full_like(near, 0.25 * self.length_mm)
-        for _ in range(_MOST_RAY_STEPS):
+        for _ in range(60):
             level, gradient = self._level_and_gradient(origins_mm + distance[..., None] * directions)
             near = np.where(level < 0.0, distance, near)
             far = np.where(level < 0.0, far, distance)
@@ -481,10 +455,7 @@ class Fingertip(Displayed, Finger):
     def bone_distance_mm(self, origins_mm: FloatArray, directions: FloatArray) -> FloatArray:
         """Distance (...) from the bone's axis to its surface along unit directions, closed form. [mm]
 
-        Parameters
-        ----------
-        origins_mm, directions : array (..., 3)
-            Rays at right angles to the axis, or from its end in any distal direction. [mm], [1]
+        Rays are at right angles to the axis, or leave its end in any distal direction.
         """
         cap_mm = self.bone_tip_x_mm - self.spine_end_x_mm
         length = np.where(origins_mm[..., 0] < self.spine_end_x_mm, np.inf, cap_mm)

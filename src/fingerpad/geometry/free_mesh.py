@@ -1,8 +1,13 @@
-"""A finger that is a mesh of one's own: bricks and wedges in any order, and what its skin needs."""
+"""A finger that is a mesh of one's own: bricks and wedges in any order with named sets, as files hold them.
+
+Sets of nodes name the skin and what is fixed; sets of elements name the layers. All else is found: faces of
+the skin, depth of the layers, the elements around the end organs, the middle of the pad.
+"""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from collections.abc import Mapping
+from dataclasses import dataclass, fields, replace
 from functools import cached_property
 
 import numpy as np
@@ -11,15 +16,27 @@ from scipy.spatial import cKDTree
 
 from fingerpad.core.checked import value_class
 from fingerpad.core.errors import InputError
-from fingerpad.core.values import Finite, FloatArray, IntArray
-from fingerpad.geometry.fingertip import Finger
+from fingerpad.core.units import LENGTHS_MM
+from fingerpad.core.values import Finite, FloatArray, IntArray, instance, one_of, pair, positive
+from fingerpad.data import fingertip as published
+from fingerpad.geometry.fingertip import SIZES_MM, Finger
 from fingerpad.geometry.grading import Grading
-from fingerpad.geometry.mesh import Mesh
+from fingerpad.geometry.mesh import LAYERS, Mesh
+from fingerpad.geometry.mesh_checks import (
+    FACES,
+    check_mesh,
+    check_skin,
+    faces_of,
+    near_plane,
+    place,
+    repeats_nodes,
+)
 
-FACES = np.array([[0, 3, 2, 1], [4, 5, 6, 7], [0, 1, 5, 4], [1, 2, 6, 5], [2, 3, 7, 6], [3, 0, 4, 7]])
-"""Corners of the faces of a brick, counter-clockwise seen from outside."""
+SETS = ("skin", "bone", "nail", "fixed", "symmetry", *LAYERS)
+"""Names of sets; a file may write them with other capitals, and with _ or - for a space."""
 
-_NEAR_TRIANGLES = 32  # Triangles nearest to a place that give the size of elements there.
+# The corners across the element from those of each of `FACES`.
+_OPPOSITE = [[4, 7, 6, 5], [0, 1, 2, 3], [3, 2, 6, 7], [0, 3, 7, 4], [1, 0, 4, 5], [2, 1, 5, 6]]
 
 
 @dataclass(frozen=True)
@@ -33,6 +50,7 @@ class FreeMesh(Mesh):
     outer_elements: IntArray
     """Element of each face of the skin; its last four nodes lie on the skin where possible, (n_faces,)."""
     receptor_depth_mm: float  # Depth of the end organs below the skin, along its normal. [mm]
+    numbers: IntArray | None = None  # Of the elements in their file, for errors, (n_elements,).
 
     @property
     def is_grid(self) -> bool:
@@ -146,25 +164,21 @@ class FingerMesh(Finger):
 
     def _heights(self, triangles: FloatArray, x: FloatArray, z: FloatArray) -> list[FloatArray]:
         """Heights y at which the upright line through each (x, z) meets triangles; mirrored if halved."""
-        z = np.where(z < 0.0, -z, z) if not self.mesh.full else z
+        z = z if self.mesh.full else np.abs(z)
         low, high = triangles.min(axis=1), triangles.max(axis=1)
+
+        def cross(one: FloatArray, other: FloatArray) -> FloatArray:
+            return one[:, 0] * other[:, 2] - one[:, 2] * other[:, 0]
+
         found = []
-        for here_x, here_z in zip(x.tolist(), z.tolist(), strict=True):
-            near = np.flatnonzero(
-                (low[:, 0] <= here_x)
-                & (high[:, 0] >= here_x)
-                & (low[:, 2] <= here_z)
-                & (high[:, 2] >= here_z)
-            )
-            a, b, c = np.moveaxis(triangles[near], 1, 0)
-            (bx, _, bz), (cx, _, cz) = (b - a).T, (c - a).T
-            px, pz = here_x - a[:, 0], here_z - a[:, 2]
-            area = bx * cz - bz * cx
+        for here in np.stack([x, np.zeros_like(x), z], axis=1):
+            beside = (low > here) | (high < here)
+            a, b, c = np.moveaxis(triangles[~beside[:, 0] & ~beside[:, 2]], 1, 0)
+            area = cross(b - a, c - a)
             safe = np.where(area == 0.0, 1.0, area)
-            u, v = (px * cz - pz * cx) / safe, (bx * pz - bz * px) / safe
-            inside = (area != 0.0) & (u >= -1e-9) & (v >= -1e-9) & (u + v <= 1.0 + 1e-9)
-            height = a[:, 1] + u * (b - a)[:, 1] + v * (c - a)[:, 1]
-            found.append(height[inside])
+            u, v = cross(here - a, c - a) / safe, cross(b - a, here - a) / safe
+            inside = (area != 0.0) & (np.minimum(u, v) >= -1e-9) & (u + v <= 1.0 + 1e-9)
+            found.append((a + u[:, None] * (b - a) + v[:, None] * (c - a))[inside, 1])
         return found
 
     def skin_point(self, x_mm: ArrayLike, z_mm: ArrayLike) -> FloatArray:
@@ -198,54 +212,268 @@ class FingerMesh(Finger):
         return np.where(depth > 0.0, depth, reach).reshape(below.shape[:-1])
 
     def own_grading(self, x_mm: Finite, z_mm: Finite) -> Grading:
-        sides = self.mesh.nodes_mm[self.mesh.skin_triangles]
-        away = np.linalg.norm(sides.mean(axis=1) - self.skin_point(x_mm, z_mm), axis=1)
-        near = sides[np.argsort(away)[:_NEAR_TRIANGLES]]
-        # The longest side of half a square face is its diagonal.
-        size = float(
-            np.median(np.linalg.norm(near - np.roll(near, 1, axis=1), axis=2).max(axis=1)) / np.sqrt(2)
-        )
+        corners = self.mesh.nodes_mm[self.mesh.skin_triangles]
+        away = np.linalg.norm(corners.mean(axis=1) - self.skin_point(x_mm, z_mm), axis=1)
+        # The longest side of half a square face is its diagonal. The nearest 32 tell the size.
+        longest = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(axis=1)
+        size = float(np.median(longest[np.argsort(away)[:32]]) / np.sqrt(2))
         extent = np.ptp(self.mesh.nodes_mm, axis=0)
         return Grading(x_mm, extent[0], extent[2], size, size, float(extent.max()), full=self.mesh.full)
 
 
-_NEAREST = 24  # Triangles that are looked at: those whose corners or middles are nearest to a point.
-
-
 def closest_on_triangles(points_mm: FloatArray, corners_mm: FloatArray) -> tuple[IntArray, FloatArray]:
-    """Closest point on a surface of triangles of similar size."""
-    count = min(_NEAREST, len(corners_mm))
-    _, near = cKDTree(corners_mm.mean(axis=1)).query(points_mm, k=count)
-    near = near.reshape(len(points_mm), count)
-    weights = _weights(points_mm[:, None], corners_mm[near])
-    found = (weights[..., None] * corners_mm[near]).sum(axis=2)
-    best = np.linalg.norm(found - points_mm[:, None], axis=2).argmin(axis=1)
-    rows = np.arange(len(points_mm))
-    return near[rows, best], weights[rows, best]
+    """Triangle closest to each point, and the weights (n, 3) of its corners there; triangles are of one size.
 
-
-def _weights(points: FloatArray, corners: FloatArray) -> FloatArray:
-    """Weights (..., 3) of the closest point of each triangle (..., 3, 3): on its face or an edge."""
-    a, b, c = corners[..., 0, :], corners[..., 1, :], corners[..., 2, :]
-    ab, ac, ap = b - a, c - a, points - a
+    The closest point is that of the triangle's plane, if it lies inside, or of one of the edges.
+    """
+    count = min(24, len(corners_mm))  # Triangles that are looked at: those whose middles are nearest.
+    near = cKDTree(corners_mm.mean(axis=1)).query(points_mm, k=count)[1].reshape(len(points_mm), count)
+    corners, points = corners_mm[near], points_mm[:, None]
+    a = corners[..., 0, :]
+    ab, ac, ap = corners[..., 1, :] - a, corners[..., 2, :] - a, points - a
     d00, d01, d11 = (ab * ab).sum(-1), (ab * ac).sum(-1), (ac * ac).sum(-1)
     d20, d21 = (ap * ab).sum(-1), (ap * ac).sum(-1)
     area = d00 * d11 - d01 * d01
     safe = np.where(area > 0.0, area, 1.0)
     v, w = (d11 * d20 - d01 * d21) / safe, (d00 * d21 - d01 * d20) / safe
-    inside = np.stack([1.0 - v - w, v, w], axis=-1)
-    on_face = (area > 0.0) & (inside >= 0.0).all(axis=-1)
-    nearest = np.full(on_face.shape, np.inf)
-    chosen = inside
+    on_face = np.stack([1.0 - v - w, v, w], axis=-1)
+    ways = [on_face]
     for first, second in ((0, 1), (1, 2), (2, 0)):
-        start, end = corners[..., first, :], corners[..., second, :]
-        way = end - start
-        square = (way * way).sum(-1)
-        t = np.clip(((points - start) * way).sum(-1) / np.where(square > 0.0, square, 1.0), 0.0, 1.0)
-        away = np.linalg.norm(points - start - t[..., None] * way, axis=-1)
-        edge = np.zeros_like(inside)
-        edge[..., first], edge[..., second] = 1.0 - t, t
-        closer = ~on_face & (away < nearest)
-        chosen = np.where(closer[..., None], edge, chosen)
-        nearest = np.where(closer, away, nearest)
-    return chosen
+        edge = corners[..., second, :] - corners[..., first, :]
+        square = (edge * edge).sum(-1)
+        along = ((points - corners[..., first, :]) * edge).sum(-1) / np.where(square > 0.0, square, 1.0)
+        on_edge = np.zeros_like(on_face)
+        on_edge[..., second] = np.clip(along, 0.0, 1.0)
+        on_edge[..., first] = 1.0 - on_edge[..., second]
+        ways.append(on_edge)
+    weights = np.stack(ways, axis=2)
+    away = np.linalg.norm(weights @ corners - points[:, None], axis=-1)
+    away[:, :, 0][(area <= 0.0) | (on_face < 0.0).any(axis=-1)] = np.inf
+    best = away.reshape(len(points), -1).argmin(axis=1)
+    rows = np.arange(len(points))
+    return near[rows, best // 4], weights.reshape(len(points), -1, 3)[rows, best]
+
+
+@dataclass(frozen=True)
+class MeshParts:
+    """What a file holds: nodes, bricks and wedges, and named sets."""
+
+    source: str  # Name of the file, for errors.
+    nodes: FloatArray  # Coordinates, in the file's unit, (n_nodes, 3).
+    elements: IntArray
+    """Rows of `nodes`; a wedge repeats its third and sixth: 0, 1, 2, 2, 3, 4, 5, 5, (n_elements, 8)."""
+    labels: IntArray  # Numbers of the elements in the file, (n_elements,).
+    node_sets: Mapping[str, IntArray]
+    element_sets: Mapping[str, IntArray]  # Rows of `nodes` and of `elements`.
+
+
+def finger_from(
+    parts: MeshParts,
+    unit: str = "mm",
+    axes: str = "x y z",
+    names: Mapping[str, str] | None = None,
+    contact_mm: tuple[float, float] | None = None,
+    receptor_depth_mm: float | None = None,
+) -> FingerMesh:
+    """Make a finger from nodes, elements and sets; parameters as of `read_finger`."""
+    names = instance("names", names or {}, Mapping)
+    for name in names:
+        one_of("names", name, SETS)
+    turn = LENGTHS_MM[one_of("unit", unit, tuple(LENGTHS_MM))] * _axes(axes)
+    pad = None if contact_mm is None else pair("contact_mm", contact_mm)
+    depth = None if receptor_depth_mm is None else positive("receptor_depth_mm", receptor_depth_mm, "mm")
+    try:
+        mesh = _mesh(parts, turn, unit, names)
+        pad = pad or _middle(mesh)
+        borders = _borders(mesh, pad)
+        mesh = _with_end_organs(mesh, pad, borders, depth)
+    except InputError as error:
+        raise InputError(f"{parts.source}: {error}") from error
+    made = FingerMesh(mesh, pad, borders)
+    made.skin_point(*pad)
+    return made
+
+
+def _axes(axes: str) -> FloatArray:
+    """Rows of the axes of a finger in those of a file, (3, 3)."""
+    known = {sign + axis: way for sign, side in (("", 1.0), ("-", -1.0))
+             for axis, way in zip("xyz", side * np.eye(3), strict=True)}  # fmt: skip
+    turn = np.array([known[one_of("each of axes", axis, tuple(known))] for axis in axes.split()])
+    if len(turn) != 3 or round(float(np.linalg.det(turn))) != 1:
+        raise InputError(
+            "axes",
+            "must name the axes of the file that point to the tip, to the nail and to the side, and "
+            "must not mirror it, as 'x y z' or 'z y -x'",
+            repr(axes),
+        )
+    return turn
+
+
+def _mesh(parts: MeshParts, turn: FloatArray, unit: str, names: Mapping[str, str]) -> FreeMesh:
+    """Nodes, elements and sets of a file, checked, without end organs."""
+    used, elements = np.unique(parts.elements, return_inverse=True)
+    nodes = parts.nodes[used] @ turn.T
+    _check_nodes(nodes, unit)
+    layer = _layers(parts, names)
+    skin, bone, nail, fixed, symmetry = (
+        np.flatnonzero(np.isin(used, _set(name, names, parts.node_sets, "nodes"))) for name in SETS[:5]
+    )
+    bone = bone if bone.size else np.setdiff1d(fixed, nail)
+    for name, members in (("skin", skin), ("bone, nail or fixed", np.union1d(bone, nail))):
+        if not members.size:
+            raise _missing(name, parts.node_sets, "nodes")
+    elements = _wedges_up(nodes, elements.reshape(-1, 8))
+    faces, owners, number = faces_of(elements)
+    times = np.bincount(number)[number]
+    if times.max() > 2:
+        label = parts.labels[owners[times.argmax()]]
+        raise InputError(f"a face must belong to one or two elements: one of element {label} has three.")
+    outside = faces[times == 1]
+    of_skin = (times == 1) & np.isin(faces, skin).all(axis=1)
+    if not of_skin.any():
+        raise InputError("set skin must hold all corners of faces on the outside of the mesh: it holds none.")
+    faces, owners = faces[of_skin], owners[of_skin]
+    elements = _skin_up(elements, faces, owners)
+    none = np.empty(0, dtype=np.int64)
+    mesh = FreeMesh(
+        nodes, elements, layer, (len(elements), 1, 1), not symmetry.size, faces, bone, nail, symmetry, none,
+        none, owners, 0.0, parts.labels,
+    )  # fmt: skip
+    if symmetry.size:
+        mesh = replace(mesh, symmetry_nodes=np.union1d(symmetry, np.flatnonzero(near_plane(mesh))))
+    check_mesh(mesh)
+    check_skin(mesh, outside)
+    return mesh
+
+
+def _check_nodes(nodes: FloatArray, unit: str) -> None:
+    if not np.isfinite(nodes).all():
+        raise InputError("nodes must have finite coordinates: some have not.")
+    extent = np.ptp(nodes, axis=0)
+    smallest, largest = SIZES_MM[0] / 2, SIZES_MM[1]
+    if extent.max() > largest or extent.min() < smallest:
+        raise InputError(
+            f"a finger must extend over {smallest:g} to {largest:g} mm each way: got "
+            f"{extent[0]:.3g}, {extent[1]:.3g} and {extent[2]:.3g} mm with unit {unit!r}; give the "
+            "unit of the file."
+        )
+    pairs = cKDTree(nodes).query_pairs(1e-7 * float(extent.max()), output_type="ndarray")
+    if len(pairs):
+        raise InputError(
+            f"the mesh is open where two nodes lie at the same place, {place(nodes[pairs[0, 0]])}, "
+            f"one of {len(pairs)} pairs: merge them."
+        )
+
+
+def plain_name(name: str) -> str:
+    """Write the name of a set in small letters with single spaces."""
+    return " ".join("".join(c if c.isalnum() else " " for c in name.lower()).split())
+
+
+def _set(name: str, names: Mapping[str, str], sets: Mapping[str, IntArray], what: str) -> IntArray:
+    """Members of a set, by its name or the one that the caller gave for it; none without it."""
+    called = names.get(name, name)
+    for each, members in sets.items():
+        if plain_name(each) == plain_name(called):
+            return members
+    if name in names:
+        raise _missing(called, sets, what)
+    return np.empty(0, dtype=np.int64)
+
+
+def _missing(name: str, sets: Mapping[str, IntArray], what: str) -> InputError:
+    return InputError(
+        f"set {name} of {what} is missing: the file has {', '.join(sets) or 'none'}; name it so, or say what "
+        f"it is called with names={{{name.split(',')[0]!r}: ...}}."
+    )
+
+
+def _layers(parts: MeshParts, names: Mapping[str, str]) -> IntArray:
+    layer = np.full(len(parts.elements), -1, dtype=np.int64)
+    for number, name in enumerate(LAYERS):
+        members = _set(name, names, parts.element_sets, "elements")
+        twice = members[layer[members] >= 0]
+        if twice.size:
+            raise InputError(
+                f"an element must be in one layer: element {parts.labels[twice[0]]} is in "
+                f"{LAYERS[layer[twice[0]]]} and in {name}."
+            )
+        layer[members] = number
+    without = np.flatnonzero(layer < 0)
+    if without.size == layer.size:
+        raise _missing(", ".join(LAYERS[:3]) + f" or {LAYERS[3]}", parts.element_sets, "elements")
+    if without.size:
+        raise InputError(
+            f"every element must be in the set of a layer: element {parts.labels[without[0]]} is in none, "
+            f"one of {without.size}."
+        )
+    return layer
+
+
+def _wedges_up(nodes: FloatArray, elements: IntArray) -> IntArray:
+    """Exchange both ends of all wedges if all are turned inside out: a file may count them the other way."""
+    wedges = elements[:, 2] == elements[:, 3]
+    first, second, third, above = (nodes[elements[wedges, n]] for n in (0, 1, 2, 4))
+    turned = elements.copy()
+    if ((np.cross(second - first, third - first) * (above - first)).sum(axis=1) < 0.0).all():
+        turned[wedges] = np.roll(elements[wedges], 4, axis=1)
+    return turned
+
+
+def _skin_up(elements: IntArray, faces: IntArray, owners: IntArray) -> IntArray:
+    """Turn elements so that their last four nodes are a face of the skin, as in other meshes."""
+    turned = elements.copy()
+    # A wedge with its side on the skin stays as it is: its triangles are its ends.
+    ends = repeats_nodes(faces) | ~repeats_nodes(elements[owners])
+    faces, owners = np.sort(faces[ends], axis=1), owners[ends]
+    for corners, opposite in zip(FACES, _OPPOSITE, strict=True):
+        up = owners[(np.sort(elements[owners][:, corners], axis=1) == faces).all(axis=1)]
+        turned[up] = elements[up][:, [*opposite, *corners]]
+    return turned
+
+
+def _middle(mesh: FreeMesh) -> tuple[float, float]:
+    """Middle of the pad: the share of the length that it has on the paper's finger."""
+    low, high = mesh.nodes_mm.min(axis=0), mesh.nodes_mm.max(axis=0)
+    share = published.CONTACT_POINT.value[0] / published.LENGTH.value
+    z = 0.0 if not mesh.full or low[2] == -high[2] else 0.5 * (low[2] + high[2])
+    return float(low[0] + share * (high[0] - low[0])), float(z)
+
+
+def _borders(mesh: FreeMesh, pad_mm: tuple[float, float]) -> tuple[float, float, float]:
+    """Depth of the lower borders of the outer three layers at the middle of the pad."""
+    depths = [0.0]
+    for number in range(len(LAYERS) - 1):
+        border = np.intersect1d(mesh.elements[mesh.layer <= number], mesh.elements[mesh.layer > number])
+        border = border[mesh.nodes_mm[border, 1] < np.median(mesh.nodes_mm[:, 1])]
+        away = np.hypot(*(mesh.nodes_mm[border][:, [0, 2]] - pad_mm).T)
+        near = mesh.node_depth_mm[border[np.argsort(away)[:8]]]
+        depths.append(max(depths[-1], float(np.median(near)) if near.size else 0.0))
+    return depths[1], depths[2], depths[3]
+
+
+def _with_end_organs(
+    mesh: FreeMesh, pad_mm: tuple[float, float], borders_mm: tuple[float, ...], depth_mm: float | None
+) -> FreeMesh:
+    """Add the elements around the end organs, and the midline."""
+    _, owners, number = faces_of(mesh.elements)
+    below = number[mesh.layer[owners] == LAYERS.index("dermis")]
+    above = (mesh.layer[owners] == LAYERS.index("living epidermis")) & np.isin(number, below)
+    sheet = np.unique(owners[above])
+    if depth_mm is None and sheet.size:
+        depth_mm = borders_mm[1]
+    else:
+        depth_mm = depth_mm or published.RECEPTOR_DEPTH.value
+        sheet = mesh.elements_at(depth_mm)
+    if not sheet.size:
+        raise InputError(
+            f"end organs {depth_mm:g} mm below the skin must lie in the mesh, which is "
+            f"{mesh.node_depth_mm.max():.3g} mm deep: give receptor_depth_mm."
+        )
+    # Next to the line of the pad's middle, x increasing.
+    volar = mesh.skin_nodes[mesh.skin_normals[mesh.skin_nodes, 1] < 0.0]
+    corners = mesh.nodes_mm[mesh.skin_triangles]
+    usual = np.median(np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2))
+    midline = volar[np.abs(mesh.nodes_mm[volar, 2] - pad_mm[1]) <= 0.25 * usual]
+    midline = midline[np.argsort(mesh.nodes_mm[midline, 0], kind="stable")]
+    return replace(mesh, midline_nodes=midline, living_epidermis=sheet, receptor_depth_mm=float(depth_mm))

@@ -17,7 +17,8 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from fingerpad.core.values import FloatArray, IntArray
-from fingerpad.geometry.free_mesh import FACES, FreeMesh
+from fingerpad.geometry.free_mesh import FreeMesh
+from fingerpad.geometry.mesh_checks import faces_of
 from fingerpad.skin.receptor_sheet import (
     Part,
     in_half,
@@ -101,15 +102,10 @@ class FreeReceptors:
     def _neighbours(self) -> IntArray:
         """Element of the same layer above and below each element, -1 without one, (n_elements, 2)."""
         mesh = self.mesh
-        faces = np.sort(mesh.elements[:, FACES].reshape(-1, 4), axis=1)
-        owner = np.repeat(np.arange(len(mesh.elements)), len(FACES))
-        # A triangle repeats any of its corners; an edge is no face.
-        faces[:, 1:][np.diff(faces, axis=1) == 0] = -1
-        whole = (faces >= 0).sum(axis=1) >= 3
-        _, face = np.unique(np.sort(faces[whole], axis=1), axis=0, return_inverse=True)
+        _, owner, face = faces_of(mesh.elements)
         order = np.argsort(face, kind="stable")
         shared = np.flatnonzero(np.diff(face[order]) == 0)
-        first, second = (owner[whole][order[shared + n]] for n in (0, 1))
+        first, second = (owner[order[shared + n]] for n in (0, 1))
         middles, depth = (
             values[mesh.elements].mean(axis=1) for values in (mesh.nodes_mm, mesh.node_depth_mm)
         )
