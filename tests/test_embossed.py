@@ -44,9 +44,10 @@ def test_a_long_rectangle_is_the_bar_and_a_circle_the_flat_punch():
 
 def test_an_outline_within_another_is_a_hole():
     ring = Embossed([rectangle(2.0, 2.0), rectangle(1.2, 1.2)], 0.5, 0.1)
-    assert is_raised(ring, 1.6, 0.0)
-    assert not is_raised(ring, 0.0, 0.0)
-    assert ring.stroke_mm == pytest.approx(0.8)
+    for turned in (ring, replace(ring, outlines_mm=[rectangle(2.0, 2.0), rectangle(1.2, 1.2)[::-1]])):
+        assert is_raised(turned, 1.6, 0.0)
+        assert not is_raised(turned, 0.0, 0.0)
+        assert turned.stroke_mm == pytest.approx(0.8)
     narrow = replace(ring, outlines_mm=[rectangle(2.0, 2.0), rectangle(1.8, 1.8)])
     assert narrow.relief_mm == pytest.approx(0.2)
     pair = Embossed([rectangle(0.5, 2.0, x=-0.7), rectangle(0.5, 2.0, x=0.7)], 0.5, 0.1)
@@ -120,6 +121,10 @@ test_outlines_and_text_that_cannot_be_embossed_are_refused = refusals(
     (([SQUARE, rectangle(1.0, 1.0, x=0.5)], {}), "must not touch or cross"),
     (([SQUARE, rectangle(1.0, 1.0, x=2.0)], {}), "must not touch or cross"),
     (([SQUARE, SQUARE], {}), "must not touch or cross"),
+    (([SQUARE, [(1.0, 0.3), (2.0, 0.0), (2.0, 0.5)]], {}), "must not touch or cross"),
+    (([[*SQUARE[:2], (3.0, -1.0), (2.0, -1.0), *SQUARE[2:]]], {}), "must not touch or cross"),
+    (([[(0.0, 0.0), (1.0, 0.0), (3.0, 0.0)]], {}), "must not touch or cross"),
+    (([[(-3.0, 0.0), (2.0, 0.0), (0.0, 0.0), (3.0, 0.0), (0.0, 2.0)]], {}), "must not touch or cross"),
     (([circle(3.0, MOST_CORNERS + 1)], {}), f"at most {MOST_CORNERS} corners"),
     (([SQUARE], {"height_mm": "high"}), ("height_mm",)),
     (([SQUARE], {"edge_radius_mm": -0.1}), "edge_radius_mm must be greater than 0"),

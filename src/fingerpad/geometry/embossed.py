@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import cached_property
-from typing import Annotated, Any
+from typing import Annotated
 
 import numpy as np
-import shapely
 from numba import njit
 
 from fingerpad.core.checked import checked, value_class
@@ -21,6 +20,10 @@ are where it is narrowest. The sides of a corner or a notch are not, however clo
 
 MOST_CORNERS = 4000
 """Most corners of all outlines together: pairs of pieces are compared, and memory grows with their number."""
+
+BESIDE_MM = 1e-6  # Beside the middle of a piece is its inside or outside. [mm]
+
+SAME = 1e-9  # Share of a piece, or cosine, that is round-off.
 
 DRAWN_EM = 1000.0
 """Size at which matplotlib draws letters before they are scaled; it keeps curves within a fraction of 1."""
@@ -67,7 +70,7 @@ class Embossed(Indenter):
                 "take fewer letters or coarser outlines",
             )
         object.__setattr__(self, "outlines_mm", tuple(tuple(map(tuple, line.tolist())) for line in outlines))
-        if not _rings(outlines).is_simple:
+        if self._crosses():
             raise InputError("Outlines must not touch or cross, each other or themselves: they do.")
         sizes = {"height_mm": self.height_mm, "half of the narrowest stroke": self.stroke_mm / 2}
         for name, most in sizes.items():
@@ -96,8 +99,7 @@ class Embossed(Indenter):
 
     def gap(self, points_mm: PointsMm) -> tuple[FloatArray, FloatArray]:
         points_mm = np.ascontiguousarray(points_mm, dtype=np.float64)
-        beyond, outward = np.empty(len(points_mm)), np.zeros((len(points_mm), 3))
-        _beyond_outline(points_mm, self._pieces, self._normals, beyond, outward)
+        beyond, outward = _beyond_outline(points_mm, self._pieces, self._normals)
         radius = self.edge_radius_mm
         shape, normal = rounded(beyond + radius, points_mm[:, 1] + radius, outward, radius)
         plate = points_mm[:, 1] + self.height_mm
@@ -105,34 +107,50 @@ class Embossed(Indenter):
 
     @cached_property
     def _pieces(self) -> FloatArray:
-        """Pieces of all outlines, the shape on their left: begin and end, x and z, (n, 2, 2). [mm]"""
-        lines = _outlines(shapely.build_area(_rings(self.outlines_mm)))
+        """Pieces of all outlines: begin and end, x and z, (n, 2, 2). [mm]"""
+        lines = map(np.array, self.outlines_mm)
         return np.concatenate([np.stack([line, np.roll(line, -1, axis=0)], axis=1) for line in lines])
 
     @cached_property
     def _normals(self) -> FloatArray:
         """Direction out of the shape at each piece, x and z, (n, 2)."""
         along = self._pieces[:, 1] - self._pieces[:, 0]
-        return np.column_stack([along[:, 1], -along[:, 0]]) / np.linalg.norm(along, axis=1)[:, None]
+        right = np.column_stack([along[:, 1], -along[:, 0]]) / np.linalg.norm(along, axis=1)[:, None]
+        beside = np.insert(self._pieces.mean(axis=1) + BESIDE_MM * right, 1, 0.0, axis=1)
+        return np.sign(_beyond_outline(beside, self._pieces, right)[0])[:, None] * right
+
+    def _crosses(self) -> bool:
+        """Whether two pieces meet other than at the corner between them."""
+        begin, along = self._pieces[:, 0], self._pieces[:, 1] - self._pieces[:, 0]
+        ends = np.cumsum([len(line) for line in self.outlines_mm])
+        here, ahead = np.arange(len(begin)), np.arange(len(begin)) + 1
+        ahead[ends - 1] = np.append(0, ends[:-1])
+        shares = self._shares(begin, along)
+        meets: np.ndarray = (np.abs(shares - 0.5) <= 0.5 + SAME).all(axis=0)
+        meets[here, here] = meets[here, ahead] = meets[ahead, here] = False
+        way = along / np.linalg.norm(along, axis=1)[:, None]
+        folds = (way * way[ahead]).sum(axis=1) < SAME - 1.0
+        return bool(meets.any() or folds.any())
+
+    def _shares(self, begin: FloatArray, way: FloatArray) -> FloatArray:
+        """Shares of ways and of pieces at which their lines cross, infinite if parallel, (2, n, n_pieces)."""
+        # begin + t way = piece + s along
+        piece, along = self._pieces[:, 0], self._pieces[:, 1] - self._pieces[:, 0]
+        turn = way[:, None, 0] * along[:, 1] - way[:, None, 1] * along[:, 0]
+        apart = piece - begin[:, None]
+        t = apart[..., 0] * along[:, 1] - apart[..., 1] * along[:, 0]
+        s = apart[..., 0] * way[:, None, 1] - apart[..., 1] * way[:, None, 0]
+        return np.divide([t, s], turn, out=np.full((2, *turn.shape), np.inf), where=turn != 0.0)
 
     @cached_property
     def _widths_mm(self) -> FloatArray:
         """Width of the narrowest stroke, and of the narrowest hole or gap; infinite without one. [mm]"""
         # From the middle of each piece the nearest piece that faces it is sought at a right angle.
-        begin, end = self._pieces[:, 0], self._pieces[:, 1]
-        middle, along = 0.5 * (begin + end), end - begin
         facing = self._normals @ self._normals.T < OPPOSITE
-        widths = np.full(2, np.inf)
+        widths = np.empty(2)
         for side, sign in enumerate((-1.0, 1.0)):
-            way = sign * self._normals
-            # middle + t way = begin + s along
-            turn = way[:, None, 0] * along[:, 1] - way[:, None, 1] * along[:, 0]
-            apart = begin[None] - middle[:, None]
-            with np.errstate(divide="ignore", invalid="ignore"):
-                t = (apart[..., 0] * along[:, 1] - apart[..., 1] * along[:, 0]) / turn
-                s = (apart[..., 0] * way[:, None, 1] - apart[..., 1] * way[:, None, 0]) / turn
-            hit = facing & (np.abs(turn) > 0.0) & (t > 0.0) & (s >= 0.0) & (s <= 1.0)
-            widths[side] = np.where(hit, t, np.inf).min()
+            t, s = self._shares(self._pieces.mean(axis=1), sign * self._normals)
+            widths[side] = t[facing & (t > 0.0) & (s >= 0.0) & (s <= 1.0)].min(initial=np.inf)
         return widths
 
 
@@ -197,35 +215,17 @@ def embossed_text(
     placed = [scale * (outline - middle) for outline in outlines]
     # Seen from the skin, z runs to the right where x, to the tip, runs up.
     turned = [line * [1.0, -1.0] if along_finger else line[:, ::-1] for line in placed]
-    # Corners to 1e-9 mm, without a second one at the same place.
-    rings = shapely.remove_repeated_points(_rings([line.round(9) + 0.0 for line in turned]))
-    corners = [np.array(ring.coords) for ring in rings.geoms]
-    if not rings.is_simple:
-        corners = joined_outlines(corners)
+    corners = joined_outlines(turned)
     return Embossed(tuple(tuple(map(tuple, line.tolist())) for line in corners), height_mm, edge_radius_mm)
 
 
 def joined_outlines(outlines: Sequence[FloatArray]) -> list[FloatArray]:
-    """Boundary of what closed outlines enclose, where those that turn as the largest do not cut out holes."""
-    parts = [shapely.Polygon(line) for line in outlines]
-    largest = max(parts, key=lambda part: part.area).exterior.is_ccw
-    holes = [part for part in parts if part.exterior.is_ccw != largest]
-    whole = [
-        part.difference(shapely.union_all([hole for hole in holes if part.contains(hole)]))
-        for part in parts
-        if part.exterior.is_ccw == largest
-    ]
-    return _outlines(shapely.union_all(whole))
+    """Boundary of what closed outlines wind about, to 1e-9 mm; holes turn the other way."""
+    from manifold3d import CrossSection, FillRule
 
-
-def _rings(outlines: Sequence[FloatArray | Sequence[tuple[float, float]]]) -> Any:
-    return shapely.MultiLineString([[*line, line[0]] for line in outlines])
-
-
-def _outlines(area: Any) -> list[FloatArray]:
-    """Corners of the outlines of an area, which lies on their left."""
-    polygons = shapely.get_parts(shapely.orient_polygons(area))
-    return [np.array(ring.coords)[:-1] for each in polygons for ring in (each.exterior, *each.interiors)]
+    # Corners lie on a grid of 7e-9 of its unit, and those within 1e-6 of a line are left out.
+    area = CrossSection([1e3 * line for line in outlines], FillRule.NonZero).simplify(1e-6)
+    return [(1e-3 * line).round(9) + 0.0 for line in area.to_polygons()]
 
 
 def _closed(name: str, outline: Sequence[tuple[float, float]]) -> FloatArray:
@@ -243,9 +243,10 @@ def _closed(name: str, outline: Sequence[tuple[float, float]]) -> FloatArray:
 
 @njit(cache=True, nogil=True)
 def _beyond_outline(
-    points: FloatArray, pieces: FloatArray, normals: FloatArray, beyond: FloatArray, outward: FloatArray
-) -> None:  # pragma: no cover (compiled)
+    points: FloatArray, pieces: FloatArray, normals: FloatArray
+) -> tuple[FloatArray, FloatArray]:  # pragma: no cover (compiled)
     """Distance in the plane from the outlines, negative inside, and its gradient."""
+    beyond, outward = np.empty(len(points)), np.zeros((len(points), 3))
     for number in range(len(points)):
         x, z = points[number, 0], points[number, 2]
         nearest, piece, inside = np.inf, 0, False
@@ -266,3 +267,4 @@ def _beyond_outline(
             outward[number, 0], outward[number, 2] = sign * to_x / length, sign * to_z / length
         else:
             outward[number, 0], outward[number, 2] = normals[piece, 0], normals[piece, 1]
+    return beyond, outward
