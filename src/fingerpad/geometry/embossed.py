@@ -126,7 +126,7 @@ class Embossed(Indenter):
         here, ahead = np.arange(len(begin)), np.arange(len(begin)) + 1
         ahead[ends - 1] = np.append(0, ends[:-1])
         shares = self._shares(begin, along)
-        meets: np.ndarray = (np.abs(shares - 0.5) <= 0.5 + SAME).all(axis=0)
+        meets = np.all(np.abs(shares - 0.5) <= 0.5 + SAME, axis=0)
         meets[here, here] = meets[here, ahead] = meets[ahead, here] = False
         way = along / np.linalg.norm(along, axis=1)[:, None]
         folds = (way * way[ahead]).sum(axis=1) < SAME - 1.0

@@ -25,6 +25,10 @@ from fingerpad.core.values import FloatArray, IntArray, PointsMm
 
 _LEAF = 4  # Triangles in a box without children.
 
+FAR_MM, ENOUGH_BOXES = 2.0, 200
+"""Farther above a surface the nearest triangle of so many boxes is near enough: in a hollow all are as far.
+[mm], [1]"""
+
 _ON_SURFACE_MM = 1e-9
 
 _LEAST_RAD, _LEAST_MM, _LEAST_SHARE = 2e-4, 1e-6, 0.5
@@ -209,35 +213,43 @@ def _to_box(p: FloatArray, low: FloatArray, high: FloatArray) -> float:
 @njit(cache=True, nogil=True)
 def _top(
     points: FloatArray, corners: FloatArray, low: FloatArray, high: FloatArray, height: FloatArray,
-    slot_found: np.ndarray, begin: int, end: int,
+    slot: np.ndarray, begin: int, end: int,
 ) -> None:  # fmt: skip  # pragma: no cover (compiled)
-    n_leaves = len(low) // 2
     stack = np.empty(64, dtype=np.int64)
     for number in range(begin, end):
-        p = points[number]
-        height[number], slot_found[number] = -np.inf, -1
-        stack[0], top = 1, 1
-        while top:
-            top -= 1
-            box = stack[top]
-            beside = p[0] < low[box, 0] or p[0] > high[box, 0] or p[2] < low[box, 2] or p[2] > high[box, 2]
-            if beside or high[box, 1] <= height[number]:
+        height[number], slot[number] = _highest(points[number], corners, low, high, stack)
+
+
+@njit(cache=True, nogil=True)
+def _highest(
+    p: FloatArray, corners: FloatArray, low: FloatArray, high: FloatArray, stack: np.ndarray
+) -> tuple[float, int]:  # pragma: no cover (compiled)
+    """Height and slot of the highest triangle above or below a point, -inf and -1 beside all."""
+    n_leaves = len(low) // 2
+    height, found = -np.inf, -1
+    stack[0], top = 1, 1
+    while top:
+        top -= 1
+        box = stack[top]
+        beside = p[0] < low[box, 0] or p[0] > high[box, 0] or p[2] < low[box, 2] or p[2] > high[box, 2]
+        if beside or high[box, 1] <= height:
+            continue
+        if box < n_leaves:
+            stack[top], stack[top + 1] = 2 * box, 2 * box + 1
+            top += 2
+            continue
+        for slot in range((box - n_leaves) * _LEAF, (box - n_leaves + 1) * _LEAF):
+            a, b, c = corners[slot, 0], corners[slot, 1], corners[slot, 2]
+            abx, abz, acx, acz = b[0] - a[0], b[2] - a[2], c[0] - a[0], c[2] - a[2]
+            area = abx * acz - abz * acx
+            if area == 0.0:
                 continue
-            if box < n_leaves:
-                stack[top], stack[top + 1] = 2 * box, 2 * box + 1
-                top += 2
-                continue
-            for slot in range((box - n_leaves) * _LEAF, (box - n_leaves + 1) * _LEAF):
-                a, b, c = corners[slot, 0], corners[slot, 1], corners[slot, 2]
-                abx, abz, acx, acz = b[0] - a[0], b[2] - a[2], c[0] - a[0], c[2] - a[2]
-                area = abx * acz - abz * acx
-                if area == 0.0:
-                    continue
-                x, z = p[0] - a[0], p[2] - a[2]
-                v, w = (x * acz - z * acx) / area, (abx * z - abz * x) / area
-                y = a[1] + v * (b[1] - a[1]) + w * (c[1] - a[1])
-                if v >= -1e-9 and w >= -1e-9 and v + w <= 1.0 + 1e-9 and y > height[number]:
-                    height[number], slot_found[number] = y, slot
+            x, z = p[0] - a[0], p[2] - a[2]
+            v, w = (x * acz - z * acx) / area, (abx * z - abz * x) / area
+            y = a[1] + v * (b[1] - a[1]) + w * (c[1] - a[1])
+            if v >= -1e-9 and w >= -1e-9 and v + w <= 1.0 + 1e-9 and y > height:
+                height, found = y, slot
+    return height, found
 
 
 @njit(cache=True, nogil=True)
@@ -246,7 +258,7 @@ def _gaps(
     turns: FloatArray, radius: float, gap: FloatArray, normal: FloatArray, begin: int, end: int,
 ) -> None:  # fmt: skip  # pragma: no cover (compiled)
     n_leaves = len(low) // 2
-    stack = np.empty(64, dtype=np.int64)
+    stack, path = np.empty((2, 64), dtype=np.int64)
     closest, slope = np.empty(3), np.empty(3)
     last = 0.0
     for number in range(begin, end):
@@ -257,7 +269,7 @@ def _gaps(
             bound = (last + apart) ** 2 * (1.0 + 1e-9) + 1e-18
             if bound < nearest:  # not if one of them is no number
                 nearest = bound
-        found, feature = 0, 6
+        found, feature, looked, above = 0, 6, 0, False
         n[0], n[1], n[2] = 0.0, 1.0, 0.0
         stack[0], top = 1, 1
         while top:
@@ -277,11 +289,16 @@ def _gaps(
                 if squared <= nearest:
                     nearest, found, feature = squared, slot, at
                     n[0], n[1], n[2] = x, y, z
+            looked += 1
+            if looked == ENOUGH_BOXES and nearest > FAR_MM**2:
+                above = p[1] > _highest(p, corners, low, high, path)[0]
+                if above:
+                    break
         last = np.sqrt(nearest)
         for axis in range(3):
             closest[axis] = p[axis] - n[axis]
         mean = normals[found, feature]
-        side = 1.0 if (n * mean).sum() >= 0.0 else -1.0
+        side = 1.0 if above or (n * mean).sum() >= 0.0 else -1.0
         gap[number] = side * last
         filled = last < radius
         in_crease = filled and 3 <= feature < 6 and turns[found, feature - 3] > 0.0
