@@ -49,8 +49,8 @@ class FreeMesh(Mesh):
 
     outer_elements: IntArray
     """Element of each face of the skin; its last four nodes lie on the skin where possible, (n_faces,)."""
-    receptor_depth_mm: float  # Depth of the end organs below the skin, along its normal. [mm]
-    numbers: IntArray | None = None  # Of the elements in their file, for errors, (n_elements,).
+    receptor_depth_mm: float  #: Depth of the end organs below the skin, along its normal. [mm]
+    numbers: IntArray | None = None  #: Of the elements in their file, for errors, (n_elements,).
 
     @property
     def is_grid(self) -> bool:
@@ -258,13 +258,13 @@ def closest_on_triangles(points_mm: FloatArray, corners_mm: FloatArray) -> tuple
 class MeshParts:
     """What a file holds: nodes, bricks and wedges, and named sets."""
 
-    source: str  # Name of the file, for errors.
-    nodes: FloatArray  # Coordinates, in the file's unit, (n_nodes, 3).
+    source: str  #: Name of the file, for errors.
+    nodes: FloatArray  #: Coordinates, in the file's unit, (n_nodes, 3).
     elements: IntArray
     """Rows of `nodes`; a wedge repeats its third and sixth: 0, 1, 2, 2, 3, 4, 5, 5, (n_elements, 8)."""
-    labels: IntArray  # Numbers of the elements in the file, (n_elements,).
+    labels: IntArray  #: Numbers of the elements in the file, (n_elements,).
     node_sets: Mapping[str, IntArray]
-    element_sets: Mapping[str, IntArray]  # Rows of `nodes` and of `elements`.
+    element_sets: Mapping[str, IntArray]  #: Rows of `nodes` and of `elements`.
 
 
 def finger_from(

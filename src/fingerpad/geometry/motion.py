@@ -58,9 +58,9 @@ class Pose:
     """How far an indenter has moved and turned since first touch, beside its advance."""
 
     x_mm: Finite = 0.0
-    z_mm: Finite = 0.0  # Way of its tip along the finger, distal positive, and across it. [mm]
+    z_mm: Finite = 0.0  #: Way of its tip along the finger, distal positive, and across it. [mm]
     tilt_deg: Finite = 0.0
-    spin_deg: Finite = 0.0  # Rotations about its tip, added to those of the `Touch`. [degrees]
+    spin_deg: Finite = 0.0  #: Rotations about its tip, added to those of the `Touch`. [degrees]
 
 
 STILL = Pose()
@@ -101,8 +101,8 @@ class Motion(ABC):
     All is linear between the samples.
     """
 
-    by_force: bool = False  # Whether the force is prescribed instead of the depth.
-    cycles: Cycles | None = None  # The part that repeats itself: not all of its cycles need be solved.
+    by_force: bool = False  #: Whether the force is prescribed instead of the depth.
+    cycles: Cycles | None = None  #: The part that repeats itself: not all of its cycles need be solved.
 
     @property
     @abstractmethod

@@ -47,10 +47,10 @@ class Triangles:
     """Outward normals at the three corners, on the three edges (opposite to each corner) and on the face,
     (n_slots, 7, 3)."""
     low_mm: FloatArray
-    high_mm: FloatArray  # Boxes; the first is not used, (n_boxes, 3). [mm]
+    high_mm: FloatArray  #: Boxes; the first is not used, (n_boxes, 3). [mm]
     turns: FloatArray
     """tan(θ/2) of the edges, opposite to each corner, that are hollow creases; 0 of others, (n_slots, 3)."""
-    radius_mm: float  # Distance over which hollow creases are filled; 0 if there are none. [mm]
+    radius_mm: float  #: Distance over which hollow creases are filled; 0 if there are none. [mm]
 
     @classmethod
     def of(
