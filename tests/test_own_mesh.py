@@ -9,7 +9,7 @@ import fingerpad as fp
 from fingerpad.experiments.requests.stimuli import read_stimuli
 from fingerpad.export.decks import abaqus_deck
 from fingerpad.export.job import job_of
-from fingerpad.geometry.free_mesh import FreeMesh, MeshParts, closest_on_triangles, finger_from
+from fingerpad.geometry.free_mesh import FreeMesh, MeshParts, finger_from
 from fingerpad.geometry.mesh import LAYERS
 from fingerpad.geometry.mesh_checks import FACES, faces_of, jacobian_at_gauss
 from fingerpad.geometry.mesh_files import _read_inp, _read_msh
@@ -214,21 +214,6 @@ def test_wedges_share_a_triangle_whichever_corner_each_repeats():
     times = np.bincount(number)[number]
     assert np.count_nonzero(times == 1) == 8
     assert [sorted(set(face)) for face in faces[times == 2].tolist()] == [[3, 4, 5], [3, 4, 5]]
-
-
-def test_closest_points_lie_on_the_surface():
-    generator = np.random.default_rng(1)
-    points = generator.normal(size=(200, 3))
-    corners = generator.normal(size=(20, 3, 3))
-    triangle, weights = closest_on_triangles(points, corners)
-    assert (weights >= 0.0).all()
-    np.testing.assert_allclose(weights.sum(axis=1), 1.0)
-    found = np.linalg.norm((weights[..., None] * corners[triangle]).sum(axis=1) - points, axis=1)
-    tried = generator.dirichlet([1.0, 1.0, 1.0], size=700)
-    sampled = np.einsum("ka,tad->tkd", tried, corners).reshape(-1, 3)
-    nearest = np.linalg.norm(points[:, None] - sampled, axis=2).min(axis=1)
-    assert (found <= nearest + 1e-12).all()
-    assert (nearest - found).max() < 0.2
 
 
 def test_exports_take_a_mesh_of_one_s_own(parts, tmp_path):

@@ -83,6 +83,22 @@ def slope_of(body, points):
     return np.stack(rise, axis=1) / 2e-6
 
 
+def test_closest_points_lie_on_the_triangles():
+    generator = np.random.default_rng(1)
+    points, corners = generator.normal(size=(200, 3)), generator.normal(size=(20, 3, 3))
+    faces = np.append(np.arange(60).reshape(20, 3), [[0, 1, 1]], axis=0)  # the last one is a line
+    row, found = Triangles.of(corners.reshape(-1, 3), faces).closest(points)
+    shares = np.linalg.solve(corners[row].transpose(0, 2, 1), found[..., None])[..., 0]
+    assert (shares >= -1e-9).all()
+    np.testing.assert_allclose(shares.sum(axis=1), 1.0)
+    tried = generator.dirichlet([1.0, 1.0, 1.0], size=700)
+    sampled = np.einsum("ka,tad->tkd", tried, corners).reshape(-1, 3)
+    nearest = np.linalg.norm(points[:, None] - sampled, axis=2).min(axis=1)
+    away = np.linalg.norm(found - points, axis=1)
+    assert (away <= nearest + 1e-12).all()
+    assert (nearest - away).max() < 0.2
+
+
 def test_the_middle_of_a_bowl_is_far_from_it_without_looking_at_all_of_its_triangles():
     line = np.linspace(-11.8, 11.8, 160)
     bowl = fp.height_surface(-np.sqrt(12.0**2 - np.minimum(line**2 + line[:, None] ** 2, 140.0)), 0.1484)

@@ -31,9 +31,12 @@ from fingerpad.geometry.mesh_checks import (
     place,
     repeats_nodes,
 )
+from fingerpad.geometry.triangles import Triangles
 
 SETS = ("skin", "bone", "nail", "fixed", "symmetry", *LAYERS)
 """Names of sets; a file may write them with other capitals, and with _ or - for a space."""
+
+UPTURNED = np.array([1.0, -1.0, 1.0])
 
 # The corners across the element from those of each of `FACES`.
 _OPPOSITE = [[4, 7, 6, 5], [0, 1, 2, 3], [3, 2, 6, 7], [0, 3, 7, 4], [1, 0, 4, 5], [2, 1, 5, 6]]
@@ -88,14 +91,22 @@ class FreeMesh(Mesh):
         """Distance of each node from the skin, (n_nodes,). [mm]"""
         return np.linalg.norm(self.nodes_mm - self.on_skin(self.nodes_mm)[0], axis=1)
 
+    @cached_property
+    def upturned_skin(self) -> Triangles:
+        """The skin turned over, so that the pad is its top."""
+        return Triangles.of(self.nodes_mm * UPTURNED, self.skin_triangles)
+
     def on_skin(self, points_mm: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Find the closest points of the skin."""
-        triangle, weights = closest_on_triangles(points_mm, self.nodes_mm[self.skin_triangles])
+        triangle, feet = self.upturned_skin.closest(points_mm * UPTURNED)
+        feet = feet * UPTURNED
         nodes = self.skin_triangles[triangle]
-        feet = (weights[..., None] * self.nodes_mm[nodes]).sum(axis=1)
-        normals = (weights[..., None] * self.skin_normals[nodes]).sum(axis=1)
         corners = self.nodes_mm[nodes]
         sides = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2)
+        # The weight of a corner is the area of the triangle of the others and the foot.
+        ahead, behind = (np.roll(corners, -step, axis=1) - feet[:, None] for step in (1, 2))
+        weights = np.linalg.norm(np.cross(ahead, behind), axis=2)
+        normals = (weights[..., None] * self.skin_normals[nodes]).sum(axis=1)
         return feet, normals / np.linalg.norm(normals, axis=1, keepdims=True), sides.max(axis=1)
 
 
@@ -154,44 +165,27 @@ class FingerMesh(Finger):
         return self.mesh
 
     @cached_property
-    def _upright(self) -> tuple[FloatArray, FloatArray]:
-        """Triangles of the skin, (n, 3, 3), and of the bone where its faces are known. [mm]"""
+    def _upturned_bone(self) -> Triangles | None:
+        """Faces of the bone turned over, if they are known."""
         mesh = self.mesh
         faces = mesh.elements[:, FACES].reshape(-1, 4)
         held = faces[np.isin(faces, mesh.bone_nodes).all(axis=1)]
         cut = np.concatenate([held[:, [0, 1, 2]], held[:, [0, 2, 3]]])
-        return mesh.nodes_mm[mesh.skin_triangles], mesh.nodes_mm[cut]
+        return Triangles.of(mesh.nodes_mm * UPTURNED, cut) if len(cut) else None
 
-    def _heights(self, triangles: FloatArray, x: FloatArray, z: FloatArray) -> list[FloatArray]:
-        """Heights y at which the upright line through each (x, z) meets triangles; mirrored if halved."""
-        z = z if self.mesh.full else np.abs(z)
-        low, high = triangles.min(axis=1), triangles.max(axis=1)
-
-        def cross(one: FloatArray, other: FloatArray) -> FloatArray:
-            return one[:, 0] * other[:, 2] - one[:, 2] * other[:, 0]
-
-        found = []
-        for here in np.stack([x, np.zeros_like(x), z], axis=1):
-            beside = (low > here) | (high < here)
-            a, b, c = np.moveaxis(triangles[~beside[:, 0] & ~beside[:, 2]], 1, 0)
-            area = cross(b - a, c - a)
-            safe = np.where(area == 0.0, 1.0, area)
-            u, v = cross(here - a, c - a) / safe, cross(b - a, here - a) / safe
-            inside = (area != 0.0) & (np.minimum(u, v) >= -1e-9) & (u + v <= 1.0 + 1e-9)
-            found.append((a + u[:, None] * (b - a) + v[:, None] * (c - a))[inside, 1])
-        return found
+    def _upturned(self, x: FloatArray, z: FloatArray) -> FloatArray:
+        return np.stack([x, np.zeros_like(x), z if self.mesh.full else np.abs(z)], axis=-1).reshape(-1, 3)
 
     def skin_point(self, x_mm: ArrayLike, z_mm: ArrayLike) -> FloatArray:
         x, z = np.broadcast_arrays(np.asarray(x_mm, dtype=np.float64), np.asarray(z_mm, dtype=np.float64))
-        heights = self._heights(self._upright[0], x.ravel(), z.ravel())
-        for here_x, here_z, height in zip(x.ravel(), z.ravel(), heights, strict=True):
-            if not height.size:
-                raise InputError(
-                    "position",
-                    "must lie on the finger, on the skin of its mesh",
-                    f"x = {here_x:g}, z = {here_z:g} mm",
-                )
-        y = np.array([height.min() for height in heights]).reshape(x.shape)
+        y = -self.mesh.upturned_skin.top(self._upturned(x, z))[0].reshape(x.shape)
+        if np.isinf(y).any():
+            here = np.isinf(y).argmax()
+            raise InputError(
+                "position",
+                "must lie on the finger, on the skin of its mesh",
+                f"x = {x.flat[here]:g}, z = {z.flat[here]:g} mm",
+            )
         return np.stack([x, y, z], axis=-1)
 
     def skin_normal(self, points_mm: ArrayLike) -> FloatArray:
@@ -199,17 +193,16 @@ class FingerMesh(Finger):
         return self.mesh.on_skin(points.reshape(-1, 3))[1].reshape(points.shape)
 
     def depth_available_mm(self, x_mm: ArrayLike, z_mm: ArrayLike) -> FloatArray:
-        below = self.skin_point(x_mm, z_mm)
-        x, y, z = below.reshape(-1, 3).T
-        bone, skin = (self._heights(triangles, x, z) for triangles in self._upright[::-1])
-        ends = [
-            min(hit[hit > start], default=max(back, default=start))
-            for start, hit, back in zip(y, bone, skin, strict=True)
-        ]
-        depth = np.array(ends) - y
+        x, y, z = np.moveaxis(self.skin_point(x_mm, z_mm), -1, 0)
+        points, bone = self._upturned(x, z), self._upturned_bone
         # A mesh may end at the bone without a face there, or have no back.
-        reach = float(np.ptp(self.mesh.nodes_mm[:, 1]))
-        return np.where(depth > 0.0, depth, reach).reshape(below.shape[:-1])
+        ends = [] if bone is None else [-bone.top(points)[0]]
+        ends.append(Triangles.of(self.mesh.nodes_mm, self.mesh.skin_triangles).top(points)[0])
+        depth = np.full(x.shape, float(np.ptp(self.mesh.nodes_mm[:, 1])))
+        for end in reversed(ends):
+            way = end.reshape(x.shape) - y
+            depth = np.where((way > 1e-9) & np.isfinite(way), way, depth)
+        return depth
 
     def own_grading(self, x_mm: Finite, z_mm: Finite) -> Grading:
         corners = self.mesh.nodes_mm[self.mesh.skin_triangles]
@@ -219,39 +212,6 @@ class FingerMesh(Finger):
         size = float(np.median(longest[np.argsort(away)[:32]]) / np.sqrt(2))
         extent = np.ptp(self.mesh.nodes_mm, axis=0)
         return Grading(x_mm, extent[0], extent[2], size, size, float(extent.max()), full=self.mesh.full)
-
-
-def closest_on_triangles(points_mm: FloatArray, corners_mm: FloatArray) -> tuple[IntArray, FloatArray]:
-    """Triangle closest to each point, and the weights (n, 3) of its corners there; triangles are of one size.
-
-    The closest point is that of the triangle's plane, if it lies inside, or of one of the edges.
-    """
-    count = min(24, len(corners_mm))  # Triangles that are looked at: those whose middles are nearest.
-    near = cKDTree(corners_mm.mean(axis=1)).query(points_mm, k=count)[1].reshape(len(points_mm), count)
-    corners, points = corners_mm[near], points_mm[:, None]
-    a = corners[..., 0, :]
-    ab, ac, ap = corners[..., 1, :] - a, corners[..., 2, :] - a, points - a
-    d00, d01, d11 = (ab * ab).sum(-1), (ab * ac).sum(-1), (ac * ac).sum(-1)
-    d20, d21 = (ap * ab).sum(-1), (ap * ac).sum(-1)
-    area = d00 * d11 - d01 * d01
-    safe = np.where(area > 0.0, area, 1.0)
-    v, w = (d11 * d20 - d01 * d21) / safe, (d00 * d21 - d01 * d20) / safe
-    on_face = np.stack([1.0 - v - w, v, w], axis=-1)
-    ways = [on_face]
-    for first, second in ((0, 1), (1, 2), (2, 0)):
-        edge = corners[..., second, :] - corners[..., first, :]
-        square = (edge * edge).sum(-1)
-        along = ((points - corners[..., first, :]) * edge).sum(-1) / np.where(square > 0.0, square, 1.0)
-        on_edge = np.zeros_like(on_face)
-        on_edge[..., second] = np.clip(along, 0.0, 1.0)
-        on_edge[..., first] = 1.0 - on_edge[..., second]
-        ways.append(on_edge)
-    weights = np.stack(ways, axis=2)
-    away = np.linalg.norm(weights @ corners - points[:, None], axis=-1)
-    away[:, :, 0][(area <= 0.0) | (on_face < 0.0).any(axis=-1)] = np.inf
-    best = away.reshape(len(points), -1).argmin(axis=1)
-    rows = np.arange(len(points))
-    return near[rows, best // 4], weights.reshape(len(points), -1, 3)[rows, best]
 
 
 @dataclass(frozen=True)

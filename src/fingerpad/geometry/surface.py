@@ -198,7 +198,7 @@ class Surface(Indenter):
         found = []
         for layer in range(int(layers.max()) + 1):
             faces = self.faces[layers == layer]
-            faces = _with_area(vertices, faces if layer else np.concatenate([faces, walls]))
+            faces = faces if layer else np.concatenate([faces, walls])
             found.append(Triangles.of(vertices, faces, self.smooth_below_deg, HOLLOW_MM))
         return tuple(found)
 
@@ -348,12 +348,6 @@ def _is_crack(vertices_mm: FloatArray, faces: IntArray, border: IntArray) -> np.
     return (np.array(gaps) < 0.72 * step).any(axis=0)
 
 
-def _with_area(vertices_mm: FloatArray, faces: IntArray) -> IntArray:
-    """Triangles that are no lines or points."""
-    first, second, third = vertices_mm[faces].transpose(1, 0, 2)
-    return faces[(np.cross(second - first, third - first) != 0.0).any(axis=1)]
-
-
 def _half_edges(faces: IntArray) -> tuple[IntArray, IntArray, IntArray, IntArray]:
     """Begin and end of all sides of all triangles, the number of their edge, and the sides of each edge."""
     a, b = faces.T.ravel(), faces[:, [1, 2, 0]].T.ravel()
@@ -472,7 +466,7 @@ def _check_walls(vertices: FloatArray, faces: IntArray) -> None:
     normal /= np.where(length > 0.0, length, 1.0)[:, None]
     steep = np.abs(normal[:, 1]) < _STEEP
     for number in range(int(layer.max()) + 1):
-        tree = Triangles.of(vertices, _with_area(vertices, faces[layer == number]))
+        tree = Triangles.of(vertices, faces[layer == number])
         others = np.flatnonzero((layer != number) & (length > 0.0) & steep)
         gap, facing = tree.gap(middle[others])
         meets = np.flatnonzero((np.abs(gap) <= JOIN_MM) & ((facing * normal[others]).sum(axis=1) < -0.9))

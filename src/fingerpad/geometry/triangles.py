@@ -51,16 +51,20 @@ class Triangles:
     turns: FloatArray
     """tan(θ/2) of the edges, opposite to each corner, that are hollow creases; 0 of others, (n_slots, 3)."""
     radius_mm: float  #: Distance over which hollow creases are filled; 0 if there are none. [mm]
+    rows: IntArray  #: Row of each among the triangles that were given, (n_slots,).
 
     @classmethod
     def of(
         cls, vertices_mm: FloatArray, faces: IntArray, smooth_below_deg: float = 0.0, radius_mm: float = 0.0
     ) -> Triangles:
-        """Sort triangles with area into a tree.
+        """Sort triangles into a tree, without those that are lines or points.
 
         Hollow creases below an angle are filled over `radius_mm`, or three of their usual lengths if that is
         less: the work grows with the number of triangles within.
         """
+        first, second, third = vertices_mm[faces].transpose(1, 0, 2)
+        rows = np.flatnonzero((np.cross(second - first, third - first) != 0.0).any(axis=1))
+        faces = faces[rows]
         corners = vertices_mm[faces]
         order = np.argsort(_morton(corners.mean(axis=1)), kind="stable")
         slots = _LEAF << max(0, int(np.ceil(np.log2(max(1.0, len(faces) / _LEAF)))))
@@ -83,7 +87,7 @@ class Triangles:
             low[level : 2 * level] = low[children].reshape(level, 2, 3).min(axis=1)
             high[level : 2 * level] = high[children].reshape(level, 2, 3).max(axis=1)
             level //= 2
-        return cls(corners, normals, low, high, turns, radius_mm)
+        return cls(corners, normals, low, high, turns, radius_mm, rows[order])
 
     def top(self, points_mm: PointsMm) -> tuple[FloatArray, np.ndarray]:
         """Height y of the highest triangle above or below each point (n, 3), -inf beside all; slot. [mm]"""
@@ -97,13 +101,22 @@ class Triangles:
 
         On the surface the gradient is the normal of a face, or the mean normal of an edge or a corner.
         """
+        return self._gaps(points_mm)[:2]
+
+    def closest(self, points_mm: PointsMm) -> tuple[IntArray, FloatArray]:
+        """Row of the triangle closest to each point, and its closest point, (n,) and (n, 3), unfilled."""
+        gap, normal, slot = self._gaps(points_mm)
+        return self.rows[slot], points_mm - gap[:, None] * normal
+
+    def _gaps(self, points_mm: PointsMm) -> tuple[FloatArray, FloatArray, IntArray]:
         points_mm = np.ascontiguousarray(points_mm, dtype=np.float64)
         gap, normal = np.empty(len(points_mm)), np.empty((len(points_mm), 3))
+        slot = np.empty(len(points_mm), dtype=np.int64)
         run_kernel(
             _gaps, len(points_mm), points_mm, self.corners_mm, self.normals, self.low_mm, self.high_mm,
-            self.turns, self.radius_mm, gap, normal,
+            self.turns, self.radius_mm, gap, normal, slot,
         )  # fmt: skip
-        return gap, normal
+        return gap, normal, slot
 
 
 def _morton(points: FloatArray) -> IntArray:
@@ -255,7 +268,8 @@ def _highest(
 @njit(cache=True, nogil=True)
 def _gaps(
     points: FloatArray, corners: FloatArray, normals: FloatArray, low: FloatArray, high: FloatArray,
-    turns: FloatArray, radius: float, gap: FloatArray, normal: FloatArray, begin: int, end: int,
+    turns: FloatArray, radius: float, gap: FloatArray, normal: FloatArray, slots: np.ndarray,
+    begin: int, end: int,
 ) -> None:  # fmt: skip  # pragma: no cover (compiled)
     n_leaves = len(low) // 2
     stack, path = np.empty((2, 64), dtype=np.int64)
@@ -294,7 +308,7 @@ def _gaps(
                 above = p[1] > _highest(p, corners, low, high, path)[0]
                 if above:
                     break
-        last = np.sqrt(nearest)
+        last, slots[number] = np.sqrt(nearest), found
         for axis in range(3):
             closest[axis] = p[axis] - n[axis]
         mean = normals[found, feature]
