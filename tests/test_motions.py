@@ -65,15 +65,18 @@ def test_a_stroke_along_corners_keeps_its_speed_and_comes_back_the_same_way():
 
 
 def test_a_rotation_turns_at_its_speed_and_is_looked_at_on_its_way():
-    motion = fp.rotation(force_mn=100.0, spin_deg=90.0, tilt_deg=0.0, speed_deg_per_s=45.0, turns=2)
+    motion = fp.stroke(force_mn=100.0, spin_deg=90.0, tilt_deg=0.0, speed_deg_per_s=45.0, strokes=2)
     assert motion.spin_deg == (0.0, 0.0, 0.0, 90.0, 0.0)
-    assert motion.tilt_deg == (0.0,) * 5
+    assert motion.x_mm is motion.z_mm is motion.tilt_deg is None
     assert np.diff(motion.times_ms).tolist() == [50.0, 950.0, 2000.0, 2000.0]
-    assert [phase.name for phase in motion.phases] == ["ramp", "hold", "turn", "turn 2"]
+    assert [phase.name for phase in motion.phases] == ["ramp", "hold", "stroke", "stroke 2"]
     turned = [pose.spin_deg for pose in motion.poses]
     np.testing.assert_allclose(turned, [0.0, 0.0, *range(0, 91, 10), *range(80, -1, -10)], atol=1e-12)
-    rocked = fp.rotation(0.5, tilt_deg=[10.0, -10.0, 0.0], speed_deg_per_s=20.0, hold_ms=0.0)
+    rocked = fp.stroke(0.5, tilt_deg=[10.0, -10.0, 0.0], speed_deg_per_s=20.0, hold_ms=0.0)
     assert rocked.times_ms == (0.0, 50.0, 550.0, 1550.0, 2050.0)
+    rolled = fp.stroke(0.5, speed_mm_per_s=10.0, x_mm=[3.0, 0.0], spin_deg=[0.0, 40.0], hold_ms=0.0)
+    assert rolled.times_ms == (0.0, 50.0, 350.0, 650.0)
+    assert rolled.spin_deg == (0.0, 0.0, 0.0, 40.0)
 
 
 def test_touches_can_be_repeated_by_force():
@@ -132,12 +135,14 @@ test_motions_that_cannot_be_are_refused = refusals(
     (lambda: fp.sampled(100.0, lambda t: 1.0 + t), "depth_mm must begin with 0 or less"),
     (lambda: fp.sampled(0.0, lambda t: t), ("end_ms",)),
     (lambda: fp.staircase([0.5], [50.0]), "either depth_mm or force_mn"),
-    (lambda: fp.stroke(0.5, speed_mm_per_s=20.0), "a stroke needs a way"),
+    (lambda: fp.stroke(0.5, speed_mm_per_s=20.0), "A stroke needs a way: x_mm or z_mm must not be 0"),
+    (lambda: fp.stroke(0.5, x_mm=1.0), "either speed_mm_per_s or speed_deg_per_s"),
+    (lambda: fp.stroke(0.5, speed_mm_per_s=1.0, speed_deg_per_s=1.0, x_mm=1.0), "give one of them"),
     (lambda: fp.stroke(0.5, speed_mm_per_s=20.0, x_mm=[1.0, 1.0]), "change from corner to corner"),
-    (lambda: fp.stroke(0.5, speed_mm_per_s=20.0, x_mm=[1.0, 2.0], z_mm=1.0), "must have as many corners"),
+    (lambda: fp.stroke(0.5, speed_mm_per_s=20.0, x_mm=[1.0, 2.0], z_mm=1.0), "of a stroke must have as many"),
     (lambda: fp.stroke(0.5, speed_mm_per_s=20.0, x_mm=[1.0, math.nan]), "x_mm must hold finite numbers"),
     (lambda: fp.stroke(0.5, speed_mm_per_s=20.0, x_mm="a"), "x_mm must be a finite number .mm.: got 'a'"),
-    (lambda: fp.rotation(0.5, speed_deg_per_s=20.0), "a rotation needs an angle"),
+    (lambda: fp.stroke(0.5, speed_deg_per_s=20.0, x_mm=1.0), "tilt_deg or spin_deg must not be 0"),
     (lambda: fp.repeated(0.5, force_mn=50.0), "either depth_mm or force_mn"),
     (lambda: fp.chirp(0.8, 0.05, (5.0, 10.0), 100.0), "must leave time for a cycle"),
     (lambda: fp.Trajectory((0.0, 1.0, 0.5), (0.0, 1.0, 1.0)), "strictly: got 0.5 after 1, number 3"),

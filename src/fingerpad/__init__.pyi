@@ -63,7 +63,6 @@ from fingerpad.geometry.motions import chirp as chirp
 from fingerpad.geometry.motions import read_trajectory as read_trajectory
 from fingerpad.geometry.motions import reduced as reduced
 from fingerpad.geometry.motions import repeated as repeated
-from fingerpad.geometry.motions import rotation as rotation
 from fingerpad.geometry.motions import sampled as sampled
 from fingerpad.geometry.motions import sine as sine
 from fingerpad.geometry.motions import staircase as staircase

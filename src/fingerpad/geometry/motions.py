@@ -225,14 +225,17 @@ def stroke(
     depth_mm: Finite | None = None,
     force_mn: Finite | None = None,
     *,
-    speed_mm_per_s: Positive,
+    speed_mm_per_s: Positive | None = None,
+    speed_deg_per_s: Positive | None = None,
     x_mm: Corners = 0.0,
     z_mm: Corners = 0.0,
+    tilt_deg: Corners = 0.0,
+    spin_deg: Corners = 0.0,
     strokes: Count = 1,
     ramp_ms: Positive = protocol.RAMP.value,
     hold_ms: NotNegative = protocol.HOLD.value,
 ) -> Trajectory:
-    """Press, hold, then slide along the skin at a constant speed, straight or along corners, to and fro.
+    """Press, hold, then slide or turn at a constant speed, straight or along corners, to and fro.
 
     The phases are "ramp", "hold", "stroke", "stroke 2" and so on.
 
@@ -242,11 +245,16 @@ def stroke(
         Depth of the hold and of the strokes. [mm]
     force_mn : float, optional
         Instead of a depth, force on the whole finger. [mN]
-    speed_mm_per_s : float
+    speed_mm_per_s : float, optional
         Speed along the skin. [mm/s]
+    speed_deg_per_s : float, optional
+        Instead, speed of the rotation. [degrees/s]
     x_mm, z_mm : float or sequence of float, optional
         Where a stroke goes along the finger, distal positive, and across it: its end, or the corners of its
-        path after the start at 0; one of the two at least. [mm]
+        path after the start at 0. [mm]
+    tilt_deg, spin_deg : float or sequence of float, optional
+        How far the object tilts along the finger and turns about the normal of the skin, as of `Touch`, there
+        or at the same corners. What has the speed is not 0 throughout. [degrees]
     strokes : int, optional
         How often it goes there or back.
     ramp_ms, hold_ms : float, optional
@@ -260,49 +268,32 @@ def stroke(
     >>> square = stroke(force_mn=200, speed_mm_per_s=20.0, x_mm=[1, 1, 0, 0], z_mm=[0, 1, 1, 0])
     >>> square.end_ms, square.z_mm
     (1200.0, (0.0, 0.0, 0.0, 0.0, 1.0, 1.0, 0.0))
+    >>> stroke(force_mn=200.0, speed_deg_per_s=60.0, spin_deg=30.0, hold_ms=150.0).times_ms
+    (0.0, 50.0, 200.0, 700.0)
     """
-    since_ms, ways = _there_and_back("a stroke needs a way", speed_mm_per_s, strokes, x_mm=x_mm, z_mm=z_mm)
+    if (speed_mm_per_s is None) == (speed_deg_per_s is None):
+        raise InputError("A stroke needs either speed_mm_per_s or speed_deg_per_s: give one of them.")
+    corners = [np.atleast_1d(each) for each in (x_mm, z_mm, tilt_deg, spin_deg)]
+    number = max(each.size for each in corners)
+    corners = [each if each.any() else np.zeros(number) for each in corners]
+    if any(each.size != number for each in corners):
+        raise InputError(f"{', '.join(POSE_COLUMNS)} of a stroke must have as many corners, or be 0.")
+    path = np.array([(0.0, *each) for each in corners])
+    names, way = ("x_mm or z_mm", path[:2]) if speed_mm_per_s else ("tilt_deg or spin_deg", path[2:])
+    lengths = np.cumsum(np.hypot(*np.diff(way)))
+    if not (np.diff(lengths, prepend=0.0) > 0.0).all():
+        raise InputError(f"A stroke needs a way: {names} must not be 0, and change from corner to corner.")
+    shares = np.append(0.0, lengths / lengths[-1])
+    both = (shares[1:], path[:, 1:]), (1.0 - shares[-2::-1], path[:, -2::-1])
+    since_ms = np.concatenate([turn + both[turn % 2][0] for turn in range(strokes)])
+    since_ms *= MS_PER_S * lengths[-1] / (speed_mm_per_s or speed_deg_per_s)
+    columns = np.hstack([both[turn % 2][1] for turn in range(strokes)])
+    ways = {
+        name: tuple(column.tolist())
+        for name, column in zip(POSE_COLUMNS, columns, strict=True)
+        if column.any()
+    }
     return _on_a_hold(depth_mm, force_mn, ramp_ms, hold_ms, since_ms, ("stroke", strokes), **ways)
-
-
-@checked
-def rotation(
-    depth_mm: Finite | None = None,
-    force_mn: Finite | None = None,
-    *,
-    speed_deg_per_s: Positive,
-    spin_deg: Corners = 0.0,
-    tilt_deg: Corners = 0.0,
-    turns: Count = 1,
-    ramp_ms: Positive = protocol.RAMP.value,
-    hold_ms: NotNegative = protocol.HOLD.value,
-) -> Trajectory:
-    """Press, hold, then turn the object about its tip at a constant speed, once or to and fro.
-
-    The phases are "ramp", "hold", "turn", "turn 2" and so on.
-
-    Parameters
-    ----------
-    depth_mm, force_mn, ramp_ms, hold_ms : float, optional
-        As of `stroke`. [mm], [mN], [ms]
-    speed_deg_per_s : float
-        Speed of the rotation. [degrees/s]
-    spin_deg, tilt_deg : float or sequence of float, optional
-        How far it turns about the normal of the skin and tilts along the finger, as of `Touch`: to its end,
-        or to several angles one after the other; one of the two at least. [degrees]
-    turns : int, optional
-        How often it turns there or back.
-
-    Examples
-    --------
-    >>> motion = rotation(force_mn=200.0, spin_deg=30.0, speed_deg_per_s=60.0, turns=2, hold_ms=150.0)
-    >>> motion.times_ms, motion.spin_deg
-    ((0.0, 50.0, 200.0, 700.0, 1200.0), (0.0, 0.0, 0.0, 30.0, 0.0))
-    """
-    since_ms, ways = _there_and_back(
-        "a rotation needs an angle", speed_deg_per_s, turns, tilt_deg=tilt_deg, spin_deg=spin_deg
-    )
-    return _on_a_hold(depth_mm, force_mn, ramp_ms, hold_ms, since_ms, ("turn", turns), **ways)
 
 
 def _column(depth: Any, force: Any, course: Callable[[Any], tuple[float, ...]]) -> dict[str, Any]:
@@ -332,26 +323,6 @@ def _amplitude(**levels: float | None) -> float:
     if amplitude > level:
         raise InputError(name, f"must be at most force_mn, {level:g} mN", f"{amplitude:g}")
     return amplitude
-
-
-def _there_and_back(
-    needs: str, speed_per_s: float, count: int, **corners: Any
-) -> tuple[FloatArray, dict[str, tuple[float, ...]]]:
-    """Return times since the start [ms] and columns of a path from 0 along corners, there and back."""
-    given = [np.atleast_1d(way) for way in corners.values()]
-    number = max(way.size for way in given)
-    ways = [way if way.any() else np.zeros(number) for way in given]
-    if any(way.size != number for way in ways):
-        raise InputError(f"{' and '.join(corners)} must have as many corners, or one of them must be 0.")
-    path = np.array([(0.0, *way) for way in ways])
-    lengths = np.cumsum(np.hypot(*np.diff(path)))
-    if not (np.diff(lengths, prepend=0.0) > 0.0).all():
-        raise InputError(f"{' or '.join(corners)} must not be 0, and change from corner to corner: {needs}.")
-    shares = np.append(0.0, lengths / lengths[-1])
-    both = (shares[1:], path[:, 1:]), (1.0 - shares[-2::-1], path[:, -2::-1])
-    since = np.concatenate([turn + both[turn % 2][0] for turn in range(count)])
-    columns = np.hstack([both[turn % 2][1] for turn in range(count)]).tolist()
-    return MS_PER_S * lengths[-1] / speed_per_s * since, dict(zip(corners, map(tuple, columns), strict=True))
 
 
 def _on_a_hold(

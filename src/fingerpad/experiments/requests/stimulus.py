@@ -77,7 +77,7 @@ OBJECTS: dict[str, Callable[..., Indenter] | str] = {
 
 MOTIONS: dict[str, Callable[..., Motion] | str] = {
     RAMP_AND_HOLD: ramp_and_hold,
-    **{kind: kind for kind in ("sine", "chirp", "repeated", "staircase", "stroke", "rotation")},
+    **{kind: kind for kind in ("sine", "chirp", "repeated", "staircase", "stroke")},
     "recorded": recorded,
     "trajectory": "Trajectory",
 }  # How it can move, by kind.
