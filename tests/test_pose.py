@@ -12,7 +12,7 @@ from fingerpad import (
     PressSettings,
     Sphere,
     Trajectory,
-    rotation,
+    stroke,
     touch_of,
 )
 from fingerpad.geometry.mesh import block_mesh
@@ -107,7 +107,7 @@ def test_half_a_finger_and_a_wire_are_refused_what_they_cannot_do_and_bone_on_th
         touch_of(Fingertip(), Sphere(), aside, grading=half)
     # A bar mirrors itself at 0 and at 90 degrees, and not between; skin under a ball is twisted by friction.
     for body in (Bar(1.7, 0.3), Sphere()):
-        turned = rotation(0.5, spin_deg=90.0, speed_deg_per_s=90.0)
+        turned = stroke(0.5, spin_deg=90.0, speed_deg_per_s=90.0)
         assert touch_of(Fingertip(), body, turned).grading.full
         with pytest.raises(InputError, match="spin_deg of the motion needs a grading with full=True"):
             touch_of(Fingertip(), body, turned, grading=half)
@@ -141,7 +141,7 @@ def test_force_slides_a_sphere_whose_first_touch_is_off_its_axis():
 def test_a_ball_that_spins_under_constant_force_meets_the_torque_of_a_sliding_hertz_contact():
     """M = 3 pi / 16 mu F a, with a from the area of contact."""
     mesh, indenter, mu = block(), Sphere(curvature_per_m=250.0), 0.3
-    motion = rotation(force_mn=40.0, spin_deg=60.0, speed_deg_per_s=600.0, hold_ms=0.0)
+    motion = stroke(force_mn=40.0, spin_deg=60.0, speed_deg_per_s=600.0, hold_ms=0.0)
     first = touching(indenter, mesh)
     done = press(mesh, ELASTIC, indenter, first, motion, PressSettings(4, 2), friction=mu)
     work_uj = np.diff(done.energy.external_uj)[-3:]

@@ -11,11 +11,11 @@ from typing import Any
 
 import numpy as np
 from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
 from fingerpad.core.errors import InputError
 from fingerpad.core.values import FloatArray, IntArray
 from fingerpad.geometry.mesh import CORNERS, LAYERS, Mesh
+from fingerpad.geometry.triangles import groups
 
 FACES = np.array([[0, 3, 2, 1], [4, 5, 6, 7], [0, 1, 5, 4], [1, 2, 6, 5], [2, 3, 7, 6], [3, 0, 4, 7]])
 """Corners of the faces of a brick, counter-clockwise seen from outside."""
@@ -94,13 +94,6 @@ def squeezed_most(mesh: Mesh, displacement_mm: FloatArray) -> tuple[int, float]:
     ratio = (jacobian_at_gauss(deformed) / jacobian_at_gauss(mesh)).min(axis=1)
     element = int(ratio.argmin())
     return element, float(ratio[element])
-
-
-def joined(pairs: IntArray, count: int) -> tuple[int, IntArray]:
-    """Return the number of parts that pairs join `count` things to, and the part of each."""
-    graph = coo_array((np.ones(len(pairs), dtype=np.int8), pairs.T), shape=(count, count))
-    n_parts, part = connected_components(graph, directed=False)
-    return int(n_parts), part
 
 
 def near_plane(mesh: Mesh, z_mm: float = 0.0) -> np.ndarray:
@@ -241,13 +234,12 @@ def _check_held(mesh: Mesh) -> None:
     holds.data[:] = 1
     shared = (holds @ holds.T).tocoo()
     # Elements are joined by a face of a brick or a wedge, three nodes or more, not by an edge.
-    by_face = shared.data >= 3
-    n_parts, part_of = joined(np.stack([shared.row[by_face], shared.col[by_face]], axis=1), n_elements)
+    part_of = groups(np.array(shared.coords)[:, shared.data >= 3], n_elements)
     motions = _rigid_motions(mesh.nodes_mm)
     held = np.zeros((n_nodes, 3), dtype=bool)
     held[mesh.symmetry_nodes, 2] = True
     held[mesh.fixed_nodes] = True
-    for part in range(n_parts):
+    for part in range(part_of.max() + 1):
         members = np.flatnonzero(part_of == part)
         nodes = np.unique(mesh.elements[members])
         rows_held = motions[nodes][held[nodes]]
@@ -321,7 +313,7 @@ def _check_sheet(mesh: Mesh) -> None:
 
 def _pieces(edges: IntArray, among: IntArray, mesh: Mesh) -> list[IntArray]:
     """Nodes that edges join, each piece an array."""
-    _, part = joined(edges, len(mesh.nodes_mm))
+    part = groups(edges.T, len(mesh.nodes_mm))
     return [among[part[among] == number] for number in np.unique(part[among])]
 
 

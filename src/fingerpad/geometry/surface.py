@@ -11,8 +11,6 @@ from functools import cached_property, partial
 from typing import Annotated
 
 import numpy as np
-from scipy.sparse import coo_matrix
-from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from fingerpad.core.checked import value_class
@@ -38,7 +36,7 @@ from fingerpad.geometry.relief import (
     narrowest_relief,
     with_rounded_edges,
 )
-from fingerpad.geometry.triangles import Triangles
+from fingerpad.geometry.triangles import Sides, Triangles, groups
 
 SMALLEST_MM, LARGEST_MM = 0.1, 1000.0
 """Extents beyond which a surface is refused: its unit must be wrong. [mm]"""
@@ -295,19 +293,17 @@ def _repaired(vertices_mm: FloatArray, faces: IntArray) -> tuple[FloatArray, Int
 
 def _border_of(faces: IntArray) -> IntArray:
     """Edges of one triangle alone: the triangle and its two corners in their order, (n, 3)."""
-    a, b, edge, count = _half_edges(faces)
-    alone = np.flatnonzero(count[edge] == 1)
-    return np.column_stack([alone % len(faces), a[alone], b[alone]])
+    sides = Sides.of(faces)
+    alone = np.flatnonzero(sides.count == 1)
+    return np.column_stack([alone % len(faces), sides.begin[alone], sides.end[alone]])
 
 
 def _parts_of(faces: IntArray) -> tuple[IntArray, np.ndarray]:
     """Part of each triangle, joined along edges, and whether each part is closed."""
-    _, _, edge, count = _half_edges(faces)
-    order = np.argsort(edge, kind="stable")
-    same = np.flatnonzero(np.diff(edge[order]) == 0)
-    part = _labels(order[same] % len(faces), order[same + 1] % len(faces), len(faces))
+    sides = Sides.of(faces)
+    part = groups(sides.pairs() % len(faces), len(faces))
     closed = np.ones(int(part.max(initial=-1)) + 1, dtype=bool)
-    closed[part[np.flatnonzero(count[edge] == 1) % len(faces)]] = False
+    closed[np.tile(part, 3)[sides.count == 1]] = False
     return part, closed
 
 
@@ -348,25 +344,11 @@ def _is_crack(vertices_mm: FloatArray, faces: IntArray, border: IntArray) -> np.
     return (np.array(gaps) < 0.72 * step).any(axis=0)
 
 
-def _half_edges(faces: IntArray) -> tuple[IntArray, IntArray, IntArray, IntArray]:
-    """Begin and end of all sides of all triangles, the number of their edge, and the sides of each edge."""
-    a, b = faces.T.ravel(), faces[:, [1, 2, 0]].T.ravel()
-    keys = np.minimum(a, b) * (int(faces.max(initial=0)) + 1) + np.maximum(a, b)
-    _, edge, count = np.unique(keys, return_inverse=True, return_counts=True)
-    return a, b, edge, count
-
-
-def _labels(a: IntArray, b: IntArray, count: int) -> IntArray:
-    """Group of each of `count` things, where pairs a, b are in one."""
-    links = coo_matrix((np.ones(len(a), dtype=np.int8), (a, b)), shape=(count, count))
-    return connected_components(links, directed=False)[1].astype(np.int64)
-
-
 def _joined(vertices: FloatArray, faces: IntArray) -> tuple[FloatArray, IntArray, int, float]:
     """Join near vertices of borders, and of walls that face each other; how many are gone, largest move."""
     loose = np.zeros(len(vertices), dtype=bool)
     loose[_border_of(faces)[:, 1:]] = True
-    part = _labels(faces[:, [0, 1]].ravel(), faces[:, [1, 2]].ravel(), len(vertices))
+    part = groups(np.concatenate([faces[:, :2], faces[:, 1:]]).T, len(vertices))
     # Vertices within one part are far from each other, and may be many.
     used = np.flatnonzero(loose) if (part[faces] == part[faces[0, 0]]).all() else np.unique(faces)
     if not used.size:
@@ -376,15 +358,16 @@ def _joined(vertices: FloatArray, faces: IntArray) -> tuple[FloatArray, IntArray
         to = np.roll(faces, ahead, axis=1)
         np.minimum.at(shortest, faces, np.linalg.norm(vertices[faces] - vertices[to], axis=2))
     within = min(JOIN_MM, 0.1 * float(shortest[used].max()))
-    i, j = used[cKDTree(vertices[used]).query_pairs(within, output_type="ndarray")].T
+    pairs = used[cKDTree(vertices[used]).query_pairs(within, output_type="ndarray")].T
+    i, j = pairs
     # A short side must not shrink to a point.
     apart = np.linalg.norm(vertices[i] - vertices[j], axis=1)
     near = (part[i] != part[j]) | (loose[i] & loose[j])
     near &= apart <= 0.1 * np.minimum(shortest[i], shortest[j])
-    i, j = i[near], j[near]
-    walls = _on_equal_ones(_labels(i, j, len(vertices))[faces])[1]
+    pairs = pairs[:, near]
+    walls = _on_equal_ones(groups(pairs, len(vertices))[faces])[1]
     loose[faces[walls]] = True
-    label = _labels(i[loose[i] & loose[j]], j[loose[i] & loose[j]], len(vertices))
+    label = groups(pairs[:, loose[pairs].all(axis=0)], len(vertices))
     count = np.bincount(label)
     # Sums about one of them, so that equal ones stay where they are.
     about = np.empty((len(count), 3))
@@ -413,20 +396,18 @@ def _on_equal_ones(faces: IntArray) -> tuple[np.ndarray, np.ndarray]:
 
 def _parted(vertices: FloatArray, faces: IntArray) -> tuple[FloatArray, IntArray]:
     """Give closed parts that meet along an edge vertices of their own; raise an error if others meet."""
-    a, b, edge, count = _half_edges(faces)
-    if count.max() <= 2:
+    sides = Sides.of(faces)
+    if sides.count.max() <= 2:
         return vertices, faces
-    order = np.argsort(edge, kind="stable")
-    pair = order[count[edge[order]] == 2] % len(faces)
-    part = _labels(pair[::2], pair[1::2], len(faces))
-    _, sides = np.unique(np.tile(part, 3) * len(count) + edge, return_inverse=True)
-    wrong = np.flatnonzero((count[edge] > 2) & (np.bincount(sides)[sides] != 2))
+    part = groups(sides.pairs() % len(faces), len(faces))
+    own = np.unique(np.tile(part, 3) * len(sides.edge) + sides.edge, return_inverse=True)[1]
+    wrong = np.flatnonzero((sides.count > 2) & (np.bincount(own)[own] != 2))
     if wrong.size:
-        x, y, z = 0.5 * (vertices[a[wrong[0]]] + vertices[b[wrong[0]]])
+        x, y, z = 0.5 * (vertices[sides.begin[wrong[0]]] + vertices[sides.end[wrong[0]]])
         raise InputError(
             "A surface must have two triangles at most along each edge: "
-            f"{len(np.unique(edge[wrong])):,} edges have more, one at ({x:.4g}, {y:.4g}, {z:.4g}) mm; leave "
-            "out inner walls, for example by the Boolean union of a CAD program."
+            f"{len(np.unique(sides.edge[wrong])):,} edges have more, one at ({x:.4g}, {y:.4g}, {z:.4g}) mm; "
+            "leave out inner walls, for example by the Boolean union of a CAD program."
         )
     corner, number = np.unique(part[:, None] * len(vertices) + faces, return_inverse=True)
     return vertices[corner % len(vertices)], number.reshape(faces.shape)
@@ -434,16 +415,16 @@ def _parted(vertices: FloatArray, faces: IntArray) -> tuple[FloatArray, IntArray
 
 def _turned_alike(faces: IntArray) -> tuple[IntArray, int]:
     """Triangles turned so that neighbours have the same side out, as most of their part, and how many."""
-    a, _, edge, count = _half_edges(faces)
-    order = np.argsort(edge, kind="stable")
-    one, other = order[count[edge[order]] == 2].reshape(-1, 2).T
-    against = (a[one] == a[other]).astype(np.int64)
+    sides = Sides.of(faces)
+    one, other = sides.pairs()
+    against = (sides.begin[one] == sides.begin[other]).astype(np.int64)
     if not against.any():
         return faces, 0
     # Each triangle is there twice, as it is and turned; links join those of one side.
     n = len(faces)
     one, other = one % n, other % n
-    label = _labels(np.r_[one, one + n], np.r_[other + n * against, other + n * (1 - against)], 2 * n)
+    links = np.array([[one, one + n], [other + n * against, other + n * (1 - against)]])
+    label = groups(links.reshape(2, -1), 2 * n)
     if (label[:n] == label[n:]).any():
         raise InputError(
             "A surface must have two sides: a strip of its triangles has one, as a Möbius strip."

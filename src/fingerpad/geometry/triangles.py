@@ -19,6 +19,8 @@ from dataclasses import dataclass
 
 import numpy as np
 from numba import njit
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
 
 from fingerpad.core.threads import run_kernel
 from fingerpad.core.values import FloatArray, IntArray, PointsMm
@@ -69,11 +71,11 @@ class Triangles:
         order = np.argsort(_morton(corners.mean(axis=1)), kind="stable")
         slots = _LEAF << max(0, int(np.ceil(np.log2(max(1.0, len(faces) / _LEAF)))))
         order = np.concatenate([order, np.full(slots - len(order), order[-1])])
-        edge = _edges(faces, len(vertices_mm))
-        normals = _normals(corners, faces, edge, len(vertices_mm))
-        turns = _hollow_turns(corners, normals[:, 6], edge, smooth_below_deg)
-        sides = np.linalg.norm(np.roll(corners, -1, axis=1) - np.roll(corners, -2, axis=1), axis=2)
-        radius_mm = min(radius_mm, 3.0 * float(np.median(sides[turns > 0.0]))) if turns.any() else 0.0
+        sides = Sides.of(faces)
+        normals = _normals(corners, faces, _opposite(sides.edge), len(vertices_mm))
+        turns = _hollow_turns(corners, normals[:, 6], sides.pairs(), smooth_below_deg)
+        lengths = np.linalg.norm(np.roll(corners, -1, axis=1) - np.roll(corners, -2, axis=1), axis=2)
+        radius_mm = min(radius_mm, 3.0 * float(np.median(lengths[turns > 0.0]))) if turns.any() else 0.0
         turns = turns[order]
         turns[len(faces) :] = 0.0  # copies of the last triangle
         corners, normals = corners[order], normals[order]
@@ -130,11 +132,37 @@ def _morton(points: FloatArray) -> IntArray:
     return code
 
 
-def _edges(faces: IntArray, n_vertices: int) -> IntArray:
-    """Return the number of the edge opposite to each corner, which neighbours share, (n, 3)."""
-    sides = np.sort(faces[:, [[1, 2], [2, 0], [0, 1]]], axis=2)
-    _, edge = np.unique((sides[..., 0] * n_vertices + sides[..., 1]).ravel(), return_inverse=True)
-    return edge.reshape(faces.shape)
+def groups(pairs: IntArray, count: int) -> IntArray:
+    """Group of each of `count` things that pairs (2, n) join."""
+    links = coo_array((np.ones(pairs.shape[1], dtype=np.int8), tuple(pairs)), shape=(count, count))
+    return connected_components(links, directed=False)[1].astype(np.int64)
+
+
+@dataclass(frozen=True)
+class Sides:
+    """Sides of triangles: first those from the first corners to the second ones, then the others in turn."""
+
+    begin: IntArray
+    end: IntArray
+    edge: IntArray  #: Number of the edge, which neighbours share.
+    count: IntArray  #: How many sides this edge has.
+
+    @classmethod
+    def of(cls, faces: IntArray) -> Sides:
+        a, b = faces.T.ravel(), faces[:, [1, 2, 0]].T.ravel()
+        keys = np.minimum(a, b) * (int(faces.max(initial=0)) + 1) + np.maximum(a, b)
+        _, edge, count = np.unique(keys, return_inverse=True, return_counts=True)
+        return cls(a, b, edge, count[edge])
+
+    def pairs(self) -> IntArray:
+        """Both sides of each edge that has two, (2, n)."""
+        order = np.argsort(self.edge, kind="stable")
+        return order[self.count[order] == 2].reshape(-1, 2).T
+
+
+def _opposite(sides: np.ndarray) -> np.ndarray:
+    """Values of sides by the corners opposite to them, (n_triangles, 3)."""
+    return sides.reshape(3, -1).T[:, [1, 2, 0]]
 
 
 def _normals(corners: FloatArray, faces: IntArray, edge: IntArray, n_vertices: int) -> FloatArray:
@@ -155,29 +183,24 @@ def _normals(corners: FloatArray, faces: IntArray, edge: IntArray, n_vertices: i
 
 
 def _hollow_turns(
-    corners: FloatArray, face_normals: FloatArray, edge: IntArray, smooth_below_deg: float
+    corners: FloatArray, face_normals: FloatArray, pairs: IntArray, smooth_below_deg: float
 ) -> FloatArray:
     """tan(θ/2) of each edge of each triangle (opposite to its corner) that is filled, 0 of others, (n, 3)."""
-    order = np.argsort(edge.ravel(), kind="stable")
-    sorted_edges = edge.ravel()[order]
-    pair = np.flatnonzero(sorted_edges[1:] == sorted_edges[:-1])
-    (one, at), (other, beyond) = divmod(order[pair], 3), divmod(order[pair + 1], 3)
-    beside = corners[one, (at + 1) % 3]
+    (at, one), (beyond, other) = (divmod(sides, len(corners)) for sides in pairs)
+    beside = corners[one, at]
     cross = np.linalg.norm(np.cross(face_normals[one], face_normals[other]), axis=1)
     angle = np.arctan2(cross, (face_normals[one] * face_normals[other]).sum(axis=1))
-    rise = (face_normals[one] * (corners[other, beyond] - beside)).sum(axis=1)
-    back = (face_normals[other] * (corners[one, at] - beside)).sum(axis=1)
+    rise = (face_normals[one] * (corners[other, beyond - 1] - beside)).sum(axis=1)
+    back = (face_normals[other] * (corners[one, at - 1] - beside)).sum(axis=1)
     hollow = np.minimum(rise, back) > _LEAST_MM
     soft = angle < np.deg2rad(smooth_below_deg)
     ridge = np.zeros(len(corners))
     for side in (one, other):
         np.maximum.at(ridge, side, np.where(soft & ~hollow, angle, 0.0))
     least = np.maximum(_LEAST_RAD, _LEAST_SHARE * np.maximum(ridge[one], ridge[other]))
-    turns = np.zeros(edge.size)
-    turns[order[pair]] = turns[order[pair + 1]] = np.where(
-        soft & hollow & (angle > least), np.tan(angle / 2), 0.0
-    )
-    return turns.reshape(edge.shape)
+    turns = np.zeros(3 * len(corners))
+    turns[pairs] = np.where(soft & hollow & (angle > least), np.tan(angle / 2), 0.0)
+    return _opposite(turns)
 
 
 @njit(cache=True, nogil=True)
