@@ -177,21 +177,15 @@ def step_times_of(
         drifts = moved <= SAME_VALUE and length_ms > hold_steps * last_ms
         if moved > SAME and not drifts:
             steps = int(np.ceil(ramp_steps * max(moved, STEPS_ASIDE * way) - SAME))
-            since = np.linspace(0.0, length_ms, steps + 1)[1:]
+            since, last_ms = np.linspace(0.0, length_ms, steps + 1)[1:], length_ms / steps
             if steps > 1 and way > SAME:
                 since = np.concatenate([since[0] * np.array(ONSET_SHARES), since])
         elif length_ms > last_ms * (1.0 + SAME):
-            since = hold_ends_ms(length_ms, last_ms, hold_steps)
+            # The first step is as long as the one before, or shorter: relaxation is fastest at its beginning.
+            since = np.geomspace(min(last_ms, length_ms / hold_steps), length_ms, hold_steps)
+            last_ms = np.diff(since, prepend=0.0)[-1]
         else:
-            since = np.array([length_ms])
-        last_ms = since[-1] - (since[-2] if since.size > 1 else 0.0)
+            since, last_ms = np.array([length_ms]), length_ms
         found += (start + since[:-1]).tolist()
         found.append(end)
     return np.array(found)
-
-
-def hold_ends_ms(length_ms: float, first_ms: float, steps: int) -> FloatArray:
-    """Return ends of the steps of a hold since its start, growing from `first_ms` or less. [ms]"""
-    ends = np.geomspace(min(first_ms, length_ms / steps), length_ms, steps)
-    ends[-1] = length_ms
-    return ends

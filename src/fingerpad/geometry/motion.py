@@ -34,7 +34,6 @@ from fingerpad.geometry.courses import (
     check_speed,
     corners_of,
     divided_ms,
-    hold_ends_ms,
     onset_of,
     phases_of,
     step_times_of,
@@ -384,15 +383,6 @@ class _RampAndHold(Motion):
 
     def prescribed_at(self, times_ms: ArrayLike) -> FloatArray:
         return self.largest * np.clip(float_array("times_ms", times_ms, None) / self.ramp_ms, 0.0, 1.0)
-
-    def step_times_ms(self, ramp_steps: int, hold_steps: int) -> FloatArray:
-        """List the times to solve at: 0, equal ramp steps, hold steps that grow geometrically. [ms]"""
-        # The first hold step is as long as a ramp step, or shorter for a short hold, because relaxation is
-        # fastest right after the ramp.
-        ramp = np.linspace(0.0, self.ramp_ms, ramp_steps + 1)
-        return np.concatenate(
-            [ramp, self.ramp_ms + hold_ends_ms(self.hold_ms, self.ramp_ms / ramp_steps, hold_steps)]
-        )
 
 
 @value_class
