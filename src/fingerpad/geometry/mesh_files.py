@@ -16,16 +16,14 @@ from fingerpad.core.files import path_of, read_text
 from fingerpad.core.values import Finite, IntArray, Pair
 from fingerpad.geometry.free_mesh import FingerMesh, MeshParts, finger_from, plain_name
 from fingerpad.geometry.mesh import LAYERS
+from fingerpad.geometry.mesh_checks import FACES
 
 _REFUSED = (
     "bricks of 8 and wedges of 6 nodes are read: tetrahedra with linear displacements lock in tissue that "
     "hardly changes its volume, and elements of higher order have no kernel here; mesh with bricks or wedges"
 )
-_INP_FACES = {
-    6: ([0, 1, 2], [3, 4, 5], [0, 1, 4, 3], [1, 2, 5, 4], [2, 0, 3, 5]),
-    8: ([0, 1, 2, 3], [4, 5, 6, 7], [0, 1, 5, 4], [1, 2, 6, 5], [2, 3, 7, 6], [3, 0, 4, 7]),
-}
-"""Nodes of the faces S1, S2, ... of Abaqus, by the number of nodes of the element."""
+_AS_BRICK = {8: np.arange(8), 6: np.array([0, 1, 2, 2, 3, 4, 5, 5])}
+"""Nodes of a brick or a wedge as those of a brick."""
 
 Row = tuple[int, list[str]]  # A line's number and its words.
 
@@ -150,9 +148,8 @@ class _Read:
             {name: rows_of(f"set {name}", members, what) for name, members in sets.items()}
             for what, sets in (("node", self.node_sets), ("element", self.element_sets))
         )
-        wedge = [0, 1, 2, 2, 3, 4, 5, 5]
         elements = [
-            rows_of(f"element {number}", nodes if len(nodes) == 8 else [nodes[n] for n in wedge], "node")
+            rows_of(f"element {number}", nodes, "node")[_AS_BRICK[len(nodes)]]
             for number, nodes in self.elements.items()
         ]
         nodes = np.array(list(self.nodes.values()), dtype=np.float64).reshape(-1, 3)
@@ -263,7 +260,8 @@ def _inp_surface(read: _Read, name: str, rows: Sequence[Row]) -> list[int]:
             nodes = read.elements.get(label)
             if nodes is None:
                 continue  # an element that is not read, such as a rigid facet
-            faces = _INP_FACES[len(nodes)]
+            # Abaqus numbers faces as `FACES`, S1 and so on, without the side of a wedge that is an edge.
+            faces = _AS_BRICK[len(nodes)][FACES[np.arange(6) != 4] if len(nodes) == 6 else FACES]
             if not re.fullmatch(rf"S[1-{len(faces)}]", side.upper()):
                 read.wrong(
                     f"surface {name} must name faces S1 to S{len(faces)} of element {label}: got {side!r}",
