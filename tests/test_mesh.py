@@ -87,21 +87,6 @@ def test_every_brick_is_sound(resolution, request):
     assert quality[near].min() > 0.95
 
 
-@pytest.mark.parametrize("resolution", ["quick", "standard", "paper"])
-def test_the_finger_is_no_visible_polygon(resolution, request):
-    """From the side, over the tip, and at the contact, the skin turns by 30 degrees a line at most."""
-    mesh = request.getfixturevalue(resolution)
-    skin = mesh.nodes_mm[mesh.skin_grid]
-    volar = skin.shape[1] // 2 if mesh.full else 0
-    side = np.concatenate([skin[:, volar], skin[-2::-1, -1]])
-    section = skin[np.abs(skin[:, volar, 0] - CONTACT_X).argmin(), volar:]
-    assert side[-1, 1] > 0.0
-    for outline in (side, section):
-        normals = FINGER.skin_normal(outline)
-        turns = np.degrees(np.arccos(np.clip((normals[1:] * normals[:-1]).sum(axis=1), -1.0, 1.0)))
-        assert 10.0 < turns.max() < 30.0
-
-
 def test_sizes_are_those_of_the_presets(quick, standard, paper):
     assert 4_000 < len(quick.nodes_mm) < 8_000
     assert 12_000 < len(standard.nodes_mm) < 20_000
