@@ -18,7 +18,7 @@ from threadpoolctl import threadpool_limits
 from fingerpad.core.units import MM_PER_M
 from fingerpad.export.decks import calculix_deck
 from fingerpad.export.job import Job
-from fingerpad.geometry.indenters import Sphere
+from fingerpad.geometry.bodies import Sphere
 from fingerpad.geometry.mesh import Mesh, block_mesh
 from fingerpad.geometry.motion import RampAndHold
 from fingerpad.mechanics.contact import place

@@ -8,8 +8,8 @@ from matplotlib.figure import Figure
 from fingerpad.core.regions import Ellipse, poisson_disc
 from fingerpad.core.signals import ResponseMap
 from fingerpad.data import psychophysics
+from fingerpad.geometry.bodies import Sphere
 from fingerpad.geometry.fingertip import Fingertip
-from fingerpad.geometry.indenters import Sphere
 from fingerpad.neuron.population import Population
 from fingerpad.report import skin as touch_figure
 from fingerpad.report.style import BLACK, BLUE, GREY, new_figure

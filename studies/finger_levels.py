@@ -20,7 +20,7 @@ from fingerpad.data import cylinder_deflection, neuron, protocol
 from fingerpad.experiments.conditions import POSITIONS_MM, RECEPTOR_X_MM, Conditions
 from fingerpad.experiments.gerling2014.nerve import PIECES
 from fingerpad.experiments.gerling2014.skin import PLATE_DEPTHS_MM
-from fingerpad.geometry.indenters import Cylinder
+from fingerpad.geometry.bodies import Cylinder
 from fingerpad.inference.afferent_fit import CHANCE
 from fingerpad.neuron.exact_spikes import exact_trains
 from fingerpad.neuron.population import Population

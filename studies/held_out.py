@@ -24,8 +24,8 @@ from fingerpad.experiments.runner import Manifest, Runner
 from fingerpad.experiments.validation.observations import KINDS, Observation, Observations, read_observations
 from fingerpad.experiments.validation.request import LOADINGS, RAMP_AND_HOLD, ValidationRequest
 from fingerpad.experiments.validation.validation import Condition, predict, validate
-from fingerpad.geometry.edged_indenters import Grating
-from fingerpad.geometry.indenters import FlatPunch, Indenter, Plate
+from fingerpad.geometry.bodies import FlatPunch, Grating, Plate
+from fingerpad.geometry.indenters import Indenter
 from fingerpad.geometry.mesh_checks import jacobian_at_gauss
 from fingerpad.geometry.motion import RampAndHold
 from fingerpad.mechanics.press_settings import PressSettings

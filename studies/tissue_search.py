@@ -27,8 +27,8 @@ from fingerpad.experiments.gerling2014.percept import FITTED_SPHERES, fit_to_peo
 from fingerpad.experiments.gerling2014.skin import PLATE_DEPTHS_MM, deflection_r2
 from fingerpad.experiments.runner import Manifest, Runner
 from fingerpad.experiments.validation.observations import read_observations
+from fingerpad.geometry.bodies import Bar, Cylinder, Plate
 from fingerpad.geometry.grading import Grading
-from fingerpad.geometry.indenters import Bar, Cylinder, Plate
 from fingerpad.geometry.motion import RampAndHold
 from fingerpad.inference.afferent_fit import CHANCE, ToRatesAndHitRates
 from fingerpad.inference.fitting.methods import cross_validate, interleaved_folds

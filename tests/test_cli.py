@@ -20,7 +20,7 @@ from fingerpad.experiments.conditions import Conditions
 from fingerpad.experiments.requests.stimulus import FingerDescription
 from fingerpad.experiments.runner import Runner
 from fingerpad.experiments.schemas import request_schema
-from fingerpad.geometry.edged_indenters import INDENTERS
+from fingerpad.geometry.bodies import INDENTERS
 
 BALL = ["touch", "--object", "sphere"]
 

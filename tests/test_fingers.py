@@ -7,10 +7,10 @@ import pytest
 
 import fingerpad as fp
 from fingerpad.experiments.conditions import Conditions
+from fingerpad.geometry.bodies import Sphere
 from fingerpad.geometry.fingertip import FINGERS, Fingertip
 from fingerpad.geometry.grading import resolution_grading
 from fingerpad.geometry.indenter_grading import grading_about
-from fingerpad.geometry.indenters import Sphere
 from fingerpad.geometry.mesh_checks import check_mesh, scaled_jacobian
 from fingerpad.geometry.motion import RampAndHold
 from fingerpad.mechanics.laws import Energy, Hencky, Hyperfoam, Ogden, Polynomial

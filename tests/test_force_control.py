@@ -4,10 +4,9 @@ import numpy as np
 import pytest
 
 from fingerpad.core.errors import ConvergenceError, InputError
-from fingerpad.geometry.edged_indenters import Edge, Gap
+from fingerpad.geometry.bodies import Bar, Cylinder, Edge, FlatPunch, Gap, Line, Plate, Sphere
 from fingerpad.geometry.fingertip import Fingertip
 from fingerpad.geometry.grading import Grading
-from fingerpad.geometry.indenters import Bar, Cylinder, FlatPunch, Line, Plate, Sphere
 from fingerpad.geometry.mesh import block_mesh
 from fingerpad.geometry.motion import ForceRampAndHold, RampAndHold
 from fingerpad.mechanics import press as press_module

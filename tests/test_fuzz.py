@@ -32,7 +32,7 @@ from fingerpad.experiments.requests.stimuli import ShiftedBar, read_stimuli
 from fingerpad.experiments.requests.stimulus import TactileStimulus
 from fingerpad.experiments.runner import Runner
 from fingerpad.experiments.validation.observations import read_observations
-from fingerpad.geometry.dots import Dots
+from fingerpad.geometry.bodies import Dots
 from fingerpad.geometry.embossed import Embossed
 from fingerpad.geometry.motion import Cycles
 from fingerpad.geometry.surface import Surface

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import fingerpad as fp
-from fingerpad.geometry.dots import Dots
+from fingerpad.geometry.bodies import Dots
 from fingerpad.geometry.indenter_grading import THIN_SIZE_MM, first_touch_x_mm, grading_about
 from fingerpad.mechanics.assembly import Sparsity, assemble
 from fingerpad.mechanics.contact import place

@@ -17,7 +17,7 @@ from fingerpad.core.displayed import Result
 from fingerpad.core.units import unit_of
 from fingerpad.experiments.requests.stimuli import read_stimuli
 from fingerpad.experiments.requests.stimulus import indenter_named
-from fingerpad.geometry.edged_indenters import INDENTERS, sizes_of
+from fingerpad.geometry.bodies import INDENTERS, sizes_of
 from fingerpad.reduction.training import ReducedRange
 from fingerpad.skin.store import touch_key
 

@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from fingerpad.core.errors import InputError
+from fingerpad.geometry.bodies import Bar, Cylinder, FlatPunch, Line, Plate, Sphere
 from fingerpad.geometry.fingertip import Fingertip
-from fingerpad.geometry.indenters import Bar, Cylinder, FlatPunch, Indenter, Line, Plate, Sphere
+from fingerpad.geometry.indenters import Indenter
 from fingerpad.geometry.mesh import block_mesh
 from fingerpad.geometry.motion import ForceRampAndHold, RampAndHold, Trajectory
 from fingerpad.mechanics import press as press_module

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import fingerpad as fp
-from fingerpad.geometry.dots import Dots
+from fingerpad.geometry.bodies import Dots
 from fingerpad.geometry.probing import check_gap, mirrored, traced_front
 from fingerpad.skin.indentation import Touch
 from fingerpad.skin.store import touch_key

@@ -21,9 +21,9 @@ from fingerpad.experiments.gerling2014.nerve import FiringCourse, dynamic_share,
 from fingerpad.experiments.gerling2014.percept import SphereDiscrimination
 from fingerpad.experiments.gerling2014.skin import SkinForce
 from fingerpad.experiments.scores import Verdict
+from fingerpad.geometry.bodies import Bar, Cylinder, Line, Sphere
 from fingerpad.geometry.fingertip import Fingertip
 from fingerpad.geometry.grading import Grading
-from fingerpad.geometry.indenters import Bar, Cylinder, Line, Sphere
 from fingerpad.geometry.mesh import finger_mesh
 from fingerpad.geometry.motion import RampAndHold
 from fingerpad.inference.afferent_fit import response_surface, start_points

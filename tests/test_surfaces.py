@@ -11,8 +11,7 @@ import trimesh
 from PIL import Image
 
 import fingerpad as fp
-from fingerpad.geometry.composed import ridges
-from fingerpad.geometry.dots import Dots
+from fingerpad.geometry.bodies import Dots, ridges
 from fingerpad.geometry.grading import resolution_grading
 from fingerpad.geometry.height_maps import MOST_HEIGHTS
 from fingerpad.geometry.indenter_grading import grading_about

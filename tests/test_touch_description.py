@@ -34,7 +34,7 @@ from fingerpad.experiments.requests.touch import (
 from fingerpad.export.decks import FORMATS
 from fingerpad.export.requests import check_outputs
 from fingerpad.geometry import height_maps
-from fingerpad.geometry.dots import Dots
+from fingerpad.geometry.bodies import Dots
 from fingerpad.geometry.embossed import Embossed
 from fingerpad.neuron.afferent_types import afferent_types
 from fingerpad.skin.indentation import Touch

@@ -7,7 +7,7 @@ import pytest
 
 from fingerpad.core.errors import InputError
 from fingerpad.core.units import cosine_and_sine
-from fingerpad.geometry.edged_indenters import Edge, Gap, Grating
+from fingerpad.geometry.bodies import Bar, Cylinder, Edge, FlatPunch, Gap, Grating, Line, Plate, Sphere
 from fingerpad.geometry.fingertip import Fingertip
 from fingerpad.geometry.grading import Grading, covering
 from fingerpad.geometry.indenter_grading import (
@@ -17,7 +17,7 @@ from fingerpad.geometry.indenter_grading import (
     grading_about,
     sizes_across,
 )
-from fingerpad.geometry.indenters import Bar, Cylinder, FlatPunch, Indenter, Line, Plate, Sphere
+from fingerpad.geometry.indenters import Indenter
 from fingerpad.geometry.motion import ForceRampAndHold, RampAndHold
 from fingerpad.mechanics.press_settings import PressSettings
 from fingerpad.mechanics.tissues import named_tissues

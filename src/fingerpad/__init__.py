@@ -36,7 +36,7 @@ def __getattr__(name: str) -> object:
     if name not in _HOME:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     home = _HOME[name]
-    value = _import_module(f"{home}.{name}") if home == __name__ else getattr(_import_module(home), name)
+    value = vars(_import_module(home)).get(name) or _import_module(f"{home}.{name}")
     globals()[name] = value
     return value
 

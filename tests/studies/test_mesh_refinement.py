@@ -9,9 +9,9 @@ from fingerpad.core.result_files import from_json, to_json
 from fingerpad.data import bar_firing_rates
 from fingerpad.experiments import runner
 from fingerpad.experiments.conditions import RECEPTOR_X_MM, Conditions
+from fingerpad.geometry.bodies import Sphere
 from fingerpad.geometry.fingertip import Fingertip
 from fingerpad.geometry.grading import Grading
-from fingerpad.geometry.indenters import Sphere
 from fingerpad.geometry.mesh import finger_mesh
 from fingerpad.geometry.motion import RampAndHold
 from fingerpad.mechanics.press_settings import PressSettings

@@ -6,8 +6,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from fingerpad.geometry.edged_indenters import Edge, Gap
-from fingerpad.geometry.indenters import Bar, Cylinder, FlatPunch, Line, Plate, Sphere
+from fingerpad.geometry.bodies import Bar, Cylinder, Edge, FlatPunch, Gap, Line, Plate, Sphere
 from fingerpad.geometry.mesh import block_mesh
 from fingerpad.geometry.mesh_checks import jacobian_at_gauss
 from fingerpad.geometry.motion import RampAndHold

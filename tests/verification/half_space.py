@@ -13,7 +13,8 @@ import numpy as np
 from scipy.integrate import quad
 from scipy.optimize import brentq
 
-from fingerpad.geometry.indenters import Cylinder, FlatPunch, Indenter, Line, Plate, Sphere
+from fingerpad.geometry.bodies import Cylinder, FlatPunch, Line, Plate, Sphere
+from fingerpad.geometry.indenters import Indenter
 from fingerpad.geometry.mesh import Mesh, block_mesh
 from fingerpad.geometry.motion import ForceRampAndHold, RampAndHold
 from fingerpad.mechanics.configuration import Body, Load

@@ -15,8 +15,8 @@ import numpy as np
 
 from fingerpad.core.values import FloatArray
 from fingerpad.export.job import Job
+from fingerpad.geometry.bodies import Sphere
 from fingerpad.geometry.grading import graded_lines
-from fingerpad.geometry.indenters import Sphere
 from fingerpad.geometry.mesh import block_mesh
 from fingerpad.geometry.motion import RampAndHold, Trajectory
 from fingerpad.mechanics.contact import place

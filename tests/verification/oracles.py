@@ -15,11 +15,10 @@ import numpy as np
 from fingerpad.export import decks
 from fingerpad.export.decks import calculix_deck
 from fingerpad.export.job import Job, job_of
-from fingerpad.geometry.edged_indenters import Edge, Gap
+from fingerpad.geometry.bodies import Bar, Cylinder, Edge, FlatPunch, Gap, Line, Plate, Sphere
 from fingerpad.geometry.embossed import Embossed
 from fingerpad.geometry.fingertip import Fingertip
 from fingerpad.geometry.grading import Grading
-from fingerpad.geometry.indenters import Bar, Cylinder, FlatPunch, Line, Plate, Sphere
 from fingerpad.geometry.mesh import block_mesh
 from fingerpad.geometry.motion import RampAndHold
 from fingerpad.mechanics.contact import place

@@ -28,10 +28,10 @@ from fingerpad.core.errors import FingerpadError
 from fingerpad.core.files import write_atomically
 from fingerpad.core.values import FloatArray
 from fingerpad.data.tissues import DEFAULT_TISSUES
-from fingerpad.geometry.edged_indenters import Edge, Gap, Grating
+from fingerpad.geometry.bodies import Bar, Cylinder, Edge, FlatPunch, Gap, Grating, Line, Sphere
 from fingerpad.geometry.fingertip import Fingertip
 from fingerpad.geometry.grading import Grading, Strip
-from fingerpad.geometry.indenters import Bar, Cylinder, FlatPunch, Indenter, Line, Sphere
+from fingerpad.geometry.indenters import Indenter
 from fingerpad.geometry.mesh import LAYERS, Mesh
 from fingerpad.geometry.motion import RampAndHold, Trajectory
 from fingerpad.mechanics.press_settings import PressSettings

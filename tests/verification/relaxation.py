@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.interpolate import interp1d
 
-from fingerpad.geometry.indenters import Plate, Sphere
+from fingerpad.geometry.bodies import Plate, Sphere
 from fingerpad.geometry.mesh import block_mesh
 from fingerpad.geometry.motion import RampAndHold
 from fingerpad.geometry.motions import sine

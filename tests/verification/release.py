@@ -8,7 +8,7 @@ import numpy as np
 from scipy.integrate import cumulative_trapezoid, quad
 from scipy.optimize import brentq
 
-from fingerpad.geometry.indenters import Plate, Sphere
+from fingerpad.geometry.bodies import Plate, Sphere
 from fingerpad.geometry.mesh import block_mesh
 from fingerpad.geometry.motion import Motion, Trajectory
 from fingerpad.geometry.motions import repeated

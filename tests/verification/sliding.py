@@ -6,7 +6,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from fingerpad.geometry.indenters import Sphere
+from fingerpad.geometry.bodies import Sphere
 from fingerpad.geometry.mesh import block_mesh
 from fingerpad.geometry.motion import Trajectory
 from fingerpad.mechanics.contact import place

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from fingerpad.geometry.indenters import FlatPunch, Sphere
+from fingerpad.geometry.bodies import FlatPunch, Sphere
 
 from .case import Row, at_most, case, near
 from .press_table import Press, solved

@@ -6,9 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 
+from fingerpad.geometry.bodies import Cylinder, Sphere
 from fingerpad.geometry.fingertip import Fingertip
 from fingerpad.geometry.grading import Grading
-from fingerpad.geometry.indenters import Cylinder, Sphere
 from fingerpad.geometry.mesh import finger_mesh
 from fingerpad.geometry.motion import RampAndHold
 from fingerpad.mechanics.contact import place

@@ -61,11 +61,22 @@ _CALLS = {
 }
 
 
+def other_name(
+    meaning: str | Callable[..., Mapping[str, float]],
+    read: Callable[[Any], float] | None = None,
+    *,
+    default: None = None,
+    kw_only: bool = True,
+) -> Any:
+    """Make an `OtherName` that type checkers know, too; they need `default` and `kw_only` in the call."""
+    return OtherName(meaning, read)
+
+
 @overload
 def value_class(kind: type[_Kind]) -> type[_Kind]: ...
 @overload
 def value_class(*, eq: bool) -> Callable[[type[_Kind]], type[_Kind]]: ...
-@dataclass_transform(frozen_default=True, field_specifiers=(field,))
+@dataclass_transform(frozen_default=True, field_specifiers=(field, other_name))
 def value_class(kind: Any = None, *, eq: bool = True) -> Any:
     """Make a class a frozen dataclass whose fields hold what their annotations say.
 
@@ -85,6 +96,8 @@ def _frozen(kind: type[_Kind], strict: bool, **options: bool) -> type[_Kind]:
     from pydantic import ConfigDict
     from pydantic.dataclasses import dataclass
 
+    for name in other_names(kind):  # are no fields
+        vars(kind).get("__annotations__", {}).pop(name, None)
     config = ConfigDict(arbitrary_types_allowed=True, strict=strict, extra="forbid")
     made: Any = dataclass(frozen=True, config=config, **options)(kind)  # type: ignore[call-overload]
     return checked_class(made)

@@ -11,10 +11,11 @@ from fingerpad.core.checked import value_class
 from fingerpad.core.values import Finite, Numbers, Seed, choice
 from fingerpad.data import protocol, psychophysics
 from fingerpad.data.tissues import DEFAULT_TISSUES
+from fingerpad.geometry.bodies import Bar, Sphere
 from fingerpad.geometry.fingertip import Finger, Fingertip
 from fingerpad.geometry.grading import RESOLUTIONS, Grading, resolution_grading
 from fingerpad.geometry.indenter_grading import grading_about
-from fingerpad.geometry.indenters import Bar, Indenter, Sphere
+from fingerpad.geometry.indenters import Indenter
 from fingerpad.mechanics.materials import Tissues
 from fingerpad.mechanics.tissues import TISSUES
 from fingerpad.neuron.afferent import Afferent

@@ -15,8 +15,8 @@ import numpy as np
 from fingerpad.core.checked import checked
 from fingerpad.core.errors import InputError
 from fingerpad.core.values import FloatArray, IntArray, Positive
-from fingerpad.geometry.edged_indenters import Edge, Gap, Grating
-from fingerpad.geometry.indenters import Bar, Cylinder, FlatPunch, Indenter, Line, Plate, Sphere
+from fingerpad.geometry.bodies import Bar, Cylinder, Edge, FlatPunch, Gap, Grating, Line, Plate, Sphere
+from fingerpad.geometry.indenters import Indenter
 
 Point = tuple[float, float]
 

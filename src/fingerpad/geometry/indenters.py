@@ -3,29 +3,25 @@
 Every indenter has its own frame: its face touches y = 0, y is the direction of pressing (into the skin), x
 runs along the finger and z across it, unless the indentation turns the body. The body fills y < 0 below its
 face. `gap` is positive outside the body and negative inside; the normal points out of the body and is the
-direction of the contact force without friction. Edge, bar with a gap and grating are in
-`fingerpad.geometry.edged_indenters`.
+direction of the contact force without friction. Bodies are in `fingerpad.geometry.bodies`, and what makes
+one of others in `fingerpad.geometry.composed`.
 """
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from dataclasses import field, fields, is_dataclass, replace
-from typing import TYPE_CHECKING, ClassVar
+from dataclasses import fields, is_dataclass
+from typing import ClassVar
 
 import numpy as np
 
-from fingerpad.core.checked import OtherName, checked_class, value_class
+from fingerpad.core.checked import checked_class
 from fingerpad.core.errors import InputError
-from fingerpad.core.units import curvature_per_m, radius_mm
-from fingerpad.core.values import Finite, FloatArray, NotNegative, PointsMm, SizeMm, positive
-from fingerpad.data import protocol
+from fingerpad.core.values import Finite, FloatArray, PointsMm
 from fingerpad.geometry.probing import mirrored, traced_front
 
-SIZES_MM = (0.01, 400.0)
-"""Smallest and largest width or diameter of a body that is pressed into a fingertip. [mm]"""
-
-BESIDE_EDGE_MM = 0.4  # Distance from the wall of an edge within which the skin bends sharply. [mm]
+Gapped = tuple[FloatArray, FloatArray]  # Gap (n,) and outward unit normal (n, 3).
+ALONG, UP, ACROSS = np.eye(3)
 
 
 @checked_class
@@ -79,6 +75,10 @@ class Indenter(ABC):
         The gap is positive outside the body and negative inside. Near the face it is the distance; the
         normal is its gradient. Far away it may be less than the distance, with the same sign.
         """
+
+    def closed_gap(self, points_mm: PointsMm) -> tuple[FloatArray, FloatArray]:
+        """Gap and normal without straight sides below the widest section; those of `gap` by default."""
+        return self.gap(points_mm)
 
     def front(self, points_mm: PointsMm) -> FloatArray:
         """Y of the body's face towards the skin above the x and z of points (n, 3), -inf beside it. [mm]
@@ -164,11 +164,53 @@ def _content(body: Indenter) -> tuple[object, ...]:
     )
 
 
-def _norm_and_direction(offsets: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Length and unit direction of each row; a zero row points along y, the direction of pressing."""
+def ball(offsets: FloatArray, radius: float) -> Gapped:
+    """Gap and normal of all within a radius of a point or line, from offsets (n, 3) to it."""
     length = np.linalg.norm(offsets, axis=1)
     unit = offsets / np.where(length, length, 1.0)[:, None]
-    return length, np.where(length[:, None] > 0.0, unit, [0.0, 1.0, 0.0])
+    return length - radius, np.where(length[:, None] > 0.0, unit, UP)  # at the centre the way of pressing
+
+
+def from_axis(points: FloatArray) -> Gapped:
+    """Distance from the axis of pressing, and the direction away from it: along the finger on the axis."""
+    radial, outward = ball(points * (ALONG + ACROSS), 0.0)
+    return radial, np.where(radial[:, None] > 0.0, outward, ALONG)
+
+
+def corner(first: Gapped, second: Gapped) -> Gapped:
+    """Gap and normal of what two bodies have in common that meet at right angles: exact if theirs are."""
+    (a, of_a), (b, of_b) = first, second
+    beyond = np.maximum([a, b], 0.0)
+    outside = np.hypot(*beyond)
+    share = beyond / np.where(outside, outside, 1.0)
+    share = np.where(outside > 0.0, share, [a >= b, a < b])
+    return np.where(outside > 0.0, outside, np.maximum(a, b)), (share[..., None] * [of_a, of_b]).sum(axis=0)
+
+
+def rounded(inside: FloatArray, depth: FloatArray, outward: FloatArray, fillet: float) -> Gapped:
+    """Gap of a body with a flat top and rounded edges, from coordinates relative to its un-rounded core.
+
+    The body is all points within `fillet` of the core {inside <= 0, depth <= 0}: `inside` runs outwards
+    along the unit vector `outward` (n, 3), `depth` along y.
+    """
+    gap, normal = corner((depth, np.broadcast_to(UP, outward.shape)), (inside, outward))
+    return gap - fillet, normal
+
+
+def nearer(first: Gapped, second: Gapped) -> Gapped:
+    """Gap and normal of whichever of two bodies is nearer."""
+    is_first = first[0] <= second[0]
+    return np.where(is_first, first[0], second[0]), np.where(is_first[:, None], first[1], second[1])
+
+
+def deeper(first: Gapped, second: Gapped) -> Gapped:
+    """Give gap and normal of what two bodies have in common: exact inside, outside the distance or less."""
+    return turned_out(nearer(turned_out(first), turned_out(second)))
+
+
+def turned_out(body: Gapped) -> Gapped:
+    """Gap and normal of all that is outside of a body."""
+    return -body[0], -body[1]
 
 
 def round_front(beside: FloatArray, radius: float) -> FloatArray:
@@ -177,326 +219,9 @@ def round_front(beside: FloatArray, radius: float) -> FloatArray:
     return np.where(beside <= radius, height, -np.inf)
 
 
-def _rod_end(centred: FloatArray, beside: FloatArray, radius: float) -> tuple[FloatArray, FloatArray]:
-    """Gap and normal of a ball or cylinder from offsets (n, 3) to its centre or axis."""
-    # Behind its widest section the body goes on with straight sides: `beside` (n, 3) are the offsets along
-    # the finger and across only. Skin that has passed the widest section is then held beside the body, and
-    # the normal is the gradient of the gap everywhere (docs/decisions/small-bodies.md).
-    distance, normal = _norm_and_direction(np.where(centred[:, 1:2] < 0.0, beside, centred))
-    return distance - radius, normal
-
-
-def rounded(
-    inside: FloatArray, depth: FloatArray, outward: FloatArray, fillet: float
-) -> tuple[FloatArray, FloatArray]:
-    """Gap of a body with a flat top and rounded edges, from coordinates relative to its un-rounded core.
-
-    The body is all points within `fillet` of the core {inside <= 0, depth <= 0}: `inside` runs outwards
-    along the unit vector `outward` (n, 3), `depth` along y.
-    """
-    up = np.array([0.0, 1.0, 0.0])
-    beyond_side, beyond_top = np.maximum(inside, 0.0), np.maximum(depth, 0.0)
-    distance, direction = _norm_and_direction(beyond_side[:, None] * outward + beyond_top[:, None] * up)
-    within = (inside <= 0.0) & (depth <= 0.0)
-    nearest_face_is_top = depth >= inside
-    gap = np.where(within, np.maximum(inside, depth), distance) - fillet
-    normal = np.where(
-        within[:, None], np.where(nearest_face_is_top[:, None], up[None, :], outward), direction
-    )
-    return gap, normal
-
-
-def _of_diameter(radius_mm: float) -> dict[str, float]:
-    return {"diameter_mm": 2 * positive("radius_mm", radius_mm, "mm")}
-
-
-@value_class
-class Cylinder(Indenter):
-    """Cylinder that lies across the finger, its axis along z.
-
-    Parameters
-    ----------
-    diameter_mm : float
-        Diameter; the paper's is 3.17 mm. [mm]
-    radius_mm : float, keyword
-        Half of it, instead. [mm]
-
-    Examples
-    --------
-    >>> gap, normal = Cylinder(diameter_mm=2.0).gap(np.array([[0.0, 0.5, 7.0]]))
-    >>> gap.tolist(), normal.tolist()
-    ([0.5], [[0.0, 1.0, 0.0]])
-    """
-
-    symmetry_deg = 90.0
-    diameter_mm: SizeMm = protocol.CYLINDER_DIAMETER.value
-    radius_mm = OtherName(_of_diameter, lambda body: body.diameter_mm / 2)
-
-    if TYPE_CHECKING:
-
-        def __init__(self, diameter_mm: float = ..., *, radius_mm: float = ...) -> None: ...
-
-    @property
-    def half_width_mm(self) -> float:
-        return self.diameter_mm / 2
-
-    @property
-    def tip_radius_mm(self) -> float:
-        return self.diameter_mm / 2
-
-    def front(self, points_mm: PointsMm) -> FloatArray:
-        return round_front(np.abs(points_mm[:, 0]), self.diameter_mm / 2)
-
-    def gap(self, points_mm: PointsMm) -> tuple[FloatArray, FloatArray]:
-        radius = self.diameter_mm / 2
-        centred = (points_mm + np.array([0.0, radius, 0.0])) * [1.0, 1.0, 0.0]
-        return _rod_end(centred, centred * [1.0, 0.0, 0.0], radius)
-
-
-@value_class
-class Line(Indenter):
-    """Line load across the finger: a wire thinner than the elements of the skin, modelled as a blade.
-
-    Nodes cannot resolve the roundness of a body as thin as their spacing: one node would balance on its top
-    and slide off. The strip of skin that lies under the undeformed wire is therefore pushed along the
-    direction of pressing and does not slide along the finger (docs/decisions.md#line-load).
-
-    Parameters
-    ----------
-    diameter_mm : float
-        Diameter of the wire; the paper's is 50 µm. [mm]
-
-    Examples
-    --------
-    >>> Line().may_touch(np.array([[0.0, 0.3, 1.0], [0.05, 0.0, 1.0]])).tolist()
-    [True, False]
-    """
-
-    symmetry_deg = 180.0
-    diameter_mm: SizeMm = protocol.LINE_DIAMETER.value
-
-    @property
-    def grips(self) -> bool:
-        return True
-
-    @property
-    def half_width_mm(self) -> float:
-        return self.diameter_mm / 2
-
-    def front(self, points_mm: PointsMm) -> FloatArray:
-        return np.where(np.abs(points_mm[:, 0]) <= self.diameter_mm / 2, 0.0, -np.inf)
-
-    def may_touch(self, undeformed_mm: PointsMm) -> np.ndarray:
-        """Only the points below the undeformed wire; bool (n,)."""
-        return np.abs(undeformed_mm[:, 0]) <= self.diameter_mm / 2 * (1 + 1e-6)
-
-    def gap(self, points_mm: PointsMm) -> tuple[FloatArray, FloatArray]:
-        """Gap along y (n,) and that direction (n, 3) at points (n, 3) of the indenter's frame. [mm]"""
-        return Plate().gap(points_mm)
-
-
-@value_class
-class Sphere(Indenter):
-    """Sphere given by its curvature, as in the psychophysics literature, or by its radius; by name only.
-
-    Parameters
-    ----------
-    curvature_per_m : float, keyword
-        1/radius; the paper writes "RC ... 1/m" and means this. [1/m]
-    radius_mm, diameter_mm : float, keywords
-        Instead of the curvature. [mm]
-
-    Examples
-    --------
-    >>> round(Sphere(curvature_per_m=287).radius_mm, 3), Sphere(radius_mm=2.0)
-    (3.484, Sphere(radius_mm=2.0))
-    """
-
-    symmetry_deg = None
-    # A bare number could be either: 3.5 mm of radius is 286 1/m.
-    curvature_per_m: Finite = field(default=protocol.STANDARD_CURVATURE.value, kw_only=True)
-    radius_mm = OtherName(
-        lambda radius_mm: {"curvature_per_m": curvature_per_m(positive("radius_mm", radius_mm, "mm"))},
-        lambda body: radius_mm(body.curvature_per_m),
-    )
-    diameter_mm = OtherName(
-        lambda diameter_mm: {
-            "curvature_per_m": curvature_per_m(positive("diameter_mm", diameter_mm, "mm") / 2)
-        },
-        lambda body: 2 * radius_mm(body.curvature_per_m),
-    )
-
-    if TYPE_CHECKING:
-
-        def __init__(
-            self, *, curvature_per_m: float = ..., radius_mm: float = ..., diameter_mm: float = ...
-        ) -> None: ...
-
-    def __post_init__(self) -> None:
-        radius = radius_mm(positive("curvature_per_m", self.curvature_per_m, "1/m"))
-        if not SIZES_MM[0] <= 2.0 * radius <= SIZES_MM[1]:
-            raise InputError(
-                f"A sphere of {self.curvature_per_m:g} 1/m has a radius of {radius:.3g} mm, outside "
-                f"{SIZES_MM[0] / 2:g} to {SIZES_MM[1] / 2:g} mm: write radius_mm if you meant a radius."
-            )
-
-    def __repr__(self) -> str:
-        # By curvature or by radius: one of the two is usually a short number.
-        sizes = (f"curvature_per_m={self.curvature_per_m!r}", f"radius_mm={self.radius_mm!r}")
-        return f"{type(self).__name__}({min(sizes, key=len)})"
-
-    @property
-    def half_width_mm(self) -> float:
-        return self.radius_mm
-
-    @property
-    def tip_radius_mm(self) -> float:
-        return self.radius_mm
-
-    def front(self, points_mm: PointsMm) -> FloatArray:
-        return round_front(np.hypot(points_mm[:, 0], points_mm[:, 2]), self.radius_mm)
-
-    def gap(self, points_mm: PointsMm) -> tuple[FloatArray, FloatArray]:
-        centred = points_mm + np.array([0.0, self.radius_mm, 0.0])
-        return _rod_end(centred, centred * [1.0, 0.0, 1.0], self.radius_mm)
-
-
-@value_class
-class Bar(Indenter):
-    """Flat bar across the finger, long in z, its two edges rounded.
-
-    Parameters
-    ----------
-    width_mm : float
-        Full width along x, fillets included. [mm]
-    fillet_mm : float
-        Radius of the two edges; `edge_radius_mm` is another name of it. [mm]
-
-    Examples
-    --------
-    >>> gap, _ = Bar(width_mm=3.0, fillet_mm=0.3).gap(np.array([[0.0, -0.1, 0.0], [1.5, -0.3, 2.0]]))
-    >>> gap.round(3).tolist()
-    [-0.1, 0.0]
-    """
-
-    symmetry_deg = 90.0
-    width_mm: SizeMm = protocol.BAR_WIDTH.value
-    fillet_mm: NotNegative = protocol.BAR_FILLET.value
-    edge_radius_mm = OtherName("fillet_mm")
-
-    if TYPE_CHECKING:
-
-        def __init__(
-            self, width_mm: float = ..., fillet_mm: float = ..., *, edge_radius_mm: float = ...
-        ) -> None: ...
-
-    def __post_init__(self) -> None:
-        fillet_within(self.fillet_mm, self.width_mm, "width_mm")
-
-    @property
-    def half_width_mm(self) -> float:
-        return self.width_mm / 2
-
-    @property
-    def edge_reach_mm(self) -> float:
-        return self.width_mm / 2 + BESIDE_EDGE_MM
-
-    def edges_mm(self, reach_mm: Finite) -> tuple[tuple[float, float], ...]:
-        return ((-self.width_mm / 2, self.fillet_mm), (self.width_mm / 2, self.fillet_mm))
-
-    def rounded_to(self, radius_mm: Finite) -> Bar:
-        return replace(self, fillet_mm=max(self.fillet_mm, min(radius_mm, self.width_mm / 2)))
-
-    def front(self, points_mm: PointsMm) -> FloatArray:
-        return round_front(np.abs(points_mm[:, 0]) - self.width_mm / 2 + self.fillet_mm, self.fillet_mm)
-
-    def gap(self, points_mm: PointsMm) -> tuple[FloatArray, FloatArray]:
-        x, y = points_mm[:, 0], points_mm[:, 1]
-        outward = np.zeros_like(points_mm)
-        outward[:, 0] = np.where(x < 0.0, -1.0, 1.0)
-        inside = np.abs(x) - (self.width_mm / 2 - self.fillet_mm)
-        return rounded(inside, y + self.fillet_mm, outward, self.fillet_mm)
-
-
-@value_class
-class FlatPunch(Indenter):
-    """Flat-ended round probe with a rounded rim.
-
-    Parameters
-    ----------
-    diameter_mm : float
-        Full diameter, rim included. [mm]
-    fillet_mm : float
-        Radius of the rim; `edge_radius_mm` is another name of it. [mm]
-    radius_mm : float, keyword
-        Half of the diameter, instead. [mm]
-
-    Examples
-    --------
-    >>> FlatPunch(radius_mm=1.0, edge_radius_mm=0.2)
-    FlatPunch(diameter_mm=2.0, fillet_mm=0.2)
-    """
-
-    symmetry_deg = None
-    diameter_mm: SizeMm = protocol.PUNCH_DIAMETER.value
-    fillet_mm: NotNegative = protocol.BAR_FILLET.value
-    edge_radius_mm = OtherName("fillet_mm")
-    radius_mm = OtherName(_of_diameter, lambda body: body.diameter_mm / 2)
-
-    if TYPE_CHECKING:
-
-        def __init__(
-            self,
-            diameter_mm: float = ...,
-            fillet_mm: float = ...,
-            *,
-            edge_radius_mm: float = ...,
-            radius_mm: float = ...,
-        ) -> None: ...
-
-    def __post_init__(self) -> None:
-        fillet_within(self.fillet_mm, self.diameter_mm, "diameter_mm")
-
-    @property
-    def half_width_mm(self) -> float:
-        return self.diameter_mm / 2
-
-    @property
-    def rim_mm(self) -> tuple[float, float]:
-        return self.diameter_mm / 2, self.fillet_mm
-
-    def rounded_to(self, radius_mm: Finite) -> FlatPunch:
-        return replace(self, fillet_mm=max(self.fillet_mm, min(radius_mm, self.diameter_mm / 2)))
-
-    def front(self, points_mm: PointsMm) -> FloatArray:
-        return round_front(
-            np.hypot(points_mm[:, 0], points_mm[:, 2]) - self.diameter_mm / 2 + self.fillet_mm, self.fillet_mm
-        )
-
-    def gap(self, points_mm: PointsMm) -> tuple[FloatArray, FloatArray]:
-        radial, outward = _norm_and_direction(points_mm * [1.0, 0.0, 1.0])
-        # On the axis any radial direction serves; x is taken, since y would not be radial.
-        outward = np.where(radial[:, None] > 0.0, outward, [1.0, 0.0, 0.0])
-        inside = radial - (self.diameter_mm / 2 - self.fillet_mm)
-        return rounded(inside, points_mm[:, 1] + self.fillet_mm, outward, self.fillet_mm)
-
-
-@value_class
-class Plate(Indenter):
-    """Flat plate without edges, larger than the finger."""
-
-    symmetry_deg = None
-
-    def front(self, points_mm: PointsMm) -> FloatArray:
-        return np.zeros(len(points_mm))
-
-    def gap(self, points_mm: PointsMm) -> tuple[FloatArray, FloatArray]:
-        return points_mm[:, 1].copy(), np.broadcast_to([0.0, 1.0, 0.0], points_mm.shape).copy()
-
-
-def fillet_within(fillet_mm: float, width_mm: float, width_name: str) -> None:
-    """Raise an error if a fillet is larger than half of a width. [mm]"""
-    if fillet_mm > width_mm / 2:
-        raise InputError(
-            "fillet_mm", f"must not exceed half of {width_name}, {width_mm / 2:g} mm", f"{fillet_mm:g} mm"
-        )
+def check_most(body: Indenter, size: str, whole: str, share: float = 0.5) -> None:
+    """Raise an error if a size of a body is larger than a half, or all, of another one. [mm]"""
+    most, given = getattr(body, whole) * share, getattr(body, size)
+    if given > most:
+        of_whole = f"{'half of ' * (share < 1.0)}{whole}"
+        raise InputError(size, f"must not exceed {of_whole}, {most:g} mm", f"{given:g} mm")

@@ -180,7 +180,7 @@ class Touch:
 
         Examples
         --------
-        >>> from fingerpad.geometry.indenters import Sphere
+        >>> from fingerpad.geometry.bodies import Sphere
         >>> touch_of(Fingertip(), Sphere(), resolution="quick").check_sites([[99.0, 0.0]])
         Traceback (most recent call last):
         fingerpad.core.errors.InputError: sites must lie on the volar skin of the mesh: (x, z) = (99, 0) ...

@@ -47,8 +47,8 @@ from fingerpad.experiments.requests.stimulus import (
     object_of,
 )
 from fingerpad.experiments.runner import Manifest, Runner
+from fingerpad.geometry.bodies import Bar
 from fingerpad.geometry.grading import RESOLUTIONS
-from fingerpad.geometry.indenters import Bar
 from fingerpad.inference.afferent_fit import OFFSETS_MM, check_free, fit_afferent
 from fingerpad.inference.fitting.methods import interleaved_folds
 from fingerpad.inference.identifiable import IDENTIFIABLE_NAMES

@@ -33,8 +33,9 @@ from fingerpad.core.values import (
 from fingerpad.data import DeflectionObservations, cylinder_deflection, fingertip, protocol
 from fingerpad.experiments.conditions import RECEPTOR_X_MM, Conditions, Touch
 from fingerpad.experiments.scores import coefficient_of_determination
+from fingerpad.geometry.bodies import Cylinder, FlatPunch, Line, Plate
 from fingerpad.geometry.grading import resolution_grading
-from fingerpad.geometry.indenters import Cylinder, FlatPunch, Indenter, Line, Plate
+from fingerpad.geometry.indenters import Indenter
 from fingerpad.geometry.mesh import LAYERS, Mesh
 from fingerpad.geometry.motion import RampAndHold
 from fingerpad.skin.indentation import touch_of

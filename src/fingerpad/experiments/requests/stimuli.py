@@ -42,10 +42,9 @@ from fingerpad.experiments.requests.stimulus import (
     finger_of,
     named_files,
 )
-from fingerpad.geometry.edged_indenters import SIZES
+from fingerpad.geometry.bodies import SIZES, Bar, Sphere
 from fingerpad.geometry.grading import RESOLUTIONS, Grading, covering
 from fingerpad.geometry.indenter_grading import grading_along
-from fingerpad.geometry.indenters import Bar, Sphere
 from fingerpad.geometry.motion import PLAUSIBLE, Motion, RampAndHold
 from fingerpad.skin.indentation import Touch
 

@@ -19,7 +19,7 @@ from fingerpad.data import protocol
 from fingerpad.data.tissues import DEFAULT_TISSUES
 from fingerpad.experiments.conditions import Conditions, straight_tilt_deg
 from fingerpad.experiments.requests.parts import Made, OneOfKinds, Part, Request, at
-from fingerpad.geometry.edged_indenters import INDENTERS
+from fingerpad.geometry.bodies import INDENTERS
 from fingerpad.geometry.fingertip import Finger, Fingertip
 from fingerpad.geometry.grading import RESOLUTIONS, Grading
 from fingerpad.geometry.indenters import Indenter
@@ -66,11 +66,11 @@ FINGERS: dict[str, Callable[..., Finger] | str] = {
 
 OBJECTS: dict[str, Callable[..., Indenter] | str] = {
     **INDENTERS,
-    "dots": "geometry.dots.Dots",
+    "dots": "geometry.bodies.Dots",
     "braille": "braille",
     "embossed": "geometry.embossed.Embossed",
     "embossed_text": "embossed_text",
-    "ridges": "geometry.composed.ridges",
+    "ridges": "geometry.bodies.ridges",
     "surface": "read_surface",
     "height_map": "read_height_map",
 }  # What can be pressed in, by kind; by its name below `fingerpad` if only a file with it needs the module.

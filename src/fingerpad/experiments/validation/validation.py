@@ -24,9 +24,9 @@ from fingerpad.experiments.scores import (
 )
 from fingerpad.experiments.validation.observations import Kind, Value
 from fingerpad.experiments.validation.request import QUASI_STATIC, ValidationRequest
-from fingerpad.geometry.edged_indenters import Grating
+from fingerpad.geometry.bodies import Grating, Plate, Sphere
 from fingerpad.geometry.indenter_grading import grading_about
-from fingerpad.geometry.indenters import Indenter, Plate, Sphere
+from fingerpad.geometry.indenters import Indenter
 from fingerpad.geometry.motion import ForceRampAndHold, RampAndHold
 from fingerpad.neuron.population import Population
 from fingerpad.neuron.spikes import RATE_OF
