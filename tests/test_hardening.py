@@ -299,7 +299,7 @@ def test_sequences_become_tuples_so_that_values_hash():
         lambda: Traces([0.0, 1.0], [[1j], [2.0]], quantity="current"),
         lambda: fp.Traces([0.0, HUGE], [[1.0], [2.0]]),
         lambda: GaussianResponses([1.0, 2.0], [[1.0, 99.0], [0.1, 1.0]]),
-        lambda: fp.reduced([0.0, 1.0]),
+        lambda: fp.Trajectory([0.0, 1.0], [0.0, 1.0]).reduced(0.0),
         lambda: fp.sampled(100.0, depth_mm=(1, 2)),
         lambda: fp.chirp(0.8, 0.05, (5.0, "6"), sweep_ms=1000.0),
         lambda: fp.braille(3),

@@ -171,7 +171,7 @@ def recording(noise_mm=0.002, seed=3):
 @pytest.mark.parametrize("seed", range(2))
 def test_a_recording_with_noise_is_reduced_to_its_corners(seed):
     true, recorded = recording(seed=seed)
-    few = fp.reduced(recorded, tolerance=0.02)
+    few = recorded.reduced(tolerance=0.02)
     assert len(few.times_ms) <= 12
     for corner in true.corners_ms:
         assert np.abs(np.array(few.times_ms) - corner).min() <= 4.0
@@ -187,17 +187,17 @@ def test_a_recording_with_noise_is_reduced_to_its_corners(seed):
 def test_the_error_of_a_reduction_is_bounded_at_all_samples_of_all_columns():
     _, recorded = recording(noise_mm=0.05)
     for tolerance in (0.001, 0.05, 0.3):
-        few = fp.reduced(recorded, tolerance)
+        few = recorded.reduced(tolerance)
         for name, extent in (("depth_mm", max(recorded.depth_mm)), ("x_mm", max(recorded.x_mm))):
             line = np.interp(recorded.times_ms, few.times_ms, getattr(few, name))
             assert np.abs(line - getattr(recorded, name)).max() <= tolerance * extent * (1 + 1e-12)
-    assert fp.reduced(recorded, 1e-9).times_ms == recorded.times_ms
+    assert recorded.reduced(1e-9).times_ms == recorded.times_ms
 
 
 def test_given_names_of_phases_stay_when_samples_are_left_out():
     _, recorded = recording()
     named = replace(recorded, phases=(Phase("ramp", 0.0, 80.0), Phase("rest", 80.0, 1200.0)))
-    assert fp.reduced(named).phases == named.phases
+    assert named.reduced().phases == named.phases
 
 
 def test_a_hold_that_drifts_is_solved_in_growing_steps():

@@ -74,7 +74,7 @@ def test_noise_of_a_tare_and_a_lift_between_two_touches_are_not_counted_as_ramp(
 def test_a_recording_with_few_samples_is_as_exact_from_high_above_the_skin():
     times = np.arange(0.0, 400.0)
     depth = np.interp(times, [0.0, 100.0, 150.0, 399.0], [-20.0, 0.0, 1.0, 1.0]) - 0.03 * (times > 300.0)
-    few = fp.reduced(fp.Trajectory(times, depth))
+    few = fp.Trajectory(times, depth).reduced()
     assert np.abs(few.prescribed_at(times) - depth).max() <= 0.005
 
 

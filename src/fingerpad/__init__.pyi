@@ -62,7 +62,6 @@ from fingerpad.geometry.motion import RampAndHold as RampAndHold
 from fingerpad.geometry.motion import Trajectory as Trajectory
 from fingerpad.geometry.motions import chirp as chirp
 from fingerpad.geometry.motions import read_trajectory as read_trajectory
-from fingerpad.geometry.motions import reduced as reduced
 from fingerpad.geometry.motions import repeated as repeated
 from fingerpad.geometry.motions import sampled as sampled
 from fingerpad.geometry.motions import sine as sine

@@ -189,3 +189,11 @@ def step_times_of(
         found += (start + since[:-1]).tolist()
         found.append(end)
     return np.array(found)
+
+
+def extent_of(table: FloatArray, names: Sequence[str]) -> FloatArray:
+    """Largest absolute value of each column, 1 for one that is 0 throughout; of a depth the deepest."""
+    largest = np.abs(table).max(axis=0)
+    deepest = table.max(axis=0)
+    largest = np.where((np.array(names) == "depth_mm") & (deepest > 0.0), deepest, largest)
+    return np.where(largest > 0.0, largest, 1.0)

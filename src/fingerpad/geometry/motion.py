@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from dataclasses import field
+from dataclasses import field, replace
 from functools import cached_property
-from typing import Annotated
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -26,6 +26,7 @@ from fingerpad.core.values import (
     float_array,
     increasing,
     limits,
+    positive,
     within,
 )
 from fingerpad.data import protocol
@@ -34,13 +35,17 @@ from fingerpad.geometry.courses import (
     check_speed,
     corners_of,
     divided_ms,
+    extent_of,
     onset_of,
     phases_of,
+    samples_of_line,
     step_times_of,
 )
 from fingerpad.geometry.fingertip import Finger
 
 _TIMES_MS = (1e-6, 1e13)  # Of a ramp or hold; a quasi-static ramp of a validation takes 1e12 ms. [ms]
+
+TOLERANCE = 0.005  # Largest error of a motion with fewer samples, over the extent of each of its columns.
 
 PLAUSIBLE = {"depth_mm": (1e-3, 20.0), "force_mn": (1.0, 1e5), "ramp_ms": _TIMES_MS, "hold_ms": _TIMES_MS}
 """Smallest and largest peaks and times of a touch: an afferent answers to 1 mN, and pads are 10 mm thick."""
@@ -307,6 +312,32 @@ class Trajectory(Motion):
                 raise InputError("phases", must, remedy=f"{phase.name!r} ends at {phase.end_ms:g} ms")
         if self.cycles is not None:
             self._check_cycles(self.cycles)
+
+    def reduced(self, tolerance: Positive = TOLERANCE) -> Trajectory:
+        """Leave out samples that lie close to a line between others: each is a step to solve at.
+
+        Samples are kept where the course deviates most from a line, so that corners stay samples. Choose a
+        tolerance above the noise of the recording. Phases that were given stay; others are named again.
+
+        Parameters
+        ----------
+        tolerance : float, optional
+            Largest error over the largest depth or force, and over the extent of each way and rotation. [1]
+
+        Examples
+        --------
+        >>> times_ms = np.arange(1001.0)
+        >>> course_mm = np.clip(times_ms / 50.0, 0.0, 1.0) + 0.001 * np.sin(times_ms)
+        >>> Trajectory(times_ms, course_mm).reduced().times_ms
+        (0.0, 50.0, 1000.0)
+        """
+        names = ["force_mn" if self.by_force else "depth_mm"]
+        names += [name for name in POSE_COLUMNS if getattr(self, name) is not None]
+        times, table = np.array(self.times_ms), np.array([getattr(self, name) for name in names]).T
+        keep = samples_of_line(times, table / extent_of(table, names), positive("tolerance", tolerance))
+        columns: dict[str, Any] = {name: tuple(np.array(getattr(self, name))[keep]) for name in names}
+        phases = self.phases if self.named_phases else ()
+        return replace(self, times_ms=tuple(times[keep]), **columns, phases=phases, cycles=None)
 
     def _check_cycles(self, cycles: Cycles) -> None:
         times, course = self._course()

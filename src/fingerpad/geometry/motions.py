@@ -30,12 +30,10 @@ from fingerpad.core.values import (
     positive,
 )
 from fingerpad.data import protocol
-from fingerpad.geometry.courses import SAME_VALUE, check_speed, samples_of_line
-from fingerpad.geometry.motion import POSE_COLUMNS, Cycles, Trajectory
+from fingerpad.geometry.courses import SAME_VALUE, check_speed, extent_of
+from fingerpad.geometry.motion import POSE_COLUMNS, TOLERANCE, Cycles, Trajectory
 
 SAMPLES_PER_CYCLE = 20  # Of a sine; a line between two of them misses it by up to 1.2 % of the amplitude.
-
-TOLERANCE = 0.005  # Largest error of a motion with fewer samples, over the extent of each of its columns.
 
 
 def _corners(name: str, value: Any) -> tuple[float, ...]:
@@ -368,7 +366,7 @@ GAP = 5.0  # Longest step in time of a recording at a fixed rate, over the media
 def read_trajectory(
     path: Path | str, *, first_touch_mm: Finite = 0.0, phases: Sequence[Phase] = ()
 ) -> Trajectory:
-    r"""Read a motion from a CSV file, with all samples; `reduced` leaves out those that are not needed.
+    r"""Read a motion from a CSV file, with all samples; `Trajectory.reduced` leaves some out.
 
     Before contact a recording has noise: a first depth or force of up to 2 % of the largest is taken as 0,
     and so is a force as far below 0.
@@ -423,7 +421,7 @@ def recorded(file: Path, first_touch_mm: float = 0.0, tolerance: float = TOLERAN
         Samples this close to a line, relative to the extent of the motion, are left out; 0 keeps all.
     """
     motion = read_trajectory(file, first_touch_mm=first_touch_mm)
-    return reduced(motion, tolerance) if tolerance else motion
+    return motion.reduced(tolerance) if tolerance else motion
 
 
 def _columns(rows: Sequence[TableRow], path: str) -> dict[str, FloatArray]:
@@ -526,7 +524,7 @@ def sampled(
     def values_at(times: FloatArray) -> FloatArray:
         return np.array([at(time) for time in times.tolist()])
 
-    scale = _extent(values_at(np.linspace(0.0, end_ms, looks + 1)), tuple(courses))
+    scale = extent_of(values_at(np.linspace(0.0, end_ms, looks + 1)), tuple(courses))
 
     def deviation(times: FloatArray, start: float, stop: float) -> FloatArray:
         """Largest deviation of any column from its chord between two times, over its extent."""
@@ -561,42 +559,3 @@ def sampled(
 
 
 SHORTEST_SHARE = 1e-9  # Duration of a piece over that of all, below which a function jumps.
-
-
-@checked
-def reduced(motion: Trajectory, tolerance: Positive = TOLERANCE) -> Trajectory:
-    """Leave out samples of a recording that lie close to a line between others; each is a step to solve at.
-
-    Samples are kept where the course deviates most from a line (`samples_of_line`), so that corners stay
-    samples. Choose a tolerance above the noise of the recording. Phases that were given stay; others are
-    named again.
-
-    Parameters
-    ----------
-    motion : Trajectory
-        Such as a recording at 1 kHz.
-    tolerance : float, optional
-        Largest error over the largest depth or force, and over the extent of each way and rotation. [1]
-
-    Examples
-    --------
-    >>> times_ms = np.arange(1001.0)
-    >>> recorded = Trajectory(times_ms, np.clip(times_ms / 50.0, 0.0, 1.0) + 0.001 * np.sin(times_ms))
-    >>> reduced(recorded).times_ms
-    (0.0, 50.0, 1000.0)
-    """
-    names = ["force_mn" if motion.by_force else "depth_mm"]
-    names += [name for name in POSE_COLUMNS if getattr(motion, name) is not None]
-    times, table = np.array(motion.times_ms), np.array([getattr(motion, name) for name in names]).T
-    keep = samples_of_line(times, table / _extent(table, names), tolerance)
-    columns: dict[str, Any] = {name: tuple(np.array(getattr(motion, name))[keep]) for name in names}
-    phases = motion.phases if motion.named_phases else ()
-    return replace(motion, times_ms=tuple(times[keep]), **columns, phases=phases, cycles=None)
-
-
-def _extent(table: FloatArray, names: Sequence[str]) -> FloatArray:
-    """Largest absolute value of each column, 1 for one that is 0 throughout; of a depth the deepest."""
-    largest = np.abs(table).max(axis=0)
-    deepest = table.max(axis=0)
-    largest = np.where((np.array(names) == "depth_mm") & (deepest > 0.0), deepest, largest)
-    return np.where(largest > 0.0, largest, 1.0)
