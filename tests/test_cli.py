@@ -78,7 +78,7 @@ def test_one_set_of_tissues_is_the_default_everywhere():
     found = {*defaults.values(), *(each.default for each in functions), Conditions().tissues}
     assert found | {FingerDescription().tissues} == {DEFAULT_TISSUES}
     assert Conditions().afferent == fp.Afferent() == fp.Population.grid().afferent
-    assert all(getattr(fp, body.__name__) is body for body in INDENTERS.values())
+    assert all(getattr(fp.bodies, body.__name__) is body for body in INDENTERS.values())
 
 
 @pytest.mark.parametrize(
@@ -107,7 +107,7 @@ def test_one_set_of_tissues_is_the_default_everywhere():
         ([*BALL, "--outputs", "febio", "--motion", "{kind: stroke, depth_mm: 1, speed_mm_per_s: 9, x_mm: 2}"],
          "febio decks move the indenter only along its axis", "febio"),
         ([*BALL, "--quiet", "--verbose"], "exclude each other", "--verbose"),
-        (["touch", "--object", "cone"], "must be one of sphere, cylinder, bar", "'cone'"),
+        (["touch", "--object", "wedge"], "must be one of sphere, cylinder, bar", "'wedge'"),
         (["touch", "--object", "punch:wide"], "diameter_mm must be a finite number", "'wide'"),
         (["touch"], "touch needs a file or options", "--help"),
         (["touch", "gone.yaml"], "gone.yaml must be a file", "No such file"),

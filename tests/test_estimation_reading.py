@@ -181,7 +181,7 @@ def test_stimuli_name_finger_tissues_and_resolution_and_options_replace_them(wri
 @pytest.mark.parametrize(
     ("name", "content", "said"),
     [
-        ("a.csv", "name,object\ntip,cone\n", "a.csv, line 2, object.indenter must be one of sphere"),
+        ("a.csv", "name,object\ntip,wedge\n", "a.csv, line 2, object.indenter must be one of sphere"),
         ("a.csv", "name,object\ntip,\n", "a.csv, line 2, object must be given"),
         ("a.csv", "name,object\ntip,bar\ntip,bar\n", "a.csv, line 3, stimuli must differ: 'tip' is repeated"),
         ("a.csv", "name,object,radius_mm\ntip,bar,1\n", "line 1: column 'radius_mm' is unknown: did you"),

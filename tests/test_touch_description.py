@@ -221,7 +221,7 @@ WRONG = [
     (BALL + "frictoin: 0.1\n", "line 2, frictoin is unknown: did you mean friction?"),
     (BALL + "colour: red\n", "line 2, colour is unknown: the file has resolution, finger, tissues"),
     ("object:\n", "line 1, object must be a mapping of keys to values: got None"),
-    ("object: cone\n", "line 1, object.indenter must be one of sphere"),
+    ("object: wedge\n", "line 1, object.indenter must be one of sphere"),
     ("object: 'sphere:raduis_mm=3'\n", "line 1, object.raduis_mm is no argument of Sphere: did"),
     ("object: {kind: shpere}\n", "got 'shpere' (did you mean sphere?)."),
     ("object: {radius_mm: 3}\n", "object.kind must be given: it is missing"),
