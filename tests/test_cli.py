@@ -237,6 +237,12 @@ def test_options_replace_keys_of_the_file_and_go_into_blocks(asked):
         ("200", ["--motion.dept_mm", "1"], "--motion.dept_mm is unknown: did you mean depth_mm?"),
         ("200", ["--times-ms", "20,soon"], "--times-ms must be an array of numbers"),
         ("200", ["--object.depth_mm", "1"], "--object.depth_mm is unknown: object has kind."),
+        ("200", ["--object", "sphear"], "--object: indenter must be one of sphere, cylinder"),
+        (
+            "200",
+            ["--object", "sphere", "--object.radius_mm", "0"],
+            "--object.radius_mm must be greater than 0",
+        ),
         ("long", ["--tissues", "human"], "touch.yaml, line 3, motion.hold_ms must"),
     ],
 )

@@ -173,9 +173,12 @@ def _blamed_on_options(keys: tuple[str, ...]) -> Iterator[None]:
     try:
         yield
     except InputError as error:
-        for place in (tuple(key.split(".")) for key in keys):
+        for key in sorted(keys, key=len, reverse=True):
+            place = tuple(key.split("."))
+            option = key.replace(place[0], f"--{place[0].replace('_', '-')}", 1)
             if error.path[: len(place)] == place:
-                named = error.where.replace(place[0], f"--{place[0].replace('_', '-')}", 1)
+                within = ": " if error.path[len(place) :] else ""
+                named = error.where.replace(key, option, 1).replace(f"{option}.", f"{option}{within}", 1)
                 raise error.at(error.path, named).from_source("") from error
         raise
 
