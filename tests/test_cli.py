@@ -101,7 +101,7 @@ def test_one_set_of_tissues_is_the_default_everywhere():
         ([*BALL, "--motion.depth_mm", "-1"], "motion.depth_mm must lie within 0.001 to 20 mm", "-1"),
         ([*BALL, "--motion.dept_mm", "1"], "motion.dept_mm is unknown: did you mean depth_mm?", ""),
         ([*BALL, "--friction.depth_mm", "1"], "friction", "depth_mm"),
-        ([*BALL, "--object.kind.deep", "1"], "object.kind must be one of sphere", "deep"),
+        ([*BALL, "--object.kind.deep", "1"], "--object: kind must be one of sphere", "deep"),
         ([*BALL, "--object.curvature_per_m", "round"], "curvature_per_m must be a finite number", "'round'"),
         ([*BALL, "--outputs", "csv,stl"], "outputs[2] must be one of figures, csv", "'stl'"),
         ([*BALL, "--outputs", "febio", "--motion", "{kind: stroke, depth_mm: 1, speed_mm_per_s: 9, x_mm: 2}"],
