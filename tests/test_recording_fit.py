@@ -474,7 +474,7 @@ def static_rates(column, rows):
          "offset needs stimuli at several places along the finger"),
         ([*BAR, "--offset", "--folds", "2"], static_rates("shift_mm", range(8)),
          "recordings must leave at least 5 rates"),
-        ([*BAR, "--finger", "chid"], ROWS, "finger.like must be one of adult"),
+        ([*BAR, "--finger", "chid"], ROWS, "--finger: like must be one of adult"),
         ([*LIST, "--finger", "a.inp"], ROWS, "finger: a.inp must be a file"),
         ([*BAR, "--dynamic-quantity", "heat"], ROWS, "--dynamic-quantity must be one"),
         ([*BAR, "--windows_ms.static", "600,1100"], ROWS, "not at 1100 ms"),
