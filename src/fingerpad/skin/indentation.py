@@ -142,18 +142,16 @@ class Touch:
         home = type(self.indenter).gap.__module__ or ""
         if not home.startswith(f"{__package__.partition('.')[0]}."):
             check_gap(self.indenter.gap, body)
-        for pose in self.stimulus.poses:
-            if self.grading.full:
-                break
+        if not self.grading.full and not self.indenter.mirrors(self.spin_deg):
+            raise InputError(
+                f"spin_deg = {self.spin_deg:g} degrees leaves {body} without symmetry across the midline, so "
+                "half a finger is not enough: give a grading with full=True."
+            )
+        for pose in () if self.grading.full else self.stimulus.poses:
             if pose.z_mm != 0.0:
                 raise InputError(f"z_mm = {pose.z_mm:g} mm of the motion needs a grading with full=True.")
             if pose.spin_deg != 0.0:  # friction twists the skin, which then has no mirror image
                 raise InputError("spin_deg of the motion needs a grading with full=True.")
-            if not self.indenter.mirrors(self.spin_deg):
-                raise InputError(
-                    f"spin_deg = {self.spin_deg:g} degrees leaves {body} without symmetry across the "
-                    "midline, so half a finger is not enough: give a grading with full=True."
-                )
         self._check_sizes()
         check_friction(self.friction, self.indenter)
         if self.progress is not None and not callable(getattr(self.progress, "stage", None)):
