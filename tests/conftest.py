@@ -3,10 +3,11 @@
 The longest files come first, so that no process works alone at the end.
 """
 
+import logging
 import os
 import re
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from functools import cache, partial
 from pathlib import Path
@@ -79,6 +80,15 @@ def perturbed() -> None:
         return body(replace(mesh, nodes_mm=nodes_mm), replace(table, law=law), *others, **named)
 
     press.Body = other_body
+
+
+@pytest.fixture(autouse=True)
+def levels() -> Iterator[None]:
+    """Put back what a command line in a test sets: the level of the logger, the handlers of the root."""
+    handlers = logging.getLogger().handlers[:]
+    yield
+    logging.getLogger("fingerpad").setLevel(logging.NOTSET)
+    logging.getLogger().handlers[:] = handlers
 
 
 @pytest.fixture(scope="session")

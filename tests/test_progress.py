@@ -4,8 +4,6 @@ import logging
 import threading
 import time
 
-import pytest
-
 import fingerpad as fp
 from cluster import wait_until
 from fingerpad.cli import main
@@ -15,15 +13,6 @@ from fingerpad.core.logger import LOGGER
 from fingerpad.core.progress import Bars, Lines, NoProgress, share_done
 
 TOUCH = "object: sphere\nmotion: {depth_mm: 0.2, hold_ms: 60}\nafferents: {windows_ms: {static: [60, 100]}}\n"
-
-
-@pytest.fixture(autouse=True)
-def levels():
-    """Put the level of the logger, and the handlers of the root, back."""
-    handlers = logging.getLogger().handlers[:]
-    yield
-    LOGGER.setLevel(logging.NOTSET)
-    logging.getLogger().handlers[:] = handlers
 
 
 def test_lines_tell_the_way_and_the_end_of_a_long_stage_only():
