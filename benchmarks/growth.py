@@ -13,11 +13,11 @@ from benchmarks.results import Report, Table
 THREADS = 2
 
 SIZES = (
-    (0.9, (3, 1, 3, 3)),
+    (0.9, (2, 1, 3, 3)),
     (1.25, (4, 1, 4, 4)),
     (1.5, (6, 2, 6, 6)),
     (2.0, (8, 2, 8, 8)),
-    (2.8, (10, 2, 10, 10)),
+    (3.8, (13, 3, 13, 13)),
 )
 """By what elements on the skin are smaller than those of `standard`, and elements through each layer."""
 

@@ -105,7 +105,6 @@ def refined(grading: Grading, factor: float) -> Grading:
         grading,
         size_x_mm=grading.size_x_mm / factor,
         size_z_mm=grading.size_z_mm / factor,
-        core_size_mm=grading.core_size_mm / factor,
         largest_mm=grading.largest_mm / factor,
         # A coarser mesh would outgrow what a grading allows to neighbours.
         growth=min(grading.growth ** (1.0 / factor), 1.3),
@@ -397,7 +396,7 @@ def _size(level: Level) -> MeshSize:
         name=level.name,
         bar_nodes=len(bar.mesh.nodes_mm),
         sphere_nodes=len(ball.mesh.nodes_mm),
-        size_x_mm=bar.grading.core_size_mm or bar.grading.size_x_mm,
+        size_x_mm=bar.grading.finest_x_mm,
         size_z_mm=bar.grading.size_z_mm,
     )
 

@@ -120,7 +120,7 @@ def pressed(body):
     """A shallow press into a coarse half finger, its lines 0.25 mm apart where the edges are."""
     grading = fp.Grading(
         17.37, 2.5, 1.2, 0.5, 0.8, 5.0, 1.3, stratum_corneum=1, dermis=1, subcutis=2,
-        core_half_length_mm=1.2, core_size_mm=0.25,
+        finer_along=((16.17, 18.57, 0.25),),
     )  # fmt: skip
     tissues, motion = fp.named_tissues("trial3"), fp.RampAndHold(depth_mm=0.4)
     return Touch(

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 import fingerpad as fp
-from fingerpad.geometry.bodies import Dots
-from fingerpad.geometry.indenter_grading import THIN_SIZE_MM, first_touch_x_mm, grading_about
+from fingerpad.geometry.size_field import grading_below
 from fingerpad.mechanics.assembly import Sparsity, assemble
 from fingerpad.mechanics.contact import place
 from fingerpad.mechanics.materials import MaterialTable
@@ -104,7 +103,7 @@ def test_quantities_that_may_drive_an_afferent_peak_below_the_indenter(skin):
 def test_a_touch_is_that_which_its_arguments_describe():
     """The named resolution and tissues, spelt out."""
     described = fp.touch_of(FINGER, BALL, SHALLOW, tissues="trial1", resolution="quick", at_mm=(16.0, 0.0))
-    tissues, grading = fp.named_tissues("trial1"), grading_about(BALL, "quick", 16.0)
+    tissues, grading = fp.named_tissues("trial1"), grading_below(FINGER, BALL, "quick", (16.0, 0.0), SHALLOW)
     touch = Touch(FINGER, BALL, SHALLOW, tissues, grading, settings_of("quick"), at_mm=(16.0, 0.0))
     assert described == touch
     softer = coarse_touch(stimulus=SHALLOW).solve()  # stiffer tissues need more force
@@ -120,23 +119,6 @@ def test_touches_are_values_and_settings_of_your_own_replace_those_of_the_resolu
     assert coarse_touch(indenter=fp.Cylinder()) != coarse_touch()
 
 
-@pytest.mark.parametrize("indenter", [BALL, fp.Cylinder(), fp.Bar(), fp.Line(), fp.Plate()], ids=NAMES)
-def test_mesh_is_fine_wherever_an_indenter_touches_first(indenter):
-    grading = grading_about(indenter, "standard", 17.37)
-    assert grading.size_x_mm <= max(0.25, indenter.half_width_mm)
-    assert grading.half_length_mm >= min(indenter.half_width_mm, 2.0)
-    assert not grading.full
-    beside = grading_about(indenter, "standard", 17.37, 2.0)
-    assert beside.full
-    assert beside.half_width_mm >= 2.0 + min(indenter.half_width_mm, 2.0)
-
-
-def test_a_wire_at_the_papers_size_keeps_the_papers_pad():
-    plain, wire = (grading_about(indenter, "paper", 17.37) for indenter in (fp.Cylinder(), fp.Line()))
-    assert replace(wire, core_half_length_mm=0.0, core_size_mm=0.0) == plain
-    assert wire.core_size_mm == THIN_SIZE_MM <= fp.Line().half_width_mm < wire.core_half_length_mm
-
-
 test_unusable_arguments_are_refused = refusals(
     ({"tissues": "steel"}, "gerling2014_fit: got 'steel'"),
     ({"tissues": None}, ("tissues",)),
@@ -147,7 +129,6 @@ test_unusable_arguments_are_refused = refusals(
     ({"at_mm": (50.0, 0.0)}, "x = 50"),
     ({"at_mm": (17.37, 12.0)}, "z = 12"),
     ({"at_mm": (-1.0, 0.0)}, "x = -1"),
-    ({"indenter": fp.Sphere(radius_mm=0.02), "at_mm": (17.0, 3.3)}, "go between the nodes"),
     call=lambda changes: fp.indent(**{"finger": FINGER, "indenter": BALL, "stimulus": SHALLOW} | changes),
 )
 
@@ -172,49 +153,6 @@ def test_tilted_indenter_presses_along_its_axis_and_meets_its_point():
     np.testing.assert_allclose(profile.deflection_mm.max(), 0.5, rtol=0, atol=0.005)
 
 
-@pytest.mark.parametrize("resolution", ["quick", "standard"])
-def test_bodies_of_the_paper_keep_their_meshes(resolution):
-    spheres = (fp.Sphere(curvature_per_m=curvature) for curvature in (144.0, 287.0, 694.0))
-    for body in (fp.Line(), fp.Cylinder(), fp.Bar(), fp.Plate(), *spheres):
-        grading = grading_about(body, resolution, 17.37)
-        assert grading.finer_along == grading.finer_across == ()
-        assert fp.touch_of(fp.Fingertip(), body, resolution=resolution).body is body
-
-
-@pytest.mark.parametrize(
-    ("body", "size_mm"),
-    [
-        (fp.Sphere(curvature_per_m=4000.0), 0.25 / 4), (fp.Cylinder(0.5), 0.25 / 4),
-        (fp.FlatPunch(1.0, 0.1), 0.1), (fp.FlatPunch(10.0, 0.05), 0.2), (fp.Bar(3.0, 0.05), 0.05),
-        (fp.Edge(0.0), 0.05), (fp.Grating(1.0, 1.0, 0.05), 0.05),
-    ],
-    ids=lambda value: type(value).__name__ if not isinstance(value, float) else "",
-)  # fmt: skip
-def test_small_bodies_and_sharp_edges_are_meshed_finer(body, size_mm):
-    """By their radius; an edge that the mesh cannot resolve is pressed as round as its elements are long."""
-    touch = fp.touch_of(fp.Fingertip(), body, fp.RampAndHold(depth_mm=0.5))
-    assert touch.grading.finest_x_mm == pytest.approx(size_mm)
-    fillet = getattr(touch.body, "fillet_mm", getattr(touch.body, "lip_mm", np.inf))
-    assert fillet >= size_mm
-    assert touch.mesh.nodes_mm.shape[0] < 50_000
-
-
-@pytest.mark.parametrize(
-    ("body", "size_mm", "through"),
-    [
-        (fp.Sphere(radius_mm=1.1), 1.1 / 4, 2), (fp.Sphere(radius_mm=1.3), 0.45, 2),
-        (fp.FlatPunch(0.5, 0.1), 0.1, 2), (fp.FlatPunch(1.0, 0.1), 0.1, 4), (fp.Bar(3.0, 0.1), 0.1, 4),
-        (fp.Bar(3.0, 0.3), 0.2, 2), (fp.Edge(0.05), 0.05, 4), (fp.Grating(1.0, 1.0, 0.05), 0.05, 2),
-    ],
-    ids=lambda value: str(value) if not isinstance(value, float) else "",
-)  # fmt: skip
-def test_quick_is_finer_from_where_it_was_too_coarse(body, size_mm, through):
-    """Under a tip of less than 1.2 mm radius; through the horny layer below a punch of 1 mm or an edge."""
-    grading = grading_about(body, "quick", 17.37)
-    assert grading.finest_x_mm == pytest.approx(size_mm)
-    assert grading.stratum_corneum == through
-
-
 def test_force_of_a_grating_is_that_of_a_mesh_that_is_fine_everywhere():
     """It first touches where the pad is highest; ridges passed between coarse nodes, with 43 % less force."""
     few_steps = fp.PressSettings(ramp_steps=3, hold_steps=1)
@@ -223,42 +161,3 @@ def test_force_of_a_grating_is_that_of_a_mesh_that_is_fine_everywhere():
     everywhere = replace(touch, grading=replace(touch.grading, centre_mm=15.0, half_length_mm=14.0))
     force_mn = touch.solve().force_mn.max()
     assert force_mn == pytest.approx(everywhere.solve().force_mn.max(), rel=0.01)
-
-
-def test_fine_mesh_reaches_to_the_first_touch_of_wide_ridges_and_dots_alone():
-    """A body that is pressed straight touches at its axis, and a flat one needs no fine mesh elsewhere."""
-    field = Dots([(x, 0.0) for x in np.arange(-12.0, 12.1, 2.4)])
-    motion, highest_mm = fp.RampAndHold(depth_mm=0.3), first_touch_x_mm(FINGER, 17.37, np.inf, 0.0)
-    for body, tilt_deg, reaches in (
-        (fp.Grating(), 0.0, True), (field, 0.0, True), (fp.Grating(), 8.0, False),
-        (field, 8.0, False), (fp.Bar(), 0.0, False), (fp.Plate(), 0.0, False),
-    ):  # fmt: skip
-        grading = fp.touch_of(FINGER, body, motion, tilt_deg=tilt_deg).grading
-        begins_mm = grading.centre_mm - grading.half_length_mm
-        assert (begins_mm < highest_mm - 4.0) == reaches
-        if not reaches:
-            assert grading == grading_about(body, "quick", 17.37)
-
-
-def test_ridges_that_slide_meet_no_coarse_elements_near_the_place_of_contact():
-    """A grating of 0.6 mm depth slid for 0.4 mm, and found no equilibrium 8 mm beside its middle."""
-    stroke = fp.Trajectory((0.0, 50.0, 100.0), depth_mm=(0.0, 0.6, 0.6), x_mm=(0.0, 0.0, 5.0))
-    touches = [
-        fp.touch_of(FINGER, fp.Grating(), each, at_mm=(15.0, 0.0)) for each in (fp.RampAndHold(0.6), stroke)
-    ]
-    still, slides = (touch.grading for touch in touches)
-    assert slides.centre_mm - slides.half_length_mm <= 5.0
-    assert slides.centre_mm + slides.half_length_mm >= 25.0
-    assert still.half_length_mm < 10.0
-    assert (slides.size_x_mm, slides.half_width_mm) == (still.size_x_mm, still.half_width_mm)
-
-
-def test_a_body_narrower_than_an_element_is_refused_before_it_is_pressed():
-    coarse = grading_about(fp.Sphere(curvature_per_m=287.0), "quick", 17.37)
-    with pytest.raises(fp.InputError, match=r"at most 0.0333333 mm, .*: got 0.45 mm"):
-        fp.touch_of(fp.Fingertip(), fp.FlatPunch(0.1, 0.01), grading=coarse)
-    with pytest.raises(
-        fp.InputError, match=r"got 0.05 mm; give a finer grading or a wider body than 0.1 mm\."
-    ):
-        fp.touch_of(fp.Fingertip(), fp.FlatPunch(0.1, 0.01))
-    fp.touch_of(fp.Fingertip(), fp.FlatPunch(0.2, 0.01))

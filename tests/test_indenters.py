@@ -20,10 +20,15 @@ def beside(body, points):
     return np.hypot(points[:, 0], points[:, 2]) if body in (SPHERE, PUNCH) else np.abs(points[:, 0])
 
 
+def half_width(body):
+    sizes = ("width_mm", "diameter_mm")
+    return next((getattr(body, size) / 2 for size in sizes if hasattr(body, size)), np.inf)
+
+
 def profile(body, s):
     """Half of the outline: (beside, y) at arc length s from the middle of the face."""
     fillet = RADIUS if body in (CYLINDER, SPHERE) else body.fillet_mm
-    half = body.half_width_mm
+    half = half_width(body)
     flat, turn = half - fillet, 0.5 * np.pi * fillet
     if s < flat:
         return s, 0.0
@@ -81,7 +86,7 @@ def test_normal_is_the_slope_of_the_gap_and_of_unit_length(body):
 @pytest.mark.parametrize("body", ALL, ids=NAMES)
 def test_front_is_where_the_gap_changes_sign(body):
     lateral = np.random.default_rng(2).uniform(-0.98, 0.98, (30, 3))
-    lateral *= min(body.half_width_mm, RADIUS) / np.sqrt(2)
+    lateral *= min(half_width(body), RADIUS) / np.sqrt(2)
     face = lateral.copy()
     face[:, 1] = body.front(lateral)
     assert np.isfinite(face).all()
@@ -93,7 +98,7 @@ def test_front_is_where_the_gap_changes_sign(body):
     np.testing.assert_allclose(gap, 0.0, atol=1e-15)
     np.testing.assert_array_equal(normal, [[0.0, 1.0, 0.0]])
     if not isinstance(body, Plate):
-        beside_it = np.array([[-1.001, 0.0, 0.0], [1.001, 0.0, 0.0]]) * body.half_width_mm
+        beside_it = np.array([[-1.001, 0.0, 0.0], [1.001, 0.0, 0.0]]) * half_width(body)
         assert (body.front(beside_it) == -np.inf).all()
 
 

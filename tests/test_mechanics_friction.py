@@ -219,7 +219,6 @@ class Wedge(Indenter):
     """A face inclined against the direction of pressing."""
 
     slope = 0.6  # rise over run
-    half_width_mm = np.inf
     normal = np.array([slope, 1.0, 0.0]) / np.hypot(slope, 1.0)
 
     def front(self, points_mm):

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from fingerpad import Fingertip, Grading
-from fingerpad.geometry.grading import graded_lines, lines_along, lines_of_sizes, resolution_grading
+from fingerpad.geometry.grading import graded_lines, lines_of_sizes, resolution_grading
 from fingerpad.geometry.mesh import LAYERS, Mesh, block_mesh, finger_mesh
 from fingerpad.geometry.mesh_checks import jacobian_at_gauss, scaled_jacobian
 from refusals import refusals
@@ -85,6 +85,21 @@ def test_every_brick_is_sound(resolution, request):
     near = (np.linalg.norm(middle[:, [0, 2]] - [CONTACT_X, 0], axis=1) < 2) & (middle[:, 1] < -6)
     assert near.sum() > 100
     assert quality[near].min() > 0.95
+
+
+@pytest.mark.parametrize("resolution", ["quick", "standard", "paper"])
+def test_the_finger_is_no_visible_polygon(resolution, request):
+    """From the side, over the tip, and at the contact, the skin turns by 30 degrees a line at most."""
+    mesh = request.getfixturevalue(resolution)
+    skin = mesh.nodes_mm[mesh.skin_grid]
+    volar = skin.shape[1] // 2 if mesh.full else 0
+    side = np.concatenate([skin[:, volar], skin[-2::-1, -1]])
+    section = skin[np.abs(skin[:, volar, 0] - CONTACT_X).argmin(), volar:]
+    assert side[-1, 1] > 0.0
+    for outline in (side, section):
+        normals = FINGER.skin_normal(outline)
+        turns = np.degrees(np.arccos(np.clip((normals[1:] * normals[:-1]).sum(axis=1), -1.0, 1.0)))
+        assert 10.0 < turns.max() < 30.0
 
 
 def test_sizes_are_those_of_the_presets(quick, standard, paper):
@@ -200,33 +215,11 @@ def test_graded_lines_keep_their_growth_their_limit_and_their_end(fine, length, 
     assert (steps[:n_fine] <= size + 1e-12).all()
 
 
-@pytest.mark.parametrize("length", [3.3, 6.0, 6.01, 17.2])
-def test_a_core_is_finer_and_the_fine_zone_stays(length):
-    grading = Grading(CONTACT_X, 6.0, 1.0, 0.1, 0.1, core_half_length_mm=0.1, core_size_mm=0.025)
-    lines = lines_along(grading, length)
-    steps = np.diff(lines)
-    np.testing.assert_allclose(steps[:4], 0.025)
-    assert steps.min() > 0.0249
-    assert steps[lines[1:] < 6.0].max() < 0.1 + 1e-12
-    assert np.median(steps[(lines[:-1] > 0.5) & (lines[1:] < 6.0)]) == pytest.approx(0.1)
-    assert (steps[1:] / steps[:-1]).max() <= 1.3 + 1e-9
-    assert lines[0] == 0.0
-    assert lines[-1] == length
-    assert steps.size % 2 == 0
-
-
-def with_core(half_length_mm, size_mm):
-    return Grading(10.0, 1.0, 1.0, 0.2, 0.2, core_half_length_mm=half_length_mm, core_size_mm=size_mm)
-
-
 test_what_cannot_be_meshed_is_refused = refusals(
     (lambda: finger_mesh(FINGER, resolution_grading("quick", 40.0)), "centre_mm must lie between"),
     (lambda: resolution_grading("coarse", 10.0), "resolution must be one of quick"),
     (lambda: Grading(10.0, 1.0, 1.0, 0.2, 0.2, growth=1.5), "growth must be above 1"),
     (lambda: Grading(10.0, 1.0, 1.0, 0.2, 0.2, dermis=0), "dermis must be a whole number"),
-    *((lambda half=half, size=size: with_core(half, size),
-       "core_half_length_mm and core_size_mm must both be 0")
-      for half, size in ((0.1, 0.0), (0.0, 0.1), (1.0, 0.1), (0.1, 0.2), (-0.1, 0.1))),
     (lambda: block_mesh([0, 1], [1, 2], [0, 1], layers=[0]), "y_edges starting at the skin"),
     (lambda: block_mesh([0, 1], [0, 2], [0, 1], layers=[0, 1]), "for each interval of y_edges"),
     (lambda: block_mesh([0, 1], [0, 2], [1, 2], layers=[0], symmetric=True), "must start at 0"),

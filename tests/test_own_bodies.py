@@ -174,6 +174,6 @@ def test_braille_is_not_its_mirror_image(along_finger):
 def test_a_mesh_resolves_dots_and_their_distances():
     grading = fp.touch_of(fp.Fingertip(), fp.braille("c")).grading
     assert not grading.full  # two dots side by side, mirror images of each other
-    assert max(grading.size_x_mm, grading.size_z_mm) <= (2.34 - 1.44) / 4
+    assert max(grading.finest_x_mm, grading.finest_z_mm) <= (2.34 - 1.44) / 4
     with pytest.raises(fp.InputError, match="height_mm must not exceed"):
         Dots([(0.0, 0.0)], height_mm=1.0)

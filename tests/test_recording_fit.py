@@ -300,7 +300,7 @@ def test_stimuli_are_indented_at_their_position_with_their_motion():
     assert (beside.tilt_deg, beside.grading.full, beside.stimulus.depth_mm) == (3.0, True, 0.4)
     assert (wire.tilt_deg, wire.grading.full, wire.stimulus.force_mn) == (0.0, False, 50.0)
     assert (gap.indenter.gap_mm, gap.grading.full, gap.spin_deg, gap.friction) == (0.5, False, 0.0, 0.3)
-    assert min(gap.grading.size_x_mm, gap.grading.core_size_mm or 1.0) <= 0.5 / 4
+    assert gap.grading.finest_x_mm <= 0.5 / 4
     assert (turned.spin_deg, turned.grading.full) == (30.0, True)
 
 

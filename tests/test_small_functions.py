@@ -5,7 +5,7 @@ from importlib import import_module
 import numpy as np
 import pytest
 
-from fingerpad import Bar, Grading, Material, RampAndHold, Sphere, named_tissues, sine
+from fingerpad import Bar, Material, RampAndHold, Sphere, named_tissues, sine
 from fingerpad.geometry.mesh import block_mesh
 from refusals import refused
 
@@ -27,7 +27,6 @@ NUMBERS = [
     ("core.threads:even_chunks", (300,), [(0, 128), (128, 256), (256, 300)]),
     ("core.threads:run_kernel", (lambda size, first, last: size * (last - first), 200, 10), [1280, 720]),
     ("experiments.gerling2014.percept:goodwin_misfit", (np.array([0.58, 0, 0, 0, 0, 0.93]),), 0.0141),
-    ("geometry.grading:lines_across", (Grading(17.0, 0.5, 1.0, 0.2, 0.5, 0.5), 2.0), [0, 0.5, 1, 1.5, 2]),
     ("geometry.courses:samples_of_line", (np.arange(4.0), COURSE, 0.2), [True, False, True, True]),
     ("mechanics.fields:largest_compression", (np.array([1.0, -3.0, 0.0, 0.0, 0.0, 0.0]),), 3.0),
     ("mechanics.inertia:share_of_force", (sine(0.5, 0.01, 183.0, cycles=4), SOFT, [5.0]), 0.0189),

@@ -11,12 +11,11 @@ import trimesh
 from PIL import Image
 
 import fingerpad as fp
-from fingerpad.geometry.bodies import Dots, ridges
+from fingerpad.geometry.bodies import ridges
 from fingerpad.geometry.grading import resolution_grading
 from fingerpad.geometry.height_maps import MOST_HEIGHTS
-from fingerpad.geometry.indenter_grading import grading_about
 from fingerpad.geometry.probing import check_gap
-from fingerpad.geometry.relief import narrowest_relief
+from fingerpad.geometry.size_field import grading_below
 from fingerpad.geometry.surface import Surface
 from fingerpad.geometry.triangles import Triangles
 from fingerpad.skin.store import touch_key
@@ -268,11 +267,14 @@ def test_corners_are_rounded_as_a_ball_and_hollows_stay():
     assert round_ones.gap(top)[0] == pytest.approx(0.2 * (np.sqrt(2.0) - 1.0), abs=1e-12)
 
 
+FINER = replace(COARSE, full=True, size_x_mm=0.6, size_z_mm=0.6)
+
+
 def test_the_content_of_a_surface_is_its_key():
     same, other = CUBE.copy(), CUBE.copy()
     other[3, 0] = np.nextafter(other[3, 0], 9.0)
     keys = [
-        touch_key(fp.touch_of(fp.Fingertip(), Surface(vertices, SIDES), grading=replace(COARSE, full=True)))
+        touch_key(fp.touch_of(fp.Fingertip(), Surface(vertices, SIDES), grading=FINER))
         for vertices in (CUBE, same, other)
     ]
     assert keys[0] == keys[1] != keys[2]
@@ -280,13 +282,10 @@ def test_the_content_of_a_surface_is_its_key():
 
 def test_fine_relief_asks_for_a_mesh_that_resolves_it():
     rippled = fp.height_surface(map_of(fp.Grating(ridge_mm=0.8, groove_mm=0.8, lip_mm=0.1), 2.4, 0.05), 0.05)
-    assert 0.6 <= rippled.relief_mm <= 1.25
-    assert grading_about(rippled, "quick", 17.37).size_x_mm <= rippled.relief_mm / 4
+    grading = grading_below(fp.Fingertip(), rippled, "quick", (17.37, 0.0), fp.RampAndHold(depth_mm=0.5))
+    assert grading.finest_x_mm <= 0.8 / 4
     with pytest.raises(fp.InputError, match="grading must have elements of at most"):
         fp.touch_of(fp.Fingertip(), rippled, grading=replace(COARSE, full=True))
-    assert fp.height_surface(map_of(fp.Sphere(curvature_per_m=287.0), 2.0), 0.1).relief_mm > 1.5
-    assert cup(8.0).relief_mm == 2.0  # its borders are slopes, not ridges
-    assert [Surface(CUBE * [half, 1.0, 1.0], SIDES).relief_mm for half in (0.05, 0.3)] == [0.1, 0.6]
 
 
 def test_two_balls_are_meshed_for_what_touches_and_not_for_the_seam():
@@ -295,46 +294,7 @@ def test_two_balls_are_meshed_for_what_touches_and_not_for_the_seam():
     pair = fp.Union([fp.Sphere(radius_mm=2.0), fp.Sphere(radius_mm=2.0)], at)
     from_file = fp.height_surface(map_of(pair, 4.0, 0.1), 0.1)
     for body in (pair, from_file):
-        assert body.relief_mm > 1.0
         assert len(fp.touch_of(fp.Fingertip(), body).mesh.nodes_mm) < 30_000
-
-
-def face(height, half_mm=3.0, step_mm=0.025):
-    """Width of the narrowest relief of a face, given by its heights over x and z."""
-    line = np.arange(-half_mm, half_mm, step_mm)
-    x, z = np.meshgrid(line, line, indexing="ij")
-    return narrowest_relief(height(x, z), step_mm, -3.0)
-
-
-@pytest.mark.parametrize(
-    ("height", "width_mm"),
-    [
-        (lambda x, z: np.where((x > 0.4) & (x < 0.43), -1.0, 0.0), 2.0),
-        (lambda x, z: np.where((x > 0.4) & (x < 0.7), -1.0, 0.0), 0.3),
-        (lambda x, z: np.where((x > 0.0) & (np.abs(z) < 0.6 * x), -3.0, 0.0), 2.0),
-        (lambda x, z: np.where(np.abs(x) < 0.1, -1.2, np.where(x > 0, -1.5, 0.0)), 2.0),
-        (lambda x, z: 0.02 * np.sign(np.sin(40.0 * x)), 2.0),
-        (lambda x, z: 0.06 * np.sign(np.sin(31.5 * x)), 0.1),
-    ],
-    ids=["crack", "groove", "corner in plan", "deep ledge", "noise", "ripples"],
-)
-def test_only_what_skin_touches_is_measured(height, width_mm):
-    assert face(height) == width_mm
-
-
-def test_a_mesh_must_resolve_the_parts_of_a_union():
-    across = ridges([-1.6, 0.0, 1.0], [1.2, 0.6, 0.6], fillet_mm=0.1)
-    assert (across.narrowest_mm, across.relief_mm, across.edge_reach_mm) == (0.4, np.inf, 2.2)
-    graded = grading_about(across, "quick", 17.37)
-    assert graded.core_size_mm <= 0.1 < graded.size_z_mm
-    with pytest.raises(fp.InputError, match="grading must have elements of at most"):
-        fp.touch_of(fp.Fingertip(), across, grading=COARSE)
-    cross = fp.Union([fp.Bar(0.6, 0.1), Dots([(0.0, 0.0)], 1.6, 0.4)], [(0, 0, 0), (0, 0, 0)])
-    assert cross.relief_mm == 0.6
-    assert (
-        fp.Union([fp.Sphere(curvature_per_m=100.0), fp.Plate()], [(0, 0, 0), (0, -1, 0)]).narrowest_mm
-        == np.inf
-    )
 
 
 def _together(*parts):
@@ -412,9 +372,6 @@ test_a_surface_that_cannot_be_pressed_is_refused_in_one_sentence = refusals(
     (lambda: Surface(CUBE * 1e4, SIDES), "check the unit"),
     (lambda: Surface(CUBE, SIDES + 1), "numbers of vertices, 0 to 7"),
     (lambda: Surface(FACING_AWAY, np.array([[0, 2, 1]])), "outer side"),
-    # It was refused in terms of a grading that nobody gave, or took hours.
-    (lambda: fp.touch_of(fp.Fingertip(), Surface(CUBE * [4.0, 1.0, 0.05], SIDES)),
-     r"^Surface has a .* dot 0\.2 mm wide, .* enlarge the body"),
     (lambda: fp.height_surface(np.zeros((1500, 1500)), 0.01),
      f"heights_mm must have at most {MOST_HEIGHTS:,} heights"),
 )  # fmt: skip

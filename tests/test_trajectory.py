@@ -200,7 +200,7 @@ def test_punch_that_goes_between_two_nodes_is_refused_instead_of_pressing_with_n
     with pytest.raises(fp.InputError, match="would go between the nodes"):
         fp.touch_of(fp.Fingertip(), tiny, fp.RampAndHold(depth_mm=0.3))
     # What its size does not tell is told by the force.
-    monkeypatch.setattr("fingerpad.skin.indentation.FEWEST_ACROSS_BODY", 1)
+    monkeypatch.setattr("fingerpad.geometry.size_field.FEWEST_BELOW", 1)
     with pytest.raises(fp.ConvergenceError, match=r"The skin slips past the indenter: its force falls from"):
         fp.touch_of(fp.Fingertip(), tiny, fp.RampAndHold(depth_mm=0.3)).solve()
 

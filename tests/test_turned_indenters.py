@@ -10,15 +10,9 @@ from fingerpad.core.units import cosine_and_sine
 from fingerpad.geometry.bodies import Bar, Cylinder, Edge, FlatPunch, Gap, Grating, Line, Plate, Sphere
 from fingerpad.geometry.fingertip import Fingertip
 from fingerpad.geometry.grading import Grading, covering
-from fingerpad.geometry.indenter_grading import (
-    ACROSS_GROOVE,
-    EDGE_SIZE_MM,
-    OBLIQUE_SIZE_MM,
-    grading_about,
-    sizes_across,
-)
 from fingerpad.geometry.indenters import Indenter
 from fingerpad.geometry.motion import ForceRampAndHold, RampAndHold
+from fingerpad.geometry.size_field import grading_below
 from fingerpad.mechanics.press_settings import PressSettings
 from fingerpad.mechanics.tissues import named_tissues
 from fingerpad.skin.indentation import Touch, touch_of
@@ -43,7 +37,6 @@ class BarAlong(Indenter):
     """The bar along the finger, written with its axes exchanged."""
 
     bar: Bar
-    half_width_mm = np.inf
 
     def gap(self, points_mm):
         gap, normal = self.bar.gap(points_mm[:, ::-1])
@@ -105,59 +98,23 @@ def test_force_control_turns_as_depth_does_and_spin_is_part_of_the_key():
     assert skin.force_imbalance <= 1e-4
 
 
-def test_a_mesh_covers_the_turned_footprint_and_both_halves_where_it_must():
-    straight, turned = (grading_about(Bar(), "quick", 17.37, spin_deg=spin) for spin in (0.0, 30.0))
-    assert not straight.full
-    assert turned.full
-    grown = np.cos(np.pi / 6) + np.sin(np.pi / 6)
-    assert turned.half_length_mm == pytest.approx(grown * straight.half_length_mm)
-    assert turned.half_width_mm == pytest.approx(grown * straight.half_width_mm)
-    along = grading_about(Bar(), "quick", 17.37, spin_deg=90.0)
-    assert (along.half_length_mm, along.half_width_mm, along.full) == (2.5, 2.5, False)
-    assert grading_about(Edge(), "quick", 17.37, spin_deg=90.0).full
-    made = touch_of(Fingertip(), Bar(), spin_deg=30.0)
-    assert made.grading == turned
-    assert made.spin_deg == 30.0
-
-
-@pytest.mark.parametrize("spin_deg", [0.0, 90.0, 30.0])
-@pytest.mark.parametrize(
-    "indenter",
-    [Bar(), Gap(0.3), Gap(2.0), Grating(0.8, 0.6), Edge()],
-    ids=["bar", "gap 0.3", "gap 2", "grating", "edge"],
-)
-def test_a_mesh_is_fine_across_edges_however_they_lie(indenter, spin_deg):
-    resolution = "quick"
-    grading = grading_about(indenter, resolution, 17.37, spin_deg=spin_deg)
-    largest = (OBLIQUE_SIZE_MM if spin_deg == 30.0 else EDGE_SIZE_MM)[resolution]
-    assert max(sizes_across(grading, spin_deg)) <= largest
-    assert max(sizes_across(grading, spin_deg)) <= indenter.narrowest_mm / ACROSS_GROOVE
-    if spin_deg == 0.0 and not isinstance(indenter, Grating):
-        assert grading.core_half_length_mm == indenter.edge_reach_mm
-    no_gap = grading_about(Gap(0.0), resolution, 17.37, spin_deg=spin_deg)
-    assert max(sizes_across(no_gap, spin_deg)) > largest
-
-
 test_what_cannot_be_turned_is_refused_in_one_sentence = refusals(
     (lambda: touch(Bar(), 20.0), "spin_deg = 20 degrees leaves Bar without symmetry.*full=True"),
     (lambda: touch(Edge(), 90.0), "spin_deg = 90 degrees leaves Edge without symmetry"),
     (lambda: touch(Bar(), np.nan), "spin_deg must be a finite number"),
     (lambda: touch(Bar(), "across"), "spin_deg must be a"),
     (lambda: touch(Line(), 90.0), "spin_deg must be 0 for Line: got 90 degrees"),
-    (lambda: touch(Gap(1.0)), r"at most 0.5 mm across grooves and ridges of 1 mm: got 0.8 mm"),
-    (lambda: touch(Gap(1.0), 90.0), r"elements of at most 0.5 mm"),
-    (lambda: touch(Gap(1.0), 9.0, replace(FULL, size_x_mm=0.4)), r"at most 0.5 mm.*got 0.8 mm"),
-    (lambda: touch_of(Fingertip(), Cylinder(0.1), spin_deg=20.0), "thinner than 0.9 mm, two elements"),
     (lambda: touch_of(Fingertip(), Bar(), spin_deg=np.inf), "spin_deg must be a finite number"),
 )  # fmt: skip
 
 
 def test_one_mesh_serves_several_indenters():
     """As fine as each of them wherever that one is fine."""
+    finger, motion = Fingertip(), RampAndHold()
     parts = [
-        grading_about(Gap(0.5), "standard", 17.37),
-        grading_about(Gap(2.0), "quick", 17.0),
-        grading_about(Bar(), "quick", 18.0, spin_deg=20.0),
+        grading_below(finger, Gap(0.5), "standard", (17.37, 0.0), motion),
+        grading_below(finger, Gap(2.0), "quick", (17.0, 0.0), motion),
+        grading_below(finger, Bar(), "quick", (18.0, 0.0), motion, spin_deg=20.0),
     ]
     joint = covering(parts)
     assert joint.full
@@ -168,15 +125,7 @@ def test_one_mesh_serves_several_indenters():
         assert joint.half_width_mm >= part.half_width_mm
         assert joint.size_x_mm <= part.size_x_mm
         assert joint.size_z_mm <= part.size_z_mm
-        if part.core_size_mm:
-            assert joint.core_size_mm <= part.core_size_mm
-            beyond = abs(part.centre_mm - joint.centre_mm) + part.core_half_length_mm
-            assert joint.core_half_length_mm >= beyond
+        assert set(part.finer_along) <= set(joint.finer_along)
     assert covering([HALF]) == HALF
-    assert covering([grading_about(Line(), "paper", 17.37)] * 2) == grading_about(Line(), "paper", 17.37)
-    wide = replace(HALF, core_half_length_mm=1.5, core_size_mm=0.2)
-    apart = covering([wide, replace(wide, centre_mm=18.37)])
-    assert (apart.core_half_length_mm, apart.core_size_mm) == (2.0, 0.2)
-    assert covering([wide, replace(HALF, size_x_mm=0.1)]).core_size_mm == 0.0
     with pytest.raises(InputError, match="at least one grading: got none"):
         covering([])

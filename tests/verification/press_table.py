@@ -34,6 +34,7 @@ from fingerpad.geometry.grading import Grading, Strip
 from fingerpad.geometry.indenters import Indenter
 from fingerpad.geometry.mesh import LAYERS, Mesh
 from fingerpad.geometry.motion import RampAndHold, Trajectory
+from fingerpad.geometry.size_field import half_width_mm
 from fingerpad.mechanics.press_settings import PressSettings
 from fingerpad.skin.code_hash import code_hash
 from fingerpad.skin.indentation import CONTACT_POINT_MM, touch_of
@@ -171,7 +172,7 @@ def presses() -> Iterator[Press]:
 
 def depth_of(press: Press) -> float:
     """Depth of a press: 0.8 of the way to the bone at most, which `check_path` allows. [mm]"""
-    wide = press.body.half_width_mm >= WIDE_MM
+    wide = half_width_mm(press.body) >= WIDE_MM
     to_bone_mm = float(Fingertip().depth_available_mm(*press.at_mm))
     return min(DEEP_MM if wide else DEPTH_MM, 0.79 * to_bone_mm)
 
@@ -196,7 +197,6 @@ def finer(grading: Grading) -> Grading:
         size_x_mm=grading.size_x_mm / FINER,
         size_z_mm=grading.size_z_mm / FINER,
         largest_mm=grading.largest_mm / FINER,
-        core_size_mm=grading.core_size_mm / FINER,
         finer_along=strips(grading.finer_along),
         finer_across=strips(grading.finer_across),
         **layers,

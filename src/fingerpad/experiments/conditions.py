@@ -14,8 +14,9 @@ from fingerpad.data.tissues import DEFAULT_TISSUES
 from fingerpad.geometry.bodies import Bar, Sphere
 from fingerpad.geometry.fingertip import Finger, Fingertip
 from fingerpad.geometry.grading import RESOLUTIONS, Grading, resolution_grading
-from fingerpad.geometry.indenter_grading import grading_about
 from fingerpad.geometry.indenters import Indenter
+from fingerpad.geometry.motion import RampAndHold
+from fingerpad.geometry.size_field import grading_below
 from fingerpad.mechanics.materials import Tissues
 from fingerpad.mechanics.tissues import TISSUES
 from fingerpad.neuron.afferent import Afferent
@@ -139,8 +140,8 @@ class Conditions:
 
     def deflection_grading(self, indenter: Indenter) -> Grading:
         """Mesh of the skin deflection study: fine about the indenter."""
-        size = self.finger.relative_size
-        return self.grading or grading_about(indenter, self.resolution, self.receptor_x_mm, finger_size=size)
+        at_mm = self.receptor_x_mm, 0.0
+        return self.grading or grading_below(self.finger, indenter, self.resolution, at_mm, RampAndHold())
 
     def bar_grading(self) -> Grading:
         """Mesh of the single-unit study: fine about the receptor, the same for all shifts."""

@@ -16,6 +16,7 @@ from fingerpad.core.values import Finite, FiniteVector, IntArray, TimesMs, Whole
 from fingerpad.export.outline import Outline, RigidMesh, face_mesh, outline_of, rigid_mesh
 from fingerpad.geometry.indenters import Indenter
 from fingerpad.geometry.mesh import LAYERS, Mesh
+from fingerpad.geometry.size_field import half_width_mm
 from fingerpad.mechanics.contact import Placement, check_friction
 from fingerpad.mechanics.materials import Material
 from fingerpad.skin.code_hash import code_hash
@@ -173,7 +174,7 @@ class Job:
             outline = self.outline
             if outline is not None and outline.revolved:
                 across = np.hypot(local[..., 0], local[..., 2])
-            beyond = self.indenter.half_width_mm + self.depths_mm.max() + BESIDE_INDENTER_MM
+            beyond = half_width_mm(self.indenter) + self.depths_mm.max() + BESIDE_INDENTER_MM
             normal = np.cross(local[:, 2] - local[:, 0], local[:, 3] - local[:, 1])
             may = (across.min(axis=1) < beyond) & (normal[:, 1] < 0.0)
         may &= ~np.isin(faces, mesh.fixed_nodes).all(axis=1)

@@ -17,6 +17,7 @@ from fingerpad.core.errors import InputError
 from fingerpad.core.values import FloatArray, IntArray, Positive
 from fingerpad.geometry.bodies import Bar, Cylinder, Edge, FlatPunch, Gap, Grating, Line, Plate, Sphere
 from fingerpad.geometry.indenters import Indenter
+from fingerpad.geometry.size_field import details_of
 
 Point = tuple[float, float]
 
@@ -29,7 +30,9 @@ LARGEST_TURN_RAD = np.deg2rad(3.0)
 FACETS_AROUND = 96
 FACETS_ACROSS = 8
 
-FACETS_ACROSS_RELIEF = 16  # Facets across the narrowest part of a body without an outline.
+FACETS_ACROSS_RELIEF = 24
+"""Facets across the narrowest part of a body without an outline. With 16, 24 and 32 of them CalculiX finds
+143.2, 141.7 and 142.0 mN under a square with a hole."""
 
 SMALLEST_FACET_MM, LARGEST_FACET_MM, MOST_FACETS = 0.025, 0.1, 250_000
 """Bounds of their size, and of their number. [mm]"""
@@ -84,7 +87,7 @@ def outline_of(indenter: Indenter, reach_mm: Positive) -> Outline | None:
         corners, centres = _rounded_side(indenter.diameter_mm / 2, indenter.fillet_mm, reach_mm)
         return _without_empty_segments(True, ((0.0, 0.0), *corners), (None, *centres))
     if isinstance(indenter, Bar):
-        half, fillet = indenter.half_width_mm, indenter.fillet_mm
+        half, fillet = indenter.width_mm / 2, indenter.fillet_mm
         return _ridges((_Ridge(-half, half, fillet, fillet),), reach_mm + fillet)
     if isinstance(indenter, Plate | Line):
         return Outline(False, ((-reach_mm, 0.0), (reach_mm, 0.0)), (None,))
@@ -191,7 +194,9 @@ def face_mesh(
     indenter: Indenter, lowest_mm: float, x_mm: tuple[float, float], z_mm: tuple[float, float]
 ) -> RigidMesh:
     """Divide the face of any body into facets over a grid; walls are as steep as one of its cells is wide."""
-    pitch = np.clip(indenter.relief_mm / FACETS_ACROSS_RELIEF, SMALLEST_FACET_MM, LARGEST_FACET_MM)
+    details = details_of(indenter)
+    finest_mm = min(*details.parts_mm, *details.grooves_mm)
+    pitch = np.clip(finest_mm / FACETS_ACROSS_RELIEF, SMALLEST_FACET_MM, LARGEST_FACET_MM)
     lines = []
     for low, high in (x_mm, z_mm):
         # The middle of the body is on a line: a symmetric body has symmetric facets.

@@ -64,8 +64,6 @@ __all__ = [
 SIZES_MM = (0.01, 400.0)
 """Smallest and largest width or diameter of a body that is pressed into a fingertip. [mm]"""
 
-BESIDE_EDGE_MM = 0.4  # Distance from the wall of an edge within which the skin bends sharply. [mm]
-
 
 def _of_diameter(radius_mm: float) -> dict[str, float]:
     return {"diameter_mm": 2 * positive("radius_mm", radius_mm, "mm")}
@@ -178,14 +176,6 @@ class Sphere(Round):
     def _from_middle(self, points: FloatArray) -> FloatArray:
         return points
 
-    @property
-    def half_width_mm(self) -> float:
-        return self.radius_mm
-
-    @property
-    def tip_radius_mm(self) -> float:
-        return self.radius_mm
-
 
 @value_class
 class Cylinder(Round):
@@ -206,14 +196,6 @@ class Cylinder(Round):
 
     def _from_middle(self, points: FloatArray) -> FloatArray:
         return points * (ALONG + UP)
-
-    @property
-    def half_width_mm(self) -> float:
-        return self.diameter_mm / 2
-
-    @property
-    def tip_radius_mm(self) -> float:
-        return self.diameter_mm / 2
 
 
 @value_class
@@ -238,17 +220,6 @@ class Bar(Walled):
 
     def _wall(self, points: FloatArray) -> Gapped:
         return _beside(points[:, 0], self.width_mm)
-
-    @property
-    def half_width_mm(self) -> float:
-        return self.width_mm / 2
-
-    @property
-    def edge_reach_mm(self) -> float:
-        return self.width_mm / 2 + BESIDE_EDGE_MM
-
-    def edges_mm(self, reach_mm: Finite) -> tuple[tuple[float, float], ...]:
-        return ((-self.width_mm / 2, self.fillet_mm), (self.width_mm / 2, self.fillet_mm))
 
     def rounded_to(self, radius_mm: Finite) -> Bar:
         return replace(self, fillet_mm=max(self.fillet_mm, min(radius_mm, self.width_mm / 2)))
@@ -286,10 +257,6 @@ class Line(Indenter):
     def gap(self, points_mm: PointsMm) -> tuple[FloatArray, FloatArray]:
         return Plate().gap(points_mm)
 
-    @property
-    def half_width_mm(self) -> float:
-        return self.diameter_mm / 2
-
 
 @value_class
 class FlatPunch(Walled):
@@ -315,14 +282,6 @@ class FlatPunch(Walled):
     def _wall(self, points: FloatArray) -> Gapped:
         radial, outward = from_axis(points)
         return radial - self.diameter_mm / 2, outward
-
-    @property
-    def half_width_mm(self) -> float:
-        return self.diameter_mm / 2
-
-    @property
-    def rim_mm(self) -> tuple[float, float]:
-        return self.diameter_mm / 2, self.fillet_mm
 
     def rounded_to(self, radius_mm: Finite) -> FlatPunch:
         return replace(self, fillet_mm=max(self.fillet_mm, min(radius_mm, self.diameter_mm / 2)))
@@ -360,13 +319,6 @@ class Edge(Walled):
 
     def _wall(self, points: FloatArray) -> Gapped:
         return points[:, 0], np.broadcast_to(ALONG, points.shape)
-
-    @property
-    def edge_reach_mm(self) -> float:
-        return self.fillet_mm + BESIDE_EDGE_MM
-
-    def edges_mm(self, reach_mm: Finite) -> tuple[tuple[float, float], ...]:
-        return ((0.0, self.fillet_mm),)
 
     def rounded_to(self, radius_mm: Finite) -> Edge:
         return replace(self, fillet_mm=max(self.fillet_mm, radius_mm))
@@ -425,23 +377,6 @@ class Gap(Walled):
             deeper(bar, rounded(lip - beyond, points_mm[:, 1] + lip, -outward, lip)) if self.gap_mm else bar
         )
 
-    @property
-    def half_width_mm(self) -> float:
-        return self.width_mm / 2
-
-    @property
-    def edge_reach_mm(self) -> float:
-        return self.gap_mm / 2 + BESIDE_EDGE_MM if self.gap_mm > 0.0 else 0.0
-
-    @property
-    def narrowest_mm(self) -> float:
-        return self.gap_mm if self.gap_mm > 0.0 else np.inf
-
-    def edges_mm(self, reach_mm: Finite) -> tuple[tuple[float, float], ...]:
-        half, lip = self.width_mm / 2, self.gap_mm / 2
-        lips = ((-lip, self.lip_radius_mm), (lip, self.lip_radius_mm)) if self.gap_mm > 0.0 else ()
-        return ((-half, self.fillet_mm), *lips, (half, self.fillet_mm))
-
 
 @value_class
 class Grating(Walled):
@@ -479,22 +414,6 @@ class Grating(Walled):
     def _wall(self, points: FloatArray) -> Gapped:
         ridge = self.period_mm * np.round(points[:, 0] / self.period_mm)
         return _beside(points[:, 0] - ridge, self.ridge_mm)
-
-    @property
-    def edge_reach_mm(self) -> float:
-        return np.inf
-
-    @property
-    def narrowest_mm(self) -> float:
-        return min(self.ridge_mm, self.groove_mm)
-
-    def edges_mm(self, reach_mm: Finite) -> tuple[tuple[float, float], ...]:
-        last = int(reach_mm / self.period_mm) + 1
-        return tuple(
-            (ridge * self.period_mm + side * self.ridge_mm / 2, self.lip_mm)
-            for ridge in range(-last, last + 1)
-            for side in (-1, 1)
-        )
 
     def rounded_to(self, radius_mm: Finite) -> Grating:
         return replace(self, lip_mm=max(self.lip_mm, min(radius_mm, self.ridge_mm / 2)))

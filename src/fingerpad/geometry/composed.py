@@ -44,17 +44,7 @@ from fingerpad.geometry.indenters import (
     nearer,
     turned_out,
 )
-from fingerpad.geometry.relief import (
-    PIXELS,
-    REACH_MM,
-    RELIEF_MM,
-    WIDTHS_MM,
-    check_edge_radius,
-    narrowest_relief,
-    with_rounded_edges,
-)
-
-SAME_MM = 1e-6  # Heights that differ by less are equal. [mm]
+from fingerpad.geometry.relief import check_edge_radius, with_rounded_edges
 
 LEAST_SLOPE = 0.2
 """Least length of the gradient in a seam by which a gap is divided: parts that face each other have none."""
@@ -116,50 +106,7 @@ class Union(Composed):
                 f"{len(self.parts)} parts."
             )
         if self.edge_radius_mm:
-            check_edge_radius(self.edge_radius_mm, replace(self, edge_radius_mm=0.0).narrowest_mm)
-
-    @property
-    def half_width_mm(self) -> float:
-        return max(
-            part.half_width_mm + abs(x) for part, (x, _, _) in zip(self.parts, self.at_mm, strict=True)
-        )
-
-    @property
-    def relief_mm(self) -> float:
-        found = min(part.relief_mm for part in self.parts)
-        return found if self._swept else min(found, self._measured_mm)
-
-    @property
-    def narrowest_mm(self) -> float:
-        return min(self._measured_mm, *(min(part.relief_mm, part.narrowest_mm) for part in self.parts))
-
-    @property
-    def edge_reach_mm(self) -> float:
-        if not (self._swept and np.isfinite(self.narrowest_mm)):
-            return 0.0
-        reaches = (
-            part.half_width_mm + abs(x) for part, (x, _, _) in zip(self.parts, self.at_mm, strict=True)
-        )
-        return min(max((reach for reach in reaches if np.isfinite(reach)), default=REACH_MM), REACH_MM)
-
-    @cached_property
-    def _swept(self) -> bool:
-        """Whether its face is the same all along z."""
-        return bool(np.ptp(self._heights(np.linspace(-REACH_MM, REACH_MM, 7)), axis=1).max() < SAME_MM)
-
-    @cached_property
-    def _measured_mm(self) -> float:
-        """Width of the narrowest dot, ridge or groove of the face; infinite if all are wide. [mm]"""
-        z_mm = np.zeros(1) if self._swept else np.linspace(-REACH_MM, REACH_MM, PIXELS)
-        height = self._heights(z_mm) * np.ones(PIXELS)
-        found = narrowest_relief(height, 2 * REACH_MM / (PIXELS - 1), float(height.min()))
-        return found if found < WIDTHS_MM[-1] else np.inf
-
-    def _heights(self, z_mm: FloatArray) -> FloatArray:
-        """Heights of the face over a grid of x and these z, the lowest that matters beside it. [mm]"""
-        x, z = np.meshgrid(np.linspace(-REACH_MM, REACH_MM, PIXELS), z_mm, indexing="ij")
-        height = self.front(np.column_stack([x.ravel(), np.zeros(x.size), z.ravel()])).reshape(x.shape)
-        return np.maximum(height, height.max() - RELIEF_MM)
+            check_edge_radius(replace(self, edge_radius_mm=0.0), self.edge_radius_mm)
 
     def _gap(self, points: FloatArray, of: GapOf) -> Gapped:
         def sharp(at: FloatArray) -> Gapped:
@@ -372,7 +319,7 @@ class Transformed(Composed):
     shift_mm: Three = (0.0, 0.0, 0.0)  #: Along the finger, towards the skin, across. [mm]
     turn_deg: Three = (0.0, 0.0, 0.0)
     """About x from y to z, then about y from x to z as `spin_deg`, then about z from x to y. [degrees]"""
-    mirror: Annotated[str, choice(("", "x", "y", "z"))] = ""  #: Axis along which it is mirrored.
+    mirror: Annotated[str, choice(("x", "y", "z"))] | None = None  #: Axis along which it is mirrored.
     scale: Positive = 1.0  #: How many times as large it becomes.
 
     @cached_property
@@ -429,17 +376,6 @@ class Dots(Indenter):
     def radius_mm(self) -> float:
         """Radius of the balls. [mm]"""
         return (self.diameter_mm**2 / 4 + self.height_mm**2) / (2 * self.height_mm)
-
-    @property
-    def relief_mm(self) -> float:
-        """Diameter of a dot, or the narrowest gap between two dots if that is smaller. [mm]"""
-        at = np.array(self.at_mm)
-        apart = np.linalg.norm(at[:, None] - at, axis=2) - self.diameter_mm
-        return min(self.diameter_mm, float(apart[apart > 0.0].min(initial=np.inf)))
-
-    @property
-    def narrowest_mm(self) -> float:
-        return self.relief_mm
 
     def gap(self, points_mm: PointsMm) -> tuple[FloatArray, FloatArray]:
         at = np.array(self.at_mm)

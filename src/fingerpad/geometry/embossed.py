@@ -49,7 +49,7 @@ class Embossed(Indenter):
     >>> button = Embossed([square], height_mm=0.5, edge_radius_mm=0.1)
     >>> button.front(np.array([[0.0, 0.0, 0.0], [1.5, 0.0, 0.0]])).round(6).tolist()
     [0.0, -0.5]
-    >>> button.relief_mm
+    >>> button.stroke_mm
     2.0
     """
 
@@ -79,23 +79,13 @@ class Embossed(Indenter):
                     "edge_radius_mm", f"must not exceed {name}, {most:.3g} mm", f"{self.edge_radius_mm:g} mm"
                 )
 
-    @property
-    def half_width_mm(self) -> float:
-        """Largest distance of the shapes from the axis, along or across; the plate goes on. [mm]"""
-        return float(np.abs(self._pieces).max())
-
-    @property
-    def relief_mm(self) -> float:
-        return float(self._widths_mm.min())
-
-    @property
-    def narrowest_mm(self) -> float:
-        return self.relief_mm
-
-    @property
+    @cached_property
     def stroke_mm(self) -> float:
         """Width of the narrowest stroke. [mm]"""
-        return float(self._widths_mm[0])
+        # From the middle of each piece the nearest piece that faces it is sought at a right angle.
+        facing = self._normals @ self._normals.T < OPPOSITE
+        t, s = self._shares(self._pieces.mean(axis=1), -self._normals)
+        return float(t[facing & (t > 0.0) & (s >= 0.0) & (s <= 1.0)].min(initial=np.inf))
 
     def gap(self, points_mm: PointsMm) -> tuple[FloatArray, FloatArray]:
         points_mm = np.ascontiguousarray(points_mm, dtype=np.float64)
@@ -142,17 +132,6 @@ class Embossed(Indenter):
         s = apart[..., 0] * way[:, None, 1] - apart[..., 1] * way[:, None, 0]
         return np.divide([t, s], turn, out=np.full((2, *turn.shape), np.inf), where=turn != 0.0)
 
-    @cached_property
-    def _widths_mm(self) -> FloatArray:
-        """Width of the narrowest stroke, and of the narrowest hole or gap; infinite without one. [mm]"""
-        # From the middle of each piece the nearest piece that faces it is sought at a right angle.
-        facing = self._normals @ self._normals.T < OPPOSITE
-        widths = np.empty(2)
-        for side, sign in enumerate((-1.0, 1.0)):
-            t, s = self._shares(self._pieces.mean(axis=1), sign * self._normals)
-            widths[side] = t[facing & (t > 0.0) & (s >= 0.0) & (s <= 1.0)].min(initial=np.inf)
-        return widths
-
 
 @checked
 def embossed_text(
@@ -186,8 +165,8 @@ def embossed_text(
     Examples
     --------
     >>> letter = embossed_text("I", capital_mm=8.0)
-    >>> letter.half_width_mm, round(letter.stroke_mm, 2)
-    (4.0, 2.06)
+    >>> round(letter.stroke_mm, 2)
+    2.06
     """
     from matplotlib.font_manager import FontProperties, findfont, get_font
     from matplotlib.path import Path

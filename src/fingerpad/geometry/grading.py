@@ -43,9 +43,6 @@ class Grading:
         Number of elements through each layer.
     full : bool
         Whether both halves of the finger are meshed, or only z >= 0.
-    core_half_length_mm, core_size_mm : float
-        Part of the fine zone with even smaller elements along the finger, under a wire: half-length about its
-        middle, and size of the elements. Both 0 for none. [mm]
     finer_along, finer_across : tuple of (from, to, size)
         Strips with even smaller elements, about a small body or an edge: x on the volar midline of its
         two sides or, across, z; and the largest size in it. Sizes grow from there by `growth`. [mm]
@@ -63,22 +60,12 @@ class Grading:
     dermis: Count = 4
     subcutis: Count = 4
     full: Flag = False
-    core_half_length_mm: Finite = 0.0
-    core_size_mm: Finite = 0.0
     finer_along: Many[Strip] = ()
     finer_across: Many[Strip] = ()
 
     def __post_init__(self) -> None:
         if not 1.0 < self.growth <= 1.3:
             raise InputError("growth", "must be above 1 and at most 1.3", repr(self.growth))
-        core = self.core_half_length_mm, self.core_size_mm
-        if core != (0.0, 0.0) and not (
-            0.0 < core[0] < self.half_length_mm and 0.0 < core[1] < self.size_x_mm
-        ):
-            raise InputError(
-                f"core_half_length_mm and core_size_mm must both be 0, or lie between 0 and "
-                f"{self.half_length_mm:g} and {self.size_x_mm:g} mm: got {core[0]!r} and {core[1]!r}."
-            )
         for name in ("finer_along", "finer_across"):
             for begin, end, size in getattr(self, name):
                 if not (np.isfinite([begin, end]).all() and begin < end and 0.0 < size < np.inf):
@@ -98,8 +85,6 @@ class Grading:
     def elements_about(self) -> float:
         """Number of elements of the fine zone and of the strips, roughly."""
         along = min(2 * self.half_length_mm, FINGER_MM) / self.size_x_mm
-        if self.core_size_mm:
-            along += 2 * self.core_half_length_mm / self.core_size_mm
         across = min((1 + self.full) * self.half_width_mm, FINGER_MM) / self.size_z_mm
         along += sum((end - begin) / size for begin, end, size in self.finer_along)
         across += sum((end - begin) / size for begin, end, size in self.finer_across)
@@ -108,7 +93,7 @@ class Grading:
     @property
     def finest_x_mm(self) -> float:
         """Size of the smallest elements along the finger. [mm]"""
-        return min([self.core_size_mm or self.size_x_mm, *(size for _, _, size in self.finer_along)])
+        return min([self.size_x_mm, *(size for _, _, size in self.finer_along)])
 
     @property
     def finest_z_mm(self) -> float:
@@ -158,15 +143,9 @@ def covering(gradings: Sequence[Grading]) -> Grading:
     same_centre = all(grading.centre_mm == first for grading in gradings)  # avoids rounding
     centre = first if same_centre else first + 0.5 * (proximal + distal)
 
-    def reach(name: str, parts: Sequence[Grading]) -> float:
-        return max((abs(part.centre_mm - centre) + getattr(part, name) for part in parts), default=0.0)
-
-    cores = [grading for grading in gradings if grading.core_size_mm]
-    core_reach = reach("core_half_length_mm", cores)
-    core_size = min((grading.core_size_mm for grading in cores), default=0.0)
-    joint = Grading(
+    return Grading(
         centre_mm=centre,
-        half_length_mm=reach("half_length_mm", gradings),
+        half_length_mm=max(abs(each.centre_mm - centre) + each.half_length_mm for each in gradings),
         half_width_mm=max(grading.half_width_mm for grading in gradings),
         size_x_mm=min(grading.size_x_mm for grading in gradings),
         size_z_mm=min(grading.size_z_mm for grading in gradings),
@@ -180,37 +159,17 @@ def covering(gradings: Sequence[Grading]) -> Grading:
         finer_along=_joined(grading.finer_along for grading in gradings),
         finer_across=_joined(grading.finer_across for grading in gradings),
     )
-    if not cores or joint.size_x_mm <= core_size:
-        return joint
-    if core_reach >= joint.half_length_mm:
-        return replace(joint, size_x_mm=core_size)
-    return replace(joint, core_half_length_mm=core_reach, core_size_mm=core_size)
 
 
 def _joined(strips: Iterable[tuple[Strip, ...]]) -> tuple[Strip, ...]:
     return tuple(dict.fromkeys(strip for each in strips for strip in each))
 
 
-def lines_along(grading: Grading, length: float, strips: Sequence[Strip] = ()) -> FloatArray:
-    """Lines from the middle of the fine zone to one end of the finger."""
-    fine, size = grading.half_length_mm, grading.size_x_mm
-    growth, largest = grading.growth, grading.largest_mm
-    core = grading.core_half_length_mm, grading.core_size_mm
-    if strips:
-        within = [(0.0, *core)] if grading.core_size_mm else []
-        return lines_of_sizes(fine, size, length, growth, largest, [*strips, *within])
-    if not grading.core_size_mm:
-        return graded_lines(fine, size, length, growth, largest)
-    if length < fine + size:  # no thin elements between the fine zone and the end of the finger
-        fine = length
-    inner = graded_lines(*core, fine, growth, size)
-    beyond = graded_lines(0.0, size, length - fine, growth, largest)
-    return np.concatenate([inner, fine + beyond[1:]])
-
-
-def lines_across(grading: Grading, length: float, strips: Sequence[Strip] = ()) -> FloatArray:
-    """Lines from the midline around the finger to its dorsal side, as those of `lines_along`."""
-    zone = grading.half_width_mm, grading.size_z_mm, length, grading.growth, grading.largest_mm
+def lines_from_middle(
+    grading: Grading, half_mm: float, size_mm: float, length_mm: float, strips: Sequence[Strip]
+) -> FloatArray:
+    """Lines from the middle of the fine zone to an end of the finger or, around, to its dorsal side. [mm]"""
+    zone = half_mm, size_mm, length_mm, grading.growth, grading.largest_mm
     return lines_of_sizes(*zone, strips) if strips else graded_lines(*zone)
 
 

@@ -87,14 +87,6 @@ class Indenter(ABC):
         """
         return traced_front(self.gap, points_mm)
 
-    @property
-    def half_width_mm(self) -> float:
-        """Half of the body's extent along x where it can touch; infinite by default. [mm]
-
-        The mesh is fine over this width and 1 mm beyond, at most over 5 mm to either side.
-        """
-        return np.inf
-
     def may_touch(self, undeformed_mm: PointsMm) -> np.ndarray:
         """Whether each undeformed point (n, 3) can come into contact; bool (n,)."""
         return np.ones(len(undeformed_mm), dtype=bool)
@@ -115,41 +107,6 @@ class Indenter(ABC):
         if any("symmetry_deg" in vars(kind) for kind in kinds[: definer + 1]):
             return self.symmetry_deg is None or spin_deg % self.symmetry_deg == 0.0
         return mirrored(self.gap, spin_deg)
-
-    @property
-    def edge_reach_mm(self) -> float:
-        """Half-width about x = 0 of the finer mesh for edges there; 0 without edges. [mm]"""
-        return 0.0
-
-    @property
-    def narrowest_mm(self) -> float:
-        """Width of the narrowest groove or ridge, which a mesh must resolve; infinite without one. [mm]"""
-        return np.inf
-
-    @property
-    def relief_mm(self) -> float:
-        """Width of the narrowest dot, ridge or groove of any direction; infinite without one. [mm]"""
-        return np.inf
-
-    @property
-    def tip_radius_mm(self) -> float:
-        """Radius of a round tip, which a mesh must resolve; infinite without one. [mm]"""
-        return np.inf
-
-    def edges_mm(self, reach_mm: Finite) -> tuple[tuple[float, float], ...]:
-        """Place along x and radius of each edge across the finger within reach of the axis. [mm]"""
-        return ()
-
-    @property
-    def rim_mm(self) -> tuple[float, float] | None:
-        """Radius of a round face and of its rounded rim; None without one. [mm]"""
-        return None
-
-    @property
-    def sharpest_mm(self) -> float:
-        """Radius of the sharpest edge or of the rim; infinite without one. [mm]"""
-        rim = () if self.rim_mm is None else (self.rim_mm[1],)
-        return min([*rim, *(radius for _, radius in self.edges_mm(0.0))], default=np.inf)
 
     def rounded_to(self, radius_mm: Finite) -> Indenter:
         """Return the body with edges or a rim of at least this radius [mm], where it has any."""

@@ -18,11 +18,12 @@ from scipy.optimize import brentq
 from fingerpad.core.errors import InputError
 from fingerpad.core.values import FloatArray, IntArray, float_array, increasing, whole
 from fingerpad.geometry.fingertip import Fingertip
-from fingerpad.geometry.grading import Grading, Strip, lines_across, lines_along
+from fingerpad.geometry.grading import Grading, Strip, lines_from_middle
 
 LAYERS = ("stratum corneum", "living epidermis", "dermis", "subcutis")
 _LIVING_EPIDERMIS = 1
 _ARC_POINTS = 4001  # arc lengths along the skin: chords of 0.01 mm are short by less than 1e-6
+_LARGEST_TURN = np.radians(30.0)  # Of the skin from one line to the next: a tip of fewer lines is a polygon.
 _TURN_TO_RAYS = 0.5  # half way raises the smallest scaled Jacobian from 0.18 to 0.56
 CORNERS = np.array(  # local coordinates of a brick's nodes, in their order
     [[-1, -1, -1], [1, -1, -1], [1, 1, -1], [-1, 1, -1], [-1, -1, 1], [1, -1, 1], [1, 1, 1], [-1, 1, 1]],
@@ -262,27 +263,65 @@ def finger_lines(finger: Fingertip, grading: Grading) -> GridLines:
         raise InputError("centre_mm", f"must lie between 0 and {x[-1]:.2f} mm", str(centre))
     middle = np.interp(centre, x, arc)
     proximal, distal = (
-        lines_along(grading, length, _strips(grading.finer_along, x, way * (arc - middle)))
+        lines_from_middle(
+            grading,
+            grading.half_length_mm,
+            grading.size_x_mm,
+            length,
+            _strips(grading.finer_along, x, way * (arc - middle)),
+        )
         for way, length in ((-1.0, middle), (1.0, arc[-1] - middle))
     )
+    turned = _turned(finger, _skin(finger, station[:, None], np.array([0.0, 0.5, 1.0]) * np.pi))
+    distal = _turning(distal, arc - middle, turned)
     along = np.concatenate([middle - proximal[::-1], middle + distal[1:]])
     along[0] = 0.0
     angle = np.linspace(0.0, np.pi, _ARC_POINTS)
     section = _skin(finger, np.interp([centre], x, station), angle)
     girth, z = _arc_length(section), section[:, 2]
+    turned = _turned(finger, section[:, None])
     volar = slice(int(z.argmax()) + 1)
     right, left = (
-        np.interp(lines_across(grading, girth[-1], _strips(strips, z[volar], girth[volar])), girth, angle)
+        lines_from_middle(
+            grading,
+            grading.half_width_mm,
+            grading.size_z_mm,
+            girth[-1],
+            _strips(strips, z[volar], girth[volar]),
+        )
         for strips in (
             grading.finer_across,
             [(-end, -begin, size) for begin, end, size in grading.finer_across],
         )
     )
+    right, left = (np.interp(_turning(lines, girth, turned), girth, angle) for lines in (right, left))
     around = np.concatenate([-left[:0:-1], right]) if grading.full else right
     through = [np.zeros(1)]
     through += [layer + np.linspace(0.0, 1.0, n + 1)[1:] for layer, n in enumerate(grading.counts[:3])]
     through.append(3.0 + _subcutis_fractions(finger, grading))
     return GridLines(along, around, np.concatenate(through))
+
+
+def _turned(finger: Fingertip, skin: FloatArray) -> FloatArray:
+    """Angle by which the skin has turned along rows of points (n, m, 3), in the row that turns most. [rad]"""
+    steps = np.linalg.norm(np.diff(finger.skin_normal(skin), axis=0), axis=2)
+    return np.concatenate([[0.0], np.cumsum(steps.max(axis=1))])
+
+
+def _turning(lines: FloatArray, arc: FloatArray, turned: FloatArray) -> FloatArray:
+    """Lines, closer together where the skin turns by more than the limit from one to the next."""
+    far = np.flatnonzero(np.diff(np.interp(lines, arc, turned)) > _LARGEST_TURN)
+    if not far.size:
+        return lines
+    first = int(far[0])
+    places = np.linspace(lines[first], lines[-1], _ARC_POINTS)
+    steps = np.diff(np.interp(places, lines, np.arange(lines.size, dtype=np.float64)))
+    turns = np.diff(np.interp(places, arc, turned)) / _LARGEST_TURN
+    number = np.concatenate([[0.0], np.cumsum(np.maximum(steps, turns))])
+    count = int(np.ceil(number[-1]))
+    count += (first + count) % 2
+    closer = np.interp(np.linspace(0.0, number[-1], count + 1), number, places)
+    return np.concatenate([lines[:first], closer])
 
 
 def _strips(strips: Sequence[Strip], place_mm: FloatArray, arc_mm: FloatArray) -> list[Strip]:

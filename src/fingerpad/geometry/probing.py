@@ -45,26 +45,33 @@ def mirrored(gap: Gap, spin_deg: float) -> bool:
     return bool((np.abs(here - there) <= SYMMETRIC_MM + FAR_SHARE * near_mm).all())
 
 
-def traced_front(gap: Gap, points_mm: FloatArray, above_mm: FloatArray | float = ABOVE_MM) -> FloatArray:
+def traced_front(
+    gap: Gap,
+    points_mm: FloatArray,
+    above_mm: FloatArray | float = ABOVE_MM,
+    below_mm: float = BELOW_MM,
+    most_steps: int = _MOST_STEPS,
+) -> FloatArray:
     """Y of a face above the x and z of points (n, 3), -inf beside the body, where its gap is 0. [mm]
 
     From above each height is lowered by its gap, which is the distance to the body or less. Where a gap is
     more than the distance, the last step is halved until the face is found. `above_mm` are heights above the
-    face from which it is sought, -inf beside it.
+    face from which it is sought, -inf beside it, and `below_mm` is the lowest. A ray along
+    a wall, which takes more than `most_steps`, does not meet it.
     """
     at = np.array(points_mm, dtype=np.float64)
     at[:, 1] = above_mm
-    outside_mm, todo = at[:, 1].copy(), np.flatnonzero(at[:, 1] > BELOW_MM)
-    for _ in range(_MOST_STEPS if todo.size else 0):
+    outside_mm, todo = at[:, 1].copy(), np.flatnonzero(at[:, 1] > below_mm)
+    for _ in range(most_steps if todo.size else 0):
         distance = gap(at[todo])[0]
         outside_mm[todo] = np.where(distance >= 0.0, at[todo, 1], outside_mm[todo])
         todo, distance = todo[distance > _CLOSE_MM], distance[distance > _CLOSE_MM]
         at[todo, 1] -= distance
-        todo = todo[at[todo, 1] > BELOW_MM]
+        todo = todo[at[todo, 1] > below_mm]
         if not todo.size:
             break
     distance = np.full(len(at), np.inf)
-    known = at[:, 1] > BELOW_MM
+    known = at[:, 1] > below_mm
     distance[known] = gap(at[known])[0]
     at[distance > SYMMETRIC_MM, 1] = -np.inf  # along a wall, which a ray never meets
     inside = np.flatnonzero(distance < -_CLOSE_MM)
@@ -73,7 +80,7 @@ def traced_front(gap: Gap, points_mm: FloatArray, above_mm: FloatArray | float =
         at[inside, 1] = 0.5 * (low + high)
         below = gap(at[inside])[0] < 0.0
         low, high = np.where(below, at[inside, 1], low), np.where(below, high, at[inside, 1])
-    return np.where(at[:, 1] > BELOW_MM, at[:, 1], -np.inf)
+    return np.where(at[:, 1] > below_mm, at[:, 1], -np.inf)
 
 
 def check_gap(gap: Gap, name: str) -> None:

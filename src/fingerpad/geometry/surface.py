@@ -6,7 +6,7 @@ What is done is told in sentences; what cannot be done is refused.
 
 from __future__ import annotations
 
-from dataclasses import fields
+from dataclasses import fields, replace
 from functools import cached_property, partial
 from typing import Annotated
 
@@ -29,17 +29,14 @@ from fingerpad.core.values import (
 )
 from fingerpad.geometry.indenters import Indenter
 from fingerpad.geometry.probing import traced_front
-from fingerpad.geometry.relief import (
-    PIXELS,
-    REACH_MM,
-    check_edge_radius,
-    narrowest_relief,
-    with_rounded_edges,
-)
+from fingerpad.geometry.relief import check_edge_radius, with_rounded_edges
 from fingerpad.geometry.triangles import Sides, Triangles, groups
 
 SMALLEST_MM, LARGEST_MM = 0.1, 1000.0
 """Extents beyond which a surface is refused: its unit must be wrong. [mm]"""
+
+REACH_MM, PIXELS = 6.0, 479
+"""Distance from the axis within which a surface is looked at [mm], and how often along each side."""
 
 SKIRT_MM = 20.0  # An open surface goes on downwards from its border as far as this. [mm]
 
@@ -133,6 +130,10 @@ class Surface(Indenter):
         for name, value in (("vertices_mm", vertices), ("faces", faces)):
             value.setflags(write=False)
             object.__setattr__(self, name, value)
+        if not (np.ptp(np.clip(vertices[faces], -REACH_MM, REACH_MM), axis=(0, 1))[[0, 2]] > 0.0).all():
+            raise InputError(
+                f"A surface must lie within {REACH_MM:g} mm of the indenter's axis: it does not."
+            )
         if len(self._border) and self._shows_inner_side():
             raise InputError(
                 "A surface must show its outer side to the skin, towards +y: it is open there or its sides "
@@ -141,7 +142,7 @@ class Surface(Indenter):
         if told:
             LOGGER.warning("%r was repaired: %s.", self, "; ".join(told))
         if self.edge_radius_mm:
-            check_edge_radius(self.edge_radius_mm, self.relief_mm)
+            check_edge_radius(replace(self, edge_radius_mm=0.0), self.edge_radius_mm)
 
     def __repr__(self) -> str:
         extents = " x ".join(f"{extent:.4g}" for extent in np.ptp(self.vertices_mm[self.faces], axis=(0, 1)))
@@ -157,28 +158,11 @@ class Surface(Indenter):
         """What was done to the triangles to make them one body."""
         return ()
 
-    @property
-    def half_width_mm(self) -> float:
-        reach = float(np.abs(self.vertices_mm[self.faces, 0]).max())
-        return reach if reach < 2 * REACH_MM else np.inf
-
     def mirrors(self, spin_deg: Finite) -> bool:
         found: dict[float, bool] = self.__dict__.setdefault("_mirrors", {})
         if spin_deg not in found:
             found[spin_deg] = super().mirrors(spin_deg)
         return found[spin_deg]
-
-    @property
-    def narrowest_mm(self) -> float:
-        """Width of the narrowest ridge, groove or dot, 2 mm if all are wider. [mm]"""
-        return self.relief_mm
-
-    @cached_property
-    def relief_mm(self) -> float:
-        """Width of the narrowest ridge, groove or dot of its face, 2 mm if all are wider. [mm]"""
-        # Beside a closed body is nothing; an open one is thought to go on at its lowest height.
-        height, _, spacing = self._face
-        return narrowest_relief(height, spacing, beside_mm=float(self.vertices_mm[self.faces, 1].min()))
 
     @cached_property
     def _border(self) -> IntArray:
@@ -210,25 +194,13 @@ class Surface(Indenter):
         upright = np.abs(normals[own, 1]) <= 1e-6 * np.linalg.norm(normals[own], axis=1)
         if (hangs & upright).any():
             return True  # walls below the border would be its other side
-        seen = self._face[1] < 0.0
-        return bool((seen[1:, 1:] & seen[1:, :-1] & seen[:-1, 1:] & seen[:-1, :-1]).any())
-
-    @cached_property
-    def _face(self) -> tuple[FloatArray, FloatArray, float]:
-        """Heights of the face over a grid of x and z, the lowest beside it; y of normals; spacing. [mm]"""
-        corners = self.vertices_mm[self.faces]
         low, high = corners.min(axis=(0, 1)), corners.max(axis=(0, 1))
         (x0, _, z0), (x1, _, z1) = np.maximum(low, -REACH_MM), np.minimum(high, REACH_MM)
-        if x1 <= x0 or z1 <= z0:
-            raise InputError(
-                f"A surface must lie within {REACH_MM:g} mm of the indenter's axis: it does not."
-            )
-        spacing = max(x1 - x0, z1 - z0) / (PIXELS - 1)
+        spacing = max(x1 - x0, z1 - z0) / PIXELS
         x, z = np.arange(x0, x1 + 1e-9, spacing), np.arange(z0, z1 + 1e-9, spacing)
-        points = np.stack(np.broadcast_arrays(x[:, None], 0.0, z), axis=-1)
-        height, normal_y = self._top(points.reshape(-1, 3))
-        shape = x.size, z.size
-        return np.maximum(height, low[1]).reshape(shape), normal_y.reshape(shape), float(spacing)
+        points = np.stack(np.broadcast_arrays(x[:, None], 0.0, z), axis=-1).reshape(-1, 3)
+        seen = (self._top(points)[1] < 0.0).reshape(x.size, z.size)
+        return bool((seen[1:, 1:] & seen[1:, :-1] & seen[:-1, 1:] & seen[:-1, :-1]).any())
 
     def _top(self, points_mm: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Height of the highest triangle above or below each point, -inf beside all, and its normal's y."""

@@ -258,7 +258,7 @@ class _Press:
         """Return the number of equal steps between two times, none of them longer than allowed."""
         before, after = self.stimulus.pose_at(begin_ms), self.stimulus.pose_at(end_ms)
         aside_mm = float(np.hypot(after.x_mm - before.x_mm, after.z_mm - before.z_mm))
-        slide = steps_of_slide(aside_mm, self.contact.indenter)
+        slide = steps_of_slide(aside_mm, self.contact.indenter) if aside_mm > 0.0 and self.is_sharp else 1
         if self.stimulus.by_force:
             return slide
         before_mm, after_mm = self.stimulus.prescribed_at([begin_ms, end_ms])
@@ -347,8 +347,7 @@ class _Press:
     @property
     def is_sharp(self) -> bool:
         """Whether the indenter is small or has an edge, round which skin slides."""
-        body = self.contact.indenter
-        return np.isfinite(self.finest_mm) or body.rim_mm is not None or body.edge_reach_mm > 0.0
+        return np.isfinite(self.finest_mm)
 
 
 def length_ms(start_ms: float, end_ms: float) -> float:

@@ -14,10 +14,10 @@ import numpy as np
 from fingerpad.core.checked import value_class
 from fingerpad.core.errors import InputError
 from fingerpad.core.values import Count, FloatArray, Numbers, Positive, increasing
-from fingerpad.geometry.indenter_grading import SHARPEST_MM
 from fingerpad.geometry.indenters import Indenter
 from fingerpad.geometry.mesh import Mesh
 from fingerpad.geometry.motion import Motion
+from fingerpad.geometry.size_field import STEP_MM, details_of
 from fingerpad.mechanics.assembly import Sparsity
 from fingerpad.mechanics.contact import Contact, Middles
 from fingerpad.mechanics.newton import NewtonSettings
@@ -60,9 +60,10 @@ def contact_about(contact: Contact, mesh: Mesh, sparsity: Sparsity, finest_mm: f
 
 def sag_mm(indenter: Indenter, finest_mm: float) -> float:
     """How deep the middle of a facet may lie within a small body. [mm]"""
-    narrowest_mm = min(indenter.half_width_mm, indenter.narrowest_mm / 2)
+    details = details_of(indenter)
+    half_mm = min(*details.parts_mm, *details.grooves_mm) / 2
     least, most = SAGS
-    return float(np.clip(SAG_OF_WIDTH * narrowest_mm, least * finest_mm, most * finest_mm))
+    return float(np.clip(SAG_OF_WIDTH * half_mm, least * finest_mm, most * finest_mm))
 
 
 def newton_about(newton: NewtonSettings, finest_mm: float) -> NewtonSettings:
@@ -85,7 +86,7 @@ def steps_of_slide(way_mm: float, indenter: Indenter) -> int:
 
     Edges that are sharper than any mesh made for them count as round as the sharpest of these.
     """
-    return _steps(way_mm, LONGEST_SLIDE * max(indenter.sharpest_mm, SHARPEST_MM))
+    return _steps(way_mm, LONGEST_SLIDE * max(details_of(indenter).sharpest_mm, STEP_MM))
 
 
 def _steps(way_mm: float, longest_mm: float) -> int:

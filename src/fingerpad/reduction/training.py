@@ -30,8 +30,8 @@ from fingerpad.core.errors import InputError
 from fingerpad.core.values import Count, Finite, FloatArray, Pair, Positive, choice, instance
 from fingerpad.geometry.fingertip import Fingertip
 from fingerpad.geometry.grading import RESOLUTIONS, Grading
-from fingerpad.geometry.indenter_grading import grading_along
 from fingerpad.geometry.motion import STILL, Pose, Trajectory
+from fingerpad.geometry.size_field import grading_below
 from fingerpad.mechanics.press_settings import PressSettings
 from fingerpad.skin.indentation import LARGEST_TILT_DEG, Touch, settings_of
 
@@ -255,9 +255,12 @@ class ReducedTraining:
         if range_.parameter is not None:
             body = replace(cast(Any, body), **{range_.parameter: shape[0]})
         corners = itertools.product(*(getattr(range_, name) for name in SPACING))
-        poses = [Pose(), *(Pose(*corner) for corner in corners)]
-        grading = self.grading or grading_along(
-            base.finger, body, self.resolution, base.at_mm, poses, base.tilt_deg, base.spin_deg
+        ways = list(zip(*[(0.0,) * len(SPACING), *corners], strict=True))
+        times_ms = tuple(1000.0 * number for number in range(len(ways[0])))
+        depths_mm = (0.0, *[range_.depth_mm] * (len(times_ms) - 1))
+        round_trip = Trajectory(times_ms, depth_mm=depths_mm, x_mm=ways[0], z_mm=ways[1], tilt_deg=ways[2])
+        grading = self.grading or grading_below(
+            base.finger, body, self.resolution, base.at_mm, round_trip, base.tilt_deg, base.spin_deg
         )
         steps = settings_of(self.resolution)
         if stimulus is None:

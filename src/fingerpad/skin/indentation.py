@@ -37,11 +37,11 @@ from fingerpad.data import fingertip as published
 from fingerpad.data.tissues import DEFAULT_TISSUES
 from fingerpad.geometry.fingertip import Finger, Fingertip
 from fingerpad.geometry.grading import RESOLUTIONS, Grading
-from fingerpad.geometry.indenter_grading import FEWEST_ACROSS_GROOVE, grading_along, sizes_across
 from fingerpad.geometry.indenters import Indenter
 from fingerpad.geometry.mesh import Mesh, finger_mesh
 from fingerpad.geometry.motion import CLEARANCE_TO_BONE, STILL, Motion, RampAndHold, check_path
 from fingerpad.geometry.probing import check_gap
+from fingerpad.geometry.size_field import check_sizes, grading_below
 from fingerpad.mechanics.contact import Placement, check_friction, place, rotation_of
 from fingerpad.mechanics.inertia import warn_of_inertia
 from fingerpad.mechanics.kernels import KERNELS
@@ -60,7 +60,6 @@ LARGEST_TILT_DEG = 45.0
 _Given = ParamSpec("_Given")
 
 LOOKS_FOR_TOUCH = 8  # Times per sample of a motion aside at which first touch is looked for.
-FEWEST_ACROSS_BODY = 3  # Least number of elements across a body that is narrow along and across the finger.
 
 
 @value_class
@@ -152,7 +151,6 @@ class Touch:
                 raise InputError(f"z_mm = {pose.z_mm:g} mm of the motion needs a grading with full=True.")
             if pose.spin_deg != 0.0:  # friction twists the skin, which then has no mirror image
                 raise InputError("spin_deg of the motion needs a grading with full=True.")
-        self._check_sizes()
         check_friction(self.friction, self.indenter)
         if self.progress is not None and not callable(getattr(self.progress, "stage", None)):
             raise InputError(
@@ -184,28 +182,6 @@ class Touch:
         fingerpad.core.errors.InputError: sites must lie on the volar skin of the mesh: (x, z) = (99, 0) ...
         """
         places_below(receptors_of(self.mesh), sites_mm)
-
-    def _check_sizes(self) -> None:
-        """Check that elements are small enough: a body, ridge or groove between two nodes has no effect."""
-        size_mm, narrowest_mm = max(sizes_across(self.grading, self.spin_deg)), self.indenter.narrowest_mm
-        fewest = FEWEST_ACROSS_BODY if self.indenter.symmetry_deg is None else 1
-        largest_mm = 2 * self.indenter.half_width_mm / fewest
-        if size_mm > largest_mm:
-            raise InputError(
-                "grading",
-                f"must have elements of at most {largest_mm:g} mm, because the "
-                f"{type(self.indenter).__name__} would go between the nodes",
-                f"{size_mm:g} mm",
-                f"give a finer grading or a wider body than {2 * self.indenter.half_width_mm:g} mm",
-            )
-        if size_mm > narrowest_mm / FEWEST_ACROSS_GROOVE:
-            raise InputError(
-                "grading",
-                f"must have elements of at most {narrowest_mm / FEWEST_ACROSS_GROOVE:g} mm across grooves "
-                f"and ridges of {narrowest_mm:g} mm",
-                f"{size_mm:g} mm",
-                "leave grading out or take grading_about(...)",
-            )
 
     def solve(self, threads: Whole | None = None, whole: Flag | None = None) -> SkinResponse:
         """Solve the indentation and return the response of the skin.
@@ -344,14 +320,17 @@ def touch_of(
     # The grading depends on this point, so finger, indenter and point are checked first.
     check_path(finger, stimulus, (x, z))
     settings = settings or settings_of(resolution)
+    grading = grading or finger.own_grading(x, z)
+    if grading is None:
+        grading = grading_below(finger, indenter, resolution, (x, z), stimulus, tilt_deg, spin_deg)
+    else:
+        check_sizes(grading, indenter, spin_deg)
     return Touch(
         finger=finger,
         indenter=indenter,
         stimulus=stimulus,
         tissues=tissues if isinstance(tissues, Tissues) else named_tissues(tissues),
-        grading=grading
-        or finger.own_grading(x, z)
-        or grading_along(finger, indenter, resolution, (x, z), stimulus.poses, tilt_deg, spin_deg),
+        grading=grading,
         settings=replace(settings, times_ms=tuple(times_ms)) if len(times_ms) else settings,
         at_mm=(x, z),
         tilt_deg=tilt_deg,

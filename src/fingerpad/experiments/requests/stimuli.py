@@ -44,8 +44,8 @@ from fingerpad.experiments.requests.stimulus import (
 )
 from fingerpad.geometry.bodies import SIZES, Bar, Sphere
 from fingerpad.geometry.grading import RESOLUTIONS, Grading, covering
-from fingerpad.geometry.indenter_grading import grading_along
 from fingerpad.geometry.motion import PLAUSIBLE, Motion, RampAndHold
+from fingerpad.geometry.size_field import grading_below
 from fingerpad.skin.indentation import Touch
 
 _NEAR_MM = max(protocol.SPHERE_POSITIONS.value)
@@ -232,9 +232,6 @@ def _grading(
     grading = zones[0] if len(zones) == 1 else covering(zones)
     if reach_mm is None:
         return grading
-    if reach_mm <= grading.core_half_length_mm:  # what remains is all as fine as the core
-        finest = grading.core_size_mm
-        grading = replace(grading, size_x_mm=finest, core_half_length_mm=0.0, core_size_mm=0.0)
     try:
         return replace(
             grading,
@@ -251,12 +248,12 @@ def _zone(stimulus: NamedStimulus, conditions: Conditions) -> Grading:
     if isinstance(stimulus.indenter, Sphere) and stays and abs(stimulus.x_mm) <= _NEAR_MM:
         return conditions.sphere_grading()
     with moved(stimulus.in_file), about():
-        return grading_along(
+        return grading_below(
             conditions.finger,
             stimulus.indenter,
             conditions.resolution,
             (conditions.receptor_x_mm + stimulus.x_mm, stimulus.z_mm),
-            stimulus.motion.poses,
+            stimulus.motion,
             stimulus.tilt_on(conditions.finger),
             stimulus.spin_deg,
         )

@@ -25,7 +25,7 @@ from fingerpad.experiments.scores import (
 from fingerpad.experiments.validation.observations import Kind, Value
 from fingerpad.experiments.validation.request import QUASI_STATIC, ValidationRequest
 from fingerpad.geometry.bodies import Grating, Plate, Sphere
-from fingerpad.geometry.indenter_grading import grading_about
+from fingerpad.geometry.grading import resolution_grading
 from fingerpad.geometry.indenters import Indenter
 from fingerpad.geometry.motion import ForceRampAndHold, RampAndHold
 from fingerpad.neuron.population import Population
@@ -276,8 +276,8 @@ def _rate(given: Given, model: ValidationRequest) -> Reading:
         curvature = given["curvature_per_m"]
         body = Sphere(curvature_per_m=curvature) if curvature > 0.0 else Plate()
         # One mesh for all curvatures, so that no difference between them is one between meshes.
-        grading = conditions.grading or grading_about(
-            Plate(), conditions.resolution, conditions.receptor_x_mm
+        grading = conditions.grading or resolution_grading(
+            conditions.resolution, conditions.receptor_x_mm, half_width_mm=5.0
         )
     along = np.cos(np.deg2rad(conditions.skin_tilt_deg))
     site = (conditions.receptor_x_mm - position_mm * along, 0.0)
