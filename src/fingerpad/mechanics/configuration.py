@@ -6,11 +6,11 @@ that of the contact, in which the multipliers are, and with friction the anchors
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
-from fingerpad.core.values import FloatArray
+from fingerpad.core.values import FloatArray, IntArray
 from fingerpad.geometry.mesh import Mesh
 from fingerpad.mechanics.assembly import Sparsity, assemble
 from fingerpad.mechanics.contact import Contact, ContactState
@@ -161,60 +161,96 @@ class Configuration:
         return load.force_mn - float(self.contact.force_mn.sum(axis=0) @ load.contact.placement.axis)
 
 
-def evaluate(
-    body: Body,
-    load: Load,
-    displacement_mm: FloatArray,
-    depth_mm: float,
-    lagging: Lagging,
-    blocks: np.ndarray,
-    before: Friction | None = None,
-    pressure_kpa: FloatArray | None = None,
-    curved: bool = True,
-    closed: bool = False,
-) -> Configuration:
-    """Potential, out-of-balance forces and tangent of one configuration."""
-    mesh, contact = body.mesh, load.contact
-    force, has_tangent = np.empty_like(displacement_mm), blocks.size > 0
-    internal = assemble(
-        mesh, displacement_mm, body.table.law, load.step.s, load.carried, body.sparsity, has_tangent, force,
-        blocks,
-    )  # fmt: skip
-    pressures = None
-    if body.is_mixed and not np.isnan(internal):
-        pressures = Pressures.of(mesh, displacement_mm, body.table.law)
-        if pressure_kpa is not None and has_tangent:
-            change = pressure_kpa - pressures.pressure_kpa
-            exchange_pressure(mesh, displacement_mm, change, body.sparsity, blocks)
-    positions = contact.points_mm(mesh.nodes_mm + displacement_mm)
-    touch = contact.state(positions, depth_mm, lagging.multipliers_mn, lagging.anchors, before)
-    np.negative(force, out=force)
-    contact.add_to_nodes(force, touch.force_mn)
-    residual = force.ravel()[body.free]
-    pressed = float(np.linalg.norm(touch.force_mn.sum(axis=0)))
-    # Of a folded element forces were left half summed, and could look balanced.
-    residual_norm_mn = np.inf if np.isnan(internal) else float(np.linalg.norm(residual))
-    relative_residual = residual_norm_mn / load.force_scale_mn(pressed)
-    stiffness = touch.stiffness
-    is_curved = curved and relative_residual < CURVATURE_BELOW_RESIDUAL
-    if is_curved:
-        stiffness = stiffness + contact.curvature_stiffness(touch, positions, depth_mm)
-    if closed and load.pressed_before is not None:
-        stiffness = stiffness + contact.closed_stiffness(touch, load.pressed_before)
-    if has_tangent:
-        contact.add_to_tangent(blocks, body.sparsity.diagonal, stiffness)
-    return Configuration(
-        displacement_mm=displacement_mm,
-        depth_mm=depth_mm,
-        positions_mm=positions,
-        contact=touch,
-        contact_stiffness=stiffness,
-        potential_uj=internal + touch.potential,
-        out_of_balance_mn=force,
-        residual_mn=residual,
-        residual_norm_mn=residual_norm_mn,
-        relative_residual=relative_residual,
-        has_tangent=has_tangent,
-        is_curved=is_curved,
-        pressures=pressures,
-    )
+@dataclass
+class Equations:
+    """Potential, out-of-balance forces and tangent in one time step; tissue is assembled once per place."""
+
+    body: Body
+    load: Load
+    blocks: np.ndarray  # Room for the tangent, (n_blocks, 3, 3). [mN/mm]
+    _places: IntArray = field(init=False)  # Blocks to which contact adds.
+    _force_of: FloatArray | None = field(default=None, init=False)
+    _force_mn: FloatArray = field(init=False)
+    _internal_uj: float = field(init=False)
+    """Displacements at which the tissue was assembled last, its forces and its energy."""
+    _tangent_of: FloatArray | None = field(default=None, init=False)
+    _below_contact: np.ndarray = field(init=False)
+    """Displacements of which the tangent of the tissue is in `blocks`, and its part where contact acts."""
+
+    def __post_init__(self) -> None:
+        self._places = self.load.contact.tangent_places(self.body.sparsity.diagonal)
+
+    def at(
+        self,
+        displacement_mm: FloatArray,
+        depth_mm: float,
+        lagging: Lagging,
+        with_tangent: bool = True,
+        before: Friction | None = None,
+        pressure_kpa: FloatArray | None = None,
+        curved: bool = True,
+        closed: bool = False,
+    ) -> Configuration:
+        """Evaluate one configuration."""
+        body, load, contact = self.body, self.load, self.load.contact
+        internal, tissue_mn = self._tissue(displacement_mm, with_tangent)
+        pressures = None
+        if body.is_mixed and not np.isnan(internal):
+            pressures = Pressures.of(body.mesh, displacement_mm, body.table.law)
+            if pressure_kpa is not None and with_tangent:
+                change = pressure_kpa - pressures.pressure_kpa
+                exchange_pressure(body.mesh, displacement_mm, change, body.sparsity, self.blocks)
+                self.forget_tangent()
+        positions = contact.points_mm(body.mesh.nodes_mm + displacement_mm)
+        touch = contact.state(positions, depth_mm, lagging.multipliers_mn, lagging.anchors, before)
+        force = -tissue_mn
+        contact.add_to_nodes(force, touch.force_mn)
+        residual = force.ravel()[body.free]
+        pressed = float(np.linalg.norm(touch.force_mn.sum(axis=0)))
+        # Of a folded element forces were left half summed, and could look balanced.
+        residual_norm_mn = np.inf if np.isnan(internal) else float(np.linalg.norm(residual))
+        relative_residual = residual_norm_mn / load.force_scale_mn(pressed)
+        stiffness = touch.stiffness
+        is_curved = curved and relative_residual < CURVATURE_BELOW_RESIDUAL
+        if is_curved:
+            stiffness = stiffness + contact.curvature_stiffness(touch, positions, depth_mm)
+        if closed and load.pressed_before is not None:
+            stiffness = stiffness + contact.closed_stiffness(touch, load.pressed_before)
+        if with_tangent:
+            contact.add_to_tangent(self.blocks, body.sparsity.diagonal, stiffness)
+        return Configuration(
+            displacement_mm=displacement_mm,
+            depth_mm=depth_mm,
+            positions_mm=positions,
+            contact=touch,
+            contact_stiffness=stiffness,
+            potential_uj=internal + touch.potential,
+            out_of_balance_mn=force,
+            residual_mn=residual,
+            residual_norm_mn=residual_norm_mn,
+            relative_residual=relative_residual,
+            has_tangent=with_tangent,
+            is_curved=is_curved,
+            pressures=pressures,
+        )
+
+    def forget_tangent(self) -> None:
+        """Assemble anew when a tangent is asked for next: `blocks` hold more than tissue and contact."""
+        self._tangent_of = None
+
+    def _tissue(self, displacement_mm: FloatArray, with_tangent: bool) -> tuple[float, FloatArray]:
+        """Energy and forces of the tissue, and its tangent in `blocks`; nothing is assembled twice."""
+        body, load = self.body, self.load
+        kept = not with_tangent or self._tangent_of is displacement_mm
+        if self._force_of is not displacement_mm or not kept:
+            self._force_of, self._force_mn = displacement_mm, np.empty_like(displacement_mm)
+            blocks = self.blocks if with_tangent else self.blocks[:0]
+            self._internal_uj = assemble(
+                body.mesh, displacement_mm, body.table.law, load.step.s, load.carried, body.sparsity,
+                with_tangent, self._force_mn, blocks,
+            )  # fmt: skip
+            if with_tangent:
+                self._tangent_of, self._below_contact = displacement_mm, self.blocks[self._places]
+        elif with_tangent:
+            self.blocks[self._places] = self._below_contact
+        return self._internal_uj, self._force_mn

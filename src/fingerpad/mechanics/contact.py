@@ -234,6 +234,10 @@ class Contact:
         tangent[diagonal[self.nodes]] += stiffness[:n_nodes]
         self.middles.add_to_tangent(tangent, stiffness[n_nodes:])
 
+    def tangent_places(self, diagonal: IntArray) -> IntArray:
+        """Blocks of the tangent to which contact adds; `diagonal` as of `Sparsity`."""
+        return np.unique(np.concatenate([diagonal[self.nodes], self.middles.blocks.ravel()]))
+
     def gap(self, local_mm: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Gap of each point (n,) [mm] and normal (n, 3), in the indenter's frame."""
         gap, normal = self.indenter.gap(local_mm)

@@ -25,7 +25,7 @@ from fingerpad.core.checked import value_class
 from fingerpad.core.errors import ConvergenceError
 from fingerpad.core.values import Count, Finite, Flag, FloatArray, Positive
 from fingerpad.geometry.mesh_checks import element_place, squeezed_most
-from fingerpad.mechanics.configuration import Balance, Body, Configuration, Lagging, Load, evaluate
+from fingerpad.mechanics.configuration import Balance, Body, Configuration, Equations, Lagging, Load
 from fingerpad.mechanics.contact import ContactState
 from fingerpad.mechanics.friction import Anchors, by_secants, slid_mm
 from fingerpad.mechanics.linear import LinearSolver, NotPositiveDefiniteError
@@ -149,7 +149,7 @@ class _Search:
     solver: LinearSolver
     lagging: Lagging
     persistent: bool
-    blocks: np.ndarray = field(init=False)
+    equations: Equations = field(init=False)
     history: list[str] = field(default_factory=list)
     straightened: int = 0
     shift: float = 0.0
@@ -160,7 +160,8 @@ class _Search:
     )
 
     def __post_init__(self) -> None:
-        self.blocks = np.empty((self.body.sparsity.column.size, 3, 3), self.solver.number_type)
+        blocks = np.empty((self.body.sparsity.column.size, 3, 3), self.solver.number_type)
+        self.equations = Equations(self.body, self.load, blocks)
 
     def run(
         self, guess_mm: FloatArray, settings: NewtonSettings, before_mm: FloatArray | None
@@ -215,15 +216,15 @@ class _Search:
         return self.persistent and (self.shift > 0.0 or len(self.history) > PATIENCE)
 
     def beginning(self, displacement_mm: FloatArray) -> Configuration:
-        load, where = self.load, (displacement_mm, self.load.depth_mm)
-        return evaluate(self.body, load, *where, self.lagging, self.blocks, pressure_kpa=load.pressure_kpa)
+        where = displacement_mm, self.load.depth_mm, self.lagging
+        return self.equations.at(*where, pressure_kpa=self.load.pressure_kpa)
 
     def with_tangent(self, now: Configuration, curved: bool | None = None) -> Configuration:
         """Return the same configuration with its tangent in `blocks`, with the body's curvature or not."""
         if now.has_tangent and curved is None:
             return now
-        where = now.displacement_mm, now.depth_mm
-        return evaluate(self.body, self.load, *where, self.lagging, self.blocks, curved=curved is not False)
+        where = now.displacement_mm, now.depth_mm, self.lagging
+        return self.equations.at(*where, curved=curved is not False)
 
     def better(self, now: Configuration, forcing: float, potentials: list[float]) -> Configuration:
         """Take a Newton step, and where no part of it helps, one that is solved for in another way."""
@@ -276,12 +277,13 @@ class _Search:
                 break
             assumed = there_mn > 0.0
             sign = np.where(assumed, 1.0, -1.0) * changed
-            contact.add_to_tangent(self.blocks, self.body.sparsity.diagonal, sign[:, None, None] * stiffness)
+            blocks, more = self.equations.blocks, sign[:, None, None] * stiffness
+            contact.add_to_tangent(blocks, self.body.sparsity.diagonal, more)
             more_mn = np.where(assumed, here_mn, 0.0) - touch.pressed_mn
             forces = np.zeros_like(now.displacement_mm)
             contact.add_to_nodes(forces, more_mn[:, None] * touch.normal)
             try:
-                found = self.solver.solve(self.blocks, now.residual_mn + forces.ravel()[free], forcing)
+                found = self.solver.solve(blocks, now.residual_mn + forces.ravel()[free], forcing)
             except ConvergenceError:
                 break
         return best
@@ -296,13 +298,13 @@ class _Search:
         most_straight = MOST_STRAIGHT if self.persistent else np.inf
         try:
             try:
-                return now, self.solver.solve(self.blocks, now.residual_mn, forcing)
+                return now, self.solver.solve(self.equations.blocks, now.residual_mn, forcing)
             except NotPositiveDefiniteError:
                 if not now.is_curved or self.straightened >= most_straight:
                     raise
             self.straightened += 1
             now = self.with_tangent(now, curved=False)
-            return now, self.solver.solve(self.blocks, now.residual_mn, forcing)
+            return now, self.solver.solve(self.equations.blocks, now.residual_mn, forcing)
         except ConvergenceError:
             if not self.persistent:
                 raise
@@ -318,14 +320,16 @@ class _Search:
         where, axes = self.body.sparsity.diagonal, np.arange(3)
         for curved, largest in LARGEST_SHIFTS.items():
             now = self.with_tangent(now, curved)
-            own, shift = self.blocks[where], first
+            blocks = self.equations.blocks
+            own, shift = blocks[where], first
+            self.equations.forget_tangent()
             stiffness = np.abs(own[:, axes, axes])
             while shift <= largest:
                 shifted = own.copy()
                 shifted[:, axes, axes] += shift * stiffness
-                self.blocks[where] = shifted
+                blocks[where] = shifted
                 try:
-                    direction = self.solver.solve(self.blocks, now.residual_mn, forcing)
+                    direction = self.solver.solve(blocks, now.residual_mn, forcing)
                 except ConvergenceError:
                     shift = max(CHANGE_SHIFT * shift, FIRST_SHIFT)
                     continue
@@ -343,9 +347,9 @@ class _Search:
         """Solve for a Newton step in which the skin does not fly into an indenter that moves aside."""
         # An indenter that slides by more than the penetration sets most nodes free for one iteration. Without
         # their stiffness a Newton step drives the skin deep into the indenter.
-        where = now.displacement_mm, now.depth_mm
-        closed = evaluate(self.body, self.load, *where, self.lagging, self.blocks, curved=False, closed=True)
-        return closed, self.solver.solve(self.blocks, closed.residual_mn, forcing)
+        where = now.displacement_mm, now.depth_mm, self.lagging
+        closed = self.equations.at(*where, curved=False, closed=True)
+        return closed, self.solver.solve(self.equations.blocks, closed.residual_mn, forcing)
 
     def renew(self, now: Configuration, augmented: bool) -> Configuration:
         """Take multipliers and anchors from the contact found; return the configuration under them."""
@@ -360,7 +364,7 @@ class _Search:
             if len(self.renewals) > MOST_PLAIN_RENEWALS:
                 anchors = by_secants([*self.renewals][-SECANTS - 1 :])
         self.lagging = Lagging(multipliers, anchors)
-        return evaluate(self.body, self.load, now.displacement_mm, now.depth_mm, self.lagging, self.blocks)
+        return self.equations.at(now.displacement_mm, now.depth_mm, self.lagging)
 
     def found(self, now: Configuration, iterations: int, balance: Balance) -> Equilibrium:
         """Gather the equilibrium, its anchors ready for the next step."""
@@ -395,8 +399,8 @@ class _Search:
             pressure = start.pressures.after(self.body.mesh.elements, displacement - start.displacement_mm)
         # Friction and mixed methods carry more than the displacements over to the tangent.
         carries = self.load.anchors is not None or self.body.is_mixed
-        blocks = self.blocks if carries or start.relative_residual > LAST_STEP else self.blocks[:0]
-        return evaluate(self.body, self.load, displacement, depth_mm, self.lagging, blocks, before, pressure)
+        with_tangent = carries or start.relative_residual > LAST_STEP
+        return self.equations.at(displacement, depth_mm, self.lagging, with_tangent, before, pressure)
 
     def along_surface(self, start: Configuration, displacement_mm: FloatArray, depth_mm: float) -> FloatArray:
         """Displacements that keep pressed nodes as deep in the indenter as the linear step leaves them."""
@@ -469,8 +473,8 @@ class _Search:
         self.load.contact.add_to_nodes(coupling, -start.contact_stiffness @ axis)
         b = coupling.ravel()[free]
         c = float(axis @ start.contact_stiffness.sum(axis=0) @ axis)
-        x = self.solver.solve(self.blocks, start.residual_mn, FORCING_RANGE[1])
-        y = self.solver.solve(self.blocks, b, DEPTH_FORCING)
+        x = self.solver.solve(self.equations.blocks, start.residual_mn, FORCING_RANGE[1])
+        y = self.solver.solve(self.equations.blocks, b, DEPTH_FORCING)
 
         force = start.missing_force_mn(self.load) - b @ x - y @ (start.residual_mn - self.solver.multiply(x))
         stiffness = y @ self.solver.multiply(y) - 2.0 * (b @ y) + c
