@@ -88,6 +88,7 @@ class Load:
     """Pressures at the start of the step, for a mixed method, (n_elements,). [kPa]"""
     reached: Reached = Reached()  # Largest force and depth before the step.
     pressed_before: np.ndarray | None = None  # Points that were pressed before the step, (n_points,).
+    moves_aside: bool = False  # Whether the indenter moves other than along its axis in this step.
 
     def force_scale_mn(self, force_mn: float) -> float:
         """Force to which a force that is out of balance is compared. [mN]"""

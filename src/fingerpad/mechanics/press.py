@@ -316,6 +316,7 @@ class _Press:
         return Load(
             self.contact_at(target_ms), depth_mm, step, carried, force_mn, start.found.anchors,
             start.found.pressure_kpa, start.reached, start.found.contact.pressed_mn > 0.0,
+            self.stimulus.pose_at(target_ms) != self.stimulus.pose_at(start.time_ms),
         )  # fmt: skip
 
     def stopped(self, last: _Moment, attempts: tuple[str, ...], cause: str) -> ConvergenceError:
