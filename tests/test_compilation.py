@@ -87,10 +87,7 @@ PRESS = """
 
 
 def test_a_first_press_reports_compilation_once(say):
-    assert say(PRESS) == (
-        ["pressed", "pressed"],
-        f"{SHORT_NOTICE}\n{NOTICE}\n",
-    )  # of the description, the press
+    assert say(PRESS) == (["pressed", "pressed"], f"{NOTICE}\n")
 
 
 def test_messages_count_the_kernels_that_are_done(say):

@@ -89,7 +89,6 @@ def refine(high: float, reached: float, start: float, steady: float, drift: floa
     return guess
 
 
-@njit(cache=True, error_model="numpy", nogil=True)
 def initial_potentials(
     current: FloatArray, tau: float, capacitance: float, threshold: float, initial: float
 ) -> FloatArray:
@@ -98,14 +97,12 @@ def initial_potentials(
     At rest a membrane has the steady potential of its current. One whose current would make it fire has just
     been reset.
     """
-    potentials = np.full(current.size, initial)
-    for neuron in range(current.size if math.isnan(initial) else 0):
-        steady = tau / capacitance * current[neuron]
-        potentials[neuron] = steady if steady < threshold else 0.0
-    return potentials
+    if not math.isnan(initial):
+        return np.full(current.size, initial)
+    steady = tau / capacitance * current
+    return np.where(steady < threshold, steady, 0.0)
 
 
-@njit(cache=True, error_model="numpy", nogil=True)
 def exact_trains(
     times: FloatArray,
     currents: FloatArray,
@@ -116,12 +113,8 @@ def exact_trains(
     initial: float,
 ) -> tuple[FloatArray, np.ndarray]:
     """Compute the spike times of all neurons, neuron after neuron."""
-    # All neurons are advanced over an interval before the next one begins: they share its exponential, rows
-    # of `currents` are contiguous in memory, and the loops over neurons vectorise. For the same reason,
-    # spikes within an interval are found in rounds of one spike per neuron, stage by stage in short loops.
-    n_neurons = currents.shape[1]
     potentials = initial_potentials(currents[0], tau, capacitance, threshold, initial)
-    ready = np.full(n_neurons, times[0])
+    ready = np.full(currents.shape[1], times[0])
     return continued_trains(times, currents, tau, capacitance, threshold, refractory, potentials, ready)
 
 
@@ -137,6 +130,9 @@ def continued_trains(
     ready: FloatArray,
 ) -> tuple[FloatArray, np.ndarray]:
     """Compute spike times as `exact_trains`, from a state that is carried on."""
+    # All neurons are advanced over an interval before the next one begins: they share its exponential, rows
+    # of `currents` are contiguous in memory, and the loops over neurons vectorise. For the same reason,
+    # spikes within an interval are found in rounds of one spike per neuron, stage by stage in short loops.
     n_neurons = currents.shape[1]
     resistance = tau / capacitance
     busy = np.empty(n_neurons, dtype=np.int64)
