@@ -77,14 +77,14 @@ def test_a_signal_that_an_import_hides_still_stops(sent: signal.Signals) -> None
 def test_a_worker_that_is_just_starting_ignores_ctrl_c(tmp_path: Path) -> None:
     """Else it might write Python's own traceback before its parent ends it."""
     script = (
-        "import time\n"
+        "import os, time\n"
         "from fingerpad.core.engine import Processes\n"
         "def work(item, threads):\n"
         "    return item\n"
         "if __name__ == '__main__':\n"
         "    print(sum(outcome() for _, outcome in Processes(2).map(work, [1, 2])))\n"
         "else:\n"
-        "    print('starts', flush=True)\n"
+        "    os.write(1, b'starts\\n')\n"
         "    time.sleep(1)\n"
     )
     (tmp_path / "starting.py").write_text(script, encoding="utf-8")
