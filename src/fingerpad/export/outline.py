@@ -194,9 +194,8 @@ def face_mesh(
     indenter: Indenter, lowest_mm: float, x_mm: tuple[float, float], z_mm: tuple[float, float]
 ) -> RigidMesh:
     """Divide the face of any body into facets over a grid; walls are as steep as one of its cells is wide."""
-    details = details_of(indenter)
-    finest_mm = min(*details.parts_mm, *details.grooves_mm)
-    pitch = np.clip(finest_mm / FACETS_ACROSS_RELIEF, SMALLEST_FACET_MM, LARGEST_FACET_MM)
+    narrowest_mm = details_of(indenter).narrowest_mm
+    pitch = np.clip(narrowest_mm / FACETS_ACROSS_RELIEF, SMALLEST_FACET_MM, LARGEST_FACET_MM)
     lines = []
     for low, high in (x_mm, z_mm):
         # The middle of the body is on a line: a symmetric body has symmetric facets.

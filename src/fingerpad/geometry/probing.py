@@ -56,8 +56,8 @@ def traced_front(
 
     From above each height is lowered by its gap, which is the distance to the body or less. Where a gap is
     more than the distance, the last step is halved until the face is found. `above_mm` are heights above the
-    face from which it is sought, -inf beside it, and `below_mm` is the lowest. A ray along
-    a wall, which takes more than `most_steps`, does not meet it.
+    face from which it is sought, -inf beside it, and `below_mm` is the lowest. A ray along a wall, which
+    takes more than `most_steps`, does not meet it.
     """
     at = np.array(points_mm, dtype=np.float64)
     at[:, 1] = above_mm

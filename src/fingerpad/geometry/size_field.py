@@ -166,6 +166,11 @@ class Details:
     parts_mm: tuple[float, float]  #: Extents of the narrowest part, infinite if all go on. [mm]
     grooves_mm: tuple[float, float]  #: Width of the narrowest groove, infinite without one. [mm]
 
+    @property
+    def narrowest_mm(self) -> float:
+        """Width of the narrowest part or groove of any direction, infinite without one. [mm]"""
+        return min(*self.parts_mm, *self.grooves_mm)
+
 
 def _parts_mm(there: np.ndarray) -> list[float]:
     """Extents of the narrowest part along and across, infinite if all go on. [mm]"""

@@ -244,8 +244,7 @@ class _Search:
         # region (Nocedal & Wright 2006, section 4.1).
         while True:
             try:
-                begins = len(self.history) == 1
-                if begins and self.load.moves_aside and self.is_set_free(now, MOST_FREE):
+                if len(self.history) == 1 and self.load.moves_aside and self.is_set_free(now, MOST_FREE):
                     return self.line_search(*self.closed_direction(now, forcing), potentials)
                 return self.line_search(*self.direction_from(now, forcing), potentials)
             except NotPositiveDefiniteError:  # even with the largest shift

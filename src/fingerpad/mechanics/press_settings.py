@@ -60,8 +60,7 @@ def contact_about(contact: Contact, mesh: Mesh, sparsity: Sparsity, finest_mm: f
 
 def sag_mm(indenter: Indenter, finest_mm: float) -> float:
     """How deep the middle of a facet may lie within a small body. [mm]"""
-    details = details_of(indenter)
-    half_mm = min(*details.parts_mm, *details.grooves_mm) / 2
+    half_mm = details_of(indenter).narrowest_mm / 2
     least, most = SAGS
     return float(np.clip(SAG_OF_WIDTH * half_mm, least * finest_mm, most * finest_mm))
 
