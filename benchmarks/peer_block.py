@@ -21,9 +21,9 @@ from fingerpad.export.job import Job
 from fingerpad.geometry.bodies import Sphere
 from fingerpad.geometry.mesh import Mesh, block_mesh
 from fingerpad.geometry.motion import RampAndHold
-from fingerpad.mechanics.contact import place
+from fingerpad.mechanics.contact import PlacedIndenter, place
 from fingerpad.mechanics.materials import Material
-from fingerpad.mechanics.press import press
+from fingerpad.mechanics.press import Specimen, press
 from fingerpad.mechanics.press_settings import PressSettings
 
 LENGTH_MM, WIDTH_MM = 14.0, 12.0
@@ -124,7 +124,9 @@ def press_block(block: str, found: str) -> dict[str, Any]:
     settings = PressSettings(increments, 1)
     started = perf_counter()
     with threadpool_limits(limits=1):  # as in `Touch.solve`
-        done = press(job.mesh, job.materials, job.indenter, job.placement, motion, settings)
+        done = press(
+            Specimen(job.mesh, job.materials), PlacedIndenter(job.indenter, job.placement), motion, settings
+        )
     solve_s = perf_counter() - started
     ramp = slice(1, increments + 1)
     np.savez(found, force_mn=done.force_mn[ramp], sed_kpa=done.sed_kpa[increments])

@@ -5,9 +5,9 @@ import numpy as np
 from fingerpad.experiments.conditions import RECEPTOR_X_MM, Conditions
 from fingerpad.geometry.grading import Grading
 from fingerpad.geometry.mesh import block_mesh
-from fingerpad.mechanics.contact import place
+from fingerpad.mechanics.contact import PlacedIndenter, place
 from fingerpad.mechanics.materials import Material, Prony
-from fingerpad.mechanics.press import press
+from fingerpad.mechanics.press import Specimen, press
 
 PRONY = Prony(shares=(0.2, 0.3), times_ms=(30.0, 400.0))
 ELASTIC = tuple(Material.neo_hooke(shear, 0.45) for shear in (40.0, 40.0, 20.0, 8.0))
@@ -33,4 +33,4 @@ def block(symmetric=True, layers=(0, 1, 2, 3, 3)):
 def press_into(mesh, materials, indenter, motion, settings, at_mm=(0.0, 0.0, 0.0), **options):
     """Press from the first touch at a place, along y."""
     placement = place(indenter, mesh.nodes_mm[mesh.skin_nodes], np.array(at_mm), np.eye(3))
-    return press(mesh, materials, indenter, placement, motion, settings, **options)
+    return press(Specimen(mesh, materials), PlacedIndenter(indenter, placement, **options), motion, settings)

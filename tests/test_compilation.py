@@ -130,3 +130,28 @@ def test_a_first_response_reports_compilation_once_and_none_that_is_stored(say):
 def test_a_press_calls_every_kernel_that_is_counted():
     fp.touch_of(fp.Fingertip(), fp.Sphere(), settings=fp.PressSettings(1, 1)).solve()
     assert [kernel for kernel in KERNELS if not kernel.signatures] == []
+
+
+def test_what_another_process_compiles_ahead_is_what_a_press_and_a_response_call():
+    """Kernels called with other types would be compiled a second time."""
+    code = """
+        from dataclasses import replace
+        import fingerpad as fp
+        from fingerpad.mechanics import balance, fields, viscoelastic
+        from fingerpad.experiments import compile_ahead
+        from fingerpad.neuron import exact_spikes, transduction
+        from fingerpad.skin import receptor_sheet
+        ahead = (
+            balance._relaxed_work, fields._mean_fields, fields._isochoric_work, viscoelastic._relax,
+            viscoelastic._states, viscoelastic._stored_energy, receptor_sheet.values_and_slopes_at,
+            receptor_sheet.values_at, transduction._interpolate, exact_spikes.continued_trains,
+        )
+        compile_ahead.main()
+        before = [list(kernel.signatures) for kernel in ahead]
+        touch = fp.touch_of(fp.Fingertip(), fp.Sphere(), settings=fp.PressSettings(1, 1))
+        skin = replace(touch, grading=compile_ahead.COARSE).solve()
+        fp.Population.grid(density_per_cm2=100).respond(skin)
+        print(all(before), before == [list(kernel.signatures) for kernel in ahead])
+    """
+    command = [sys.executable, "-c", textwrap.dedent(code)]
+    assert subprocess.run(command, capture_output=True, text=True).stdout.split() == ["True", "True"]

@@ -15,10 +15,10 @@ from fingerpad.mechanics.balance import (
     instantaneous_energy,
     relaxed_work,
 )
-from fingerpad.mechanics.contact import place
+from fingerpad.mechanics.contact import PlacedIndenter, place
 from fingerpad.mechanics.element import SHAPE_DERIVATIVES
 from fingerpad.mechanics.materials import Hyperfoam, MaterialTable
-from fingerpad.mechanics.press import press
+from fingerpad.mechanics.press import Specimen, press
 from fingerpad.mechanics.viscoelastic import (
     StepCoefficients,
     StressHistory,
@@ -193,7 +193,10 @@ def test_heat_of_a_foam_pressed_and_released_by_a_quarter_is_never_negative_and_
     imbalance = []
     for steps in (5, 20):
         energy = press(
-            mesh, (foam,) * 4, fp.Plate(), placement, motion, fp.PressSettings(steps, steps)
+            Specimen(mesh, (foam,) * 4),
+            PlacedIndenter(fp.Plate(), placement),
+            motion,
+            fp.PressSettings(steps, steps),
         ).energy
         assert (np.diff(energy.dissipated_uj) > 0.0).all()
         imbalance.append(energy.relative_imbalance)

@@ -5,8 +5,8 @@ import pytest
 
 import fingerpad as fp
 from fingerpad.geometry.mesh import block_mesh
-from fingerpad.mechanics.contact import Contact, Placement, place
-from fingerpad.mechanics.press import press
+from fingerpad.mechanics.contact import Contact, PlacedIndenter, Placement, place
+from fingerpad.mechanics.press import Specimen, press
 
 RADIUS = 2.0
 SPHERE = fp.Sphere(curvature_per_m=1000.0 / RADIUS)
@@ -148,7 +148,9 @@ def force_of_a_bar(size_mm, wider_mm=0.0):
     motion, steps = fp.RampAndHold(depth_mm=0.6, ramp_ms=50, hold_ms=10), fp.PressSettings(6, 1)
     still = Placement(np.zeros(3), np.eye(3))
     tissue = (fp.Material.neo_hooke(30.0, 0.4),) * 4
-    return press(mesh, tissue, fp.Bar(2.4 + wider_mm, 0.05), still, motion, steps).force_mn[-1]
+    return press(
+        Specimen(mesh, tissue), PlacedIndenter(fp.Bar(2.4 + wider_mm, 0.05), still), motion, steps
+    ).force_mn[-1]
 
 
 def test_a_row_on_an_edge_does_not_touch_on_a_coarse_mesh_and_this_error_converges():

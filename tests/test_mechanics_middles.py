@@ -6,8 +6,8 @@ import pytest
 from fingerpad import ConvergenceError, Material, PressSettings, RampAndHold, Sphere
 from fingerpad.geometry.mesh import block_mesh
 from fingerpad.mechanics.assembly import Sparsity
-from fingerpad.mechanics.contact import Contact, Middles, Placement, place
-from fingerpad.mechanics.press import press
+from fingerpad.mechanics.contact import Contact, Middles, PlacedIndenter, Placement, place
+from fingerpad.mechanics.press import Specimen, press
 from fingerpad.mechanics.press_settings import sag_mm
 
 SPACING_MM = 0.5
@@ -103,7 +103,12 @@ def test_facets_do_not_cut_through_a_small_ball(friction):
     motion, steps = RampAndHold(0.7, ramp_ms=50.0, hold_ms=50.0), PressSettings(ramp_steps=7, hold_steps=1)
 
     def pressed(finest_mm):
-        return press(mesh, tissue, BALL, placement, motion, steps, friction=friction, finest_mm=finest_mm)
+        return press(
+            Specimen(mesh, tissue),
+            PlacedIndenter(BALL, placement, friction=friction, finest_mm=finest_mm),
+            motion,
+            steps,
+        )
 
     def sunk_mm(done):
         skin_mm = (mesh.nodes_mm + done.displacement_mm[-1])[contact_of(mesh).middles.corners].mean(axis=1)

@@ -11,12 +11,12 @@ from fingerpad.geometry.mesh import block_mesh, finger_mesh
 from fingerpad.mechanics import linear, multigrid
 from fingerpad.mechanics.assembly import Sparsity, assemble
 from fingerpad.mechanics.columns import find_scales, round_matrix
-from fingerpad.mechanics.contact import place
+from fingerpad.mechanics.contact import PlacedIndenter, place
 from fingerpad.mechanics.linear import LinearSolver, free_degrees_of_freedom
 from fingerpad.mechanics.materials import MaterialTable
 from fingerpad.mechanics.multigrid import Multigrid
 from fingerpad.mechanics.newton import NewtonSettings
-from fingerpad.mechanics.press import press
+from fingerpad.mechanics.press import Specimen, press
 
 SMALL = block_mesh(
     np.arange(7.0), [0.0, 0.3, 0.5, 1.5], np.array([0.0, 0.5, 1.0, 1.5, 2.5, 3.5]), [0, 2, 3], symmetric=True
@@ -237,7 +237,9 @@ def test_press_equals_that_of_a_factor_in_every_step(monkeypatch):
     settings = PressSettings(2, 2, NewtonSettings(residual_tolerance=1e-9, penetration_tolerance=1e-3))
 
     def pressed():
-        return press(mesh, materials, sphere, placement, RampAndHold(0.4, 50, 200), settings)
+        return press(
+            Specimen(mesh, materials), PlacedIndenter(sphere, placement), RampAndHold(0.4, 50, 200), settings
+        )
 
     monkeypatch.setattr(linear, "MULTIGRID_NODES", 100)
     monkeypatch.setattr(multigrid, "COARSEST_COLUMNS", 10)

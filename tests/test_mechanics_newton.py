@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 import fingerpad as fp
+from fingerpad.mechanics.moments import Press
 from fingerpad.mechanics.newton import NewtonSettings, _Search
-from fingerpad.mechanics.press import _Press
 from presses import RELAXING, block, press_into
 
 BALL = fp.Sphere(curvature_per_m=500.0)
@@ -82,7 +82,7 @@ def test_skin_that_snaps_ends_in_one_state_with_any_number_of_steps(ramp_steps):
 def test_a_guess_that_folds_is_replaced_by_the_step_before(monkeypatch):
     """A guess may turn an element inside out; the search then starts where the last step ended."""
     usual = pressed(block(), BALL, NewtonSettings())
-    monkeypatch.setattr(_Press, "continued", lambda job, start, target_ms: 1e9)
+    monkeypatch.setattr(Press, "continued", lambda job, start, target_ms: 1e9)
     folded = pressed(block(), BALL, NewtonSettings())
     np.testing.assert_allclose(folded.force_mn, usual.force_mn, rtol=1e-3)
 

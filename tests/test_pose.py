@@ -17,8 +17,8 @@ from fingerpad import (
 )
 from fingerpad.geometry.mesh import block_mesh
 from fingerpad.geometry.motion import Pose, RampAndHold
-from fingerpad.mechanics.contact import Placement, place, rotation_of
-from fingerpad.mechanics.press import press
+from fingerpad.mechanics.contact import PlacedIndenter, Placement, place, rotation_of
+from fingerpad.mechanics.press import Specimen, press
 from presses import ELASTIC, RELAXING
 from refusals import refused
 
@@ -53,12 +53,12 @@ def test_indenter_that_moves_and_turns_before_it_touches_presses_as_if_placed_th
     times_ms, depth_mm = (0.0, *np.linspace(50.0, 100.0, 13)), (-0.6, *np.linspace(-0.6, 0.3, 13))
     way = {name: (0.0, *[getattr(pose, name)] * 13) for name in vars(pose)}
     motion = Trajectory(times_ms, depth_mm=depth_mm, **way)
-    moved = press(mesh, ELASTIC, indenter, first, motion, STEPS, friction=0.3)
+    moved = press(Specimen(mesh, ELASTIC), PlacedIndenter(indenter, first, friction=0.3), motion, STEPS)
     rotation = rotation_of(pose.tilt_deg, pose.spin_deg)
     origin_mm = first.origin_mm + np.array([pose.x_mm, 0.0, pose.z_mm])
     there = Placement(origin_mm, rotation, np.array([0.0, 1.0, 0.0]))
     down = Trajectory(times_ms, depth_mm=depth_mm)
-    placed = press(mesh, ELASTIC, indenter, there, down, STEPS, friction=0.3)
+    placed = press(Specimen(mesh, ELASTIC), PlacedIndenter(indenter, there, friction=0.3), down, STEPS)
     assert placed.force_mn[-1] > 1.0
     np.testing.assert_allclose(moved.force_mn[-4:], placed.force_mn[-4:], rtol=1e-6)
     np.testing.assert_allclose(moved.sed_kpa[-1], placed.sed_kpa[-1], atol=1e-5 * placed.sed_kpa.max())
@@ -70,7 +70,9 @@ def sliding(way_mm, mu, materials=RELAXING, **aside):
     times_ms, x_mm = (0.0, 50.0, 100.0, 300.0), (0.0, 0.0, 0.0, way_mm)
     motion = Trajectory(times_ms, (0.0, 0.3, 0.3, 0.3), x_mm=x_mm, **aside)
     first = touching(indenter, mesh)
-    return press(mesh, materials, indenter, first, motion, PressSettings(16, 2), friction=mu)
+    return press(
+        Specimen(mesh, materials), PlacedIndenter(indenter, first, friction=mu), motion, PressSettings(16, 2)
+    )
 
 
 @pytest.mark.parametrize("mu", [0.0, 0.8])
@@ -120,7 +122,7 @@ def test_half_a_finger_and_a_wire_are_refused_what_they_cannot_do_and_bone_on_th
     indenter = Bar(1.6, 0.4)
     deep = Trajectory((0.0, 50.0, 100.0), (0.0, 0.5, 1.9), tilt_deg=(0.0, 0.0, 30.0))
     with refused("depth_mm"):
-        press(mesh, ELASTIC, indenter, touching(indenter, mesh), deep, STEPS)
+        press(Specimen(mesh, ELASTIC), PlacedIndenter(indenter, touching(indenter, mesh)), deep, STEPS)
 
 
 def test_force_slides_a_sphere_whose_first_touch_is_off_its_axis():
@@ -131,7 +133,9 @@ def test_force_slides_a_sphere_whose_first_touch_is_off_its_axis():
     inside = Placement(placement.origin_mm + np.array([0.0, 4e-16, 0.0]), placement.rotation)
     aside = {"x_mm": (0.0, 0.0, 0.8), "z_mm": (0.0, 0.0, -0.4)}
     motion = Trajectory((0.0, 50.0, 100.0), force_mn=(0.0, 10.0, 10.0), **aside)
-    done = press(mesh, RELAXING, indenter, inside, motion, PressSettings(4, 2), friction=0.5)
+    done = press(
+        Specimen(mesh, RELAXING), PlacedIndenter(indenter, inside, friction=0.5), motion, PressSettings(4, 2)
+    )
     np.testing.assert_allclose(done.force_mn[done.times_ms >= 50.0], 10.0, rtol=1e-4)
     aside = np.linalg.norm(done.contact_force_mn[-1, [0, 2]])
     assert 0.35 < aside / done.contact_force_mn[-1, 1] < 0.6
@@ -142,7 +146,9 @@ def test_a_ball_that_spins_under_constant_force_meets_the_torque_of_a_sliding_he
     mesh, indenter, mu = block(), Sphere(curvature_per_m=250.0), 0.3
     motion = stroke(force_mn=40.0, spin_deg=60.0, speed_deg_per_s=600.0, hold_ms=0.0)
     first = touching(indenter, mesh)
-    done = press(mesh, ELASTIC, indenter, first, motion, PressSettings(4, 2), friction=mu)
+    done = press(
+        Specimen(mesh, ELASTIC), PlacedIndenter(indenter, first, friction=mu), motion, PressSettings(4, 2)
+    )
     work_uj = np.diff(done.energy.external_uj)[-3:]
     torque = work_uj / np.deg2rad(np.diff(np.interp(done.times_ms, motion.times_ms, motion.spin_deg))[-3:])
     radius_mm = np.sqrt(done.contact.area_mm2[-1] / np.pi)

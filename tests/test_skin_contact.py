@@ -5,9 +5,9 @@ import pytest
 
 from fingerpad import Material, PressSettings, RampAndHold, Sphere
 from fingerpad.geometry.mesh import block_mesh
-from fingerpad.mechanics.contact import place
+from fingerpad.mechanics.contact import PlacedIndenter, place
 from fingerpad.mechanics.fields import skin_contact
-from fingerpad.mechanics.press import press
+from fingerpad.mechanics.press import Specimen, press
 
 E_STAR_KPA = 100.0
 
@@ -96,7 +96,12 @@ def test_area_grows_without_steps_while_a_ball_is_pressed_and_stays_nearly_the_s
     tissue = (Material.neo_hooke(20.0, 0.45),) * 4
     ball = Sphere(curvature_per_m=500.0)
     placement = place(ball, mesh.nodes_mm[mesh.skin_nodes], np.zeros(3), np.eye(3))
-    done = press(mesh, tissue, ball, placement, RampAndHold(0.4, 50.0, 500.0), PressSettings(40, 2))
+    done = press(
+        Specimen(mesh, tissue),
+        PlacedIndenter(ball, placement),
+        RampAndHold(0.4, 50.0, 500.0),
+        PressSettings(40, 2),
+    )
     grown = np.diff(done.contact.area_mm2[5:41])
     assert grown.min() > 0.2 * grown.mean()
     assert grown.max() < 2.0 * grown.mean()

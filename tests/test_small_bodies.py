@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import fingerpad as fp
-from fingerpad.mechanics.press import _Press
+from fingerpad.mechanics.moments import Press
 
 
 @pytest.mark.parametrize(
@@ -56,9 +56,9 @@ def test_skin_that_slips_past_the_indenter_is_no_result():
     job = SimpleNamespace(stimulus=SimpleNamespace(stays=True), contact=SimpleNamespace(placement=placement))
     start = SimpleNamespace(found=state(1.0, 20.0))
     with pytest.raises(fp.ConvergenceError, match="slips past the indenter: its force falls from 20 to 5 mN"):
-        _Press.check_that_it_holds(job, start, state(1.1, 5.0, was_shifted=True))
+        Press.check_that_it_holds(job, start, state(1.1, 5.0, was_shifted=True))
     with pytest.raises(fp.ConvergenceError, match="its force falls from 20 to 0 mN"):
-        _Press.check_that_it_holds(job, start, state(1.1, 0.0))
-    _Press.check_that_it_holds(job, start, state(1.1, 5.0))
-    _Press.check_that_it_holds(job, start, state(0.9, 5.0, was_shifted=True))
-    _Press.check_that_it_holds(job, start, state(1.1, 21.0, was_shifted=True))
+        Press.check_that_it_holds(job, start, state(1.1, 0.0))
+    Press.check_that_it_holds(job, start, state(1.1, 5.0))
+    Press.check_that_it_holds(job, start, state(0.9, 5.0, was_shifted=True))
+    Press.check_that_it_holds(job, start, state(1.1, 21.0, was_shifted=True))

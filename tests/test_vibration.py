@@ -13,11 +13,11 @@ from fingerpad.geometry.mesh import block_mesh
 from fingerpad.geometry.motion import Cycles
 from fingerpad.geometry.motions import SAMPLES_PER_CYCLE
 from fingerpad.mechanics import cycles
-from fingerpad.mechanics.contact import place
+from fingerpad.mechanics.contact import PlacedIndenter, place
 from fingerpad.mechanics.cycles import PronyCycle
 from fingerpad.mechanics.inertia import fastest_hz, resonance_hz
 from fingerpad.mechanics.materials import MaterialTable
-from fingerpad.mechanics.press import press
+from fingerpad.mechanics.press import Specimen, press
 from fingerpad.mechanics.viscoelastic import StepCoefficients, StressHistory
 
 PRONY = fp.Prony(shares=(0.2, 0.3), times_ms=(30.0, 400.0))
@@ -35,7 +35,7 @@ def vibrated(motion, cycle_tolerance=0.01, friction=0.0):
     mesh = block()
     placement = place(BALL, mesh.nodes_mm[mesh.skin_nodes], np.zeros(3), np.eye(3))
     settings = fp.PressSettings(3, 3, cycle_tolerance=cycle_tolerance)
-    return press(mesh, LAYERS, BALL, placement, motion, settings, friction=friction)
+    return press(Specimen(mesh, LAYERS), PlacedIndenter(BALL, placement, friction=friction), motion, settings)
 
 
 @pytest.fixture

@@ -10,10 +10,10 @@ from fingerpad.geometry.bodies import Bar, Cylinder, Edge, FlatPunch, Gap, Line,
 from fingerpad.geometry.mesh import block_mesh
 from fingerpad.geometry.mesh_checks import jacobian_at_gauss
 from fingerpad.geometry.motion import RampAndHold
-from fingerpad.mechanics.contact import place
+from fingerpad.mechanics.contact import PlacedIndenter, place
 from fingerpad.mechanics.materials import Material, Prony
 from fingerpad.mechanics.newton import NewtonSettings
-from fingerpad.mechanics.press import press
+from fingerpad.mechanics.press import Specimen, press
 from fingerpad.mechanics.press_settings import PressSettings
 
 from .case import Row, at_least, at_most, case, near
@@ -50,7 +50,9 @@ def pressed(mesh, indenter, layers=LAYERS, motion=None, settings=None):
     """Press a block."""
     placement = place(indenter, mesh.nodes_mm[mesh.skin_nodes], np.zeros(3), np.eye(3))
     motion = motion or RampAndHold(DEPTH_MM, 50.0, 300.0)
-    return press(mesh, layers, indenter, placement, motion, settings or PressSettings(4, 3))
+    return press(
+        Specimen(mesh, layers), PlacedIndenter(indenter, placement), motion, settings or PressSettings(4, 3)
+    )
 
 
 @lru_cache(maxsize=len(INDENTERS))

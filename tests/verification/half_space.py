@@ -18,12 +18,12 @@ from fingerpad.geometry.indenters import Indenter
 from fingerpad.geometry.mesh import Mesh, block_mesh
 from fingerpad.geometry.motion import ForceRampAndHold, RampAndHold
 from fingerpad.mechanics.configuration import Body, Load
-from fingerpad.mechanics.contact import Contact, place
+from fingerpad.mechanics.contact import Contact, PlacedIndenter, place
 from fingerpad.mechanics.fields import SkinContact, cauchy_stress, skin_contact
 from fingerpad.mechanics.linear import LinearSolver, choose_preconditioner, free_degrees_of_freedom
 from fingerpad.mechanics.materials import Material
 from fingerpad.mechanics.newton import NewtonSettings, find_equilibrium
-from fingerpad.mechanics.press import press
+from fingerpad.mechanics.press import Specimen, press
 from fingerpad.mechanics.press_settings import PressSettings
 from fingerpad.mechanics.viscoelastic import (
     StepCoefficients,
@@ -138,7 +138,12 @@ def pressed(mesh, indenter, depth_mm, poisson, force_mn=None) -> Pressed:
     material = Material.linear_elastic(YOUNG_KPA, poisson)
     placement = place(indenter, mesh.nodes_mm[mesh.skin_nodes], np.zeros(3), np.eye(3))
     motion = RampAndHold(depth_mm, 1.0, 1.0) if force_mn is None else ForceRampAndHold(force_mn, 1.0, 1.0)
-    done = press(mesh, (material,) * 4, indenter, placement, motion, PressSettings(1, 1, TIGHT))
+    done = press(
+        Specimen(mesh, (material,) * 4),
+        PlacedIndenter(indenter, placement),
+        motion,
+        PressSettings(1, 1, TIGHT),
+    )
     return Pressed(
         solid=Solid(mesh, (material,) * 4),
         displacement_mm=done.displacement_mm[-1],

@@ -19,10 +19,10 @@ from fingerpad.geometry.bodies import Sphere
 from fingerpad.geometry.grading import graded_lines
 from fingerpad.geometry.mesh import block_mesh
 from fingerpad.geometry.motion import RampAndHold, Trajectory
-from fingerpad.mechanics.contact import place
+from fingerpad.mechanics.contact import PlacedIndenter, place
 from fingerpad.mechanics.materials import Material
 from fingerpad.mechanics.newton import NewtonSettings
-from fingerpad.mechanics.press import Deformation, press
+from fingerpad.mechanics.press import Deformation, Specimen, press
 from fingerpad.mechanics.press_settings import PressSettings
 
 YOUNG_KPA, POISSON = (136.0, 136.0, 80.0, 34.0), 0.48
@@ -63,7 +63,9 @@ def coarse_job(times_ms: FloatArray, depths_mm: FloatArray) -> Job:
 def ours() -> Deformation:
     """Our own solution, contact closed to 0.05 % of the depth."""
     settings = PressSettings(STEPS, 1, NewtonSettings(penetration_tolerance=5e-4))
-    return press(job().mesh, job().materials, BALL, job().placement, MOTION, settings)
+    return press(
+        Specimen(job().mesh, job().materials), PlacedIndenter(BALL, job().placement), MOTION, settings
+    )
 
 
 @lru_cache(maxsize=1)
@@ -77,4 +79,4 @@ def job_and_back() -> Job:
 def ours_and_back() -> Deformation:
     """Our own solution of it."""
     settings = PressSettings(2, 1, NewtonSettings(penetration_tolerance=5e-4))
-    return press(job().mesh, job().materials, BALL, job().placement, BACK, settings)
+    return press(Specimen(job().mesh, job().materials), PlacedIndenter(BALL, job().placement), BACK, settings)

@@ -21,10 +21,10 @@ from fingerpad.geometry.fingertip import Fingertip
 from fingerpad.geometry.grading import Grading
 from fingerpad.geometry.mesh import block_mesh
 from fingerpad.geometry.motion import RampAndHold
-from fingerpad.mechanics.contact import place
+from fingerpad.mechanics.contact import PlacedIndenter, place
 from fingerpad.mechanics.laws import Polynomial
 from fingerpad.mechanics.materials import Material, Tissues
-from fingerpad.mechanics.press import press
+from fingerpad.mechanics.press import Specimen, press
 from fingerpad.mechanics.press_settings import PressSettings
 from fingerpad.skin.indentation import Touch
 
@@ -151,7 +151,12 @@ def calculix_indenters() -> list[Row]:
     for name, (indenter, axes, friction) in PRESSES.items():
         placement = place(indenter, mesh.nodes_mm[mesh.skin_nodes], np.zeros(3), axes)
         settings = PressSettings(ramp_steps=2, hold_steps=1)
-        got = press(mesh, materials, indenter, placement, motion, settings, friction=friction).force_mn[2]
+        got = press(
+            Specimen(mesh, materials),
+            PlacedIndenter(indenter, placement, friction=friction),
+            motion,
+            settings,
+        ).force_mn[2]
         pressed = Job(mesh, materials, indenter, placement, times, motion.prescribed_at(times), friction)
         with tempfile.TemporaryDirectory() as folder:
             found = calculix.run(calculix_deck(pressed), Path(folder), len(mesh.elements), ())
@@ -173,7 +178,7 @@ def calculix_gap() -> list[Row]:
     indenter, motion = Gap(1.2, 5.0, 0.6, 0.6), RampAndHold(depth_mm=0.3, ramp_ms=10.0, hold_ms=1.0)
     placement = place(indenter, mesh.nodes_mm[mesh.skin_nodes], np.zeros(3), np.eye(3))
     settings = PressSettings(ramp_steps=2, hold_steps=1)
-    got = press(mesh, materials, indenter, placement, motion, settings).force_mn[2]
+    got = press(Specimen(mesh, materials), PlacedIndenter(indenter, placement), motion, settings).force_mn[2]
     times = np.array([0.0, 5.0, 10.0])
     pressed = Job(mesh, materials, indenter, placement, times, motion.prescribed_at(times))
     with tempfile.TemporaryDirectory() as folder:

@@ -9,10 +9,10 @@ from fingerpad.geometry.bodies import Plate, Sphere
 from fingerpad.geometry.mesh import block_mesh
 from fingerpad.geometry.motion import RampAndHold
 from fingerpad.geometry.motions import sine
-from fingerpad.mechanics.contact import place
+from fingerpad.mechanics.contact import PlacedIndenter, place
 from fingerpad.mechanics.materials import Material, Polynomial, Prony
 from fingerpad.mechanics.newton import NewtonSettings
-from fingerpad.mechanics.press import press
+from fingerpad.mechanics.press import Specimen, press
 from fingerpad.mechanics.press_settings import PressSettings
 from fingerpad.mechanics.viscoelastic import (
     StepCoefficients,
@@ -187,7 +187,7 @@ def oscillating_block() -> list[Row]:
         motion = sine(0.02, 0.005, frequency, cycles=15, hold_ms=200.0)
         amplitudes = []
         for materials in (relaxing, at_once):
-            done = press(mesh, materials, Plate(), placement, motion, tight)
+            done = press(Specimen(mesh, materials), PlacedIndenter(Plate(), placement), motion, tight)
             vibrates = done.times_ms > motion.cycles.start_ms
             times = done.times_ms[vibrates] - motion.cycles.start_ms
             amplitudes.append(in_and_out_of_phase(times, done.force_mn[vibrates], frequency))
@@ -232,7 +232,12 @@ def pressed_block(poisson, hold_ms):
     ball = Sphere(curvature_per_m=500.0)
     placement = place(ball, mesh.nodes_mm[mesh.skin_nodes], np.zeros(3), np.eye(3))
     settings = PressSettings(3, 12, NewtonSettings(residual_tolerance=1e-6, penetration_tolerance=2e-4))
-    done = press(mesh, layers, ball, placement, RampAndHold(0.4, INWARDS_MS, hold_ms), settings)
+    done = press(
+        Specimen(mesh, layers),
+        PlacedIndenter(ball, placement),
+        RampAndHold(0.4, INWARDS_MS, hold_ms),
+        settings,
+    )
     hold = done.times_ms[3:] - INWARDS_MS
     return hold[1:], done.force_mn[4:] / done.force_mn[3]
 

@@ -12,10 +12,10 @@ from fingerpad.geometry.bodies import Plate, Sphere
 from fingerpad.geometry.mesh import block_mesh
 from fingerpad.geometry.motion import Motion, Trajectory
 from fingerpad.geometry.motions import repeated
-from fingerpad.mechanics.contact import place
+from fingerpad.mechanics.contact import PlacedIndenter, place
 from fingerpad.mechanics.materials import Material, Prony
 from fingerpad.mechanics.newton import NewtonSettings
-from fingerpad.mechanics.press import Deformation, press
+from fingerpad.mechanics.press import Deformation, Specimen, press
 from fingerpad.mechanics.press_settings import PressSettings
 
 from . import balance
@@ -39,7 +39,12 @@ def foam_block(motion: Motion, prony: Prony, steps: int = 20) -> Deformation:
     foam = Material.hyperfoam((SHEAR_KPA,), (EXPONENT,), 1e-6, prony)
     mesh = block_mesh([0.0, 2.0], [0.0, THICK_MM], [0.0, 2.0], layers=[2])
     placement = place(Plate(), mesh.nodes_mm[mesh.skin_nodes], np.zeros(3), np.eye(3))
-    return press(mesh, (foam,) * 4, Plate(), placement, motion, PressSettings(steps, steps, TIGHT))
+    return press(
+        Specimen(mesh, (foam,) * 4),
+        PlacedIndenter(Plate(), placement),
+        motion,
+        PressSettings(steps, steps, TIGHT),
+    )
 
 
 def instantaneous_kpa(stretch, prony: Prony):
@@ -200,7 +205,7 @@ def ball_in_and_out() -> Deformation:
     motion = Trajectory((0.0, TURN_MS, 2 * TURN_MS), (0.0, DEEP_MM, 0.0))
     # Round-off of the large far elements is 1e-5 of the small forces before contact is lost.
     settings = PressSettings(12, 1, NewtonSettings(residual_tolerance=1e-4))
-    return press(mesh, tissue, ball, placement, motion, settings)
+    return press(Specimen(mesh, tissue), PlacedIndenter(ball, placement), motion, settings)
 
 
 @case(THEME, "Hysteresis of a sphere", "Lee & Radok 1960, Ting 1966: viscoelastic half-space", slow=True)

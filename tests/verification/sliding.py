@@ -9,10 +9,10 @@ import numpy as np
 from fingerpad.geometry.bodies import Sphere
 from fingerpad.geometry.mesh import block_mesh
 from fingerpad.geometry.motion import Trajectory
-from fingerpad.mechanics.contact import place
+from fingerpad.mechanics.contact import PlacedIndenter, place
 from fingerpad.mechanics.materials import Material
 from fingerpad.mechanics.newton import NewtonSettings
-from fingerpad.mechanics.press import Deformation, press
+from fingerpad.mechanics.press import Deformation, Specimen, press
 from fingerpad.mechanics.press_settings import PressSettings
 
 from .case import Row, at_most, case, equal, near
@@ -67,7 +67,9 @@ def partial_slip(fine=0.2, sectors=6) -> tuple[Deformation, np.ndarray]:
         x_mm=np.array([0.0, *(0.0 for _ in DEPTHS), *WAYS]) * ONSET_MM,
     )
     materials = (Material.linear_elastic(YOUNG_KPA, POISSON),) * 4
-    done = press(mesh, materials, indenter, placement, motion, SETTINGS, friction=FRICTION)
+    done = press(
+        Specimen(mesh, materials), PlacedIndenter(indenter, placement, friction=FRICTION), motion, SETTINGS
+    )
     return done, mesh.nodes_mm[mesh.skin_nodes]
 
 
@@ -147,7 +149,12 @@ def frictionless_slide() -> list[Row]:
     placement = place(indenter, mesh.nodes_mm[mesh.skin_nodes], np.array([-1.2, 0.0, 0.0]), np.eye(3))
     motion = Trajectory((0.0, 50.0, 100.0), (0.0, 0.3, 0.3), x_mm=(0.0, 0.0, 2.4))
     materials = (Material.neo_hooke(20.0, 0.45),) * 4
-    done = press(mesh, materials, indenter, placement, motion, PressSettings(10, 1, SETTINGS.newton))
+    done = press(
+        Specimen(mesh, materials),
+        PlacedIndenter(indenter, placement),
+        motion,
+        PressSettings(10, 1, SETTINGS.newton),
+    )
     slides = done.times_ms >= 50.0
     force, aside = done.force_mn[slides], done.contact_force_mn[slides, 0]
     return [

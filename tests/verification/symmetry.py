@@ -11,9 +11,9 @@ from fingerpad.geometry.fingertip import Fingertip
 from fingerpad.geometry.grading import Grading
 from fingerpad.geometry.mesh import finger_mesh
 from fingerpad.geometry.motion import RampAndHold
-from fingerpad.mechanics.contact import place
+from fingerpad.mechanics.contact import PlacedIndenter, place
 from fingerpad.mechanics.newton import NewtonSettings
-from fingerpad.mechanics.press import press
+from fingerpad.mechanics.press import Specimen, press
 from fingerpad.mechanics.press_settings import PressSettings
 from fingerpad.mechanics.tissues import named_tissues
 
@@ -53,9 +53,11 @@ def finger_answers(indenter):
         mesh = finger_mesh(Fingertip(), replace(coarse, full=full))
         placement = place(indenter, mesh.nodes_mm[mesh.skin_nodes], np.array([17.37, -10.0, 0.0]), np.eye(3))
         done = press(
-            mesh, named_tissues("trial3").layers, indenter, placement, RampAndHold(0.5, 50.0, 100.0),
+            Specimen(mesh, named_tissues("trial3").layers),
+            PlacedIndenter(indenter, placement),
+            RampAndHold(0.5, 50.0, 100.0),
             PressSettings(2, 1, TIGHT),
-        )  # fmt: skip
+        )
         yield mesh, done
 
 

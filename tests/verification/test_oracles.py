@@ -13,8 +13,9 @@ import numpy as np
 import pytest
 
 from fingerpad.export.decks import calculix_deck
+from fingerpad.mechanics.contact import PlacedIndenter
 from fingerpad.mechanics.newton import NewtonSettings
-from fingerpad.mechanics.press import press
+from fingerpad.mechanics.press import Specimen, press
 from fingerpad.mechanics.press_settings import PressSettings
 
 from . import calculix, oracles
@@ -59,7 +60,9 @@ def test_felupe_agrees_on_a_coarse_block(motion, end_ms):
     there = coarse_job(times, motion.prescribed_at(times))
     force, sed = felupe_press.press(there)
     settings = PressSettings(2, 1, NewtonSettings(penetration_tolerance=5e-4))
-    ours = press(there.mesh, there.materials, BALL, there.placement, motion, settings)
+    ours = press(
+        Specimen(there.mesh, there.materials), PlacedIndenter(BALL, there.placement), motion, settings
+    )
     of_force, of_field = oracles.SAME_ELEMENT
     scale = ours.force_mn.max()
     np.testing.assert_allclose(ours.force_mn[1 : times.size], 2.0 * force, rtol=of_force, atol=1e-5 * scale)

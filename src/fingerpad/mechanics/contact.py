@@ -122,6 +122,17 @@ class Placement:
         return np.array([force @ self.axis, force[0], force[2], torque[2], -(torque @ self.rotation[:, 1])])
 
 
+@dataclass(frozen=True)
+class PlacedIndenter:
+    """What presses: an indenter, where it stands, and how it touches."""
+
+    body: Indenter
+    placement: Placement  # At first touch.
+    friction: float = 0.0  # Coulomb's coefficient between skin and indenter.
+    finest_mm: float = np.inf  # Size of the elements below a small body or an edge, see `contact_about`. [mm]
+    deepest_mm: float = np.inf  # How deep a force may push it. [mm]
+
+
 def rotation_of(tilt_deg: float, spin_deg: float) -> FloatArray:
     """Axes of an indenter tilted about z and then turned about its own y, as columns."""
     cosine, sine = np.cos(np.deg2rad(tilt_deg)), np.sin(np.deg2rad(tilt_deg))

@@ -20,18 +20,16 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, fields, is_dataclass, replace
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from fingerpad.core.errors import ConvergenceError
 from fingerpad.core.values import FloatArray
 from fingerpad.mechanics.materials import MaterialTable
+from fingerpad.mechanics.moments import Moment
 from fingerpad.mechanics.steps import Step, Stop, change_of_length, interpolation_error, steps_at
 from fingerpad.mechanics.viscoelastic import StressHistory
-
-if TYPE_CHECKING:
-    from fingerpad.mechanics.press import _Moment as Moment
 
 SOLVED_FIRST = 3  # Cycles that are solved before the first gap: contact and shape settle in them.
 

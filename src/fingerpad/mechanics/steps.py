@@ -39,7 +39,7 @@ SAFETY, SHORTEN, LENGTHEN = 0.85, 0.25, 2.0
 
 
 @runtime_checkable
-class Moment(Protocol):
+class Solved(Protocol):
     """A solved time; the next step starts from it and leaves it as it is."""
 
     @property
@@ -51,7 +51,7 @@ class Moment(Protocol):
         ...
 
 
-Reached = TypeVar("Reached", bound=Moment)
+Reached = TypeVar("Reached", bound=Solved)
 Step = Callable[[Reached, float], Reached]  # Solves from a moment to a time [ms]; raises ConvergenceError.
 
 Stop = Callable[[Reached, tuple[str, ...], str], ConvergenceError]
@@ -96,7 +96,7 @@ def steps_at(
         yield moment
 
 
-def _attempt(moment: Moment, target_ms: float, error: ConvergenceError) -> str:
+def _attempt(moment: Solved, target_ms: float, error: ConvergenceError) -> str:
     """One line of history for a step that did not converge."""
     last = error.history[-1] if error.history else "no iteration"
     return f"step from {moment.time_ms:.4g} to {target_ms:.4g} ms: {error.args[0]} Last: {last}."
@@ -129,7 +129,7 @@ def adaptive_steps(
             yield moment
 
 
-def _largest(moment: Moment, where: np.ndarray) -> float:
+def _largest(moment: Solved, where: np.ndarray) -> float:
     return float(moment.sed_kpa[where].max(initial=0.0))
 
 
@@ -201,7 +201,7 @@ def change_of_length(error_kpa: float, allowed_kpa: float, lengthen: float = LEN
 
 
 def interpolation_error(
-    before: Moment, moment: Moment, after: Moment, where: np.ndarray, both: bool = False
+    before: Solved, moment: Solved, after: Solved, where: np.ndarray, both: bool = False
 ) -> float:
     """Largest error of linear interpolation of SED from `moment` to `after`."""
     earlier_ms, later_ms = moment.time_ms - before.time_ms, after.time_ms - moment.time_ms

@@ -42,11 +42,11 @@ from fingerpad.geometry.mesh import Mesh, finger_mesh
 from fingerpad.geometry.motion import CLEARANCE_TO_BONE, STILL, Motion, RampAndHold, check_path
 from fingerpad.geometry.probing import check_gap
 from fingerpad.geometry.size_field import check_sizes, grading_below
-from fingerpad.mechanics.contact import Placement, check_friction, place, rotation_of
+from fingerpad.mechanics.contact import PlacedIndenter, Placement, check_friction, place, rotation_of
 from fingerpad.mechanics.inertia import warn_of_inertia
 from fingerpad.mechanics.kernels import KERNELS
 from fingerpad.mechanics.materials import Tissues
-from fingerpad.mechanics.press import Deformation, press
+from fingerpad.mechanics.press import Deformation, Specimen, press
 from fingerpad.mechanics.press_settings import PressSettings
 from fingerpad.mechanics.tissues import named_tissues
 from fingerpad.skin.fields import stored_fields, watched_elements
@@ -257,11 +257,16 @@ class Touch:
 
     def _press(self, watched: np.ndarray, threads: int | None) -> Deformation:
         # Libraries get one thread, since their sums depend on the number of threads; our loops' do not.
-        with announce_compilation(KERNELS), compiled_threads(threads), threadpool_limits(limits=1):
-            return press(
-                self.mesh, self.tissues.layers, self.body, self.placement, self.stimulus, self.settings,
-                self.deepest_mm, watched, self.friction, self.grading.finest_strip_mm,
-            )  # fmt: skip
+        with (
+            compiled_threads(threads) as used,
+            announce_compilation(KERNELS, on_two_cores=used > 1),
+            threadpool_limits(limits=1),
+        ):
+            specimen = Specimen(self.mesh, self.tissues.layers, watched)
+            indenter = PlacedIndenter(
+                self.body, self.placement, self.friction, self.grading.finest_strip_mm, self.deepest_mm
+            )
+            return press(specimen, indenter, self.stimulus, self.settings)
 
     @property
     def body(self) -> Indenter:
