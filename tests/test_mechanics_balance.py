@@ -49,6 +49,15 @@ def test_work_of_a_force_is_exact_for_cubics_and_stops_at_kinks():
     assert work.tolist() == [0.0, 3.0]
 
 
+def test_work_of_a_force_that_grows_evenly_and_falls_again_is_that_of_hertz():
+    """F = d^3/2 gives W = 2/5 d^5/2; splines of time, of which d is a root, err by three times as much."""
+    times = np.arange(11.0)
+    force = np.minimum(times, 10.0 - times) / 5.0
+    depth = force ** (2 / 3)
+    work = indenter_work(times, depth, force, kinks_ms=(5.0,))
+    np.testing.assert_allclose(work, 0.4 * depth**2.5, atol=1e-3)
+
+
 def test_contact_stores_only_while_it_presses():
     gap = [np.array([0.3, -0.01, -0.02, 0.1]), np.array([-0.02, -0.03, 0.2, 0.2])]
     force = [np.array([0.0, 1.0, 4.0, 0.0]), np.array([2.0, 3.0, 0.0, 0.0])]
