@@ -105,11 +105,8 @@ class AfferentModel:
         end = max(bound for window in self.used_windows_ms for bound in window)
         for group, columns in zip(self.drives, self.stimuli, strict=True):
             if group.times_ms[-1] < end:
-                raise InputError(
-                    "windows_ms",
-                    "must end with the stimuli",
-                    remedy=f"one ends at {end:g} ms, stimulus {columns[0] + 1} at {group.times_ms[-1]:g} ms",
-                )
+                said = f"one ends at {end:g} ms, stimulus {columns[0] + 1} at {group.times_ms[-1]:g} ms"
+                raise InputError("windows_ms", "must end with the stimuli", remedy=said)
 
     @classmethod
     def of_traces(
@@ -134,11 +131,8 @@ class AfferentModel:
         parts = [traces] if isinstance(traces, Traces) else list(traces)
         quantities = sorted({f"{part.dynamic_quantity} and {part.static_quantity}" for part in parts})
         if len(quantities) != 1:
-            raise InputError(
-                "traces",
-                "must bring one dynamic_quantity and one static_quantity",
-                str(", ".join(quantities) or "no traces"),
-            )
+            wanted = "must bring one dynamic_quantity and one static_quantity"
+            raise InputError("traces", wanted, str(", ".join(quantities) or "no traces"))
         groups: dict[tuple[object, ...], list[tuple[int, Traces]]] = {}
         first = 0
         for trace in parts:

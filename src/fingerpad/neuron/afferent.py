@@ -66,11 +66,8 @@ class AnyAfferent(Follows, Protocol):
 def checked_afferent(afferent: AnyAfferent) -> AnyAfferent:
     """Return an afferent, or raise `InputError` if it is none: a class without parameters, for example."""
     if isinstance(afferent, type) or not all(hasattr(afferent, name) for name in _NEEDED):
-        raise InputError(
-            "afferent",
-            "must be one such as Afferent(), RA(), PC(), SAII() or OwnAfferent(...)",
-            shown(afferent),
-        )
+        wanted = "must be one such as Afferent(), RA(), PC(), SAII() or OwnAfferent(...)"
+        raise InputError("afferent", wanted, shown(afferent))
     return afferent
 
 

@@ -51,11 +51,8 @@ class EndOrgans:
         shares = np.full(n_ends, 1.0 / n_ends) if self.weights is None else self.weights
         weights = float_array("weights", np.atleast_2d(shares), 2)
         if weights.shape not in ((1, n_ends), (n_afferents, n_ends)):
-            raise InputError(
-                "weights",
-                f"needs one number per end organ, {n_ends}, or a row of them per afferent, {n_afferents}",
-                f"shape {weights.shape}",
-            )
+            wanted = f"needs one number per end organ, {n_ends}, or a row of them per afferent, {n_afferents}"
+            raise InputError("weights", wanted, f"shape {weights.shape}")
         if (weights < 0.0).any():
             raise InputError("weights", "must not be negative", remedy=f"the smallest is {weights.min():g}")
         totals = weights.sum(axis=1)

@@ -55,12 +55,8 @@ class LeakyIntegrateAndFire:
 
     def __post_init__(self) -> None:
         if self.initial_mv is not None and self.initial_mv >= self.threshold_mv:
-            raise InputError(
-                "initial_mv",
-                f"must be below the threshold, {self.threshold_mv:g} mV",
-                f"{self.initial_mv:g}",
-                "leave it out to start at rest",
-            )
+            wanted = f"must be below the threshold, {self.threshold_mv:g} mV"
+            raise InputError("initial_mv", wanted, f"{self.initial_mv:g}", "leave it out to start at rest")
 
     def spikes(self, current: Traces) -> SpikeTrains:
         """Spike times of one neuron per site, exact for a piecewise linear current [mA]."""

@@ -125,11 +125,8 @@ class Population:
         if self.ends is not None and len(self.ends) != len(positions):
             raise InputError("ends", f"needs one row per afferent, {len(positions)}", str(len(self.ends)))
         if factors is not None and (factors.size != len(positions) or (factors <= 0.0).any()):
-            raise InputError(
-                "sensitivity",
-                f"needs one factor above 0 per receptor, {len(positions)}",
-                f"{factors.size}, the smallest {factors.min(initial=math.inf):g}",
-            )
+            got = f"{factors.size}, the smallest {factors.min(initial=math.inf):g}"
+            raise InputError("sensitivity", f"needs one factor above 0 per receptor, {len(positions)}", got)
         places = positions[:, [0, -1]] if self.places_mm is None else self.places_mm
         if places.shape != (len(positions), 2):
             raise InputError("places_mm", f"needs a pair per receptor, {len(positions)}", str(places.shape))

@@ -181,11 +181,8 @@ class PsychometricFunction:
         if proportion_correct is None:
             return self.threshold
         if not self.guess < proportion_correct < 1.0 - self.lapse:
-            raise InputError(
-                "proportion_correct",
-                f"must lie between guess and 1 - lapse, {self.guess:g} ... {1.0 - self.lapse:g}",
-                f"{proportion_correct:g}",
-            )
+            wanted = f"must lie between guess and 1 - lapse, {self.guess:g} ... {1.0 - self.lapse:g}"
+            raise InputError("proportion_correct", wanted, f"{proportion_correct:g}")
         return float(level_at(self.shape, proportion_correct, self.parameters))
 
     def slope(self, proportion_correct: Finite | None = None) -> float:
@@ -208,11 +205,8 @@ def checked_levels(levels: ArrayLike, sigmoid: str) -> FloatArray:
     """Return levels as an array if they are in the domain of `sigmoid`, else raise `InputError`."""
     checked = float_array("levels", levels, 1)
     if SIGMOIDS[sigmoid].logarithmic and (checked <= 0.0).any():
-        raise InputError(
-            "levels",
-            f"must be greater than 0 for {sigmoid!r}",
-            remedy=f"the smallest is {checked.min():g}; shift them, or choose another sigmoid",
-        )
+        said = f"the smallest is {checked.min():g}; shift them, or choose another sigmoid"
+        raise InputError("levels", f"must be greater than 0 for {sigmoid!r}", remedy=said)
     return checked
 
 
@@ -253,11 +247,8 @@ class JudgementCounts:
         if (correct != np.floor(correct)).any() or (trials != np.floor(trials)).any():
             raise InputError("n_correct and n_trials must be whole numbers: multiply rates by their trials.")
         if (trials < 1.0).any() or (correct < 0.0).any() or (correct > trials).any():
-            raise InputError(
-                "n_trials",
-                "must be at least 1 and n_correct within 0 ... n_trials",
-                f"{correct.tolist()} of {trials.tolist()}",
-            )
+            wanted = "must be at least 1 and n_correct within 0 ... n_trials"
+            raise InputError("n_trials", wanted, f"{correct.tolist()} of {trials.tolist()}")
 
     @property
     def proportion(self) -> FloatArray:

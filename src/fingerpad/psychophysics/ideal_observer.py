@@ -98,11 +98,8 @@ class GaussianResponses:
     def __post_init__(self) -> None:
         mean, covariance = self.mean, self.covariance
         if covariance.shape != (mean.size, mean.size):
-            raise InputError(
-                "covariance",
-                "must have one row and column per receptor",
-                f"{covariance.shape} for {mean.size}",
-            )
+            wanted = "must have one row and column per receptor"
+            raise InputError("covariance", wanted, f"{covariance.shape} for {mean.size}")
         if np.abs(covariance - covariance.T).max(initial=0.0) > 1e-9 * np.abs(covariance).max(initial=0.0):
             raise InputError("covariance", "must be symmetric", remedy="the two halves differ")
         self.factor  # noqa: B018

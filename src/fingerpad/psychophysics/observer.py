@@ -211,11 +211,8 @@ class EuclideanDistance(Encoder):
 
     def sizes(self, plan: Experiment) -> tuple[int, ...]:
         if plan.criterion_sigma > 0.0:
-            raise InputError(
-                "criterion_sigma",
-                "must be 0 for Euclidean Distance",
-                remedy="its decision point does not vary",
-            )
+            wanted = "must be 0 for Euclidean Distance"
+            raise InputError("criterion_sigma", wanted, remedy="its decision point does not vary")
         return plan.hit_rates, plan.presentations, plan.pairs
 
     def values(
@@ -358,11 +355,8 @@ def checked_responses(responses: ArrayLike, silent_value: Finite | None = None) 
             "depth or use more sensitive afferents",
         )
     if silent.any() and silent_value is None:
-        raise InputError(
-            "responses",
-            "must be finite",
-            remedy=f"{silent.sum()} are NaN, as of silent receptors; give silent_value to replace them",
-        )
+        said = f"{silent.sum()} are NaN, as of silent receptors; give silent_value to replace them"
+        raise InputError("responses", "must be finite", remedy=said)
     table[silent] = silent_value
     table = float_array("responses", table, 2)
     if table.shape[0] < 2 or table.shape[1] == 0:

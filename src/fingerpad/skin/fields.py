@@ -203,11 +203,8 @@ def watched_elements(mesh: Mesh, depths_mm: Sequence[float] = ()) -> IntArray:
         return sheet
     layers = [mesh.layer[mesh.elements_at(depth_mm)] for depth_mm in depths_mm]
     if empty := [depth for depth, found in zip(depths_mm, layers, strict=True) if not found.size]:
-        raise InputError(
-            "receptor_depths_mm",
-            f"must be depths of the tissue, which is at most {mesh.node_depth_mm.max():.3g} mm thick",
-            f"{empty[0]:g} mm",
-        )
+        wanted = f"must be depths of the tissue, which is at most {mesh.node_depth_mm.max():.3g} mm thick"
+        raise InputError("receptor_depths_mm", wanted, f"{empty[0]:g} mm")
     held = np.flatnonzero(np.isin(mesh.layer, np.concatenate(layers)))
     return np.concatenate([sheet, np.setdiff1d(held, sheet)])
 

@@ -387,11 +387,8 @@ def places_below(receptors: Receptors, sites: ArrayLike, depth_mm: ArrayLike | N
     """Find end organs by their x and z on the volar side, or below x, y and z of the skin."""
     points = float_array("sites", sites, None)
     if points.ndim != 2 or points.shape[1] not in (2, 3):
-        raise InputError(
-            "sites",
-            "must be a list of places, such as [(x, z)] or [(x, y, z)], in mm",
-            f"shape {points.shape}",
-        )
+        wanted = "must be a list of places, such as [(x, z)] or [(x, y, z)], in mm"
+        raise InputError("sites", wanted, f"shape {points.shape}")
     if depth_mm is None:
         return _places_of(_Sites(receptors, points))
     depths = float_array("depth_mm", depth_mm, None)

@@ -315,11 +315,8 @@ class NailEdge:
         outside |= along > self.half_length_mm(distance) + _ROUND_OFF_MM
         if outside.any():
             wrong = places[np.argmax(outside)]
-            raise InputError(
-                "places_mm",
-                f"must lie within {self.reach_mm:g} mm of the edge of the nail and between its ends",
-                f"along = {wrong[0]:g}, distance = {wrong[1]:g} mm",
-            )
+            wanted = f"must lie within {self.reach_mm:g} mm of the edge of the nail and between its ends"
+            raise InputError("places_mm", wanted, f"along = {wrong[0]:g}, distance = {wrong[1]:g} mm")
         lines, arcs = self._lines
         step = np.clip(distance / _STEP_MM, 0.0, arcs.shape[1] - 1 - 1e-9)
         before = step.astype(np.int64)
@@ -371,12 +368,8 @@ class NailEdge:
 
     def _within_reach(self, name: str, distance_mm: float) -> float:
         if positive(name, distance_mm, "mm") > self.reach_mm:
-            raise InputError(
-                name,
-                f"must not exceed the reach of {self.reach_mm:g} mm from the nail's edge",
-                f"{distance_mm:.3g} mm",
-                "raise reach_mm",
-            )
+            wanted = f"must not exceed the reach of {self.reach_mm:g} mm from the nail's edge"
+            raise InputError(name, wanted, f"{distance_mm:.3g} mm", "raise reach_mm")
         return float(distance_mm)
 
     @cached_property

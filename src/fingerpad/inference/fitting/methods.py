@@ -468,11 +468,8 @@ def _checked_memberships(memberships: ArrayLike, n_observations: int) -> IntArra
     folds = given.astype(np.int64)
     present = np.unique(folds)
     if (folds != given).any() or present.size < 2 or not np.array_equal(present, np.arange(present.size)):
-        raise InputError(
-            "memberships",
-            "must number at least two folds from 0 on without a gap",
-            str(np.unique(given).tolist()),
-        )
+        wanted = "must number at least two folds from 0 on without a gap"
+        raise InputError("memberships", wanted, str(np.unique(given).tolist()))
     return folds
 
 
