@@ -53,14 +53,7 @@ class BandPass:
     def of(self, traces: Traces | Drive) -> tuple[FloatArray, FloatArray]:
         """Filter the quantity of the static term at every site; before the first time it is constant."""
         driven = traces if isinstance(traces, Drive) else resampled(traces, self.time_constant_ms)
-
-        def filtered(sites: slice) -> FloatArray:
-            values = np.array(driven.values[:, sites])
-            for stage in range(self.rise + self.fall):
-                _stage(driven.times_ms, values, self.time_constant_ms, stage < self.rise)
-            return values
-
-        return driven.times_ms, np.hstack(in_blocks(filtered, driven.n_sites))
+        return driven.times_ms, _filtered(driven, self.time_constant_ms, self.rise, self.fall)
 
 
 @lru_cache
@@ -88,13 +81,19 @@ def resampled(traces: Traces, time_constant_ms: float) -> Drive:
 def smoothed_rate(traces: Traces, time_constant_ms: float) -> tuple[FloatArray, FloatArray]:
     """Rate of change of a quantity behind a first-order low pass: what this holds back, over its constant."""
     driven = resampled(traces, time_constant_ms)
+    return driven.times_ms, _filtered(driven, time_constant_ms, rise=1, fall=0) / time_constant_ms
 
-    def held_back(sites: slice) -> FloatArray:
+
+def _filtered(driven: Drive, time_constant_ms: float, rise: int, fall: int) -> FloatArray:
+    """Values behind stages of which the first ones hold back what the low pass transmits."""
+
+    def filtered(sites: slice) -> FloatArray:
         values = np.array(driven.values[:, sites])
-        _stage(driven.times_ms, values, time_constant_ms, True)
+        for stage in range(rise + fall):
+            _stage(driven.times_ms, values, time_constant_ms, stage < rise)
         return values
 
-    return driven.times_ms, np.hstack(in_blocks(held_back, driven.n_sites)) / time_constant_ms
+    return np.hstack(in_blocks(filtered, driven.n_sites))
 
 
 @njit(cache=True, error_model="numpy", nogil=True)
