@@ -213,6 +213,7 @@ def checked_levels(levels: ArrayLike, sigmoid: str) -> FloatArray:
 SMALLEST_OVERDISPERSION = 1e-5
 """Below it the beta-binomial formula loses precision and the binomial one is used."""
 
+NEARLY_NEVER = 1e-12  # Proportion that takes the place of 0.
 LARGEST_LEVEL = 1e9  # Largest level of a stimulus; the fit loses its digits with far larger numbers.
 
 
@@ -267,11 +268,8 @@ def log_probability(
         return ways + xlogy(k, p) + xlog1py(n - k, -p)
     v = (1.0 - rho) / np.maximum(rho, SMALLEST_OVERDISPERSION)
     # Both arguments of the beta function must be positive, so 0 and 1 are replaced by close values.
-    inside = np.clip(p, _NEARLY_NEVER, 1.0 - _NEARLY_NEVER)
+    inside = np.clip(p, NEARLY_NEVER, 1.0 - NEARLY_NEVER)
     return ways + betaln(k + inside * v, n - k + (1.0 - inside) * v) - betaln(inside * v, (1.0 - inside) * v)
-
-
-_NEARLY_NEVER = 1e-12
 
 
 def binomial_interval(
