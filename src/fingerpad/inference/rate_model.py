@@ -51,14 +51,12 @@ class RateModel(Protocol):
     @property
     def names(self) -> tuple[str, ...]:
         """Names of the parameters, in their order."""
-        ...
 
     @property
     def n_stimuli(self) -> int: ...
 
     def evaluate(self, parameters: FloatArray) -> Rates:
         """Rates (n_stimuli,) for one set of parameters (n_parameters,). [spikes/s]"""
-        ...
 
 
 def evaluate_rows(model: RateModel, points: ArrayLike) -> Rates:
@@ -172,15 +170,16 @@ class AfferentModel:
         if not (six.shape == (len(PARAMETER_NAMES),) and np.isfinite(six).all() and (six[3:] > 0.0).all()):
             # It raises the error that names the parameter.
             Afferent.from_parameters(six, refractory_ms=self.refractory_ms, initial_mv=self.initial_mv)
-        intercept, dynamic_gain, static_gain, *membrane = six.tolist()
-        membrane += [float(self.refractory_ms), np.nan if self.initial_mv is None else float(self.initial_mv)]
+        intercept, dynamic_gain, static_gain, tau, capacitance, threshold = six.tolist()
+        initial = np.nan if self.initial_mv is None else self.initial_mv
+        membrane = tau, capacitance, threshold, self.refractory_ms, initial
         rates = np.empty((2, self.n_stimuli))
         for driven, columns in zip(self.drives, self.stimuli, strict=True):
             # I = beta + k_d U' + k_s U, in the order of Transduction.current.
             current = dynamic_gain * driven.rate_per_ms
             current += intercept
             current += static_gain * driven.values
-            trains = exact_trains(driven.times_ms, current, *membrane)
+            trains = exact_trains(driven.times_ms, current, membrane)
             rates[:, columns] = [window_rates_hz(*trains, *window) for window in self.used_windows_ms]
         return rates[0], rates[1]
 

@@ -47,12 +47,10 @@ class Follows(Protocol):
     @property
     def dynamic_quantity(self) -> str:
         """Quantity of the dynamic term, by the names of `SkinResponse.sample`."""
-        ...
 
     @property
     def static_quantity(self) -> str:
         """Quantity of the static term."""
-        ...
 
 
 class AnyAfferent(Follows, Protocol):
@@ -60,7 +58,6 @@ class AnyAfferent(Follows, Protocol):
 
     def spikes(self, traces: Traces) -> SpikeTrains:
         """Simulate the spikes at every site."""
-        ...
 
 
 def checked_afferent(afferent: AnyAfferent) -> AnyAfferent:
