@@ -70,15 +70,12 @@ class ResponseModel(Protocol):
     @property
     def n_receptors(self) -> int:
         """Number of receptors."""
-        ...
 
     def log_likelihood(self, responses: FloatArray) -> FloatArray:
         """Logarithm (...,) of the probability (density) of responses (..., n_receptors)."""
-        ...
 
     def draw(self, seed: int, trials: IntArray) -> FloatArray:
         """Sample responses (n_trials, n_receptors) with the random numbers of these trials."""
-        ...
 
 
 @value_class
