@@ -53,12 +53,9 @@ from fingerpad.inference.identifiable import (
 from fingerpad.inference.rate_model import Rates
 from fingerpad.inference.recordings import check_trains
 from fingerpad.neuron.afferent import Afferent
-from fingerpad.neuron.escape_rate import ESCAPE_TIME_MS, EscapeRate, panels
+from fingerpad.neuron.escape_rate import ESCAPE_TIME_MS, NODES, WEIGHTS, EscapeRate, panels
 from fingerpad.neuron.spikes import Windows, firing_rate_hz
 from fingerpad.neuron.transduction import Drive
-
-_NODES = tuple(0.5 + 0.5 * np.polynomial.legendre.leggauss(5)[0])
-_WEIGHTS = tuple(0.5 * np.polynomial.legendre.leggauss(5)[1])
 
 
 @njit(cache=True, error_model="numpy", nogil=True)
@@ -153,7 +150,7 @@ def accumulate(
         scale = length / n_panels * tau / escape
         for panel in range(n_panels):
             for node in range(5):
-                x = length * (panel + _NODES[node]) / n_panels
+                x = length * (panel + NODES[node]) / n_panels
                 gone = -math.expm1(-x)
                 lag = x - gone
                 slopes[0] = x1 + (tau - x1) * gone
@@ -161,7 +158,7 @@ def accumulate(
                 slopes[2] = x3 + (w3 - x3) * gone + drift3 * lag
                 slopes[4] = z + (p - z) * gone + q * lag + r * x * (1.0 - gone)
                 log_hazard = a * slopes[0] + b * slopes[1] + c * slopes[2] - sharpness
-                expected = scale * _WEIGHTS[node] * math.exp(log_hazard)
+                expected = scale * WEIGHTS[node] * math.exp(log_hazard)
                 value -= expected
                 for i in range(5):
                     weighted = expected * slopes[i]
