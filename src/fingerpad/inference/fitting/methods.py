@@ -64,15 +64,12 @@ class Problem(Protocol):
     @property
     def n_observations(self) -> int:
         """Number of observed stimuli; `chosen` are their numbers from 0."""
-        ...
 
     def residuals(self, parameters: FloatArray, chosen: IntArray) -> FloatArray:
         """Scaled differences between observations and predictions under the chosen stimuli."""
-        ...
 
     def score(self, parameters: FloatArray, chosen: IntArray) -> float:
         """Goodness of fit over the chosen stimuli, 1 if it is perfect; larger is better."""
-        ...
 
 
 @dataclass(frozen=True)
@@ -106,7 +103,6 @@ class Method(Protocol):
 
     def fit(self, problem: Problem, chosen: IntArray) -> Fit:
         """Fit the chosen observations of a problem."""
-        ...
 
 
 def best_of(attempts: tuple[Fit, ...]) -> Fit:
@@ -413,10 +409,6 @@ class FoldFit:
     training: IntArray
     testing: IntArray  #: Observations used for fitting, and those left out, (n_training,).
 
-    @property
-    def score_train(self) -> float:
-        return self.fit.score
-
 
 @dataclass(frozen=True)
 class CrossValidation:
@@ -427,7 +419,7 @@ class CrossValidation:
     @property
     def score_train(self) -> float:
         """Mean training score of the folds."""
-        return float(np.mean([fold.score_train for fold in self.folds]))
+        return float(np.mean([fold.fit.score for fold in self.folds]))
 
     @property
     def score_test(self) -> float:

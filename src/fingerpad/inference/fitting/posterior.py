@@ -116,7 +116,6 @@ MOST_TRIES = 200  # Times that a start at an impossible point is drawn again.
 class Chains:
     """Converged draws from a density, and the measures of convergence."""
 
-    names: tuple[str, ...]
     draws: FloatArray  #: The second half of all steps, (n_ensembles, n_steps, n_walkers, n_parameters).
     log_densities: FloatArray  #: Up to a constant, (n_ensembles, n_steps, n_walkers).
     r_hat: FloatArray  #: Split R-hat over the ensembles, (n_parameters,). [1]
@@ -126,8 +125,6 @@ class Chains:
     autocorrelation_steps: FloatArray  #: Draws made per effective one, (n_parameters,). [1]
     acceptance: float  #: Accepted share of the proposals. [0-1]
     n_evaluations: int  #: Evaluations of the density, those of the discarded first half included.
-    seed: int  #: Of the random numbers; the same seed gives the same bits.
-    history: tuple[str, ...]  #: One line per check of convergence.
 
     @property
     def flat(self) -> FloatArray:
@@ -161,7 +158,6 @@ def sample(
     moves: Sequence[tuple[Any, float]] | None = None,
 ) -> Chains:
     """Sample a density until the ensembles agree and the effective sample sizes suffice."""
-    labels = tuple(names)
     middle, scale = np.asarray(centre, dtype=np.float64), np.asarray(spread, dtype=np.float64)
     density = _Checked(log_density)
     seeds = independent_keys(seed, n_ensembles)
@@ -185,7 +181,6 @@ def sample(
         )
         if r_hat.max() <= largest_r_hat and min(bulk.min(), tail.min()) >= smallest_effective_size:
             return Chains(
-                names=labels,
                 draws=draws,
                 log_densities=np.array([sampler.get_log_prob(discard=done // 2) for sampler, _ in ensembles]),
                 r_hat=r_hat,
@@ -195,15 +190,13 @@ def sample(
                 # A walker is proposed one move per step, and an accepted one changes its position.
                 acceptance=float(np.any(np.diff(draws, axis=1) != 0.0, axis=-1).mean()),
                 n_evaluations=density.count,
-                seed=seed,
-                history=tuple(history),
             )
         if done == most_steps:
             smaller = np.minimum(bulk, tail)
             raise ConvergenceError(
-                f"The draws have not converged after {most_steps} steps: {labels[int(r_hat.argmax())]} has "
+                f"The draws have not converged after {most_steps} steps: {names[int(r_hat.argmax())]} has "
                 f"R-hat {r_hat.max():.3f} (wanted: at most {largest_r_hat:g}), and the effective sample size "
-                f"of {labels[int(smaller.argmin())]} is only {smaller.min():.0f} (wanted: "
+                f"of {names[int(smaller.argmin())]} is only {smaller.min():.0f} (wanted: "
                 f"{smallest_effective_size:g}). Raise most_steps, or check whether the data determine these "
                 "parameters.",
                 tuple(history),
