@@ -160,9 +160,18 @@ def sample(
     """Sample a density until the ensembles agree and the effective sample sizes suffice."""
     middle, scale = np.asarray(centre, dtype=np.float64), np.asarray(spread, dtype=np.float64)
     density = _Checked(log_density)
-    seeds = independent_keys(seed, n_ensembles)
     usual = [(emcee.moves.StretchMove(), 0.5), (emcee.moves.KDEMove(bw_method=BANDWIDTH), 0.5)]
-    ensembles = [_ensemble(density, middle, scale, n_walkers, one, list(moves or usual)) for one in seeds]
+
+    def ensemble(key: Key) -> tuple[emcee.EnsembleSampler, emcee.State]:
+        """Walkers with random numbers of their own, and their start at scattered points."""
+        start, proposals = independent_keys(key, 2)
+        walkers, heights = _start(density, middle, scale, n_walkers, generator(start))
+        chosen = list(moves or usual)
+        sampler = emcee.EnsembleSampler(n_walkers, middle.size, density, moves=chosen, vectorize=True)
+        sampler.random_state = emcee_state(proposals)
+        return sampler, emcee.State(walkers, log_prob=heights, random_state=sampler.random_state)
+
+    ensembles = [ensemble(key) for key in independent_keys(seed, n_ensembles)]
     history: list[str] = []
     done, wanted = 0, n_steps
     while True:
@@ -202,22 +211,6 @@ def sample(
                 tuple(history),
             )
         wanted = min(2 * done, most_steps)
-
-
-def _ensemble(
-    density: _Checked,
-    centre: FloatArray,
-    spread: FloatArray,
-    n_walkers: int,
-    key: Key,
-    proposals: list[tuple[Any, float]],
-) -> tuple[emcee.EnsembleSampler, emcee.State]:
-    """Return an ensemble with random numbers of its own, and its start at scattered points."""
-    start, moves = independent_keys(key, 2)
-    walkers, heights = _start(density, centre, spread, n_walkers, generator(start))
-    sampler = emcee.EnsembleSampler(n_walkers, centre.size, density, moves=proposals, vectorize=True)
-    sampler.random_state = emcee_state(moves)
-    return sampler, emcee.State(walkers, log_prob=heights, random_state=sampler.random_state)
 
 
 class _Checked:
