@@ -162,8 +162,7 @@ class GradientSum(Encoder):
         if not len(pairs):
             raise InputError("neighbours", "must hold at least one pair of receptors", "none")
         trials = session_trials(session, len(responses), sizes[0])
-        measures = np.broadcast_to(responses, (sigmas.size, *responses.shape))
-        return noisy_gradient_sums(measures, pairs, sigmas, seed, trials, sizes[1])  # (a)-(f)
+        return noisy_gradient_sums(responses, pairs, sigmas, seed, trials, sizes[1])  # (a)-(f)
 
     def hit_rates(self, values: FloatArray, seed: int, plan: Experiment, session: int) -> FloatArray:
         means, spreads = values.mean(axis=-1), values.std(axis=-1, ddof=1)  # (e), of all distributions
