@@ -239,9 +239,7 @@ def _bent(excess: FloatArray, bend: float) -> tuple[FloatArray, FloatArray]:
     return bend * np.logaddexp(0.0, excess / bend), np.exp(-np.logaddexp(0.0, -excess / bend))
 
 
-def closed_form_rates(
-    stimuli: AfferentModel, four: FloatArray, bend: float = BEND
-) -> tuple[Rates, tuple[FloatArray, FloatArray]]:
+def closed_form_rates(stimuli: AfferentModel, four: FloatArray) -> tuple[Rates, Rates]:
     """Mean over each window of the rate under a constant drive, and its derivatives (n_stimuli, 4).
 
     The charging from rest and single spikes are neglected. The rates are inaccurate in the ramp, but smooth,
@@ -253,7 +251,7 @@ def closed_form_rates(
         for driven, columns in zip(stimuli.drives, stimuli.stimuli, strict=True):
             speed, value = _samples(driven, window_ms)
             g = intercept + dynamic_gain * speed + static_gain * value
-            rate, per_drive, per_tau = constant_drive_rate(g, float(tau), stimuli.refractory_ms, bend)
+            rate, per_drive, per_tau = constant_drive_rate(g, float(tau), stimuli.refractory_ms, BEND)
             rates[phase, columns] = rate.mean(axis=0)
             for number, slope in enumerate((per_drive, per_drive * speed, per_drive * value, per_tau)):
                 slopes[phase, columns, number] = slope.mean(axis=0)

@@ -272,11 +272,9 @@ def log_probability(
     return ways + betaln(k + inside * v, n - k + (1.0 - inside) * v) - betaln(inside * v, (1.0 - inside) * v)
 
 
-def binomial_interval(
-    proportion: ArrayLike, trials: int, confidence: float = 0.95
-) -> tuple[FloatArray, FloatArray]:
-    """Exact confidence interval of a probability, given an observed proportion (Clopper & Pearson 1934)."""
+def binomial_interval(proportion: ArrayLike, trials: int) -> tuple[FloatArray, FloatArray]:
+    """Exact 95 % confidence interval of an observed proportion (Clopper & Pearson 1934)."""
     successes = np.rint(np.asarray(proportion, dtype=np.float64) * trials).astype(np.int64)
-    intervals = [binomtest(int(count), trials).proportion_ci(confidence) for count in successes.ravel()]
+    intervals = [binomtest(int(count), trials).proportion_ci(0.95) for count in successes.ravel()]
     low, high = np.moveaxis(np.reshape(intervals, (*successes.shape, 2)), -1, 0)
     return low, high
