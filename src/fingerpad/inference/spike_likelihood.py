@@ -244,16 +244,9 @@ class SpikeLikelihood:
                 "duration_ms", f"must lie within the drive, {times[0]:g} ... {times[-1]:g} ms", str(given)
             )
         check_trains(self.trains, times[0], ends, self.refractory_ms)
-        intervals = cut(
-            times,
-            self.drive.rate_per_ms,
-            self.drive.values,
-            sites,
-            ends,
-            self.trains.times_ms,
-            self.trains.offsets,
-            float(self.refractory_ms),
-        )
+        driven = self.drive.rate_per_ms, self.drive.values
+        spikes = self.trains.times_ms, self.trains.offsets
+        intervals = cut(times, *driven, sites, ends, *spikes, self.refractory_ms)
         for name, value in (("sites", sites), ("duration_ms", ends), ("_intervals", intervals)):
             object.__setattr__(self, name, value)
 

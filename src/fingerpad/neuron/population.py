@@ -243,13 +243,8 @@ class Population:
             )
         x, z = centre_x + pitch_mm * around_zero(rows), centre_z + pitch_mm * around_zero(columns)
         positions = np.stack(np.meshgrid(x, z, indexing="ij"), axis=-1).reshape(-1, 2)
-        return cls(
-            positions,
-            pitch_mm,
-            afferent or Afferent(),
-            centre_mm=CENTRE_MM if follows else None,
-            depth_mm=depth_mm,
-        )
+        centre_mm = CENTRE_MM if follows else None
+        return cls(positions, pitch_mm, afferent or Afferent(), centre_mm=centre_mm, depth_mm=depth_mm)
 
     @classmethod
     def mixed(cls, parts: Mapping[str, Population]) -> Population:
@@ -379,11 +374,8 @@ class Population:
             for name, part in some.items():
                 part._check_tissues(skin)
                 end = start + len(part.sites_mm)
-                maps[name] = part.respond_to(
-                    traces.part(slice(start, end)) if len(some) > 1 else traces,
-                    dynamic_window_ms,
-                    static_window_ms,
-                )
+                below = traces.part(slice(start, end)) if len(some) > 1 else traces
+                maps[name] = part.respond_to(below, dynamic_window_ms, static_window_ms)
                 start = end
         return ResponseMap.joined({name: maps[name] for name in parts}) if there.parts else maps[""]
 

@@ -290,15 +290,8 @@ class SkinResponse(Result):
         """
         static, *other = self._read(dict.fromkeys((static_quantity, dynamic_quantity)), sites, depth_mm)
         dynamic = Traces(self.times_ms, other[0], quantity=dynamic_quantity) if other else None
-        return Traces(
-            self.times_ms,
-            static,
-            np.array(self.kinks_ms),
-            static_quantity,
-            dynamic,
-            self.phases,
-            self.onset_ms,
-        )
+        motion = self.phases, self.onset_ms
+        return Traces(self.times_ms, static, np.array(self.kinks_ms), static_quantity, dynamic, *motion)
 
     def sample(self, quantity: str, sites: ArrayLike, depth_mm: ArrayLike | None = None) -> FloatArray:
         """Sample a quantity that may drive an afferent below points of the skin, (n_times, n_sites).

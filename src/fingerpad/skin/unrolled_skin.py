@@ -82,13 +82,10 @@ class _Quarter:
     def area(self, start: FloatArray, end: FloatArray) -> FloatArray:
         """Integral of the element of area over phi. [mm²]"""
         middle, reach = 0.5 * (start + end), 0.5 * (end - start)
-        return sum(
-            (
-                reach * weight * self.area_element(middle + reach * node)
-                for node, weight in zip(_NODES, _WEIGHTS, strict=True)
-            ),
-            np.zeros_like(middle),
-        )
+        total = np.zeros_like(middle)
+        for node, weight in zip(_NODES, _WEIGHTS, strict=True):
+            total += reach * weight * self.area_element(middle + reach * node)
+        return total
 
     def reached(self, start: FloatArray, area: FloatArray) -> FloatArray:
         """Find phi up to which the integral from `start` takes a value, by Newton's method in a bracket."""
