@@ -235,10 +235,8 @@ class JudgementCounts:
     def __post_init__(self) -> None:
         levels, correct, trials = self.levels, self.n_correct, self.n_trials
         if not levels.size == correct.size == trials.size or levels.size == 0:
-            raise InputError(
-                "levels, n_correct and n_trials must have one entry per level: "
-                f"got {levels.size}, {correct.size} and {trials.size}."
-            )
+            got = f"{levels.size}, {correct.size} and {trials.size}"
+            raise InputError(f"levels, n_correct and n_trials must have one entry per level: got {got}.")
         if np.abs(levels).max() > LARGEST_LEVEL:
             raise InputError(
                 "levels", f"must lie within {LARGEST_LEVEL:g}", str(levels.tolist()), "change the unit"

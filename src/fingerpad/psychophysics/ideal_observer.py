@@ -275,10 +275,8 @@ def present(
     True
     """
     if standard.n_receptors != comparison.n_receptors:
-        raise InputError(
-            "standard and comparison must have the same receptors: "
-            f"got {standard.n_receptors} and {comparison.n_receptors}."
-        )
+        got = f"{standard.n_receptors} and {comparison.n_receptors}"
+        raise InputError(f"standard and comparison must have the same receptors: got {got}.")
     trials = session_trials(session, 2, n_trials)
     first, second = standard.draw(seed, trials[0]), comparison.draw(seed, trials[1])
     # One likelihood may be -inf, but not both: the responses come from one of the models.

@@ -66,10 +66,8 @@ class SurfaceProfile(Result):
     def __post_init__(self) -> None:
         distance, deflection = self.distance_mm, self.deflection_mm
         if not distance.size or distance.shape != deflection.shape:
-            raise InputError(
-                "SurfaceProfile needs one deflection per distance: got "
-                f"{deflection.size} for {distance.size} distances."
-            )
+            got = f"{deflection.size} for {distance.size} distances"
+            raise InputError(f"SurfaceProfile needs one deflection per distance: got {got}.")
 
     def __repr__(self) -> str:
         return (
