@@ -114,11 +114,12 @@ class EndOrgans:
 
     def combined(self, traces: Traces) -> Traces:
         """Traces of the afferents from those of `sites_mm`."""
-        return traces.with_values(self._together)
-
-    def _together(self, values: FloatArray) -> FloatArray:
-        shaped = values.reshape(len(values), *self.positions_mm.shape[:2])
         weights = np.asarray(self.weights)
-        if self.combine == "sum":
-            return np.sum(shaped * weights, axis=2)
-        return np.max(shaped * (weights / weights.max(axis=1, keepdims=True)), axis=2)
+        if self.combine == "largest":
+            weights = weights / weights.max(axis=1, keepdims=True)
+        together = np.sum if self.combine == "sum" else np.max
+
+        def of_afferents(values: FloatArray) -> FloatArray:
+            return together(values.reshape(len(values), *self.positions_mm.shape[:2]) * weights, axis=2)
+
+        return traces.with_values(of_afferents)
