@@ -19,7 +19,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Protocol, runtime_checkable
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -33,7 +33,7 @@ from fingerpad.core.units import MS_PER_S
 from fingerpad.core.values import Count, Finite, FloatArray, IntArray, Many, NotNegative, Positive
 from fingerpad.data import neuron, protocol
 from fingerpad.inference.fitting.methods import fractional_sum_of_squares
-from fingerpad.inference.identifiable import IDENTIFIABLE_NAMES, six_parameters
+from fingerpad.inference.identifiable import six_parameters
 from fingerpad.inference.recordings import RateRecordings
 from fingerpad.neuron.afferent import PARAMETER_NAMES, Afferent
 from fingerpad.neuron.exact_spikes import exact_trains
@@ -44,13 +44,8 @@ Rates = tuple[FloatArray, FloatArray]  # Dynamic and static rates, one column pe
 ROWS_PER_BLOCK = 4  # Rows of parameters that a thread evaluates at a time.
 
 
-@runtime_checkable
 class RateModel(Protocol):
     """Contract of a model that predicts the dynamic and the static rate under every stimulus."""
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """Names of the parameters, in their order."""
 
     @property
     def n_stimuli(self) -> int: ...
@@ -62,8 +57,6 @@ class RateModel(Protocol):
 def evaluate_rows(model: RateModel, points: ArrayLike) -> Rates:
     """Rates (n_points, n_stimuli) for rows of parameters, on all threads. [spikes/s]"""
     rows = np.asarray(points, dtype=np.float64)
-    if rows.ndim != 2 or rows.shape[1] != len(model.names):
-        raise InputError("points", f"must have {len(model.names)} columns", f"shape {rows.shape}")
     rates = np.empty((2, len(rows), model.n_stimuli))
 
     def work(block: slice) -> None:
@@ -189,7 +182,6 @@ class Reparametrised:
     """A rate model in other parameters."""
 
     model: SkipValidation[RateModel]
-    names: tuple[str, ...]
     transform: Callable[[FloatArray], FloatArray]  #: From the new parameters to those of `model`.
 
     @property
@@ -202,7 +194,7 @@ class Reparametrised:
 
 def four_number_model(model: RateModel) -> Reparametrised:
     """Express a model of the paper's six parameters in the four identifiable ones."""
-    return Reparametrised(model, IDENTIFIABLE_NAMES, six_parameters)
+    return Reparametrised(model, six_parameters)
 
 
 BEND = 0.05  # Width s over which the rate sets in, relative to the threshold. [1]
@@ -288,10 +280,6 @@ class RateProblem:
 
     def __post_init__(self) -> None:
         self.recordings.check_stimuli(self.model.n_stimuli)
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        return self.model.names
 
     @property
     def n_observations(self) -> int:

@@ -517,11 +517,6 @@ class SoftAfferent:
     seed: int  #: Seed of the simulated presentations, the same for all parameters.
 
     @property
-    def names(self) -> tuple[str, ...]:
-        """The four identifiable parameters and the width of the threshold."""
-        return SPIKE_PARAMETER_NAMES
-
-    @property
     def n_stimuli(self) -> int:
         return self.drive.n_sites
 
