@@ -109,8 +109,7 @@ class SpikeRecordings:
             raise InputError("duration_ms", wanted, repr(self.duration_ms))
         duration = float_array("duration_ms", np.broadcast_to(duration, len(self.stimuli)), 1)
         object.__setattr__(self, "duration_ms", duration)
-        for presentation, (name, end) in enumerate(zip(self.stimuli, duration, strict=True)):
-            train = self.trains[presentation]
+        for name, train, end in zip(self.stimuli, self.trains, duration, strict=True):
             if train.size and (train[0] < 0.0 or train[-1] > end):
                 outside = train[0] if train[0] < 0.0 else train[-1]
                 wanted = f"must lie between 0 and duration_ms, {end:g} ms"
