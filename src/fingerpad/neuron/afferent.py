@@ -62,7 +62,8 @@ class AnyAfferent(Follows, Protocol):
 
 def checked_afferent(afferent: AnyAfferent) -> AnyAfferent:
     """Return an afferent, or raise `InputError` if it is none: a class without parameters, for example."""
-    if isinstance(afferent, type) or not all(hasattr(afferent, name) for name in _NEEDED):
+    needed = "dynamic_quantity", "static_quantity", "spikes"
+    if isinstance(afferent, type) or not all(hasattr(afferent, name) for name in needed):
         wanted = "must be one such as Afferent(), RA(), PC(), SAII() or OwnAfferent(...)"
         raise InputError("afferent", wanted, shown(afferent))
     return afferent
@@ -92,9 +93,6 @@ def parameter_units(follows: Follows) -> dict[str, str]:
 def type_of(afferent: object) -> str:
     """Name of the type of an afferent: that of its class where it has none."""
     return str(getattr(afferent, "type", type(afferent).__name__))
-
-
-_NEEDED = ("dynamic_quantity", "static_quantity", "spikes")
 
 
 @value_class

@@ -63,7 +63,7 @@ def _largest_share(rise: int, fall: int) -> float:
     response = np.ones((times.size, 1))
     response[0] = 0.0
     for stage in range(rise + fall):
-        _stage(times, response, 1.0, stage < rise)
+        continued_stage(times, response, 1.0, stage < rise, response[0].copy())
     return 0.5 * float(np.abs(np.diff(response[:, 0])).sum())
 
 
@@ -90,21 +90,16 @@ def _filtered(driven: Drive, time_constant_ms: float, rise: int, fall: int) -> F
     def filtered(sites: slice) -> FloatArray:
         values = np.array(driven.values[:, sites])
         for stage in range(rise + fall):
-            _stage(driven.times_ms, values, time_constant_ms, stage < rise)
+            continued_stage(driven.times_ms, values, time_constant_ms, stage < rise, values[0].copy())
         return values
 
     return np.hstack(in_blocks(filtered, driven.n_sites))
 
 
 @njit(cache=True, error_model="numpy", nogil=True)
-def _stage(times: FloatArray, values: FloatArray, tau: float, high: bool) -> None:
-    """Replace values by those behind one stage, 1/(1 + tau s), or what it holds back if `high`."""
-    continued_stage(times, values, tau, high, values[0].copy())
-
-
-@njit(cache=True, error_model="numpy", nogil=True)
 def continued_stage(times: FloatArray, values: FloatArray, tau: float, high: bool, state: FloatArray) -> None:
-    """Do as `_stage` from a state (n_sites,) of the low pass, which is overwritten with the last one."""
+    """Replace values by those behind one stage, 1/(1 + tau s), or what it holds back if `high`."""
+    # The state (n_sites,) of the low pass is overwritten with the last one.
     n_sites = values.shape[1]
     before = values[0].copy()
     for site in range(n_sites):
