@@ -19,7 +19,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -44,6 +44,7 @@ Rates = tuple[FloatArray, FloatArray]  # Dynamic and static rates, one column pe
 ROWS_PER_BLOCK = 4  # Rows of parameters that a thread evaluates at a time.
 
 
+@runtime_checkable
 class RateModel(Protocol):
     """Contract of a model that predicts the dynamic and the static rate under every stimulus."""
 
@@ -130,17 +131,11 @@ class AfferentModel:
             key = trace.times_ms.tobytes(), trace.kinks_ms.tobytes(), trace.phases, trace.onset_ms
             groups.setdefault(key, []).append((first, trace))
             first += trace.n_sites
-        joined = (Traces.joined([trace for _, trace in group]) for group in groups.values())
-        return cls(
-            tuple(drive(each, pieces=pieces) for each in joined),
-            tuple(
-                np.concatenate([start + np.arange(trace.n_sites) for start, trace in group])
-                for group in groups.values()
-            ),
-            windows_ms,
-            refractory_ms,
-            initial_mv,
-        )
+        drives, columns = [], []
+        for group in groups.values():
+            drives.append(drive(Traces.joined([trace for _, trace in group]), pieces=pieces))
+            columns.append(np.concatenate([start + np.arange(trace.n_sites) for start, trace in group]))
+        return cls(tuple(drives), tuple(columns), windows_ms, refractory_ms, initial_mv)
 
     @cached_property
     def used_windows_ms(self) -> Windows:

@@ -232,9 +232,8 @@ class UnrolledSkin:
         """`around` at phi >= 0: the integral over the volar and, beyond it, the dorsal quarter."""
         volar, dorsal = self._quarters(s)
         side = np.full_like(phi, _HALF)
-        area = volar.area(np.zeros_like(phi), np.minimum(phi, side)) + dorsal.area(
-            side, np.maximum(phi, side)
-        )
+        area = volar.area(np.zeros_like(phi), np.minimum(phi, side))
+        area = area + dorsal.area(side, np.maximum(phi, side))
         return area / self._midline_slope(s)
 
     def _phi(self, s: FloatArray, around: FloatArray) -> FloatArray:
