@@ -169,7 +169,7 @@ class Afferents:
             + self.static_gain[number] * relative[0]
             + self.dynamic_gain[number] / RAMP_MS * relative[1]
         )
-        trains = exact_trains(times_ms, current, tau, 1.0, 1.0, neuron.REFRACTORY.value, np.nan)
+        trains = exact_trains(times_ms, current, (tau, 1.0, 1.0, neuron.REFRACTORY.value, np.nan))
         dynamic, static = (window_rates_hz(*trains, *window) for window in PAPER_WINDOWS_MS)
         return dynamic, static
 

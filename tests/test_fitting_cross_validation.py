@@ -66,7 +66,7 @@ def test_synthetic_truth_is_recovered_in_every_fold():
         assert fold.score_test > 0.999
     assert result.score_train > 0.999
     assert result.score_test == pytest.approx(np.mean([fold.score_test for fold in result.folds]))
-    assert result.score_train == pytest.approx(np.mean([fold.score_train for fold in result.folds]))
+    assert result.score_train == pytest.approx(np.mean([fold.fit.score for fold in result.folds]))
 
 
 def test_each_fold_is_fitted_without_its_own_observations():
@@ -76,7 +76,7 @@ def test_each_fold_is_fitted_without_its_own_observations():
     spoiled_dynamic[2::6] *= 2.0
     spoiled = cross_validate(toy_problem((spoiled_dynamic, observed[1])), toy_method(), interleaved_folds(36))
     assert spoiled.folds[2].fit.parameters.tobytes() == clean.folds[2].fit.parameters.tobytes()
-    assert spoiled.folds[2].score_train == clean.folds[2].score_train
+    assert spoiled.folds[2].fit.score == clean.folds[2].fit.score
     assert spoiled.folds[2].score_test < clean.folds[2].score_test - 0.01
     assert spoiled.folds[0].fit.parameters.tobytes() != clean.folds[0].fit.parameters.tobytes()
     fit, training, method = clean.folds[3].fit, clean.folds[3].training, toy_method()
@@ -97,7 +97,7 @@ def test_the_better_start_on_the_training_set_is_taken():
     for fold in result.folds:
         low, high = fold.fit.attempts
         assert fold.fit.start == 1
-        assert fold.score_train == high.score > low.score
+        assert fold.fit.score == high.score > low.score
         assert fold.fit.history == high.history
         assert fold.fit.n_evaluations == low.n_evaluations + high.n_evaluations
         assert low.score == pytest.approx(0.5, abs=0.01)

@@ -36,7 +36,6 @@ from fingerpad.inference.fitting.methods import (
     interleaved_folds,
 )
 from fingerpad.inference.identifiable import (
-    IDENTIFIABLE_NAMES,
     LARGEST_RESTING_SHARE,
     identifiable,
     silent_at_rest,
@@ -51,7 +50,7 @@ from fingerpad.inference.rate_model import (
     closed_form_rates,
 )
 from fingerpad.inference.recordings import RateRecordings
-from fingerpad.neuron.afferent import PARAMETER_NAMES, AnyAfferent, type_of
+from fingerpad.neuron.afferent import AnyAfferent, type_of
 from fingerpad.neuron.spikes import RATE_OF, Windows, rate_windows_ms
 from fingerpad.neuron.transduction import Drive
 from fingerpad.psychophysics.observer import expected_euclidean_hit_rates, expected_hit_rates
@@ -95,10 +94,6 @@ class ReceptorOffset:
             np.array(list(traces), dtype=np.float64),
             [AfferentModel.of_traces(each, windows_ms) for each in traces.values()],
         )
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        return (*PARAMETER_NAMES, OFFSET_NAME)
 
     @property
     def n_stimuli(self) -> int:
@@ -169,9 +164,6 @@ def response_surface() -> ResponseSurface:
 OFFSETS_MM = (-0.3, -0.2, -0.1, 0.0, 0.1, 0.2, 0.3)
 """Offsets from the receptor at which the drive is sampled. The paper's bar moves in steps of 0.2 mm. [mm]"""
 
-FITTED_NAMES = ("resting_share", *IDENTIFIABLE_NAMES[1:])
-"""The four numbers of a fit: beta tau/(C v) [1], k_d/(C v), k_s/(C v) and tau."""
-
 LOWEST = (-1.5, 0.0, 0.0, 3.0)
 HIGHEST = (LARGEST_RESTING_SHARE, 0.6, 0.2, 300.0)
 SCALES = (0.3, 0.05, 0.02, 20.0)
@@ -238,18 +230,18 @@ class Search:
 
 
 def four_numbers(model: AfferentModel, recordings: RateRecordings) -> Search:
-    """Search the four numbers of `FITTED_NAMES`."""
-    problem = RateProblem(Reparametrised(model, FITTED_NAMES, fitted_six), recordings)
+    """Search beta tau/(C v) [1], k_d/(C v), k_s/(C v) and tau."""
+    problem = RateProblem(Reparametrised(model, fitted_six), recordings)
     return Search(problem, bounds_of(*model.drives))
 
 
 def four_numbers_and_offset(model: ReceptorOffset, recordings: RateRecordings) -> Search:
-    """Search the four numbers of `FITTED_NAMES` and the offset of the receptor."""
+    """Search the four numbers of `four_numbers` and the offset of the receptor."""
 
     def seven(numbers: FloatArray) -> FloatArray:
         return np.append(fitted_six(numbers[:4]), numbers[4])
 
-    problem = RateProblem(Reparametrised(model, (*FITTED_NAMES, OFFSET_NAME), seven), recordings)
+    problem = RateProblem(Reparametrised(model, seven), recordings)
     low_mm, high_mm = model.offsets_mm[[0, -1]].tolist()
     return Search(problem, bounds_of(*model.at(0.0).drives).and_one(OFFSET_SCALE_MM, low_mm, high_mm))
 

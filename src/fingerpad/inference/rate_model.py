@@ -33,7 +33,7 @@ from fingerpad.core.units import MS_PER_S
 from fingerpad.core.values import Count, Finite, FloatArray, IntArray, Many, NotNegative, Positive
 from fingerpad.data import neuron, protocol
 from fingerpad.inference.fitting.methods import fractional_sum_of_squares
-from fingerpad.inference.identifiable import IDENTIFIABLE_NAMES, six_parameters
+from fingerpad.inference.identifiable import six_parameters
 from fingerpad.inference.recordings import RateRecordings
 from fingerpad.neuron.afferent import PARAMETER_NAMES, Afferent
 from fingerpad.neuron.exact_spikes import exact_trains
@@ -49,23 +49,15 @@ class RateModel(Protocol):
     """Contract of a model that predicts the dynamic and the static rate under every stimulus."""
 
     @property
-    def names(self) -> tuple[str, ...]:
-        """Names of the parameters, in their order."""
-        ...
-
-    @property
     def n_stimuli(self) -> int: ...
 
     def evaluate(self, parameters: FloatArray) -> Rates:
         """Rates (n_stimuli,) for one set of parameters (n_parameters,). [spikes/s]"""
-        ...
 
 
 def evaluate_rows(model: RateModel, points: ArrayLike) -> Rates:
     """Rates (n_points, n_stimuli) for rows of parameters, on all threads. [spikes/s]"""
     rows = np.asarray(points, dtype=np.float64)
-    if rows.ndim != 2 or rows.shape[1] != len(model.names):
-        raise InputError("points", f"must have {len(model.names)} columns", f"shape {rows.shape}")
     rates = np.empty((2, len(rows), model.n_stimuli))
 
     def work(block: slice) -> None:
@@ -105,11 +97,8 @@ class AfferentModel:
         end = max(bound for window in self.used_windows_ms for bound in window)
         for group, columns in zip(self.drives, self.stimuli, strict=True):
             if group.times_ms[-1] < end:
-                raise InputError(
-                    "windows_ms",
-                    "must end with the stimuli",
-                    remedy=f"one ends at {end:g} ms, stimulus {columns[0] + 1} at {group.times_ms[-1]:g} ms",
-                )
+                said = f"one ends at {end:g} ms, stimulus {columns[0] + 1} at {group.times_ms[-1]:g} ms"
+                raise InputError("windows_ms", "must end with the stimuli", remedy=said)
 
     @classmethod
     def of_traces(
@@ -134,28 +123,19 @@ class AfferentModel:
         parts = [traces] if isinstance(traces, Traces) else list(traces)
         quantities = sorted({f"{part.dynamic_quantity} and {part.static_quantity}" for part in parts})
         if len(quantities) != 1:
-            raise InputError(
-                "traces",
-                "must bring one dynamic_quantity and one static_quantity",
-                str(", ".join(quantities) or "no traces"),
-            )
+            wanted = "must bring one dynamic_quantity and one static_quantity"
+            raise InputError("traces", wanted, str(", ".join(quantities) or "no traces"))
         groups: dict[tuple[object, ...], list[tuple[int, Traces]]] = {}
         first = 0
         for trace in parts:
             key = trace.times_ms.tobytes(), trace.kinks_ms.tobytes(), trace.phases, trace.onset_ms
             groups.setdefault(key, []).append((first, trace))
             first += trace.n_sites
-        joined = (Traces.joined([trace for _, trace in group]) for group in groups.values())
-        return cls(
-            tuple(drive(each, pieces=pieces) for each in joined),
-            tuple(
-                np.concatenate([start + np.arange(trace.n_sites) for start, trace in group])
-                for group in groups.values()
-            ),
-            windows_ms,
-            refractory_ms,
-            initial_mv,
-        )
+        drives, columns = [], []
+        for group in groups.values():
+            drives.append(drive(Traces.joined([trace for _, trace in group]), pieces=pieces))
+            columns.append(np.concatenate([start + np.arange(trace.n_sites) for start, trace in group]))
+        return cls(tuple(drives), tuple(columns), windows_ms, refractory_ms, initial_mv)
 
     @cached_property
     def used_windows_ms(self) -> Windows:
@@ -178,15 +158,16 @@ class AfferentModel:
         if not (six.shape == (len(PARAMETER_NAMES),) and np.isfinite(six).all() and (six[3:] > 0.0).all()):
             # It raises the error that names the parameter.
             Afferent.from_parameters(six, refractory_ms=self.refractory_ms, initial_mv=self.initial_mv)
-        intercept, dynamic_gain, static_gain, *membrane = six.tolist()
-        membrane += [float(self.refractory_ms), np.nan if self.initial_mv is None else float(self.initial_mv)]
+        intercept, dynamic_gain, static_gain, tau, capacitance, threshold = six.tolist()
+        initial = np.nan if self.initial_mv is None else self.initial_mv
+        membrane = tau, capacitance, threshold, self.refractory_ms, initial
         rates = np.empty((2, self.n_stimuli))
         for driven, columns in zip(self.drives, self.stimuli, strict=True):
             # I = beta + k_d U' + k_s U, in the order of Transduction.current.
             current = dynamic_gain * driven.rate_per_ms
             current += intercept
             current += static_gain * driven.values
-            trains = exact_trains(driven.times_ms, current, *membrane)
+            trains = exact_trains(driven.times_ms, current, membrane)
             rates[:, columns] = [window_rates_hz(*trains, *window) for window in self.used_windows_ms]
         return rates[0], rates[1]
 
@@ -196,7 +177,6 @@ class Reparametrised:
     """A rate model in other parameters."""
 
     model: SkipValidation[RateModel]
-    names: tuple[str, ...]
     transform: Callable[[FloatArray], FloatArray]  #: From the new parameters to those of `model`.
 
     @property
@@ -209,7 +189,7 @@ class Reparametrised:
 
 def four_number_model(model: RateModel) -> Reparametrised:
     """Express a model of the paper's six parameters in the four identifiable ones."""
-    return Reparametrised(model, IDENTIFIABLE_NAMES, six_parameters)
+    return Reparametrised(model, six_parameters)
 
 
 BEND = 0.05  # Width s over which the rate sets in, relative to the threshold. [1]
@@ -246,9 +226,7 @@ def _bent(excess: FloatArray, bend: float) -> tuple[FloatArray, FloatArray]:
     return bend * np.logaddexp(0.0, excess / bend), np.exp(-np.logaddexp(0.0, -excess / bend))
 
 
-def closed_form_rates(
-    stimuli: AfferentModel, four: FloatArray, bend: float = BEND
-) -> tuple[Rates, tuple[FloatArray, FloatArray]]:
+def closed_form_rates(stimuli: AfferentModel, four: FloatArray) -> tuple[Rates, Rates]:
     """Mean over each window of the rate under a constant drive, and its derivatives (n_stimuli, 4).
 
     The charging from rest and single spikes are neglected. The rates are inaccurate in the ramp, but smooth,
@@ -260,7 +238,7 @@ def closed_form_rates(
         for driven, columns in zip(stimuli.drives, stimuli.stimuli, strict=True):
             speed, value = _samples(driven, window_ms)
             g = intercept + dynamic_gain * speed + static_gain * value
-            rate, per_drive, per_tau = constant_drive_rate(g, float(tau), stimuli.refractory_ms, bend)
+            rate, per_drive, per_tau = constant_drive_rate(g, float(tau), stimuli.refractory_ms, BEND)
             rates[phase, columns] = rate.mean(axis=0)
             for number, slope in enumerate((per_drive, per_drive * speed, per_drive * value, per_tau)):
                 slopes[phase, columns, number] = slope.mean(axis=0)
@@ -297,10 +275,6 @@ class RateProblem:
 
     def __post_init__(self) -> None:
         self.recordings.check_stimuli(self.model.n_stimuli)
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        return self.model.names
 
     @property
     def n_observations(self) -> int:

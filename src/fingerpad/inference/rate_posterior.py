@@ -72,11 +72,8 @@ class CorrelatedResiduals:
         else:
             places = self.positions_mm
             if places.size != n or np.unique(places).size != n:
-                raise InputError(
-                    "positions_mm",
-                    f"needs a different position for each of {n} stimuli",
-                    f"{places.size} values, {np.unique(places).size} of them different",
-                )
+                got = f"{places.size} values, {np.unique(places).size} of them different"
+                raise InputError("positions_mm", f"needs a different position for each of {n} stimuli", got)
             distances = np.abs(places[:, None] - places)
         whitening = np.array([_whitening(distances, length) for length in lengths])
         # log |R|^(-1/2), and equal prior probabilities.
@@ -184,11 +181,8 @@ N_PREDICTED = 1000  # Draws from which the bands of the rates are computed.
 def to_coordinates(four: ArrayLike) -> FloatArray:
     numbers = np.asarray(four, dtype=np.float64)
     if numbers.shape[-1:] != (4,) or not (numbers[..., 1:] > 0.0).all():
-        raise InputError(
-            "four",
-            f"must hold {', '.join(IDENTIFIABLE_NAMES)}, all but the first greater than 0",
-            str(numbers.tolist()),
-        )
+        wanted = f"must hold {', '.join(IDENTIFIABLE_NAMES)}, all but the first greater than 0"
+        raise InputError("four", wanted, str(numbers.tolist()))
     tau = numbers[..., 3:]
     return np.concatenate([numbers[..., :1] * tau, np.log(numbers[..., 1:])], axis=-1)
 

@@ -105,22 +105,15 @@ class SpikeRecordings:
             )
         duration = np.atleast_1d(self.duration_ms)
         if duration.ndim > 1 or duration.size not in (1, len(self.stimuli)) or (duration <= 0.0).any():
-            raise InputError(
-                "duration_ms",
-                f"must be above 0, one for all or for each of {len(self.stimuli)} presentations",
-                repr(self.duration_ms),
-            )
+            wanted = f"must be above 0, one for all or for each of {len(self.stimuli)} presentations"
+            raise InputError("duration_ms", wanted, repr(self.duration_ms))
         duration = float_array("duration_ms", np.broadcast_to(duration, len(self.stimuli)), 1)
         object.__setattr__(self, "duration_ms", duration)
-        for presentation, (name, end) in enumerate(zip(self.stimuli, duration, strict=True)):
-            train = self.trains[presentation]
+        for name, train, end in zip(self.stimuli, self.trains, duration, strict=True):
             if train.size and (train[0] < 0.0 or train[-1] > end):
                 outside = train[0] if train[0] < 0.0 else train[-1]
-                raise InputError(
-                    "spikes",
-                    f"must lie between 0 and duration_ms, {end:g} ms",
-                    remedy=f"{name!r} has one at {outside:g} ms",
-                )
+                wanted = f"must lie between 0 and duration_ms, {end:g} ms"
+                raise InputError("spikes", wanted, remedy=f"{name!r} has one at {outside:g} ms")
 
     def rates(self, windows_ms: Windows, measure: str = INTERVAL) -> RateRecordings:
         """Compute the rates of each stimulus in the ramp and in the hold, Eqs. 6-10, mean over presentations.
@@ -134,11 +127,8 @@ class SpikeRecordings:
         """
         end = max(window[-1] for window in windows_ms)
         if self.duration_ms.size and end > self.duration_ms.min() + ROUNDING_MS:
-            raise InputError(
-                "windows_ms",
-                f"must end within the recordings of {self.duration_ms.min():g} ms",
-                remedy=f"one ends at {end:g} ms",
-            )
+            wanted = f"must end within the recordings of {self.duration_ms.min():g} ms"
+            raise InputError("windows_ms", wanted, remedy=f"one ends at {end:g} ms")
         names = tuple(dict.fromkeys(self.stimuli))
         owner = np.array([names.index(name) for name in self.stimuli], dtype=np.int64)
         n_presentations = np.bincount(owner, minlength=len(names))
@@ -161,11 +151,8 @@ def check_trains(
         train, name = trains[number], f"train {number}" if names is None else names[number]
         if train.size and not start_ms < train[0] <= train[-1] <= end:
             outside = train[0] if train[0] <= start_ms else train[-1]
-            raise InputError(
-                "spikes",
-                f"must lie after {start_ms:g} and until {end:g} ms, where the recording ends",
-                remedy=f"{name} has one at {outside:g} ms",
-            )
+            wanted = f"must lie after {start_ms:g} and until {end:g} ms, where the recording ends"
+            raise InputError("spikes", wanted, remedy=f"{name} has one at {outside:g} ms")
         close = np.flatnonzero(np.diff(train) <= refractory_ms)
         if close.size:
             raise InputError(

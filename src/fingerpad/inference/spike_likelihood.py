@@ -53,12 +53,9 @@ from fingerpad.inference.identifiable import (
 from fingerpad.inference.rate_model import Rates
 from fingerpad.inference.recordings import check_trains
 from fingerpad.neuron.afferent import Afferent
-from fingerpad.neuron.escape_rate import ESCAPE_TIME_MS, EscapeRate, panels
+from fingerpad.neuron.escape_rate import ESCAPE_TIME_MS, NODES, WEIGHTS, EscapeRate, panels
 from fingerpad.neuron.spikes import Windows, firing_rate_hz
 from fingerpad.neuron.transduction import Drive
-
-_NODES = tuple(0.5 + 0.5 * np.polynomial.legendre.leggauss(5)[0])
-_WEIGHTS = tuple(0.5 * np.polynomial.legendre.leggauss(5)[1])
 
 
 @njit(cache=True, error_model="numpy", nogil=True)
@@ -153,7 +150,7 @@ def accumulate(
         scale = length / n_panels * tau / escape
         for panel in range(n_panels):
             for node in range(5):
-                x = length * (panel + _NODES[node]) / n_panels
+                x = length * (panel + NODES[node]) / n_panels
                 gone = -math.expm1(-x)
                 lag = x - gone
                 slopes[0] = x1 + (tau - x1) * gone
@@ -161,7 +158,7 @@ def accumulate(
                 slopes[2] = x3 + (w3 - x3) * gone + drift3 * lag
                 slopes[4] = z + (p - z) * gone + q * lag + r * x * (1.0 - gone)
                 log_hazard = a * slopes[0] + b * slopes[1] + c * slopes[2] - sharpness
-                expected = scale * _WEIGHTS[node] * math.exp(log_hazard)
+                expected = scale * WEIGHTS[node] * math.exp(log_hazard)
                 value -= expected
                 for i in range(5):
                     weighted = expected * slopes[i]
@@ -247,16 +244,9 @@ class SpikeLikelihood:
                 "duration_ms", f"must lie within the drive, {times[0]:g} ... {times[-1]:g} ms", str(given)
             )
         check_trains(self.trains, times[0], ends, self.refractory_ms)
-        intervals = cut(
-            times,
-            self.drive.rate_per_ms,
-            self.drive.values,
-            sites,
-            ends,
-            self.trains.times_ms,
-            self.trains.offsets,
-            float(self.refractory_ms),
-        )
+        driven = self.drive.rate_per_ms, self.drive.values
+        spikes = self.trains.times_ms, self.trains.offsets
+        intervals = cut(times, *driven, sites, ends, *spikes, self.refractory_ms)
         for name, value in (("sites", sites), ("duration_ms", ends), ("_intervals", intervals)):
             object.__setattr__(self, name, value)
 
@@ -525,11 +515,6 @@ class SoftAfferent:
     drive: Drive  #: One column per stimulus.
     windows_ms: Windows  #: Windows of the dynamic and of the static rate. [ms]
     seed: int  #: Seed of the simulated presentations, the same for all parameters.
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """The four identifiable parameters and the width of the threshold."""
-        return SPIKE_PARAMETER_NAMES
 
     @property
     def n_stimuli(self) -> int:

@@ -47,12 +47,10 @@ class Follows(Protocol):
     @property
     def dynamic_quantity(self) -> str:
         """Quantity of the dynamic term, by the names of `SkinResponse.sample`."""
-        ...
 
     @property
     def static_quantity(self) -> str:
         """Quantity of the static term."""
-        ...
 
 
 class AnyAfferent(Follows, Protocol):
@@ -60,17 +58,14 @@ class AnyAfferent(Follows, Protocol):
 
     def spikes(self, traces: Traces) -> SpikeTrains:
         """Simulate the spikes at every site."""
-        ...
 
 
 def checked_afferent(afferent: AnyAfferent) -> AnyAfferent:
     """Return an afferent, or raise `InputError` if it is none: a class without parameters, for example."""
-    if isinstance(afferent, type) or not all(hasattr(afferent, name) for name in _NEEDED):
-        raise InputError(
-            "afferent",
-            "must be one such as Afferent(), RA(), PC(), SAII() or OwnAfferent(...)",
-            shown(afferent),
-        )
+    needed = "dynamic_quantity", "static_quantity", "spikes"
+    if isinstance(afferent, type) or not all(hasattr(afferent, name) for name in needed):
+        wanted = "must be one such as Afferent(), RA(), PC(), SAII() or OwnAfferent(...)"
+        raise InputError("afferent", wanted, shown(afferent))
     return afferent
 
 
@@ -98,9 +93,6 @@ def parameter_units(follows: Follows) -> dict[str, str]:
 def type_of(afferent: object) -> str:
     """Name of the type of an afferent: that of its class where it has none."""
     return str(getattr(afferent, "type", type(afferent).__name__))
-
-
-_NEEDED = ("dynamic_quantity", "static_quantity", "spikes")
 
 
 @value_class

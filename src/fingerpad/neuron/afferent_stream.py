@@ -48,7 +48,7 @@ class AfferentStream:
         self._trace = [(self._time_ms, self._static, self._dynamic)]
         if isinstance(afferent, Afferent | RapidlyAdapting):
             rest_ma = afferent.intercept_ma if isinstance(afferent, Afferent) else 0.0
-            self._constants = afferent.membrane.constants()[:-1]
+            self._constants = afferent.membrane.constants()
             self._potentials = afferent.membrane.initial_potentials_mv(np.full(count, float(rest_ma)))
         stages = afferent.rise + afferent.fall if isinstance(afferent, RapidlyAdapting) else 1
         self._filtered = np.zeros((stages, count))
@@ -75,9 +75,8 @@ class AfferentStream:
         followed = later if dynamic is None else self._values("dynamic", dynamic)
         if isinstance(self._afferent, Afferent | RapidlyAdapting):
             knots_ms, current_ma = self._current(self._afferent, float(time_ms), later, followed)
-            spikes = SpikeTrains(
-                *continued_trains(knots_ms, current_ma, *self._constants, self._potentials, self._ready)
-            )
+            state = self._potentials, self._ready
+            spikes = SpikeTrains(*continued_trains(knots_ms, current_ma, self._constants, *state))
         else:
             spikes = self._replayed(float(time_ms), later, followed)
         self._time_ms, self._static, self._dynamic = float(time_ms), later, followed

@@ -53,14 +53,7 @@ class BandPass:
     def of(self, traces: Traces | Drive) -> tuple[FloatArray, FloatArray]:
         """Filter the quantity of the static term at every site; before the first time it is constant."""
         driven = traces if isinstance(traces, Drive) else resampled(traces, self.time_constant_ms)
-
-        def filtered(sites: slice) -> FloatArray:
-            values = np.array(driven.values[:, sites])
-            for stage in range(self.rise + self.fall):
-                _stage(driven.times_ms, values, self.time_constant_ms, stage < self.rise)
-            return values
-
-        return driven.times_ms, np.hstack(in_blocks(filtered, driven.n_sites))
+        return driven.times_ms, _filtered(driven, self.time_constant_ms, self.rise, self.fall)
 
 
 @lru_cache
@@ -70,7 +63,7 @@ def _largest_share(rise: int, fall: int) -> float:
     response = np.ones((times.size, 1))
     response[0] = 0.0
     for stage in range(rise + fall):
-        _stage(times, response, 1.0, stage < rise)
+        continued_stage(times, response, 1.0, stage < rise, response[0].copy())
     return 0.5 * float(np.abs(np.diff(response[:, 0])).sum())
 
 
@@ -88,24 +81,25 @@ def resampled(traces: Traces, time_constant_ms: float) -> Drive:
 def smoothed_rate(traces: Traces, time_constant_ms: float) -> tuple[FloatArray, FloatArray]:
     """Rate of change of a quantity behind a first-order low pass: what this holds back, over its constant."""
     driven = resampled(traces, time_constant_ms)
+    return driven.times_ms, _filtered(driven, time_constant_ms, rise=1, fall=0) / time_constant_ms
 
-    def held_back(sites: slice) -> FloatArray:
+
+def _filtered(driven: Drive, time_constant_ms: float, rise: int, fall: int) -> FloatArray:
+    """Values behind stages of which the first ones hold back what the low pass transmits."""
+
+    def filtered(sites: slice) -> FloatArray:
         values = np.array(driven.values[:, sites])
-        _stage(driven.times_ms, values, time_constant_ms, True)
+        for stage in range(rise + fall):
+            continued_stage(driven.times_ms, values, time_constant_ms, stage < rise, values[0].copy())
         return values
 
-    return driven.times_ms, np.hstack(in_blocks(held_back, driven.n_sites)) / time_constant_ms
-
-
-@njit(cache=True, error_model="numpy", nogil=True)
-def _stage(times: FloatArray, values: FloatArray, tau: float, high: bool) -> None:
-    """Replace values by those behind one stage, 1/(1 + tau s), or what it holds back if `high`."""
-    continued_stage(times, values, tau, high, values[0].copy())
+    return np.hstack(in_blocks(filtered, driven.n_sites))
 
 
 @njit(cache=True, error_model="numpy", nogil=True)
 def continued_stage(times: FloatArray, values: FloatArray, tau: float, high: bool, state: FloatArray) -> None:
-    """Do as `_stage` from a state (n_sites,) of the low pass, which is overwritten with the last one."""
+    """Replace values by those behind one stage, 1/(1 + tau s), or what it holds back if `high`."""
+    # The state (n_sites,) of the low pass is overwritten with the last one.
     n_sites = values.shape[1]
     before = values[0].copy()
     for site in range(n_sites):

@@ -51,11 +51,8 @@ class EndOrgans:
         shares = np.full(n_ends, 1.0 / n_ends) if self.weights is None else self.weights
         weights = float_array("weights", np.atleast_2d(shares), 2)
         if weights.shape not in ((1, n_ends), (n_afferents, n_ends)):
-            raise InputError(
-                "weights",
-                f"needs one number per end organ, {n_ends}, or a row of them per afferent, {n_afferents}",
-                f"shape {weights.shape}",
-            )
+            wanted = f"needs one number per end organ, {n_ends}, or a row of them per afferent, {n_afferents}"
+            raise InputError("weights", wanted, f"shape {weights.shape}")
         if (weights < 0.0).any():
             raise InputError("weights", "must not be negative", remedy=f"the smallest is {weights.min():g}")
         totals = weights.sum(axis=1)
@@ -117,11 +114,12 @@ class EndOrgans:
 
     def combined(self, traces: Traces) -> Traces:
         """Traces of the afferents from those of `sites_mm`."""
-        return traces.with_values(self._together)
-
-    def _together(self, values: FloatArray) -> FloatArray:
-        shaped = values.reshape(len(values), *self.positions_mm.shape[:2])
         weights = np.asarray(self.weights)
-        if self.combine == "sum":
-            return np.sum(shaped * weights, axis=2)
-        return np.max(shaped * (weights / weights.max(axis=1, keepdims=True)), axis=2)
+        if self.combine == "largest":
+            weights = weights / weights.max(axis=1, keepdims=True)
+        together = np.sum if self.combine == "sum" else np.max
+
+        def of_afferents(values: FloatArray) -> FloatArray:
+            return together(values.reshape(len(values), *self.positions_mm.shape[:2]) * weights, axis=2)
+
+        return traces.with_values(of_afferents)

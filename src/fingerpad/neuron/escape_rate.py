@@ -33,8 +33,10 @@ ESCAPE_TIME_MS = 1.0  # Mean time to a spike at a potential equal to the thresho
 _TRAINS_PER_BLOCK = 32  # Trains that one thread simulates at a time.
 
 _ESCAPE = int(Purpose.ESCAPE)
-_NODES = tuple(0.5 + 0.5 * np.polynomial.legendre.leggauss(5)[0])
-_WEIGHTS = tuple(0.5 * np.polynomial.legendre.leggauss(5)[1])
+NODES = tuple(0.5 + 0.5 * np.polynomial.legendre.leggauss(5)[0])
+WEIGHTS = tuple(0.5 * np.polynomial.legendre.leggauss(5)[1])
+"""Of the quadrature over a panel from 0 to 1."""
+
 _LONGEST_PANEL = 0.5  # Largest length of a panel over tau: the potential is too curved over longer ones.
 _HIGHEST_STEP = 1.0  # Largest change of the log hazard over one panel: the quadrature error is then 1e-9.
 
@@ -82,12 +84,7 @@ class EscapeRate:
         threshold_mv = self.membrane.threshold_mv
         drives = np.ascontiguousarray(current.values.T) / (self.membrane.capacitance_mf * threshold_mv)
         initial = self.membrane.initial_potentials_mv(current.values[0]) / threshold_mv
-        numbers = (
-            float(self.membrane.time_constant_ms),
-            float(self.membrane.refractory_ms),
-            float(self.width),
-            float(self.escape_ms),
-        )
+        numbers = self.membrane.time_constant_ms, self.membrane.refractory_ms, self.width, self.escape_ms
 
         def trains(some: slice) -> SpikeTrains:
             part = everyone.part(some)
@@ -113,7 +110,7 @@ def panels(length: float, start: float, steady: float, drift: float, width: floa
 def _integral(begin: float, end: float, start: float, steady: float, drift: float, width: float) -> float:
     """Integral of exp((u - 1)/width) over one panel, in x."""
     total = 0.0
-    for node, weight in zip(_NODES, _WEIGHTS):  # noqa: B905 (Numba knows no strict)
+    for node, weight in zip(NODES, WEIGHTS):  # noqa: B905 (Numba knows no strict)
         u = potential_at(begin + node * (end - begin), start, steady, drift)
         total += weight * math.exp((u - 1.0) / width)
     return (end - begin) * total

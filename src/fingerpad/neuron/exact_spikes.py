@@ -18,6 +18,9 @@ from numba import njit
 
 from fingerpad.core.values import FloatArray
 
+Constants = tuple[float, float, float, float, float]
+"""tau [ms], C [mF], threshold [mV], refractory period [ms], and initial potential [mV], NaN if at rest."""
+
 _MOST_REFINEMENTS = 200
 _ROUND_OFF = 4.0 * float(np.finfo(np.float64).eps)
 
@@ -89,14 +92,13 @@ def refine(high: float, reached: float, start: float, steady: float, drift: floa
     return guess
 
 
-def initial_potentials(
-    current: FloatArray, tau: float, capacitance: float, threshold: float, initial: float
-) -> FloatArray:
-    """Potentials (n_neurons,) before the first current changes: `initial`, or those at rest if it is NaN.
+def initial_potentials(current: FloatArray, constants: Constants) -> FloatArray:
+    """Potentials (n_neurons,) before the first current changes: the given one, or those at rest.
 
     At rest a membrane has the steady potential of its current. One whose current would make it fire has just
     been reset.
     """
+    tau, capacitance, threshold, _, initial = constants
     if not math.isnan(initial):
         return np.full(current.size, initial)
     steady = tau / capacitance * current
@@ -104,35 +106,22 @@ def initial_potentials(
 
 
 def exact_trains(
-    times: FloatArray,
-    currents: FloatArray,
-    tau: float,
-    capacitance: float,
-    threshold: float,
-    refractory: float,
-    initial: float,
+    times: FloatArray, currents: FloatArray, constants: Constants
 ) -> tuple[FloatArray, np.ndarray]:
     """Compute the spike times of all neurons, neuron after neuron."""
-    potentials = initial_potentials(currents[0], tau, capacitance, threshold, initial)
     ready = np.full(currents.shape[1], times[0])
-    return continued_trains(times, currents, tau, capacitance, threshold, refractory, potentials, ready)
+    return continued_trains(times, currents, constants, initial_potentials(currents[0], constants), ready)
 
 
 @njit(cache=True, error_model="numpy", nogil=True)
 def continued_trains(
-    times: FloatArray,
-    currents: FloatArray,
-    tau: float,
-    capacitance: float,
-    threshold: float,
-    refractory: float,
-    potentials: FloatArray,
-    ready: FloatArray,
+    times: FloatArray, currents: FloatArray, constants: Constants, potentials: FloatArray, ready: FloatArray
 ) -> tuple[FloatArray, np.ndarray]:
     """Compute spike times as `exact_trains`, from a state that is carried on."""
     # All neurons are advanced over an interval before the next one begins: they share its exponential, rows
     # of `currents` are contiguous in memory, and the loops over neurons vectorise. For the same reason,
     # spikes within an interval are found in rounds of one spike per neuron, stage by stage in short loops.
+    tau, capacitance, threshold, refractory, _ = constants
     n_neurons = currents.shape[1]
     resistance = tau / capacitance
     busy = np.empty(n_neurons, dtype=np.int64)

@@ -15,7 +15,7 @@ from fingerpad.core.errors import InputError
 from fingerpad.core.signals import CURRENTS, SpikeTrains, Traces
 from fingerpad.core.threads import in_blocks
 from fingerpad.core.values import Finite, FloatArray, Positive
-from fingerpad.neuron.exact_spikes import exact_trains, initial_potentials
+from fingerpad.neuron.exact_spikes import Constants, exact_trains, initial_potentials
 
 
 def checked_current(traces: Traces) -> Traces:
@@ -55,12 +55,8 @@ class LeakyIntegrateAndFire:
 
     def __post_init__(self) -> None:
         if self.initial_mv is not None and self.initial_mv >= self.threshold_mv:
-            raise InputError(
-                "initial_mv",
-                f"must be below the threshold, {self.threshold_mv:g} mV",
-                f"{self.initial_mv:g}",
-                "leave it out to start at rest",
-            )
+            wanted = f"must be below the threshold, {self.threshold_mv:g} mV"
+            raise InputError("initial_mv", wanted, f"{self.initial_mv:g}", "leave it out to start at rest")
 
     def spikes(self, current: Traces) -> SpikeTrains:
         """Spike times of one neuron per site, exact for a piecewise linear current [mA]."""
@@ -68,24 +64,18 @@ class LeakyIntegrateAndFire:
 
         def trains(neurons: slice) -> SpikeTrains:
             some = current.part(neurons)
-            return SpikeTrains(*exact_trains(some.times_ms, some.values, *self.constants()))
+            return SpikeTrains(*exact_trains(some.times_ms, some.values, self.constants()))
 
         return SpikeTrains.joined(in_blocks(trains, current.n_sites))
 
     def initial_potentials_mv(self, current_ma: FloatArray) -> FloatArray:
         """Potentials (n_sites,) at the first time, under the first currents (n_sites,). [mV]"""
-        tau, capacitance, threshold, _, initial = self.constants()
-        return initial_potentials(current_ma, tau, capacitance, threshold, initial)
+        return initial_potentials(current_ma, self.constants())
 
-    def constants(self) -> tuple[float, float, float, float, float]:
+    def constants(self) -> Constants:
         """Return the parameters in their order, NaN for an initial potential at rest."""
-        return (
-            float(self.time_constant_ms),
-            float(self.capacitance_mf),
-            float(self.threshold_mv),
-            float(self.refractory_ms),
-            math.nan if self.initial_mv is None else float(self.initial_mv),
-        )
+        initial_mv = math.nan if self.initial_mv is None else self.initial_mv
+        return self.time_constant_ms, self.capacitance_mf, self.threshold_mv, self.refractory_ms, initial_mv
 
 
 def membrane_potential(

@@ -125,11 +125,8 @@ class Population:
         if self.ends is not None and len(self.ends) != len(positions):
             raise InputError("ends", f"needs one row per afferent, {len(positions)}", str(len(self.ends)))
         if factors is not None and (factors.size != len(positions) or (factors <= 0.0).any()):
-            raise InputError(
-                "sensitivity",
-                f"needs one factor above 0 per receptor, {len(positions)}",
-                f"{factors.size}, the smallest {factors.min(initial=math.inf):g}",
-            )
+            got = f"{factors.size}, the smallest {factors.min(initial=math.inf):g}"
+            raise InputError("sensitivity", f"needs one factor above 0 per receptor, {len(positions)}", got)
         places = positions[:, [0, -1]] if self.places_mm is None else self.places_mm
         if places.shape != (len(positions), 2):
             raise InputError("places_mm", f"needs a pair per receptor, {len(positions)}", str(places.shape))
@@ -246,13 +243,8 @@ class Population:
             )
         x, z = centre_x + pitch_mm * around_zero(rows), centre_z + pitch_mm * around_zero(columns)
         positions = np.stack(np.meshgrid(x, z, indexing="ij"), axis=-1).reshape(-1, 2)
-        return cls(
-            positions,
-            pitch_mm,
-            afferent or Afferent(),
-            centre_mm=CENTRE_MM if follows else None,
-            depth_mm=depth_mm,
-        )
+        centre_mm = CENTRE_MM if follows else None
+        return cls(positions, pitch_mm, afferent or Afferent(), centre_mm=centre_mm, depth_mm=depth_mm)
 
     @classmethod
     def mixed(cls, parts: Mapping[str, Population]) -> Population:
@@ -382,11 +374,8 @@ class Population:
             for name, part in some.items():
                 part._check_tissues(skin)
                 end = start + len(part.sites_mm)
-                maps[name] = part.respond_to(
-                    traces.part(slice(start, end)) if len(some) > 1 else traces,
-                    dynamic_window_ms,
-                    static_window_ms,
-                )
+                below = traces.part(slice(start, end)) if len(some) > 1 else traces
+                maps[name] = part.respond_to(below, dynamic_window_ms, static_window_ms)
                 start = end
         return ResponseMap.joined({name: maps[name] for name in parts}) if there.parts else maps[""]
 

@@ -47,11 +47,9 @@ class Drive:
     phases: Many[Phase] = ()  #: As of `Traces`.
 
     def __post_init__(self) -> None:
-        if not self.times_ms.size == len(self.values) or self.values.shape != self.rate_per_ms.shape:
-            raise InputError(
-                "Drive needs one row of values and of rate_per_ms per knot: "
-                f"got {self.values.shape} and {self.rate_per_ms.shape} for {self.times_ms.size} knots."
-            )
+        if self.times_ms.size != len(self.values) or self.values.shape != self.rate_per_ms.shape:
+            got = f"{self.values.shape} and {self.rate_per_ms.shape} for {self.times_ms.size} knots"
+            raise InputError(f"Drive needs one row of values and of rate_per_ms per knot: got {got}.")
 
     @property
     def n_sites(self) -> int:

@@ -84,11 +84,8 @@ def tuning_curve(
     """
     checked_afferent(afferent)
     if afferent.dynamic_quantity != afferent.static_quantity:
-        raise InputError(
-            "tuning_curve",
-            "needs an afferent that follows one quantity",
-            f"{afferent.dynamic_quantity!r} and {afferent.static_quantity!r}",
-        )
+        got = f"{afferent.dynamic_quantity!r} and {afferent.static_quantity!r}"
+        raise InputError("tuning_curve", "needs an afferent that follows one quantity", got)
 
     def threshold_um(frequency_hz: float) -> float:
         low, high = _RANGE_UM

@@ -181,11 +181,8 @@ class PsychometricFunction:
         if proportion_correct is None:
             return self.threshold
         if not self.guess < proportion_correct < 1.0 - self.lapse:
-            raise InputError(
-                "proportion_correct",
-                f"must lie between guess and 1 - lapse, {self.guess:g} ... {1.0 - self.lapse:g}",
-                f"{proportion_correct:g}",
-            )
+            wanted = f"must lie between guess and 1 - lapse, {self.guess:g} ... {1.0 - self.lapse:g}"
+            raise InputError("proportion_correct", wanted, f"{proportion_correct:g}")
         return float(level_at(self.shape, proportion_correct, self.parameters))
 
     def slope(self, proportion_correct: Finite | None = None) -> float:
@@ -208,17 +205,15 @@ def checked_levels(levels: ArrayLike, sigmoid: str) -> FloatArray:
     """Return levels as an array if they are in the domain of `sigmoid`, else raise `InputError`."""
     checked = float_array("levels", levels, 1)
     if SIGMOIDS[sigmoid].logarithmic and (checked <= 0.0).any():
-        raise InputError(
-            "levels",
-            f"must be greater than 0 for {sigmoid!r}",
-            remedy=f"the smallest is {checked.min():g}; shift them, or choose another sigmoid",
-        )
+        said = f"the smallest is {checked.min():g}; shift them, or choose another sigmoid"
+        raise InputError("levels", f"must be greater than 0 for {sigmoid!r}", remedy=said)
     return checked
 
 
 SMALLEST_OVERDISPERSION = 1e-5
 """Below it the beta-binomial formula loses precision and the binomial one is used."""
 
+NEARLY_NEVER = 1e-12  # Proportion that takes the place of 0.
 LARGEST_LEVEL = 1e9  # Largest level of a stimulus; the fit loses its digits with far larger numbers.
 
 
@@ -240,10 +235,8 @@ class JudgementCounts:
     def __post_init__(self) -> None:
         levels, correct, trials = self.levels, self.n_correct, self.n_trials
         if not levels.size == correct.size == trials.size or levels.size == 0:
-            raise InputError(
-                "levels, n_correct and n_trials must have one entry per level: "
-                f"got {levels.size}, {correct.size} and {trials.size}."
-            )
+            got = f"{levels.size}, {correct.size} and {trials.size}"
+            raise InputError(f"levels, n_correct and n_trials must have one entry per level: got {got}.")
         if np.abs(levels).max() > LARGEST_LEVEL:
             raise InputError(
                 "levels", f"must lie within {LARGEST_LEVEL:g}", str(levels.tolist()), "change the unit"
@@ -253,11 +246,8 @@ class JudgementCounts:
         if (correct != np.floor(correct)).any() or (trials != np.floor(trials)).any():
             raise InputError("n_correct and n_trials must be whole numbers: multiply rates by their trials.")
         if (trials < 1.0).any() or (correct < 0.0).any() or (correct > trials).any():
-            raise InputError(
-                "n_trials",
-                "must be at least 1 and n_correct within 0 ... n_trials",
-                f"{correct.tolist()} of {trials.tolist()}",
-            )
+            wanted = "must be at least 1 and n_correct within 0 ... n_trials"
+            raise InputError("n_trials", wanted, f"{correct.tolist()} of {trials.tolist()}")
 
     @property
     def proportion(self) -> FloatArray:
@@ -276,18 +266,13 @@ def log_probability(
         return ways + xlogy(k, p) + xlog1py(n - k, -p)
     v = (1.0 - rho) / np.maximum(rho, SMALLEST_OVERDISPERSION)
     # Both arguments of the beta function must be positive, so 0 and 1 are replaced by close values.
-    inside = np.clip(p, _NEARLY_NEVER, 1.0 - _NEARLY_NEVER)
+    inside = np.clip(p, NEARLY_NEVER, 1.0 - NEARLY_NEVER)
     return ways + betaln(k + inside * v, n - k + (1.0 - inside) * v) - betaln(inside * v, (1.0 - inside) * v)
 
 
-_NEARLY_NEVER = 1e-12
-
-
-def binomial_interval(
-    proportion: ArrayLike, trials: int, confidence: float = 0.95
-) -> tuple[FloatArray, FloatArray]:
-    """Exact confidence interval of a probability, given an observed proportion (Clopper & Pearson 1934)."""
+def binomial_interval(proportion: ArrayLike, trials: int) -> tuple[FloatArray, FloatArray]:
+    """Exact 95 % confidence interval of an observed proportion (Clopper & Pearson 1934)."""
     successes = np.rint(np.asarray(proportion, dtype=np.float64) * trials).astype(np.int64)
-    intervals = [binomtest(int(count), trials).proportion_ci(confidence) for count in successes.ravel()]
+    intervals = [binomtest(int(count), trials).proportion_ci(0.95) for count in successes.ravel()]
     low, high = np.moveaxis(np.reshape(intervals, (*successes.shape, 2)), -1, 0)
     return low, high

@@ -13,7 +13,7 @@ bootstrap of a thousand sets takes tenths of a second.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Annotated
 
@@ -26,6 +26,7 @@ from fingerpad.core.displayed import Columns, Result
 from fingerpad.core.errors import ConvergenceError, InputError
 from fingerpad.core.values import Finite, FloatArray, Number, choice
 from fingerpad.psychophysics.curve import (
+    NEARLY_NEVER,
     SIGMOIDS,
     SMALLEST_OVERDISPERSION,
     JudgementCounts,
@@ -49,9 +50,8 @@ _SCALES = (1.0, 1.0, 0.1, 0.01, 1.0)
 _DIFFERENCE = 1e-4
 _FLATTEST = 1e-8
 _ROUND_OFF = 1e-14
-_NEARLY_NEVER = 1e-12
 _SETS_AT_ONCE = 200
-_START_POINTS = {THRESHOLD: 15, WIDTH: 9, GUESS: 4, LAPSE: 3, OVERDISPERSION: 4}
+_START_POINTS = (15, 9, 4, 3, 4)  # Of a coarse grid, along each free parameter.
 
 
 @dataclass(frozen=True)
@@ -130,10 +130,7 @@ def maximise_likelihood(model: Model, n_correct: FloatArray) -> tuple[FloatArray
 
 def _starts(model: Model, n_correct: FloatArray) -> FloatArray:
     """Point of a coarse grid with the largest likelihood, for each set of counts."""
-    axes = [
-        _inner_points(model.lower[index], model.upper[index], count) for index, count in _START_POINTS.items()
-    ]
-    grid = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, len(PARAMETERS))
+    grid = grid_points(centres(model.lower, model.upper, np.where(model.free, _START_POINTS, 1)))
     best = np.empty(len(n_correct), dtype=np.int64)
     for first in range(0, len(n_correct), _SETS_AT_ONCE):
         some = slice(first, first + _SETS_AT_ONCE)
@@ -141,17 +138,22 @@ def _starts(model: Model, n_correct: FloatArray) -> FloatArray:
     return grid[best]
 
 
-def _inner_points(lower: float, upper: float, count: int) -> FloatArray:
-    """Points between the bounds, not on them, where derivatives may vanish."""
-    if lower == upper:
-        return np.array([lower])
-    return lower + (upper - lower) * (np.arange(count) + 0.5) / count
+def centres(lower: FloatArray, upper: FloatArray, sizes: Iterable[int]) -> list[FloatArray]:
+    """Centres of equal cells along each axis; none is on a bound, where derivatives may vanish."""
+    return [
+        low + (high - low) * (np.arange(size) + 0.5) / size
+        for low, high, size in zip(lower, upper, sizes, strict=True)
+    ]
+
+
+def grid_points(axes: list[FloatArray]) -> FloatArray:
+    return np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, len(axes))
 
 
 def _gradient(model: Model, n_correct: FloatArray, points: FloatArray) -> FloatArray:
     """Return the derivatives g (n_sets, 5) of the log likelihood, through psi and by rho itself."""
     psi, share, t = model.proportions(points)
-    p = np.clip(psi, _NEARLY_NEVER, 1.0 - _NEARLY_NEVER)
+    p = np.clip(psi, NEARLY_NEVER, 1.0 - NEARLY_NEVER)
     guess, lapse, width = points[:, GUESS, None], points[:, LAPSE, None], np.exp(points[:, WIDTH, None])
     rise = (1.0 - guess - lapse) * model.sigmoid.density(t) * model.sigmoid.stretch / width
     by_proportion, by_overdispersion = _scores(n_correct, model.n_trials, p, points[:, OVERDISPERSION, None])

@@ -43,6 +43,8 @@ from fingerpad.psychophysics.curve_fit import (
     WIDTH,
     Model,
     PsychometricFit,
+    centres,
+    grid_points,
     maximise_likelihood,
 )
 
@@ -205,13 +207,13 @@ def posterior(fit: PsychometricFit) -> FunctionCloud:
     sizes = (COARSE_POINTS,) * min(n_free, 3) + (9,) * (n_free - 3)
     # A grid finds the region of the posterior; a narrow posterior needs a second one.
     for step in range(REFINEMENTS):
-        axes = _centres(lower, upper, sizes)
+        axes = centres(lower, upper, sizes)
         if step == 0 and model.free[THRESHOLD]:
             # The posterior of a step lies between two levels, which may be close to each other.
             between = 0.5 * (model.coordinates[1:] + model.coordinates[:-1])
             axes[THRESHOLD] = np.union1d(axes[THRESHOLD], between)
         lower, upper = _where_it_is(axes, _heights(fit, axes), lower, upper)
-    axes = _centres(lower, upper, FINE_POINTS[n_free])
+    axes = centres(lower, upper, FINE_POINTS[n_free])
     weights = np.exp(_heights(fit, axes))
     points = _grid_points(model, axes)
     kept = weights.ravel() > 0.1 * NEGLIGIBLE * weights.max()
@@ -220,18 +222,10 @@ def posterior(fit: PsychometricFit) -> FunctionCloud:
 
 def _grid_points(model: Model, axes: list[FloatArray]) -> FloatArray:
     """Working coordinates (n_points, 5) of a grid over the free parameters."""
-    mesh = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, len(axes))
+    mesh = grid_points(axes)
     points = np.tile(model.lower, (len(mesh), 1))
     points[:, model.free] = mesh
     return points
-
-
-def _centres(lower: FloatArray, upper: FloatArray, sizes: tuple[int, ...]) -> list[FloatArray]:
-    """Centres of equal cells between bounds, along each axis."""
-    return [
-        low + (high - low) * (np.arange(size) + 0.5) / size
-        for low, high, size in zip(lower, upper, sizes, strict=True)
-    ]
 
 
 def _heights(fit: PsychometricFit, axes: list[FloatArray]) -> FloatArray:

@@ -242,25 +242,23 @@ def noisy_responses(
 def noisy_gradient_sums(
     responses: FloatArray,
     neighbours: ArrayLike,
-    noise_sigma: Finite | FloatArray,
+    sigmas: FloatArray,
     seed: Whole,
     trials: IntArray,
     presentations: Count,
 ) -> FloatArray:
-    """Gradient sums of noisy presentations: several measures or noises meet the same random numbers."""
-    values = np.asarray(responses, dtype=np.float64)
-    measures = np.ascontiguousarray(values.reshape(-1, *values.shape[-2:]))
-    sigmas = np.ascontiguousarray(np.broadcast_to(noise_sigma, values.shape[:-2]).ravel(), dtype=np.float64)
+    """Gradient sums of noisy presentations, (n_sigmas, *trials.shape, presentations), of the same numbers."""
+    values = np.ascontiguousarray(responses, dtype=np.float64)
     pairs = np.ascontiguousarray(neighbours, dtype=np.int64)
     numbers = np.ascontiguousarray(trials, dtype=np.int64).ravel()
     stimuli = np.repeat(np.arange(trials.shape[0]), trials.shape[1])
-    sums = np.zeros((len(measures), numbers.size, presentations))
+    sums = np.zeros((len(sigmas), numbers.size, presentations))
 
     def fill(some: slice) -> None:
-        _fill_sums(measures, stimuli[some], pairs, sigmas, seed, numbers[some], sums[:, some])
+        _fill_sums(values, stimuli[some], pairs, sigmas, seed, numbers[some], sums[:, some])
 
     in_blocks(fill, numbers.size, _TRIALS_AT_ONCE)
-    return sums.reshape(*values.shape[:-2], *trials.shape, presentations)
+    return sums.reshape(len(sigmas), *trials.shape, presentations)
 
 
 def shared_noise_gradient_sums(
@@ -275,9 +273,9 @@ def shared_noise_gradient_sums(
 
 
 @njit(cache=True, nogil=True)
-def _fill_sums(measures, stimuli, pairs, sigmas, seed, trials, sums):  # type: ignore[no-untyped-def]
-    """Add up the sums (n_measures, n_trials, presentations) of some trials, a few presentations at a time."""
-    n_receptors, count = measures.shape[2], sums.shape[2]
+def _fill_sums(responses, stimuli, pairs, sigmas, seed, trials, sums):  # type: ignore[no-untyped-def]
+    """Add up the sums (n_sigmas, n_trials, presentations) of some trials, a few presentations at a time."""
+    n_receptors, count = responses.shape[1], sums.shape[2]
     draws = np.zeros((n_receptors, _PRESENTATIONS_AT_ONCE))
     noisy = np.empty_like(draws)
     for trial in range(trials.size):
@@ -288,9 +286,9 @@ def _fill_sums(measures, stimuli, pairs, sigmas, seed, trials, sums):  # type: i
                     four = four_normals(seed, trials[trial], receptor, _RESPONSE, start // 4 + 1)
                     for k in range(4):  # up to three too many at the end, not used
                         draws[receptor, start - first + k] = four[k]
-            for measure in range(measures.shape[0]):
-                _multiply(measures[measure, stimuli[trial]], sigmas[measure], draws, noisy)
-                _add_gradients(noisy, pairs, sums[measure, trial, first:last])
+            for noise in range(sigmas.size):
+                _multiply(responses[stimuli[trial]], sigmas[noise], draws, noisy)
+                _add_gradients(noisy, pairs, sums[noise, trial, first:last])
 
 
 @njit(cache=True, nogil=True)

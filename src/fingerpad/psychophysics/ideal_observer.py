@@ -70,15 +70,12 @@ class ResponseModel(Protocol):
     @property
     def n_receptors(self) -> int:
         """Number of receptors."""
-        ...
 
     def log_likelihood(self, responses: FloatArray) -> FloatArray:
         """Logarithm (...,) of the probability (density) of responses (..., n_receptors)."""
-        ...
 
     def draw(self, seed: int, trials: IntArray) -> FloatArray:
         """Sample responses (n_trials, n_receptors) with the random numbers of these trials."""
-        ...
 
 
 @value_class
@@ -98,11 +95,8 @@ class GaussianResponses:
     def __post_init__(self) -> None:
         mean, covariance = self.mean, self.covariance
         if covariance.shape != (mean.size, mean.size):
-            raise InputError(
-                "covariance",
-                "must have one row and column per receptor",
-                f"{covariance.shape} for {mean.size}",
-            )
+            wanted = "must have one row and column per receptor"
+            raise InputError("covariance", wanted, f"{covariance.shape} for {mean.size}")
         if np.abs(covariance - covariance.T).max(initial=0.0) > 1e-9 * np.abs(covariance).max(initial=0.0):
             raise InputError("covariance", "must be symmetric", remedy="the two halves differ")
         self.factor  # noqa: B018
@@ -281,10 +275,8 @@ def present(
     True
     """
     if standard.n_receptors != comparison.n_receptors:
-        raise InputError(
-            "standard and comparison must have the same receptors: "
-            f"got {standard.n_receptors} and {comparison.n_receptors}."
-        )
+        got = f"{standard.n_receptors} and {comparison.n_receptors}"
+        raise InputError(f"standard and comparison must have the same receptors: got {got}.")
     trials = session_trials(session, 2, n_trials)
     first, second = standard.draw(seed, trials[0]), comparison.draw(seed, trials[1])
     # One likelihood may be -inf, but not both: the responses come from one of the models.

@@ -65,8 +65,6 @@ END_OF_STIMULUS_MS = protocol.RAMP.value + protocol.HOLD.value
 """A usual value for the latency of a silent receptor. [ms]"""
 
 CRITERION_MOVES = ("point", "fraction", "likelihood")
-"""Quantity multiplied by a varied criterion: the decision point, the fraction beta, or a likelihood ratio of
-1 between comparison and standard, which then is the criterion in the place of the fraction."""
 
 MOST_REPETITIONS = 1_000_000
 NOISE_DRAWS = 4000  # Common random presentations in the fit of the noise; its sampling error is one per cent.
@@ -97,12 +95,11 @@ class Experiment:
     """Spread of the decision point: for each hit rate it is multiplied by Normal(1, criterion_sigma). Above 0
     this is the paper's derivative of Gradient Sum: one mean and standard deviation per sphere, from
     `presentations_varied` sums; steps (f) and (g) are omitted."""
-    presentations_varied: Repetitions = (
-        _REPETITIONS_VARIED  # Presentations of each sphere when the criterion varies.
-    )
+    presentations_varied: Repetitions = _REPETITIONS_VARIED
+    """Presentations of each sphere when the criterion varies."""
     criterion_moves: Annotated[str, choice(CRITERION_MOVES)] = CRITERION_MOVES[0]
-    """Quantity multiplied by the varied criterion: the decision point itself, beta, or a likelihood ratio of
-    1 that replaces beta."""
+    """Quantity multiplied by the varied criterion: the decision point itself, the fraction beta, or a
+    likelihood ratio of 1 between comparison and standard, which replaces beta."""
 
     def __post_init__(self) -> None:
         if math.prod(self.sums_per_sphere) > MOST_REPETITIONS:
@@ -125,17 +122,14 @@ class Encoder(Protocol):
 
     def sizes(self, plan: Experiment) -> tuple[int, ...]:
         """Repetitions that decide which random numbers are drawn."""
-        ...
 
     def values(
         self, responses: FloatArray, sigmas: FloatArray, seed: int, sizes: tuple[int, ...], session: int
     ) -> FloatArray:
         """Statistics of noisy presentations, (n_sigmas, ...), all from the same random numbers."""
-        ...
 
     def hit_rates(self, values: FloatArray, seed: int, plan: Experiment, session: int) -> FloatArray:
         """Hit rates (hit_rates, n_comparisons) of the statistics of one noise."""
-        ...
 
     def predictor(
         self, responses: FloatArray, seed: int, plan: Experiment, session: int
@@ -147,11 +141,9 @@ class Encoder(Protocol):
         self, responses: FloatArray, noise_sigma: float, seed: int, session: int, count: int
     ) -> FloatArray:
         """Statistic of so many noisy presentations of each stimulus, (n_stimuli, count)."""
-        ...
 
     def statistic(self, standard: ResponseModel, seed: int, session: int) -> Statistic:
         """Statistic of one trial, for `Presentation.of`."""
-        ...
 
 
 @dataclass(frozen=True)
@@ -170,11 +162,10 @@ class GradientSum(Encoder):
         if not len(pairs):
             raise InputError("neighbours", "must hold at least one pair of receptors", "none")
         trials = session_trials(session, len(responses), sizes[0])
-        measures = np.broadcast_to(responses, (sigmas.size, *responses.shape))
-        return noisy_gradient_sums(measures, pairs, sigmas, seed, trials, sizes[1])  # (a)-(f)
+        return noisy_gradient_sums(responses, pairs, sigmas, seed, trials, sizes[1])  # (a)-(f)
 
     def hit_rates(self, values: FloatArray, seed: int, plan: Experiment, session: int) -> FloatArray:
-        means, spreads = moments(values)  # (e): (n_spheres, n_distributions)
+        means, spreads = values.mean(axis=-1), values.std(axis=-1, ddof=1)  # (e), of all distributions
         decide = _varied_criterion if plan.criterion_sigma > 0.0 else _picked_pairs
         return decide(means.T, spreads.T, seed, plan, session)
 
@@ -187,8 +178,7 @@ class GradientSum(Encoder):
     def of_noisy(
         self, responses: FloatArray, noise_sigma: float, seed: int, session: int, count: int
     ) -> FloatArray:
-        trials = session_trials(session, len(responses), 1)
-        return noisy_gradient_sums(responses, self.neighbours, noise_sigma, seed, trials, count)[:, 0]
+        return self.values(responses, np.array([noise_sigma]), seed, (1, count), session)[0, :, 0]
 
     def statistic(self, standard: ResponseModel, seed: int, session: int) -> Statistic:
         return lambda responses: gradient_sum(responses, self.neighbours)
@@ -211,11 +201,8 @@ class EuclideanDistance(Encoder):
 
     def sizes(self, plan: Experiment) -> tuple[int, ...]:
         if plan.criterion_sigma > 0.0:
-            raise InputError(
-                "criterion_sigma",
-                "must be 0 for Euclidean Distance",
-                remedy="its decision point does not vary",
-            )
+            wanted = "must be 0 for Euclidean Distance"
+            raise InputError("criterion_sigma", wanted, remedy="its decision point does not vary")
         return plan.hit_rates, plan.presentations, plan.pairs
 
     def values(
@@ -358,11 +345,8 @@ def checked_responses(responses: ArrayLike, silent_value: Finite | None = None) 
             "depth or use more sensitive afferents",
         )
     if silent.any() and silent_value is None:
-        raise InputError(
-            "responses",
-            "must be finite",
-            remedy=f"{silent.sum()} are NaN, as of silent receptors; give silent_value to replace them",
-        )
+        said = f"{silent.sum()} are NaN, as of silent receptors; give silent_value to replace them"
+        raise InputError("responses", "must be finite", remedy=said)
     table[silent] = silent_value
     table = float_array("responses", table, 2)
     if table.shape[0] < 2 or table.shape[1] == 0:
@@ -408,11 +392,6 @@ def _picks(seed: int, trials: IntArray, shape: tuple[int, int], choices: int) ->
     """Sample from 0 ... choices - 1, `shape` times in each trial; (n_trials, *shape)."""
     numbers = uniforms(seed, trials, 1, Purpose.PICK, shape[0] * shape[1])
     return (numbers * choices).astype(np.int64).reshape(-1, *shape)
-
-
-def moments(answers: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return mean mu_2 and standard deviation sigma_2 over the last axis, step (e)."""
-    return answers.mean(axis=-1), answers.std(axis=-1, ddof=1)
 
 
 def decision_point(standard: FloatArray, comparison: FloatArray, criterion: float | FloatArray) -> FloatArray:
@@ -473,7 +452,7 @@ def expected_hit_rates(
     values = checked_responses(responses)
     pairs = check_neighbours(neighbours, values.shape[1])
     sums = shared_noise_gradient_sums(values, pairs, checked_noise(noise_sigma), standard_normals)
-    means, spreads = moments(sums)
+    means, spreads = sums.mean(axis=-1), sums.std(axis=-1, ddof=1)
     point = decision_point(means[0], means[1:], criterion)
     return hit_probability(point, means[1:], spreads[1:], side(means[np.newaxis]))
 

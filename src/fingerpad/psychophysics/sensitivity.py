@@ -241,11 +241,8 @@ def d_prime_of_proportion(
     """
     guessing, never_failed = task(0.0), task(LARGEST_D_PRIME)
     if not guessing - _SMALL <= proportion_correct < never_failed:
-        raise InputError(
-            "proportion_correct",
-            f"must lie between the chance level, {guessing:g}, and 1",
-            f"{proportion_correct:g}",
-        )
+        wanted = f"must lie between the chance level, {guessing:g}, and 1"
+        raise InputError("proportion_correct", wanted, f"{proportion_correct:g}")
     if proportion_correct <= guessing:
         return 0.0
     if task is forced_choice:

@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from enum import Enum
+from functools import partial
 from operator import attrgetter
 from typing import TYPE_CHECKING
 
@@ -95,20 +96,15 @@ def _at_last_time(function: str) -> Callable[[Deformation, Mesh], FloatArray]:
     return of
 
 
-def _of_press(
-    name: str, unit: str, long_name: str, path: str = "", components: int = 1, exported: str = ""
+def _over_time(
+    place: Place, name: str, unit: str, words: str, path: str = "", components: int = 1, exported: str = ""
 ) -> Field:
-    """Field of the whole press over time, stored and exported."""
+    """Field over time, stored and exported."""
     of = _by(path or name)
-    return Field(name, unit, long_name, Place.PRESS, of, components, Times.ALL, exported=exported or name)
+    return Field(name, unit, words, place, of, components, Times.ALL, exported=exported or name)
 
 
-def _at_skin(
-    name: str, unit: str, long_name: str, path: str, components: int = 1, exported: str = ""
-) -> Field:
-    """Field at nodes of the skin over time, stored and exported."""
-    of = _by(path)
-    return Field(name, unit, long_name, Place.SKIN_NODE, of, components, Times.ALL, exported=exported or name)
+_of_press, _at_skin = partial(_over_time, Place.PRESS), partial(_over_time, Place.SKIN_NODE)
 
 
 def _watched(
@@ -203,11 +199,8 @@ def watched_elements(mesh: Mesh, depths_mm: Sequence[float] = ()) -> IntArray:
         return sheet
     layers = [mesh.layer[mesh.elements_at(depth_mm)] for depth_mm in depths_mm]
     if empty := [depth for depth, found in zip(depths_mm, layers, strict=True) if not found.size]:
-        raise InputError(
-            "receptor_depths_mm",
-            f"must be depths of the tissue, which is at most {mesh.node_depth_mm.max():.3g} mm thick",
-            f"{empty[0]:g} mm",
-        )
+        wanted = f"must be depths of the tissue, which is at most {mesh.node_depth_mm.max():.3g} mm thick"
+        raise InputError("receptor_depths_mm", wanted, f"{empty[0]:g} mm")
     held = np.flatnonzero(np.isin(mesh.layer, np.concatenate(layers)))
     return np.concatenate([sheet, np.setdiff1d(held, sheet)])
 

@@ -66,39 +66,6 @@ LOOKS_FOR_TOUCH = 8  # Times per sample of a motion aside at which first touch i
 class Touch:
     """Everything that determines one indentation; its value is the key of the stored result.
 
-    Parameters
-    ----------
-    finger : Fingertip or FingerMesh
-        The finger.
-    indenter : Indenter
-        The rigid body.
-    stimulus : RampAndHold, ForceRampAndHold or Trajectory
-        Its motion, by depth or by force.
-    tissues : Tissues
-        Laws of the four layers.
-    grading : Grading
-        Fine zone and element sizes of the mesh; those that a `FingerMesh` has.
-    settings : PressSettings
-        Steps and tolerances.
-    at_mm : (float, float), optional
-        x and z of the skin point that the indenter's axis goes through; by default the middle of the
-        finger's pad, `Fingertip.contact_mm`. [mm]
-    tilt_deg : float
-        Rotation of the indenter about z. At 0 it presses along y, perpendicular to the finger's long axis;
-        a positive tilt turns the direction of pressing towards the proximal end. [degrees]
-    friction : float
-        Coulomb's coefficient between skin and indenter.
-    spin_deg : float
-        Rotation of the indenter about its direction of pressing, after the tilt. At 0 a bar lies across the
-        finger, at 90 along it; a positive spin turns the indenter's x axis from distal towards +z. [degrees]
-    receptor_depths_mm : tuple of float
-        Depths of end organs at which all quantities are wanted beside the border of epidermis and dermis:
-        they are kept in the layers that hold these depths. [mm]
-    whole : bool
-        Whether `solve` keeps all nodes and elements over time, unless it is told. No part of the key.
-    progress : Progress, optional
-        Shown how far `solve` is. No part of the key.
-
     Raises
     ------
     InputError
@@ -113,18 +80,28 @@ class Touch:
     """
 
     finger: Finger
-    indenter: Indenter
-    stimulus: Motion
-    tissues: Tissues
-    grading: Grading
-    settings: PressSettings = field(default_factory=PressSettings)
-    at_mm: Pair = None  # type: ignore[assignment]  # a pair after initialisation
+    indenter: Indenter  #: The rigid body.
+    stimulus: Motion  #: Its motion, by depth or by force.
+    tissues: Tissues  #: Laws of the four layers.
+    grading: Grading  #: Fine zone and element sizes of the mesh; those that a `FingerMesh` has.
+    settings: PressSettings = field(default_factory=PressSettings)  #: Steps and tolerances.
+    at_mm: Pair = None  # type: ignore[assignment]  #: a pair after initialisation
+    """x and z of the skin point that the indenter's axis goes through; by default the middle of the finger's
+    pad, `Fingertip.contact_mm`. [mm]"""
     tilt_deg: Annotated[float, limits(-LARGEST_TILT_DEG, LARGEST_TILT_DEG)] = 0.0
-    friction: Finite = 0.0
+    """Rotation of the indenter about z. At 0 it presses along y, perpendicular to the finger's long axis; a
+    positive tilt turns the direction of pressing towards the proximal end. [degrees]"""
+    friction: Finite = 0.0  #: Coulomb's coefficient between skin and indenter.
     spin_deg: Finite = 0.0
+    """Rotation of the indenter about its direction of pressing, after the tilt. At 0 a bar lies across the
+    finger, at 90 along it; a positive spin turns the indenter's x axis from distal towards +z. [degrees]"""
     receptor_depths_mm: Numbers = ()
+    """Depths of end organs at which all quantities are wanted beside the border of epidermis and dermis: they
+    are kept in the layers that hold these depths. [mm]"""
     whole: Flag = field(default=False, compare=False, repr=False)
+    """Whether `solve` keeps all nodes and elements over time, unless it is told. No part of the key."""
     progress: SkipValidation[Progress | None] = field(default=None, compare=False, repr=False)
+    """Shown how far `solve` is. No part of the key."""
 
     def __post_init__(self) -> None:
         x, z = self.at_mm or self.finger.contact_mm

@@ -434,11 +434,9 @@ class ReceptorSheet:
         # the finger, give the distance.
         nodes = self.mesh.nodes_mm[self.mesh.grid[:, :, through]]
         middles = 0.25 * (nodes[:-1, :-1] + nodes[1:, :-1] + nodes[1:, 1:] + nodes[:-1, 1:])
-        bulge = np.zeros_like(middles)
-        wide = self._wider(nodes)
-        bulge += 0.5 * _bulge(wide, 1)[:-1] + 0.5 * _bulge(wide, 1)[1:]
         tall = np.concatenate([2 * nodes[:1] - nodes[1:2], nodes, 2 * nodes[-1:] - nodes[-2:-1]])
-        bulge += 0.5 * _bulge(tall, 0)[:, :-1] + 0.5 * _bulge(tall, 0)[:, 1:]
+        along, around = _bulge(tall, 0), _bulge(self._wider(nodes), 1)
+        bulge = (0.5 * around[:-1] + 0.5 * around[1:]) + (0.5 * along[:, :-1] + 0.5 * along[:, 1:])
         normal = np.cross(nodes[1:, 1:] - nodes[:-1, :-1], nodes[:-1, 1:] - nodes[1:, :-1])
         normal /= np.linalg.norm(normal, axis=2, keepdims=True)
         # The middle moves along the normal only.

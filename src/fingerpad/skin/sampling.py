@@ -66,10 +66,8 @@ class SurfaceProfile(Result):
     def __post_init__(self) -> None:
         distance, deflection = self.distance_mm, self.deflection_mm
         if not distance.size or distance.shape != deflection.shape:
-            raise InputError(
-                "SurfaceProfile needs one deflection per distance: got "
-                f"{deflection.size} for {distance.size} distances."
-            )
+            got = f"{deflection.size} for {distance.size} distances"
+            raise InputError(f"SurfaceProfile needs one deflection per distance: got {got}.")
 
     def __repr__(self) -> str:
         return (
@@ -290,15 +288,8 @@ class SkinResponse(Result):
         """
         static, *other = self._read(dict.fromkeys((static_quantity, dynamic_quantity)), sites, depth_mm)
         dynamic = Traces(self.times_ms, other[0], quantity=dynamic_quantity) if other else None
-        return Traces(
-            self.times_ms,
-            static,
-            np.array(self.kinks_ms),
-            static_quantity,
-            dynamic,
-            self.phases,
-            self.onset_ms,
-        )
+        motion = self.phases, self.onset_ms
+        return Traces(self.times_ms, static, np.array(self.kinks_ms), static_quantity, dynamic, *motion)
 
     def sample(self, quantity: str, sites: ArrayLike, depth_mm: ArrayLike | None = None) -> FloatArray:
         """Sample a quantity that may drive an afferent below points of the skin, (n_times, n_sites).
@@ -387,11 +378,8 @@ def places_below(receptors: Receptors, sites: ArrayLike, depth_mm: ArrayLike | N
     """Find end organs by their x and z on the volar side, or below x, y and z of the skin."""
     points = float_array("sites", sites, None)
     if points.ndim != 2 or points.shape[1] not in (2, 3):
-        raise InputError(
-            "sites",
-            "must be a list of places, such as [(x, z)] or [(x, y, z)], in mm",
-            f"shape {points.shape}",
-        )
+        wanted = "must be a list of places, such as [(x, z)] or [(x, y, z)], in mm"
+        raise InputError("sites", wanted, f"shape {points.shape}")
     if depth_mm is None:
         return _places_of(_Sites(receptors, points))
     depths = float_array("depth_mm", depth_mm, None)

@@ -82,13 +82,10 @@ class _Quarter:
     def area(self, start: FloatArray, end: FloatArray) -> FloatArray:
         """Integral of the element of area over phi. [mm²]"""
         middle, reach = 0.5 * (start + end), 0.5 * (end - start)
-        return sum(
-            (
-                reach * weight * self.area_element(middle + reach * node)
-                for node, weight in zip(_NODES, _WEIGHTS, strict=True)
-            ),
-            np.zeros_like(middle),
-        )
+        total = np.zeros_like(middle)
+        for node, weight in zip(_NODES, _WEIGHTS, strict=True):
+            total += reach * weight * self.area_element(middle + reach * node)
+        return total
 
     def reached(self, start: FloatArray, area: FloatArray) -> FloatArray:
         """Find phi up to which the integral from `start` takes a value, by Newton's method in a bracket."""
@@ -235,9 +232,8 @@ class UnrolledSkin:
         """`around` at phi >= 0: the integral over the volar and, beyond it, the dorsal quarter."""
         volar, dorsal = self._quarters(s)
         side = np.full_like(phi, _HALF)
-        area = volar.area(np.zeros_like(phi), np.minimum(phi, side)) + dorsal.area(
-            side, np.maximum(phi, side)
-        )
+        area = volar.area(np.zeros_like(phi), np.minimum(phi, side))
+        area = area + dorsal.area(side, np.maximum(phi, side))
         return area / self._midline_slope(s)
 
     def _phi(self, s: FloatArray, around: FloatArray) -> FloatArray:
@@ -315,11 +311,8 @@ class NailEdge:
         outside |= along > self.half_length_mm(distance) + _ROUND_OFF_MM
         if outside.any():
             wrong = places[np.argmax(outside)]
-            raise InputError(
-                "places_mm",
-                f"must lie within {self.reach_mm:g} mm of the edge of the nail and between its ends",
-                f"along = {wrong[0]:g}, distance = {wrong[1]:g} mm",
-            )
+            wanted = f"must lie within {self.reach_mm:g} mm of the edge of the nail and between its ends"
+            raise InputError("places_mm", wanted, f"along = {wrong[0]:g}, distance = {wrong[1]:g} mm")
         lines, arcs = self._lines
         step = np.clip(distance / _STEP_MM, 0.0, arcs.shape[1] - 1 - 1e-9)
         before = step.astype(np.int64)
@@ -371,12 +364,8 @@ class NailEdge:
 
     def _within_reach(self, name: str, distance_mm: float) -> float:
         if positive(name, distance_mm, "mm") > self.reach_mm:
-            raise InputError(
-                name,
-                f"must not exceed the reach of {self.reach_mm:g} mm from the nail's edge",
-                f"{distance_mm:.3g} mm",
-                "raise reach_mm",
-            )
+            wanted = f"must not exceed the reach of {self.reach_mm:g} mm from the nail's edge"
+            raise InputError(name, wanted, f"{distance_mm:.3g} mm", "raise reach_mm")
         return float(distance_mm)
 
     @cached_property

@@ -264,7 +264,7 @@ def _folds(prepared: Prepared, rates: RateRecordings, validation: CrossValidatio
         FittedFold(
             fold=fold.fold + 1,
             stimuli=tuple(rates.stimuli[row] for row in fold.testing),
-            fss_train=fold.score_train,
+            fss_train=fold.fit.score,
             fss_test=fold.score_test,
             n_evaluations=fold.fit.n_evaluations,
             seconds=fold.fit.seconds,

@@ -12,6 +12,7 @@ from fingerpad.core.values import Matrix, Number, Vector, WholeVector
 from fingerpad.inference.fitting.methods import FoldFit
 from fingerpad.inference.fitting.sensitivity import SobolIndices
 from fingerpad.inference.rate_model import RateProblem
+from fingerpad.neuron.afferent import PARAMETER_NAMES
 
 if TYPE_CHECKING:
     from fingerpad.inference.fitting.posterior import Chains
@@ -195,7 +196,7 @@ class SearchStep:
 
 @result_class
 class Search:
-    """Search of one fold from one start point."""
+    """Search of one fold from one start point, in the paper's six parameters."""
 
     start: int  #: Number of the start point, from 1.
     fss_train: Number
@@ -216,7 +217,7 @@ class Search:
                     SearchStep(
                         iteration=iteration,
                         fss=step.score,
-                        parameters=dict(zip(problem.names, step.parameters.tolist(), strict=True)),
+                        parameters=dict(zip(PARAMETER_NAMES, step.parameters.tolist(), strict=True)),
                     )
                     for iteration, step in enumerate(search.history)
                 ),

@@ -165,7 +165,7 @@ def _fold(problem: RateProblem, fold: FoldFit, shift_mm: FloatArray) -> FoldResu
         fold=fold.fold + 1,
         start=fold.fit.start + 1,
         testing_shift_mm=shift_mm[fold.testing],
-        fss_train=fold.score_train,
+        fss_train=fold.fit.score,
         fss_test=fold.score_test,
         climbs=Search.of(problem, fold),
     )

@@ -9,6 +9,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Protocol, runtime_checkable
 
 import numpy as np
@@ -64,15 +65,12 @@ class Problem(Protocol):
     @property
     def n_observations(self) -> int:
         """Number of observed stimuli; `chosen` are their numbers from 0."""
-        ...
 
     def residuals(self, parameters: FloatArray, chosen: IntArray) -> FloatArray:
         """Scaled differences between observations and predictions under the chosen stimuli."""
-        ...
 
     def score(self, parameters: FloatArray, chosen: IntArray) -> float:
         """Goodness of fit over the chosen stimuli, 1 if it is perfect; larger is better."""
-        ...
 
 
 @dataclass(frozen=True)
@@ -106,7 +104,6 @@ class Method(Protocol):
 
     def fit(self, problem: Problem, chosen: IntArray) -> Fit:
         """Fit the chosen observations of a problem."""
-        ...
 
 
 def best_of(attempts: tuple[Fit, ...]) -> Fit:
@@ -170,59 +167,38 @@ class LeastSquares:
     def _refined(self, problem: Problem, chosen: IntArray, start: FloatArray) -> Fit:
         clock, scales = time.perf_counter(), self.bounds.scales
         low, high = self.bounds.low / scales, self.bounds.high / scales
-        visited = _Visited(problem, chosen, scales)
-        visited.residuals(start / scales)
-        steps = [visited.best]
-        for difference in self.difference_steps if self.jacobian is None else self.difference_steps[:1]:
-            least_squares(
-                visited.residuals,
-                np.clip(visited.best.parameters / scales, low, high),  # round-off at a bound
-                self._slopes(visited, difference),
-                bounds=(low, high),
-                max_nfev=self.most_iterations,
-            )
-            steps.append(visited.best)
-        seconds = time.perf_counter() - clock
-        return Fit(steps[-1].parameters, steps[-1].score, visited.n_evaluations, seconds, tuple(steps))
+        best, n_evaluations = FitStep(np.full(scales.size, np.nan), -np.inf), 0
 
-    def _slopes(self, visited: _Visited, difference: float) -> Callable[[FloatArray], FloatArray]:
-        """Return the derivatives of the residuals as a function of a point, in units of the scales."""
-        scales = self.bounds.scales
-        if self.jacobian is not None:
-            jacobian = self.jacobian
-            return lambda place: jacobian(place * scales, visited.chosen) * scales
-        low, high = self.bounds.low / scales, self.bounds.high / scales
+        def residuals(place: FloatArray) -> FloatArray:
+            nonlocal best, n_evaluations
+            parameters = place * scales
+            found = problem.residuals(parameters, chosen)
+            n_evaluations += 1
+            score = 1.0 - float(found @ found)
+            if score > best.score:
+                best = FitStep(parameters, score)
+            return found
 
-        def central(place: FloatArray) -> FloatArray:
-            before = np.maximum(place - difference, low)
-            after = np.minimum(place + difference, high)
+        def slopes(place: FloatArray, difference: float) -> FloatArray:
+            if self.jacobian is not None:
+                return self.jacobian(place * scales, chosen) * scales
+            before, after = np.maximum(place - difference, low), np.minimum(place + difference, high)
             columns = []
             for number in range(place.size):
                 ends = [place.copy(), place.copy()]
                 ends[0][number], ends[1][number] = before[number], after[number]
-                rise = visited.residuals(ends[1]) - visited.residuals(ends[0])
-                columns.append(rise / (after[number] - before[number]))
+                columns.append((residuals(ends[1]) - residuals(ends[0])) / (after[number] - before[number]))
             return np.column_stack(columns)
 
-        return central
-
-
-class _Visited:
-    """Residuals of a problem in scaled parameters, with a count and the best point so far."""
-
-    def __init__(self, problem: Problem, chosen: IntArray, scales: FloatArray):
-        self.problem, self.chosen, self.scales = problem, chosen, scales
-        self.n_evaluations = 0
-        self.best = FitStep(np.full(scales.size, np.nan), -np.inf)
-
-    def residuals(self, place: FloatArray) -> FloatArray:
-        parameters = place * self.scales
-        residuals = self.problem.residuals(parameters, self.chosen)
-        self.n_evaluations += 1
-        score = 1.0 - float(residuals @ residuals)
-        if score > self.best.score:
-            self.best = FitStep(parameters, score)
-        return residuals
+        residuals(start / scales)
+        steps = [best]
+        for difference in self.difference_steps if self.jacobian is None else self.difference_steps[:1]:
+            begun = np.clip(best.parameters / scales, low, high)  # round-off at a bound
+            derivatives = partial(slopes, difference=difference)
+            least_squares(residuals, begun, derivatives, bounds=(low, high), max_nfev=self.most_iterations)
+            steps.append(best)
+        seconds = time.perf_counter() - clock
+        return Fit(best.parameters, best.score, n_evaluations, seconds, tuple(steps))
 
 
 @dataclass(frozen=True)
@@ -337,7 +313,8 @@ class ResponseSurface:
             if not history:
                 history.append(FitStep(base, at_base))
             slopes = regression_slopes(design, values)
-            best, highest, n_trials = _ascend(score, base, at_base, slopes, units, allowed)
+            direction = slopes / (float(np.linalg.norm(slopes)) or 1.0) * units
+            best, highest, n_trials = _ascend(score, base, at_base, direction, allowed)
             n_evaluations += len(design) + n_trials
             if highest - at_base <= self.smallest_gain:
                 return Fit(base, at_base, n_evaluations, time.perf_counter() - clock, tuple(history))
@@ -352,20 +329,12 @@ class ResponseSurface:
 
 
 def _ascend(
-    score: Objective,
-    base: FloatArray,
-    at_base: float,
-    slopes: FloatArray,
-    units: FloatArray,
-    allowed: Restriction,
+    score: Objective, base: FloatArray, at_base: float, direction: FloatArray, allowed: Restriction
 ) -> tuple[FloatArray, float, int]:
     """Best point on the path of steepest ascent, its score, and the steps that were tried."""
-    best, highest = base, at_base
-    steepness = float(np.linalg.norm(slopes))
-    if steepness == 0.0:
+    best, highest, step = base, at_base, 1.0
+    if not direction.any():
         return best, highest, 0
-    direction = slopes / steepness * units
-    step = 1.0
     for n_trials in range(1, _MOST_STEPS + 1):
         trial = allowed(best + step * direction)
         value = score(trial)
@@ -413,10 +382,6 @@ class FoldFit:
     training: IntArray
     testing: IntArray  #: Observations used for fitting, and those left out, (n_training,).
 
-    @property
-    def score_train(self) -> float:
-        return self.fit.score
-
 
 @dataclass(frozen=True)
 class CrossValidation:
@@ -427,7 +392,7 @@ class CrossValidation:
     @property
     def score_train(self) -> float:
         """Mean training score of the folds."""
-        return float(np.mean([fold.score_train for fold in self.folds]))
+        return float(np.mean([fold.fit.score for fold in self.folds]))
 
     @property
     def score_test(self) -> float:
@@ -468,11 +433,8 @@ def _checked_memberships(memberships: ArrayLike, n_observations: int) -> IntArra
     folds = given.astype(np.int64)
     present = np.unique(folds)
     if (folds != given).any() or present.size < 2 or not np.array_equal(present, np.arange(present.size)):
-        raise InputError(
-            "memberships",
-            "must number at least two folds from 0 on without a gap",
-            str(np.unique(given).tolist()),
-        )
+        wanted = "must number at least two folds from 0 on without a gap"
+        raise InputError("memberships", wanted, str(np.unique(given).tolist()))
     return folds
 
 

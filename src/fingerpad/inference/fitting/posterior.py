@@ -116,7 +116,6 @@ MOST_TRIES = 200  # Times that a start at an impossible point is drawn again.
 class Chains:
     """Converged draws from a density, and the measures of convergence."""
 
-    names: tuple[str, ...]
     draws: FloatArray  #: The second half of all steps, (n_ensembles, n_steps, n_walkers, n_parameters).
     log_densities: FloatArray  #: Up to a constant, (n_ensembles, n_steps, n_walkers).
     r_hat: FloatArray  #: Split R-hat over the ensembles, (n_parameters,). [1]
@@ -126,8 +125,6 @@ class Chains:
     autocorrelation_steps: FloatArray  #: Draws made per effective one, (n_parameters,). [1]
     acceptance: float  #: Accepted share of the proposals. [0-1]
     n_evaluations: int  #: Evaluations of the density, those of the discarded first half included.
-    seed: int  #: Of the random numbers; the same seed gives the same bits.
-    history: tuple[str, ...]  #: One line per check of convergence.
 
     @property
     def flat(self) -> FloatArray:
@@ -161,12 +158,20 @@ def sample(
     moves: Sequence[tuple[Any, float]] | None = None,
 ) -> Chains:
     """Sample a density until the ensembles agree and the effective sample sizes suffice."""
-    labels = tuple(names)
     middle, scale = np.asarray(centre, dtype=np.float64), np.asarray(spread, dtype=np.float64)
     density = _Checked(log_density)
-    seeds = independent_keys(seed, n_ensembles)
     usual = [(emcee.moves.StretchMove(), 0.5), (emcee.moves.KDEMove(bw_method=BANDWIDTH), 0.5)]
-    ensembles = [_ensemble(density, middle, scale, n_walkers, one, list(moves or usual)) for one in seeds]
+
+    def ensemble(key: Key) -> tuple[emcee.EnsembleSampler, emcee.State]:
+        """Walkers with random numbers of their own, and their start at scattered points."""
+        start, proposals = independent_keys(key, 2)
+        walkers, heights = _start(density, middle, scale, n_walkers, generator(start))
+        chosen = list(moves or usual)
+        sampler = emcee.EnsembleSampler(n_walkers, middle.size, density, moves=chosen, vectorize=True)
+        sampler.random_state = emcee_state(proposals)
+        return sampler, emcee.State(walkers, log_prob=heights, random_state=sampler.random_state)
+
+    ensembles = [ensemble(key) for key in independent_keys(seed, n_ensembles)]
     history: list[str] = []
     done, wanted = 0, n_steps
     while True:
@@ -185,7 +190,6 @@ def sample(
         )
         if r_hat.max() <= largest_r_hat and min(bulk.min(), tail.min()) >= smallest_effective_size:
             return Chains(
-                names=labels,
                 draws=draws,
                 log_densities=np.array([sampler.get_log_prob(discard=done // 2) for sampler, _ in ensembles]),
                 r_hat=r_hat,
@@ -195,36 +199,18 @@ def sample(
                 # A walker is proposed one move per step, and an accepted one changes its position.
                 acceptance=float(np.any(np.diff(draws, axis=1) != 0.0, axis=-1).mean()),
                 n_evaluations=density.count,
-                seed=seed,
-                history=tuple(history),
             )
         if done == most_steps:
             smaller = np.minimum(bulk, tail)
             raise ConvergenceError(
-                f"The draws have not converged after {most_steps} steps: {labels[int(r_hat.argmax())]} has "
+                f"The draws have not converged after {most_steps} steps: {names[int(r_hat.argmax())]} has "
                 f"R-hat {r_hat.max():.3f} (wanted: at most {largest_r_hat:g}), and the effective sample size "
-                f"of {labels[int(smaller.argmin())]} is only {smaller.min():.0f} (wanted: "
+                f"of {names[int(smaller.argmin())]} is only {smaller.min():.0f} (wanted: "
                 f"{smallest_effective_size:g}). Raise most_steps, or check whether the data determine these "
                 "parameters.",
                 tuple(history),
             )
         wanted = min(2 * done, most_steps)
-
-
-def _ensemble(
-    density: _Checked,
-    centre: FloatArray,
-    spread: FloatArray,
-    n_walkers: int,
-    key: Key,
-    proposals: list[tuple[Any, float]],
-) -> tuple[emcee.EnsembleSampler, emcee.State]:
-    """Return an ensemble with random numbers of its own, and its start at scattered points."""
-    start, moves = independent_keys(key, 2)
-    walkers, heights = _start(density, centre, spread, n_walkers, generator(start))
-    sampler = emcee.EnsembleSampler(n_walkers, centre.size, density, moves=proposals, vectorize=True)
-    sampler.random_state = emcee_state(moves)
-    return sampler, emcee.State(walkers, log_prob=heights, random_state=sampler.random_state)
 
 
 class _Checked:

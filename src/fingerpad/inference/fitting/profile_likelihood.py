@@ -43,7 +43,6 @@ class ProfileLikelihood:
     losses: FloatArray  #: Largest log likelihood of all minus the largest for this value, (n_values,). [1]
     points: FloatArray  #: The best parameters for each value, (n_values, n_parameters).
     interval: tuple[float, float]  #: Ends of the confidence interval; infinite where the data set no bound.
-    level: float  #: Level of confidence. [0-1]
 
 
 def profile_likelihoods(
@@ -60,7 +59,6 @@ def profile_likelihoods(
     several starts are given, also from the best of the nearest ones, since the likelihood has many local
     maxima.
     """
-    labels = tuple(names)
     origins, units = np.atleast_2d(starts), np.asarray(scales, dtype=np.float64)
     search = _Search(log_likelihood, units, origins)
     best, highest = search.best_of(origins)
@@ -78,11 +76,9 @@ def profile_likelihoods(
     def sweep(indices: slice) -> list[tuple[FloatArray, float]]:
         return search.sweep(best, indices.start, allowed)
 
-    sweeps = in_blocks(sweep, len(labels), 1)
+    sweeps = in_blocks(sweep, len(names), 1)
     highest = max(height for fits in sweeps for _, height in fits)
-    return tuple(
-        _profile(labels[index], index, fits, highest, level, allowed) for index, fits in enumerate(sweeps)
-    )
+    return tuple(_profile(names[index], index, fits, highest, allowed) for index, fits in enumerate(sweeps))
 
 
 @dataclass(frozen=True)
@@ -162,13 +158,13 @@ class _Search:
 
 
 def _profile(
-    name: str, index: int, fits: list[tuple[FloatArray, float]], highest: float, level: float, allowed: float
+    name: str, index: int, fits: list[tuple[FloatArray, float]], highest: float, allowed: float
 ) -> ProfileLikelihood:
     points = np.array([point for point, _ in fits])
     order = np.argsort(points[:, index])
     values = points[order, index]
     losses = highest - np.array([height for _, height in fits])[order]
-    return ProfileLikelihood(name, values, losses, points[order], _interval(values, losses, allowed), level)
+    return ProfileLikelihood(name, values, losses, points[order], _interval(values, losses, allowed))
 
 
 def _interval(values: FloatArray, losses: FloatArray, allowed: float) -> tuple[float, float]:
