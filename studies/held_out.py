@@ -22,8 +22,14 @@ from fingerpad.experiments.conditions import RECEPTOR_X_MM, Conditions
 from fingerpad.experiments.gerling2014.skin import PLATE_DEPTHS_MM
 from fingerpad.experiments.runner import Manifest, Runner
 from fingerpad.experiments.validation.observations import KINDS, Observation, Observations, read_observations
-from fingerpad.experiments.validation.request import LOADINGS, RAMP_AND_HOLD, ValidationRequest
-from fingerpad.experiments.validation.validation import Condition, predict, validate
+from fingerpad.experiments.validation.validation import (
+    LOADINGS,
+    RAMP_AND_HOLD,
+    Condition,
+    ValidationRequest,
+    predict,
+    validate,
+)
 from fingerpad.geometry.bodies import FlatPunch, Grating, Plate
 from fingerpad.geometry.indenters import Indenter
 from fingerpad.geometry.mesh_checks import jacobian_at_gauss

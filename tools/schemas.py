@@ -32,8 +32,7 @@ from fingerpad.experiments.requests.stimulus import MEASURED, RAMP_AND_HOLD
 from fingerpad.experiments.requests.touch import ReductionRequest, RespondRequest, TouchFile, TouchRequest
 from fingerpad.experiments.run import ReproductionRequest
 from fingerpad.experiments.sweep.request import SweepRequest
-from fingerpad.experiments.validation.request import ValidationRequest
-from fingerpad.experiments.validation.validation import ValidationFile
+from fingerpad.experiments.validation.validation import ValidationFile, ValidationRequest
 
 RESULT_FILES: tuple[type, ...] = (
     ReproductionResult,

@@ -18,8 +18,7 @@ from fingerpad.experiments.gerling2014.reproduction import HUMAN, PAPER, Reprodu
 from fingerpad.experiments.requests.parts import Request
 from fingerpad.experiments.requests.touch import ReductionRequest, RespondRequest, TouchRequest
 from fingerpad.experiments.runner import Runner
-from fingerpad.experiments.validation.request import ValidationRequest
-from fingerpad.experiments.validation.validation import validate
+from fingerpad.experiments.validation.validation import ValidationRequest, validate
 from fingerpad.geometry.grading import RESOLUTIONS
 from fingerpad.mechanics.tissues import TISSUES
 

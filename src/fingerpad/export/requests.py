@@ -27,8 +27,7 @@ from fingerpad.experiments.gerling2014.reproduction import ReproductionResult
 from fingerpad.experiments.requests.parts import Request, at
 from fingerpad.experiments.requests.touch import ReductionRequest, RespondRequest, TouchRequest, TouchResult
 from fingerpad.experiments.run import ReproductionRequest, run
-from fingerpad.experiments.validation.request import ValidationRequest
-from fingerpad.experiments.validation.validation import ValidationFile
+from fingerpad.experiments.validation.validation import ValidationFile, ValidationRequest
 from fingerpad.export.decks import DECKS, RESULTS, write_deck
 from fingerpad.export.job import job_of
 from fingerpad.export.results import require
