@@ -18,7 +18,6 @@ from fingerpad.data import neuron
 from fingerpad.experiments.fit import results
 from fingerpad.inference.afferent_fit import (
     ReceptorOffset,
-    Search,
     fitted_four,
     fitted_six,
     four_numbers,
@@ -333,7 +332,10 @@ def fit_offset(
     def moving(begun: FloatArray) -> Method:
         if method == "cma_es":
             return search.by_evolution(np.append(begun, 0.0), seed)
-        return _from_all_offsets(search, begun, roving.offsets_mm)
+        within = np.clip(begun, search.bounds.low[:4], search.bounds.high[:4])  # round-off at a bound
+        offsets_mm = sorted({0.0, *roving.offsets_mm[1:-1].tolist()})
+        starts = [np.append(within, offset) for offset in offsets_mm]
+        return LeastSquares(starts, search.bounds, n_refined=2)
 
     best, crossed = validated(search.problem, Continued(first.method, moving, first.problem), memberships)
     four, offset_mm = fitted_four(best.parameters[:4]).tolist(), float(best.parameters[-1])
@@ -356,10 +358,3 @@ def fit_offset(
             fss_in_sample=np.array([one.method.fit(one.problem, everything).score for one in held]),
         ),
     )
-
-
-def _from_all_offsets(search: Search, begun: FloatArray, offsets_mm: FloatArray) -> Method:
-    """Least squares from each offset."""
-    within = np.clip(begun, search.bounds.low[:4], search.bounds.high[:4])  # round-off at a bound
-    starts = [np.append(within, offset) for offset in sorted({0.0, *offsets_mm[1:-1].tolist()})]
-    return LeastSquares(starts, search.bounds, n_refined=2)

@@ -150,6 +150,10 @@ class AfferentsSettings(PopulationSettings):
     windows_ms: RateWindowSettings = RateWindowSettings()  #: When spikes count.
 
 
+AFFERENT_OBJECTS = ("afferents", "afferents.afferent", "afferents.population")
+"""Keys of a request with a block `afferents` that may name an object."""
+
+
 def as_settings(value: Any) -> Any:
     """Return the block of a population, or of an afferent, that is given in the place of the block."""
     if isinstance(value, Population):

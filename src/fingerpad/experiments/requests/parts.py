@@ -15,7 +15,7 @@ import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, is_dataclass, replace
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
 from pkgutil import resolve_name
 from types import MappingProxyType
@@ -149,9 +149,7 @@ def made_by(kind: str, makes: Callable[..., Any], without: Sequence[str] = ()) -
 
 def object_of_python(kind: type) -> Any:
     """Type of an object of Python, which a file names as module:object and results show as it is written."""
-    return Annotated[
-        Any, Check(lambda name, value: like_or_made(name, value, kind), {"type": "string"}, repr)
-    ]
+    return Annotated[Any, Check(partial(like_or_made, kind=kind), {"type": "string"}, repr)]
 
 
 def like_or_made(name: str, value: Any, kind: type) -> Any:

@@ -196,11 +196,8 @@ TissuesPart = Annotated[
 ]  # Tissues by name, or of one's own.
 
 
-FINGER_OBJECTS: tuple[str, ...] = (
-    "finger",
-    "tissues",
-    "grading",
-)  # Keys of a `FingerDescription` that may name an object.
+FINGER_OBJECTS = ("finger", "tissues", "grading")
+"""Keys of a `FingerDescription` that may name an object."""
 
 
 class FingerDescription(Part):
