@@ -9,8 +9,9 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from fingerpad.core.checked import result_class
-from fingerpad.core.result_files import read_results
+from fingerpad.core.result_files import from_json
 from fingerpad.core.values import Number, Vector
+from fingerpad.experiments import schemas
 from fingerpad.experiments.gerling2014.claims import ClaimRow, Group, Statement, Summary
 from fingerpad.experiments.gerling2014.nerve import SingleUnitResult
 from fingerpad.experiments.gerling2014.percept import SphereDiscrimination
@@ -88,7 +89,8 @@ def read_excerpt(path: Path) -> Excerpt:
     StoreError
         If the file cannot be read.
     """
-    return excerpt(read_results(path, ReproductionResult))
+    schemas.read(path, "fingerpad reproduction")  # refuses any other file
+    return excerpt(from_json(ReproductionResult, path.read_bytes()))
 
 
 def excerpt(results: ReproductionResult) -> Excerpt:
