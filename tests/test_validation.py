@@ -72,7 +72,7 @@ def test_columns_stand_in_any_order_and_lines_keep_their_numbers(tmp_path):
         "0.11,1,plate\r\n# and\r\n0.2,1.0, punch:6.350\r\n0.3,1e0,punch:6.35\r\n",
     )
     found = read_observations(path)
-    assert (found.kind.name, found.kind.unit) == ("force", "N")
+    assert (found.kind.name, found.kind.observed) == ("force", "force_n")
     assert [row.line for row in found.rows] == [4, 6, 7]
     assert [row.condition for row in found.rows] == [
         (each, 1.0) for each in ("plate", "punch:6.350", "punch:6.35")

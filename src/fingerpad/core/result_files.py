@@ -17,9 +17,9 @@ from fingerpad.core.values import JsonObject, JsonSchema
 _Kind = TypeVar("_Kind")
 
 
-def to_json(result: Any, indent: int | None = 1) -> bytes:
+def to_json(result: Any) -> bytes:
     """JSON of a result, null for NaN."""
-    return TypeAdapter(type(result)).dump_json(result, indent=indent)
+    return TypeAdapter(type(result)).dump_json(result, indent=1)
 
 
 def from_json(cls: type[_Kind], content: bytes) -> _Kind:

@@ -119,21 +119,19 @@ class FitRequest(FingerRequest):
     def check(self) -> None:
         """Raise `InputError` if the fit is impossible; before anything is solved."""
         with self.origin.located():
-            self._check()
+            if self.free or self.afferent != DEFAULT:
+                self._check_chosen()
+            stimuli = self.recorded.stimuli
+            for name, stimulus in stimuli.items():
+                check_windows(self.used_windows_ms, stimulus.motion.end_ms, name)
+            if self.offset:
+                check_offset(self.method, [stimulus.x_mm for stimulus in stimuli.values()])
+            n_free = len(self.free) or len(IDENTIFIABLE_NAMES) + self.offset
+            check_enough(self.rates, self.memberships, n_free)
+            if self.method == "likelihood":
+                motions = {stimulus.motion for stimulus in stimuli.values()}
+                check_spikes(self.recorded.recordings, len(motions))
         self.touches  # noqa: B018
-
-    def _check(self) -> None:
-        if self.free or self.afferent != DEFAULT:
-            self._check_chosen()
-        for name, stimulus in self.recorded.stimuli.items():
-            check_windows(self.used_windows_ms, stimulus.motion.end_ms, name)
-        if self.offset:
-            check_offset(self.method, [stimulus.x_mm for stimulus in self.recorded.stimuli.values()])
-        n_free = len(self.free) or len(IDENTIFIABLE_NAMES) + self.offset
-        check_enough(self.rates, self.memberships, n_free)
-        if self.method == "likelihood":
-            motions = {stimulus.motion for stimulus in self.recorded.stimuli.values()}
-            check_spikes(self.recorded.recordings, len(motions))
 
     def _check_chosen(self) -> None:
         """Refuse a fit of chosen numbers that names none, or asks for what only the four numbers have."""

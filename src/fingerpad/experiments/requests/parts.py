@@ -193,7 +193,7 @@ class OneOfKinds:
         return self.part(kind).model_validate(value)
 
     def __get_pydantic_core_schema__(self, *_: Any) -> CoreSchema:
-        return Check(self, {}, _as_written).__get_pydantic_core_schema__()
+        return Check(self, {}, as_written).__get_pydantic_core_schema__()
 
     def __get_pydantic_json_schema__(self, core: CoreSchema, handler: GetJsonSchemaHandler) -> JsonSchema:
         parts = [handler(self.part(kind).__pydantic_core_schema__) for kind in self.makers]
@@ -201,7 +201,7 @@ class OneOfKinds:
         return {"anyOf": [*parts, *texts, {"type": "string"}]}
 
 
-def _as_written(value: Any) -> Any:
+def as_written(value: Any) -> Any:
     """Return the keys of a part; an object of Python as it is shown."""
     if isinstance(value, Part):
         return value.model_dump()

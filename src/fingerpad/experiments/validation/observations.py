@@ -69,14 +69,6 @@ class Kind:
         """Condition that is a place along the finger, whose direction a source may leave open."""
         return next((name for name in self.conditions if name in ("distance_mm", "position_mm")), "")
 
-    @property
-    def unit(self) -> str:
-        return unit_of(self.observed)
-
-    @property
-    def is_rate(self) -> bool:
-        return self.observed == "rate_hz"
-
 
 KINDS: dict[str, Kind] = {
     kind.name: kind
@@ -181,8 +173,7 @@ def _kind(path: Path, columns: tuple[str, ...]) -> Kind:
 
 def _observation(line: TableRow, kind: Kind, own: Mapping[str, Indenter]) -> Observation:
     condition = tuple(_value(line, column, own) for column in kind.conditions)
-    observed = _value(line, kind.observed, own)
-    assert isinstance(observed, float)
+    observed = line.number(kind.observed, unit_of(kind.observed), COLUMNS[kind.observed])
     stiffest = STIFFEST_N_PER_MM * line.number("depth_mm", "mm") if kind.observed == "force_n" else np.inf
     if observed > stiffest:
         raise InputError(

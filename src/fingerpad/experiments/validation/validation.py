@@ -14,7 +14,7 @@ from pydantic import Field
 from fingerpad.core.checked import result_class
 from fingerpad.core.errors import ConvergenceError, InputError
 from fingerpad.core.signals import INTERVAL, Traces
-from fingerpad.core.units import MN_PER_N
+from fingerpad.core.units import MN_PER_N, unit_of
 from fingerpad.core.values import FloatArray, Number, Pair, Positive, Text, choice
 from fingerpad.data import fingertip, protocol
 from fingerpad.experiments.conditions import Conditions
@@ -208,10 +208,10 @@ def validate(request: ValidationRequest, runner: Runner) -> ValidationFile:
     }
     return ValidationFile(
         kind=kind.name,
-        unit=kind.unit,
+        unit=unit_of(kind.observed),
         resolution=request.resolution,
         tissues=manifest.materials,
-        **(of_rates if kind.is_rate else {"loading": request.loading}),
+        **(of_rates if kind.observed == "rate_hz" else {"loading": request.loading}),
         n_rows=observed.size,
         n_predicted=int(known.sum()),
         r2=coefficient_of_determination(*scored),
