@@ -102,7 +102,7 @@ UNFIT = [
     (FORCE + "plate,1,\n", "mine.csv, line 2: force_n must be given"),
     (FORCE + "punch:x,1,1\n", "mine.csv, line 2: diameter_mm must be a finite number"),
     (RATE + "0.2,30,-1\n", "mine.csv, line 2: rate_hz must not be negative [spikes/s]"),
-    (FORCE + "plate,1,1\n" * 1_000_000, "mine.csv must be at most 1 MB: it has 10.0 MB; split it"),
+    (FORCE + "plate,1,1\n" * 1_000_000, "mine.csv must have at most 1 MB: got 10 MB; split it"),
 ]
 
 

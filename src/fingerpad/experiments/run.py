@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from types import MappingProxyType
 from typing import Annotated, Any, ClassVar
 
 from fingerpad.core.engine import Engine
@@ -49,17 +48,15 @@ class ReproductionRequest(Request):
         return reproduce(columns, self.goes_beyond, runner)
 
 
-RUNS: Mapping[type[Request], Callable[[Any, Runner], Any]] = MappingProxyType(
-    {
-        TouchRequest: TouchRequest.run,
-        RespondRequest: RespondRequest.run,
-        FitRequest: run_fit,
-        DiscriminationRequest: discriminate,
-        ValidationRequest: validate,
-        ReductionRequest: ReductionRequest.run,
-        ReproductionRequest: ReproductionRequest.run,
-    }
-)  # What runs a request, by its class.
+RUNS: Mapping[type[Request], Callable[[Any, Runner], Any]] = {
+    TouchRequest: TouchRequest.run,
+    RespondRequest: RespondRequest.run,
+    FitRequest: run_fit,
+    DiscriminationRequest: discriminate,
+    ValidationRequest: validate,
+    ReductionRequest: ReductionRequest.run,
+    ReproductionRequest: ReproductionRequest.run,
+}  # What runs a request, by its class.
 
 
 def run(
