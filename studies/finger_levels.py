@@ -89,21 +89,9 @@ SITES = Sites()
 def outputs_of(
     responses: Mapping[Key, SkinResponse], candidate: Candidate, conditions: Conditions
 ) -> tuple[FloatArray, dict[str, FloatArray]]:
-    """Read from one candidate's presses what the levels need.
+    """Read from one candidate's presses the times of the drives (n_times,) [ms], and one point of `Outputs`.
 
     The responses are those of `studies.tissue_search.touches`, the bar pressed once.
-
-    Returns
-    -------
-    array (n_times,)
-        Times of the drives. [ms]
-    dict of array
-        One point of `Outputs`.
-
-    Raises
-    ------
-    InputError
-        If the bar and the spheres have different times.
     """
     profile = responses["cylinder", Cylinder().diameter_mm, 0.0].surface_profile()
     force_n = [responses["plate", depth, 0.0].force_mn[-1] / MN_PER_N for depth in PLATE_DEPTHS_MM]
@@ -144,22 +132,12 @@ def deflection_distances_mm() -> FloatArray:
 
 @dataclass(frozen=True)
 class Afferents:
-    """One afferent per point, in units in which C v is 1 and the largest stress under the bar is 1.
+    """One afferent per point, in units in which C v is 1 and the largest stress under the bar is 1."""
 
-    Parameters
-    ----------
-    resting_share : array (n_points,)
-        Potential at rest over the threshold, beta tau/(C v). [1]
-    dynamic_gain, static_gain : array (n_points,)
-        k_d/(C v) [1] and k_s/(C v) [1/ms], times the largest stress.
-    time_constant_ms : array (n_points,)
-        tau. [ms]
-    """
-
-    resting_share: FloatArray
+    resting_share: FloatArray  #: Potential at rest over the threshold, beta tau/(C v), (n_points,). [1]
     dynamic_gain: FloatArray
-    static_gain: FloatArray
-    time_constant_ms: FloatArray
+    static_gain: FloatArray  #: k_d/(C v) [1] and k_s/(C v) [1/ms], times the largest stress, (n_points,).
+    time_constant_ms: FloatArray  #: tau, (n_points,). [ms]
 
     def rates(self, number: int, times_ms: FloatArray, relative: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Dynamic and static rates (n_sites,) of one point, from (2, n_times, n_sites). [spikes/s]"""
