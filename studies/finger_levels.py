@@ -13,12 +13,12 @@ from functools import cached_property
 import numpy as np
 
 from fingerpad.core.errors import InputError
-from fingerpad.core.random_streams import Purpose, normals
 from fingerpad.core.units import MN_PER_N
 from fingerpad.core.values import FloatArray
 from fingerpad.data import cylinder_deflection, neuron, protocol
 from fingerpad.experiments.conditions import POSITIONS_MM, RECEPTOR_X_MM, Conditions
 from fingerpad.experiments.gerling2014.nerve import PIECES
+from fingerpad.experiments.gerling2014.percept import draws_of
 from fingerpad.experiments.gerling2014.skin import PLATE_DEPTHS_MM
 from fingerpad.geometry.bodies import Cylinder
 from fingerpad.inference.afferent_fit import CHANCE
@@ -63,7 +63,7 @@ class Sites:
     @cached_property
     def draws(self) -> FloatArray:
         """Presentations, (N_DRAWS, n_receptors)."""
-        return normals(SEED, 1, len(self.population.positions_mm), Purpose.RESPONSE, N_DRAWS)[0].T
+        return draws_of(self.population, SEED, N_DRAWS)
 
     @cached_property
     def _both(self) -> tuple[FloatArray, np.ndarray]:

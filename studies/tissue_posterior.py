@@ -14,11 +14,11 @@ from fingerpad.core.errors import ConvergenceError, InputError
 from fingerpad.core.values import FloatArray, IntArray, Number
 from fingerpad.data import protocol
 from fingerpad.experiments.conditions import Conditions
+from fingerpad.experiments.fit.likelihoods import interval
 from fingerpad.experiments.fit.results import CredibleInterval, PosteriorConvergence
 from fingerpad.experiments.runner import Manifest, Runner
 from fingerpad.experiments.scores import coefficient_of_determination
 from fingerpad.inference.fitting.methods import fractional_sum_of_squares
-from fingerpad.inference.fitting.posterior import credible_band
 from fingerpad.inference.identifiable import LARGEST_RESTING_SHARE, identifiable
 from fingerpad.neuron.afferent import Afferent
 from fingerpad.psychophysics.sensitivity import InterpolatedObserver
@@ -200,12 +200,6 @@ def like_human(
     gains = [RESTING + 1, RESTING + 2]
     values[:, gains] *= stress[:, np.newaxis]
     return values
-
-
-def interval(draws: FloatArray) -> CredibleInterval:
-    """Median and 95 % interval of draws (n_draws,)."""
-    low, high = credible_band(draws, 0.95)
-    return CredibleInterval(median=np.median(draws), low=low, high=high)
 
 
 def weber_fractions(static_hz: FloatArray, noise_sigma: FloatArray) -> FloatArray:

@@ -16,14 +16,13 @@ import numpy as np
 
 from fingerpad.core.checked import result_class
 from fingerpad.core.errors import ConvergenceError
-from fingerpad.core.random_streams import Purpose, normals
 from fingerpad.core.signals import Traces
 from fingerpad.core.units import MN_PER_N
 from fingerpad.core.values import FloatArray, Matrix, Number, Vector
 from fingerpad.data import protocol, psychophysics
 from fingerpad.experiments.conditions import POSITIONS_MM, RECEPTOR_X_MM, Conditions, Touch
 from fingerpad.experiments.gerling2014 import nerve
-from fingerpad.experiments.gerling2014.percept import FITTED_SPHERES, fit_to_people
+from fingerpad.experiments.gerling2014.percept import FITTED_SPHERES, draws_of, fit_to_people
 from fingerpad.experiments.gerling2014.skin import PLATE_DEPTHS_MM, deflection_r2
 from fingerpad.experiments.runner import Manifest, Runner
 from fingerpad.experiments.validation.observations import read_observations
@@ -36,12 +35,7 @@ from fingerpad.inference.rate_model import AfferentModel, RateProblem
 from fingerpad.neuron.afferent import PARAMETER_NAMES
 from fingerpad.neuron.population import Population
 from fingerpad.psychophysics.encoding import neighbour_pairs
-from fingerpad.psychophysics.observer import (
-    NOISE_DRAWS,
-    expected_euclidean_hit_rates,
-    expected_hit_rates,
-    fit_noise_sigma,
-)
+from fingerpad.psychophysics.observer import expected_euclidean_hit_rates, expected_hit_rates, fit_noise_sigma
 from fingerpad.skin.sampling import SkinResponse
 from studies.tissue_candidates import LEVELS, Candidate, candidates
 
@@ -123,7 +117,7 @@ def bar_traces(
     s distal of its axis, along the skin's tangent.
     """
     if ONE_BAR in responses:
-        along = float(np.cos(np.deg2rad(conditions.skin_tilt_deg)))
+        along = conditions.along_skin
         sites = [(RECEPTOR_X_MM + shift * along, 0.0) for shift in protocol.BAR_SHIFTS.value]
         return [driven(responses[ONE_BAR], candidate, np.array(sites))]
     receptor = np.array(nerve.RECEPTOR)
@@ -152,7 +146,7 @@ class Skins:
     @cached_property
     def draws(self) -> FloatArray:
         """Presentations behind expected hit rates, (NOISE_DRAWS, n_receptors)."""
-        return normals(self.seed, 1, len(self.population.positions_mm), Purpose.RESPONSE, NOISE_DRAWS)[0].T
+        return draws_of(self.population, self.seed)
 
     @cached_property
     def model(self) -> AfferentModel:

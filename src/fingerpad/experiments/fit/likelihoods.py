@@ -203,13 +203,13 @@ def uncertainty(
     )
 
 
-def _interval(draws: FloatArray) -> results.CredibleInterval:
+def interval(draws: FloatArray) -> results.CredibleInterval:
     low, high = credible_band(draws, LEVEL)
     return results.CredibleInterval(median=float(np.median(draws)), low=float(low), high=float(high))
 
 
 def _intervals(draws: Mapping[str, FloatArray]) -> dict[str, results.CredibleInterval]:
-    return {name: _interval(values) for name, values in draws.items()}
+    return {name: interval(values) for name, values in draws.items()}
 
 
 def _predictions(found: AfferentPosterior, recordings: RateRecordings) -> dict[str, results.PhasePrediction]:
@@ -230,8 +230,8 @@ def _prediction(drawn: ResidualDraws, observed_hz: FloatArray) -> results.PhaseP
         new_low_hz=new_low,
         new_high_hz=new_high,
         share_within_new=((new_low <= observed_hz) & (observed_hz <= new_high)).mean(),
-        residual_deviation_hz=_interval(drawn.deviation_hz),
-        residual_length_mm=_interval(drawn.length_mm),
+        residual_deviation_hz=interval(drawn.deviation_hz),
+        residual_length_mm=interval(drawn.length_mm),
         probability_of_independence=(drawn.length_mm == INDEPENDENT).mean(),
     )
 

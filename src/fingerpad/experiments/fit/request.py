@@ -28,14 +28,7 @@ from fingerpad.experiments.requests.afferents import (
     files_of,
 )
 from fingerpad.experiments.requests.parts import as_list, at, object_of_python
-from fingerpad.experiments.requests.stimuli import (
-    BAR,
-    NamedStimulus,
-    ShiftedBar,
-    Stimuli,
-    along_skin,
-    read_stimuli,
-)
+from fingerpad.experiments.requests.stimuli import BAR, NamedStimulus, ShiftedBar, Stimuli, read_stimuli
 from fingerpad.experiments.requests.stimulus import (
     FINGER_OBJECTS,
     FingerDescription,
@@ -257,7 +250,7 @@ def run_fit(request: FitRequest, runner: Runner) -> FitFile | ChosenNumbersFile:
         offset: [traces.part(slice(place, place + 1)) for traces in sampled]
         for place, offset in enumerate(offsets_mm)
     }
-    shifts_mm = _shifts_mm(list(recorded.stimuli.values()), along_skin(request.settings))
+    shifts_mm = _shifts_mm(list(recorded.stimuli.values()), request.settings.along_skin)
     with runner.stage("fit", 1) as advance:
         found = fit_recordings(
             beside[0.0],

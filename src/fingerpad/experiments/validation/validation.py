@@ -366,8 +366,7 @@ def _rate(given: Given, model: ValidationRequest) -> Reading:
         grading = conditions.grading or resolution_grading(
             conditions.resolution, conditions.receptor_x_mm, half_width_mm=5.0
         )
-    along = np.cos(np.deg2rad(conditions.skin_tilt_deg))
-    site = (conditions.receptor_x_mm - position_mm * along, 0.0)
+    site = (conditions.receptor_x_mm - position_mm * conditions.along_skin, 0.0)
     conditions.finger.skin_point(*site)
     if force_n == 0.0:
         return Reading(None, lambda _: _resting_rate(model))
