@@ -26,7 +26,7 @@ from fingerpad.experiments.gerling2014 import nerve
 from fingerpad.experiments.gerling2014.reproduction import ReproductionResult
 from fingerpad.experiments.run import ReproductionRequest
 from fingerpad.experiments.run import run as run_request
-from fingerpad.experiments.runner import STORE_FOLDER
+from fingerpad.experiments.runner import STORE_FOLDER, Runner
 from fingerpad.report.results import page_of
 from fingerpad.skin.store import Store
 from studies.results_page import read_excerpt, readme_table
@@ -92,7 +92,7 @@ def second(first, stamps):
         chains = {"n_walkers": 100, "smallest_effective_size": 100.0, "largest_r_hat": 1.02}
         patch.setattr(nerve, "CHAINS", chains)  # short ones
         request = ReproductionRequest.read(None, {"resolution": "quick", "seed": 7, "extended": True})
-        results = run_request(request, first.folder)
+        results = run_request(request, Runner(first.folder))
     return json.loads(to_json(results))
 
 

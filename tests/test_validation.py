@@ -162,7 +162,7 @@ def request_of(folder, content, **keys):
 
 
 def result_of(folder, content, **keys):
-    return run(request_of(folder, content, **keys), folder)
+    return run(request_of(folder, content, **keys), Runner(folder))
 
 
 def test_force_at_depth_0_is_0_and_grows_with_depth(folder):
@@ -308,7 +308,7 @@ def test_the_published_deflection_scores_as_in_the_reproduction(folder):
     assert [row.condition[2] for row in found.rows] == table.distance_mm[~table.is_artefact].tolist()
     third = Conditions(resolution="quick", tissues="trial3")
     keys = {"resolution": third.resolution, "tissues": third.tissues}
-    scored = run(fp.ValidationRequest.read({"observations": found} | keys), folder)
+    scored = run(fp.ValidationRequest.read({"observations": found} | keys), Runner(folder))
     touch = deflection_touches(third)["trial3", "cylinder"]
     profile = Store(folder / STORE_FOLDER).load(touch).surface_profile()
     assert scored.r2 == pytest.approx(deflection_r2(profile), abs=1e-12)

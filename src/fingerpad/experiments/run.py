@@ -3,11 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from pathlib import Path
 from typing import Annotated, Any, ClassVar
 
-from fingerpad.core.engine import Engine
-from fingerpad.core.progress import Progress
 from fingerpad.core.values import Flag, Seed, choice
 from fingerpad.experiments.conditions import Conditions
 from fingerpad.experiments.discrimination.analysis import discriminate
@@ -59,12 +56,6 @@ RUNS: Mapping[type[Request], Callable[[Any, Runner], Any]] = {
 }  # What runs a request, by its class.
 
 
-def run(
-    request: Request,
-    folder: Path,
-    jobs: int | Engine = 1,
-    progress: Progress | None = None,
-    command: str | None = None,
-) -> Any:
-    """Run a request, with its stored presses in a folder."""
-    return RUNS[type(request)](request, Runner(folder, jobs, progress, command))
+def run(request: Request, runner: Runner) -> Any:
+    """Run a request, with its stored presses in the folder of the runner."""
+    return RUNS[type(request)](request, runner)
