@@ -16,22 +16,20 @@ from fingerpad.core.errors import InputError
 from fingerpad.core.units import MN_PER_N
 from fingerpad.core.values import FloatArray
 from fingerpad.data import cylinder_deflection, neuron, protocol
-from fingerpad.experiments.conditions import POSITIONS_MM, RECEPTOR_X_MM, Conditions
+from fingerpad.experiments.conditions import POSITIONS_MM, Conditions
 from fingerpad.experiments.gerling2014.nerve import PIECES
 from fingerpad.experiments.gerling2014.percept import draws_of
 from fingerpad.experiments.gerling2014.skin import PLATE_DEPTHS_MM
 from fingerpad.geometry.bodies import Cylinder
 from fingerpad.inference.afferent_fit import CHANCE
 from fingerpad.neuron.exact_spikes import exact_trains
-from fingerpad.neuron.population import Population
 from fingerpad.neuron.spikes import PAPER_WINDOWS_MS, window_rates_hz
 from fingerpad.neuron.transduction import Drive, drive
-from fingerpad.psychophysics.encoding import neighbour_pairs
 from fingerpad.psychophysics.observer import expected_euclidean_hit_rates, expected_hit_rates
 from fingerpad.skin.sampling import SkinResponse
 from studies.tissue_candidates import Candidate
 from studies.tissue_design import REFERENCE_KPA
-from studies.tissue_search import SPHERES_PER_M, Key, bar_traces, driven
+from studies.tissue_search import SPHERES_PER_M, Key, Receptors, bar_traces, driven
 
 N_DRAWS = 500
 """Presentations behind an expected hit rate; the sampling error of the noise is three per cent."""
@@ -47,18 +45,8 @@ Outputs = Mapping[str, FloatArray]
 with the subcutis of `REFERENCE_KPA`), "bars", "standard" and "comparisons"."""
 
 
-class Sites:
+class Sites(Receptors):
     """Receptors of the population on one side of the midline, and how they stand for all of them."""
-
-    @cached_property
-    def population(self) -> Population:
-        """Receptors about the contact point."""
-        return Population.grid(centre_mm=(RECEPTOR_X_MM, 0.0))
-
-    @cached_property
-    def neighbours(self) -> np.ndarray:
-        """Pairs of the Gradient Sum."""
-        return neighbour_pairs(self.population.positions_mm, self.population.pitch_mm)
 
     @cached_property
     def draws(self) -> FloatArray:

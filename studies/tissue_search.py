@@ -124,14 +124,8 @@ def bar_traces(
     return [driven(responses["bar", shift, 0.0], candidate, receptor) for shift in protocol.BAR_SHIFTS.value]
 
 
-@dataclass(frozen=True)
-class Skins:
-    """What the afferents of one candidate follow under bars and spheres."""
-
-    bars: list[Traces]  #: At the receptor, one column per shift of the bar in all.
-    spheres: Mapping[tuple[float, float], Traces]
-    """At the receptors of the population, by curvature and position. [1/m, mm]"""
-    seed: int = 0  #: Of the presentations behind expected hit rates.
+class Receptors:
+    """The population that discriminates spheres."""
 
     @cached_property
     def population(self) -> Population:
@@ -142,6 +136,16 @@ class Skins:
     def neighbours(self) -> np.ndarray:
         """Pairs of the Gradient Sum."""
         return neighbour_pairs(self.population.positions_mm, self.population.pitch_mm)
+
+
+@dataclass(frozen=True)
+class Skins(Receptors):
+    """What the afferents of one candidate follow under bars and spheres."""
+
+    bars: list[Traces]  #: At the receptor, one column per shift of the bar in all.
+    spheres: Mapping[tuple[float, float], Traces]
+    """At the receptors of the population, by curvature and position. [1/m, mm]"""
+    seed: int = 0  #: Of the presentations behind expected hit rates.
 
     @cached_property
     def draws(self) -> FloatArray:
