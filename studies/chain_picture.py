@@ -34,21 +34,7 @@ def touched(curvature_per_m: float, resolution: str) -> tuple[SkinResponse, Resp
 
 
 def draw(skin: SkinResponse, response: ResponseMap, percept: Percept) -> Figure:
-    """Draw the pressed finger, the spikes of a population and hit rates side by side.
-
-    Parameters
-    ----------
-    skin : SkinResponse
-        Under the standard sphere.
-    response : ResponseMap
-        Responses of a population to it.
-    percept : Percept
-        Hit rates of a run.
-
-    Returns
-    -------
-    Figure
-    """
+    """Draw the finger under the standard sphere, the spikes of a population and hit rates side by side."""
     figure = new_figure(10.6, 3.2)
     grid = figure.add_gridspec(2, 3, width_ratios=(2.0, 1.0, 1.0), height_ratios=(1.0, 4.5))
     section, curve = figure.add_subplot(grid[:, 0]), figure.add_subplot(grid[:, 2])

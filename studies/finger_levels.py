@@ -13,25 +13,23 @@ from functools import cached_property
 import numpy as np
 
 from fingerpad.core.errors import InputError
-from fingerpad.core.random_streams import Purpose, normals
 from fingerpad.core.units import MN_PER_N
 from fingerpad.core.values import FloatArray
 from fingerpad.data import cylinder_deflection, neuron, protocol
-from fingerpad.experiments.conditions import POSITIONS_MM, RECEPTOR_X_MM, Conditions
+from fingerpad.experiments.conditions import POSITIONS_MM, Conditions
 from fingerpad.experiments.gerling2014.nerve import PIECES
+from fingerpad.experiments.gerling2014.percept import draws_of
 from fingerpad.experiments.gerling2014.skin import PLATE_DEPTHS_MM
 from fingerpad.geometry.bodies import Cylinder
 from fingerpad.inference.afferent_fit import CHANCE
 from fingerpad.neuron.exact_spikes import exact_trains
-from fingerpad.neuron.population import Population
 from fingerpad.neuron.spikes import PAPER_WINDOWS_MS, window_rates_hz
 from fingerpad.neuron.transduction import Drive, drive
-from fingerpad.psychophysics.encoding import neighbour_pairs
 from fingerpad.psychophysics.observer import expected_euclidean_hit_rates, expected_hit_rates
 from fingerpad.skin.sampling import SkinResponse
 from studies.tissue_candidates import Candidate
 from studies.tissue_design import REFERENCE_KPA
-from studies.tissue_search import SPHERES_PER_M, Key, bar_traces, driven
+from studies.tissue_search import SPHERES_PER_M, Key, Receptors, bar_traces, driven
 
 N_DRAWS = 500
 """Presentations behind an expected hit rate; the sampling error of the noise is three per cent."""
@@ -47,23 +45,13 @@ Outputs = Mapping[str, FloatArray]
 with the subcutis of `REFERENCE_KPA`), "bars", "standard" and "comparisons"."""
 
 
-class Sites:
+class Sites(Receptors):
     """Receptors of the population on one side of the midline, and how they stand for all of them."""
-
-    @cached_property
-    def population(self) -> Population:
-        """Receptors about the contact point."""
-        return Population.grid(centre_mm=(RECEPTOR_X_MM, 0.0))
-
-    @cached_property
-    def neighbours(self) -> np.ndarray:
-        """Pairs of the Gradient Sum."""
-        return neighbour_pairs(self.population.positions_mm, self.population.pitch_mm)
 
     @cached_property
     def draws(self) -> FloatArray:
         """Presentations, (N_DRAWS, n_receptors)."""
-        return normals(SEED, 1, len(self.population.positions_mm), Purpose.RESPONSE, N_DRAWS)[0].T
+        return draws_of(self.population, SEED, N_DRAWS)
 
     @cached_property
     def _both(self) -> tuple[FloatArray, np.ndarray]:
@@ -89,21 +77,9 @@ SITES = Sites()
 def outputs_of(
     responses: Mapping[Key, SkinResponse], candidate: Candidate, conditions: Conditions
 ) -> tuple[FloatArray, dict[str, FloatArray]]:
-    """Read from one candidate's presses what the levels need.
+    """Read from one candidate's presses the times of the drives (n_times,) [ms], and one point of `Outputs`.
 
     The responses are those of `studies.tissue_search.touches`, the bar pressed once.
-
-    Returns
-    -------
-    array (n_times,)
-        Times of the drives. [ms]
-    dict of array
-        One point of `Outputs`.
-
-    Raises
-    ------
-    InputError
-        If the bar and the spheres have different times.
     """
     profile = responses["cylinder", Cylinder().diameter_mm, 0.0].surface_profile()
     force_n = [responses["plate", depth, 0.0].force_mn[-1] / MN_PER_N for depth in PLATE_DEPTHS_MM]
@@ -144,22 +120,12 @@ def deflection_distances_mm() -> FloatArray:
 
 @dataclass(frozen=True)
 class Afferents:
-    """One afferent per point, in units in which C v is 1 and the largest stress under the bar is 1.
+    """One afferent per point, in units in which C v is 1 and the largest stress under the bar is 1."""
 
-    Parameters
-    ----------
-    resting_share : array (n_points,)
-        Potential at rest over the threshold, beta tau/(C v). [1]
-    dynamic_gain, static_gain : array (n_points,)
-        k_d/(C v) [1] and k_s/(C v) [1/ms], times the largest stress.
-    time_constant_ms : array (n_points,)
-        tau. [ms]
-    """
-
-    resting_share: FloatArray
+    resting_share: FloatArray  #: Potential at rest over the threshold, beta tau/(C v), (n_points,). [1]
     dynamic_gain: FloatArray
-    static_gain: FloatArray
-    time_constant_ms: FloatArray
+    static_gain: FloatArray  #: k_d/(C v) [1] and k_s/(C v) [1/ms], times the largest stress, (n_points,).
+    time_constant_ms: FloatArray  #: tau, (n_points,). [ms]
 
     def rates(self, number: int, times_ms: FloatArray, relative: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Dynamic and static rates (n_sites,) of one point, from (2, n_times, n_sites). [spikes/s]"""

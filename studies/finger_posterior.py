@@ -71,18 +71,12 @@ class Prior:
 
     The potential at rest is normal about 0 and stays below `LARGEST_RESTING_SHARE`. The others are
     log-normal: two thirds lie between the median divided and multiplied by the factor.
-
-    Parameters
-    ----------
-    medians, factors : array (5,)
-        Of the modulus [kPa], both gains [1/kPa, 1/(kPa ms)], tau [ms] and the noise.
-    resting_share_sd : float
-        Standard deviation of the potential at rest over the threshold. [1]
     """
 
     medians: FloatArray
     factors: FloatArray
-    resting_share_sd: float = 1.0
+    """Of the modulus [kPa], both gains [1/kPa, 1/(kPa ms)], tau [ms] and the noise, (5,)."""
+    resting_share_sd: float = 1.0  #: Standard deviation of the potential at rest over the threshold. [1]
 
     @classmethod
     def about_human(cls) -> Prior:
@@ -112,25 +106,13 @@ class Prior:
 
 @dataclass(frozen=True)
 class Observations:
-    """What is observed on all levels.
+    """What is observed on all levels."""
 
-    Parameters
-    ----------
-    deflection_mm : array (n_distances,)
-        Under the cylinder, at `deflection_distances_mm`. [mm]
-    plate_force_n : array (n_depths, 2)
-        Lowest and highest force of `SUBJECTS` subjects. [N]
-    dynamic_hz, static_hz : array (n_shifts,)
-        Rates under the bar. [spikes/s]
-    hits : array (2,)
-        Hits with the comparison spheres, in `trials` each.
-    """
-
-    deflection_mm: FloatArray
-    plate_force_n: FloatArray
+    deflection_mm: FloatArray  #: Under the cylinder, at `deflection_distances_mm`, (n_distances,). [mm]
+    plate_force_n: FloatArray  #: Lowest and highest force of `SUBJECTS` subjects, (n_depths, 2). [N]
     dynamic_hz: FloatArray
-    static_hz: FloatArray
-    hits: FloatArray
+    static_hz: FloatArray  #: Rates under the bar, (n_shifts,). [spikes/s]
+    hits: FloatArray  #: Hits with the comparison spheres, in `trials` each, (2,).
     trials: float = psychophysics.GOODWIN_TRIALS.value
 
     @classmethod
@@ -164,27 +146,15 @@ class Finger:
 
 @dataclass(frozen=True)
 class Prediction:
-    """Predicted observations; rates and hit rates that were not asked for are empty.
+    """Predicted observations; rates and hit rates that were not asked for are empty."""
 
-    Parameters
-    ----------
-    deflection_mm : array (n_points, n_distances)
-        [mm]
-    plate_force_n : array (n_points, n_depths)
-        Of the finger of the parameters, the mean one between subjects. [N]
-    bar_hz : array (2, n_points, n_shifts)
-        Dynamic and static rates. [spikes/s]
-    sphere_hz : array (n_points, n_positions, n_spheres, n_receptors)
-        Static rates of the population. [spikes/s]
-    hit_rates : array (n_points, n_positions, 2)
-        Of the Gradient Sum. [0-1]
-    """
-
-    deflection_mm: FloatArray
+    deflection_mm: FloatArray  #: Under the cylinder, (n_points, n_distances). [mm]
     plate_force_n: FloatArray
-    bar_hz: FloatArray
+    """Of the finger of the parameters, the mean one between subjects, (n_points, n_depths). [N]"""
+    bar_hz: FloatArray  #: Dynamic and static rates, (2, n_points, n_shifts). [spikes/s]
     sphere_hz: FloatArray
-    hit_rates: FloatArray
+    """Static rates of the population, (n_points, n_positions, n_spheres, n_receptors). [spikes/s]"""
+    hit_rates: FloatArray  #: Of the Gradient Sum, (n_points, n_positions, 2). [0-1]
 
 
 _EMPTY = np.empty(0)
@@ -275,22 +245,10 @@ def log_extremes(
 ) -> FloatArray:
     """Log likelihood of the lowest and the highest of some normal numbers, their deviation integrated out.
 
-    The joint density of both among n is n (n - 1) f(low) f(high) (F(high) - F(low))^(n - 2).
+    The joint density of both among n is n (n - 1) f(low) f(high) (F(high) - F(low))^(n - 2). Depths are
+    independent and share the deviation, one of some that are equally probable.
 
-    Parameters
-    ----------
-    extremes : array (n_depths, 2)
-        Lowest and highest at every depth; depths are independent and share the deviation.
-    centre : array (n_points, n_depths)
-        Mean of the normal distribution.
-    n_subjects : int, optional
-        How many numbers.
-    deviations : sequence of float, optional
-        Equally probable standard deviations.
-
-    Returns
-    -------
-    array (n_points,)
+    Extremes are (n_depths, 2), means of the distribution (n_points, n_depths), and the result (n_points,).
 
     Examples
     --------
@@ -399,13 +357,7 @@ class Sampling:
 def draw_posterior(
     finger: Finger, likelihood: Likelihood, prior: Prior, seed: int, settings: Sampling | None = None
 ) -> Posterior:
-    """Sample the posterior given all levels.
-
-    Raises
-    ------
-    ConvergenceError
-        If the draws have not converged.
-    """
+    """Sample the posterior given all levels."""
     density = log_posterior(finger, likelihood, prior)
     random = np.random.Generator(np.random.Philox([seed, 2]))
     first = prior.draw(N_TRIED, random)
@@ -425,21 +377,11 @@ def draw_posterior(
 
 @dataclass(frozen=True)
 class Proposal:
-    """A multivariate Student distribution, from which points are proposed independently of the present one.
+    """A multivariate Student distribution: points are proposed independently of the present one."""
 
-    Parameters
-    ----------
-    centre : array (n,)
-        Its centre.
-    factor : array (n, n)
-        Cholesky factor of its scale matrix.
-    freedom : float
-        Degrees of freedom: tails wider than those of what is sampled.
-    """
-
-    centre: FloatArray
-    factor: FloatArray
-    freedom: float = 7.0
+    centre: FloatArray  #: Its centre, (n,).
+    factor: FloatArray  #: Cholesky factor of its scale matrix, (n, n).
+    freedom: float = 7.0  #: Degrees of freedom: tails wider than those of what is sampled.
 
     @classmethod
     def of(cls, centre: FloatArray, covariance: FloatArray) -> Proposal:
@@ -485,11 +427,6 @@ def adapted(density: LogDensity, points: FloatArray, random: np.random.Generator
     over the mixture of their proposals (Cornuet et al. 2012), and weights are truncated at the mean times the
     root of their number (Ionides 2008).
 
-    Raises
-    ------
-    ConvergenceError
-        If no draw is possible.
-
     Examples
     --------
     >>> random = np.random.default_rng(1)
@@ -526,22 +463,10 @@ def adapted(density: LogDensity, points: FloatArray, random: np.random.Generator
 def synthetic(
     truth: Prediction, residuals: Mapping[str, tuple[float, float]], random: np.random.Generator
 ) -> Observations:
-    """Draw an experiment whose truth is the prediction of one point.
+    """Draw an experiment whose truth is the prediction of one point; rates are not below 0, as recorded ones.
 
-    Parameters
-    ----------
-    truth : Prediction
-        Of one point.
-    residuals : mapping of str to (float, float)
-        Deviation and correlation length [mm] of "deflection" [mm], "dynamic" and "static" [spikes/s], and the
-        deviation between subjects as the first entry of "force".
-    random : Generator
-        Source of the random numbers.
-
-    Returns
-    -------
-    Observations
-        Its rates are not below 0, as recorded ones.
+    Residuals are deviation and correlation length [mm] of "deflection" [mm], "dynamic" and "static"
+    [spikes/s], and the deviation between subjects as the first entry of "force".
     """
     shifts = bar_firing_rates().shift_mm
     dynamic, static = truth.bar_hz[:, 0]

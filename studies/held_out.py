@@ -22,8 +22,14 @@ from fingerpad.experiments.conditions import RECEPTOR_X_MM, Conditions
 from fingerpad.experiments.gerling2014.skin import PLATE_DEPTHS_MM
 from fingerpad.experiments.runner import Manifest, Runner
 from fingerpad.experiments.validation.observations import KINDS, Observation, Observations, read_observations
-from fingerpad.experiments.validation.request import LOADINGS, RAMP_AND_HOLD, ValidationRequest
-from fingerpad.experiments.validation.validation import Condition, predict, validate
+from fingerpad.experiments.validation.validation import (
+    LOADINGS,
+    RAMP_AND_HOLD,
+    Condition,
+    ValidationRequest,
+    predict,
+    validate,
+)
 from fingerpad.geometry.bodies import FlatPunch, Grating, Plate
 from fingerpad.geometry.indenters import Indenter
 from fingerpad.geometry.mesh_checks import jacobian_at_gauss
@@ -72,33 +78,17 @@ PRESSED_PER_M = (144.0, 165.0, 190.0, 218.0, 250.0, psychophysics.SPHERE_287.val
 
 @result_class
 class Check:
-    """One published number or statement, and the prediction.
-
-    Parameters
-    ----------
-    subject, statement : str
-        Force, spheres, gratings, adaptation, volume or percept; what is compared.
-    source, status : str
-        Where it was published, and the status of what we know of it.
-    role : str
-        `CHOSEN` or `PREDICTED`.
-    predicted : float
-        In `unit`; NaN if it cannot be pressed.
-    unit : str
-        Unit of the numbers.
-    low, high : float
-        Published range; NaN where there is no bound.
-    """
+    """One published number or statement, and the prediction."""
 
     subject: str
-    statement: str
+    statement: str  #: Force, spheres, gratings, adaptation, volume or percept; what is compared.
     source: str
-    status: str
-    role: str
-    predicted: Number
-    unit: str
+    status: str  #: Where it was published, and the status of what we know of it.
+    role: str  #: `CHOSEN` or `PREDICTED`.
+    predicted: Number  #: In `unit`; NaN if it cannot be pressed.
+    unit: str  #: Unit of the numbers.
     low: Number
-    high: Number
+    high: Number  #: Published range; NaN where there is no bound.
 
     @property
     def inside(self) -> bool | None:
@@ -135,13 +125,6 @@ def run(runner: Runner, conditions: Conditions) -> HeldOut:
     """Press what is missing, predict, and compare; the afferent is the one that belongs to the tissues.
 
     A stopped run continues after the last stored press.
-
-    Raises
-    ------
-    ConvergenceError
-        If a press without an alternative cannot be solved.
-    StoreError
-        If a stored press is damaged or the folder cannot be written.
     """
     return HeldOut(
         checks=(
@@ -257,12 +240,8 @@ def force_checks(force_n: Mapping[str, FloatArray]) -> Iterable[Check]:
 def sphere_rates(conditions: Conditions, runner: Runner) -> tuple[FloatArray, FloatArray]:
     """Predict static rates under spheres that a force presses. [spikes/s]
 
-    Returns
-    -------
-    array (n_forces, n_curvatures)
-        In the middle of the contact; NaN where the sphere would come too near to the bone.
-    array (n_profiles, n_positions)
-        Beside the middle.
+    In the middle of the contact (n_forces, n_curvatures), NaN where the sphere would come too near to the
+    bone; and beside the middle (n_profiles, n_positions).
     """
     curvatures = facts.SPHERE_CURVATURES.value
     middle = [(force, curvature) for force in SPHERE_FORCES_N for curvature in curvatures]

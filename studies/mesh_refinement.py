@@ -118,19 +118,13 @@ def _at_factor(touch: Touch, factor: float) -> Touch:
 
 @dataclass(frozen=True)
 class Reading:
-    """Responses of receptors on one mesh.
+    """Responses of receptors on one mesh."""
 
-    Parameters
-    ----------
-    touches : tuple
-        Numbers of the bar's shifts, or positions and curvatures of spheres.
-    sed_kpa, rate_hz : dict of arrays (n_touches, n_receptors)
-        SED at the end of the "ramp" and of the "hold" [kPa], "dynamic" and "static" firing rate [spikes/s].
-    """
-
-    touches: tuple[Any, ...]
+    touches: tuple[Any, ...]  #: Numbers of the bar's shifts, or positions and curvatures of spheres.
     sed_kpa: dict[str, FloatArray]
     rate_hz: dict[str, FloatArray]
+    """SED at the end of the "ramp" and of the "hold" [kPa], "dynamic" and "static" firing rate [spikes/s],
+    (n_touches, n_receptors)."""
 
     def only(self, touches: Sequence[Any]) -> Reading:
         """Return the rows of some touches, in their order."""
@@ -198,29 +192,17 @@ class Differences:
 
 @result_class
 class MeshErrors:
-    """Errors of one mesh at the touches that it shares with a finer one.
-
-    Parameters
-    ----------
-    mesh, against : str
-        Their names.
-    touches : int
-        How many are shared.
-    sed : dict of Differences
-        At the end of the "ramp" and of the "hold", over the largest SED on the finer mesh. [1]
-    rate_hz : dict of Differences
-        "dynamic" and "static" firing rate. [spikes/s]
-    fss, fss_against : float
-        Weighted FSS of the rates under the bar on either mesh, no parameter fitted; NaN of spheres. [1]
-    """
+    """Errors of one mesh at the touches that it shares with a finer one."""
 
     mesh: str
-    against: str
-    touches: int
+    against: str  #: Their names.
+    touches: int  #: How many are shared.
     sed: dict[str, Differences]
-    rate_hz: dict[str, Differences]
+    """At the end of the "ramp" and of the "hold", over the largest SED on the finer mesh. [1]"""
+    rate_hz: dict[str, Differences]  #: "dynamic" and "static" firing rate. [spikes/s]
     fss: Number = float("nan")
     fss_against: Number = float("nan")
+    """Weighted FSS of the rates under the bar on either mesh, no parameter fitted; NaN of spheres. [1]"""
 
 
 def compare(readings: Mapping[str, Reading], mesh: str, against: str, fss: bool = False) -> MeshErrors:
@@ -258,20 +240,8 @@ def goodness_of_fit(reading: Reading) -> float:
 def observed_order(values: Sequence[float], factors: Sequence[float]) -> tuple[float, float]:
     """Order p and limit u of a quantity on three similar meshes, u_i = u + c f_i^-p (Richardson 1911).
 
-    Parameters
-    ----------
-    values, factors : sequence of 3 floats
-        The quantity, and by how much elements are smaller, from coarse to fine.
-
-    Returns
-    -------
-    (float, float)
-        p and u; NaN unless the values approach a limit with an order from 0.3 to 6.
-
-    Raises
-    ------
-    InputError
-        If there are not three of each, or the factors do not increase from above 0.
+    Values and factors, by which elements are smaller, go from coarse to fine. NaN unless the values approach
+    a limit with an order from 0.3 to 6.
 
     Examples
     --------
@@ -333,39 +303,21 @@ class Convergence:
 
 @result_class
 class MeshRefinement:
-    """Result of `python -m studies mesh-refinement`.
+    """Result of `python -m studies mesh-refinement`."""
 
-    Parameters
-    ----------
-    code_hash : str
-        Of the mechanics that solved the touches.
-    meshes : tuple of MeshSize
-        From coarse to fine.
-    profiles : dict of BarProfile
-        By mesh.
-    bars, spheres : tuple of MeshErrors
-        One receptor under the shifted bar, and the receptors of the population under spheres.
-    convergence : tuple of Convergence
-        By touch.
-    """
-
-    code_hash: str
-    meshes: tuple[MeshSize, ...]
-    profiles: dict[str, BarProfile]
+    code_hash: str  #: Of the mechanics that solved the touches.
+    meshes: tuple[MeshSize, ...]  #: From coarse to fine.
+    profiles: dict[str, BarProfile]  #: By mesh.
     bars: tuple[MeshErrors, ...]
     spheres: tuple[MeshErrors, ...]
-    convergence: tuple[Convergence, ...]
+    """One receptor under the shifted bar, and the receptors of the population under spheres."""
+    convergence: tuple[Convergence, ...]  #: By touch.
 
 
 def run(runner: Runner, conditions: Conditions) -> MeshRefinement:
     """Solve every indentation that is not stored yet (an hour on one core), and compare the meshes.
 
     The conditions are not used. A stopped run continues after the last stored touch.
-
-    Raises
-    ------
-    ConvergenceError
-        If an indentation cannot be solved.
     """
     receptors = {
         "bars": np.array([[RECEPTOR_X_MM, 0.0]]),

@@ -35,11 +35,6 @@ def joined(*blocks: str) -> str:
 def replaced(text: str, start: str, end: str, content: str) -> str:
     r"""Return a page with new content between two marks.
 
-    Raises
-    ------
-    InputError
-        If the marks are missing.
-
     Examples
     --------
     >>> replaced("a <b> old <c> d", "<b>", "<c>", "new")
@@ -59,22 +54,7 @@ def with_blocks(text: str, blocks: Mapping[str, str]) -> str:
 
 
 def write_blocks(page: Path, blocks: Mapping[str, str], target: Path | None = None) -> Path:
-    """Write a page, or a copy of it, with its blocks anew.
-
-    Parameters
-    ----------
-    page : Path
-        Page of docs/.
-    blocks : mapping of str
-        Markdown by the name of the block.
-    target : Path, optional
-        File of the copy; the page itself by default.
-
-    Returns
-    -------
-    Path
-        The written file.
-    """
+    """Write a page of docs/, or a copy of it as `target`, with its blocks anew; return the written file."""
     written = target or page
     write_atomically(written, with_blocks(page.read_text(encoding="utf-8"), blocks).encode())
     return written

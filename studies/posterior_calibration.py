@@ -61,13 +61,7 @@ class Calibration:
 
 
 def calibrate(names: tuple[str, ...], replicates: Iterable[tuple[FloatArray, FloatArray]]) -> Calibration:
-    """Compare true parameters (n_parameters,) with posterior draws (n_draws, n_parameters), by experiment.
-
-    Raises
-    ------
-    InputError
-        If there is no replicate, or truth and draws are not one number per name.
-    """
+    """Compare true parameters (n_parameters,) with posterior draws (n_draws, n_parameters), by experiment."""
     shares = []
     for truth, draws in replicates:
         if truth.shape != (len(names),) or draws.shape[1:] != truth.shape:

@@ -9,8 +9,9 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from fingerpad.core.checked import result_class
-from fingerpad.core.result_files import read_results
+from fingerpad.core.result_files import from_json
 from fingerpad.core.values import Number, Vector
+from fingerpad.experiments import schemas
 from fingerpad.experiments.gerling2014.claims import ClaimRow, Group, Statement, Summary
 from fingerpad.experiments.gerling2014.nerve import SingleUnitResult
 from fingerpad.experiments.gerling2014.percept import SphereDiscrimination
@@ -34,30 +35,16 @@ class HitRates:
 
 @result_class
 class Percept:
-    """Hit rates of the codes and of people, with 95 % intervals.
+    """Hit rates of the codes and of people, with 95 % intervals."""
 
-    Parameters
-    ----------
-    standard_per_m : float
-        Curvature of the standard. [1/m]
-    curvature_per_m : array (n_curvatures,)
-        Curvatures of the comparisons. [1/m]
-    codes : tuple of HitRates
-        The model's.
-    noise_sigma : float
-        Noise of all codes, fitted to people with the first.
-    people_curvature_per_m, people, people_low, people_high : array (n_people,)
-        Hit rates of people and their binomial intervals.
-    """
-
-    standard_per_m: float
-    curvature_per_m: Vector
-    codes: tuple[HitRates, ...]
-    noise_sigma: Number
+    standard_per_m: float  #: Curvature of the standard. [1/m]
+    curvature_per_m: Vector  #: Curvatures of the comparisons, (n_curvatures,). [1/m]
+    codes: tuple[HitRates, ...]  #: The model's.
+    noise_sigma: Number  #: Noise of all codes, fitted to people with the first.
     people_curvature_per_m: Vector
     people: Vector
     people_low: Vector
-    people_high: Vector
+    people_high: Vector  #: Hit rates of people and their binomial intervals, (n_people,).
 
 
 @result_class
@@ -81,14 +68,9 @@ class Excerpt:
 
 
 def read_excerpt(path: Path) -> Excerpt:
-    """Take from results.json of `fingerpad reproduce --extended` what the pages show.
-
-    Raises
-    ------
-    StoreError
-        If the file cannot be read.
-    """
-    return excerpt(read_results(path, ReproductionResult))
+    """Take from results.json of `fingerpad reproduce --extended` what the pages show."""
+    schemas.read(path, "fingerpad reproduction")  # refuses any other file
+    return excerpt(from_json(ReproductionResult, path.read_bytes()))
 
 
 def excerpt(results: ReproductionResult) -> Excerpt:

@@ -18,40 +18,20 @@ from studies.pages import DOCS, joined, write_blocks
 
 @dataclass(frozen=True)
 class Study:
-    """A study: what it computes and which page shows it.
-
-    Parameters
-    ----------
-    name, help : str
-        Of the command and of the files; what it does, in one line.
-    run : callable
-        From a runner and conditions to a result, an instance of a `result_class`.
-    blocks : callable
-        From that result to the blocks of the page, Markdown by name.
-    page : str or None
-        Page of docs/ that has these blocks.
-    has_conditions : bool
-        Whether resolution, seed and tissues can be chosen.
-    """
+    """A study: what it computes and which page shows it."""
 
     name: str
-    help: str
+    help: str  #: Of the command and of the files; what it does, in one line.
     run: Callable[[Runner, Conditions], Any]
+    """From a runner and conditions to a result, an instance of a `result_class`."""
     blocks: Callable[[Any], Mapping[str, str]]
-    page: str | None
-    has_conditions: bool = True
+    """From that result to the blocks of the page, Markdown by name."""
+    page: str | None  #: Page of docs/ that has these blocks.
+    has_conditions: bool = True  #: Whether resolution, seed and tissues can be chosen.
 
 
 def run_study(study: Study, runner: Runner, conditions: Conditions) -> tuple[Path, Path]:
-    """Run a study, and write `NAME.md`, its page with new blocks or the blocks, and `NAME.json`, its numbers.
-
-    Raises
-    ------
-    ConvergenceError
-        If an indentation cannot be solved; finished ones stay stored.
-    StoreError
-        If a stored indentation is damaged or the folder cannot be written.
-    """
+    """Run a study; write `NAME.md`, its page with new blocks or the blocks, and `NAME.json`, its numbers."""
     result = study.run(runner, conditions)
     numbers = runner.folder / f"{study.name}.json"
     write_atomically(numbers, to_json(result) + b"\n")

@@ -59,32 +59,18 @@ SED, STRESS = Reading(), Reading("compressive_stress")
 
 @dataclass(frozen=True)
 class Candidate:
-    """Tissues and a drive that are tried together.
+    """Tissues and a drive that are tried together."""
 
-    Parameters
-    ----------
-    name : str
-        Short, unique within a study.
-    tissues : Tissues
-        Laws of the four layers.
-    reading : Reading
-        What drives the afferent.
-    chosen_by : tuple of str
-        Those of `LEVELS` whose observations were used to choose tissues or reading: in sample there. On the
-        others the result is a prediction.
-    factor : float
-        Common factor on all moduli. At a prescribed depth it multiplies forces and stresses, and the gains of
-        the afferent compensate for it, so that it needs no press of its own.
-    finalist : bool
-        Press the bar at all 36 shifts instead of reading one bar at shifted sites.
-    """
-
-    name: str
-    tissues: Tissues
-    reading: Reading
+    name: str  #: Short, unique within a study.
+    tissues: Tissues  #: Laws of the four layers.
+    reading: Reading  #: What drives the afferent.
     chosen_by: tuple[str, ...] = ()
+    """Those of `LEVELS` whose observations were used to choose tissues or reading: in sample there. On the
+    others the result is a prediction."""
     factor: float = 1.0
-    finalist: bool = False
+    """Common factor on all moduli. At a prescribed depth it multiplies forces and stresses, and the gains of
+    the afferent compensate for it, so that it needs no press of its own."""
+    finalist: bool = False  #: Press the bar at all 36 shifts instead of reading one bar at shifted sites.
 
     def __post_init__(self) -> None:
         for level in self.chosen_by:

@@ -183,13 +183,7 @@ class Emulator:
 
     @classmethod
     def fit(cls, points: ArrayLike, outputs: Mapping[str, FloatArray]) -> Emulator:
-        """Fit every output (n_points, ...) at points (n_points, n_parameters), each parameter from 0 to 1.
-
-        Raises
-        ------
-        InputError
-            If there are fewer than four points, or an output has not one row per point.
-        """
+        """Fit every output (n_points, ...) at points (n_points, n_parameters), each parameter from 0 to 1."""
         at = float_array("points", points, 2)
         if len(at) < FEWEST_POINTS:
             raise InputError(f"points needs at least {FEWEST_POINTS} rows: got {len(at)}.")
@@ -208,12 +202,7 @@ def left_out(
 ) -> tuple[list[Emulator], IntArray]:
     """Fit one emulator per fold to the points outside of it; every n-th point is in the same fold.
 
-    Returns
-    -------
-    list of Emulator
-        One per fold.
-    int array (n_points,)
-        Number of the emulator that has not seen a point.
+    Also return the number of the emulator that has not seen each point, (n_points,).
     """
     unseen = np.arange(len(points)) % whole("n_folds", n_folds, at_least=2)
     emulators = []

@@ -14,11 +14,11 @@ from fingerpad.core.errors import ConvergenceError, InputError
 from fingerpad.core.values import FloatArray, IntArray, Number
 from fingerpad.data import protocol
 from fingerpad.experiments.conditions import Conditions
+from fingerpad.experiments.fit.likelihoods import interval
 from fingerpad.experiments.fit.results import CredibleInterval, PosteriorConvergence
 from fingerpad.experiments.runner import Manifest, Runner
 from fingerpad.experiments.scores import coefficient_of_determination
 from fingerpad.inference.fitting.methods import fractional_sum_of_squares
-from fingerpad.inference.fitting.posterior import credible_band
 from fingerpad.inference.identifiable import LARGEST_RESTING_SHARE, identifiable
 from fingerpad.neuron.afferent import Afferent
 from fingerpad.psychophysics.sensitivity import InterpolatedObserver
@@ -85,22 +85,12 @@ class Marginal:
 
 @result_class
 class EmulatorError:
-    """Difference between emulated and pressed tissues that the emulator has not seen.
+    """Difference between emulated and pressed tissues that the emulator has not seen."""
 
-    Parameters
-    ----------
-    quantity : str
-        With its unit.
-    rms, largest : float
-        Over all points of the design.
-    residual : float
-        Deviation of the observations, in the same unit; NaN if nothing is observed.
-    """
-
-    quantity: str
+    quantity: str  #: With its unit.
     rms: float
-    largest: float
-    residual: Number
+    largest: float  #: Over all points of the design.
+    residual: Number  #: Deviation of the observations, in the same unit; NaN if nothing is observed.
 
 
 @result_class
@@ -114,40 +104,19 @@ class Target:
 
 @result_class
 class TissuePosterior:
-    """Result of `python -m studies tissue-posterior`.
-
-    Parameters
-    ----------
-    n_tissues, n_unsolved : int
-        Points of the design that were pressed, and those of which a press could not be solved.
-    errors : tuple of EmulatorError
-        Of the emulator.
-    convergence : PosteriorConvergence
-        Of the draws.
-    marginals : tuple of Marginal
-        One per parameter.
-    targets : tuple of Target
-        Of the set `human`.
-    all_targets : float
-        Probability that all are met at once.
-    calibration : Calibration
-        Of synthetic experiments with pressed tissues that the emulator has not seen.
-    unsolved : int
-        Synthetic experiments whose draws have not converged.
-    manifest : Manifest
-        What ran.
-    """
+    """Result of `python -m studies tissue-posterior`."""
 
     n_tissues: int
     n_unsolved: int
-    errors: tuple[EmulatorError, ...]
-    convergence: PosteriorConvergence
-    marginals: tuple[Marginal, ...]
-    targets: tuple[Target, ...]
-    all_targets: float
-    calibration: Calibration
-    unsolved: int
-    manifest: Manifest
+    """Points of the design that were pressed, and those of which a press could not be solved."""
+    errors: tuple[EmulatorError, ...]  #: Of the emulator.
+    convergence: PosteriorConvergence  #: Of the draws.
+    marginals: tuple[Marginal, ...]  #: One per parameter.
+    targets: tuple[Target, ...]  #: Of the set `human`.
+    all_targets: float  #: Probability that all are met at once.
+    calibration: Calibration  #: Of synthetic experiments with pressed tissues that the emulator has not seen.
+    unsolved: int  #: Synthetic experiments whose draws have not converged.
+    manifest: Manifest  #: What ran.
 
 
 def pressed(
@@ -155,21 +124,8 @@ def pressed(
 ) -> tuple[FloatArray, dict[str, FloatArray], IntArray]:
     """Press what is missing of some candidates, and read what the levels need.
 
-    A candidate of which a press cannot be solved is left out.
-
-    Returns
-    -------
-    array (n_times,)
-        Times of all drives. [ms]
-    dict of array
-        `Outputs` of the candidates that were solved.
-    int array (n_solved,)
-        Their numbers.
-
-    Raises
-    ------
-    InputError
-        If candidates have different times, or none was solved.
+    A candidate of which a press cannot be solved is left out. The result is the times of all drives
+    (n_times,) [ms], `Outputs` of the candidates that were solved, and their numbers (n_solved,).
     """
     wanted = [touches(candidate, conditions) for candidate in candidates]
     every = [touch for one in wanted for touch in one.values()]
@@ -233,16 +189,7 @@ def like_human(
 ) -> FloatArray:
     """Parameters (n_points, 11) of tissues with the afferent of `human`, its gains scaled to equal currents.
 
-    Parameters
-    ----------
-    shares : array (n_points, n_tissues)
-        Of `RANGES`.
-    outputs, human : Outputs
-        Of these tissues, and of `human`.
-    prior : Prior
-        With the medians of `human`.
-    resting_share : float
-        Potential at rest over the threshold of the afferent of `human`.
+    Shares (n_points, n_tissues) are those of `RANGES`; the prior has the medians of `human`.
     """
     values = np.empty((len(shares), len(PARAMETERS)))
     values[:, : len(RANGES)] = values_at(shares)
@@ -255,21 +202,11 @@ def like_human(
     return values
 
 
-def interval(draws: FloatArray) -> CredibleInterval:
-    """Median and 95 % interval of draws (n_draws,)."""
-    low, high = credible_band(draws, 0.95)
-    return CredibleInterval(median=np.median(draws), low=low, high=high)
-
-
 def weber_fractions(static_hz: FloatArray, noise_sigma: FloatArray) -> FloatArray:
     """Weber fraction at the standard for each draw; NaN where no pressed sphere is discriminated.
 
-    Parameters
-    ----------
-    static_hz : array (n_points, n_spheres, n_receptors)
-        Static rates under `SPHERES_PER_M`. [spikes/s]
-    noise_sigma : array (n_points,)
-        Noise.
+    Static rates under `SPHERES_PER_M` are (n_points, n_spheres, n_receptors) [spikes/s], the noise
+    (n_points,).
     """
     observers = (
         InterpolatedObserver(np.array(SPHERES_PER_M), rates, SITES.neighbours, sigma, SITES.draws)
@@ -280,17 +217,7 @@ def weber_fractions(static_hz: FloatArray, noise_sigma: FloatArray) -> FloatArra
 
 
 def judged(found: Prediction, values: FloatArray, observed: Observations) -> tuple[tuple[Target, ...], float]:
-    """Probability of each target of the set `human`, and of all at once.
-
-    Parameters
-    ----------
-    found : Prediction
-        Of the draws.
-    values : array (n_draws, 11)
-        Their parameters.
-    observed : Observations
-        Of all levels.
-    """
+    """Probability of each target of the set `human`, and of all at once, from draws (n_draws, 11)."""
     wanted, noise = targets(), values[:, -1]
     dynamic, static = (np.array([flat_and_largest(row) for row in rates]) for rates in found.bar_hz)
     euclidean = euclidean_hit_rates(found.sphere_hz, noise) - observed.hits / observed.trials
@@ -400,28 +327,15 @@ def drawn(cases: Sequence[Case], runner: Runner) -> list[FloatArray | None]:
 
 @dataclass(frozen=True)
 class Pressed:
-    """Pressed tissues of the design, and emulators that have not seen them.
+    """Pressed tissues of the design, and emulators that have not seen them."""
 
-    Parameters
-    ----------
-    shares : array (n_points, n_tissues)
-        Of `RANGES`.
-    outputs : Outputs
-        Of the presses.
-    times_ms : array (n_times,)
-        Times of the drives. [ms]
-    centres : array (n_points, 11)
-        Parameters with the afferent of `human`, from `like_human`.
-    emulators, unseen
-        From `left_out`.
-    """
-
-    shares: FloatArray
-    outputs: Outputs
-    times_ms: FloatArray
+    shares: FloatArray  #: Of `RANGES`, (n_points, n_tissues).
+    outputs: Outputs  #: Of the presses.
+    times_ms: FloatArray  #: Times of the drives, (n_times,). [ms]
     centres: FloatArray
+    """Parameters with the afferent of `human`, from `like_human`, (n_points, 11)."""
     emulators: Sequence[Emulator]
-    unseen: IntArray
+    unseen: IntArray  #: Both from `left_out`.
 
     def emulated(self) -> dict[str, FloatArray]:
         """Return outputs of every point by the emulator that has not seen it."""
@@ -464,13 +378,6 @@ def run(runner: Runner, conditions: Conditions) -> TissuePosterior:
     """Press the design, draw the posterior, and test it with synthetic experiments.
 
     A stopped run continues after the last stored press. The tissues of the conditions are not used.
-
-    Raises
-    ------
-    ConvergenceError
-        If the draws have not converged.
-    StoreError
-        If a stored indentation is damaged or the folder cannot be written.
     """
     seed, prior, observed = conditions.seed, Prior.about_human(), Observations.published()
     likelihood = Likelihood(observed)

@@ -16,14 +16,13 @@ import numpy as np
 
 from fingerpad.core.checked import result_class
 from fingerpad.core.errors import ConvergenceError
-from fingerpad.core.random_streams import Purpose, normals
 from fingerpad.core.signals import Traces
 from fingerpad.core.units import MN_PER_N
 from fingerpad.core.values import FloatArray, Matrix, Number, Vector
 from fingerpad.data import protocol, psychophysics
 from fingerpad.experiments.conditions import POSITIONS_MM, RECEPTOR_X_MM, Conditions, Touch
 from fingerpad.experiments.gerling2014 import nerve
-from fingerpad.experiments.gerling2014.percept import FITTED_SPHERES, fit_to_people
+from fingerpad.experiments.gerling2014.percept import FITTED_SPHERES, draws_of, fit_to_people
 from fingerpad.experiments.gerling2014.skin import PLATE_DEPTHS_MM, deflection_r2
 from fingerpad.experiments.runner import Manifest, Runner
 from fingerpad.experiments.validation.observations import read_observations
@@ -36,12 +35,7 @@ from fingerpad.inference.rate_model import AfferentModel, RateProblem
 from fingerpad.neuron.afferent import PARAMETER_NAMES
 from fingerpad.neuron.population import Population
 from fingerpad.psychophysics.encoding import neighbour_pairs
-from fingerpad.psychophysics.observer import (
-    NOISE_DRAWS,
-    expected_euclidean_hit_rates,
-    expected_hit_rates,
-    fit_noise_sigma,
-)
+from fingerpad.psychophysics.observer import expected_euclidean_hit_rates, expected_hit_rates, fit_noise_sigma
 from fingerpad.skin.sampling import SkinResponse
 from studies.tissue_candidates import LEVELS, Candidate, candidates
 
@@ -123,30 +117,15 @@ def bar_traces(
     s distal of its axis, along the skin's tangent.
     """
     if ONE_BAR in responses:
-        along = float(np.cos(np.deg2rad(conditions.skin_tilt_deg)))
+        along = conditions.along_skin
         sites = [(RECEPTOR_X_MM + shift * along, 0.0) for shift in protocol.BAR_SHIFTS.value]
         return [driven(responses[ONE_BAR], candidate, np.array(sites))]
     receptor = np.array(nerve.RECEPTOR)
     return [driven(responses["bar", shift, 0.0], candidate, receptor) for shift in protocol.BAR_SHIFTS.value]
 
 
-@dataclass(frozen=True)
-class Skins:
-    """What the afferents of one candidate follow under bars and spheres.
-
-    Parameters
-    ----------
-    bars : list of Traces
-        At the receptor, one column per shift of the bar in all.
-    spheres : dict of Traces
-        At the receptors of the population, by curvature and position. [1/m, mm]
-    seed : int
-        Of the presentations behind expected hit rates.
-    """
-
-    bars: list[Traces]
-    spheres: Mapping[tuple[float, float], Traces]
-    seed: int = 0
+class Receptors:
+    """The population that discriminates spheres."""
 
     @cached_property
     def population(self) -> Population:
@@ -158,10 +137,20 @@ class Skins:
         """Pairs of the Gradient Sum."""
         return neighbour_pairs(self.population.positions_mm, self.population.pitch_mm)
 
+
+@dataclass(frozen=True)
+class Skins(Receptors):
+    """What the afferents of one candidate follow under bars and spheres."""
+
+    bars: list[Traces]  #: At the receptor, one column per shift of the bar in all.
+    spheres: Mapping[tuple[float, float], Traces]
+    """At the receptors of the population, by curvature and position. [1/m, mm]"""
+    seed: int = 0  #: Of the presentations behind expected hit rates.
+
     @cached_property
     def draws(self) -> FloatArray:
         """Presentations behind expected hit rates, (NOISE_DRAWS, n_receptors)."""
-        return normals(self.seed, 1, len(self.population.positions_mm), Purpose.RESPONSE, NOISE_DRAWS)[0].T
+        return draws_of(self.population, self.seed)
 
     @cached_property
     def model(self) -> AfferentModel:
@@ -188,57 +177,36 @@ class Skins:
 
 @result_class
 class Deflection:
-    """Skin under cylinder and plate.
+    """Skin under cylinder and plate."""
 
-    Parameters
-    ----------
-    r2 : float
-        Of the deflection under the cylinder. [1]
-    plate_force_n : array (2,)
-        Force of the plate at the depths of `PLATE_DEPTHS_MM`, at the end of the hold. [N]
-    """
-
-    r2: float
+    r2: float  #: Of the deflection under the cylinder. [1]
     plate_force_n: Vector
+    """Force of the plate at the depths of `PLATE_DEPTHS_MM`, at the end of the hold, (2,). [N]"""
 
 
 @result_class
 class Firing:
-    """Rates under the bar.
-
-    Parameters
-    ----------
-    fss, fss_out_of_sample : float
-        FSS over all shifts, and mean over the six folds on the shifts left out, of the afferent fitted to
-        rates and hit rates; NaN where no folds were fitted. [1]
-    dynamic_hz, static_hz : (float, float)
-        Smallest rate under the flat face of the bar, and largest rate. [spikes/s]
-    """
+    """Rates under the bar."""
 
     fss: float
     fss_out_of_sample: Number
+    """FSS over all shifts, and mean over the six folds on the shifts left out, of the afferent fitted to
+    rates and hit rates; NaN where no folds were fitted. [1]"""
     dynamic_hz: tuple[float, float]
     static_hz: tuple[float, float]
+    """Smallest rate under the flat face of the bar, and largest rate. [spikes/s]"""
 
 
 @result_class
 class Percept:
-    """Discrimination of spheres by the population.
-
-    Parameters
-    ----------
-    noise_sigma : float
-        Noise at which the Gradient Sum meets people's two hit rates best; NaN if none does. [1]
-    hit_rates : array (n_positions, 2)
-        Of the Gradient Sum at the paper's noise. [0-1]
-    euclidean_rms : float
-        Difference of the Euclidean Distance from people, root mean square over spheres and positions, at
-        `noise_sigma`. [0-1]
-    """
+    """Discrimination of spheres by the population."""
 
     noise_sigma: Number
-    hit_rates: Matrix
+    """Noise at which the Gradient Sum meets people's two hit rates best; NaN if none does. [1]"""
+    hit_rates: Matrix  #: Of the Gradient Sum at the paper's noise, (n_positions, 2). [0-1]
     euclidean_rms: Number
+    """Difference of the Euclidean Distance from people, root mean square over spheres and positions, at
+    `noise_sigma`. [0-1]"""
 
 
 @result_class
@@ -343,25 +311,14 @@ def _hit_rates(tables: Sequence[FloatArray], code: Callable[[FloatArray], FloatA
 
 @result_class
 class Targets:
-    """When a level counts as met.
-
-    Parameters
-    ----------
-    r2, fss : float
-        Least R² under the cylinder, and least FSS out of sample. [1]
-    plate_force_n : array (2, 2)
-        Smallest and largest force of people at each depth of `PLATE_DEPTHS_MM`. [N]
-    noise_sigma : (float, float)
-        Range of the fitted noise. [1]
-    euclidean_rms : float
-        Largest error of the Euclidean Distance at that noise. [0-1]
-    """
+    """When a level counts as met."""
 
     r2: float
-    fss: float
+    fss: float  #: Least R² under the cylinder, and least FSS out of sample. [1]
     plate_force_n: Matrix
-    noise_sigma: tuple[float, float]
-    euclidean_rms: float
+    """Smallest and largest force of people at each depth of `PLATE_DEPTHS_MM`, (2, 2). [N]"""
+    noise_sigma: tuple[float, float]  #: Range of the fitted noise. [1]
+    euclidean_rms: float  #: Largest error of the Euclidean Distance at that noise. [0-1]
 
 
 def targets() -> Targets:
@@ -388,31 +345,17 @@ def met(levels: Levels, wanted: Targets) -> tuple[str, ...]:
 
 @result_class
 class Row:
-    """One candidate and its levels.
-
-    Parameters
-    ----------
-    name, drive : str
-        Of the candidate, and what drives the afferent.
-    shear_kpa : array (4,)
-        Initial long-term shear moduli, with the common factor, from the outside in. [kPa]
-    chosen_by : tuple of str
-        Levels whose observations were used to choose the candidate: in sample there.
-    shifted_bars : bool
-        Whether the bar was pressed at all shifts.
-    levels : Levels or None
-        None if a press could not be solved.
-    unsolved : str
-        Why not.
-    """
+    """One candidate and its levels."""
 
     name: str
-    drive: str
+    drive: str  #: Of the candidate, and what drives the afferent.
     shear_kpa: Vector
+    """Initial long-term shear moduli, with the common factor, from the outside in, (4,). [kPa]"""
     chosen_by: tuple[str, ...]
-    shifted_bars: bool
-    levels: Levels | None
-    unsolved: str = ""
+    """Levels whose observations were used to choose the candidate: in sample there."""
+    shifted_bars: bool  #: Whether the bar was pressed at all shifts.
+    levels: Levels | None  #: None if a press could not be solved.
+    unsolved: str = ""  #: Why not.
 
 
 @result_class
@@ -428,11 +371,6 @@ def search_one(candidate: Candidate, runner: Runner, conditions: Conditions, fol
     """Press what is missing of one candidate, and compute its levels.
 
     Candidates with the same tissues share their presses. The tissues of the conditions are not used.
-
-    Raises
-    ------
-    StoreError
-        If a stored indentation is damaged.
     """
     levels, unsolved, wanted = None, "", touches(candidate, conditions)
     try:

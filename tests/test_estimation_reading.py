@@ -12,13 +12,7 @@ from hypothesis import strategies as st
 
 import fingerpad as fp
 from fingerpad.experiments.recording_files import read_recordings
-from fingerpad.experiments.requests.stimuli import (
-    ListedStimuli,
-    NamedStimulus,
-    ShiftedBar,
-    along_skin,
-    read_stimuli,
-)
+from fingerpad.experiments.requests.stimuli import ListedStimuli, NamedStimulus, ShiftedBar, read_stimuli
 from fingerpad.inference.recordings import SpikeRecordings
 from tests.mutations import CHANGES, VALUES, changed, places
 
@@ -64,7 +58,7 @@ def test_shifts_that_are_equal_are_one_stimulus_however_they_are_written(written
     assert recorded.recordings.stimuli == ("0", "0.1")
     assert recorded.recordings.dynamic_rate_hz.tolist() == [2.0, 5.0]
     assert recorded.stimuli["0.1"] == NamedStimulus(
-        fp.Bar(2.0), fp.RampAndHold(0.5), x_mm=-0.1 * along_skin(bar.conditions), name="0.1"
+        fp.Bar(2.0), fp.RampAndHold(0.5), x_mm=-0.1 * bar.conditions.along_skin, name="0.1"
     )
 
 

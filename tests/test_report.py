@@ -13,7 +13,7 @@ import pytest
 from matplotlib.collections import PolyCollection
 from matplotlib.patches import Circle
 
-from fingerpad.core.result_files import schema_of, to_json
+from fingerpad.core.result_files import to_json
 from fingerpad.data import STATUSES, all_published
 from fingerpad.experiments.gerling2014.claims import Group, paired
 from fingerpad.experiments.gerling2014.nerve import PopulationMaps
@@ -42,6 +42,7 @@ from sections import (
     skin_deflection_section,
     typed,
 )
+from tools.schemas import schema_of
 
 QUICK = finger_mesh(Fingertip(), resolution_grading("quick", 17.37))
 

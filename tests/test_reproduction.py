@@ -20,16 +20,16 @@ import fingerpad as fp
 from fingerpad import __version__, cli
 from fingerpad.core.compilation import SHORT_NOTICE, SUBJECT
 from fingerpad.core.errors import InputError
-from fingerpad.core.result_files import read_results, to_json
+from fingerpad.core.result_files import from_json, to_json
 from fingerpad.data import all_published
 from fingerpad.experiments.gerling2014 import nerve
 from fingerpad.experiments.gerling2014.reproduction import ReproductionResult
 from fingerpad.experiments.run import ReproductionRequest
 from fingerpad.experiments.run import run as run_request
-from fingerpad.experiments.runner import STORE_FOLDER
+from fingerpad.experiments.runner import STORE_FOLDER, Runner
 from fingerpad.report.results import page_of
 from fingerpad.skin.store import Store
-from studies.results_page import excerpt, readme_table
+from studies.results_page import read_excerpt, readme_table
 
 COMMAND = (sys.executable, "-W", "error", "-m", "fingerpad", "reproduce")
 MEASURES = ("static", "dynamic", "latency")
@@ -92,7 +92,7 @@ def second(first, stamps):
         chains = {"n_walkers": 100, "smallest_effective_size": 100.0, "largest_r_hat": 1.02}
         patch.setattr(nerve, "CHAINS", chains)  # short ones
         request = ReproductionRequest.read(None, {"resolution": "quick", "seed": 7, "extended": True})
-        results = run_request(request, first.folder)
+        results = run_request(request, Runner(first.folder))
     return json.loads(to_json(results))
 
 
@@ -114,7 +114,7 @@ def test_a_run_ends_with_status_0_and_whole_files_and_the_numbers_of_the_pages(f
     assert sorted(os.listdir(first.folder)) == ["figures", STORE_FOLDER, "report.html", "results.json"]
     assert len(stamps) == INDENTATIONS
     assert all(re.fullmatch(r"[0-9a-f]{32}\.npz", name) for name in stamps)
-    shown = excerpt(read_results(first.folder / "results.json", ReproductionResult))
+    shown = read_excerpt(first.folder / "results.json")
     assert sum(shown.indentations.values()) == INDENTATIONS
     assert len(readme_table(shown).splitlines()) == 2 + len(first.results["statements"])
     for percept in shown.percept.values():
@@ -276,9 +276,8 @@ def test_the_page_shows_every_compared_number_and_figure_and_no_machine_path(fir
             assert row["ours"] in text
     assert str(first.folder) not in page
     assert str(Path.home()) + "/" not in page
-    drawings = page_of(
-        "reproduction", read_results(first.folder / "results.json", ReproductionResult)
-    ).drawings
+    results = from_json(ReproductionResult, (first.folder / "results.json").read_bytes())
+    drawings = page_of("reproduction", results).drawings
     assert page.count("<img ") == sum(len(drawing.images) for drawing in drawings)
     for path in (first.folder / "figures").iterdir():
         content = path.read_bytes()

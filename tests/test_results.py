@@ -11,8 +11,9 @@ import pytest
 
 from fingerpad.core.checked import result_class
 from fingerpad.core.errors import InputError, StoreError
-from fingerpad.core.result_files import from_json, read_results, schema_of, to_json, write_results
+from fingerpad.core.result_files import from_json, read_format, to_json, write_results
 from fingerpad.core.values import Matrix, Number, Vector, WholeVector
+from tools.schemas import schema_of
 
 
 @result_class
@@ -74,7 +75,7 @@ def test_an_unknown_missing_or_unfit_field_is_an_error(changed: dict[str, object
 def test_a_file_meets_its_schema_or_is_not_written(tmp_path: Path) -> None:
     path, schema = tmp_path / "found.json", schema_of(Found)
     write_results(path, found(), schema)
-    assert to_json(read_results(path, Found)) == to_json(found())
+    assert read_format(path, {"fingerpad test": 2}) == json.loads(to_json(found()))
     path.unlink()
     schema["properties"]["absent"] = {"type": "number"}
     schema["required"] = ["absent"]
@@ -90,7 +91,6 @@ def test_a_file_meets_its_schema_or_is_not_written(tmp_path: Path) -> None:
         (b'{"format": "fingerpad test", "format_version": 1}', "version 1"),
         (b"[1]", "no format"),
         (b"half of a fi", "cannot be read as JSON"),
-        (b'{"format": "fingerpad test", "format_version": 2}', "damaged"),
     ],
 )
 def test_a_file_of_another_format_is_refused_with_a_sentence(
@@ -99,4 +99,4 @@ def test_a_file_of_another_format_is_refused_with_a_sentence(
     path = tmp_path / "found.json"
     path.write_bytes(content)
     with pytest.raises(StoreError, match=said):
-        read_results(path, Found)
+        read_format(path, {"fingerpad test": 2})

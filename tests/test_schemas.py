@@ -6,9 +6,8 @@ import fastjsonschema
 import pytest
 
 from fingerpad.core.errors import StoreError
-from fingerpad.core.result_files import file_format
 from fingerpad.experiments.schemas import all_formats, file_name, read, request_schema, schema
-from tools.schemas import REQUESTS, RESULT_FILES, write_schemas
+from tools.schemas import REQUESTS, RESULT_FILES, file_format, write_schemas
 
 
 @pytest.mark.parametrize("results", RESULT_FILES)

@@ -13,7 +13,6 @@ from hypothesis import strategies as st
 import fingerpad as fp
 from fingerpad.core import result_files
 from fingerpad.core.plain_yaml import read_yaml
-from fingerpad.core.result_files import file_format
 from fingerpad.experiments.conditions import RECEPTOR_X_MM, Conditions
 from fingerpad.experiments.examples import tasks
 from fingerpad.experiments.fit.request import FitFile
@@ -22,7 +21,7 @@ from fingerpad.neuron.afferent import PARAMETER_NAMES
 from fingerpad.skin.unrolled_skin import NailEdge, UnrolledSkin
 from tests.mutations import CHANGES, VALUES, places
 from tests.mutations import changed as mutated
-from tools.schemas import parts_in
+from tools.schemas import file_format, parts_in
 
 ROOT = Path(__file__).parents[1]
 read = fp.DiscriminationRequest.read

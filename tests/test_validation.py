@@ -72,7 +72,7 @@ def test_columns_stand_in_any_order_and_lines_keep_their_numbers(tmp_path):
         "0.11,1,plate\r\n# and\r\n0.2,1.0, punch:6.350\r\n0.3,1e0,punch:6.35\r\n",
     )
     found = read_observations(path)
-    assert (found.kind.name, found.kind.unit) == ("force", "N")
+    assert (found.kind.name, found.kind.observed) == ("force", "force_n")
     assert [row.line for row in found.rows] == [4, 6, 7]
     assert [row.condition for row in found.rows] == [
         (each, 1.0) for each in ("plate", "punch:6.350", "punch:6.35")
@@ -102,7 +102,7 @@ UNFIT = [
     (FORCE + "plate,1,\n", "mine.csv, line 2: force_n must be given"),
     (FORCE + "punch:x,1,1\n", "mine.csv, line 2: diameter_mm must be a finite number"),
     (RATE + "0.2,30,-1\n", "mine.csv, line 2: rate_hz must not be negative [spikes/s]"),
-    (FORCE + "plate,1,1\n" * 1_000_000, "mine.csv must be at most 1 MB: it has 10.0 MB; split it"),
+    (FORCE + "plate,1,1\n" * 1_000_000, "mine.csv must have at most 1 MB: got 10 MB; split it"),
 ]
 
 
@@ -162,7 +162,7 @@ def request_of(folder, content, **keys):
 
 
 def result_of(folder, content, **keys):
-    return run(request_of(folder, content, **keys), folder)
+    return run(request_of(folder, content, **keys), Runner(folder))
 
 
 def test_force_at_depth_0_is_0_and_grows_with_depth(folder):
@@ -308,7 +308,7 @@ def test_the_published_deflection_scores_as_in_the_reproduction(folder):
     assert [row.condition[2] for row in found.rows] == table.distance_mm[~table.is_artefact].tolist()
     third = Conditions(resolution="quick", tissues="trial3")
     keys = {"resolution": third.resolution, "tissues": third.tissues}
-    scored = run(fp.ValidationRequest.read({"observations": found} | keys), folder)
+    scored = run(fp.ValidationRequest.read({"observations": found} | keys), Runner(folder))
     touch = deflection_touches(third)["trial3", "cylinder"]
     profile = Store(folder / STORE_FOLDER).load(touch).surface_profile()
     assert scored.r2 == pytest.approx(deflection_r2(profile), abs=1e-12)

@@ -15,11 +15,10 @@ from pathlib import Path
 from typing import Any, get_args
 
 from docstring_parser import DocstringStyle, parse
-from pydantic import BaseModel
+from pydantic import BaseModel, TypeAdapter
 
 from fingerpad.core.checked import other_names
 from fingerpad.core.files import write_atomically
-from fingerpad.core.result_files import file_format, schema_of
 from fingerpad.core.units import unit_of
 from fingerpad.core.values import JsonSchema
 from fingerpad.experiments import schemas
@@ -32,8 +31,7 @@ from fingerpad.experiments.requests.stimulus import MEASURED, RAMP_AND_HOLD
 from fingerpad.experiments.requests.touch import ReductionRequest, RespondRequest, TouchFile, TouchRequest
 from fingerpad.experiments.run import ReproductionRequest
 from fingerpad.experiments.sweep.request import SweepRequest
-from fingerpad.experiments.validation.request import ValidationRequest
-from fingerpad.experiments.validation.validation import ValidationFile
+from fingerpad.experiments.validation.validation import ValidationFile, ValidationRequest
 
 RESULT_FILES: tuple[type, ...] = (
     ReproductionResult,
@@ -66,6 +64,18 @@ def write_schemas(folder: Path = Path(schemas.__file__).parent) -> None:
     for name, request in REQUESTS.items():
         content = json.dumps(explained_schema(request), indent=1).encode()
         write_atomically(folder / f"fingerpad-{name}-request.schema.json", content)
+
+
+def schema_of(results: type) -> JsonSchema:
+    """Return the JSON schema of a class of results, as a file holds it."""
+    declared = TypeAdapter(results).json_schema(mode="serialization")
+    return {"$schema": "https://json-schema.org/draft/2020-12/schema"} | declared
+
+
+def file_format(results: Any) -> tuple[str, int]:
+    """Return format and version of a class of results that are a file: literals, each with a default."""
+    declared = results.__dataclass_fields__
+    return declared["format"].default, declared["format_version"].default
 
 
 def structure(schema: Any) -> Any:

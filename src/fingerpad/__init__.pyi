@@ -22,7 +22,7 @@ from fingerpad.experiments.requests.touch import RespondRequest as RespondReques
 from fingerpad.experiments.requests.touch import TouchRequest as TouchRequest
 from fingerpad.experiments.run import ReproductionRequest as ReproductionRequest
 from fingerpad.experiments.sweep.request import SweepRequest as SweepRequest
-from fingerpad.experiments.validation.request import ValidationRequest as ValidationRequest
+from fingerpad.experiments.validation.validation import ValidationRequest as ValidationRequest
 from fingerpad.export.decks import export_touch as export_touch
 from fingerpad.export.requests import discriminate as discriminate
 from fingerpad.export.requests import fit as fit

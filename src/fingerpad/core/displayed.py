@@ -107,7 +107,7 @@ class Displayed:
 class Result(Displayed):
     """Base of results: they draw themselves, turn into a table or a data set, and save themselves."""
 
-    whole_as_json: ClassVar[bool] = False  #: If JSON holds all fields, as `core/result_files` reads them.
+    whole_as_json: ClassVar[bool] = False  #: If JSON holds all fields, as `core/result_files` writes them.
 
     def columns(self) -> Columns:
         """Columns of the table of this result by name, the index first; by default its lists of numbers."""

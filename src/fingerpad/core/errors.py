@@ -75,12 +75,6 @@ def closest(wrong: Any, known: Collection[str]) -> str | None:
     return near[0] if near else None
 
 
-def got(value: Any, known: Collection[str], text: str | None = None) -> str:
-    """Text of a value that is none of several names, with the closest of them."""
-    near, said = closest(value, known), text or shown(value)
-    return f"{said} (did you mean {near}?)" if near else said
-
-
 class InputError(FingerpadError, ValueError):
     """An argument, option or file that cannot be used as given.
 

@@ -81,10 +81,10 @@ def check_file(path: Path, largest_mb: float) -> Path:
     return path
 
 
-def check_new(path: Path, another: str = "name") -> None:
-    """Raise `InputError` if a file exists that a user may have changed; `another` of what to choose."""
+def check_new(path: Path) -> None:
+    """Raise `InputError` if a file exists that a user may have changed."""
     if path.exists():
-        raise InputError(f"{path} exists and is not overwritten: choose another {another}.")
+        raise InputError(f"{path} exists and is not overwritten: choose another name.")
 
 
 def read_text(path: Path) -> str:

@@ -169,11 +169,10 @@ class Presentations:
             )
 
     @classmethod
-    def of_population(cls, n_receptors: int, n_trials: int = 1) -> Presentations:
-        """Present one touch `n_trials` times to as many receptors as there are sites, trial by trial."""
-        receptors, trials = numbered("n_receptors", n_receptors), numbered("n_trials", n_trials)
-        sites = np.tile(receptors, trials.size)
-        return cls(sites, np.repeat(trials, receptors.size), sites)
+    def of_population(cls, n_receptors: int) -> Presentations:
+        """Present one touch once to as many receptors as there are sites."""
+        sites = numbered("n_receptors", n_receptors)
+        return cls(sites, np.zeros_like(sites), sites)
 
     @classmethod
     def of_one_afferent(cls, n_stimuli: int, n_repeats: int = 1) -> Presentations:

@@ -1,4 +1,4 @@
-"""Files of results: JSON of a class that `result_class` makes, NaN as null, and the schema of it."""
+"""Files of results: JSON of a class that `result_class` makes, NaN as null, checked by a schema."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ from fingerpad.core.values import JsonObject, JsonSchema
 _Kind = TypeVar("_Kind")
 
 
-def to_json(result: Any, indent: int | None = 1) -> bytes:
+def to_json(result: Any) -> bytes:
     """JSON of a result, null for NaN."""
-    return TypeAdapter(type(result)).dump_json(result, indent=indent)
+    return TypeAdapter(type(result)).dump_json(result, indent=1)
 
 
 def from_json(cls: type[_Kind], content: bytes) -> _Kind:
@@ -30,13 +30,6 @@ def from_json(cls: type[_Kind], content: bytes) -> _Kind:
         first = error.errors(include_url=False)[0]
         place = ".".join(str(part) for part in first["loc"]) or "the file"
         raise InputError(f"{place} is not as {cls.__name__} needs it: {first['msg']}.") from error
-
-
-def schema_of(cls: type) -> JsonSchema:
-    """JSON schema of a class of results, as a file holds it."""
-    return {"$schema": "https://json-schema.org/draft/2020-12/schema"} | TypeAdapter(cls).json_schema(
-        mode="serialization"
-    )
 
 
 def write_results(path: Path, results: Any, schema: JsonSchema) -> None:
@@ -57,25 +50,10 @@ def check_schema(path: Path, values: JsonObject, schema: JsonSchema) -> None:
         ) from error
 
 
-def read_results(path: Path, cls: type[_Kind]) -> _Kind:
-    """Read a file of results."""
-    content, _ = _json_of_format(path, dict([file_format(cls)]))
-    try:
-        return from_json(cls, content)
-    except InputError as error:
-        raise StoreError(f"{path} is damaged: {error} Run the command again.") from error
-
-
 def read_format(path: Path, versions: Mapping[str, int]) -> JsonObject:
     """Read the JSON values of a file whose format and version are known."""
-    return _json_of_format(path, versions)[1]
-
-
-def _json_of_format(path: Path, versions: Mapping[str, int]) -> tuple[bytes, JsonObject]:
-    """Content of a file and its JSON values: the classes of some fields accept texts only from JSON."""
     try:
-        content = check_file(path, LARGEST_TEXT_MB).read_bytes()
-        values = json.loads(content)
+        values = json.loads(check_file(path, LARGEST_TEXT_MB).read_bytes())
     except InputError as error:
         raise StoreError(str(error)) from error
     except (OSError, ValueError, RecursionError) as error:
@@ -88,10 +66,4 @@ def _json_of_format(path: Path, versions: Mapping[str, int]) -> tuple[bytes, Jso
         raise StoreError(
             f"{path} must have the format {wanted}: got {came}; run the command again to write it anew."
         )
-    return content, values
-
-
-def file_format(cls: Any) -> tuple[str, int]:
-    """Format and version of a class of results that are a file: literals, each with a default."""
-    declared = cls.__dataclass_fields__
-    return declared["format"].default, declared["format_version"].default
+    return values

@@ -69,7 +69,9 @@ def column_of(rows: Sequence[TableRow], column: str, unit: str = "", check: Chec
 
 def read_csv(path: Path, known: Sequence[str], prefixes: tuple[str, ...] = ()) -> list[TableRow]:
     r"""Rows of a CSV file: comments begin with #, then a header, then one row per line."""
-    reader = csv.reader(_without_comments(read_text(path)), strict=True)
+    texts = io.StringIO(read_text(path), newline="")
+    # An empty line in the place of a comment keeps the line numbers.
+    reader = csv.reader(("\n" if text.lstrip().startswith("#") else text for text in texts), strict=True)
     try:
         rows = [(reader.line_num, row) for row in reader if any(entry.strip() for entry in row)]
     except csv.Error as error:
@@ -99,9 +101,3 @@ def read_csv(path: Path, known: Sequence[str], prefixes: tuple[str, ...] = ()) -
             )
         lines.append(TableRow(f"{path}, line {number}", dict(zip(columns, row, strict=True)), number))
     return lines
-
-
-def _without_comments(text: str) -> Iterator[str]:
-    """Lines of a text, with comments replaced by empty lines to keep the line numbers."""
-    for line in io.StringIO(text, newline=""):
-        yield "\n" if line.lstrip().startswith("#") else line

@@ -21,7 +21,7 @@ from numpy.typing import ArrayLike, NDArray
 from pydantic import Strict
 from pydantic_core import core_schema
 
-from fingerpad.core.errors import InputError, got, shown
+from fingerpad.core.errors import InputError, closest, shown
 from fingerpad.core.files import path_of
 from fingerpad.core.units import unit_of
 
@@ -134,7 +134,9 @@ def text(name: str, value: Any) -> str:
 def one_of(name: str, value: Any, allowed: Collection[str]) -> str:
     """Return one of several names."""
     if not isinstance(value, str) or value not in allowed:
-        raise InputError(name, f"must be one of {', '.join(allowed)}", got(value, allowed))
+        near, came = closest(value, allowed), shown(value)
+        came = f"{came} (did you mean {near}?)" if near else came
+        raise InputError(name, f"must be one of {', '.join(allowed)}", came)
     return value
 
 

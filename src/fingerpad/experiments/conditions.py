@@ -84,6 +84,11 @@ class Conditions:
         """As of the function `skin_tilt_deg`."""
         return skin_tilt_deg(self.finger)
 
+    @property
+    def along_skin(self) -> float:
+        """Distance along the finger's axis over that along the skin at the receptor."""
+        return float(np.cos(np.deg2rad(self.skin_tilt_deg)))
+
     def touch(
         self,
         indenter: Indenter,
@@ -120,8 +125,7 @@ class Conditions:
         Its flat face stays parallel to the skin at the receptor (docs/decisions.md#bar-orientation). A
         positive shift moves the bar towards the proximal end (docs/decisions.md#bar-shift).
         """
-        tilt, grading = self.skin_tilt_deg, self.bar_grading()
-        along = float(np.cos(np.deg2rad(tilt)))
+        tilt, along, grading = self.skin_tilt_deg, self.along_skin, self.bar_grading()
         return [
             self.touch(Bar(), self.receptor_x_mm - shift * along, grading, tilt_deg=tilt)
             for shift in protocol.BAR_SHIFTS.value

@@ -97,16 +97,21 @@ def read_recordings(path: str | Path, stimuli: Stimuli, unit: Whole | None = Non
         raise InputError(f"unit belongs to NWB files ({', '.join(SUFFIXES_OF_NWB)}): {path} is none.")
     _check_columns(path, stimuli.column, lines[0])
     known: dict[str, NamedStimulus] = {}
-    presented = [_presented(line, stimuli, known) for line in lines]
+    for line in lines:
+        entry = line.text(stimuli.column)
+        if entry not in known:
+            with line.placed():
+                known[entry] = stimuli.named(entry)
+    presented = [known[line.text(stimuli.column)] for line in lines]
     names = [stimulus.name for stimulus in presented]
-    found = {stimulus.name: stimulus for stimulus in presented}
     memberships = _memberships(path, lines, names) if FOLD in lines[0].entries else None
-    presentations = dict(Counter(names))
-    if SPIKES not in lines[0].entries:
-        rates = _mean_rates(lines, names, str(path))
-        return Recorded(rates, found, memberships, presentations)
-    spikes, after = _spikes(lines, presented, str(path))
-    return Recorded(spikes, found, memberships, presentations, after)
+    recordings: RateRecordings | SpikeRecordings
+    if SPIKES in lines[0].entries:
+        recordings, after = _spikes(lines, presented, str(path))
+    else:
+        recordings, after = _mean_rates(lines, names, str(path)), 0
+    found = {stimulus.name: stimulus for stimulus in presented}
+    return Recorded(recordings, found, memberships, dict(Counter(names)), after)
 
 
 def _check_columns(path: Path, column: str, first: TableRow) -> None:
@@ -124,15 +129,6 @@ def _check_columns(path: Path, column: str, first: TableRow) -> None:
         )
     if DURATION in given and SPIKES not in given:
         raise InputError(f"{path} has {DURATION}, which belongs to {SPIKES}: leave it out.")
-
-
-def _presented(line: TableRow, stimuli: Stimuli, known: dict[str, NamedStimulus]) -> NamedStimulus:
-    """Stimulus of a line; those that were presented before are `known`."""
-    entry = line.text(stimuli.column)
-    if entry not in known:
-        with line.placed():
-            known[entry] = stimuli.named(entry)
-    return known[entry]
 
 
 def _mean_rates(lines: Sequence[TableRow], names: Sequence[str], source: str) -> RateRecordings:

@@ -3,12 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from pathlib import Path
-from types import MappingProxyType
 from typing import Annotated, Any, ClassVar
 
-from fingerpad.core.engine import Engine
-from fingerpad.core.progress import Progress
 from fingerpad.core.values import Flag, Seed, choice
 from fingerpad.experiments.conditions import Conditions
 from fingerpad.experiments.discrimination.analysis import discriminate
@@ -18,8 +14,7 @@ from fingerpad.experiments.gerling2014.reproduction import HUMAN, PAPER, Reprodu
 from fingerpad.experiments.requests.parts import Request
 from fingerpad.experiments.requests.touch import ReductionRequest, RespondRequest, TouchRequest
 from fingerpad.experiments.runner import Runner
-from fingerpad.experiments.validation.request import ValidationRequest
-from fingerpad.experiments.validation.validation import validate
+from fingerpad.experiments.validation.validation import ValidationRequest, validate
 from fingerpad.geometry.grading import RESOLUTIONS
 from fingerpad.mechanics.tissues import TISSUES
 
@@ -50,25 +45,17 @@ class ReproductionRequest(Request):
         return reproduce(columns, self.goes_beyond, runner)
 
 
-RUNS: Mapping[type[Request], Callable[[Any, Runner], Any]] = MappingProxyType(
-    {
-        TouchRequest: TouchRequest.run,
-        RespondRequest: RespondRequest.run,
-        FitRequest: run_fit,
-        DiscriminationRequest: discriminate,
-        ValidationRequest: validate,
-        ReductionRequest: ReductionRequest.run,
-        ReproductionRequest: ReproductionRequest.run,
-    }
-)  # What runs a request, by its class.
+RUNS: Mapping[type[Request], Callable[[Any, Runner], Any]] = {
+    TouchRequest: TouchRequest.run,
+    RespondRequest: RespondRequest.run,
+    FitRequest: run_fit,
+    DiscriminationRequest: discriminate,
+    ValidationRequest: validate,
+    ReductionRequest: ReductionRequest.run,
+    ReproductionRequest: ReproductionRequest.run,
+}  # What runs a request, by its class.
 
 
-def run(
-    request: Request,
-    folder: Path,
-    jobs: int | Engine = 1,
-    progress: Progress | None = None,
-    command: str | None = None,
-) -> Any:
-    """Run a request, with its stored presses in a folder."""
-    return RUNS[type(request)](request, Runner(folder, jobs, progress, command))
+def run(request: Request, runner: Runner) -> Any:
+    """Run a request, with its stored presses in the folder of the runner."""
+    return RUNS[type(request)](request, runner)

@@ -13,7 +13,7 @@ from dataclasses import replace
 from datetime import UTC, datetime
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any, TypedDict
+from typing import Any
 
 import numpy as np
 
@@ -92,17 +92,8 @@ class Manifest:
         return tuple(dict.fromkeys(text for stage in self.stages for text in stage.caveats))
 
 
-class Software(TypedDict):
+def software() -> dict[str, Any]:
     """Fields of a `Manifest` that name the program and the system."""
-
-    version: str
-    code_hash: str
-    python: str
-    platform: str
-    packages: dict[str, str]
-
-
-def software() -> Software:
     return {
         "version": __version__,
         "code_hash": code_hash(),

@@ -27,8 +27,8 @@ from fingerpad.experiments.gerling2014.reproduction import ReproductionResult
 from fingerpad.experiments.requests.parts import Request, at
 from fingerpad.experiments.requests.touch import ReductionRequest, RespondRequest, TouchRequest, TouchResult
 from fingerpad.experiments.run import ReproductionRequest, run
-from fingerpad.experiments.validation.request import ValidationRequest
-from fingerpad.experiments.validation.validation import ValidationFile
+from fingerpad.experiments.runner import Runner
+from fingerpad.experiments.validation.validation import ValidationFile, ValidationRequest
 from fingerpad.export.decks import DECKS, RESULTS, write_deck
 from fingerpad.export.job import job_of
 from fingerpad.export.results import require
@@ -80,9 +80,9 @@ def runs(
             (check or kind.check)(asked)
             if out is None:
                 with TemporaryDirectory() as folder:
-                    return run(asked, Path(folder), jobs, progress, command)
+                    return run(asked, Runner(Path(folder), jobs, progress, command))
             stored = make_writable(folder_of(Path(out)))
-            found: Kind = run(asked, stored, jobs, progress, command)
+            found: Kind = run(asked, Runner(stored, jobs, progress, command))
             write(found, Path(out))
             return found
 

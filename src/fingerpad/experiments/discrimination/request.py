@@ -35,6 +35,7 @@ from fingerpad.data import psychophysics
 from fingerpad.experiments.conditions import Conditions
 from fingerpad.experiments.examples import tasks
 from fingerpad.experiments.requests.afferents import (
+    AFFERENT_OBJECTS,
     Afferents,
     AfferentsSettings,
     check_windows,
@@ -135,9 +136,7 @@ class DiscriminationRequest(StimulusSet, FingerRequest):
     """
 
     word: ClassVar[str] = "task"
-    python: ClassVar[tuple[str, ...]] = (
-        *FINGER_OBJECTS, "object", "motion", "afferents", "afferents.afferent", "afferents.population",
-    )  # fmt: skip
+    python: ClassVar[tuple[str, ...]] = (*FINGER_OBJECTS, "object", "motion", *AFFERENT_OBJECTS)
 
     question: Text = "Which stimuli can be told apart?"  #: In words: the title of the page.
     axis: Text | None = None  #: What the levels are, for the axes of figures; by default the key that varies.

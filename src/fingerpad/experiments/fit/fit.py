@@ -15,17 +15,9 @@ from fingerpad.core.signals import Traces
 from fingerpad.core.units import units_of
 from fingerpad.core.values import Flag, FloatArray, IntArray, Whole, choice
 from fingerpad.data import neuron
-from fingerpad.experiments.fit.results import (
-    FitResult,
-    FittedFold,
-    HeldOffset,
-    OffsetFit,
-    PhaseRates,
-    SpikeFitSummary,
-)
+from fingerpad.experiments.fit import results
 from fingerpad.inference.afferent_fit import (
     ReceptorOffset,
-    Search,
     fitted_four,
     fitted_six,
     four_numbers,
@@ -69,7 +61,7 @@ class Prepared:
         """Covariance (4, 4) of the identifiable numbers, from the fits of the folds; None for few folds."""
         return jackknife_covariance([identifiable(self.six(fold.fit.parameters)) for fold in folds.folds])
 
-    def spikes(self, fit: Fit, folds: CrossValidation) -> SpikeFitSummary | None:
+    def spikes(self, fit: Fit, folds: CrossValidation) -> results.SpikeFitSummary | None:
         """Summary of a fit to spikes; None for a fit to rates."""
         return None
 
@@ -115,7 +107,7 @@ def fit_recordings(
     with_sensitivity: Flag = False,
     beside: Beside | None = None,
     positions_mm: ArrayLike | None = None,
-) -> FitResult:
+) -> results.FitResult:
     """Fit an afferent to recordings under stimuli whose traces are known.
 
     Parameters
@@ -185,7 +177,7 @@ def fit_recordings(
         posterior = rate_posterior(model, rates, four, seed, positions_mm) if with_posterior else None
         profiles = profiled(model, rates, four, positions_mm) if with_profiles else None
         sensitivity = fss_sensitivity(problem, four, seed) if with_sensitivity else None
-    return FitResult(
+    return results.FitResult(
         method=method,
         source=rates.source,
         n_evaluations=best.n_evaluations,
@@ -239,7 +231,7 @@ def check_enough(rates: RateRecordings, memberships: IntArray, n_free: int = len
 
 def _phases(
     problem: RateProblem, rates: RateRecordings, fitted: FloatArray, validation: CrossValidation
-) -> dict[str, PhaseRates]:
+) -> dict[str, results.PhaseRates]:
     """Every rate as observed, fitted, and predicted without its fold; FSS in sample."""
     predicted = dict(zip(PHASES, problem.model.evaluate(fitted), strict=True))
     left_out = {phase: np.empty(problem.n_observations) for phase in PHASES}
@@ -248,7 +240,7 @@ def _phases(
             left_out[phase][fold.testing] = rate[fold.testing]
     observed = {phase: getattr(rates, f"{phase}_rate_hz") for phase in PHASES}
     return {
-        phase: PhaseRates(
+        phase: results.PhaseRates(
             fss_in_sample=None if seen is None else fractional_sum_of_squares(seen, predicted[phase]),
             observed_hz=seen,
             fitted_hz=predicted[phase],
@@ -258,10 +250,12 @@ def _phases(
     }
 
 
-def _folds(prepared: Prepared, rates: RateRecordings, validation: CrossValidation) -> tuple[FittedFold, ...]:
+def _folds(
+    prepared: Prepared, rates: RateRecordings, validation: CrossValidation
+) -> tuple[results.FittedFold, ...]:
     six = [prepared.six(fold.fit.parameters) for fold in validation.folds]
     return tuple(
-        FittedFold(
+        results.FittedFold(
             fold=fold.fold + 1,
             stimuli=tuple(rates.stimuli[row] for row in fold.testing),
             fss_train=fold.fit.score,
@@ -327,7 +321,7 @@ def fit_offset(
     method: Annotated[str, choice(OFFSET_METHODS)],
     windows_ms: Windows | None,
     seed: Whole = 0,
-) -> OffsetFit:
+) -> results.OffsetFit:
     """Fit a receptor in its place, then let it move from the best fit, which it can only improve."""
     beside_mm = check_beside(beside)
     roving = ReceptorOffset.of_traces({offset: beside[offset] for offset in beside_mm}, windows_ms)
@@ -338,7 +332,10 @@ def fit_offset(
     def moving(begun: FloatArray) -> Method:
         if method == "cma_es":
             return search.by_evolution(np.append(begun, 0.0), seed)
-        return _from_all_offsets(search, begun, roving.offsets_mm)
+        within = np.clip(begun, search.bounds.low[:4], search.bounds.high[:4])  # round-off at a bound
+        offsets_mm = sorted({0.0, *roving.offsets_mm[1:-1].tolist()})
+        starts = [np.append(within, offset) for offset in offsets_mm]
+        return LeastSquares(starts, search.bounds, n_refined=2)
 
     best, crossed = validated(search.problem, Continued(first.method, moving, first.problem), memberships)
     four, offset_mm = fitted_four(best.parameters[:4]).tolist(), float(best.parameters[-1])
@@ -346,7 +343,7 @@ def fit_offset(
     error = jackknife_covariance(np.reshape(folds_mm, (-1, 1)))
     everything = np.arange(roving.n_stimuli)
     held = [prepare(method, place, rates, rates, seed) for place in roving.models]
-    return OffsetFit(
+    return results.OffsetFit(
         offset_mm=offset_mm,
         standard_error_mm=np.nan if error is None else np.sqrt(error[0, 0]),
         folds_mm=np.array(folds_mm),
@@ -356,15 +353,8 @@ def fit_offset(
         fss_by_phase=search.problem.score_by_phase(best.parameters, everything),
         n_evaluations=best.n_evaluations,
         seconds=best.seconds,
-        held=HeldOffset(
+        held=results.HeldOffset(
             offset_mm=beside_mm,
             fss_in_sample=np.array([one.method.fit(one.problem, everything).score for one in held]),
         ),
     )
-
-
-def _from_all_offsets(search: Search, begun: FloatArray, offsets_mm: FloatArray) -> Method:
-    """Least squares from each offset."""
-    within = np.clip(begun, search.bounds.low[:4], search.bounds.high[:4])  # round-off at a bound
-    starts = [np.append(within, offset) for offset in sorted({0.0, *offsets_mm[1:-1].tolist()})]
-    return LeastSquares(starts, search.bounds, n_refined=2)

@@ -15,17 +15,8 @@ from fingerpad.core.errors import ConvergenceError
 from fingerpad.core.signals import SpikeTrains
 from fingerpad.core.units import units_of
 from fingerpad.core.values import FloatArray, IntArray
+from fingerpad.experiments.fit import results
 from fingerpad.experiments.fit.fit import Prepared, Recordings, check_spikes
-from fingerpad.experiments.fit.results import (
-    CredibleInterval,
-    ParameterIdentifiability,
-    ParameterProfile,
-    PhasePrediction,
-    PosteriorConvergence,
-    RatePosterior,
-    SpikeFitSummary,
-    UncertaintyResult,
-)
 from fingerpad.inference.afferent_fit import spike_start, start_points
 from fingerpad.inference.fitting.methods import CrossValidation, Fit, Problem, halton
 from fingerpad.inference.fitting.posterior import credible_band
@@ -93,7 +84,7 @@ def likely_points(likelihood: RateLikelihood, four: ArrayLike) -> FloatArray:
     return from_coordinates(points[heights >= heights.max() - MOST_LOSS])
 
 
-def profiles(likelihood: RateLikelihood, starts: FloatArray) -> tuple[ParameterProfile, ...]:
+def profiles(likelihood: RateLikelihood, starts: FloatArray) -> tuple[results.ParameterProfile, ...]:
     """Profile the likelihood of the four numbers; those that are positive in their logarithm."""
 
     def log_likelihood(points: FloatArray) -> FloatArray:
@@ -110,10 +101,10 @@ def profiles(likelihood: RateLikelihood, starts: FloatArray) -> tuple[ParameterP
     return tuple(_profile(profile, logarithm=index > 0) for index, profile in enumerate(found))
 
 
-def _profile(profile: ProfileLikelihood, logarithm: bool) -> ParameterProfile:
+def _profile(profile: ProfileLikelihood, logarithm: bool) -> results.ParameterProfile:
     """Return a profile in the unit of its number; an end that is not finite is open."""
     low, high = (float(np.exp(end) if logarithm else end) for end in profile.interval)
-    return ParameterProfile(
+    return results.ParameterProfile(
         name=profile.name,
         values=np.exp(profile.values) if logarithm else profile.values,
         losses=profile.losses,
@@ -145,22 +136,22 @@ def rate_posterior(
     seed: int,
     positions_mm: ArrayLike | None = None,
     **settings: Any,
-) -> RatePosterior:
+) -> results.RatePosterior:
     likelihood = _likelihood(model, rates, positions_mm)
     found = afferent_posterior(likelihood, admissible(four), seed=seed, **settings)
-    return RatePosterior(
+    return results.RatePosterior(
         level=LEVEL,
         seed=seed,
         numbers=_intervals(dict(zip(IDENTIFIABLE_NAMES, found.four.T, strict=True))),
         covariance=np.cov(found.four, rowvar=False),
-        convergence=PosteriorConvergence.of(found.chains),
+        convergence=results.PosteriorConvergence.of(found.chains),
         rates=_predictions(found, rates),
     )
 
 
 def profiled(
     model: AfferentModel, rates: RateRecordings, four: ArrayLike, positions_mm: ArrayLike | None = None
-) -> tuple[ParameterProfile, ...]:
+) -> tuple[results.ParameterProfile, ...]:
     likelihood = _likelihood(model, rates, positions_mm)
     return profiles(likelihood, likely_points(likelihood, admissible(four)))
 
@@ -179,7 +170,7 @@ def uncertainty(
     shift_mm: FloatArray,
     seed: int,
     **settings: Any,
-) -> UncertaintyResult:
+) -> results.UncertaintyResult:
     """Find what rates determine of six fitted parameters, with stimuli at places along a line."""
     model, six = four_number_model(six_model), np.asarray(fitted, dtype=np.float64)
     four, capacitance_mf, threshold_mv = identifiable(six), float(six[4]), float(six[5])
@@ -190,18 +181,18 @@ def uncertainty(
     draws["resting_share"] = chains.flat[:, 0]
     some = posterior.four[np.linspace(0, len(posterior.four) - 1, SEEDS_OF_PROFILES).astype(np.int64)]
     local = identifiability(lambda values: np.concatenate(six_model.evaluate(values)), six, PARAMETER_NAMES)
-    return UncertaintyResult(
+    return results.UncertaintyResult(
         level=LEVEL,
         seed=seed,
         units=units_of(IDENTIFIABLE_NAMES),
         fit=dict(zip(IDENTIFIABLE_NAMES, four.tolist(), strict=True)),
         capacitance_mf=capacitance_mf,
         threshold_mv=threshold_mv,
-        identifiability=ParameterIdentifiability(
+        identifiability=results.ParameterIdentifiability(
             rank=local.rank, relative_singular_values=local.singular_values / local.singular_values[0]
         ),
         posterior=_intervals(draws),
-        convergence=PosteriorConvergence.of(chains),
+        convergence=results.PosteriorConvergence.of(chains),
         shift_mm=shift_mm,
         rates=_predictions(posterior, recordings),
         evidence_for_alike_residuals=(
@@ -212,26 +203,26 @@ def uncertainty(
     )
 
 
-def _interval(draws: FloatArray) -> CredibleInterval:
+def interval(draws: FloatArray) -> results.CredibleInterval:
     low, high = credible_band(draws, LEVEL)
-    return CredibleInterval(median=float(np.median(draws)), low=float(low), high=float(high))
+    return results.CredibleInterval(median=float(np.median(draws)), low=float(low), high=float(high))
 
 
-def _intervals(draws: Mapping[str, FloatArray]) -> dict[str, CredibleInterval]:
-    return {name: _interval(values) for name, values in draws.items()}
+def _intervals(draws: Mapping[str, FloatArray]) -> dict[str, results.CredibleInterval]:
+    return {name: interval(values) for name, values in draws.items()}
 
 
-def _predictions(found: AfferentPosterior, recordings: RateRecordings) -> dict[str, PhasePrediction]:
+def _predictions(found: AfferentPosterior, recordings: RateRecordings) -> dict[str, results.PhasePrediction]:
     return {
         phase: _prediction(drawn, getattr(recordings, f"{phase}_rate_hz"))
         for phase, drawn in found.rates.items()
     }
 
 
-def _prediction(drawn: ResidualDraws, observed_hz: FloatArray) -> PhasePrediction:
+def _prediction(drawn: ResidualDraws, observed_hz: FloatArray) -> results.PhasePrediction:
     low, high = credible_band(drawn.predicted_hz, LEVEL)
     new_low, new_high = credible_band(drawn.new_hz, LEVEL)
-    return PhasePrediction(
+    return results.PhasePrediction(
         observed_hz=observed_hz,
         median_hz=np.median(drawn.predicted_hz, axis=0),
         low_hz=low,
@@ -239,8 +230,8 @@ def _prediction(drawn: ResidualDraws, observed_hz: FloatArray) -> PhasePredictio
         new_low_hz=new_low,
         new_high_hz=new_high,
         share_within_new=((new_low <= observed_hz) & (observed_hz <= new_high)).mean(),
-        residual_deviation_hz=_interval(drawn.deviation_hz),
-        residual_length_mm=_interval(drawn.length_mm),
+        residual_deviation_hz=interval(drawn.deviation_hz),
+        residual_length_mm=interval(drawn.length_mm),
         probability_of_independence=(drawn.length_mm == INDEPENDENT).mean(),
     )
 
@@ -287,10 +278,10 @@ class PreparedSpikes(Prepared):
         """Covariance (4, 4) of the identifiable numbers: part of the inverse of the Fisher information."""
         return self._covariance(fit)[:4, :4]
 
-    def spikes(self, fit: Fit, folds: CrossValidation) -> SpikeFitSummary:
+    def spikes(self, fit: Fit, folds: CrossValidation) -> results.SpikeFitSummary:
         left_out = [(self.method.of(fold.testing), fold.fit.parameters) for fold in folds.folds]
         test = time_rescaling(self.everything, fit.parameters)
-        return SpikeFitSummary(
+        return results.SpikeFitSummary(
             n_spikes=self.everything.n_spikes,
             log_likelihood=self.everything.log_likelihood(fit.parameters),
             log_likelihood_out_of_sample=sum(part.log_likelihood(five) for part, five in left_out),

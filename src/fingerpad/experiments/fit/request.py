@@ -28,14 +28,7 @@ from fingerpad.experiments.requests.afferents import (
     files_of,
 )
 from fingerpad.experiments.requests.parts import as_list, at, object_of_python
-from fingerpad.experiments.requests.stimuli import (
-    BAR,
-    NamedStimulus,
-    ShiftedBar,
-    Stimuli,
-    along_skin,
-    read_stimuli,
-)
+from fingerpad.experiments.requests.stimuli import BAR, NamedStimulus, ShiftedBar, Stimuli, read_stimuli
 from fingerpad.experiments.requests.stimulus import (
     FINGER_OBJECTS,
     FingerDescription,
@@ -119,21 +112,19 @@ class FitRequest(FingerRequest):
     def check(self) -> None:
         """Raise `InputError` if the fit is impossible; before anything is solved."""
         with self.origin.located():
-            self._check()
+            if self.free or self.afferent != DEFAULT:
+                self._check_chosen()
+            stimuli = self.recorded.stimuli
+            for name, stimulus in stimuli.items():
+                check_windows(self.used_windows_ms, stimulus.motion.end_ms, name)
+            if self.offset:
+                check_offset(self.method, [stimulus.x_mm for stimulus in stimuli.values()])
+            n_free = len(self.free) or len(IDENTIFIABLE_NAMES) + self.offset
+            check_enough(self.rates, self.memberships, n_free)
+            if self.method == "likelihood":
+                motions = {stimulus.motion for stimulus in stimuli.values()}
+                check_spikes(self.recorded.recordings, len(motions))
         self.touches  # noqa: B018
-
-    def _check(self) -> None:
-        if self.free or self.afferent != DEFAULT:
-            self._check_chosen()
-        for name, stimulus in self.recorded.stimuli.items():
-            check_windows(self.used_windows_ms, stimulus.motion.end_ms, name)
-        if self.offset:
-            check_offset(self.method, [stimulus.x_mm for stimulus in self.recorded.stimuli.values()])
-        n_free = len(self.free) or len(IDENTIFIABLE_NAMES) + self.offset
-        check_enough(self.rates, self.memberships, n_free)
-        if self.method == "likelihood":
-            motions = {stimulus.motion for stimulus in self.recorded.stimuli.values()}
-            check_spikes(self.recorded.recordings, len(motions))
 
     def _check_chosen(self) -> None:
         """Refuse a fit of chosen numbers that names none, or asks for what only the four numbers have."""
@@ -259,7 +250,7 @@ def run_fit(request: FitRequest, runner: Runner) -> FitFile | ChosenNumbersFile:
         offset: [traces.part(slice(place, place + 1)) for traces in sampled]
         for place, offset in enumerate(offsets_mm)
     }
-    shifts_mm = _shifts_mm(list(recorded.stimuli.values()), along_skin(request.settings))
+    shifts_mm = _shifts_mm(list(recorded.stimuli.values()), request.settings.along_skin)
     with runner.stage("fit", 1) as advance:
         found = fit_recordings(
             beside[0.0],

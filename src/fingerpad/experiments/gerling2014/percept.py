@@ -503,9 +503,8 @@ def rise_needed(measured: Measured, noise_sigma: float, draws: FloatArray) -> fl
         return np.array([standard, standard + way * (farthest - standard)])
 
     def missed(way: float) -> float:
-        return (
-            float(expected_hit_rates(pair(way), measured.neighbours, noise_sigma, draws)[0]) - HIT_RATES[-1]
-        )
+        hit_rates = expected_hit_rates(pair(way), measured.neighbours, noise_sigma, draws)
+        return float(hit_rates[0]) - HIT_RATES[-1]
 
     if np.array_equal(standard, farthest) or missed(STEEPEST) < 0.0:
         return float("nan")

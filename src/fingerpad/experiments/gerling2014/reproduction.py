@@ -16,14 +16,6 @@ from fingerpad.experiments.conditions import CURVATURES, POSITIONS_MM, RECEPTOR_
 from fingerpad.experiments.fit.results import UncertaintyResult
 from fingerpad.experiments.gerling2014 import nerve, percept, skin
 from fingerpad.experiments.gerling2014.claims import ClaimRow, Statement, Summary, judged, paired, summary
-from fingerpad.experiments.gerling2014.nerve import (
-    FiringCourse,
-    PopulationMaps,
-    SingleUnitResult,
-    ThreeLevels,
-)
-from fingerpad.experiments.gerling2014.percept import SphereDiscrimination
-from fingerpad.experiments.gerling2014.skin import MeshPicture, NailBorder, SkinDeflectionResult, SkinForce
 from fingerpad.experiments.gerling2014.thresholds import (
     CurvatureThresholds,
     curvature_thresholds,
@@ -47,14 +39,14 @@ class SetResult:
     """What one set of tissues with its afferent gives on all levels."""
 
     tissues: str
-    mesh: MeshPicture
-    levels: ThreeLevels  #: The mesh under the standard sphere, and that indentation on all levels.
-    skin_force: SkinForce  #: Level 1: deflection and force.
-    single_unit: SingleUnitResult
-    firing: FiringCourse  #: Level 2: rates under the bar and their fit; when it fires, what drives it.
-    discrimination: SphereDiscrimination
-    population: PopulationMaps
-    nail: NailBorder
+    mesh: skin.MeshPicture
+    levels: nerve.ThreeLevels  #: The mesh under the standard sphere, and that indentation on all levels.
+    skin_force: skin.SkinForce  #: Level 1: deflection and force.
+    single_unit: nerve.SingleUnitResult
+    firing: nerve.FiringCourse  #: Level 2: rates under the bar and their fit; when it fires, what drives it.
+    discrimination: percept.SphereDiscrimination
+    population: nerve.PopulationMaps
+    nail: skin.NailBorder
     single_unit_uncertainty: UncertaintyResult | None = None
     curvature_thresholds: CurvatureThresholds | None = None  #: Beyond the paper, where asked for.
     comparison: tuple[ClaimRow, ...]  #: The paper's numbers beside ours.
@@ -68,7 +60,7 @@ class ReproductionResult:
     format_version: Literal[6] = 6
     summary: dict[str, Summary]  #: A few plain numbers of both sets, "paper" and "human".
     statements: tuple[Statement, ...]  #: What can fail, with our value and verdict of both sets.
-    skin_deflection: SkinDeflectionResult  #: Level 1: the paper's three trials.
+    skin_deflection: skin.SkinDeflectionResult  #: Level 1: the paper's three trials.
     paper: SetResult
     human: SetResult  #: The paper's own system, and the set that serves all three levels.
     tissues: tuple[TissueLayer, ...]  #: Every named set of tissues, those of run and trials among them.
@@ -131,7 +123,7 @@ def _set_in_process(
     threads: int | None,
     folder: Path,
     solved: Collection[Path],
-    deflection: SkinDeflectionResult,
+    deflection: skin.SkinDeflectionResult,
 ) -> tuple[SetResult, tuple[StageSummary, ...]]:
     """Read the stored indentations of one column, and analyse them; also tell what was read."""
     (name, conditions, touches), runner = item, Runner(folder)
@@ -142,7 +134,7 @@ def _set_in_process(
 def set_result(
     conditions: Conditions,
     responses: Mapping[str, Mapping[Any, SkinResponse]],
-    deflection: SkinDeflectionResult,
+    deflection: skin.SkinDeflectionResult,
 ) -> SetResult:
     """Fit the afferent of one set of tissues, let observers judge its spikes, and compare with the paper."""
     bars, spheres, seed = list(responses["bar, 36 shifts"].values()), responses["spheres"], conditions.seed

@@ -150,6 +150,10 @@ class AfferentsSettings(PopulationSettings):
     windows_ms: RateWindowSettings = RateWindowSettings()  #: When spikes count.
 
 
+AFFERENT_OBJECTS = ("afferents", "afferents.afferent", "afferents.population")
+"""Keys of a request with a block `afferents` that may name an object."""
+
+
 def as_settings(value: Any) -> Any:
     """Return the block of a population, or of an afferent, that is given in the place of the block."""
     if isinstance(value, Population):
@@ -259,23 +263,20 @@ def _laid(
     elif not isinstance(finger, Fingertip):
         words = "must be grid on a mesh, whose skin has no plane"
         raise InputError((*place, "layout"), words, settings.layout)
+    elif settings.layout == NAIL_ROWS:
+        # Only what needs it loads the module that unrolls the skin.
+        from fingerpad.skin.unrolled_skin import NailEdge
+
+        nail = NailEdge(finger)
+        with at(*place):
+            rows = nail.rows(settings.rows or 1, settings.density_per_cm2)
+        laid = Population.of_layout(rows, nail.points, afferent)
     else:
-        # Only what needs them loads the modules that unroll the skin.
-        lay = _along_nail if settings.layout == NAIL_ROWS else _in_region
-        laid = Population.of_layout(*lay(settings, place, finger), afferent)
+        laid = Population.of_layout(*_in_region(settings, place, finger), afferent)
     laid = replace(laid, depth_mm=settings.depth_mm)
     if settings.sensitivity_spread == 0.0:
         return laid
     return replace(laid, sensitivity=sensitivities(len(laid), settings.sensitivity_spread, settings.seed))
-
-
-def _along_nail(settings: PopulationSettings, place: Place, finger: Fingertip) -> tuple[Layout, Any]:
-    """Rows along the edge of the nail, and what places their points on the skin."""
-    from fingerpad.skin.unrolled_skin import NailEdge
-
-    nail = NailEdge(finger)
-    with at(*place):
-        return nail.rows(settings.rows or 1, settings.density_per_cm2), nail.points
 
 
 def _in_region(settings: PopulationSettings, place: Place, finger: Fingertip) -> tuple[Layout, Any]:

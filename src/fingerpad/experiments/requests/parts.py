@@ -15,7 +15,7 @@ import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, is_dataclass, replace
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
 from pkgutil import resolve_name
 from types import MappingProxyType
@@ -149,9 +149,7 @@ def made_by(kind: str, makes: Callable[..., Any], without: Sequence[str] = ()) -
 
 def object_of_python(kind: type) -> Any:
     """Type of an object of Python, which a file names as module:object and results show as it is written."""
-    return Annotated[
-        Any, Check(lambda name, value: like_or_made(name, value, kind), {"type": "string"}, repr)
-    ]
+    return Annotated[Any, Check(partial(like_or_made, kind=kind), {"type": "string"}, repr)]
 
 
 def like_or_made(name: str, value: Any, kind: type) -> Any:
@@ -195,7 +193,7 @@ class OneOfKinds:
         return self.part(kind).model_validate(value)
 
     def __get_pydantic_core_schema__(self, *_: Any) -> CoreSchema:
-        return Check(self, {}, _as_written).__get_pydantic_core_schema__()
+        return Check(self, {}, as_written).__get_pydantic_core_schema__()
 
     def __get_pydantic_json_schema__(self, core: CoreSchema, handler: GetJsonSchemaHandler) -> JsonSchema:
         parts = [handler(self.part(kind).__pydantic_core_schema__) for kind in self.makers]
@@ -203,7 +201,7 @@ class OneOfKinds:
         return {"anyOf": [*parts, *texts, {"type": "string"}]}
 
 
-def _as_written(value: Any) -> Any:
+def as_written(value: Any) -> Any:
     """Return the keys of a part; an object of Python as it is shown."""
     if isinstance(value, Part):
         return value.model_dump()

@@ -7,7 +7,6 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Annotated, Any
 
-import numpy as np
 from pydantic import Discriminator, Strict, Tag
 
 from fingerpad.core.checked import checked
@@ -291,8 +290,8 @@ class ShiftedBar:
         def in_file(place: Place) -> tuple[Place, str]:
             return place, f"Stimulus {name} cannot be used: {spelled(place)}"
 
-        along = along_skin(self.conditions)
-        return NamedStimulus(self.bar, self.motion, -shift_mm * along, name=name, in_file=in_file)
+        x_mm = -shift_mm * self.conditions.along_skin
+        return NamedStimulus(self.bar, self.motion, x_mm, name=name, in_file=in_file)
 
     def touches(self, stimuli: Sequence[NamedStimulus], conditions: Conditions) -> dict[str, Touch]:
         """One touch per stimulus, for the paper's bar those of the reproduction."""
@@ -333,11 +332,6 @@ class ListedStimuli:
 
 Stimuli = ShiftedBar | ListedStimuli
 """Tells which stimulus the entry of a table of recordings means, and how it is pressed."""
-
-
-def along_skin(conditions: Conditions) -> float:
-    """Distance along the finger's axis over that along the skin at the receptor."""
-    return float(np.cos(np.deg2rad(conditions.skin_tilt_deg)))
 
 
 @checked

@@ -18,7 +18,7 @@ from fingerpad.core.values import Check, Finite, NotNegative, Positive, choice, 
 from fingerpad.data import protocol
 from fingerpad.data.tissues import DEFAULT_TISSUES
 from fingerpad.experiments.conditions import Conditions, straight_tilt_deg
-from fingerpad.experiments.requests.parts import Made, OneOfKinds, Part, Request, at
+from fingerpad.experiments.requests.parts import Made, OneOfKinds, Part, Request, as_written, at
 from fingerpad.geometry.bodies import INDENTERS
 from fingerpad.geometry.fingertip import Finger, Fingertip
 from fingerpad.geometry.grading import RESOLUTIONS, Grading
@@ -187,20 +187,12 @@ def dict_of(grading: Grading | None) -> Any:
 
 
 TissuesPart = Annotated[
-    Any,
-    Check(
-        tissues_of,
-        {"anyOf": [{"enum": list(TISSUES)}, {"type": "string"}]},
-        lambda value: value if isinstance(value, str) else repr(value),
-    ),
+    Any, Check(tissues_of, {"anyOf": [{"enum": list(TISSUES)}, {"type": "string"}]}, as_written)
 ]  # Tissues by name, or of one's own.
 
 
-FINGER_OBJECTS: tuple[str, ...] = (
-    "finger",
-    "tissues",
-    "grading",
-)  # Keys of a `FingerDescription` that may name an object.
+FINGER_OBJECTS = ("finger", "tissues", "grading")
+"""Keys of a `FingerDescription` that may name an object."""
 
 
 class FingerDescription(Part):

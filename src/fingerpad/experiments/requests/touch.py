@@ -21,6 +21,7 @@ from fingerpad.core.values import Number, Numbers, Pair, Positive, Seed, Text, c
 from fingerpad.data import neuron
 from fingerpad.data.tissues import DEFAULT_TISSUES
 from fingerpad.experiments.requests.afferents import (
+    AFFERENT_OBJECTS,
     Afferents,
     AfferentsSettings,
     check_windows,
@@ -59,9 +60,7 @@ class TouchRequest(StimulusDescription, FingerRequest):
     """
 
     word: ClassVar[str] = "touch"
-    python: ClassVar[tuple[str, ...]] = (
-        *FINGER_OBJECTS, "object", "motion", "afferents", "afferents.afferent", "afferents.population",
-    )  # fmt: skip
+    python: ClassVar[tuple[str, ...]] = (*FINGER_OBJECTS, "object", "motion", *AFFERENT_OBJECTS)
 
     title: Text = "One touch"  #: What it is, in words: the title of the page.
     times_ms: Numbers = ()  #: Times at which the result is wanted beside those that the motion has. [ms]
@@ -246,9 +245,7 @@ class ReductionRequest(StimulusDescription, FingerRequest):
     """A touch to be reduced, as `fingerpad.reduce` presses it and a file describes it."""
 
     word: ClassVar[str] = "range"
-    python: ClassVar[tuple[str, ...]] = (
-        *FINGER_OBJECTS, "object", "afferents", "afferents.afferent", "afferents.population",
-    )  # fmt: skip
+    python: ClassVar[tuple[str, ...]] = (*FINGER_OBJECTS, "object", *AFFERENT_OBJECTS)
 
     range: RangeSettings  #: The poses.
     afferents: Afferents = AfferentsSettings()  #: Who will respond: what they follow is kept.

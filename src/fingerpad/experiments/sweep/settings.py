@@ -16,7 +16,7 @@ from fingerpad.core.signals import ResponseMap
 from fingerpad.core.values import FloatArray, IntArray
 from fingerpad.experiments.discrimination.analysis import SESSION, silent_stimuli
 from fingerpad.experiments.requests.afferents import population_neighbours
-from fingerpad.experiments.requests.touch import TouchRequest, estimate_press
+from fingerpad.experiments.requests.touch import estimate_press
 from fingerpad.experiments.sweep.request import ObserverSettings, SweepRequest
 from fingerpad.psychophysics.encoding import taking_part
 from fingerpad.psychophysics.observer import ENCODERS, compare_observers
@@ -69,7 +69,12 @@ def settle(case: Case, threads: int | None = None) -> Settled:
     first = case.settings[0]
     try:
         described = sweep.described(first)
-        skin, pressed = skin_of(described, Store(case.store), threads)
+        touch, store = described.touch, Store(case.store)
+        pressed = bool(store.missing([touch]))
+        if pressed:
+            store.save(touch, touch.solve(threads))
+        # In the single precision of the store: a sweep that goes on has the bits of one that did not stop.
+        skin = store.load(touch)
     except (InputError, ConvergenceError) as error:
         return Settled(
             case.press, False, time.perf_counter() - began, failures=dict.fromkeys(case.settings, str(error))
@@ -86,16 +91,6 @@ def settle(case: Case, threads: int | None = None) -> Settled:
     places = dict.fromkeys(FIELDS[name].place for name in names)
     kept |= {PLACES_MM[place][0]: PLACES_MM[place][1](skin) for place in places if place in PLACES_MM}
     return Settled(case.press, pressed, seconds, kept, responses, failures)
-
-
-def skin_of(described: TouchRequest, store: Store, threads: int | None) -> tuple[SkinResponse, bool]:
-    """Response of the skin to a touch, and whether it was pressed for it."""
-    if not store.missing([described.touch]):
-        return store.load(described.touch), False
-    skin = described.touch.solve(threads)
-    store.save(described.touch, skin)
-    # What was stored is in single precision: a sweep that goes on has the same bits as one that did not stop.
-    return store.load(described.touch), True
 
 
 @lru_cache(maxsize=2)

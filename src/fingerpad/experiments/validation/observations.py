@@ -11,6 +11,7 @@ import numpy as np
 
 from fingerpad.core.checked import checked
 from fingerpad.core.errors import InputError
+from fingerpad.core.files import check_file
 from fingerpad.core.tables import TableRow, read_csv
 from fingerpad.core.units import unit_of
 from fingerpad.core.values import FloatArray, finite, float_array, not_negative, positive
@@ -18,7 +19,6 @@ from fingerpad.experiments.requests.stimulus import indenter_named
 from fingerpad.geometry.indenters import Indenter
 
 LARGEST_FILE_MB = 1.0  # Larger files are refused: they hold no published table. [MB]
-_BYTES_PER_MB = 1e6
 
 STIFFEST_N_PER_MM = 10.0  # No fingertip has it; plates have 0.05 to 0.5 (Dandekar 1995, as quoted).
 Value = float | str
@@ -68,14 +68,6 @@ class Kind:
     def axis(self) -> str:
         """Condition that is a place along the finger, whose direction a source may leave open."""
         return next((name for name in self.conditions if name in ("distance_mm", "position_mm")), "")
-
-    @property
-    def unit(self) -> str:
-        return unit_of(self.observed)
-
-    @property
-    def is_rate(self) -> bool:
-        return self.observed == "rate_hz"
 
 
 KINDS: dict[str, Kind] = {
@@ -148,14 +140,7 @@ def read_observations(path: str | Path, objects: Mapping[str, Indenter] | None =
     >>> found.kind.name, found.rows[1].condition, found.observed.tolist()
     ('force', ('plate', 1.0), [0.11, 0.23])
     """
-    path = Path(path)
-    size_mb = path.stat().st_size / _BYTES_PER_MB if path.is_file() else 0.0
-    if size_mb > LARGEST_FILE_MB:
-        raise InputError(
-            path,
-            f"must be at most {LARGEST_FILE_MB:g} MB",
-            remedy=f"it has {size_mb:.1f} MB; split it into several",
-        )
+    path = check_file(Path(path), LARGEST_FILE_MB)
     lines = read_csv(path, (INDENTER, *COLUMNS))
     kind = _kind(path, tuple(lines[0].entries))
     own = dict(objects or {})
@@ -181,8 +166,7 @@ def _kind(path: Path, columns: tuple[str, ...]) -> Kind:
 
 def _observation(line: TableRow, kind: Kind, own: Mapping[str, Indenter]) -> Observation:
     condition = tuple(_value(line, column, own) for column in kind.conditions)
-    observed = _value(line, kind.observed, own)
-    assert isinstance(observed, float)
+    observed = line.number(kind.observed, unit_of(kind.observed), COLUMNS[kind.observed])
     stiffest = STIFFEST_N_PER_MM * line.number("depth_mm", "mm") if kind.observed == "force_n" else np.inf
     if observed > stiffest:
         raise InputError(
