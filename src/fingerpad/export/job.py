@@ -200,12 +200,12 @@ class Job:
         )
         return tuple(each for each in sets if each.nodes.size)
 
-    def parts(self, layer: Whole) -> Iterator[tuple[bool, IntArray]]:
-        """Elements of a layer by shape: whether they are wedges, and their numbers."""
-        for wedges in (False, True):
+    def parts(self, layer: Whole) -> Iterator[tuple[bool, IntArray, IntArray]]:
+        """Elements of a layer by shape: whether they are wedges, their numbers, and their nodes."""
+        for wedges, nodes in ((False, self.mesh.elements), (True, self.wedges)):
             numbers = np.flatnonzero((self.is_wedge == wedges) & (self.mesh.layer == layer))
             if numbers.size:
-                yield wedges, numbers
+                yield wedges, numbers, nodes[numbers]
 
     @property
     def summary(self) -> tuple[str, ...]:
