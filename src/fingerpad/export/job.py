@@ -108,7 +108,6 @@ class Job:
 
     @cached_property
     def wedges(self) -> IntArray:
-        """Nodes of each wedge (n_elements, 6), see `wedge_nodes`."""
         return wedge_nodes(self.mesh)
 
     @property

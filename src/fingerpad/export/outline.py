@@ -154,7 +154,6 @@ class RigidMesh:
 
     @property
     def outer_mm(self) -> FloatArray:
-        """The outer nodes. [mm]"""
         return self.nodes_mm[: len(self.nodes_mm) // 2]
 
     def solids(self, faces: IntArray) -> IntArray:

@@ -234,9 +234,8 @@ class SweepFile:
         self._rows: dict[str, dict[tuple[int, ...], np.ndarray]] = {}  # By name, and by place.
         with _written(self.path):
             if self.path.exists() and any(self.path.iterdir()):
-                opened = opened_group(self.path)
-                check_same(self.path, opened.attrs.asdict(), attributes)
-                self._group = opened
+                self._group = opened_group(self.path)
+                check_same(self.path, self._group.attrs.asdict(), attributes)
             else:
                 self._group = zarr.create_group(self.path, zarr_format=3)
                 self._begin()

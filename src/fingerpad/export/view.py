@@ -32,7 +32,7 @@ from fingerpad.core.checked import checked
 from fingerpad.core.errors import InputError
 from fingerpad.core.files import path_of, write_atomically
 from fingerpad.core.progress import NoProgress, Progress
-from fingerpad.core.values import Finite, FloatArray, count_from, finite, instance, one_of
+from fingerpad.core.values import Finite, FloatArray, count_from, instance, one_of
 from fingerpad.export.results import library
 from fingerpad.export.touch_file import check_touch, read_touch, spike_trains
 from fingerpad.report.skin import BONE, DECADES, SKIN
@@ -171,7 +171,7 @@ class _View:
 
     def checked(self, time_ms: float) -> float:
         times = self.data["time"].values
-        if not 0.0 <= finite("time_ms", time_ms, "ms") <= times[-1]:
+        if not 0.0 <= time_ms <= times[-1]:
             raise InputError("time_ms", f"must lie within 0 ... {times[-1]:g} ms", f"{time_ms:g} ms")
         lacking = [
             name

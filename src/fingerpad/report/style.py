@@ -107,9 +107,9 @@ def write_png(path: Path, draw: Callable[..., Figure], *parts: Any) -> Path:
     return path
 
 
-def name_panel(axes: Axes, title: str, xlabel: str, ylabel: str, **more: Any) -> None:
+def name_panel(axes: Axes, title: str, xlabel: str, ylabel: str) -> None:
     axes.set_title(title, fontsize=10.0)
-    axes.set(xlabel=xlabel, ylabel=ylabel, **more)
+    axes.set(xlabel=xlabel, ylabel=ylabel)
 
 
 def draw_chance(axes: Axes, label: str | None = None) -> None:
