@@ -265,7 +265,7 @@ def _answer(
     totals: Sequence[FloatArray],
 ) -> Answer:
     """Answer of the fields at `_sites` over time; `totals` are the first five fields of an `Answer`."""
-    times = totals[0]
+    times, depth, force, error, area = totals
     x, z = map_axes(described)
     on_skin = _on_pad(finger_of(described), *np.meshgrid(x, z, indexing="ij"))
     sed = np.full((times.size, x.size, z.size), np.nan)
@@ -282,7 +282,7 @@ def _answer(
         traces = Traces(times, static, kinks_ms, quantity, rate_of)
         maps[name], first = part.respond_to(traces, (start, held), (held, ends)), here.stop
     response = ResponseMap.joined(maps) if population.parts else maps[""]
-    return Answer(*totals, middles_mm, x, z, sed, response)
+    return Answer(times, depth, force, error, area, middles_mm, x, z, sed, response)
 
 
 @dataclass(frozen=True)
