@@ -102,7 +102,7 @@ def mixed() -> None:
     maps = {
         name: population.respond(indented(BALL, motion), *windows).parts for name, motion in TOUCHES.items()
     }
-    write_png(draw_mixed_responses, maps, IMAGES / "mixed_responses.png")
+    write_png(IMAGES / "mixed_responses.png", draw_mixed_responses, maps)
 
 
 @cache
@@ -144,7 +144,7 @@ def tuning() -> None:
             cells.append(f"{_micrometres(curve[number])}{ratio}")
         rows.append(cells)
     _write_table("tuning", ["frequency [Hz]", *(f"{name} [µm]" for name in curves)], rows)
-    write_png(draw_tuning, curves, IMAGES / "afferent_tuning.png")
+    write_png(IMAGES / "afferent_tuning.png", draw_tuning, curves)
 
 
 def observed_um(name: str) -> FloatArray:
@@ -269,7 +269,7 @@ def fields() -> None:
         observed = published.FIELD_AREAS.value[list(published.TYPES).index(name)]
         rows.append([name, f"{low:.1f} to {high:.1f}", branched, f"{observed:g}"])
     _write_table("fields", ["type", "one end organ [mm²]", "several [mm²]", "median of units [mm²]"], rows)
-    write_png(lambda found: draw_fields(*found), (depths, areas_of), IMAGES / "afferent_fields.png")
+    write_png(IMAGES / "afferent_fields.png", draw_fields, depths, areas_of)
 
 
 def velocity_threshold(afferent: AnyAfferent, site_mm: float) -> float:
@@ -451,7 +451,7 @@ def vibration() -> None:
     )
     _write_table("errors", head, error_rows(), DOCS / "vibration.md")
     runs = [vibrated(frequency, 0.1, 12) for frequency in (5.0, 10.0, 20.0, 40.0, 100.0, 200.0)]
-    write_png(draw_vibrations, runs, IMAGES / "vibration.png")
+    write_png(IMAGES / "vibration.png", draw_vibrations, runs)
 
 
 PARTS = {"mixed": mixed, "tuning": tuning, "fields": fields, "adaptation": adaptation, "vibration": vibration}

@@ -40,7 +40,7 @@ def write_pages(results: Path | None = None, picture: bool = True) -> None:
     if picture:
         percept = shown.percept["human"]
         skin, response = chain_picture.touched(percept.standard_per_m, shown.resolution)
-        write_png(lambda parts: chain_picture.draw(*parts), (skin, response, percept), PICTURE)
+        write_png(PICTURE, chain_picture.draw, skin, response, percept)
         written.append(PICTURE)
     for path in written:
         print(f"Written: {path.relative_to(DOCS.parent)}")

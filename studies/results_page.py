@@ -16,12 +16,13 @@ from fingerpad.experiments.gerling2014.claims import ClaimRow, Group, Statement,
 from fingerpad.experiments.gerling2014.nerve import SingleUnitResult
 from fingerpad.experiments.gerling2014.percept import SphereDiscrimination
 from fingerpad.experiments.gerling2014.reproduction import ReproductionResult
-from fingerpad.report.reproduction import SET_COLUMNS, count_sentence, side_by_side, statement_cells
+from fingerpad.report.reproduction import count_sentence, side_by_side, statement_cells
 from fingerpad.report.tables import ABSENT, fixed, number
 from studies.pages import joined, replaced, table
 
 COMMAND = "python -m studies results"
 README_START, README_END = f"<!-- {COMMAND} writes this table -->", "<!-- end of the table -->"
+SET_COLUMNS = ("the paper", "`paper`", "", "`human`", "")  # Values and verdicts of both sets.
 
 
 @result_class

@@ -23,7 +23,7 @@ def response(columns: int = 2, count: int = 12, gain: float = 1.0) -> ResponseMa
 
 def test_a_picture_is_written_as_it_is_drawn(tmp_path):
     shown = {"press": {"SAI": response()}}
-    path = write_png(draw_mixed_responses, shown, tmp_path / "deeper" / "map.png")
+    path = write_png(tmp_path / "deeper" / "map.png", draw_mixed_responses, shown)
     assert path.read_bytes() == png(draw_mixed_responses, shown)
     assert path.read_bytes().startswith(b"\x89PNG")
 

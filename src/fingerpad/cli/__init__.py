@@ -100,7 +100,6 @@ FINGERPAD = Program(
 
 
 def parser_of(program: Program, name: str) -> Parser:
-    """Make the parser of a command."""
     what, add, _ = program.commands[name]
     parser = Parser(prog=f"{program.name} {name}", description=what)
     add(parser)
@@ -184,7 +183,6 @@ def _add_within_blocks(parser: Parser, words: Iterable[str]) -> None:
 
 
 def _show_help(program: Program) -> None:
-    """Print the list of commands."""
     width = max(map(len, program.commands)) + 2
     print(f"usage: {program.name} [--version] [--help] COMMAND ...\n\n{program.what}\n\ncommands:")
     for name, (what, _, _) in program.commands.items():

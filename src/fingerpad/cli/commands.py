@@ -116,7 +116,6 @@ def _read(kind: type[int] | type[float], text: str) -> float:
 
 
 def _add(name: str, parser: argparse.ArgumentParser) -> None:
-    """Add the options of a command."""
     row = TABLE[name]
     if "request" in row:
         _add_request(name, row, parser)

@@ -15,14 +15,11 @@ PC_REACH = _NUMBERS["PC_REACH"]
 class AfferentRow:
     """One type of afferents: the chain from the skin to the spikes, its numbers, and how dense it is."""
 
-    chain: str
-    """"slow", the paper's Eqs. 1-5; or "rapid", a band pass and a membrane."""
-    density_per_cm2: float
-    """In the fingertip. [1/cm2]"""
+    chain: str  #: "slow", the paper's Eqs. 1-5; or "rapid", a band pass and a membrane.
+    density_per_cm2: float  #: In the fingertip. [1/cm2]
     numbers: Mapping[str, Published[float] | float | str]
     """By the fields of the chain; those that are absent have its defaults."""
-    of_tissues: bool = False
-    """Whether the defaults are those that were fitted with the tissues."""
+    of_tissues: bool = False  #: Whether the defaults are those that were fitted with the tissues.
 
     @property
     def values(self) -> dict[str, float | str]:

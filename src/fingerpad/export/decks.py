@@ -19,7 +19,7 @@ without its deviator being taken again, which changes stored energies of short P
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -29,7 +29,7 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from fingerpad.core.checked import checked
 from fingerpad.core.errors import InputError
-from fingerpad.core.files import path_of, write_atomically
+from fingerpad.core.files import write_atomically
 from fingerpad.core.values import FloatArray, IntArray, one_of
 from fingerpad.export.job import CONTACT_KPA_PER_MM, Job, job_of
 from fingerpad.export.results import NEEDED, require
@@ -42,13 +42,7 @@ PER_LINE, PER_LINE_OF_ELEMENT = 8, 16  # Most values on a data line of Abaqus an
 NO_TERM = 1e20
 """D of a volumetric term that is absent: CalculiX silently replaces 0 by a stiffness of its own."""
 
-UPPER_FACE, OUTER_FACE = 2, 1
-"""Faces of a brick or wedge in contact: the side of the skin, and the outer side of the indenter's."""
-
 MODULI = ("long_term", "instantaneous")
-SLOWEST_SHARE = 1.0 / 64
-"""Smallest increment that CalculiX may choose, as a share of the increment of the indentation."""
-
 MOST_PRONY_TERMS = 6  # Most Prony terms of FEBio's viscoelastic material.
 ABAQUS_VOLUME = 2  # Number of FEBio's volumetric energy K/2 (J-1)².
 
@@ -58,15 +52,14 @@ KINDS = ("hex8", "penta6")  # FEBio's names of bricks and wedges.
 
 def abaqus_deck(job: Job) -> str:
     origin, (x, y, z) = job.placement.origin_mm, job.placement.rotation.T
-    skin, reference = job.mesh.skin_nodes, len(job.mesh.nodes_mm) + 1
-    share = job.mesh.skin_area_mm2[np.searchsorted(skin, job.touching_nodes)] if job.indenter.grips else ()
-    outline = job.outline
+    outline, held = job.outline, job.touching_nodes
+    areas_mm2 = job.mesh.skin_area_mm2[np.searchsorted(job.mesh.skin_nodes, held)]
     return _rendered(
         "abaqus.inp",
         job=job,
         relaxes=any(job.materials[layer].prony.shares for layer in job.layer_names),
-        gripped=list(zip(job.touching_nodes, share, strict=True)) if job.indenter.grips else [],
-        reference=reference,
+        gripped=list(zip(held, areas_mm2, strict=True)),
+        reference=len(job.mesh.nodes_mm) + 1,
         origin=origin,
         outline=outline,
         facets=_facet_numbers(job) if outline is None else [],
@@ -161,15 +154,15 @@ def export_touch(
     if format_name in DECKS:
         return (write_deck(folder, job_of(touch), format_name, elastic_moduli),)
     skin = touch.solve(whole=format_name in NEEDED)
-    return (skin.save(path_of("folder", folder) / RESULTS[format_name]),)
+    return (skin.save(folder / RESULTS[format_name]),)
 
 
 def write_deck(folder: Path, job: Job, format_name: str, elastic_moduli: str | None = None) -> Path:
     """Write the input file of a solver; arguments as of `export_touch`, with what `job_of` returns."""
     name, deck = DECKS[format_name]
     text = deck(job) if elastic_moduli is None else calculix_deck(job, elastic_moduli)
-    write_atomically(path_of("folder", folder) / name, text.encode())
-    return path_of("folder", folder) / name
+    write_atomically(folder / name, text.encode())
+    return folder / name
 
 
 def _rendered(template: str, **values: Any) -> str:
@@ -184,26 +177,21 @@ def _environment() -> Environment:
         keep_trailing_newline=True,
         undefined=StrictUndefined,
     )
-    made.filters |= {"digits": _digits, "listed": _listed}
+    made.filters |= {"digits": digits, "listed": lambda values: ",".join(map(digits, values))}
     functions = (digits, rows, nodes, elements, layer_elements, node_set, surface, law, elastic_law, is_foam)
     made.globals |= {function.__name__: function for function in functions}
-    made.globals |= {
-        "CONTACT_KPA_PER_MM": CONTACT_KPA_PER_MM,
-        "UPPER_FACE": UPPER_FACE,
-        "OUTER_FACE": OUTER_FACE,
-        "SLOWEST_SHARE": SLOWEST_SHARE,
-    }
+    made.globals["CONTACT_KPA_PER_MM"] = CONTACT_KPA_PER_MM
     return made
 
 
-def digits(value: float) -> str:
+def digits(value: float | str) -> str:
     """Write a number with 12 digits, in at most 20 characters, which is the limit of CalculiX."""
-    return f"{value:.12g}"
+    return value if isinstance(value, str) else f"{value:.12g}"
 
 
 def rows(values: Iterable[float | str], per_line: int = PER_LINE, ending: str = "") -> str:
     """Write the data lines of a card, up to `per_line` values each; all but the last have an ending."""
-    texts = [_digits(value) for value in values]
+    texts = [digits(value) for value in values]
     return f"{ending}\n".join(", ".join(texts[n : n + per_line]) for n in range(0, len(texts), per_line))
 
 
@@ -215,22 +203,21 @@ def nodes(points_mm: FloatArray, first: int, name: str) -> str:
 
 def elements(kind: str, name: str, numbers: IntArray, corners: IntArray) -> str:
     """Card of elements; `corners` holds node numbers."""
-    lines = (rows([str(n), *map(str, row)], PER_LINE_OF_ELEMENT, ",")
-             for n, row in zip(numbers, corners, strict=True))  # fmt: skip
+    numbered = np.column_stack([numbers, corners])
+    lines = (rows(row, PER_LINE_OF_ELEMENT, ",") for row in numbered)
     return "\n".join([f"*ELEMENT, TYPE={kind}, ELSET={name}", *lines])
 
 
 def layer_elements(job: Job, layer: int, brick: str, wedge: str) -> str:
     """Cards of one layer's elements, a set of the layer's name, numbered as in the mesh from 1."""
-    name, found = job.layer_names[layer], []
-    for wedges, numbers in job.parts(layer):
-        kind, corners = (wedge, job.wedges) if wedges else (brick, job.mesh.elements)
-        found.append(elements(kind, name, numbers + 1, corners[numbers] + 1))
-    return "\n".join(found)
+    return "\n".join(
+        elements(wedge if wedges else brick, job.layer_names[layer], numbers + 1, corners + 1)
+        for wedges, numbers, corners in job.parts(layer)
+    )
 
 
 def node_set(name: str, held: IntArray) -> str:
-    return f"*NSET, NSET={name}\n{rows(map(str, held + 1))}"
+    return f"*NSET, NSET={name}\n{rows(held + 1)}"
 
 
 def surface(name: str, numbers: IntArray, face: int) -> str:
@@ -305,53 +292,29 @@ def _in_two_terms(law: Law) -> Law:
 Values = dict[str, float | str]
 
 
-@dataclass(frozen=True)
-class _Material:
-    """Element `material` of the file; a viscoelastic one has an elastic one within."""
-
-    name: str
-    kind: str
-    values: Values
-    elastic: str = ""
-    coefficients: Values = field(default_factory=dict)
-
-
-@dataclass(frozen=True)
-class _Part:
-    """Elements of one layer, or of the indenter, that have one shape: their numbers and nodes, from 1."""
-
-    name: str
-    kind: str
-    elements: list[tuple[int, np.ndarray]]
-
-
-def _digits(value: Any) -> str:
-    return value if isinstance(value, str) else digits(value)
-
-
-def _listed(values: Iterable[Any]) -> str:
-    return ",".join(str(value) if isinstance(value, np.integer) else digits(value) for value in values)
-
-
-def _parts(job: Job) -> Iterator[_Part]:
+def _parts(job: Job) -> Iterator[tuple[str, str, list[Any]]]:
+    """Elements of one shape of a layer, or of the indenter: name, kind, and numbers with nodes, from 1."""
     for layer, name in job.layer_names.items():
-        for wedges, numbers in job.parts(layer):
-            corners = (job.wedges if wedges else job.mesh.elements)[numbers] + 1
-            yield _Part(name, KINDS[wedges], list(zip((numbers + 1).tolist(), corners, strict=True)))
-    number = len(job.mesh.elements)
+        for wedges, numbers, corners in job.parts(layer):
+            yield name, KINDS[wedges], list(zip(numbers + 1, corners + 1, strict=True))
+    number = len(job.mesh.elements) + 1
     for kind, faces in zip(KINDS, (job.rigid.quads, job.rigid.triangles), strict=True):
         if len(faces):
-            corners = job.rigid.solids(faces) + len(job.mesh.nodes_mm) + 1
-            yield _Part(INDENTER, kind, list(enumerate(corners, number + 1)))
+            yield (
+                INDENTER,
+                kind,
+                list(enumerate(job.rigid.solids(faces) + len(job.mesh.nodes_mm) + 1, number)),
+            )
             number += len(faces)
 
 
-def _febio_material(name: str, material: Material) -> _Material:
+def _febio_material(name: str, material: Material) -> tuple[str, str, Values, str, Values]:
+    """Name, type and values of a material; of a viscoelastic one the law within and its coefficients."""
     kind, coefficients, bulk_kpa = _febio_law(name, material)
     shares, times = material.prony.shares, material.prony.times_ms
     volume: Values = {"density": 1, "k": bulk_kpa, "pressure_model": ABAQUS_VOLUME}
     if not shares:
-        return _Material(name, kind, volume | coefficients)
+        return name, kind, volume | coefficients, "", {}
     if len(shares) > MOST_PRONY_TERMS:
         raise InputError(
             f"FEBio takes {MOST_PRONY_TERMS} Prony terms: layer {name} has {len(shares)}; fit fewer terms."
@@ -362,7 +325,7 @@ def _febio_material(name: str, material: Material) -> _Material:
     relaxing: Values = {f"t{i}": time for i, time in enumerate(times, 1)}
     relaxing |= {"g0": final, **{f"g{i}": factor * share for i, share in enumerate(shares, 1)}}
     elastic: Values = {"density": 1, **coefficients}
-    return _Material(name, "uncoupled viscoelastic", volume | relaxing, kind, elastic)
+    return name, "uncoupled viscoelastic", volume | relaxing, kind, elastic
 
 
 def _febio_law(name: str, material: Material) -> tuple[str, Values, float]:

@@ -89,10 +89,9 @@ class Job:
         for n in range(1, self.times_ms.size):
             start, end = float(self.times_ms[n - 1]), float(self.times_ms[n])
             speed = (self.depths_mm[n] - self.depths_mm[n - 1]) / (end - start)
+            steps = 1
             if found and self._continues(found[-1], end - start, speed):
                 start, steps = found[-1].start_ms, found.pop().steps + 1
-            else:
-                steps = 1
             found.append(Phase(start, end, steps, float(self.depths_mm[n])))
         return tuple(found)
 
@@ -109,7 +108,6 @@ class Job:
 
     @cached_property
     def wedges(self) -> IntArray:
-        """Nodes of each wedge (n_elements, 6), see `wedge_nodes`."""
         return wedge_nodes(self.mesh)
 
     @property
@@ -138,14 +136,8 @@ class Job:
         beyond = deepest + BESIDE_INDENTER_MM
         outline = self.outline
         if outline is None:
-            along, across = (
-                (
-                    float(reached[:, axis].min(initial=0.0)) - 1.0,
-                    float(reached[:, axis].max(initial=0.0)) + 1.0,
-                )
-                for axis in (0, 2)
-            )
-            local = face_mesh(self.indenter, lowest, along, across)
+            low, high = reached.min(axis=0, initial=0.0) - 1.0, reached.max(axis=0, initial=0.0) + 1.0
+            local = face_mesh(self.indenter, lowest, (low[0], high[0]), (low[2], high[2]))
         else:
             extent = float(skin[:, 2].min() - beyond), float(skin[:, 2].max() + beyond)
             local = rigid_mesh(outline, lowest, extent)
@@ -157,13 +149,11 @@ class Job:
         """Elements whose skin face may come to touch the indenter; all of an element that is gripped."""
         mesh = self.mesh
         top, faces = mesh.skin_elements, mesh.skin_faces
-        strange = np.flatnonzero(
-            (np.sort(faces, axis=1) != np.sort(mesh.elements[top, 4:], axis=1)).any(axis=1)
-        )
+        strange = top[(np.sort(faces, axis=1) != np.sort(mesh.elements[top, 4:], axis=1)).any(axis=1)]
         if strange.size:
             raise InputError(
                 f"A deck needs skin on one face of an element, and a triangle of a wedge: element "
-                f"{top[strange[0]]} has another; export vtu, csv or npz."
+                f"{strange[0]} has another; export vtu, csv or npz."
             )
         local = self.placement.to_local(mesh.nodes_mm[faces].reshape(-1, 3), depth_mm=0.0)
         local = local.reshape(*faces.shape, 3)
@@ -200,12 +190,12 @@ class Job:
         )
         return tuple(each for each in sets if each.nodes.size)
 
-    def parts(self, layer: Whole) -> Iterator[tuple[bool, IntArray]]:
-        """Elements of a layer by shape: whether they are wedges, and their numbers."""
-        for wedges in (False, True):
+    def parts(self, layer: Whole) -> Iterator[tuple[bool, IntArray, IntArray]]:
+        """Elements of a layer by shape: whether they are wedges, their numbers, and their nodes."""
+        for wedges, nodes in ((False, self.mesh.elements), (True, self.wedges)):
             numbers = np.flatnonzero((self.is_wedge == wedges) & (self.mesh.layer == layer))
             if numbers.size:
-                yield wedges, numbers
+                yield wedges, numbers, nodes[numbers]
 
     @property
     def summary(self) -> tuple[str, ...]:
@@ -215,8 +205,7 @@ class Job:
             "Units: mm, ms, kPa, mN (1 kPa mm2 = 1 mN); energy in microjoule.",
             f"{type(self.indenter).__name__} pressed {self.depths_mm.max():g} mm deep into "
             f"{len(mesh.nodes_mm)} nodes and {len(mesh.elements)} elements"
-            + (half if mesh.symmetry_nodes.size else "")
-            + ".",
+            f"{half if mesh.symmetry_nodes.size else ''}.",
             f"{self.times_ms.size - 1} steps from 0 to {self.times_ms[-1]:g} ms.",
         )
 

@@ -88,7 +88,7 @@ def outline_of(indenter: Indenter, reach_mm: Positive) -> Outline | None:
         return _without_empty_segments(True, ((0.0, 0.0), *corners), (None, *centres))
     if isinstance(indenter, Bar):
         half, fillet = indenter.width_mm / 2, indenter.fillet_mm
-        return _ridges((_Ridge(-half, half, fillet, fillet),), reach_mm + fillet)
+        return _ridges(((-half, half, fillet, fillet),), reach_mm + fillet)
     if isinstance(indenter, Plate | Line):
         return Outline(False, ((-reach_mm, 0.0), (reach_mm, 0.0)), (None,))
     if isinstance(indenter, Edge):
@@ -99,40 +99,32 @@ def outline_of(indenter: Indenter, reach_mm: Positive) -> Outline | None:
         return outline_of(Bar(indenter.width_mm, indenter.fillet_mm), reach_mm)
     if isinstance(indenter, Gap):
         inner, outer, lip = indenter.gap_mm / 2, indenter.width_mm / 2, indenter.lip_radius_mm
-        left = _Ridge(-outer, -inner, indenter.fillet_mm, lip)
-        return _ridges((left, _Ridge(inner, outer, lip, indenter.fillet_mm)), reach_mm)
+        left, right = (-outer, -inner, indenter.fillet_mm, lip), (inner, outer, lip, indenter.fillet_mm)
+        return _ridges((left, right), reach_mm)
     if isinstance(indenter, Grating):
         count, half = int(np.ceil(reach_mm / indenter.period_mm)), indenter.ridge_mm / 2
-        middles = indenter.period_mm * np.arange(-count, count + 1)
-        lip = indenter.lip_mm
-        return _ridges(tuple(_Ridge(u - half, u + half, lip, lip) for u in middles.tolist()), reach_mm)
+        middles, lip = indenter.period_mm * np.arange(-count, count + 1), indenter.lip_mm
+        return _ridges(tuple((u - half, u + half, lip, lip) for u in middles.tolist()), reach_mm)
     return None
 
 
-@dataclass(frozen=True)
-class _Ridge:
-    """Flat ridge between two walls: their u and the radii of its two edges. [mm]"""
-
-    left: float
-    right: float
-    left_radius: float
-    right_radius: float
+Ridge = tuple[float, float, float, float]  # Flat between two walls: their u, the radii of its edges. [mm]
 
 
-def _ridges(ridges: tuple[_Ridge, ...], depth: float) -> Outline:
+def _ridges(ridges: tuple[Ridge, ...], depth: float) -> Outline:
     """Ridges side by side; floors as deep as `depth` join them to one line."""
     corners: list[Point] = []
     centres: list[Point | None] = []
-    for n, ridge in enumerate(ridges):
-        if n > 0:
+    for left, right, left_radius, right_radius in ridges:
+        if corners:
             centres.append(None)
-        right, right_centres = _rounded_side(ridge.right, ridge.right_radius, depth - ridge.right_radius)
-        left, left_centres = _rounded_side(-ridge.left, ridge.left_radius, depth - ridge.left_radius)
-        corners += [(-u, y) for u, y in reversed(left)] + list(right)
+        left_side, left_centres = _rounded_side(-left, left_radius, depth - left_radius)
+        right_side, right_centres = _rounded_side(right, right_radius, depth - right_radius)
+        corners += [*((-u, y) for u, y in reversed(left_side)), *right_side]
         turned = [None if centre is None else (-centre[0], centre[1]) for centre in reversed(left_centres)]
         centres += [*turned, None, *right_centres]
     joined = _without_empty_segments(False, tuple(corners), tuple(centres))
-    return replace(joined, middles=tuple(0.5 * (ridge.left + ridge.right) for ridge in ridges))
+    return replace(joined, middles=tuple(0.5 * (left + right) for left, right, *_ in ridges))
 
 
 def _rounded_side(
@@ -162,7 +154,6 @@ class RigidMesh:
 
     @property
     def outer_mm(self) -> FloatArray:
-        """The outer nodes. [mm]"""
         return self.nodes_mm[: len(self.nodes_mm) // 2]
 
     def solids(self, faces: IntArray) -> IntArray:
@@ -196,10 +187,10 @@ def face_mesh(
     """Divide the face of any body into facets over a grid; walls are as steep as one of its cells is wide."""
     narrowest_mm = details_of(indenter).narrowest_mm
     pitch = np.clip(narrowest_mm / FACETS_ACROSS_RELIEF, SMALLEST_FACET_MM, LARGEST_FACET_MM)
-    lines = []
-    for low, high in (x_mm, z_mm):
-        # The middle of the body is on a line: a symmetric body has symmetric facets.
-        lines.append(pitch * np.arange(np.floor(low / pitch), np.ceil(high / pitch) + 1))
+    # The middle of the body is on a line: a symmetric body has symmetric facets.
+    lines = (
+        pitch * np.arange(np.floor(low / pitch), np.ceil(high / pitch) + 1) for low, high in (x_mm, z_mm)
+    )
     x, z = np.meshgrid(*lines, indexing="ij")
     if x.size > MOST_FACETS:
         raise InputError(

@@ -21,7 +21,7 @@ from fingerpad.core.phases import Phase
 from fingerpad.core.signals import PLACES, RECEPTOR_COLUMNS, ResponseMap, SpikeTrains
 from fingerpad.core.tables import read_csv
 from fingerpad.core.units import MS_PER_S
-from fingerpad.core.values import Finite, FloatArray, NotNegative, instance, positive
+from fingerpad.core.values import Finite, FloatArray, NotNegative, positive
 from fingerpad.experiments.recording_files import SUFFIXES_OF_NWB, nwb_session, spike_times
 from fingerpad.export.results import library, require
 from fingerpad.neuron.afferent_types import afferent_types
@@ -168,7 +168,6 @@ def write_responses_nwb(
     file = path_of("path", path)
     if file.suffix not in SUFFIXES_OF_NWB:
         raise InputError(f"A session is written as {', '.join(SUFFIXES_OF_NWB)}: got {file.name}.")
-    instance("responses", responses, Mapping)
     began = started or datetime.now(UTC)
     if began.tzinfo is None:
         raise InputError("started", "must have a time zone, such as datetime.UTC", str(began.isoformat()))
@@ -197,9 +196,8 @@ def write_responses_nwb(
             ),
         )
         session.add_trial_column("stimulus", "name of the touch")
-        for (name, answer), onset_ms, lasts_ms in zip(
-            responses.items(), onsets_ms, durations_ms, strict=True
-        ):
+        trials = zip(responses.items(), onsets_ms, durations_ms, strict=True)
+        for (name, answer), onset_ms, lasts_ms in trials:
             session.add_trial(onset_ms / MS_PER_S, (onset_ms + lasts_ms) / MS_PER_S, stimulus=name)
             for phase in answer.phases:
                 start, end = ((onset_ms + time_ms) / MS_PER_S for time_ms in phase.window_ms)
@@ -211,11 +209,9 @@ def write_responses_nwb(
         known = [name for name in tables[0] if name not in ("receptor", *RECEPTOR_COLUMNS)]
         for name in known:
             session.add_unit_column(name, _UNIT_COLUMNS[name])
+        words = "in each trial, in the unit at the end of the name; NaN if there is none"
         for name, column in RECEPTOR_COLUMNS.items():
-            words = (
-                f"{column.long_name}, in each trial, in the unit at the end of the name; NaN if there is none"
-            )
-            session.add_unit_column(name, words)
+            session.add_unit_column(name, f"{column.long_name}, {words}")
         for receptor in range(len(tables[0]["receptor"])):
             trains = [answer.spikes[receptor] for answer in responses.values()]
             times_ms = [onset + train for onset, train in zip(onsets_ms, trains, strict=True)]
@@ -278,7 +274,6 @@ def _same_receptors(responses: Mapping[str, ResponseMap]) -> None:
         raise InputError("responses", "must hold at least one touch", remedy="it is empty")
     first = next(iter(responses.values()))
     for name, response in responses.items():
-        instance(f"responses[{name!r}]", response, ResponseMap)
         if not np.array_equal(response.positions_mm, first.positions_mm) or response.types != first.types:
             raise InputError(
                 "responses", "must come from the same receptors", remedy=f"those of {name!r} lie elsewhere"
@@ -291,18 +286,14 @@ def _durations(responses: Mapping[str, ResponseMap], duration_ms: float | None) 
     for name, response in responses.items():
         lasts_ms = response.duration_ms if duration_ms is None else duration_ms
         if lasts_ms is None:
-            raise InputError(
-                "duration_ms", "must be given", remedy=f"the response to {name!r} does not know its own"
-            )
+            remedy = f"the response to {name!r} does not know its own"
+            raise InputError("duration_ms", "must be given", remedy=remedy)
         positive("duration_ms", lasts_ms, "ms")
         latest_ms = max(
-            response.spikes.times_ms.max(initial=0.0), *(phase.end_ms for phase in response.phases), 0.0
+            [response.spikes.times_ms.max(initial=0.0), *(each.end_ms for each in response.phases)]
         )
         if latest_ms > lasts_ms:
-            raise InputError(
-                "duration_ms",
-                f"must reach to the last spike and phase, at {latest_ms:g} ms under {name!r}",
-                f"{lasts_ms:g} ms",
-            )
+            must = f"must reach to the last spike and phase, at {latest_ms:g} ms under {name!r}"
+            raise InputError("duration_ms", must, f"{lasts_ms:g} ms")
         durations_ms.append(lasts_ms)
     return np.array(durations_ms)

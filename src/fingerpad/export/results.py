@@ -11,7 +11,6 @@ import io
 import json
 import shutil
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
 from secrets import token_hex
@@ -90,10 +89,10 @@ def dataset(contents: Contents) -> xarray.Dataset:
 def save(result: Result, path: str | Path, **options: Any) -> Path:
     """Write a result by the ending of the name; see `Result.save`."""
     path = path_of("path", path)
-    known = {ending: writer for ending, writer in WRITERS.items() if hasattr(result, writer.needs)}
+    known = {ending: write for ending, (write, needed) in WRITERS.items() if hasattr(result, needed)}
     if path.suffix not in known:
         raise InputError(f"A {type(result).__name__} is saved as {', '.join(known)}: got {path.name}.")
-    write = known[path.suffix].write
+    write = known[path.suffix]
     taken = inspect.signature(write).parameters
     if options and not any(each.kind is inspect.Parameter.VAR_KEYWORD for each in taken.values()):
         raise InputError(f"A file {path.suffix} has no options: got {', '.join(options)}.")
@@ -146,12 +145,13 @@ def _json(result: Result, path: Path, **options: Any) -> None:
 def _npz(result: Result, path: Path, **options: Any) -> None:
     """Write every variable of the data set by its name, and in `units` the unit of each as JSON."""
     variables, attributes = result.contents(**options)
-    arrays: Any = {name: values.astype(str) if values.dtype == object else values
-              for name, (_, values, _) in variables.items()}  # fmt: skip
+    arrays: Any = {
+        name: values.astype(str) if values.dtype == object else values
+        for name, (_, values, _) in variables.items()
+    }
     units = {name: about["units"] for name, (_, _, about) in variables.items() if "units" in about}
     content = io.BytesIO()
-    said: Any = {"units": np.array(json.dumps(units)), "attributes": np.array(json.dumps(attributes))}
-    np.savez_compressed(content, **arrays, **said)
+    np.savez_compressed(content, **arrays, units=json.dumps(units), attributes=json.dumps(attributes))
     write_atomically(path, content.getvalue())
 
 
@@ -173,8 +173,7 @@ def _zarr(result: Result, path: Path, **options: Any) -> None:
     """Write a Zarr store beside its place and rename it: what was there is replaced at once."""
     library("zarr")
     data = dataset(result.contents(**options))
-    beside = [path.with_name(f".{path.name}.{token_hex(8)}.{what}") for what in ("part", "old")]
-    unfinished, replaced = beside
+    unfinished, replaced = (path.with_name(f".{path.name}.{token_hex(8)}.{what}") for what in ("part", "old"))
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         data.to_zarr(unfinished, mode="w", consolidated=False)
@@ -188,7 +187,7 @@ def _zarr(result: Result, path: Path, **options: Any) -> None:
     finally:
         if replaced.exists() and not path.exists():
             replaced.rename(path)
-        for leftover in beside:
+        for leftover in (unfinished, replaced):
             shutil.rmtree(leftover, ignore_errors=True)
 
 
@@ -215,26 +214,18 @@ def _picture(result: Result, path: Path, **options: Any) -> None:
     write_atomically(path, content.getvalue())
 
 
-@dataclass(frozen=True)
-class Writer:
-    """How a result becomes a file."""
-
-    write: Callable[..., None]
-    needs: str = "columns"  #: Attribute of the results that it writes.
-
-
-WRITERS: dict[str, Writer] = {
-    ".csv": Writer(_csv),
-    ".parquet": Writer(_parquet),
-    ".json": Writer(_json),
-    ".npz": Writer(_npz),
-    ".nc": Writer(_netcdf),
-    ".zarr": Writer(_zarr),
-    ".nwb": Writer(_nwb, "to_nwb"),
-    ".vtu": Writer(_vtu, "deformation"),
-    ".pvd": Writer(_vtu, "deformation"),
-    ".png": Writer(_picture),
-    ".pdf": Writer(_picture),
-    ".svg": Writer(_picture),
+WRITERS: dict[str, tuple[Callable[..., None], str]] = {
+    ".csv": (_csv, "columns"),
+    ".parquet": (_parquet, "columns"),
+    ".json": (_json, "columns"),
+    ".npz": (_npz, "columns"),
+    ".nc": (_netcdf, "columns"),
+    ".zarr": (_zarr, "columns"),
+    ".nwb": (_nwb, "to_nwb"),
+    ".vtu": (_vtu, "deformation"),
+    ".pvd": (_vtu, "deformation"),
+    ".png": (_picture, "columns"),
+    ".pdf": (_picture, "columns"),
+    ".svg": (_picture, "columns"),
 }
-"""Writers of results by the ending of the file."""
+"""What writes a result by the ending of the file, and an attribute of the results that it writes."""

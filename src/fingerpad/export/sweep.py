@@ -51,8 +51,6 @@ FORMAT, FORMAT_VERSION = "fingerpad sweep", 1
 
 PENDING, DONE, FAILED, LEFT_OUT = range(4)
 
-MEANINGS = "pending done failed left_out"
-
 HIT_RATE = "hit_rate"  # Variable of what observers find.
 
 _SETTINGS_IN_CHUNK = 64
@@ -164,8 +162,7 @@ def sweep(
     folder = out.parent / STORE_FOLDER if store is None else Path(store)
     engine = engine_of(jobs, KERNELS)
     file = SweepFile(out, asked, _attributes(asked, command or ""))
-    status = file.status()
-    _leave_out(file, asked, status)
+    file.leave_out()
     status = file.status()
     todo = (status == PENDING) | ((status == FAILED) & retry_failed)
     cases = unsettled(asked, ~todo, folder)
@@ -211,29 +208,17 @@ def _observe(file: SweepFile, progress: Progress) -> None:
     file.finish()
 
 
-def _leave_out(file: SweepFile, sweep: SweepRequest, status: np.ndarray) -> None:
-    """Note the settings that do not meet the constraints, once."""
-    if sweep.where and not (status == LEFT_OUT).any():
-        allowed = np.fromiter((sweep.allowed(setting) for setting in range(sweep.size)), bool, sweep.size)
-        if not allowed.all():
-            file.leave_out(~allowed)
-
-
 def _attributes(sweep: SweepRequest, command: str) -> Mapping[str, object]:
     """Provenance of a data set."""
     found = software()
-    sample = sweep.sample
     return {
         "title": sweep.title,
         "sweep": json.dumps(sweep.written()),
         "source": sweep.origin.name,
         "inputs_sha256": hashlib.sha256(sweep.hashed.encode()).hexdigest(),
-        "version": found["version"],
-        "code_hash": found["code_hash"],
-        "packages": found["packages"],
-        "platform": found["platform"],
+        **{name: found[name] for name in ("version", "code_hash", "packages", "platform")},
         "seed": sweep.described(0).afferents.seed,
-        **({} if sample is None else {"sample_seed": sample.seed}),
+        **({} if sweep.sample is None else {"sample_seed": sweep.sample.seed}),
         "started": datetime.now(UTC).isoformat(timespec="seconds"),
         "command": command,
     }
@@ -249,9 +234,8 @@ class SweepFile:
         self._rows: dict[str, dict[tuple[int, ...], np.ndarray]] = {}  # By name, and by place.
         with _written(self.path):
             if self.path.exists() and any(self.path.iterdir()):
-                opened = opened_group(self.path)
-                check_same(self.path, opened.attrs.asdict(), attributes)
-                self._group = opened
+                self._group = opened_group(self.path)
+                check_same(self.path, self._group.attrs.asdict(), attributes)
             else:
                 self._group = zarr.create_group(self.path, zarr_format=3)
                 self._begin()
@@ -273,8 +257,11 @@ class SweepFile:
                 written = np.array(spelled, dtype=object) if text else np.array(values, dtype=float)
                 about = {"long_name": field, "units": "1" if text else udunits(unit_of(field))}
                 self._create(name, (axis.name,), written.shape, str if text else "f8", about)[:] = written
-        flags: dict[str, Any] = {"flag_values": [PENDING, DONE, FAILED, LEFT_OUT], "flag_meanings": MEANINGS}
-        flags["long_name"] = "what became of each setting"
+        flags = {
+            "flag_values": [PENDING, DONE, FAILED, LEFT_OUT],
+            "flag_meanings": "pending done failed left_out",
+            "long_name": "what became of each setting",
+        }
         chunks = self._chunks(self.sweep.shape, ())
         self._create("status", self._dims, self.sweep.shape, "i1", flags, chunks)
         self._create("reason", self._dims, self.sweep.shape, str, {"long_name": "why it failed"}, chunks)
@@ -304,12 +291,16 @@ class SweepFile:
         """Status of every setting, (size,)."""
         return np.asarray(self._arrays["status"][...]).ravel()
 
-    def leave_out(self, settings: np.ndarray) -> None:
-        """Note settings that the constraints leave out, a mask (size,)."""
-        status = self.status()
-        status[settings] = LEFT_OUT
-        with _written(self.path):
-            self._arrays["status"][...] = status.reshape(self.sweep.shape)
+    def leave_out(self) -> None:
+        """Note the settings that do not meet the constraints, once."""
+        sweep, status = self.sweep, self.status()
+        if not sweep.where or (status == LEFT_OUT).any():
+            return
+        allowed = np.array([sweep.allowed(setting) for setting in range(sweep.size)], dtype=bool)
+        if not allowed.all():
+            status[~allowed] = LEFT_OUT
+            with _written(self.path):
+                self._arrays["status"][...] = status.reshape(sweep.shape)
 
     def add(self, settled: Settled) -> None:
         """Add what became of a press; it is written with `flush`."""
@@ -412,15 +403,11 @@ def check_same(path: Path, found: Mapping[str, Any], expected: Mapping[str, Any]
     """Raise `InputError` unless a data set is of the same sweep and the same program."""
     check_format(path, found, FORMAT, FORMAT_VERSION)
     if found["inputs_sha256"] != expected["inputs_sha256"]:
-        raise InputError(
-            path, "must be of the same sweep", remedy="it is of another one; choose another --out"
-        )
+        remedy = "it is of another one; choose another --out"
+        raise InputError(path, "must be of the same sweep", remedy=remedy)
     if found["code_hash"] != expected["code_hash"]:
-        raise InputError(
-            path,
-            "must be continued with the same program",
-            remedy=f"version {found['version']} began it; choose another --out",
-        )
+        remedy = f"version {found['version']} began it; choose another --out"
+        raise InputError(path, "must be continued with the same program", remedy=remedy)
 
 
 def opened_group(path: Path) -> Any:
@@ -448,8 +435,6 @@ def _written(path: Path) -> Iterator[None]:
 
 def _padded(values: np.ndarray, shape: tuple[int, ...], fill: Any) -> np.ndarray:
     """Values at the beginning of an array of a shape, and a filling after them."""
-    if values.shape == shape:
-        return values
     padded = np.full(shape, fill, dtype=values.dtype)
-    padded[tuple(slice(0, size) for size in values.shape)] = values
+    padded[tuple(map(slice, values.shape))] = values
     return padded

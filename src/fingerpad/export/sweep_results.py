@@ -133,14 +133,11 @@ def write_sweep_table(data: xarray.Dataset, path: str | Path) -> Path:
     StoreError
         If the file cannot be written.
     """
-    path = path_of("path", path)
+    path = Path(path)
     check_sweep_data(data)
     table = _table(data)
-    about = {
-        "format": TABLE,
-        "format_version": TABLE_VERSION,
-        **{name: data.attrs[name] for name in ("title", "inputs_sha256", "version") if name in data.attrs},
-    }
+    about = {"format": TABLE, "format_version": TABLE_VERSION}
+    about |= {name: data.attrs[name] for name in ("title", "inputs_sha256", "version") if name in data.attrs}
     if path.suffix == ".csv":
         content = f"# {json.dumps(about)}\n".encode() + table_csv(dict(table.items()))
     else:

@@ -20,7 +20,6 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING, Annotated, Any
 
-import matplotlib
 import numpy as np
 from matplotlib.cm import ScalarMappable
 from matplotlib.colors import LogNorm, Normalize
@@ -33,11 +32,11 @@ from fingerpad.core.checked import checked
 from fingerpad.core.errors import InputError
 from fingerpad.core.files import path_of, write_atomically
 from fingerpad.core.progress import NoProgress, Progress
-from fingerpad.core.values import Finite, FloatArray, count_from, finite, instance, one_of
+from fingerpad.core.values import Finite, FloatArray, count_from, instance, one_of
 from fingerpad.export.results import library
 from fingerpad.export.touch_file import check_touch, read_touch, spike_trains
 from fingerpad.report.skin import BONE, DECADES, SKIN
-from fingerpad.report.style import BLACK, BLUE, STYLE, new_figure, say_nothing_to_draw
+from fingerpad.report.style import BLACK, BLUE, new_figure, png, say_nothing_to_draw
 from fingerpad.skin.sampling import SkinResponse
 
 if TYPE_CHECKING:
@@ -51,6 +50,9 @@ SHORT_NAMES = {
     "slip": "slip_mm",
 }
 """Short names of fields; any other variable at nodes or elements goes by its own."""
+
+SHOWN_DIMS = (("node",), ("node", "axis"), ("element",), ("skin_node",), ("skin_node", "axis"))
+"""Dimensions of the fields that can be shown, beside time."""
 
 SUFFIXES = (".png", ".gif", ".mp4")
 
@@ -127,12 +129,11 @@ def save_view(
     else:
         data = instance("touch", touch, library("xarray").Dataset)
         check_touch("touch", data)
-    view = _View(data, _variable(data, field))
+    view, times = _View(data, _variable(data, field)), data["time"].values
     if not film:
-        deepest_ms = float(data["time"].values[data["depth_mm"].values.argmax()])
-        write_atomically(path, view.png(view.checked(deepest_ms if time_ms is None else time_ms)))
+        deepest_ms = float(times[data["depth_mm"].values.argmax()])
+        write_atomically(path, png(view.figure, view.checked(deepest_ms if time_ms is None else time_ms)))
         return (path,)
-    times = data["time"].values
     steps = np.linspace(0.0, times.size - 1.0, frames)
     shown = np.interp(steps, np.arange(times.size), times)
     view.checked(float(times[0]))
@@ -144,21 +145,16 @@ def save_view(
 
 def _pictures(view: _View, times_ms: list[float], advance: Callable[[], None]) -> Iterator[Image.Image]:
     for time_ms in times_ms:
-        yield Image.open(io.BytesIO(view.png(time_ms))).convert("RGB")
+        yield Image.open(io.BytesIO(png(view.figure, time_ms))).convert("RGB")
         advance()
 
 
 def fields_of(data: xarray.Dataset) -> tuple[str, ...]:
     """Names of the fields of a data set that can be shown, short ones where there are."""
     short = {name: alias for alias, name in SHORT_NAMES.items()}
-    return tuple(short.get(str(name), str(name)) for name in data.data_vars if _can_be_shown(data[name]))
-
-
-def _can_be_shown(values: xarray.DataArray) -> bool:
-    dims = [str(name) for name in values.dims if name != "time"]
-    return dims in (["node", "axis"], ["node"], ["element"], ["skin_node"], ["skin_node", "axis"]) and (
-        str(values.name) not in ("node_mm", "layer")
-    )
+    dims = {name: tuple(dim for dim in data[name].dims if dim != "time") for name in map(str, data.data_vars)}
+    shown = [name for name in dims if dims[name] in SHOWN_DIMS and name not in ("node_mm", "layer")]
+    return tuple(short.get(name, name) for name in shown)
 
 
 def _variable(data: xarray.Dataset, field: str) -> str:
@@ -175,7 +171,7 @@ class _View:
 
     def checked(self, time_ms: float) -> float:
         times = self.data["time"].values
-        if not 0.0 <= finite("time_ms", time_ms, "ms") <= times[-1]:
+        if not 0.0 <= time_ms <= times[-1]:
             raise InputError("time_ms", f"must lie within 0 ... {times[-1]:g} ms", f"{time_ms:g} ms")
         lacking = [
             name
@@ -246,12 +242,6 @@ class _View:
         """Points of the finger's frame [mm] on the picture, from its upper left corner, in pixels."""
         return self._screen(points - self._camera[0]) + 0.5 * np.array(PIXELS)
 
-    def png(self, time_ms: float) -> bytes:
-        buffer = io.BytesIO()
-        with matplotlib.rc_context(STYLE):
-            self.figure(time_ms).savefig(buffer, format="png", metadata={"Software": None})
-        return buffer.getvalue()
-
     def scene(self, time_ms: float) -> np.ndarray:
         """Render finger, object and afferents, (height, width, 3)."""
         plotter = self._plotter
@@ -295,9 +285,7 @@ class _View:
             body = pyvista.UnstructuredGrid({pyvista.CellType.HEXAHEDRON: bricks}, points)
             by_node = "node" in data[self.variable].dims
             (body.point_data if by_node else body.cell_data)["shown"] = values
-            body = (
-                self._mirrored(body) if self._half else body.clip("z", origin=(0.0, 0.0, 0.0), crinkle=False)
-            )
+            body = self._mirrored(body) if self._half else body.clip("z", origin=(0.0, 0.0, 0.0))
             plotter.add_mesh(body.extract_surface(algorithm="dataset_surface"), scalars="shown", **shades)
             plotter.add_mesh(self._bone(points), color=BONE, ambient=0.4)
         if not self.data["nail"].size:
@@ -340,14 +328,12 @@ class _View:
         top = np.maximum(front, floor)
         heights = np.stack([np.full_like(top, floor), top], axis=-1)
         wide = np.broadcast_arrays(x[:, None, None], heights, z[None, :, None])
-        placed = np.stack(wide, axis=-1) @ self.at("object_axes", time_ms).T + self.at(
-            "object_tip_mm", time_ms
-        )
+        placed = np.stack(wide, axis=-1) @ self.at("object_axes", time_ms).T
+        placed += self.at("object_tip_mm", time_ms)
         solid = _pyvista().StructuredGrid(*np.moveaxis(placed, -1, 0))
         high = np.maximum.reduce([top[:-1, :-1], top[1:, :-1], top[:-1, 1:], top[1:, 1:]]) > floor
         solid = solid.extract_cells(np.flatnonzero(high.ravel(order="F")))
-        if not self.on_skin:
-            solid = solid.clip("z", origin=(0.0, 0.0, 0.0))
+        solid = solid if self.on_skin else solid.clip("z", origin=(0.0, 0.0, 0.0))
         return solid.extract_surface(algorithm="dataset_surface")
 
     @cached_property
@@ -357,14 +343,13 @@ class _View:
         corners = data["node_mm"].values[data["facet_nodes"].values]
         middles = corners.mean(axis=1)
         receptors = data["receptor_mm"].values
-        mirrored = receptors * ([1.0] * (receptors.shape[1] - 1) + [-1.0 if self._half else 1.0])
         side = np.where(self._half & (receptors[:, -1] < 0.0), -1.0, 1.0)
-        target = np.where((side < 0.0)[:, None], mirrored, receptors)
-        volar = np.arange(len(middles))
+        target = receptors.copy()
+        target[:, -1] *= side
+        volar, columns = np.arange(len(middles)), [0, 1, 2]
         if receptors.shape[1] == 2:
             normal = np.cross(corners[:, 2] - corners[:, 0], corners[:, 3] - corners[:, 1])
-            volar = np.flatnonzero(normal[:, 1] < 0.0)
-        columns = [0, 2] if receptors.shape[1] == 2 else [0, 1, 2]
+            volar, columns = np.flatnonzero(normal[:, 1] < 0.0), [0, 2]
         facets = volar[cKDTree(middles[volar][:, columns]).query(target)[1]]
         points = middles[facets].copy()
         points[:, columns] = target
@@ -380,7 +365,7 @@ class _View:
         moved[data["skin_node"].values] = self.at("skin_displacement_mm", time_ms)
         shift = moved[data["facet_nodes"].values[facets]].mean(axis=1)
         shift[:, 2] *= np.where(self._half & (points[:, 2] < 0.0), -1.0, 1.0)
-        near = np.ones(len(points), dtype=bool) if self.on_skin else points[:, 2] <= _ON_PLANE_MM
+        near = self.on_skin | (points[:, 2] <= _ON_PLANE_MM)
         spots = self._spots((points + shift)[near])
         colours = np.where(self._fires(time_ms)[near], BLACK, "white")
         axes.scatter(*spots.T, s=8.0 if self.on_skin else 14.0, c=colours, edgecolors=BLACK, linewidths=0.7)

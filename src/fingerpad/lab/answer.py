@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from functools import cache
@@ -126,11 +126,8 @@ def motion_of(
     """
     training = described.training
     if state.depth_mm > training.range.depth_mm:
-        raise InputError(
-            "depth_mm",
-            f"must be at most {training.range.depth_mm:g}, the depth of this reduced touch",
-            f"{state.depth_mm:g}",
-        )
+        must = f"must be at most {training.range.depth_mm:g}, the depth of this reduced touch"
+        raise InputError("depth_mm", must, f"{state.depth_mm:g}")
     shape = shape_of(described, state.size)
     ways = (state.x_mm, state.x_mm + state.slide_mm)
     poses = [(x, state.z_mm, state.tilt_deg, *shape) for x in ways]
@@ -167,8 +164,7 @@ def population_of(described: ReductionRequest, state: LabState) -> Population:
     """Afferents of one type or several in the pad, each 1 mm apart."""
     finger = finger_of(described)
     grid = Population.grid(psychophysics.RECEPTOR_DENSITY.value, ROWS, COLUMNS, finger=finger)
-    x, z = grid.positions_mm.T
-    positions = grid.positions_mm[_on_pad(finger, x, z)]
+    positions = grid.positions_mm[_on_pad(finger, *grid.positions_mm.T)]
     parts = {
         name: Population(positions, grid.pitch_mm, afferent)
         for name, afferent in afferents_in(described, state).items()
@@ -222,23 +218,18 @@ def map_axes(described: ReductionRequest) -> tuple[FloatArray, FloatArray]:
 
 def reduced_answer(described: ReductionRequest, model: ReducedModel, state: LabState) -> Answer:
     motion, shape = motion_of(described, model, state)
-    weights = [
-        model.pose_weights((pose.x_mm, pose.z_mm, pose.tilt_deg, *shape))
-        for pose in map(motion.pose_at, sample_times_ms(motion).tolist())
-    ]
     population = population_of(described, state)
     stream = ReducedTouch(model, _sites(described, population), *shape)
-    samples = []
+    weights, samples = [], []
     with one_thread():
         for time in sample_times_ms(motion).tolist():
             pose, depth = motion.pose_at(time), float(motion.prescribed_at(time))
+            weights.append(model.pose_weights((pose.x_mm, pose.z_mm, pose.tilt_deg, *shape)))
             samples.append(stream.step(time, depth, None, pose.x_mm, pose.z_mm, pose.tilt_deg))
     fields = {name: np.stack([sample.fields[name] for sample in samples]) for name in samples[0].fields}
-    return _answer(
-        described, motion, population, fields, np.array(weights) @ model.middle_mm,
-        *(np.array([getattr(sample, name) for sample in samples]) for name in
-          ("time_ms", "depth_mm", "force_mn", "force_error_mn", "contact_area_mm2")),
-    )  # fmt: skip
+    names = ("time_ms", "depth_mm", "force_mn", "force_error_mn", "contact_area_mm2")
+    totals = [np.array([getattr(sample, name) for sample in samples]) for name in names]
+    return _answer(described, motion, population, fields, np.array(weights) @ model.middle_mm, totals)
 
 
 def in_full(described: ReductionRequest, motion: Trajectory, state: LabState, skin: SkinResponse) -> Answer:
@@ -247,15 +238,15 @@ def in_full(described: ReductionRequest, motion: Trajectory, state: LabState, sk
     sites = _sites(described, population)
     followed = [name for part in population.parts.values() or [population] for name in part.quantities]
     fields = {name: skin.sample(name, sites) for name in {STORED_ENERGY, *followed}}
-    none = np.zeros(skin.times_ms.size)
-    totals = skin.times_ms, skin.depth_mm, skin.force_mn, none, skin.contact_area_mm2
+    no_error_mn = np.zeros(skin.times_ms.size)
+    totals = skin.times_ms, skin.depth_mm, skin.force_mn, no_error_mn, skin.contact_area_mm2
     nodes_mm = skin.mesh.nodes_mm[skin.mesh.skin_nodes]
     weight = skin.contact_pressure_kpa * skin.mesh.skin_area_mm2
     total = weight.sum(axis=1, keepdims=True)
     middles_mm = (weight @ nodes_mm[:, [0, 2]]) / np.where(total > 0.0, total, 1.0)
     if skin.touch is not None and not skin.touch.grading.full:
         middles_mm[:, 1] = 0.0
-    return _answer(described, motion, population, fields, middles_mm, *totals)
+    return _answer(described, motion, population, fields, middles_mm, totals)
 
 
 def _sites(described: ReductionRequest, population: Population) -> FloatArray:
@@ -271,12 +262,10 @@ def _answer(
     population: Population,
     fields: dict[str, FloatArray],
     middles_mm: FloatArray,
-    times: FloatArray,
-    depth: FloatArray,
-    force: FloatArray,
-    error: FloatArray,
-    area: FloatArray,
+    totals: Sequence[FloatArray],
 ) -> Answer:
+    """Answer of the fields at `_sites` over time; `totals` are the first five fields of an `Answer`."""
+    times, depth, force, error, area = totals
     x, z = map_axes(described)
     on_skin = _on_pad(finger_of(described), *np.meshgrid(x, z, indexing="ij"))
     sed = np.full((times.size, x.size, z.size), np.nan)

@@ -109,18 +109,15 @@ class Laboratory:
         key = state.object, state.finger, state.tissues
         with self._lock:
             if key not in self._described:
-                source = self._files[state.object]
+                replaced = {
+                    name: getattr(state, name) for name in ("finger", "tissues") if getattr(state, name)
+                }
                 request: ReductionRequest = ReductionRequest.read(
-                    source, self.replaced(state), self.allow_python
+                    self.source(state), replaced, self.allow_python
                 )
                 request.check()
                 self._described[key] = request.changed(quantities=(*request.quantities, *FOLLOWED))
             return self._described[key]
-
-    @staticmethod
-    def replaced(state: LabState) -> dict[str, str]:
-        """Keys of the range that a state replaces."""
-        return {name: getattr(state, name) for name in ("finger", "tissues") if getattr(state, name)}
 
     def path(self, state: LabState) -> Path:
         """File of the reduced touch of a state, by what it depends on: of the afferents, what they follow."""
@@ -237,8 +234,7 @@ def alone(state: LabState) -> LabState:
 
 
 def shipped() -> list[Path]:
-    folder = Path(str(resources.files("fingerpad.lab") / "ranges"))
-    return sorted(folder.glob("*.yaml"))
+    return sorted(Path(str(resources.files("fingerpad.lab") / "ranges")).glob("*.yaml"))
 
 
 class _Worker:

@@ -28,7 +28,7 @@ CONTROLS = [each for each in ALL if each[0] in ("object", "depth_mm", "x_mm", "o
 def write_static(laboratory: Laboratory, folder: Path, progress: Progress | None = None) -> Path:
     """Compute answers over a grid of states, and write `index.html`, which opens without a server."""
     progress = progress or NoProgress()
-    objects = {label: state for name in laboratory.names for label, state in _sizes(laboratory, name)}
+    objects = dict(each for name in laboratory.names for each in _sizes(laboratory, name))
     known = {label: _grid(laboratory, state) for label, state in objects.items()}
     views = {}
     total = len(AFFERENTS) * sum(len(depths) * len(places) for depths, places in known.values())
@@ -46,9 +46,8 @@ def write_static(laboratory: Laboratory, folder: Path, progress: Progress | None
                         advance()
             for (label, i, j), (state, answer) in answers.items():
                 others = {}
-                for other in objects:
-                    there = min(j, len(known[other][1]) - 1)
-                    second = answers[other, i, there][1]
+                for other, (_, places) in known.items():
+                    second = answers[other, i, min(j, len(places) - 1)][1]
                     others[other] = comparison(label, other, answer, second)
                 view = view_of_answer(laboratory, state, answer, FRAMES, beside=True)
                 views["|".join([label, afferent, str(i), str(j)])] = asdict(view) | {"comparisons": others}
@@ -57,7 +56,6 @@ def write_static(laboratory: Laboratory, folder: Path, progress: Progress | None
     page = (here / "static.html").read_text("utf-8")
     page = page.replace("{{ page }}", (here / "page.js").read_text("utf-8"))
     packed = base64.b64encode(gzip.compress(content.encode(), mtime=0)).decode()
-    folder.mkdir(parents=True, exist_ok=True)
     path = folder / "index.html"
     write_atomically(path, page.replace("{{ data }}", packed).encode())
     return path

@@ -64,10 +64,8 @@ def view_of(laboratory: Laboratory, state: LabState, exact: bool = False) -> Vie
         second = laboratory.poll(replace(state, object=state.other, size=state.other_size))
         if isinstance(second, Making):
             return second
-        said = comparison(
-            _named(state.object, state.size), _named(state.other, state.other_size), answer, second
-        )
-        view = replace(view, other=_shown(second), compared=said)
+        names = _named(state.object, state.size), _named(state.other, state.other_size)
+        view = replace(view, other=_shown(second), compared=comparison(*names, answer, second))
     if exact:
         full = laboratory.poll(state, exact=True)
         if isinstance(full, Making):
@@ -84,8 +82,8 @@ def view_of_answer(
     x = np.linspace(0.3, finger.length_mm - 0.3, OUTLINE_POINTS)
     positions = answer.response.positions_mm
     nearest = np.linalg.norm(positions - answer.middle_mm[answer.force_mn.argmax()], axis=1)
-    asked, there = described, laboratory.model(state) is not None
     body = described.training.touch_with(shape_of(described, state.size)).indenter
+    measuring = laboratory.model(state) is not None and not laboratory.measured(state)
     return View(
         answer=_shown(answer, frames),
         x_mm=_plain(answer.x_mm),
@@ -95,8 +93,8 @@ def view_of_answer(
         positions_mm=_plain(positions),
         order=np.argsort(nearest, kind="stable").tolist(),
         shown_ms=float(answer.times_ms[-1] - state.ramp_ms),
-        said=f"{body}, tissues {asked.tissues}, {asked.resolution} mesh."
-        + (" Its error is being measured." if there and not laboratory.measured(state) else ""),
+        said=f"{body}, tissues {described.tissues}, {described.resolution} mesh."
+        + (" Its error is being measured." if measuring else ""),
         python=python_lines(laboratory, state, beside),
     )
 

@@ -19,7 +19,7 @@ from fingerpad.core.checked import checked_class, value_class
 from fingerpad.core.displayed import Columns, Result
 from fingerpad.core.errors import InputError
 from fingerpad.core.units import with_unit
-from fingerpad.core.values import Finite, FloatArray, Number, finite, float_array, not_negative
+from fingerpad.core.values import Finite, FloatArray, Number, float_array, not_negative
 from fingerpad.reduction.model import (
     GRID_POINTS,
     ReducedModel,
@@ -92,7 +92,7 @@ class ReducedTouch:
         if bool(shape) != (parameter is not None):
             wanted = f"needs {shape[0].name} as parameter" if shape else "has no parameter of the indenter"
             raise InputError(f"This reduced touch {wanted}: got {parameter!r}.")
-        self._model, self._shape = model, () if parameter is None else (finite("parameter", parameter),)
+        self._model, self._shape = model, () if parameter is None else (parameter,)
         self._receptors, self._sheet = receptors, self._places_below()
         n_branches, n_quantities = model.times_ms.size, len(model.quantities)
         self._at_receptors = _Filters.at_rest((n_branches, n_quantities, len(receptors)))
@@ -135,18 +135,17 @@ class ReducedTouch:
             If the time goes back, neither or both of depth and force are given, or the pose lies out of the
             range; the state is then unchanged.
         """
-        step_ms = finite("time_ms", time_ms, "ms") - self._time_ms
+        step_ms = time_ms - self._time_ms
         if step_ms < 0.0:
             raise InputError("time_ms", "must not go back", f"{time_ms:g} after {self._time_ms:g} ms")
         if (depth_mm is None) == (force_mn is None):
             raise InputError("A step needs either depth_mm or force_mn: give one of them.")
         model = self._model
-        pose = finite("x_mm", x_mm, "mm"), finite("z_mm", z_mm, "mm"), finite("tilt_deg", tilt_deg, "degrees")
-        weights = model.pose_weights((*pose, *self._shape))
+        weights = model.pose_weights((x_mm, z_mm, tilt_deg, *self._shape))
         first_mm = float(weights @ model.first_touch_mm)
         corner_mm = weights @ model.middle_mm - model.reach_mm
         spacing_mm = 2 * model.reach_mm / (GRID_POINTS - 1)
-        moved_mm = np.hypot(*(self._way_mm - pose[:2]))
+        moved_mm = np.hypot(*(self._way_mm - [x_mm, z_mm]))
         press = _Press(
             model,
             totals=weighted(weights, model.totals),
@@ -157,8 +156,8 @@ class ReducedTouch:
             kept=float(np.exp(-moved_mm / FORGETS_MM)),
             step_ms=step_ms,
         )
-        if force_mn is None:
-            below_mm = finite("depth_mm", depth_mm, "mm") - first_mm
+        if depth_mm is not None:
+            below_mm = depth_mm - first_mm
         else:
             wanted_mn = not_negative("force_mn", force_mn, "mN")
             below_mm = press.depth_of(wanted_mn, self._below_mm, self._further_mm)
@@ -177,7 +176,7 @@ class ReducedTouch:
         self._at_receptors = self._at_receptors.after(press.factors, amplitude * scale)
         self._springs, self._at_sheet = contact.springs, contact.sheet
         self._further_mm = below_mm - self._below_mm
-        self._way_mm, self._below_mm, self._time_ms = np.array(pose[:2]), below_mm, time_ms
+        self._way_mm, self._below_mm, self._time_ms = np.array([x_mm, z_mm]), below_mm, time_ms
         loss = lost(amplitude, self._at_receptors.relaxed / scale, model.squared)
         values = np.maximum(at_receptors[0] - loss.sum(axis=0), 0.0)
         self._largest = np.maximum(self._largest, [*values.max(axis=1, initial=0.0), contact.force_mn])
@@ -236,7 +235,6 @@ class _Press:
 
     @cached_property
     def factors(self) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Factors of the filters."""
         return filter_step(self.step_ms, self.model.times_ms)
 
     @cached_property

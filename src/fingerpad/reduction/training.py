@@ -27,7 +27,7 @@ from scipy.optimize import brentq
 
 from fingerpad.core.checked import value_class
 from fingerpad.core.errors import InputError
-from fingerpad.core.values import Count, Finite, FloatArray, Pair, Positive, choice, instance
+from fingerpad.core.values import Count, Finite, FloatArray, Pair, Positive, choice
 from fingerpad.geometry.fingertip import Fingertip
 from fingerpad.geometry.grading import RESOLUTIONS, Grading
 from fingerpad.geometry.motion import STILL, Pose, Trajectory
@@ -206,11 +206,10 @@ class ReducedTraining:
     grading: Grading | None = None  #: Mesh instead of that which the resolution grades over the range.
 
     def __post_init__(self) -> None:
-        touch = instance("touch", self.touch, Touch)
+        touch = self.touch
         if not isinstance(touch.finger, Fingertip):
-            raise InputError(
-                "finger", "must be a Fingertip to be reduced", f"a {type(touch.finger).__name__}"
-            )
+            came = f"a {type(touch.finger).__name__}"
+            raise InputError("finger", "must be a Fingertip to be reduced", came)
         if touch.friction > 0.0 and self.range.moves:
             why = "because what slides with friction depends on its way, which a reduced touch does not know"
             must = f"must be 0 for a range of x_mm or z_mm, {why}"

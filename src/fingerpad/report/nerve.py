@@ -151,9 +151,8 @@ TICKS_MS = (1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0, 200.0, 500.0, 1000.0)
 def draw_population(section: PopulationMaps) -> Figure:
     drawn = new_figure(COLUMN_IN, 3.5)
     panels = drawn.subplots(1, len(QUANTITIES), sharey=True)
-    for axes, letter, (key, (phase, label, colours, scaling)) in zip(
-        panels, "abc", QUANTITIES.items(), strict=True
-    ):
+    for axes, letter, key in zip(panels, "abc", QUANTITIES, strict=True):
+        phase, label, colours, scaling = QUANTITIES[key]
         axes.set_title(f"({letter}) {phase}")
         values = getattr(section, key).T
         if np.isnan(values).all():
@@ -161,13 +160,11 @@ def draw_population(section: PopulationMaps) -> Figure:
             continue
         low, high = float(np.nanmin(values)), float(np.nanmax(values))
         scale = scaling(low, max(high, 1.001 * low, 1e-3), clip=True)  # apart, as logarithms need it
-        axes.patch.set(
-            facecolor=PALE, hatch="//", edgecolor=GREY, linewidth=0.0
-        )  # skin that does not respond
+        # Skin that does not respond.
+        axes.patch.set(facecolor=PALE, hatch="//", edgecolor=GREY, linewidth=0.0)
         shown = np.ma.masked_where(~(values > 0.0), values)
-        picture = axes.pcolormesh(
-            section.x_mm, section.z_mm, shown, cmap=colours, norm=scale, shading="nearest"
-        )
+        cells: Any = {"cmap": colours, "norm": scale, "shading": "nearest"}
+        picture = axes.pcolormesh(section.x_mm, section.z_mm, shown, **cells)
         dots: Any = {"markersize": 3.0, "color": "white", "markeredgecolor": "black", "markeredgewidth": 0.6}
         axes.plot(*section.receptors_mm.T, "o", **dots)
         axes.set(**MAP_AXES)
@@ -281,11 +278,9 @@ def draw_parameters(axes: Axes, fit: SpikeFit) -> None:
 def rows_of_rates(found: FitResult) -> Rows:
     """Return the rates of every stimulus: observed, fitted, and predicted without its fold."""
     presentations, rows = found.presentations or [None] * len(found.stimulus), []
+    phases = [found.phases[phase] for phase in PHASE_LABELS]
+    rates = [each for one in phases for each in (one.observed_hz, one.fitted_hz, one.out_of_sample_hz)]
     for place, (name, presented) in enumerate(zip(found.stimulus, presentations, strict=True)):
-        phases = (found.phases[phase] for phase in PHASE_LABELS)
-        rates = (
-            each for phase in phases for each in (phase.observed_hz, phase.fitted_hz, phase.out_of_sample_hz)
-        )
         shown = (ABSENT if each is None else fixed(each[place], 1) for each in rates)
         rows.append((name, str(found.fold[place]), plain(presented), *shown))
     return rows

@@ -345,8 +345,9 @@ def draw_task_responses(found: TaskResult) -> Figure:
     measure = main_decoding(found).measure
     what, _, unit = MEASURE_LABELS[measure]
     responses, places = found.responses[measure], found.population.positions_mm[:, [0, -1]]
+    shown = [round(row) for row in np.linspace(0, len(responses) - 1, min(len(responses), MOST_MAPS))]
     # Marks are so small that many of them do not cover each other.
-    shown, size = _shown(len(responses)), float(np.clip(2500.0 / len(places), 4.0, 140.0))
+    size = float(np.clip(2500.0 / len(places), 4.0, 140.0))
     low, high = places.min(axis=0) - MARGIN_MM, places.max(axis=0) + MARGIN_MM
     along, across = high - low
     drawn = new_figure(10.0, float(np.clip(8.0 / len(shown) * across / along, 0.5, 4.0)) + 1.0)
@@ -365,9 +366,8 @@ def draw_task_responses(found: TaskResult) -> Figure:
     for axes in panels[1:]:
         axes.set_ylabel("")
     drawn.colorbar(picture, ax=panels, label=f"{what} [{unit}]", shrink=0.8)
-    drawn.supxlabel(
-        f"others less the standard: ▲ more, ▼ less, largest {number(largest)} {unit}", fontsize=9.0
-    )
+    key = f"others less the standard: ▲ more, ▼ less, largest {number(largest)} {unit}"
+    drawn.supxlabel(key, fontsize=9.0)
     return drawn
 
 
@@ -381,11 +381,6 @@ def titled(decoding: Decoding) -> str:
 
 def why_silent(decoding: Decoding) -> str:
     return f"silent under {', '.join(decoding.silent[:3])}"
-
-
-def _shown(n_stimuli: int) -> list[int]:
-    """Rows of the stimuli to draw: all, or the first, the last and some between."""
-    return [round(row) for row in np.linspace(0, n_stimuli - 1, min(n_stimuli, MOST_MAPS))]
 
 
 def _places(found: TaskResult) -> FloatArray:

@@ -146,7 +146,6 @@ def _draw_three(axes: Axes, section: ThreeLevels) -> None:
 
 # The signs differ without colour.
 SIGNS = {Verdict.MET: "✓", Verdict.MISSED: "✗", Verdict.NOT_DECIDABLE: "?", Verdict.NOT_APPLICABLE: "–"}
-SET_COLUMNS = ("the paper", "`paper`", "", "`human`", "")  # Values and verdicts of both sets.
 
 
 def side_by_side(
@@ -212,11 +211,11 @@ def rows_of_verdicts(result: ReproductionResult) -> Rows:
 
 def statement_cells(each: Statement) -> tuple[str, ...]:
     """Return what the paper says, and our value and verdict of both sets."""
-    ours = [
-        (getattr(each, name), _marked(getattr(each, f"verdict_{name}"), getattr(each, f"fitted_{name}")))
-        for name in SETS
-    ]
-    return each.statement, each.published, *ours[0], *ours[1]
+    cells = [each.statement, each.published]
+    for name in SETS:
+        verdict, fitted = getattr(each, f"verdict_{name}"), getattr(each, f"fitted_{name}")
+        cells += [getattr(each, name), _marked(verdict, fitted)]
+    return tuple(cells)
 
 
 def _marked(verdict: Verdict, fitted: str) -> str:

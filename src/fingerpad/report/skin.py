@@ -101,7 +101,7 @@ def save_figure(
     file = path_of("path", path)
     if file.suffix.lower() != ".png":
         raise InputError(f"A figure is written as .png: got {file.name}.")
-    return write_png(lambda parts: draw_touch(*parts), (skin, response, indenter), file)
+    return write_png(file, draw_touch, skin, response, indenter)
 
 
 @enter(DRAWINGS, ("SkinResponse", "force"))

@@ -15,7 +15,7 @@ from matplotlib.figure import Figure
 from matplotlib.text import Text
 
 from fingerpad.core.checked import checked
-from fingerpad.core.files import path_of, write_atomically
+from fingerpad.core.files import write_atomically
 from fingerpad.core.units import with_unit
 from fingerpad.core.values import FloatArray
 from fingerpad.report.tables import in_words
@@ -101,15 +101,15 @@ def png(draw: Callable[..., Figure], *parts: Any) -> bytes:
 
 
 @checked
-def write_png(draw: Callable[[Any], Figure], section: Any, path: Path) -> Path:
-    """Write what `draw` makes of results as PNG; the file is there whole or not at all."""
-    write_atomically(path_of("path", path), png(draw, section))
-    return path_of("path", path)
+def write_png(path: Path, draw: Callable[..., Figure], *parts: Any) -> Path:
+    """Write what `draw` makes of its arguments as PNG; the file is there whole or not at all."""
+    write_atomically(path, png(draw, *parts))
+    return path
 
 
-def name_panel(axes: Axes, title: str, xlabel: str, ylabel: str, **more: Any) -> None:
+def name_panel(axes: Axes, title: str, xlabel: str, ylabel: str) -> None:
     axes.set_title(title, fontsize=10.0)
-    axes.set(xlabel=xlabel, ylabel=ylabel, **more)
+    axes.set(xlabel=xlabel, ylabel=ylabel)
 
 
 def draw_chance(axes: Axes, label: str | None = None) -> None:
