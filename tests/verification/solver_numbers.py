@@ -1,0 +1,141 @@
+"""What each number of the solver is for: presses with the number and without it.
+
+`python -m tests.verification.solver_numbers [PART PARTS]` presses what has no row yet, and keeps each row.
+Without a number its mechanism is off, or always on.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import sys
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
+from itertools import product
+from typing import Any
+from unittest.mock import patch
+
+import fingerpad as fp
+from fingerpad.core.errors import FingerpadError
+from fingerpad.core.files import write_atomically
+from fingerpad.mechanics import configuration
+
+from .page import PAGE
+from .press_table import limited_to, slide
+
+ROWS = PAGE.parent / "verification" / "solver_numbers.json"
+MOST_SECONDS = 600
+BALL = fp.Sphere(curvature_per_m=287.0)
+FORCED = fp.ForceRampAndHold(force_mn=60.0)
+BACK = fp.Trajectory((0.0, 50.0, 100.0, 150.0), depth_mm=(0.0, 1.0, 1.0, 0.0))
+CASES: dict[str, tuple[Any, dict[str, Any]]] = {
+    "ball": (BALL, {}),
+    "ball, 60 mN": (BALL, {"stimulus": FORCED}),
+    "plate, 500 mN": (fp.Plate(), {"stimulus": fp.ForceRampAndHold(force_mn=500.0)}),
+    "ball, withdrawn": (BALL, {"stimulus": BACK}),
+    "ball, slides": (BALL, {"stimulus": slide("x_mm", 2.0, depth_mm=0.6), "friction": 0.5}),
+    "ball, slides at 60 mN": (BALL, {"stimulus": slide("x_mm", 2.0, force_mn=60.0), "friction": 0.5}),
+    "ball of 0.5 mm": (fp.Sphere(curvature_per_m=2000.0), {"stimulus": fp.RampAndHold(depth_mm=1.5)}),
+    "punch": (fp.FlatPunch(1.0, 0.1), {"stimulus": fp.RampAndHold(depth_mm=1.0)}),
+    "punch, friction": (fp.FlatPunch(1.0, 0.1), {"stimulus": fp.RampAndHold(depth_mm=1.5), "friction": 0.5}),
+    "sharp bar": (fp.Bar(3.0, 0.05), {"stimulus": fp.RampAndHold(depth_mm=1.5)}),
+    "sharp bar, friction": (
+        fp.Bar(3.0, 0.05),
+        {"stimulus": fp.RampAndHold(depth_mm=0.8), "friction": 0.5, "tissues": "trial2_wu"},
+    ),
+    "grating": (fp.Grating(1.0, 1.0), {"stimulus": fp.RampAndHold(depth_mm=1.0), "friction": 0.5}),
+    "wire": (fp.Line(0.3), {"stimulus": fp.RampAndHold(depth_mm=1.0)}),
+}
+"""Presses at quick; of each the paper's ramp of 1 mm with the hold, unless it says otherwise."""
+
+EVER = 10**9
+WITHOUT: dict[str, Any] = {
+    "SHORTEST_NEAR_REST": 1.0 / 64,
+    "REMEMBERED_POTENTIALS": 1,
+    "ENOUGH": 0.0,
+    "LAST_STEP": 0.0,
+    "RENEW_AT": 0.0,
+    "MOST_FREE": 1.0,
+    "PATIENCE": EVER,
+    "MOST_CONTACT_CHANGES": 0,
+    "CONTACT_FORCING": 1e-9,
+    "MOST_STRAIGHT": EVER,
+    "LARGEST_SHIFTS": {True: 0.0, False: 2.0},
+    "LONGEST_SHIFTED_STEP": 1.0,
+    "MOST_FULL_AUGMENTATIONS": EVER,
+    "MOST_PLAIN_RENEWALS": EVER,
+    "AT_REST": math.inf,
+    "MOST_ADVANCE": 1e3,
+    "MOST_CONTINUED": 1.0,
+    "LARGEST_DROP": 1.0,
+    "LEAST_SHARE_OF_FORCE": 0.0,
+    "LEAST_DEPTH_MM": 1e-6,
+    "CURVATURE_BELOW_RESIDUAL": math.inf,
+    "LEAST_PENETRATION": 0.0,
+    "SAG_OF_WIDTH": 0.0,
+    "LONGEST_STEP": math.inf,
+    "LONGEST_SLIDE": math.inf,
+    "STICK_PENALTY": 15_000.0,
+    "STIFFNESS_KPA": 3_000.0,
+    "MORE_NEWTON_STEPS": 1,
+    "LENGTHEN_AFTER": 1,
+    "LEAST_SECANT": 0.0,
+    "MOST_EXPECTED": math.inf,
+}
+"""Numbers, and values that take their effect away."""
+
+
+@contextmanager
+def without(name: str) -> Iterator[None]:
+    """Replace a number in all modules that have it."""
+    mechanics = [module for key, module in sys.modules.items() if key.startswith("fingerpad.mechanics.")]
+    homes = [module for module in mechanics if name in vars(module)]
+    assert homes or not name, f"{name} is in no module"
+    with ExitStack() as patches:
+        for home in homes:
+            patches.enter_context(patch.object(home, name, WITHOUT[name]))
+        yield
+
+
+def row(case: str, name: str) -> dict[str, Any]:
+    """Press once, and say what it took and gave."""
+    body, options = CASES[case]
+    options = dict(options)
+    stimulus = options.pop("stimulus", None)
+    touch = fp.touch_of(fp.Fingertip(), body, stimulus, **options)
+    count, assemble = 0, configuration.assemble
+
+    def counted(*arguments: Any) -> float:
+        nonlocal count
+        count += 1
+        return assemble(*arguments)
+
+    with without(name), patch.object(configuration, "assemble", counted), limited_to(MOST_SECONDS):
+        try:
+            skin = touch.solve()
+        except (FingerpadError, TimeoutError) as error:
+            return {"failure": str(error), "assemblies": count}
+    return {
+        "assemblies": count,
+        "newton_steps": skin.newton_steps,
+        "force_mn": float(skin.force_mn.max()),
+        "energy_imbalance": float(skin.energy_imbalance),
+    }
+
+
+def read_rows() -> dict[str, dict[str, Any]]:
+    return json.loads(ROWS.read_text(encoding="utf-8")) if ROWS.exists() else {}
+
+
+def measure(part: int = 0, parts: int = 1) -> None:
+    """Press what has no row."""
+    for number, (name, case) in enumerate(product(["", *WITHOUT], CASES)):
+        key = f"{name}|{case}"
+        if number % parts == part and key not in read_rows():
+            made = row(case, name)
+            write_atomically(ROWS, json.dumps(read_rows() | {key: made}, indent=1).encode())
+            print(key, made, flush=True)
+
+
+if __name__ == "__main__":
+    measure(*(int(word) for word in sys.argv[1:3]))
