@@ -55,33 +55,6 @@ def test_a_package_imports_only_what_its_row_names(package):
     assert imported(package) <= named | ({"core", "data"} if package not in ("core", "data") else {"core"})
 
 
-def lines_behind(module: str) -> int:
-    """Lines of a module and of all that it imports at once, directly or through others."""
-    files = {
-        ".".join(path.relative_to(PACKAGE).with_suffix("").parts): path for path in PACKAGE.rglob("*.py")
-    }
-    found: dict[str, int] = {}
-    waiting = [module]
-    while waiting:
-        name = waiting.pop().removeprefix("fingerpad.")
-        name = name if name in files else f"{name}.__init__"
-        if name not in files or name in found:
-            continue
-        text = files[name].read_text(encoding="utf-8")
-        found[name] = len(text.splitlines())
-        for node in ast.parse(text).body:
-            if isinstance(node, ast.ImportFrom) and (node.module or "").startswith("fingerpad."):
-                inside = [f"{node.module}.{alias.name}" for alias in node.names]
-                waiting += [one if one.removeprefix("fingerpad.") in files else node.module for one in inside]
-    return sum(found.values())
-
-
-@pytest.mark.parametrize("command", ["fit", "discriminate"])
-def test_a_command_needs_half_of_the_package_at_most(command):
-    package = sum(len(path.read_text(encoding="utf-8").splitlines()) for path in PACKAGE.rglob("*.py"))
-    assert lines_behind(f"cli.{command}") <= package / 2
-
-
 def test_a_command_loads_what_its_options_need_when_they_are_given():
     """The likelihood of spikes, the uncertainty of a fit and regions of the skin are loaded on demand."""
     late = ("inference.spike_likelihood", "inference.fitting.posterior", "skin.unrolled_skin")

@@ -67,6 +67,12 @@ def points(**sweep):
     return [found.values(setting) for setting in range(found.size)]
 
 
+def test_a_sweep_is_written_with_its_keys_in_one_order():
+    """A set of keys has another order in every run, and the file that holds them had other bytes."""
+    asked = {"where": "motion.depth_mm < 9", "fields": ["sed_kpa"], "title": "Depths"} | STUDY
+    assert list(fp.SweepRequest.read(asked).written()) == ["title", "touch", "grid", "where", "fields"]
+
+
 def test_a_grid_has_all_combinations_and_fields_of_the_skin_come_first():
     sweep = fp.SweepRequest.read(
         {

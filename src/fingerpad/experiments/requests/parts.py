@@ -104,6 +104,12 @@ class Part(BaseModel):
         """The values in the file, without defaults."""
         return self.chosen(*type(self).model_fields)
 
+    @property
+    def set_in_order(self) -> Content:
+        """The fields that were given, null too, in the order of the class: that of a set differs each run."""
+        names = (name for name in type(self).model_fields if name in self.model_fields_set)
+        return {name: getattr(self, name) for name in names}
+
     def chosen(self, *names: str) -> Content:
         """Those of the names that the file gives a value, and not null, with that value."""
         values = {name: getattr(self, name) for name in names if name in self.model_fields_set}
@@ -391,7 +397,7 @@ class Request(Part):
             return source
         origin = Origin(name or cls.word)
         if isinstance(source, cls):
-            content: Any = {name: getattr(source, name) for name in source.model_fields_set}
+            content: Any = source.set_in_order
             origin = source.origin
         elif isinstance(source, str | Path):
             text = read_text(path_of("source", source)) if text is None else text

@@ -115,7 +115,7 @@ class ObserverSettings(Part):
 def _as_block(value: Any) -> Any:
     """Return the keys of a touch that is given as a request."""
     if isinstance(value, TouchRequest):
-        return {name: getattr(value, name) for name in value.model_fields_set}
+        return value.set_in_order
     return value
 
 
@@ -339,7 +339,7 @@ class SweepRequest(Request):
 
     def written(self, without: Sequence[str] = ()) -> Content:
         """Return the keys that are given as plain values; an object of Python as it is shown."""
-        given = {name: getattr(self, name) for name in self.model_fields_set if name not in without}
+        given = {name: value for name, value in self.set_in_order.items() if name not in without}
         return json.loads(json.dumps(given, default=_plain))
 
 
