@@ -31,7 +31,7 @@ NUMBERS = [
     ("mechanics.fields:largest_compression", (np.array([1.0, -3.0, 0.0, 0.0, 0.0, 0.0]),), 3.0),
     ("mechanics.inertia:share_of_force", (sine(0.5, 0.01, 183.0, cycles=4), SOFT, [5.0]), 0.0189),
     ("mechanics.multigrid:kept_lines", (LINES, 1.0), [0, 1, 3, 5, 7]),
-    ("mechanics.press:length_ms", (500.1, 500.4), 0.3),
+    ("mechanics.moments:length_ms", (500.1, 500.4), 0.3),
     ("mechanics.press_settings:steps_of_advance", (0.4, 0.05), 8),
     ("mechanics.press_settings:steps_of_advance", (0.4, float("inf")), 1),
     ("mechanics.press_settings:steps_of_slide", (0.1, Bar(fillet_mm=0.3)), 2),
