@@ -11,6 +11,7 @@ from fingerpad.geometry.fingertip import Fingertip
 from fingerpad.geometry.indenters import Indenter
 from fingerpad.geometry.mesh import block_mesh
 from fingerpad.geometry.motion import ForceRampAndHold, RampAndHold, Trajectory
+from fingerpad.mechanics import moments
 from fingerpad.mechanics import press as press_module
 from fingerpad.mechanics.contact import Contact, Placement
 from fingerpad.mechanics.friction import Anchors, Approach, dragged, friction, slid_mm
@@ -146,8 +147,8 @@ def contacts(monkeypatch):
         found.append(equilibrium.contact)
         return equilibrium
 
-    find = press_module.find_equilibrium
-    monkeypatch.setattr(press_module, "find_equilibrium", spied)
+    find = moments.find_equilibrium
+    monkeypatch.setattr(moments, "find_equilibrium", spied)
     return found
 
 

@@ -80,7 +80,7 @@ def test_a_quantity_is_read_and_raised_to_its_exponent():
 
 
 def test_one_bar_is_read_where_a_shifted_bar_would_have_the_receptor():
-    (traces,) = bar_traces({ONE_BAR: Skin()}, SED_DRIVEN, SimpleNamespace(skin_tilt_deg=60.0))
+    (traces,) = bar_traces({ONE_BAR: Skin()}, SED_DRIVEN, SimpleNamespace(along_skin=0.5))
     assert traces.values[-1] == pytest.approx(RECEPTOR_X_MM + 0.5 * np.array(protocol.BAR_SHIFTS.value))
 
 

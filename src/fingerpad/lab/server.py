@@ -110,7 +110,7 @@ def serve(laboratory: Laboratory, port: int = 0, ready: Callable[[str], None] = 
     from panel.custom import JSComponent
     from panel.io.server import get_server
     from param import String
-    from tornado.websocket import WebSocketHandler
+    from tornado.websocket import WebSocketClosedError, WebSocketHandler
 
     class Page(JSComponent):
         spec = String(json.dumps(spec_of(laboratory)))
@@ -132,6 +132,13 @@ def serve(laboratory: Laboratory, port: int = 0, ready: Callable[[str], None] = 
     for rule in server._tornado.wildcard_router.rules:
         if issubclass(rule.target, WebSocketHandler):
             rule.target = _refusing(rule.target)
+
+    def report(loop: Any, context: dict[str, Any]) -> None:
+        # A browser may leave while its answer is on the way.
+        if not isinstance(context.get("exception"), WebSocketClosedError):
+            loop.default_exception_handler(context)
+
+    server.io_loop.asyncio_loop.set_exception_handler(report)  # type: ignore[attr-defined]
     # Panel would end without a word after Ctrl-C.
     signal.signal(signal.SIGINT, interrupted)
     ready(f"http://{HOST}:{port}/")
