@@ -114,7 +114,7 @@ def test_history_is_that_of_its_formula():
     """H and S_i against the two lines of the module's head, written for whole arrays."""
     rng, n = np.random.default_rng(5), 700
     layer = rng.integers(0, 2, n)
-    step = StepCoefficients(*(rng.uniform(0.1, 1.0, size) for size in ((2,), (2, 3), (2, 3), (2, 3))))
+    step = StepCoefficients(1.0, *(rng.uniform(0.1, 1.0, size) for size in ((2,), (2, 3), (2, 3), (2, 3))))
     before = StressHistory(rng.normal(size=(n, 8, 6)), rng.normal(size=(3, n, 8, 6)))
     now = rng.normal(size=(n, 8, 6))
     new, old, decay = (of.T[:, layer, None, None] for of in (step.new, step.old, step.decay))

@@ -18,7 +18,7 @@ from fingerpad.mechanics.fields import FieldState, Watched
 from fingerpad.mechanics.materials import MaterialTable
 from fingerpad.mechanics.moments import tissue_after
 from fingerpad.mechanics.tissues import named_tissues
-from fingerpad.mechanics.viscoelastic import StressHistory
+from fingerpad.mechanics.viscoelastic import StepCoefficients, StressHistory
 from fingerpad.neuron.population import Population
 from fingerpad.skin.fields import stored_fields, watched_elements
 from fingerpad.skin.indentation import Touch
@@ -26,7 +26,6 @@ from fingerpad.skin.indentation import Touch
 COARSE = Grading(
     fingertip.CONTACT_POINT.value[0], 4.0, 1.5, 1.0, 0.75, stratum_corneum=1, dermis=2, subcutis=2
 )
-
 
 STRESS_KPA = 100.0  # Of all skin: every afferent fires.
 
@@ -47,11 +46,12 @@ def relax_skin_at_rest(touch: Touch) -> None:
     """Call the kernels of what follows a solved step."""
     mesh, table = touch.mesh, MaterialTable.of(touch.tissues.layers)
     chosen = watched_elements(mesh)
-    watched = Watched(chosen, mesh.nodes_mm, mesh.elements[chosen], mesh.layer[chosen], table)
+    watched = Watched.of(mesh, table, chosen)
     history = StressHistory.unloaded(len(mesh.elements), table.shares.shape[1])
     at_rest = FieldState.unloaded(len(mesh.nodes_mm), chosen.size)
     nowhere_mm = np.zeros_like(mesh.nodes_mm)
-    tissue_after(mesh, watched, history, at_rest, (nowhere_mm, nowhere_mm), step_ms=1.0)
+    step = StepCoefficients.of(table, step_ms=1.0)
+    tissue_after(mesh, watched, history, at_rest, (nowhere_mm, nowhere_mm), step)
 
 
 def main() -> None:

@@ -121,11 +121,11 @@ def indenter_work(
 
 def _phase_work(times: FloatArray, depth: FloatArray, force: FloatArray) -> FloatArray:
     """Cumulative work within one phase."""
+    forth = np.sign(depth[-1] - depth[0])
     if times.size < FEW_STEPS:
         steps = 0.5 * (force[1:] + force[:-1]) * np.diff(depth)
-    elif (np.diff(depth) > 0.0).all() or (np.diff(depth) < 0.0).all():
-        way = np.sign(depth[-1] - depth[0]) * depth
-        return np.sign(depth[-1] - depth[0]) * CubicSpline(way, force).antiderivative()(way)
+    elif (forth * np.diff(depth) > 0.0).all():
+        return forth * CubicSpline(forth * depth, force).antiderivative()(forth * depth)
     else:
         half, middle = 0.5 * np.diff(times)[:, None], 0.5 * (times[1:] + times[:-1])[:, None]
         points = middle + half * _GAUSS_POINTS

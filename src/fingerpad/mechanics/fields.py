@@ -176,6 +176,10 @@ class Watched:
     layer: np.ndarray  # Their row of the material table, (n_elements,).
     table: MaterialTable
 
+    @classmethod
+    def of(cls, mesh: Mesh, table: MaterialTable, elements: np.ndarray) -> Watched:
+        return cls(elements, mesh.nodes_mm, mesh.elements[elements], mesh.layer[elements], table)
+
     def after(
         self,
         before: FieldState,

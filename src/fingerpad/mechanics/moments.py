@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import logging
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import NamedTuple
@@ -34,8 +33,6 @@ from fingerpad.mechanics.viscoelastic import (
     instantaneous_state,
     stored_energy_density,
 )
-
-LOGGER = logging.getLogger(__name__)
 
 MOST_CONTINUED = 4.0  # Largest factor by which the last step of the skin is extended for the next guess.
 LARGEST_DROP = 0.1  # Largest share by which the force may fall in a step that drives the indenter deeper.
@@ -84,13 +81,13 @@ def tissue_after(
     before: StressHistory,
     fields: FieldState,
     way_mm: tuple[FloatArray, FloatArray],
-    step_ms: float,
+    step: StepCoefficients,
 ) -> TissueAfter:
     """Relax the stress over a step between two displacements, and find the energies and fields after it."""
     table, (start_mm, end_mm) = watched.table, way_mm
     now = instantaneous_state(mesh, end_mm, table)
-    unspent_uj = relaxed_work(mesh, start_mm, end_mm, table, step_ms, before, now)
-    history = before.advanced(StepCoefficients.of(table, step_ms), mesh.layer, now.stress_kpa)
+    unspent_uj = relaxed_work(mesh, start_mm, end_mm, table, step.step_ms, before, now)
+    history = before.advanced(step, mesh.layer, now.stress_kpa)
     sed_kpa = stored_energy_density(mesh, end_mm, table, history, now)
     held_uj = float(now.energies[:, :, 0].sum(axis=1) @ sed_kpa)
     energies = TissueEnergies(held_uj, instantaneous_energy(now), unspent_uj)
@@ -154,7 +151,6 @@ class Press:
 
     def step(self, start: Moment, target_ms: float, persistent: bool = False) -> Moment:
         """Solve one step; `start` stays as it is, so a step that fails or is too long can be repeated."""
-        step_ms = length_ms(start.time_ms, target_ms)
         load = self.load(start, target_ms)
         guess = start.found.displacement_mm + self.continued(start, target_ms) * start.step_mm
         newton = replace(self.newton, persistent=True) if persistent else self.newton
@@ -167,7 +163,7 @@ class Press:
         self.newton_steps += found.iterations
         way_mm = start.found.displacement_mm, found.displacement_mm
         history, sed_kpa, fields, energies = tissue_after(
-            self.body.mesh, self.watched, start.history, start.fields, way_mm, step_ms
+            self.body.mesh, self.watched, start.history, start.fields, way_mm, load.step
         )
         moved_mm = found.displacement_mm - start.found.displacement_mm
         depth_mm = found.depth_mm - start.found.depth_mm
@@ -267,8 +263,7 @@ class Press:
 
     def load(self, start: Moment, target_ms: float) -> Load:
         """Indenter at the end of a step: at its depth, or with its force on the body as it is meshed."""
-        step_ms = length_ms(start.time_ms, target_ms)
-        step = StepCoefficients.of(self.body.table, step_ms)
+        step = StepCoefficients.of(self.body.table, length_ms(start.time_ms, target_ms))
         carried = start.history.carried(step, self.body.mesh.layer)
         force_mn, prescribed = None, round(float(self.stimulus.prescribed_at(target_ms)), SAME_DIGITS)
         if not self.stimulus.by_force:

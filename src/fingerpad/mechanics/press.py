@@ -101,7 +101,7 @@ def press(
     solver = LinearSolver(approximate)
 
     chosen = np.arange(len(mesh.elements)) if watched is None else watched
-    follow = Watched(chosen, mesh.nodes_mm, mesh.elements[chosen], mesh.layer[chosen], table)
+    follow = Watched.of(mesh, table, chosen)
     newton = settings.newton_about(indenter.finest_mm)
     limits_mm = indenter.finest_mm, indenter.deepest_mm
     job = Press(discretised, contact, stimulus, solver, newton, follow, *limits_mm)

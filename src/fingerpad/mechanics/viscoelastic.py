@@ -37,6 +37,7 @@ def flat(stresses: FloatArray) -> FloatArray:
 class StepCoefficients:
     """Coefficients of one time step, one row per layer."""
 
+    step_ms: float  # Its length. [ms]
     s: FloatArray  # 1 - sum_i a_i g_i, the factor on the instantaneous energy, (n_layers,).
     new: FloatArray
     old: FloatArray
@@ -47,7 +48,7 @@ class StepCoefficients:
         decay = np.exp(-step_ms / table.times_ms)
         average = table.times_ms / step_ms * (1.0 - decay)
         new, old = (1.0 - average) * table.shares, (average - decay) * table.shares
-        return cls(1.0 - new.sum(axis=1), new, old, decay)
+        return cls(step_ms, 1.0 - new.sum(axis=1), new, old, decay)
 
 
 @dataclass(frozen=True)

@@ -85,7 +85,7 @@ class Touch:
     tissues: Tissues  #: Laws of the four layers.
     grading: Grading  #: Fine zone and element sizes of the mesh; those that a `FingerMesh` has.
     settings: PressSettings = field(default_factory=PressSettings)  #: Steps and tolerances.
-    at_mm: Pair = None  # type: ignore[assignment]  #: a pair after initialisation
+    at_mm: Pair = None  # type: ignore[assignment]  # a pair after initialisation
     """x and z of the skin point that the indenter's axis goes through; by default the middle of the finger's
     pad, `Fingertip.contact_mm`. [mm]"""
     tilt_deg: Annotated[float, limits(-LARGEST_TILT_DEG, LARGEST_TILT_DEG)] = 0.0
