@@ -1,5 +1,6 @@
 import tracemalloc
 from dataclasses import replace
+from itertools import product
 
 import numpy as np
 import pytest
@@ -147,8 +148,25 @@ def test_sites_that_are_not_simulated_would_be_silent():
     peaks = np.concatenate([near, 2.0 - near / near[-1], np.linspace(0.0, 0.2, 40)])
     sed = Traces(times, course * np.maximum(peaks, 0.0), kinks_ms=[50.0])
     slow = Traces(20.0 * times, sed.values, kinks_ms=[1000.0])
-    for traces in (sed, slow):
-        found, all_simulated = afferent.spikes(traces), afferent.spikes(drive(traces))
+    for each, traces in product((afferent, replace(afferent, adapting_share=0.4)), (sed, slow)):
+        found, all_simulated = each.spikes(traces), each.spikes(drive(traces))
         assert_array_equal(found.times_ms, all_simulated.times_ms)
         assert_array_equal(found.offsets, all_simulated.offsets)
-    assert 0 < np.count_nonzero(np.diff(found.offsets)) < peaks.size
+        assert 0 < np.count_nonzero(np.diff(found.offsets)) < peaks.size
+
+
+def test_a_held_static_term_loses_its_share_as_an_exponential():
+    afferent = Afferent(intercept_ma=0.0, static_gain=2.0, adapting_share=0.4, adapting_ms=80.0)
+    quantity = afferent.static_quantity
+    held = Traces([0.0, 1e-3, 400.0], [[0.0], [3.0], [3.0]], kinks_ms=[1e-3], quantity=quantity)
+    current = afferent.current(held)
+    later = current.times_ms > 1.0
+    expected = 6.0 * (1.0 - 0.4 * (1.0 - np.exp(-current.times_ms[later] / 80.0)))
+    assert_allclose(current.values[later, 0], expected, rtol=1e-5)
+    unadapted = replace(afferent, adapting_share=0.0).current(held)
+    assert_allclose(unadapted.values[later, 0], 6.0, rtol=1e-15)
+    # Once the term is gone, what was lost returns with the same time constant, below the intercept.
+    gone = Traces([0.0, 1e-3, 400.0, 400.001, 480.0], [[0.0], [3.0], [3.0], [0.0], [0.0]], held.kinks_ms)
+    gone = replace(gone, kinks_ms=np.array([1e-3, 400.0, 400.001]), quantity=quantity)
+    left = afferent.current(gone).values[-1, 0]
+    assert left == pytest.approx(-2.4 * (1.0 - np.exp(-5.0)) * np.exp(-1.0), rel=1e-4)

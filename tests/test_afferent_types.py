@@ -288,6 +288,27 @@ def test_scattered_end_organs_lie_within_reach_and_depend_on_seed_and_number_onl
     assert_array_equal(lifted.positions_mm[..., [0, 2]], ends.positions_mm[:2])
 
 
+def test_an_afferent_with_end_organs_follows_their_mean_wherever_it_is_placed():
+    branched = fp.Afferent(end_organs=6, reach_mm=0.5)
+    places = fp.Population.grid(rows=2, columns=3).positions_mm
+    ends = EndOrgans.about(places, count=6, reach_mm=0.5)
+    assert (np.linalg.norm(ends.positions_mm - places[:, None], axis=2) < 0.6).all()
+    assert_allclose(ends.positions_mm.mean(axis=1), places, atol=1e-12)
+    given = fp.Population(places, 1.0, fp.Afferent(), ends=ends).respond(FINGER)
+    populations = (
+        fp.Population(places, 1.0, branched),
+        fp.Population.grid(rows=2, columns=3, afferent=branched),
+        fp.Population.mixed({"SAI": fp.Population(places, 1.0, branched)}),
+    )
+    for population in populations:
+        assert_array_equal(population.sites_mm, ends.sites_mm)
+        assert_array_equal(population.respond(FINGER).spikes.times_ms, given.spikes.times_ms)
+    lifted = fp.Population.of_layout(
+        fp.hexagonal(SQUARE, 25.0), lambda flat: np.insert(flat, 1, 7.0, axis=1), branched
+    )
+    assert lifted.sites_mm.shape == (6 * len(lifted), 3)
+
+
 def test_a_mixed_population_has_the_published_densities_and_one_response():
     population = fp.Population.at_densities(SQUARE, seed=4)
     assert list(population) == list(population.respond(FINGER)) == ["SAI", "RA", "PC", "SAII"]

@@ -302,7 +302,10 @@ OWN = fp.OwnAfferent(
 
 @pytest.mark.parametrize(
     "afferent",
-    [fp.Afferent(), *afferent_types().values(), fp.Afferent(static_quantity="stored"), OWN],
+    [
+        *(fp.Afferent(), *afferent_types().values(), fp.Afferent(static_quantity="stored"), OWN),
+        *(fp.Afferent(adapting_share=0.5, adapting_ms=20.0), fp.SAI(adapting_share=0.5, adapting_ms=20.0)),
+    ],
     ids=lambda afferent: type(afferent).__name__,
 )
 def test_streamed_spikes_are_those_of_one_go(afferent: fp.Afferent) -> None:

@@ -14,9 +14,9 @@ from fingerpad.core.errors import InputError, shown
 from fingerpad.core.signals import INTERVAL, STORED_ENERGY, SpikeTrains, Traces
 from fingerpad.core.threads import in_blocks
 from fingerpad.core.units import SKIN_QUANTITY_UNITS, gain_unit, units_of
-from fingerpad.core.values import Finite, FloatArray, NotNegative, choice, float_array
+from fingerpad.core.values import Count, Finite, FloatArray, NotNegative, Positive, Share, choice, float_array
 from fingerpad.data import neuron
-from fingerpad.neuron.band_pass import resampled, smoothed_rate
+from fingerpad.neuron.band_pass import continued_stage, resampled, smoothed_rate
 from fingerpad.neuron.lif import LeakyIntegrateAndFire
 from fingerpad.neuron.spikes import Window, firing_rate_hz, rate_windows_ms
 from fingerpad.neuron.transduction import Drive, Transduction, drive
@@ -137,6 +137,14 @@ class Afferent:
     """Time constant tau_s of a low pass before the dynamic term, which then follows the absolute rate of S
     with tau_s dS/dt + S = Q; 0, as in the paper, for none. It makes an afferent right under vibration: the
     rate of change of a fast one would otherwise make it as sensitive at 400 Hz as at 20 Hz. [ms]"""
+    adapting_share: Share = 0.0
+    """Share a of the static term P that is lost while it lasts, as the generator current of Merkel cells
+    adapts: k_s (P - a R) with tau_a dR/dt + R = P. The paper's does not adapt. [1]"""
+    adapting_ms: Positive = 200.0  #: Time constant of that loss, tau_a. [ms]
+    end_organs: Count = 1
+    reach_mm: NotNegative = 0.0
+    """End organs of each afferent of a population, and the radius of the disc that they fill, as of
+    `EndOrgans.about`. The paper's afferent has one. [mm]"""
     type: str = "SAI"  #: Name of its type, of `fingerpad.data.afferents.TYPES` or of one's own.
 
     def __post_init__(self) -> None:
@@ -260,10 +268,19 @@ class Afferent:
             )
         # Most of the skin moves too little for a spike.
         may_fire = self._largest_current_ma(traces) > _SURELY_SILENT * self.rheobase_ma
-        return spikes_where(may_fire, traces, lambda some: self._fired(self._driven(some)))
+        return spikes_where(may_fire, traces, self._fired)
 
-    def _fired(self, driven: Drive) -> SpikeTrains:
-        return self.membrane.spikes(self.transduction.current(driven))
+    def current(self, traces: Traces | Drive) -> Traces:
+        """Compute the current through the membrane at every site, Eq. 1. [mA]"""
+        driven = traces if isinstance(traces, Drive) else self._driven(traces)
+        if self.adapting_share:
+            lost = np.array(driven.values)
+            continued_stage(driven.times_ms, lost, self.adapting_ms, False, lost[0].copy())
+            driven = replace(driven, values=driven.values - self.adapting_share * lost)
+        return self.transduction.current(driven)
+
+    def _fired(self, traces: Traces | Drive) -> SpikeTrains:
+        return self.membrane.spikes(self.current(traces))
 
     def _driven(self, traces: Traces) -> Drive:
         """Resample what the two terms follow, and the rate of change of the dynamic one."""
@@ -283,7 +300,9 @@ class Afferent:
             slopes = np.diff(followed, axis=0) / np.diff(traces.times_ms)[:, np.newaxis]
             fastest = 3.0 * np.abs(slopes).max(axis=0)
         static = (self.static_gain * traces.values).max(axis=0)
-        return self.intercept_ma + max(self.dynamic_gain, 0.0) * fastest + static
+        # What a negative gain has lost is a current that remains when the static term is gone.
+        remains = max(-self.static_gain, 0.0) * self.adapting_share * traces.values.max(axis=0)
+        return self.intercept_ma + max(self.dynamic_gain, 0.0) * fastest + static + remains
 
     def rates(
         self,

@@ -18,6 +18,7 @@ from fingerpad.neuron.afferent import Afferent, AnyAfferent, checked_afferent
 from fingerpad.neuron.afferent_types import RapidlyAdapting
 from fingerpad.neuron.band_pass import continued_stage, knots_between
 from fingerpad.neuron.exact_spikes import continued_trains
+from fingerpad.neuron.transduction import PIECES_PER_INTERVAL, SHORTEST_PIECE_MS, knots_of
 
 
 @checked_class
@@ -52,6 +53,7 @@ class AfferentStream:
             self._potentials = afferent.membrane.initial_potentials_mv(np.full(count, float(rest_ma)))
         stages = afferent.rise + afferent.fall if isinstance(afferent, RapidlyAdapting) else 1
         self._filtered = np.zeros((stages, count))
+        self._lost = np.zeros(count)
 
     def step(self, time_ms: Finite, static: ArrayLike, dynamic: ArrayLike | None = None) -> SpikeTrains:
         """Go to a later time, and return the spikes since the last one, a train per site.
@@ -95,7 +97,11 @@ class AfferentStream:
         )
         filters = tau_ms > 0.0
         ends = np.array([self._time_ms, time_ms])
-        knots_ms = knots_between(self._time_ms, time_ms, tau_ms) if filters else ends
+        knots_ms = ends
+        if filters:
+            knots_ms = knots_between(self._time_ms, time_ms, tau_ms)
+        elif isinstance(afferent, Afferent) and afferent.adapting_share:
+            knots_ms = knots_of(ends, PIECES_PER_INTERVAL, SHORTEST_PIECE_MS)  # those of `drive`
         share = (knots_ms - self._time_ms) / (time_ms - self._time_ms)
         values = between(self._dynamic, dynamic)
         if isinstance(afferent, RapidlyAdapting):
@@ -108,7 +114,12 @@ class AfferentStream:
             rate = values / tau_ms
         gains = afferent.transduction
         driven = gains.intercept_ma + gains.dynamic_gain * np.abs(rate)
-        return knots_ms, driven + gains.static_gain * between(self._static, static)
+        followed = between(self._static, static)
+        if afferent.adapting_share:
+            lost = followed.copy()
+            continued_stage(knots_ms, lost, afferent.adapting_ms, False, self._lost)
+            followed -= afferent.adapting_share * lost
+        return knots_ms, driven + gains.static_gain * followed
 
     def _replayed(self, time_ms: float, static: FloatArray, dynamic: FloatArray) -> SpikeTrains:
         """Spikes since the last sample of an afferent that is given the whole trace."""

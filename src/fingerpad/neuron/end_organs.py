@@ -15,6 +15,7 @@ from fingerpad.core.regions import Place
 from fingerpad.core.signals import Traces
 from fingerpad.core.values import Check, Count, FiniteArray, FloatArray, Positive, Whole, choice, float_array
 
+GOLDEN_ANGLE = np.pi * (3.0 - np.sqrt(5.0))
 _SUM_TOLERANCE = 1e-6
 
 
@@ -102,9 +103,40 @@ class EndOrgans:
         drawn = uniforms(seed, 1, len(centres), Purpose.END_ORGAN, 2 * count)[0]
         distance, angle = reach_mm * np.sqrt(drawn[:, :count]), 2.0 * np.pi * drawn[:, count:]
         offsets = np.stack([distance * np.cos(angle), distance * np.sin(angle)], axis=-1)
-        ends = centres[:, None] + offsets
+        return cls._at(centres, offsets, place, combine)
+
+    @classmethod
+    def about(
+        cls, places_mm: ArrayLike, count: Count, reach_mm: Positive, place: Place | None = None
+    ) -> EndOrgans:
+        """Spread end organs evenly over a disc about the place of each afferent, as seeds of a sunflower.
+
+        All afferents have the same pattern, so that no two differ by chance.
+
+        Parameters
+        ----------
+        places_mm, count, reach_mm, place
+            As in `scattered`.
+
+        Examples
+        --------
+        >>> ends = EndOrgans.about([[17.0, 0.0]], count=6, reach_mm=0.5)
+        >>> ends.positions_mm.mean(axis=1).round(9).tolist()
+        [[17.0, 0.0]]
+        """
+        numbers = np.arange(count)
+        distance, angle = reach_mm * np.sqrt((numbers + 0.5) / count), GOLDEN_ANGLE * numbers
+        offsets = np.stack([distance * np.cos(angle), distance * np.sin(angle)], axis=-1)
+        return cls._at(places_mm, offsets - offsets.mean(axis=0), place)
+
+    @classmethod
+    def _at(
+        cls, places_mm: ArrayLike, offsets: FloatArray, place: Place | None, combine: str = "sum"
+    ) -> EndOrgans:
+        """End organs so far from the places of their afferents, (n_afferents or none, n_ends, 2). [mm]"""
+        ends = float_array("places_mm", places_mm, 2)[:, None] + offsets
         if place is not None:
-            ends = place(ends.reshape(-1, 2)).reshape(len(centres), count, 3)
+            ends = place(ends.reshape(-1, 2)).reshape(*ends.shape[:2], 3)
         return cls(ends, combine=combine)
 
     @property

@@ -6,6 +6,7 @@ import math
 import warnings
 from collections.abc import Iterator, Mapping
 from dataclasses import field, replace
+from functools import cached_property
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -86,6 +87,12 @@ def sensitivities(
     return np.exp(spread * drawn - 0.5 * spread**2)
 
 
+def _end_organs(afferent: AnyAfferent, places_mm: FloatArray, place: Place | None = None) -> EndOrgans | None:
+    """End organs of afferents that have several."""
+    count, reach_mm = getattr(afferent, "end_organs", 1), getattr(afferent, "reach_mm", 0.0)
+    return EndOrgans.about(places_mm, count, reach_mm, place) if count > 1 and reach_mm > 0.0 else None
+
+
 @value_class
 class Population:
     """Afferents at different positions of the skin, with their sensitivities and end organs.
@@ -105,7 +112,8 @@ class Population:
     """Positions in the plane of the layout, by which neighbours are found, (n_receptors, 2); default: x and
     z. [mm]"""
     ends: EndOrgans | None = None
-    """Several end organs of each afferent; by default it has one, at its position."""
+    """Several end organs of each afferent; by default those of `Afferent.end_organs` about its position, and
+    one at it where positions have three coordinates or the afferent says nothing of end organs."""
     centre_mm: Pair | None = None
     """Middle of the pad about which the positions lie, if they follow the finger that is touched: `on` moves
     them to the middle of its pad. By default they stay. [mm]"""
@@ -190,6 +198,8 @@ class Population:
         positions = layout.places_mm if place is None else place(layout.places_mm)
         factors = None if sensitivity is None else float_array("sensitivity", sensitivity, 1)
         responding = afferent or Afferent()
+        if ends is None:
+            ends = _end_organs(responding, layout.places_mm, place)
         return cls(positions, layout.pitch_mm, responding, factors, layout.places_mm, ends, depth_mm=depth_mm)
 
     @classmethod
@@ -400,7 +410,14 @@ class Population:
         """Where the skin is sampled, (n_sites, 2 or 3): the end organs, afferent by afferent. [mm]"""
         if self.parts:
             return np.concatenate([part.sites_mm for part in self.parts.values()])
-        return self.positions_mm if self.ends is None else self.ends.sites_mm
+        return self.positions_mm if self._ends is None else self._ends.sites_mm
+
+    @cached_property
+    def _ends(self) -> EndOrgans | None:
+        """End organs: those given, or those that the afferents have about their positions."""
+        if self.ends is not None or self.positions_mm.shape[1] > 2:
+            return self.ends
+        return _end_organs(self.afferent, self.positions_mm)
 
     @property
     def kept_depths_mm(self) -> tuple[float, ...]:
@@ -426,8 +443,8 @@ class Population:
             raise InputError(
                 "skin.sed", "must give one trace per receptor", f"{traces.n_sites} for {len(sites)}"
             )
-        if self.ends is not None:
-            traces = self.ends.combined(traces)
+        if self._ends is not None:
+            traces = self._ends.combined(traces)
         measure = getattr(self.afferent, "rate_measure", INTERVAL)
         windows_ms = rate_windows_ms(
             traces.phases, dynamic_window_ms, static_window_ms, traces.times_ms[-1], measure

@@ -85,7 +85,8 @@ def _threshold_sentence(found: TaskResult, side: SideCurve) -> str:
 
 
 LONGEST_TABLE = 200  # Conditions that the page lists; validate.json has all rows.
-QUANTITIES = {"N": "force", "mm": "deflection", "spikes/s": "firing rate"}  # What was observed, by its unit.
+# What was observed, by its unit.
+QUANTITIES = {"N": "force", "mm": "deflection", "spikes/s": "firing rate", "mm²": "area", "": "strain"}
 
 
 @enter(ROWS, "conditions")

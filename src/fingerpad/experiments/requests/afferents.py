@@ -14,7 +14,18 @@ from fingerpad.core.files import read_text
 from fingerpad.core.random_streams import seed_of
 from fingerpad.core.regions import PATTERNS, Layout
 from fingerpad.core.signals import ResponseMap, Skin
-from fingerpad.core.values import Count, Finite, IntArray, NotNegative, Pair, Positive, Seed, Text, choice
+from fingerpad.core.values import (
+    Count,
+    Finite,
+    IntArray,
+    NotNegative,
+    Pair,
+    Positive,
+    Seed,
+    Share,
+    Text,
+    choice,
+)
 from fingerpad.data import psychophysics
 from fingerpad.data.afferents import TYPES
 from fingerpad.data.tissues import DEFAULT_TISSUES
@@ -101,6 +112,10 @@ class AfferentSettings(Part):
     refractory_ms: NotNegative | None = None  #: Rest after each spike. [ms]
     dynamic_quantity: Annotated[str, choice(sampled_fields())] | None = None
     static_quantity: Annotated[str, choice(sampled_fields())] | None = None  #: What the two terms follow.
+    adapting_share: Share | None = None
+    adapting_ms: Positive | None = None
+    end_organs: Count | None = None
+    reach_mm: NotNegative | None = None  #: As of `fingerpad.Afferent`.
 
 
 def _form_of_afferent(value: Any) -> str:
@@ -401,7 +416,7 @@ def respond_to(
     afferent = cast(Afferent, population.afferent)
     membrane = EscapeRate(afferent.membrane, settings.noise)
     noisy = OwnAfferent(
-        lambda traces: membrane.spikes(afferent.transduction.current(traces), settings.seed),
+        lambda traces: membrane.spikes(afferent.current(traces), settings.seed),
         dynamic_quantity=afferent.dynamic_quantity,
         static_quantity=afferent.static_quantity,
     )
@@ -424,7 +439,6 @@ def parameters_of(population: Population) -> dict[str, float | str]:
 def _check_noise(settings: AfferentsSettings, population: Population, place: Place) -> None:
     """Raise `InputError` if a soft threshold is asked for afferents that have none."""
     afferent = None if population.parts else population.afferent
-    plain = isinstance(afferent, Afferent) and afferent.smoothing_ms == 0.0
-    if settings.noise > 0.0 and not plain:
+    if settings.noise > 0.0 and not isinstance(afferent, Afferent):
         words = "must be 0 for other types and mixed populations, because a soft threshold is that of "
         raise InputError((*place, "noise"), words + "the default afferent alone", f"{settings.noise:g}")

@@ -1,4 +1,4 @@
-"""Files of observations: five kinds, each known by its header."""
+"""Files of observations: eight kinds, each known by its header."""
 
 from __future__ import annotations
 
@@ -14,9 +14,11 @@ from fingerpad.core.errors import InputError
 from fingerpad.core.files import check_file
 from fingerpad.core.tables import TableRow, read_csv
 from fingerpad.core.units import unit_of
-from fingerpad.core.values import FloatArray, finite, float_array, not_negative, positive
+from fingerpad.core.values import FloatArray, finite, float_array, not_negative, one_of, positive
+from fingerpad.data.afferents import TYPES
 from fingerpad.experiments.requests.stimulus import indenter_named
 from fingerpad.geometry.indenters import Indenter
+from fingerpad.geometry.mesh import LAYERS
 
 LARGEST_FILE_MB = 1.0  # Larger files are refused: they hold no published table. [MB]
 
@@ -46,9 +48,16 @@ COLUMNS: dict[str, Callable[..., float]] = {
     "force_n": not_negative,
     "deflection_mm": finite,
     "rate_hz": not_negative,
-}  # Check of each column of numbers; the other column is the indenter.
+    "time_ms": not_negative,
+    "area_mm2": not_negative,
+    "strain": not_negative,
+}  # Check of each column of numbers.
 
 INDENTER = "indenter"
+WORDS = {
+    "afferent": tuple(TYPES),
+    "layer": tuple(layer.replace(" ", "_") for layer in LAYERS[:-1]),
+}  # Columns that hold one of some words.
 
 
 @dataclass(frozen=True)
@@ -78,6 +87,9 @@ KINDS: dict[str, Kind] = {
         Kind("rate_curvature", ("force_n", "curvature_per_m"), "rate_hz"),
         Kind("rate_position", ("force_n", "curvature_per_m", "position_mm"), "rate_hz"),
         Kind("grating", ("force_n", "ridge_mm", "groove_mm", "position_mm"), "rate_hz"),
+        Kind("receptive_field", ("afferent", "depth_mm"), "area_mm2"),
+        Kind("adaptation", ("depth_mm", "time_ms"), "rate_hz"),
+        Kind("strain", ("force_n", "layer"), "strain"),
     )
 }  # By name.
 
@@ -113,7 +125,10 @@ class Observations:
     def conditions(self) -> list[tuple[object, ...]]:
         """Conditions of the rows, equal where they mean the same: `punch:6.35` and `punch:6.350` are one."""
         return [
-            tuple(self.indenter(value) if isinstance(value, str) else value for value in row.condition)
+            tuple(
+                self.indenter(str(value)) if column == INDENTER else value
+                for column, value in zip(self.kind.conditions, row.condition, strict=True)
+            )
             for row in self.rows
         ]
 
@@ -141,7 +156,7 @@ def read_observations(path: str | Path, objects: Mapping[str, Indenter] | None =
     ('force', ('plate', 1.0), [0.11, 0.23])
     """
     path = check_file(Path(path), LARGEST_FILE_MB)
-    lines = read_csv(path, (INDENTER, *COLUMNS))
+    lines = read_csv(path, (INDENTER, *WORDS, *COLUMNS))
     kind = _kind(path, tuple(lines[0].entries))
     own = dict(objects or {})
     return Observations(kind, tuple(_observation(line, kind, own) for line in lines), str(path), own)
@@ -177,10 +192,12 @@ def _observation(line: TableRow, kind: Kind, own: Mapping[str, Indenter]) -> Obs
 
 
 def _value(line: TableRow, column: str, own: Mapping[str, Indenter]) -> Value:
-    if column != INDENTER:
+    if column in COLUMNS:
         return line.number(column, unit_of(column), COLUMNS[column])
     text = line.text(column)
     with line.placed():
+        if column in WORDS:
+            return one_of(column, text, WORDS[column])
         if text not in own:
             indenter_named(text)
     return text

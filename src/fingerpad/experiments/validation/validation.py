@@ -14,7 +14,7 @@ from pydantic import Field
 from fingerpad.core.checked import result_class
 from fingerpad.core.errors import ConvergenceError, InputError
 from fingerpad.core.signals import INTERVAL, Traces
-from fingerpad.core.units import MN_PER_N, unit_of
+from fingerpad.core.units import MN_PER_N, MS_PER_S, unit_of
 from fingerpad.core.values import FloatArray, Number, Pair, Positive, Text, choice
 from fingerpad.data import fingertip, protocol
 from fingerpad.experiments.conditions import Conditions
@@ -40,12 +40,12 @@ from fingerpad.experiments.scores import (
     gain_through_origin,
     observed_ranges,
 )
-from fingerpad.experiments.validation.observations import Kind, Observations, Value, read_observations
-from fingerpad.geometry.bodies import Grating, Plate, Sphere
+from fingerpad.experiments.validation.observations import WORDS, Kind, Observations, Value, read_observations
+from fingerpad.geometry.bodies import FlatPunch, Grating, Plate, Sphere
 from fingerpad.geometry.grading import RESOLUTIONS, resolution_grading
 from fingerpad.geometry.indenters import Indenter
-from fingerpad.geometry.motion import ForceRampAndHold, RampAndHold
-from fingerpad.neuron.afferent import AnyAfferent
+from fingerpad.geometry.motion import ForceRampAndHold, Motion, RampAndHold
+from fingerpad.neuron.afferent import AnyAfferent, type_of
 from fingerpad.neuron.population import Population
 from fingerpad.neuron.spikes import RATE_OF
 from fingerpad.skin.indentation import Touch, settings_of, touch_of
@@ -54,6 +54,13 @@ from fingerpad.skin.sampling import SkinResponse
 RAMP_AND_HOLD, QUASI_STATIC = "ramp_and_hold", "quasi_static"
 LOADINGS = (RAMP_AND_HOLD, QUASI_STATIC)  # Read at the end of the paper's hold, or with relaxed tissues.
 QUASI_STATIC_MS = 1e12  # After such a ramp all Prony terms have relaxed to 1 in 10⁶. [ms]
+
+PROBE, PROBING_MM_PER_MS, PROBED_MS = FlatPunch(1.0, 0.2), 0.02, 200.0
+"""Probe of receptive fields, its speed and its hold, as assumed of Vega-Bermudez & Johnson 1999."""
+FIELD_MM, PLACES_MM = 4.0, 0.2  # Places are probed so far from the receptor, so far apart.
+SHARE_OF_PEAK = 0.1
+"""Share of the spikes at the most sensitive place that a place within a receptive field elicits; assumed."""
+STEADY, HELD_STEPS = FlatPunch(2.0), 12  # Probe of adaptation, assumed, and the steps of its hold.
 
 
 class ValidationRequest(FingerRequest):
@@ -129,8 +136,11 @@ class Prediction:
 
     line: int
     indenter: str | None = None  #: As it is written in the file.
+    afferent: str | None = None  #: Type of the afferent.
+    layer: str | None = None  #: Layer of the skin.
     depth_mm: float | None = None
     distance_mm: float | None = None  #: Depth, and distance from the indenter's axis, proximal positive. [mm]
+    time_ms: float | None = None  #: From the start of the hold. [ms]
     force_n: float | None = None  #: Force that presses. [N]
     curvature_per_m: float | None = None  #: Of the sphere. [1/m]
     ridge_mm: float | None = None
@@ -199,19 +209,29 @@ def validate(request: ValidationRequest, runner: Runner) -> ValidationFile:
         turned = np.isfinite(found.mirrored)
         r2_mirrored = coefficient_of_determination(observed[turned], found.mirrored[turned])
     motion = RampAndHold()
-    of_rates = {
+    loading = {"loading": request.loading}
+    of_afferent = {
         "afferent": parameters_of(Population(np.zeros((1, 2)), 1.0, request.responding)),
+        "receptor_depth_mm": request.depth_mm or fingertip.RECEPTOR_DEPTH.value,
+    }
+    of_rates = of_afferent | {
         "ramp_ms": motion.ramp_ms,
         "hold_ms": motion.hold_ms,
         "static_window_ms": request.static_window_ms,
-        "receptor_depth_mm": request.depth_mm or fingertip.RECEPTOR_DEPTH.value,
+    }
+    told = {
+        "force": loading,
+        "deflection": loading,
+        "receptive_field": of_afferent,
+        "adaptation": of_afferent,
+        "strain": {},
     }
     return ValidationFile(
         kind=kind.name,
         unit=unit_of(kind.observed),
         resolution=request.resolution,
         tissues=manifest.materials,
-        **(of_rates if kind.observed == "rate_hz" else {"loading": request.loading}),
+        **told.get(kind.name, of_rates),
         n_rows=observed.size,
         n_predicted=int(known.sum()),
         r2=coefficient_of_determination(*scored),
@@ -293,7 +313,7 @@ def predict(model: ValidationRequest, runner: Runner) -> Predictions:
 
 def _plan(kind: Kind, given: Given, model: ValidationRequest) -> Plan:
     try:
-        return _READING[kind.observed](given, model)
+        return _READING[kind.name](given, model)
     except InputError as error:
         return error
 
@@ -383,6 +403,99 @@ def _rate(given: Given, model: ValidationRequest) -> Reading:
     return Reading(touch, read)
 
 
+def _area(given: Given, model: ValidationRequest) -> Reading:
+    """Area within which a probe elicits `SHARE_OF_PEAK` of the spikes at the most sensitive place. [mm²]"""
+    depth_mm, name = given["depth_mm"], str(given["afferent"])
+    if depth_mm == 0.0:
+        return Reading(None, lambda _: 0.0)
+    own = model.responding
+    afferent = own if type_of(own) == name else chosen_afferent(name, model.tissues)
+    touch = _probed(model, PROBE, RampAndHold(depth_mm, depth_mm / PROBING_MM_PER_MS, PROBED_MS))
+    # The receptor moves instead of the probe: its places are those of the probe about a receptor, mirrored.
+    away = np.arange(-FIELD_MM, FIELD_MM + PLACES_MM / 2, PLACES_MM)
+    x, z = np.meshgrid(model.settings.receptor_x_mm + model.settings.along_skin * away, away, indexing="ij")
+    places = np.stack([x.ravel(), z.ravel()], axis=1)
+    population = Population(places, PLACES_MM, afferent, depth_mm=model.depth_mm)
+
+    def read(skin: SkinResponse | None) -> float:
+        assert skin is not None
+        counts = population.respond(skin).spikes.counts
+        within = counts >= max(1.0, SHARE_OF_PEAK * counts.max())
+        return float(PLACES_MM**2 * within.sum())
+
+    return Reading(touch, read)
+
+
+def _adapted(given: Given, model: ValidationRequest) -> Reading:
+    """One over the interval between spikes that holds a time of a hold. [spikes/s]"""
+    depth_mm, time_ms = given["depth_mm"], given["time_ms"]
+    if depth_mm == 0.0:
+        return Reading(None, lambda _: _resting_rate(model))
+    depth, time = (model.observed.kind.conditions.index(name) for name in ("depth_mm", "time_ms"))
+    longest_ms = max(
+        float(row.condition[time]) for row in model.observed.rows if row.condition[depth] == depth_mm
+    )
+    # Slow spikes need a while until the interval of the last time is closed.
+    motion = RampAndHold(depth_mm, hold_ms=longest_ms + MS_PER_S)
+    touch = _probed(model, STEADY, motion, HELD_STEPS)
+    site = np.array([(model.settings.receptor_x_mm, 0.0)])
+    receptor = Population(site, 1.0, model.responding, depth_mm=model.depth_mm)
+
+    def read(skin: SkinResponse | None) -> float:
+        assert skin is not None
+        spikes_ms, at_ms = receptor.respond(skin).spikes[0], motion.ramp_ms + time_ms
+        after = int(np.searchsorted(spikes_ms, at_ms))
+        if not 0 < after < spikes_ms.size:
+            return 0.0
+        return float(MS_PER_S / (spikes_ms[after] - spikes_ms[after - 1]))
+
+    return Reading(touch, read)
+
+
+def _strain(given: Given, model: ValidationRequest) -> Reading:
+    """Share by which a layer below a flat plate is thinner, at the end of the paper's ramp and hold. [1]"""
+    force_n, layers = given["force_n"], WORDS["layer"]
+    if force_n == 0.0:
+        return Reading(None, lambda _: 0.0)
+    finger = model.settings.finger
+    borders = (0.0, *finger.layer_depths_mm)
+    number = layers.index(str(given["layer"]))
+    depth_mm = 0.5 * (borders[number] + borders[number + 1])
+    motion = ForceRampAndHold(force_mn=MN_PER_N * force_n)
+    touch = _probed(model, Plate(), motion, depths_mm=(depth_mm,))
+
+    def read(skin: SkinResponse | None) -> float:
+        assert skin is not None
+        site = [(model.settings.receptor_x_mm, 0.0)]
+        return 1.0 - float(np.exp(-skin.sample("compressive_strain", site, depth_mm)[-1, 0]))
+
+    return Reading(touch, read)
+
+
+def _probed(
+    model: ValidationRequest,
+    body: Indenter,
+    motion: Motion,
+    hold_steps: int = 0,
+    depths_mm: tuple[float, ...] = (),
+) -> Touch:
+    """Touch along the normal of the skin at the receptor."""
+    conditions = model.settings
+    settings = settings_of(conditions.resolution)
+    return touch_of(
+        conditions.finger,
+        body,
+        motion,
+        conditions.tissues,
+        conditions.resolution,
+        (conditions.receptor_x_mm, 0.0),
+        grading=conditions.grading,
+        tilt_deg=conditions.skin_tilt_deg,
+        settings=replace(settings, hold_steps=hold_steps) if hold_steps else settings,
+        receptor_depths_mm=depths_mm or conditions.receptor_depths_mm,
+    )
+
+
 def _resting_rate(model: ValidationRequest) -> float:
     """Rate of the afferent without any touch. [spikes/s]"""
     afferent = model.responding
@@ -392,7 +505,12 @@ def _resting_rate(model: ValidationRequest) -> float:
 
 
 _READING: Mapping[str, Callable[[Given, ValidationRequest], Reading]] = {
-    "force_n": _force,
-    "deflection_mm": _deflection,
-    "rate_hz": _rate,
-}  # By what was observed.
+    "force": _force,
+    "deflection": _deflection,
+    "rate_curvature": _rate,
+    "rate_position": _rate,
+    "grating": _rate,
+    "receptive_field": _area,
+    "adaptation": _adapted,
+    "strain": _strain,
+}  # By the kind.
