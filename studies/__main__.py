@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import fingerpad.cli
 from fingerpad.cli import Program
-from studies import held_out, mesh_refinement, tissue_page, tissue_posterior, tissue_search
+from studies import held_out, mesh_refinement, sai_search, tissue_page, tissue_posterior, tissue_search
 from studies.results_command import RESULTS
 from studies.study import Study, command_of
 
@@ -29,6 +29,13 @@ STUDIES = (
         held_out.run,
         held_out.blocks,
         "held-out.md",
+    ),
+    Study(
+        "sai-search",
+        "Search for one SAI afferent by rates under a bar and areas of receptive fields.",
+        sai_search.run,
+        sai_search.blocks,
+        "decisions/stiffening.md",
     ),
     Study(
         "mesh-refinement",

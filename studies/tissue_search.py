@@ -72,7 +72,7 @@ def touches(candidate: Candidate, conditions: Conditions) -> dict[Key, Touch]:
         bars = zip(protocol.BAR_SHIFTS.value, own.bar_touches(), strict=True)
         pressed |= {("bar", shift, 0.0): touch for shift, touch in bars}
     else:
-        pressed[ONE_BAR] = own.touch(Bar(), RECEPTOR_X_MM, _wide_bar_grading(own), tilt_deg=own.skin_tilt_deg)
+        pressed[ONE_BAR] = own.touch(Bar(), RECEPTOR_X_MM, wide_bar_grading(own), tilt_deg=own.skin_tilt_deg)
     return pressed | {
         ("sphere", curvature, position): own.sphere_touch(curvature, position)
         for position in POSITIONS_MM
@@ -84,7 +84,7 @@ ONE_BAR: Key = ("one bar", 0.0, 0.0)
 """The bar that is read at shifted sites."""
 
 
-def _wide_bar_grading(conditions: Conditions) -> Grading:
+def wide_bar_grading(conditions: Conditions) -> Grading:
     """Mesh of the single-unit study, fine over all shifted sites and not only about the receptor."""
     farthest = max(abs(shift) for shift in protocol.BAR_SHIFTS.value)
     return replace(conditions.bar_grading(), half_length_mm=farthest + SITE_MARGIN_MM)

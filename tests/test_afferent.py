@@ -50,7 +50,7 @@ def test_the_default_afferent_is_that_of_the_default_tissues():
 
 def test_only_the_sets_with_an_afferent_of_their_own_differ_from_trial_3():
     assert Afferent.for_tissues("paper").dynamic_quantity == SED_DRIVEN.dynamic_quantity == STORED_ENERGY
-    assert len({Afferent.for_tissues(name) for name in ("human", "paper", "trial3")}) == 3
+    assert len({Afferent.for_tissues(name) for name in ("human", "stiffening", "paper", "trial3")}) == 4
     for other in ("trial1", "wu2007", named_tissues("human")):
         assert Afferent.for_tissues(other) == Afferent.for_tissues("trial3")
 
@@ -153,6 +153,16 @@ def test_sites_that_are_not_simulated_would_be_silent():
         assert_array_equal(found.times_ms, all_simulated.times_ms)
         assert_array_equal(found.offsets, all_simulated.offsets)
         assert 0 < np.count_nonzero(np.diff(found.offsets)) < peaks.size
+
+
+def test_a_threshold_holds_for_what_lasts_once_the_afferent_has_adapted():
+    afferent = Afferent.for_tissues("stiffening").with_static_threshold(2.0)
+    assert afferent.static_threshold == pytest.approx(2.0, rel=1e-12)
+    course = np.outer([0.0, 1.0, 1.0], 2.0 * np.array([0.99, 1.01]))
+    stress = Traces([0.0, 1.0, 20_000.0], course, kinks_ms=[1.0], quantity="von_mises")
+    stress = replace(stress, dynamic=Traces(stress.times_ms, 0.0 * course, quantity="stored"))
+    late = [train[train > 5000.0].size for train in afferent.spikes(stress)]
+    assert late[0] == 0 < late[1]
 
 
 def test_a_held_static_term_loses_its_share_as_an_exponential():

@@ -23,7 +23,7 @@ from fingerpad.experiments.run import run
 from fingerpad.experiments.runner import STORE_FOLDER, Runner
 from fingerpad.experiments.schemas import read
 from fingerpad.experiments.validation import validation
-from fingerpad.experiments.validation.observations import COLUMNS, KINDS, read_observations
+from fingerpad.experiments.validation.observations import COLUMNS, KINDS, WORDS, read_observations
 from fingerpad.experiments.validation.validation import predict
 from fingerpad.report.results import draw_validation, summary
 from fingerpad.skin.indentation import Touch
@@ -88,7 +88,7 @@ def test_the_header_decides_the_kind_and_every_example_is_read(tmp_path, kind):
     found = read_observations(written(tmp_path, text))
     assert found.kind == kind
     assert len(set(found.conditions)) < len(found.rows) or kind.name == "grating"
-    assert set(kind.columns) <= {"indenter", *COLUMNS}
+    assert set(kind.columns) <= {"indenter", *WORDS, *COLUMNS}
 
 
 UNFIT = [
@@ -372,6 +372,71 @@ def test_an_interrupted_run_keeps_what_is_finished_and_goes_on(call, folder, tmp
     assert [row["predicted"] for row in results["predictions"]] == [
         row.predicted for row in expected.predictions
     ]
+
+
+def test_a_layer_is_compressed_as_its_nodes_come_closer(tmp_path):
+    layers = ("stratum_corneum", "living_epidermis", "dermis")
+    rows = "".join(f"1,{layer},0.1\n" for layer in layers) + "0,dermis,0\n"
+    file = written(tmp_path, "force_n,layer,strain\n" + rows)
+    found = [row.predicted for row in fp.validate(observations=file, resolution="quick").predictions]
+    tilt_deg = QUICK.skin_tilt_deg
+    skin = fp.indent(
+        QUICK.finger,
+        fp.Plate(),
+        fp.ForceRampAndHold(force_mn=1000.0),
+        tilt_deg=tilt_deg,
+        at_mm=(RECEPTOR_X_MM, 0),
+    )
+    rest, mesh = skin.mesh.nodes_mm, skin.mesh
+    below = np.abs(rest[:, [0, 2]] - (RECEPTOR_X_MM, 0.0)).max(axis=1) < 2.0
+    moved = rest + skin.displacement_mm
+    depths = (0.0, *QUICK.finger.layer_depths_mm)
+    surface = QUICK.finger.skin_point(RECEPTOR_X_MM, 0.0)
+    inward = -QUICK.finger.skin_normal(surface).ravel()
+
+    def height(at_mm):
+        """Height of the tissue that lay so deep below the middle of the contact, along the normal."""
+        wanted = surface.ravel() + at_mm * inward
+        near = below & (np.abs((rest - wanted) @ inward) < 0.02)
+        return float((moved[near] @ inward)[np.argmin(np.linalg.norm(rest[near] - wanted, axis=1))])
+
+    heights = np.array([height(depth) for depth in depths])
+    assert found[:3] == pytest.approx(1.0 - np.diff(heights) / np.diff(depths), rel=0.2)
+    assert found[3] == 0.0
+    assert mesh.nodes_mm is rest
+
+
+def test_a_receptive_field_holds_the_places_from_which_a_probe_elicits_a_tenth(tmp_path):
+    file = written(tmp_path, "afferent,depth_mm,area_mm2\nRA,0.3,5\nRA,0.1,5\nRA,0,0\n")
+    deep, shallow, none = (
+        row.predicted for row in fp.validate(observations=file, resolution="quick").predictions
+    )
+    assert 0.0 == none < shallow < deep
+    # The probe itself goes to places beside the receptor.
+    motion, radius = fp.RampAndHold(0.3, 15.0, 300.0), np.sqrt(deep / np.pi)
+    receptor = fp.Population(np.array([[RECEPTOR_X_MM, 0.0]]), 1.0, fp.RA())
+    middle, inside, outside = (
+        receptor.respond(
+            fp.indent(QUICK.finger, fp.FlatPunch(1.0, 0.2), motion, at_mm=(RECEPTOR_X_MM, away))
+        ).spikes.counts[0]
+        for away in (0.0, radius - 0.25, radius + 0.25)
+    )
+    assert inside >= max(1.0, 0.1 * middle) > outside
+
+
+def test_adaptation_is_the_interval_at_a_time_of_the_hold(tmp_path):
+    file = written(tmp_path, "depth_mm,time_ms,rate_hz\n0.8,100,60\n0.8,900,45\n0,5,0\n")
+    early, late, none = (
+        row.predicted for row in fp.validate(observations=file, resolution="quick").predictions
+    )
+    skin = fp.indent(
+        QUICK.finger, fp.FlatPunch(2.0), fp.RampAndHold(0.8, hold_ms=1900.0), tilt_deg=QUICK.skin_tilt_deg
+    )
+    train = fp.Population(np.array([[RECEPTOR_X_MM, 0.0]]), 1.0).respond(skin).spikes[0]
+    for rate_hz, time_ms in ((early, 150.0), (late, 950.0)):
+        after = train[train > time_ms][0] - train[train < time_ms][-1]
+        assert rate_hz == pytest.approx(1000.0 / after, rel=0.02)
+    assert (early > late > 0.0, none) == (True, 0.0)
 
 
 @pytest.mark.parametrize("kind", KINDS)

@@ -32,6 +32,12 @@ ELASTICITY: dict[str, tuple[Numbers, ...]] = {
         (published.HUMAN_DERMIS_SHEAR,),
         (published.HUMAN_SUBCUTIS_SHEAR,),
     ),
+    "stiffening": (
+        (published.STIFFENING_STRATUM_CORNEUM,),
+        (published.STIFFENING_LIVING_EPIDERMIS,),
+        (published.STIFFENING_DERMIS,),
+        (published.STIFFENING_SUBCUTIS,),
+    ),
     "paper": (_SOFT, _SOFT, *_IDENTIFIED),
     "trial1": (_SOFT, _SOFT, *_MAENO),
     "trial2": (_STIFF, _STIFF, *_IDENTIFIED),

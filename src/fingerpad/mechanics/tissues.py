@@ -62,16 +62,14 @@ def _stiffening() -> tuple[Material, Material]:
     return dermis, subcutis
 
 
+def _polynomial(coefficients: Published, poisson: float = NU) -> Material:
+    c10, c01, c20, c11, c02 = coefficients.value
+    return Material.polynomial(c10, c01, c20, c11, c02, poisson, skin_prony())
+
+
 def _wu_polynomials() -> tuple[Material, Material]:
     """Dermis and subcutis after Wu, nearly incompressible like the other layers."""
-    dermis, subcutis = (
-        Material.polynomial(c10, c01, c20, c11, c02, NU, skin_prony())
-        for c10, c01, c20, c11, c02 in (
-            published.WU_SKIN_POLYNOMIAL.value,
-            published.WU_SUBCUTIS_POLYNOMIAL.value,
-        )
-    )
-    return dermis, subcutis
+    return _polynomial(published.WU_SKIN_POLYNOMIAL), _polynomial(published.WU_SUBCUTIS_POLYNOMIAL)
 
 
 def _paper() -> Tissues:
@@ -91,6 +89,17 @@ def _human() -> Tissues:
     return Tissues(*(_shear(shear, LONG_TERM) for shear in layers))
 
 
+def _stiffer_under_load() -> Tissues:
+    """Layers whose energy has a term in (I1 - 3)², by which they stiffen where they are strained."""
+    layers = (
+        published.STIFFENING_STRATUM_CORNEUM,
+        published.STIFFENING_LIVING_EPIDERMIS,
+        published.STIFFENING_DERMIS,
+        published.STIFFENING_SUBCUTIS,
+    )
+    return Tissues(*(_polynomial(layer, LONG_TERM) for layer in layers))
+
+
 def _laboratory() -> Tissues:
     epidermis = _shear(published.LABORATORY_EPIDERMIS_SHEAR)
     inner = (_shear(published.LABORATORY_DERMIS_SHEAR), _shear(published.LABORATORY_SUBCUTIS_SHEAR))
@@ -100,6 +109,8 @@ def _laboratory() -> Tissues:
 TISSUES: dict[str, Callable[[], Tissues]] = {
     # One set for deflection, force, firing and percept; compressive stress drives both terms.
     "human": _human,
+    # Layers that stiffen, for deep touches and small bodies; von Mises stress drives both terms.
+    "stiffening": _stiffer_under_load,
     # Closest to the paper's printed numbers; strain energy density drives both terms.
     "paper": _paper,
     # All layers linear elastic after Maeno, with a Prony series.

@@ -150,6 +150,8 @@ class Afferent:
     def __post_init__(self) -> None:
         # Both stages check their parameters when they are made.
         self.transduction, self.membrane  # noqa: B018
+        if self.adapting_share == 1.0:
+            raise InputError("adapting_share", "must be below 1, so that something lasts", "1")
 
     @classmethod
     def for_tissues(cls, tissues: object) -> Afferent:
@@ -158,8 +160,9 @@ class Afferent:
         Parameters
         ----------
         tissues : str or Tissues
-            "human", the default afferent, driven by compressive stress; "paper" or "trial3", driven by strain
-            energy density (SED). Its membrane starts at 0, as the paper prints, and not at rest.
+            "human", the default afferent, driven by compressive stress; "stiffening", with several end organs
+            and adaptation, driven by von Mises stress and the rate of strain energy density (SED); "paper" or
+            "trial3", driven by SED. Its membrane starts at 0, as the paper prints, and not at rest.
             For any other name and for tissues of your own, no afferent was fitted; the one of "trial3" is
             returned.
 
@@ -172,6 +175,10 @@ class Afferent:
         """
         if isinstance(tissues, str) and tissues == "human":
             return cls()
+        if isinstance(tissues, str) and tissues == "stiffening":
+            numbers = {name: getattr(neuron, number).value for name, number in neuron.stiffening.items()}
+            numbers["end_organs"] = int(numbers["end_organs"])
+            return cls(**numbers, dynamic_quantity=STORED_ENERGY, static_quantity="von_mises")
         fitted = neuron.fitted["paper" if isinstance(tissues, str) and tissues == "paper" else "trial3"]
         return cls.from_parameters(
             [getattr(neuron, name).value for name in fitted],
@@ -223,14 +230,19 @@ class Afferent:
 
     @property
     def static_threshold(self) -> float:
-        """Constant quantity above which the afferent fires, (C v / tau - beta) / k_s. [its unit]
+        """Constant quantity above which the afferent fires, (C v / tau - beta) / (k_s (1 - a)). [its unit]
 
         Examples
         --------
         >>> round(Afferent().static_threshold, 2), round(Afferent.for_tissues("trial3").static_threshold, 3)
         (2.91, 0.038)
         """
-        return (self.rheobase_ma - self.intercept_ma) / self.static_gain
+        return (self.rheobase_ma - self.intercept_ma) / self._lasting_gain
+
+    @property
+    def _lasting_gain(self) -> float:
+        """Static gain on a quantity that has lasted for long. [mA/kPa, or per its unit]"""
+        return self.static_gain * (1.0 - self.adapting_share)
 
     @property
     def rheobase_ma(self) -> float:
@@ -246,7 +258,7 @@ class Afferent:
         5.0
         """
         raised = quantity - self.static_threshold
-        return replace(self, intercept_ma=self.intercept_ma - self.static_gain * raised)
+        return replace(self, intercept_ma=self.intercept_ma - self._lasting_gain * raised)
 
     def spikes(self, traces: Traces | Drive) -> SpikeTrains:
         """Simulate the spikes of this afferent, a train per site.

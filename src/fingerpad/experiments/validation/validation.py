@@ -55,7 +55,7 @@ RAMP_AND_HOLD, QUASI_STATIC = "ramp_and_hold", "quasi_static"
 LOADINGS = (RAMP_AND_HOLD, QUASI_STATIC)  # Read at the end of the paper's hold, or with relaxed tissues.
 QUASI_STATIC_MS = 1e12  # After such a ramp all Prony terms have relaxed to 1 in 10⁶. [ms]
 
-PROBE, PROBING_MM_PER_MS, PROBED_MS = FlatPunch(1.0, 0.2), 0.02, 200.0
+PROBE, PROBING_MM_PER_MS, PROBED_MS = FlatPunch(1.0, 0.2), 0.02, 300.0
 """Probe of receptive fields, its speed and its hold, as assumed of Vega-Bermudez & Johnson 1999."""
 FIELD_MM, PLACES_MM = 4.0, 0.2  # Places are probed so far from the receptor, so far apart.
 SHARE_OF_PEAK = 0.1
