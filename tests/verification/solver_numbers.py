@@ -1,7 +1,7 @@
 """What each number of the solver is for: presses with the number and without it.
 
-`python -m tests.verification.solver_numbers [PART PARTS]` presses what has no row yet, and keeps each row.
-Without a number its mechanism is off, or always on.
+`python -m tests.verification.solver_numbers [PART PARTS]` presses what has no row yet, keeps each row and
+writes docs/decisions/solver-numbers.md. Without a number its mechanism is off, or always on.
 """
 
 from __future__ import annotations
@@ -24,7 +24,9 @@ from .page import PAGE
 from .press_table import limited_to, slide
 
 ROWS = PAGE.parent / "verification" / "solver_numbers.json"
+TABLE_PAGE = PAGE.parent / "decisions" / "solver-numbers.md"
 MOST_SECONDS = 600
+SAME_FORCE = 1e-6  # Share of the force within which two presses are one.
 BALL = fp.Sphere(curvature_per_m=287.0)
 FORCED = fp.ForceRampAndHold(force_mn=60.0)
 BACK = fp.Trajectory((0.0, 50.0, 100.0, 150.0), depth_mm=(0.0, 1.0, 1.0, 0.0))
@@ -127,14 +129,48 @@ def read_rows() -> dict[str, dict[str, Any]]:
     return json.loads(ROWS.read_text(encoding="utf-8")) if ROWS.exists() else {}
 
 
+def effect(made: dict[str, Any], usual: dict[str, Any]) -> str:
+    """What a press without a number does otherwise, in words; empty if it is the same."""
+    if "failure" in made:
+        return "stops" if made["assemblies"] <= 2 * usual["assemblies"] else "takes over twice as long"
+    changes = made["assemblies"] / usual["assemblies"] - 1.0
+    moved = made["force_mn"] / usual["force_mn"] - 1.0
+    said = [f"{changes:+.0%} assemblies"] if made["assemblies"] != usual["assemblies"] else []
+    return ", ".join([*said, *([f"force {moved:+.2%}"] if abs(moved) > SAME_FORCE else [])])
+
+
+def page_text(rows: dict[str, dict[str, Any]]) -> str:
+    """Page of the numbers: what changes without each of them, and in how many presses nothing does."""
+    lines = []
+    for name in WITHOUT:
+        pressed = [case for case in CASES if f"{name}|{case}" in rows]
+        said = {case: effect(rows[f"{name}|{case}"], rows[f"|{case}"]) for case in pressed}
+        changed = "; ".join(f"{case}: {words}" for case, words in said.items() if words)
+        same = sum(not words for words in said.values())
+        lines.append(f"| `{name}` | {changed or 'nothing'} | {same} of {len(pressed)} |")
+    table = "\n".join(["| number | without it | presses that stay the same |", "|---|---|---|", *lines])
+    return f"""# Numbers of the solver
+
+**Question.** Which of the numbers that steer contact, friction and Newton steps does a measurement defend?
+
+**Measurement.** Presses at quick resolution, with every number and without one of them: its mechanism is
+off, or always on. A number without any effect here serves presses that are harder than these, or none.
+
+{table}
+
+`python -m tests.verification.solver_numbers` presses what is missing and writes this page.
+"""
+
+
 def measure(part: int = 0, parts: int = 1) -> None:
-    """Press what has no row."""
+    """Press what has no row, and write the page."""
     for number, (name, case) in enumerate(product(["", *WITHOUT], CASES)):
         key = f"{name}|{case}"
         if number % parts == part and key not in read_rows():
             made = row(case, name)
             write_atomically(ROWS, json.dumps(read_rows() | {key: made}, indent=1).encode())
             print(key, made, flush=True)
+    write_atomically(TABLE_PAGE, page_text(read_rows()).encode())
 
 
 if __name__ == "__main__":

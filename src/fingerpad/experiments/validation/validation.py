@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import pairwise
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Literal
 
@@ -454,15 +455,15 @@ def _adapted(given: Given, model: ValidationRequest) -> Reading:
 
 def _strain(given: Given, model: ValidationRequest) -> Reading:
     """Share by which a layer below a flat plate is thinner, at the end of the paper's ramp and hold. [1]"""
-    force_n, layers = given["force_n"], WORDS["layer"]
+    force_n = given["force_n"]
     if force_n == 0.0:
         return Reading(None, lambda _: 0.0)
     finger = model.settings.finger
     borders = (0.0, *finger.layer_depths_mm)
-    number = layers.index(str(given["layer"]))
-    depth_mm = 0.5 * (borders[number] + borders[number + 1])
+    middles_mm = tuple(0.5 * (above + below) for above, below in pairwise(borders))
+    depth_mm = middles_mm[WORDS["layer"].index(str(given["layer"]))]
     motion = ForceRampAndHold(force_mn=MN_PER_N * force_n)
-    touch = _probed(model, Plate(), motion, depths_mm=(depth_mm,))
+    touch = _probed(model, Plate(), motion, depths_mm=middles_mm)  # the same for all layers
 
     def read(skin: SkinResponse | None) -> float:
         assert skin is not None
