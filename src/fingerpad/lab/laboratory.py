@@ -32,10 +32,6 @@ from fingerpad.neuron.afferent_types import afferent_types
 from fingerpad.reduction.model import ReducedModel, read_reduced, write_reduced
 from fingerpad.skin.code_hash import code_hash
 
-_TYPES = afferent_types().values()
-FOLLOWED = tuple(dict.fromkeys(q for one in _TYPES for q in (one.dynamic_quantity, one.static_quantity)))
-"""Quantities that the types of afferents follow: a reduced touch of the laboratory keeps them all."""
-
 KEPT_ANSWERS = 16  # Answers that are kept, so that a comparison and a second user do not compute again.
 
 
@@ -116,7 +112,11 @@ class Laboratory:
                     self.source(state), replaced, self.allow_python
                 )
                 request.check()
-                self._described[key] = request.changed(quantities=(*request.quantities, *FOLLOWED))
+                # A reduced touch of the laboratory keeps what any type of afferents follows.
+                types = afferent_types(request.tissues).values()
+                followed = [q for one in types for q in (one.dynamic_quantity, one.static_quantity)]
+                kept = tuple(dict.fromkeys([*request.quantities, *followed]))
+                self._described[key] = request.changed(quantities=kept)
             return self._described[key]
 
     def path(self, state: LabState) -> Path:
