@@ -5,7 +5,7 @@
 | `tissue-search` | compares sets of tissues and drives on deflection, force, firing and percept |
 | `tissue-posterior` | draws tissues, afferent and noise from one posterior, and tests its calibration |
 | `held-out` | predicts what no search has used, and compares it with what was published |
-| `sai-search` | finds an SAI afferent by rates under a bar and areas of receptive fields, and predicts the rest |
+| `sai-search` | finds an SAI afferent by rates under a bar and areas of receptive fields |
 | `mesh-refinement` | measures the error of the meshes of the paper's finger against finer ones |
 | `results` | writes the pages that show the numbers of a reproduction |
 
