@@ -376,14 +376,14 @@ def test_an_interrupted_run_keeps_what_is_finished_and_goes_on(call, folder, tmp
 
 def test_a_layer_is_compressed_as_its_nodes_come_closer(tmp_path):
     layers = ("stratum_corneum", "living_epidermis", "dermis")
-    rows = "".join(f"0.3,{layer},0.1\n" for layer in layers) + "0,dermis,0\n"
+    rows = "".join(f"1,{layer},0.1\n" for layer in layers) + "0,dermis,0\n"
     file = written(tmp_path, "force_n,layer,strain\n" + rows)
     found = [row.predicted for row in fp.validate(observations=file, resolution="quick").predictions]
     tilt_deg = QUICK.skin_tilt_deg
     skin = fp.indent(
         QUICK.finger,
         fp.Plate(),
-        fp.ForceRampAndHold(force_mn=300.0),
+        fp.ForceRampAndHold(force_mn=1000.0),
         tilt_deg=tilt_deg,
         at_mm=(RECEPTOR_X_MM, 0),
     )

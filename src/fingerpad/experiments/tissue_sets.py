@@ -32,12 +32,6 @@ ELASTICITY: dict[str, tuple[Numbers, ...]] = {
         (published.HUMAN_DERMIS_SHEAR,),
         (published.HUMAN_SUBCUTIS_SHEAR,),
     ),
-    "stiffening": (
-        (published.STIFFENING_STRATUM_CORNEUM,),
-        (published.STIFFENING_LIVING_EPIDERMIS,),
-        (published.STIFFENING_DERMIS,),
-        (published.STIFFENING_SUBCUTIS,),
-    ),
     "paper": (_SOFT, _SOFT, *_IDENTIFIED),
     "trial1": (_SOFT, _SOFT, *_MAENO),
     "trial2": (_STIFF, _STIFF, *_IDENTIFIED),
@@ -52,6 +46,12 @@ ELASTICITY: dict[str, tuple[Numbers, ...]] = {
         _LABORATORY,
         (published.LABORATORY_DERMIS_SHEAR,),
         (published.LABORATORY_SUBCUTIS_SHEAR,),
+    ),
+    "stiffening": (
+        (published.STIFFENING_STRATUM_CORNEUM,),
+        (published.STIFFENING_LIVING_EPIDERMIS,),
+        (published.STIFFENING_DERMIS,),
+        (published.STIFFENING_SUBCUTIS,),
     ),
 }  # Published numbers behind the moduli of every layer of every set, from the skin inwards.
 

@@ -109,8 +109,6 @@ def _laboratory() -> Tissues:
 TISSUES: dict[str, Callable[[], Tissues]] = {
     # One set for deflection, force, firing and percept; compressive stress drives both terms.
     "human": _human,
-    # Layers that stiffen, for deep touches and small bodies; von Mises stress drives both terms.
-    "stiffening": _stiffer_under_load,
     # Closest to the paper's printed numbers; strain energy density drives both terms.
     "paper": _paper,
     # All layers linear elastic after Maeno, with a Prony series.
@@ -136,6 +134,8 @@ TISSUES: dict[str, Callable[[], Tissues]] = {
     ),
     # Neo-Hookean fit of this fingertip, published later by the authors' laboratory.
     "gerling2014_fit": _laboratory,
+    # Layers that stiffen, for deep touches and small bodies; von Mises stress drives the static term.
+    "stiffening": _stiffer_under_load,
 }
 
 
