@@ -153,12 +153,17 @@ def page_text(rows: dict[str, dict[str, Any]]) -> str:
 
 **Question.** Which of the numbers that steer contact, friction and Newton steps does a measurement defend?
 
-**Measurement.** Presses at quick resolution, with every number and without one of them: its mechanism is
-off, or always on. A number without any effect here serves presses that are harder than these, or none.
+**Choice.** All stay until the table of [presses](../presses.md) has been pressed without those that have no
+effect here.
+
+**Reason.** Presses at quick resolution, with every number and without one of them: its mechanism is off, or
+always on. A number without any effect here serves presses that are harder than these, or none.
 
 {table}
 
 `python -m tests.verification.solver_numbers` presses what is missing and writes this page.
+
+**To change it.** The constants of `fingerpad.mechanics`.
 """
 
 
