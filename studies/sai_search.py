@@ -21,9 +21,8 @@ from fingerpad.data import afferents as published
 from fingerpad.data import bar_firing_rates, protocol
 from fingerpad.experiments.conditions import RECEPTOR_X_MM, Conditions
 from fingerpad.experiments.runner import Manifest, Runner
-from fingerpad.experiments.validation.validation import PROBE, PROBED_MS, PROBING_MM_PER_MS, SHARE_OF_PEAK
+from fingerpad.experiments.validation.validation import PROBE, probing, within_field
 from fingerpad.geometry.bodies import Bar
-from fingerpad.geometry.motion import RampAndHold
 from fingerpad.inference.fitting.methods import fractional_sum_of_squares, interleaved_folds
 from fingerpad.neuron.afferent import Afferent
 from fingerpad.neuron.population import Population
@@ -101,7 +100,7 @@ class Recordings:
         areas = []
         for depth_mm in published.FIELD_DEPTHS.value:
             counts = population.respond(self.skins[depth_mm]).spikes.counts.reshape(RAYS, -1)
-            within = counts >= max(1.0, SHARE_OF_PEAK * counts.max())
+            within = within_field(counts)
             last = np.where(within.any(axis=1), within.shape[1] - np.argmax(within[:, ::-1], axis=1), 0)
             radius = np.maximum(last - 0.5, 0.0) * (RADII_MM[1] - RADII_MM[0])
             areas.append(float(np.mean(np.pi * radius**2)))
@@ -123,7 +122,7 @@ def touches(conditions: Conditions) -> dict[Any, Any]:
         depth_mm: touch_of(
             conditions.finger,
             PROBE,
-            RampAndHold(depth_mm, depth_mm / PROBING_MM_PER_MS, PROBED_MS),
+            probing(depth_mm),
             conditions.tissues,
             conditions.resolution,
             tilt_deg=conditions.skin_tilt_deg,

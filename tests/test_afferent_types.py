@@ -9,6 +9,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 import fingerpad as fp
 from fingerpad.core.regions import Rectangle
 from fingerpad.data import afferents as published
+from fingerpad.experiments.requests.afferents import AfferentsSettings, respond_to
 from fingerpad.neuron.band_pass import BandPass
 from fingerpad.neuron.end_organs import EndOrgans
 from fingerpad.neuron.escape_rate import EscapeRate
@@ -307,6 +308,14 @@ def test_an_afferent_with_end_organs_follows_their_mean_wherever_it_is_placed():
         fp.hexagonal(SQUARE, 25.0), lambda flat: np.insert(flat, 1, 7.0, axis=1), branched
     )
     assert lifted.sites_mm.shape == (6 * len(lifted), 3)
+
+
+def test_a_soft_threshold_keeps_the_end_organs():
+    branched = fp.Population.grid(afferent=fp.Afferent(end_organs=6, reach_mm=2.0))
+    soft = respond_to(AfferentsSettings(noise=1e-6), branched, FINGER).spikes
+    sharp, alone = branched.respond(FINGER).spikes, fp.Population.grid().respond(FINGER).spikes
+    assert_array_equal(soft.counts, sharp.counts)
+    assert (sharp.counts != alone.counts).any()
 
 
 def test_a_mixed_population_has_the_published_densities_and_one_response():

@@ -173,13 +173,14 @@ class Afferent:
         >>> Afferent.for_tissues("human") == Afferent()
         True
         """
-        if isinstance(tissues, str) and tissues == "human":
+        known = tissues if isinstance(tissues, str) else ""
+        if known == "human":
             return cls()
-        if isinstance(tissues, str) and tissues == "stiffening":
+        if known == "stiffening":
             numbers = {name: getattr(neuron, number).value for name, number in neuron.stiffening.items()}
             numbers["end_organs"] = int(numbers["end_organs"])
             return cls(**numbers, dynamic_quantity=STORED_ENERGY, static_quantity="von_mises")
-        fitted = neuron.fitted["paper" if isinstance(tissues, str) and tissues == "paper" else "trial3"]
+        fitted = neuron.fitted["paper" if known == "paper" else "trial3"]
         return cls.from_parameters(
             [getattr(neuron, name).value for name in fitted],
             dynamic_quantity=STORED_ENERGY,
@@ -286,10 +287,15 @@ class Afferent:
         """Compute the current through the membrane at every site, Eq. 1. [mA]"""
         driven = traces if isinstance(traces, Drive) else self._driven(traces)
         if self.adapting_share:
-            lost = np.array(driven.values)
-            continued_stage(driven.times_ms, lost, self.adapting_ms, False, lost[0].copy())
-            driven = replace(driven, values=driven.values - self.adapting_share * lost)
+            values = self.adapted(driven.times_ms, driven.values, driven.values[0].copy())
+            driven = replace(driven, values=values)
         return self.transduction.current(driven)
+
+    def adapted(self, times_ms: FloatArray, values: FloatArray, state: FloatArray) -> FloatArray:
+        """Take what is lost from the static term; the state (n_sites,) of the loss is carried on."""
+        lost = values.copy()
+        continued_stage(times_ms, lost, self.adapting_ms, False, state)
+        return values - self.adapting_share * lost
 
     def _fired(self, traces: Traces | Drive) -> SpikeTrains:
         return self.membrane.spikes(self.current(traces))

@@ -116,9 +116,7 @@ class AfferentStream:
         driven = gains.intercept_ma + gains.dynamic_gain * np.abs(rate)
         followed = between(self._static, static)
         if afferent.adapting_share:
-            lost = followed.copy()
-            continued_stage(knots_ms, lost, afferent.adapting_ms, False, self._lost)
-            followed -= afferent.adapting_share * lost
+            followed = afferent.adapted(knots_ms, followed, self._lost)
         return knots_ms, driven + gains.static_gain * followed
 
     def _replayed(self, time_ms: float, static: FloatArray, dynamic: FloatArray) -> SpikeTrains:

@@ -410,10 +410,10 @@ class Population:
         """Where the skin is sampled, (n_sites, 2 or 3): the end organs, afferent by afferent. [mm]"""
         if self.parts:
             return np.concatenate([part.sites_mm for part in self.parts.values()])
-        return self.positions_mm if self._ends is None else self._ends.sites_mm
+        return self.positions_mm if self.branches is None else self.branches.sites_mm
 
     @cached_property
-    def _ends(self) -> EndOrgans | None:
+    def branches(self) -> EndOrgans | None:
         """End organs: those given, or those that the afferents have about their positions."""
         if self.ends is not None or self.positions_mm.shape[1] > 2:
             return self.ends
@@ -443,8 +443,8 @@ class Population:
             raise InputError(
                 "skin.sed", "must give one trace per receptor", f"{traces.n_sites} for {len(sites)}"
             )
-        if self._ends is not None:
-            traces = self._ends.combined(traces)
+        if self.branches is not None:
+            traces = self.branches.combined(traces)
         measure = getattr(self.afferent, "rate_measure", INTERVAL)
         windows_ms = rate_windows_ms(
             traces.phases, dynamic_window_ms, static_window_ms, traces.times_ms[-1], measure

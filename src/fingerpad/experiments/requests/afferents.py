@@ -420,7 +420,8 @@ def respond_to(
         dynamic_quantity=afferent.dynamic_quantity,
         static_quantity=afferent.static_quantity,
     )
-    return replace(population, afferent=noisy).respond(skin, *windows)
+    there = population.on(skin)
+    return replace(there, afferent=noisy, ends=there.branches).respond(skin, *windows)
 
 
 def parameters_of(population: Population) -> dict[str, float | str]:
@@ -439,6 +440,7 @@ def parameters_of(population: Population) -> dict[str, float | str]:
 def _check_noise(settings: AfferentsSettings, population: Population, place: Place) -> None:
     """Raise `InputError` if a soft threshold is asked for afferents that have none."""
     afferent = None if population.parts else population.afferent
-    if settings.noise > 0.0 and not isinstance(afferent, Afferent):
+    plain = isinstance(afferent, Afferent) and afferent.smoothing_ms == 0.0
+    if settings.noise > 0.0 and not plain:
         words = "must be 0 for other types and mixed populations, because a soft threshold is that of "
         raise InputError((*place, "noise"), words + "the default afferent alone", f"{settings.noise:g}")

@@ -43,7 +43,7 @@ from fingerpad.experiments.scores import (
 )
 from fingerpad.experiments.validation.observations import WORDS, Kind, Observations, Value, read_observations
 from fingerpad.geometry.bodies import FlatPunch, Grating, Plate, Sphere
-from fingerpad.geometry.grading import RESOLUTIONS, resolution_grading
+from fingerpad.geometry.grading import RESOLUTIONS, Grading, resolution_grading
 from fingerpad.geometry.indenters import Indenter
 from fingerpad.geometry.motion import ForceRampAndHold, Motion, RampAndHold
 from fingerpad.neuron.afferent import AnyAfferent, type_of
@@ -391,10 +391,7 @@ def _rate(given: Given, model: ValidationRequest) -> Reading:
     conditions.finger.skin_point(*site)
     if force_n == 0.0:
         return Reading(None, lambda _: _resting_rate(model))
-    motion, tilt_deg = ForceRampAndHold(force_mn=MN_PER_N * force_n), conditions.skin_tilt_deg
-    pressed = conditions.finger, body, motion, conditions.tissues, conditions.resolution
-    depths_mm = conditions.receptor_depths_mm
-    touch = touch_of(*pressed, grading=grading, tilt_deg=tilt_deg, receptor_depths_mm=depths_mm)
+    touch = _probed(model, body, ForceRampAndHold(force_mn=MN_PER_N * force_n), grading=grading)
     receptor = Population(np.array([site]), 1.0, model.responding, depth_mm=model.depth_mm)
 
     def read(skin: SkinResponse | None) -> float:
@@ -404,6 +401,16 @@ def _rate(given: Given, model: ValidationRequest) -> Reading:
     return Reading(touch, read)
 
 
+def probing(depth_mm: float) -> RampAndHold:
+    """Motion of the probe of receptive fields."""
+    return RampAndHold(depth_mm, depth_mm / PROBING_MM_PER_MS, PROBED_MS)
+
+
+def within_field(counts: np.ndarray) -> np.ndarray:
+    """Whether places lie within a receptive field, by the spikes that a probe elicits from each."""
+    return counts >= max(1.0, SHARE_OF_PEAK * counts.max())
+
+
 def _area(given: Given, model: ValidationRequest) -> Reading:
     """Area within which a probe elicits `SHARE_OF_PEAK` of the spikes at the most sensitive place. [mm²]"""
     depth_mm, name = given["depth_mm"], str(given["afferent"])
@@ -411,7 +418,7 @@ def _area(given: Given, model: ValidationRequest) -> Reading:
         return Reading(None, lambda _: 0.0)
     own = model.responding
     afferent = own if type_of(own) == name else chosen_afferent(name, model.tissues)
-    touch = _probed(model, PROBE, RampAndHold(depth_mm, depth_mm / PROBING_MM_PER_MS, PROBED_MS))
+    touch = _probed(model, PROBE, probing(depth_mm))
     # The receptor moves instead of the probe: its places are those of the probe about a receptor, mirrored.
     away = np.arange(-FIELD_MM, FIELD_MM + PLACES_MM / 2, PLACES_MM)
     x, z = np.meshgrid(model.settings.receptor_x_mm + model.settings.along_skin * away, away, indexing="ij")
@@ -421,8 +428,7 @@ def _area(given: Given, model: ValidationRequest) -> Reading:
     def read(skin: SkinResponse | None) -> float:
         assert skin is not None
         counts = population.respond(skin).spikes.counts
-        within = counts >= max(1.0, SHARE_OF_PEAK * counts.max())
-        return float(PLACES_MM**2 * within.sum())
+        return float(PLACES_MM**2 * within_field(counts).sum())
 
     return Reading(touch, read)
 
@@ -479,8 +485,9 @@ def _probed(
     motion: Motion,
     hold_steps: int = 0,
     depths_mm: tuple[float, ...] = (),
+    grading: Grading | None = None,
 ) -> Touch:
-    """Touch along the normal of the skin at the receptor."""
+    """Touch along the normal of the skin at the middle of the pad, above the receptor."""
     conditions = model.settings
     settings = settings_of(conditions.resolution)
     return touch_of(
@@ -489,8 +496,7 @@ def _probed(
         motion,
         conditions.tissues,
         conditions.resolution,
-        (conditions.receptor_x_mm, 0.0),
-        grading=conditions.grading,
+        grading=grading or conditions.grading,
         tilt_deg=conditions.skin_tilt_deg,
         settings=replace(settings, hold_steps=hold_steps) if hold_steps else settings,
         receptor_depths_mm=depths_mm or conditions.receptor_depths_mm,
