@@ -287,15 +287,9 @@ class Afferent:
         """Compute the current through the membrane at every site, Eq. 1. [mA]"""
         driven = traces if isinstance(traces, Drive) else self._driven(traces)
         if self.adapting_share:
-            values = self.adapted(driven.times_ms, driven.values, driven.values[0].copy())
+            values = adapted(self, driven.times_ms, driven.values, driven.values[0].copy())
             driven = replace(driven, values=values)
         return self.transduction.current(driven)
-
-    def adapted(self, times_ms: FloatArray, values: FloatArray, state: FloatArray) -> FloatArray:
-        """Take what is lost from the static term; the state (n_sites,) of the loss is carried on."""
-        lost = values.copy()
-        continued_stage(times_ms, lost, self.adapting_ms, False, state)
-        return values - self.adapting_share * lost
 
     def _fired(self, traces: Traces | Drive) -> SpikeTrains:
         return self.membrane.spikes(self.current(traces))
@@ -345,6 +339,13 @@ class Afferent:
         )
         spikes = self.spikes(traces)
         return firing_rate_hz(spikes, dynamic), firing_rate_hz(spikes, static)
+
+
+def adapted(afferent: Afferent, times_ms: FloatArray, values: FloatArray, state: FloatArray) -> FloatArray:
+    """Take what is lost from the static term; the state (n_sites,) of the loss is carried on."""
+    lost = values.copy()
+    continued_stage(times_ms, lost, afferent.adapting_ms, False, state)
+    return values - afferent.adapting_share * lost
 
 
 def spikes_where(

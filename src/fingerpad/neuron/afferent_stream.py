@@ -14,7 +14,7 @@ from fingerpad.core.checked import checked_class
 from fingerpad.core.errors import InputError
 from fingerpad.core.signals import SpikeTrains, Traces
 from fingerpad.core.values import Finite, FloatArray, Whole, finite, float_array, whole
-from fingerpad.neuron.afferent import Afferent, AnyAfferent, checked_afferent
+from fingerpad.neuron.afferent import Afferent, AnyAfferent, adapted, checked_afferent
 from fingerpad.neuron.afferent_types import RapidlyAdapting
 from fingerpad.neuron.band_pass import continued_stage, knots_between
 from fingerpad.neuron.exact_spikes import continued_trains
@@ -116,7 +116,7 @@ class AfferentStream:
         driven = gains.intercept_ma + gains.dynamic_gain * np.abs(rate)
         followed = between(self._static, static)
         if afferent.adapting_share:
-            followed = afferent.adapted(knots_ms, followed, self._lost)
+            followed = adapted(afferent, knots_ms, followed, self._lost)
         return knots_ms, driven + gains.static_gain * followed
 
     def _replayed(self, time_ms: float, static: FloatArray, dynamic: FloatArray) -> SpikeTrains:
