@@ -38,7 +38,7 @@ from fingerpad.mechanics.press_settings import PressSettings
 from fingerpad.neuron.afferent import Afferent
 from fingerpad.neuron.population import Population
 from fingerpad.neuron.spikes import firing_rate_hz, modulation_index
-from fingerpad.psychophysics.encoding import neighbour_pairs
+from fingerpad.psychophysics.encoding import Noise, neighbour_pairs
 from fingerpad.psychophysics.observer import NOISE_DRAWS, expected_hit_rates, fit_noise_sigma
 from fingerpad.psychophysics.sensitivity import InterpolatedObserver
 from fingerpad.report.page import edition
@@ -497,8 +497,10 @@ def weber_fractions_of(grid: Population, static_hz: FloatArray, seed: int) -> li
     draws = normals(seed, 1, len(grid), Purpose.RESPONSE, NOISE_DRAWS)[0].T
     people = (psychophysics.SPHERE_287.value, *psychophysics.GOODWIN_CURVATURES.value)
     rows = static_hz[[PRESSED_PER_M.index(curvature) for curvature in people]]
-    sigma = fit_noise_sigma(lambda noise: expected_hit_rates(rows, pairs, noise, draws)).noise_sigma
-    observer = InterpolatedObserver(np.array(PRESSED_PER_M), static_hz, pairs, sigma, draws)
+    offset = grid.noise_offset_hz
+    fit = fit_noise_sigma(lambda sigma: expected_hit_rates(rows, pairs, Noise(sigma, offset), draws))
+    noise = Noise(fit.noise_sigma, offset)
+    observer = InterpolatedObserver(np.array(PRESSED_PER_M), static_hz, pairs, noise, draws)
     return [observer.difference(standard) / standard for standard in STANDARDS_PER_M]
 
 

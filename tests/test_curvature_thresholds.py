@@ -87,7 +87,7 @@ def test_ideal_threshold_is_fishers(found):
 
 
 def test_a_threshold_out_of_range_is_reported_and_affects_only_its_row(found):
-    noisy = replace(proportional(0.1), noise_sigma=0.5)
+    noisy = replace(proportional(0.1), noise=0.5)
     assert np.isnan(noisy.difference(287.0, 0.75))
     with pytest.raises(ConvergenceError, match="No sphere up to 700 /m is discriminated from 287 /m in 75%"):
         study.threshold_at(noisy, 287.0)

@@ -15,6 +15,7 @@ from fingerpad.core.random_streams import Purpose, normals, uniforms
 from fingerpad.psychophysics.encoding import (
     LARGEST_SESSION,
     TRIALS_PER_SESSION,
+    Noise,
     gradient_sum,
     neighbour_pairs,
     noisy_gradient_sums,
@@ -173,23 +174,24 @@ def test_euclidean_distance_follows_the_printed_steps(norm, plan):
 
 
 @pytest.mark.parametrize("presentations", [1, 6, 128, 131])
-def test_sums_in_compiled_blocks_are_those_of_the_plain_formula(presentations):
+@pytest.mark.parametrize("noise", [Noise(0.07), Noise(0.03, offset=130.0)], ids=["multiplies", "offset"])
+def test_sums_in_compiled_blocks_are_those_of_the_plain_formula(presentations, noise):
     """More presentations than a block holds, numbers that do not fill the generator's blocks of four."""
     values, trials = bumps([287.0, 365.0]), session_trials(2, 2, 3)
-    (sums,) = noisy_gradient_sums(values, PAIRS, np.array([0.07]), 4, trials, presentations)
+    (sums,) = noisy_gradient_sums(values, PAIRS, [noise], 4, trials, presentations)
     assert sums.shape == (2, 3, presentations)
     for repeat in range(3):
-        plain = gradient_sum(noisy_responses(values, 0.07, 4, trials[:, repeat], presentations), PAIRS)
+        plain = gradient_sum(noisy_responses(values, noise, 4, trials[:, repeat], presentations), PAIRS)
         assert_allclose(sums[:, repeat], plain, rtol=1e-13)
 
 
 def test_several_noises_meet_the_same_numbers_as_each_alone():
-    sigmas, trials = np.array([0.03, 0.08]), session_trials(0, 7, 2)
-    together = noisy_gradient_sums(bumps(), PAIRS, sigmas, 4, trials, 5)
-    for one, sigma in zip(together, sigmas, strict=True):
-        assert_array_equal(one, noisy_gradient_sums(bumps(), PAIRS, np.array([sigma]), 4, trials, 5)[0])
+    noises, trials = [Noise(0.03), Noise(0.08), Noise(0.03, offset=40.0)], session_trials(0, 7, 2)
+    together = noisy_gradient_sums(bumps(), PAIRS, noises, 4, trials, 5)
+    for one, noise in zip(together, noises, strict=True):
+        assert_array_equal(one, noisy_gradient_sums(bumps(), PAIRS, [noise], 4, trials, 5)[0])
     draws = standard_normals(3, (300, 18))  # the same for every sphere
-    sums = shared_noise_gradient_sums(bumps(), PAIRS, 0.05, draws)
+    sums = shared_noise_gradient_sums(bumps(), PAIRS, Noise(0.05), draws)
     assert_allclose(sums, gradient_sum(bumps()[:, np.newaxis] * (1.0 + 0.05 * draws), PAIRS), rtol=1e-13)
 
 
@@ -197,10 +199,10 @@ def test_the_number_of_threads_changes_no_bit():
     """Threads share the trials; the same numbers come from a process that has only one."""
     program = (
         "import numpy as np\n"
-        "from fingerpad.psychophysics.encoding import noisy_gradient_sums, session_trials\n"
+        "from fingerpad.psychophysics.encoding import Noise, noisy_gradient_sums, session_trials\n"
         "values = np.arange(1.0, 15.0).reshape(2, 7)\n"
         "pairs = np.stack([np.arange(6), np.arange(1, 7)], axis=1)\n"
-        "sums = noisy_gradient_sums(values, pairs, np.array([0.1]), 3, session_trials(0, 2, 100), 10)\n"
+        "sums = noisy_gradient_sums(values, pairs, [Noise(0.1)], 3, session_trials(0, 2, 100), 10)\n"
         "print(sums.tobytes().hex()[:4000], hash(sums.tobytes()))"
     )
     said = []
@@ -210,9 +212,16 @@ def test_the_number_of_threads_changes_no_bit():
     assert said[0] == said[1] != ""
 
 
+def test_noise_with_an_offset_hardly_depends_on_small_responses():
+    rates = np.array([[0.0, 30.0, 40.0, 3000.0]])
+    noisy = noisy_responses(rates, Noise(0.05, offset=40.0), 1, session_trials(0, 1), 20000)[0]
+    assert_allclose(noisy.mean(axis=0) - rates[0], 0.0, atol=2.0)
+    assert_allclose(noisy.std(axis=0), [2.0, 2.5, 0.05 * math.sqrt(2.0) * 40.0, 150.0], rtol=0.02)
+
+
 def test_sessions_of_one_seed_share_no_noise():
     first, second = (
-        noisy_responses(bumps()[:1], 0.05, 1, session_trials(session, 1), 1000)[0] / bumps()[0] - 1.0
+        noisy_responses(bumps()[:1], Noise(0.05), 1, session_trials(session, 1), 1000)[0] / bumps()[0] - 1.0
         for session in (0, 1)
     )
     correlation = np.corrcoef(first.ravel(), second.ravel())[0, 1]
@@ -312,7 +321,7 @@ test_what_cannot_be_used_is_refused = refusals(
     (lambda: discriminate_by(EuclideanDistance(), bumps() * np.nan, 0.1, 0, None, 1.0), "stays silent"),
     (lambda: discriminate_by(GradientSum(PAIRS), bumps(), 0.1, 0, session=-1), ("session",)),
     (lambda: discriminate_by(GradientSum(PAIRS), bumps()[:1], 0.1, 0), "at least one comparison"),
-    (lambda: discriminate_by(GradientSum(PAIRS), bumps(), -0.1, 0), ("noise_sigma",)),
+    (lambda: discriminate_by(GradientSum(PAIRS), bumps(), -0.1, 0), ("noise",)),
     (lambda: discriminate_by(GradientSum(PAIRS + 1), bumps(), 0.1, 0), ("neighbours",)),
     (lambda: discriminate_by(GradientSum(PAIRS), [["a"]], 0.1, 0), "responses must be an array of numbers"),
     (lambda: discriminate_by(EuclideanDistance("maximum"), bumps(), 0.1, 0), ("norm",)),

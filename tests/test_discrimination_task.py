@@ -225,9 +225,9 @@ def test_two_stimuli_give_a_forced_choice_and_no_missing_threshold():
         assert binom.cdf(correct, trials, high) == pytest.approx(0.025, abs=1e-6)
         np.testing.assert_allclose(choice.d_primes[:, 0], np.sqrt(2.0) * ndtri([proportion, low, high]))
         assert choice.d_primes[0] == pytest.approx(decoding.d_prime)
-    table, neighbours = taking_part(found.responses["static"], question.neighbours)
-    (presented,) = noisy_presentations(table, 0.1, question.experiment.seed, session=2)
-    sums = [gradient_sum(each, neighbours) for each in (presented.standard, presented.comparison)]
+    measured = taking_part(found.responses["static"], question.neighbours)
+    (presented,) = noisy_presentations(measured.responses, 0.1, question.experiment.seed, session=2)
+    sums = [gradient_sum(each, measured.neighbours) for each in (presented.standard, presented.comparison)]
     greater = (sums[1][:, None] > sums[0]).mean()
     proportion = found.decodings[0].forced_choice.proportions[0, 0]
     assert proportion == pytest.approx(max(greater, 1 - greater), abs=1e-9)

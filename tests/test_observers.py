@@ -23,6 +23,7 @@ from fingerpad.psychophysics import (
     sensitivity,
     yes_no,
 )
+from fingerpad.psychophysics.encoding import Noise
 from fingerpad.psychophysics.ideal_observer import SMALLEST_SPREAD, noisy_presentations
 from fingerpad.psychophysics.observer import GradientSum
 from fingerpad.psychophysics.sensitivity import best_difference
@@ -150,12 +151,14 @@ def test_ideal_observer_detects_a_change_of_spread_alone():
     assert shown.of(lambda responses: responses[:, 0]).proportion_correct < 0.51
 
 
-@pytest.mark.parametrize(("noise_sigma", "floor"), [(0.05, 0.0), (0.15, 0.0), (0.15, 4.0)])
-def test_ideal_observers_of_small_differences_reach_fishers_information(noise_sigma, floor):
+@pytest.mark.parametrize(
+    ("noise", "floor"), [(0.05, 0.0), (0.15, 0.0), (0.15, 4.0), (Noise(0.1, offset=40.0), 0.0)]
+)
+def test_ideal_observers_of_small_differences_reach_fishers_information(noise, floor):
     rates, slopes = np.array([20.0, 35.0, 50.0, 60.0]), np.array([0.01, 0.03, -0.02, 0.05])
-    j = gaussian_information(rates, slopes, noise_sigma, floor)
+    j = gaussian_information(rates, slopes, noise, floor)
     step = 1.0 / math.sqrt(j)  # where d' is 1 by Fisher's information
-    models = [multiplied_responses(rates + side * step * slopes, noise_sigma, floor) for side in (-0.5, 0.5)]
+    models = [multiplied_responses(rates + side * step * slopes, noise, floor) for side in (-0.5, 0.5)]
     ideal = present(models[0], models[1], seed=5, n_trials=40_000).ideal()
     assert ideal.d_prime == pytest.approx(1.0, abs=4.0 * ideal.d_prime_error)
 
@@ -190,6 +193,7 @@ def test_bad_models_are_refused():
     with pytest.raises(InputError, match="1 of 2 receptors are silent"):
         multiplied_responses([0.0, 10.0], 0.1)
     assert multiplied_responses([0.0, 10.0], 0.1, smallest_spread=1.0).covariance[0, 0] == 1.0
+    assert multiplied_responses([0.0, 10.0], Noise(0.1, offset=10.0)).covariance[0, 0] == 1.0
     with pytest.raises(InputError, match="same receptors"):
         present(GaussianResponses([1.0], np.eye(1)), GaussianResponses([1.0, 2.0], np.eye(2)), seed=1)
     with pytest.raises(InputError, match="one row and column"):

@@ -21,7 +21,7 @@ from fingerpad.experiments.gerling2014.percept import (
 )
 from fingerpad.experiments.scores import Estimate, estimate, extreme
 from fingerpad.psychophysics.curve import binomial_interval
-from fingerpad.psychophysics.encoding import Measured, gradient_sum, neighbour_pairs, taking_part
+from fingerpad.psychophysics.encoding import Measured, Noise, gradient_sum, neighbour_pairs, taking_part
 from fingerpad.psychophysics.observer import (
     EuclideanDistance,
     Experiment,
@@ -168,12 +168,12 @@ def test_statistics_are_those_of_known_hit_rates():
     assert value(found.targets[1].largest_from_line) == np.abs(away + 0.01).max()
 
 
-@pytest.mark.parametrize("sigma", [0.03, 0.058, 0.12])
-def test_few_receptors_give_a_skewed_distance_that_the_closed_form_knows(sigma):
+@pytest.mark.parametrize("noise", [0.03, 0.058, 0.12, Noise(0.04, offset=30.0)], ids=str)
+def test_few_receptors_give_a_skewed_distance_that_the_closed_form_knows(noise):
     """Twelve receptors, as respond to a sphere: without the skewness rates near chance are 0.02 too high."""
     values = np.linspace(10.0, 55.0, 12) * np.array([[1.0], [1.03], [1.06], [1.2]])
-    sampled = discriminate_by(EuclideanDistance(), values, sigma, 3, Experiment(hit_rates=4000)).hit_rate
-    assert_allclose(sampled, expected_euclidean_hit_rates(values, sigma), atol=0.005)
+    sampled = discriminate_by(EuclideanDistance(), values, noise, 3, Experiment(hit_rates=4000)).hit_rate
+    assert_allclose(sampled, expected_euclidean_hit_rates(values, noise), atol=0.005)
 
 
 def test_receptors_that_are_silent_once_take_no_part_in_latencies():

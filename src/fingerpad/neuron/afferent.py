@@ -145,6 +145,10 @@ class Afferent:
     reach_mm: NotNegative = 0.0
     """End organs of each afferent of a population, and the radius of the disc that they fill, as of
     `EndOrgans.about`. The paper's afferent has one. [mm]"""
+    noise_offset_hz: NotNegative = 0.0
+    """Rate r_0 below which the rates vary between trials by an amount that hardly depends on them, as the
+    numbers of spikes in recordings do: `fingerpad.psychophysics.Noise`. The paper's noise multiplies.
+    [spikes/s]"""
     type: str = "SAI"  #: Name of its type, of `fingerpad.data.afferents.TYPES` or of one's own.
 
     def __post_init__(self) -> None:

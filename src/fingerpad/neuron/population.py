@@ -426,6 +426,12 @@ class Population:
         return tuple(sorted({part.depth_mm for part in several if part.depth_mm is not None}))
 
     @property
+    def noise_offset_hz(self) -> float:
+        """Largest offset of the noise of its afferents, as of `Afferent`. [spikes/s]"""
+        several = self.parts.values() or [self]
+        return max(float(getattr(part.afferent, "noise_offset_hz", 0.0)) for part in several)
+
+    @property
     def quantities(self) -> tuple[str, str]:
         """Quantities of the dynamic and of the static term of the afferents of one type."""
         return self.afferent.dynamic_quantity, self.afferent.static_quantity

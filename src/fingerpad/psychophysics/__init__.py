@@ -9,7 +9,7 @@ from fingerpad.psychophysics.curve_uncertainty import (
     goodness_of_fit,
     posterior,
 )
-from fingerpad.psychophysics.encoding import delaunay_pairs, gradient_sum, neighbour_pairs
+from fingerpad.psychophysics.encoding import Noise, delaunay_pairs, gradient_sum, neighbour_pairs
 from fingerpad.psychophysics.ideal_observer import (
     Discriminability,
     GaussianResponses,
@@ -43,7 +43,7 @@ from fingerpad.psychophysics.sensitivity import (
 
 __all__ = [
     "TASKS", "Discriminability", "EuclideanDistance", "Experiment", "FunctionCloud",
-    "GaussianResponses", "GoodnessOfFit", "GradientSum", "JudgementCounts", "Presentation",
+    "GaussianResponses", "GoodnessOfFit", "GradientSum", "JudgementCounts", "Noise", "Presentation",
     "PsychometricFit", "PsychometricFunction", "ResponseModel", "Sensitivity", "Statistic", "bootstrap",
     "d_prime_of_proportion", "delaunay_pairs", "discriminability", "discriminate_by",
     "efficiency", "fit_noise_sigma", "fit_psychometric", "forced_choice", "gaussian_information",

@@ -1,9 +1,9 @@
 """Codes of a population of afferents, and its noise (paper, section 2.2.3, Figure 3, (a) to (e*)).
 
 Codes apply to any response measure (a rate, a latency) and along the last axis, so thousands of noisy
-populations are evaluated at once. The noise is multiplicative and has keys:
+populations are evaluated at once. The noise is that of `Noise`; the paper's multiplies, r_0 = 0:
 
-    r' = r n,    n ~ Normal(1, sigma_1)                 (a)
+    r' = r + sigma_1 sqrt(r^2 + r_0^2) n,    n ~ Normal(0, 1)        (a)
     S  = sum over receptors and their neighbours of |r'_i - r'_j|    (b), (c)
 
 Each n has the key (seed, trial, receptor, RESPONSE) and a position in that stream, the number of the
@@ -14,7 +14,7 @@ divide the trials; the sums are the same on any number of threads.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Annotated, NamedTuple
 
 import numpy as np
@@ -22,25 +22,27 @@ from numba import njit
 from numpy.typing import ArrayLike
 from scipy.spatial import Delaunay, QhullError, cKDTree
 
-from fingerpad.core.checked import checked
+from fingerpad.core.checked import checked, value_class
 from fingerpad.core.errors import InputError
 from fingerpad.core.random_streams import LARGEST_SEED, Purpose, four_normals, normals
 from fingerpad.core.regions import PATTERNS
 from fingerpad.core.signals import ResponseMap
 from fingerpad.core.threads import in_blocks
 from fingerpad.core.values import (
+    Check,
     Count,
     Finite,
     FloatArray,
     IntArray,
+    NotNegative,
     NotNegativeWhole,
     Positive,
     Whole,
     array,
     choice,
     float_array,
-    not_negative,
-    positive,
+    limits,
+    within,
 )
 
 RESPONSE_MEASURES: dict[str, Callable[[ResponseMap], FloatArray]] = {
@@ -49,6 +51,12 @@ RESPONSE_MEASURES: dict[str, Callable[[ResponseMap], FloatArray]] = {
     "latency": lambda response: response.first_spike_latency_ms,
 }
 """Measures of a response on which spheres are discriminated, by name. [spikes/s or ms]"""
+
+
+def noise_offset(measure: str, offset_hz: float) -> float:
+    """Return the offset of the noise of a measure: that of rates does not hold for a latency."""
+    return 0.0 if measure == "latency" else offset_hz
+
 
 NORMS = ("city-block", "euclidean")
 _BETWEEN_FIRST_AND_SECOND_NEIGHBOUR = {4: 1.5, 6: 0.5 * (1.0 + math.sqrt(3.0)), 8: 1.5}
@@ -133,14 +141,53 @@ def _plane(positions_mm: ArrayLike) -> FloatArray:
     return positions
 
 
+LARGEST_NOISE = 1000.0
+"""Largest standard deviation of noise over the response: with less than this every answer is a guess."""
+
+
+@value_class
+class Noise:
+    """Noise of a response r: its standard deviation is sigma_1 sqrt(r^2 + r_0^2).
+
+    Examples
+    --------
+    >>> Noise(0.1).spread([0.0, 40.0]).tolist(), Noise(0.1, offset=30.0).spread([0.0, 40.0]).tolist()
+    ([0.0, 4.0], [3.0, 5.0])
+    """
+
+    sigma: Annotated[float, limits(0.0, LARGEST_NOISE)]
+    """Standard deviation sigma_1 over the response, where this is much larger than the offset."""
+    offset: NotNegative = 0.0
+    """Response r_0 below which the noise hardly depends on the response; 0, as in the paper, for noise that
+    multiplies. [unit of the response]"""
+
+    def spread(self, responses: ArrayLike) -> FloatArray:
+        """Return the standard deviation of the noise of every response. [unit of the response]"""
+        return self.sigma * np.hypot(responses, self.offset)
+
+
+def noise_of(name: str, noise: float | Noise) -> Noise:
+    """Return a noise, also from the standard deviation of one that multiplies."""
+    return noise if isinstance(noise, Noise) else Noise(within(name, noise, 0.0, LARGEST_NOISE))
+
+
+AnyNoise = Annotated[float | Noise, Check(noise_of, {"type": "number"})]
+"""A noise, or the standard deviation sigma_1 of one that multiplies."""
+
+
 class Measured(NamedTuple):
     """One measure of a population under several stimuli, and the pairs of its receptors that take part."""
 
     responses: FloatArray  #: The standard in the first row, (n_stimuli, n_receptors). [any unit]
     neighbours: IntArray  #: Pairs that the Gradient Sum goes over, (n_pairs, 2).
+    offset: float = 0.0  #: Of the noise, as of `Noise`. [unit of the responses]
+
+    def noise(self, sigma: float) -> Noise:
+        """Return the noise of this measure with a standard deviation sigma_1."""
+        return Noise(sigma, self.offset)
 
 
-def taking_part(responses: ArrayLike, neighbours: ArrayLike) -> Measured:
+def taking_part(responses: ArrayLike, neighbours: ArrayLike, offset: float = 0.0) -> Measured:
     """Leave out the receptors that are silent under one stimulus (docs/decisions/silent-receptors.md).
 
     A receptor that is silent under one stimulus has no latency to compare with its neighbours'. It is left
@@ -149,7 +196,7 @@ def taking_part(responses: ArrayLike, neighbours: ArrayLike) -> Measured:
     table = np.asarray(responses, dtype=np.float64)
     pairs = check_neighbours(neighbours, table.shape[-1] if table.ndim else 0)
     silent = np.asarray(np.isnan(table).any(axis=0))
-    return Measured(np.where(silent, 0.0, table), pairs[~silent[pairs].any(axis=1)])
+    return Measured(np.where(silent, 0.0, table), pairs[~silent[pairs].any(axis=1)], offset)
 
 
 @checked
@@ -232,49 +279,50 @@ def session_trials(session: NotNegativeWhole, *shape: int) -> IntArray:
 
 
 def noisy_responses(
-    responses: FloatArray, noise_sigma: float, seed: int, trials: IntArray, presentations: int
+    responses: FloatArray, noise: Noise, seed: int, trials: IntArray, presentations: int
 ) -> FloatArray:
     draws = normals(seed, trials, responses.shape[1], Purpose.RESPONSE, presentations)
-    return responses[:, np.newaxis] * (1.0 + noise_sigma * draws.transpose(0, 2, 1))
+    return responses[:, np.newaxis] + noise.spread(responses)[:, np.newaxis] * draws.transpose(0, 2, 1)
 
 
 @checked
 def noisy_gradient_sums(
     responses: FloatArray,
     neighbours: ArrayLike,
-    sigmas: FloatArray,
+    noises: Sequence[Noise],
     seed: Whole,
     trials: IntArray,
     presentations: Count,
 ) -> FloatArray:
-    """Gradient sums of noisy presentations, (n_sigmas, *trials.shape, presentations), of the same numbers."""
+    """Gradient sums of noisy presentations, (n_noises, *trials.shape, presentations), of the same numbers."""
     values = np.ascontiguousarray(responses, dtype=np.float64)
     pairs = np.ascontiguousarray(neighbours, dtype=np.int64)
     numbers = np.ascontiguousarray(trials, dtype=np.int64).ravel()
     stimuli = np.repeat(np.arange(trials.shape[0]), trials.shape[1])
-    sums = np.zeros((len(sigmas), numbers.size, presentations))
+    spreads = np.array([noise.spread(values) for noise in noises])
+    sums = np.zeros((len(noises), numbers.size, presentations))
 
     def fill(some: slice) -> None:
-        _fill_sums(values, stimuli[some], pairs, sigmas, seed, numbers[some], sums[:, some])
+        _fill_sums(values, stimuli[some], pairs, spreads, seed, numbers[some], sums[:, some])
 
     in_blocks(fill, numbers.size, _TRIALS_AT_ONCE)
-    return sums.reshape(len(sigmas), *trials.shape, presentations)
+    return sums.reshape(len(noises), *trials.shape, presentations)
 
 
 def shared_noise_gradient_sums(
-    responses: FloatArray, neighbours: ArrayLike, noise_sigma: float, standard_normals: FloatArray
+    responses: FloatArray, neighbours: ArrayLike, noise: Noise, standard_normals: FloatArray
 ) -> FloatArray:
     """Sum the gradients of every stimulus under the same noise."""
     values = np.ascontiguousarray(responses, dtype=np.float64)
     pairs = np.ascontiguousarray(neighbours, dtype=np.int64)
     sums = np.zeros((len(values), len(standard_normals)))
-    _fill_shared(values, pairs, noise_sigma, np.ascontiguousarray(standard_normals.T), sums)
+    _fill_shared(values, pairs, noise.spread(values), np.ascontiguousarray(standard_normals.T), sums)
     return sums
 
 
 @njit(cache=True, nogil=True)
-def _fill_sums(responses, stimuli, pairs, sigmas, seed, trials, sums):  # type: ignore[no-untyped-def]
-    """Add up the sums (n_sigmas, n_trials, presentations) of some trials, a few presentations at a time."""
+def _fill_sums(responses, stimuli, pairs, spreads, seed, trials, sums):  # type: ignore[no-untyped-def]
+    """Add up the sums (n_noises, n_trials, presentations) of some trials, a few presentations at a time."""
     n_receptors, count = responses.shape[1], sums.shape[2]
     draws = np.zeros((n_receptors, _PRESENTATIONS_AT_ONCE))
     noisy = np.empty_like(draws)
@@ -286,13 +334,14 @@ def _fill_sums(responses, stimuli, pairs, sigmas, seed, trials, sums):  # type: 
                     four = four_normals(seed, trials[trial], receptor, _RESPONSE, start // 4 + 1)
                     for k in range(4):  # up to three too many at the end, not used
                         draws[receptor, start - first + k] = four[k]
-            for noise in range(sigmas.size):
-                _multiply(responses[stimuli[trial]], sigmas[noise], draws, noisy)
+            stimulus = stimuli[trial]
+            for noise in range(spreads.shape[0]):
+                _add_noise(responses[stimulus], spreads[noise, stimulus], draws, noisy)
                 _add_gradients(noisy, pairs, sums[noise, trial, first:last])
 
 
 @njit(cache=True, nogil=True)
-def _fill_shared(values, pairs, sigma, standard_normals, sums):  # type: ignore[no-untyped-def]
+def _fill_shared(values, pairs, spreads, standard_normals, sums):  # type: ignore[no-untyped-def]
     """Add up the sums (n_stimuli, n_draws) of responses under given noise (n_receptors, n_draws)."""
     n_receptors, count = standard_normals.shape
     draws = np.zeros((n_receptors, _PRESENTATIONS_AT_ONCE))
@@ -301,15 +350,15 @@ def _fill_shared(values, pairs, sigma, standard_normals, sums):  # type: ignore[
         last = min(first + _PRESENTATIONS_AT_ONCE, count)
         draws[:, : last - first] = standard_normals[:, first:last]
         for stimulus in range(values.shape[0]):
-            _multiply(values[stimulus], sigma, draws, noisy)
+            _add_noise(values[stimulus], spreads[stimulus], draws, noisy)
             _add_gradients(noisy, pairs, sums[stimulus, first:last])
 
 
 @njit(cache=True, nogil=True)
-def _multiply(responses, sigma, draws, noisy):  # type: ignore[no-untyped-def]
+def _add_noise(responses, spreads, draws, noisy):  # type: ignore[no-untyped-def]
     for receptor in range(responses.size):
         for k in range(draws.shape[1]):
-            noisy[receptor, k] = responses[receptor] * (1.0 + sigma * draws[receptor, k])
+            noisy[receptor, k] = responses[receptor] + spreads[receptor] * draws[receptor, k]
 
 
 @njit(cache=True, nogil=True)
@@ -319,17 +368,3 @@ def _add_gradients(noisy, pairs, sums):  # type: ignore[no-untyped-def]
         one, other = noisy[pairs[pair, 0]], noisy[pairs[pair, 1]]
         for k in range(sums.size):
             sums[k] += 2.0 * abs(one[k] - other[k])
-
-
-LARGEST_NOISE = 1000.0
-"""Largest standard deviation of noise over the response: with less than this every answer is a guess."""
-
-
-def checked_noise(noise_sigma: float, above_zero: bool = False) -> float:
-    """Return the standard deviation of multiplicative noise, over the response, as a float."""
-    sigma = (positive if above_zero else not_negative)("noise_sigma", noise_sigma)
-    if sigma > LARGEST_NOISE:
-        raise InputError(
-            "noise_sigma", f"must be at most {LARGEST_NOISE:g} times the response", f"{noise_sigma:g}"
-        )
-    return sigma

@@ -16,10 +16,10 @@ The ideal observer knows the distribution of the responses:
     ln p(r) = -1/2 |L^-1 (r - mu)|^2 - sum ln L_ii - n/2 ln 2 pi,    S = L L^T
 
 The paper's noise multiplies each response by Normal(1, sigma_1): a Gaussian with the standard deviation
-sigma_1 mu_i, which depends on the stimulus as well.
+sigma_1 mu_i, which depends on the stimulus as well; `Noise` may have an offset r_0.
 A noise floor s is added to it where codes are compared with the ideal observer:
 
-    r ~ Normal(mu, (sigma_1 mu)^2 + s^2)
+    r ~ Normal(mu, sigma_1^2 (mu^2 + r_0^2) + s^2)
 
 Without the floor a receptor that responds weakly or not at all has hardly any noise, and one that begins to
 respond identifies the stimulus with certainty (docs/decisions.md#ideal-observer).
@@ -42,7 +42,6 @@ from fingerpad.core.checked import checked, value_class
 from fingerpad.core.errors import InputError
 from fingerpad.core.random_streams import Purpose, normals
 from fingerpad.core.values import (
-    Finite,
     FiniteMatrix,
     FiniteVector,
     FloatArray,
@@ -52,9 +51,10 @@ from fingerpad.core.values import (
     Several,
     Whole,
     float_array,
+    positive,
     vector,
 )
-from fingerpad.psychophysics.encoding import checked_noise, session_trials
+from fingerpad.psychophysics.encoding import AnyNoise, Noise, noise_of, session_trials
 
 SMALLEST_SPREAD = 1.0  # Noise floor s. [spikes/s or ms]
 EFFICIENCY_TRIALS = 4000  # Presentations of either stimulus behind one efficiency.
@@ -132,16 +132,16 @@ class GaussianResponses:
 
 @checked
 def multiplied_responses(
-    responses: ArrayLike, noise_sigma: Finite, smallest_spread: NotNegative = 0.0
+    responses: ArrayLike, noise: AnyNoise, smallest_spread: NotNegative = 0.0
 ) -> GaussianResponses:
-    """Return responses under the paper's noise: each multiplied by its own Normal(1, sigma_1).
+    """Return responses under noise, such as the paper's: each multiplied by its own Normal(1, sigma_1).
 
     Parameters
     ----------
     responses : array_like (n_receptors,)
         Without noise. [any unit]
-    noise_sigma : float
-        Standard deviation sigma_1.
+    noise : float or Noise
+        Standard deviation sigma_1 of noise that multiplies, above 0, or another `Noise`.
     smallest_spread : float, optional
         Standard deviation of further noise that does not depend on the response. [unit of `responses`]
 
@@ -157,14 +157,21 @@ def multiplied_responses(
     [[1.0, 0.0], [0.0, 4.0]]
     """
     values = float_array("responses", responses, 1)
-    sigma = checked_noise(noise_sigma, above_zero=True)
-    if smallest_spread == 0.0 and (values == 0.0).any():
+    spread = _some_noise(noise).spread(values)
+    if smallest_spread == 0.0 and (spread == 0.0).any():
         raise InputError(
-            f"{np.count_nonzero(values == 0.0)} of {values.size} receptors are silent, so multiplicative "
+            f"{np.count_nonzero(spread == 0.0)} of {values.size} receptors are silent, so multiplicative "
             "noise has no effect on them: leave out receptors that no stimulus excites, or give "
             "smallest_spread."
         )
-    return GaussianResponses(values, np.diag(np.square(sigma * values) + smallest_spread**2))
+    return GaussianResponses(values, np.diag(np.square(spread) + smallest_spread**2))
+
+
+def _some_noise(noise: float | Noise) -> Noise:
+    """Return a noise if there is any: without it the ideal observer never fails."""
+    found = noise_of("noise", noise)
+    positive("noise", found.sigma)
+    return found
 
 
 Statistic = Callable[[FloatArray], FloatArray]
@@ -320,11 +327,11 @@ def efficiency(code: Discriminability, ideal: Discriminability) -> tuple[float, 
 
 @checked
 def gaussian_information(
-    responses: ArrayLike, slopes: ArrayLike, noise_sigma: Finite, smallest_spread: NotNegative = 0.0
+    responses: ArrayLike, slopes: ArrayLike, noise: AnyNoise, smallest_spread: NotNegative = 0.0
 ) -> float:
-    """Fisher information J with the paper's noise, the limit of the ideal observer. [1/unit of x squared]
+    """Fisher information J with noise, the limit of the ideal observer. [1/unit of x squared]
 
-        V_i = (sigma_1 mu_i)^2 + s^2
+        V_i = sigma_1^2 (mu_i^2 + r_0^2) + s^2
         J = sum_i mu_i'^2 / V_i + 2 (sigma_1^2 mu_i mu_i' / V_i)^2,    d' -> dx sqrt J,  dx > 0
 
     The second term is the information in the variance, which depends on the mean. Without a noise floor s,
@@ -336,8 +343,8 @@ def gaussian_information(
         mu, not zero unless there is a noise floor. [any unit]
     slopes : array_like (n_receptors,)
         mu', their derivatives by the stimulus x. [that unit per unit of x]
-    noise_sigma : float
-        Standard deviation sigma_1 of the multiplicative noise.
+    noise : float or Noise
+        Standard deviation sigma_1 of noise that multiplies, above 0, or another `Noise`.
     smallest_spread : float, optional
         Noise floor s. [unit of `responses`]
 
@@ -349,8 +356,9 @@ def gaussian_information(
     0.25
     """
     values, rises = float_array("responses", responses, 1), float_array("slopes", slopes, 1)
-    sigma = checked_noise(noise_sigma, above_zero=True)
-    zeros = np.count_nonzero(values == 0.0) if smallest_spread == 0.0 else 0
+    found = _some_noise(noise)
+    spread = found.spread(values)
+    zeros = np.count_nonzero(spread == 0.0) if smallest_spread == 0.0 else 0
     if values.size != rises.size or zeros:
         raise InputError(
             "responses",
@@ -358,13 +366,14 @@ def gaussian_information(
             f"{rises.size} slopes for {values.size} responses, {zeros} of them zero",
             "leave those out or give smallest_spread",
         )
-    variance = np.square(sigma * values) + smallest_spread**2
-    return float((np.square(rises) / variance + 2.0 * np.square(sigma**2 * values * rises / variance)).sum())
+    variance = np.square(spread) + smallest_spread**2
+    of_variance = 2.0 * np.square(found.sigma**2 * values * rises / variance)
+    return float((np.square(rises) / variance + of_variance).sum())
 
 
 @checked
 def noisy_presentations(
-    table: Matrix, noise_sigma: Finite, seed: Whole, session: Whole = 0
+    table: Matrix, noise: AnyNoise, seed: Whole, session: Whole = 0
 ) -> list[Presentation]:
     """Draw responses to the standard and to each comparison.
 
@@ -372,10 +381,10 @@ def noisy_presentations(
     ----------
     table : array (n_stimuli, n_receptors)
         One measure of every receptor without noise, the standard first. [spikes/s or ms]
-    noise_sigma : float
-        Standard deviation sigma_1 of the multiplicative noise, above 0.
+    noise : float or Noise
+        Standard deviation sigma_1 of noise that multiplies, above 0, or another `Noise`.
     seed, session : int
         Of the random numbers.
     """
-    standard, *comparisons = (multiplied_responses(row, noise_sigma, SMALLEST_SPREAD) for row in table)
+    standard, *comparisons = (multiplied_responses(row, noise, SMALLEST_SPREAD) for row in table)
     return [present(standard, comparison, seed, EFFICIENCY_TRIALS, session) for comparison in comparisons]

@@ -2,7 +2,8 @@
 
 Letters in brackets are the steps of Figure 3. Choices where the paper gives no detail:
 
-- Noise multiplies every response by Normal(1, sigma_1), independent for each receptor and presentation.
+- Noise multiplies every response by Normal(1, sigma_1), independent for each receptor and presentation, or
+  has another law of `Noise`.
 - The decision point divides the distance from the standard's mean to the comparison's by the fraction
   beta; a hit is a value beyond it, on the comparison's side.
 - The comparison's side is the sign of the difference of the means over all repetitions. Measures that
@@ -50,10 +51,12 @@ from fingerpad.core.values import (
 from fingerpad.data import protocol, psychophysics
 from fingerpad.psychophysics.encoding import (
     NORMS,
+    AnyNoise,
+    Noise,
     check_neighbours,
-    checked_noise,
     distance,
     gradient_sum,
+    noise_of,
     noisy_gradient_sums,
     noisy_responses,
     session_trials,
@@ -124,21 +127,21 @@ class Encoder(Protocol):
         """Repetitions that decide which random numbers are drawn."""
 
     def values(
-        self, responses: FloatArray, sigmas: FloatArray, seed: int, sizes: tuple[int, ...], session: int
+        self, responses: FloatArray, noises: Sequence[Noise], seed: int, sizes: tuple[int, ...], session: int
     ) -> FloatArray:
-        """Statistics of noisy presentations, (n_sigmas, ...), all from the same random numbers."""
+        """Statistics of noisy presentations, (n_noises, ...), all from the same random numbers."""
 
     def hit_rates(self, values: FloatArray, seed: int, plan: Experiment, session: int) -> FloatArray:
         """Hit rates (hit_rates, n_comparisons) of the statistics of one noise."""
 
     def predictor(
         self, responses: FloatArray, seed: int, plan: Experiment, session: int
-    ) -> Callable[[float], FloatArray]:
+    ) -> Callable[[Noise], FloatArray]:
         """From a noise to mean hit rates (n_comparisons,), for fits of the noise."""
-        return lambda sigma: discriminate_by(self, responses, sigma, seed, plan, session=session).hit_rate
+        return lambda noise: discriminate_by(self, responses, noise, seed, plan, session=session).hit_rate
 
     def of_noisy(
-        self, responses: FloatArray, noise_sigma: float, seed: int, session: int, count: int
+        self, responses: FloatArray, noise: Noise, seed: int, session: int, count: int
     ) -> FloatArray:
         """Statistic of so many noisy presentations of each stimulus, (n_stimuli, count)."""
 
@@ -156,13 +159,13 @@ class GradientSum(Encoder):
         return plan.sums_per_sphere
 
     def values(
-        self, responses: FloatArray, sigmas: FloatArray, seed: int, sizes: tuple[int, ...], session: int
+        self, responses: FloatArray, noises: Sequence[Noise], seed: int, sizes: tuple[int, ...], session: int
     ) -> FloatArray:
         pairs = check_neighbours(self.neighbours, responses.shape[1])
         if not len(pairs):
             raise InputError("neighbours", "must hold at least one pair of receptors", "none")
         trials = session_trials(session, len(responses), sizes[0])
-        return noisy_gradient_sums(responses, pairs, sigmas, seed, trials, sizes[1])  # (a)-(f)
+        return noisy_gradient_sums(responses, pairs, noises, seed, trials, sizes[1])  # (a)-(f)
 
     def hit_rates(self, values: FloatArray, seed: int, plan: Experiment, session: int) -> FloatArray:
         means, spreads = values.mean(axis=-1), values.std(axis=-1, ddof=1)  # (e), of all distributions
@@ -171,14 +174,14 @@ class GradientSum(Encoder):
 
     def predictor(
         self, responses: FloatArray, seed: int, plan: Experiment, session: int
-    ) -> Callable[[float], FloatArray]:
+    ) -> Callable[[Noise], FloatArray]:
         draws = normals(seed, 1, responses.shape[1], Purpose.RESPONSE, NOISE_DRAWS)[0].T
-        return lambda sigma: expected_hit_rates(responses, self.neighbours, sigma, draws, plan.criterion)
+        return lambda noise: expected_hit_rates(responses, self.neighbours, noise, draws, plan.criterion)
 
     def of_noisy(
-        self, responses: FloatArray, noise_sigma: float, seed: int, session: int, count: int
+        self, responses: FloatArray, noise: Noise, seed: int, session: int, count: int
     ) -> FloatArray:
-        return self.values(responses, np.array([noise_sigma]), seed, (1, count), session)[0, :, 0]
+        return self.values(responses, [noise], seed, (1, count), session)[0, :, 0]
 
     def statistic(self, standard: ResponseModel, seed: int, session: int) -> Statistic:
         return lambda responses: gradient_sum(responses, self.neighbours)
@@ -206,17 +209,23 @@ class EuclideanDistance(Encoder):
         return plan.hit_rates, plan.presentations, plan.pairs
 
     def values(
-        self, responses: FloatArray, sigmas: FloatArray, seed: int, sizes: tuple[int, ...], session: int
+        self, responses: FloatArray, noises: Sequence[Noise], seed: int, sizes: tuple[int, ...], session: int
     ) -> FloatArray:
         repetitions, n_sets, n_pairs = sizes
         trials = session_trials(session, repetitions, len(responses))
-        each = [self._distances(responses, sigmas, seed, trial, n_sets, n_pairs) for trial in trials]
+        each = [self._distances(responses, noises, seed, trial, n_sets, n_pairs) for trial in trials]
         return np.stack(each, axis=1)
 
     def _distances(
-        self, values: FloatArray, sigmas: FloatArray, seed: int, trials: IntArray, n_sets: int, n_pairs: int
+        self,
+        values: FloatArray,
+        noises: Sequence[Noise],
+        seed: int,
+        trials: IntArray,
+        n_sets: int,
+        n_pairs: int,
     ) -> FloatArray:
-        """Distances (n_sigmas, n_spheres, pairs) of random sets from sets of the standard (a)-(g*)."""
+        """Distances (n_noises, n_spheres, pairs) of random sets from sets of the standard (a)-(g*)."""
         draws = normals(seed, trials, values.shape[1], Purpose.RESPONSE, n_sets).transpose(0, 2, 1)
         of_standard, of_sphere = _picks(seed, trials, (n_pairs, 2), n_sets).transpose(2, 0, 1)
         # The distance of a set from itself is 0 and has no noise: the standard meets its other sets.
@@ -225,8 +234,8 @@ class EuclideanDistance(Encoder):
         first = draws[0, of_standard]
         second = draws[np.arange(len(values))[:, np.newaxis], of_sphere]
         noisy = (
-            (values[0] * (1.0 + sigma * first), values[:, np.newaxis] * (1.0 + sigma * second))
-            for sigma in sigmas
+            (values[0] + spread[0] * first, values[:, np.newaxis] + spread[:, np.newaxis] * second)
+            for spread in (noise.spread(values) for noise in noises)
         )
         return np.array([distance(*both, self.norm) for both in noisy])
 
@@ -237,10 +246,10 @@ class EuclideanDistance(Encoder):
         return np.heaviside(beyond, 0.5).mean(axis=1)  # (h*)
 
     def of_noisy(
-        self, responses: FloatArray, noise_sigma: float, seed: int, session: int, count: int
+        self, responses: FloatArray, noise: Noise, seed: int, session: int, count: int
     ) -> FloatArray:
         trials = session_trials(session, len(responses))
-        sets = noisy_responses(responses, noise_sigma, seed, trials, 2 * count)
+        sets = noisy_responses(responses, noise, seed, trials, 2 * count)
         # The standard is compared with other presentations of itself.
         return distance(sets[:1, :count], sets[:, count:], self.norm)
 
@@ -261,7 +270,7 @@ ENCODERS: dict[str, Callable[[np.ndarray], Encoder]] = {
 def discriminate_by(
     encoder: Encoder,
     responses: ArrayLike,
-    noise_sigma: Finite,
+    noise: AnyNoise,
     seed: Whole,
     experiment: Experiment | None = None,
     silent_value: Finite | None = None,
@@ -275,8 +284,8 @@ def discriminate_by(
         The code: `GradientSum(neighbours)` or `EuclideanDistance()`.
     responses : array_like (n_stimuli, n_receptors)
         One measure (a rate, a latency) of every receptor; the standard in the first row. [any unit]
-    noise_sigma : float
-        Standard deviation sigma_1 of the multiplicative noise.
+    noise : float or Noise
+        Standard deviation sigma_1 of noise that multiplies, or another `Noise`.
     seed : int
         Of the whole run; the same seed and session give the same result.
     experiment : Experiment, optional
@@ -300,7 +309,7 @@ def discriminate_by(
     >>> discriminate_by(GradientSum([[0, 1]]), responses, 0.02, seed=1).hit_rate.round(1).tolist()
     [0.5, 0.9]
     """
-    observer = noise_sigma, experiment or Experiment()
+    observer = noise, experiment or Experiment()
     return compare_observers(encoder, responses, [observer], seed, silent_value, session)[0]
 
 
@@ -308,7 +317,7 @@ def discriminate_by(
 def compare_observers(
     encoder: Encoder,
     responses: ArrayLike,
-    observers: Sequence[tuple[float, Experiment]],
+    observers: Sequence[tuple[AnyNoise, Experiment]],
     seed: NotNegativeWhole,
     silent_value: Finite | None = None,
     session: Whole = 0,
@@ -316,17 +325,17 @@ def compare_observers(
     """Discriminate under several noises and criteria, which meet the same random numbers, drawn once."""
     values = checked_responses(responses, silent_value)
     found: dict[int, HitRates] = {}
-    alike: dict[tuple[int, ...], dict[float, list[int]]] = {}
-    for number, (noise_sigma, plan) in enumerate(observers):
-        alike.setdefault(encoder.sizes(plan), {}).setdefault(checked_noise(noise_sigma), []).append(number)
-    for sizes, by_sigma in alike.items():
-        sigmas = list(by_sigma)
-        for first in range(0, len(sigmas), _NOISES_AT_ONCE):
-            some = sigmas[first : first + _NOISES_AT_ONCE]
-            drawn = encoder.values(values, np.array(some), seed, sizes, session)
-            for sigma, of_sigma in zip(some, drawn, strict=True):
-                for number in by_sigma[sigma]:
-                    rates = encoder.hit_rates(of_sigma, seed, observers[number][1], session)
+    alike: dict[tuple[int, ...], dict[Noise, list[int]]] = {}
+    for number, (noise, plan) in enumerate(observers):
+        alike.setdefault(encoder.sizes(plan), {}).setdefault(noise_of("noise", noise), []).append(number)
+    for sizes, by_noise in alike.items():
+        noises = list(by_noise)
+        for first in range(0, len(noises), _NOISES_AT_ONCE):
+            some = noises[first : first + _NOISES_AT_ONCE]
+            drawn = encoder.values(values, some, seed, sizes, session)
+            for noise, of_noise in zip(some, drawn, strict=True):
+                for number in by_noise[noise]:
+                    rates = encoder.hit_rates(of_noise, seed, observers[number][1], session)
                     mean, spread = rates.mean(axis=0), rates.std(axis=0, ddof=1)  # over the repetitions (k)
                     found[number] = HitRates(mean, spread, seed, session)
     return [found[number] for number in range(len(observers))]
@@ -440,31 +449,31 @@ class NoiseFit:
 def expected_hit_rates(
     responses: ArrayLike,
     neighbours: ArrayLike,
-    noise_sigma: Finite,
+    noise: AnyNoise,
     standard_normals: FloatArray,
     criterion: Finite = psychophysics.DECISION_CRITERION.value,
 ) -> FloatArray:
     """Predict the mean hit rates of a `GradientSum` without repeating the experiment.
 
     The same standard normal samples are used for every sphere and every noise, so the result is a smooth
-    function of `noise_sigma`, as `fit_noise_sigma` needs.
+    function of the noise, as `fit_noise_sigma` needs.
     """
     values = checked_responses(responses)
     pairs = check_neighbours(neighbours, values.shape[1])
-    sums = shared_noise_gradient_sums(values, pairs, checked_noise(noise_sigma), standard_normals)
+    sums = shared_noise_gradient_sums(values, pairs, noise_of("noise", noise), standard_normals)
     means, spreads = sums.mean(axis=-1), sums.std(axis=-1, ddof=1)
     point = decision_point(means[0], means[1:], criterion)
     return hit_probability(point, means[1:], spreads[1:], side(means[np.newaxis]))
 
 
 @checked
-def expected_euclidean_hit_rates(responses: ArrayLike, noise_sigma: Finite) -> FloatArray:
+def expected_euclidean_hit_rates(responses: ArrayLike, noise: AnyNoise) -> FloatArray:
     """Predict the mean hit rates of an `EuclideanDistance`, city-block, in closed form.
 
     For one receptor the difference of two noisy responses a and b is normal, and its absolute value has
 
         m = s sqrt(2/pi) exp(-d^2 / 2 s^2) + d (1 - 2 Phi(-d/s)),    v = d^2 + s^2 - m^2,
-        d = b - a,    s = sigma_1 sqrt(a^2 + b^2)
+        d = b - a,    s^2 = s_a^2 + s_b^2
 
     as mean and variance (the folded normal distribution). Receptors are independent, so both add up, and
     so do the third central moments,
@@ -476,9 +485,9 @@ def expected_euclidean_hit_rates(responses: ArrayLike, noise_sigma: Finite) -> F
     rates near chance would be 0.02 too high.
     """
     values = checked_responses(responses)
-    sigma = checked_noise(noise_sigma, above_zero=True)
+    spread = noise_of("noise", noise).spread(values)
     d = np.abs(values - values[0])
-    s = np.maximum(sigma * np.hypot(values, values[0]), np.finfo(float).tiny)  # both silent: no difference
+    s = np.maximum(np.hypot(spread, spread[0]), np.finfo(float).tiny)  # both silent: no difference
     x = d / s
     tail, centre = np.sqrt(2.0 / np.pi) * np.exp(-0.5 * np.square(x)), 1.0 - 2.0 * ndtr(-x)
     m, second = s * (tail + x * centre), np.square(d) + np.square(s)

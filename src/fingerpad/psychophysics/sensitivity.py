@@ -45,6 +45,7 @@ from fingerpad.core.values import (
     choice,
     whole,
 )
+from fingerpad.psychophysics.encoding import Noise
 from fingerpad.psychophysics.observer import expected_hit_rates
 
 CORRECTIONS = ("log-linear", "half", "none")
@@ -260,7 +261,7 @@ class InterpolatedObserver:
     levels: FloatArray  #: Of the stimuli whose responses are known, increasing, (n_levels,).
     table: FloatArray  #: Responses to these, (n_levels, n_receptors).
     neighbours: IntArray  #: Pairs of the Gradient Sum, (n_pairs, 2).
-    noise_sigma: float  #: Standard deviation of the multiplicative noise.
+    noise: float | Noise  #: Of the responses; a number for noise that multiplies.
     draws: FloatArray  #: Common random presentations, (n_draws, n_receptors).
 
     @cached_property
@@ -281,7 +282,7 @@ class InterpolatedObserver:
 
     def hit_rate(self, standard: float, comparison: float) -> float:
         pair = [self.responses(standard), self.responses(comparison)]
-        return float(expected_hit_rates(pair, self.neighbours, self.noise_sigma, self.draws)[0])
+        return float(expected_hit_rates(pair, self.neighbours, self.noise, self.draws)[0])
 
     def difference(self, standard: float, proportion: float = 0.75) -> float:
         """Return how much higher a level must be for that hit rate; NaN if it is beyond the highest."""

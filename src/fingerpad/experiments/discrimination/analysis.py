@@ -28,7 +28,7 @@ from fingerpad.experiments.runner import Manifest, Runner
 from fingerpad.psychophysics.curve import binomial_interval
 from fingerpad.psychophysics.curve_fit import fit_psychometric
 from fingerpad.psychophysics.curve_uncertainty import bootstrap, posterior
-from fingerpad.psychophysics.encoding import RESPONSE_MEASURES, Measured, taking_part
+from fingerpad.psychophysics.encoding import RESPONSE_MEASURES, Measured, Noise, noise_offset, taking_part
 from fingerpad.psychophysics.ideal_observer import (
     EFFICIENCY_TRIALS,
     SMALLEST_SPREAD,
@@ -252,7 +252,10 @@ def analyse(task: DiscriminationRequest, skins: Mapping[str, Skin]) -> TaskResul
             f"afferents responds to {_named(stimuli, next(iter(silent.values())))}, so that there is no hit "
             "rate; indent deeper, or place the population below the stimuli."
         )
-    encoded = {measure: taking_part(table, task.neighbours) for measure, table in tables.items()}
+    encoded = {
+        measure: taking_part(table, task.neighbours, noise_offset(measure, task.population.noise_offset_hz))
+        for measure, table in tables.items()
+    }
     noise = _noise(task, encoded, silent)
     settings, population = task.afferents, task.population
     return TaskResult(
@@ -299,9 +302,10 @@ def _noise(
             f"{_named(task.pressed, silent[measure])}; give a number, or another measure first."
         )
     rows, observed = [row - 1 for row in points], list(points.values())
-    (table, neighbours), settings = encoded[measure], task.experiment
-    predict = ENCODERS[code](neighbours).predictor(table, settings.seed, settings.plan, SESSION)
-    fit = fit_noise_sigma(lambda sigma: predict(sigma)[rows], observed)
+    measured, settings = encoded[measure], task.experiment
+    encoder = ENCODERS[code](measured.neighbours)
+    predict = encoder.predictor(measured.responses, settings.seed, settings.plan, SESSION)
+    fit = fit_noise_sigma(lambda sigma: predict(measured.noise(sigma))[rows], observed)
     return TaskNoise(
         sigma=fit.noise_sigma,
         fitted_to=FittedNoise(
@@ -323,8 +327,10 @@ def _decodings(
     if silent.size:
         names = tuple(task.pressed[row].name for row in silent)
         return [Decoding(code=code, measure=measure, silent=names) for code in codes]
-    shown = noisy_presentations(encoded[0], sigma, seed, EFFICIENCY_SESSION) if sigma > 0.0 else []
-    return [_decoding(task, code, measure, encoded, sigma, shown) for code in codes]
+    noise, shown = encoded.noise(sigma), []
+    if sigma > 0.0:
+        shown = noisy_presentations(encoded.responses, noise, seed, EFFICIENCY_SESSION)
+    return [_decoding(task, code, measure, encoded, noise, shown) for code in codes]
 
 
 def _decoding(
@@ -332,10 +338,10 @@ def _decoding(
     code: str,
     measure: str,
     encoded: Measured,
-    sigma: float,
+    noise: Noise,
     shown: list[Presentation],
 ) -> Decoding:
-    settings, (table, neighbours) = task.experiment, encoded
+    settings, table = task.experiment, encoded.responses
     if code == IDEAL:
         best = np.array([presentation.ideal_hit_rate() for presentation in shown])
         decoding = Decoding(
@@ -346,9 +352,9 @@ def _decoding(
             d_prime=np.array([presentation.ideal().d_prime for presentation in shown]),
         )
     else:
-        encoder = ENCODERS[code](neighbours)
-        rates = discriminate_by(encoder, table, sigma, settings.seed, settings.plan, session=SESSION)
-        values = encoder.of_noisy(table, sigma, settings.seed, SESSION, SHOWN_PRESENTATIONS)
+        encoder = ENCODERS[code](encoded.neighbours)
+        rates = discriminate_by(encoder, table, noise, settings.seed, settings.plan, session=SESSION)
+        values = encoder.of_noisy(table, noise, settings.seed, SESSION, SHOWN_PRESENTATIONS)
         decoding = Decoding(
             code=code,
             measure=measure,
@@ -357,7 +363,7 @@ def _decoding(
             statistic=TaskStatistic(mean=values.mean(axis=1), sd=values.std(axis=1, ddof=1)),
         )
         if shown:
-            standard = multiplied_responses(table[0], sigma, SMALLEST_SPREAD)
+            standard = multiplied_responses(table[0], noise, SMALLEST_SPREAD)
             statistic = encoder.statistic(standard, settings.seed, EFFICIENCY_SESSION)
             found = [presentation.of(statistic) for presentation in shown]
             shares = [efficiency(one, each.ideal()) for one, each in zip(found, shown, strict=True)]

@@ -36,6 +36,7 @@ from fingerpad.psychophysics.encoding import (
     Measured,
     gradient_sum,
     neighbour_pairs,
+    noise_offset,
     taking_part,
 )
 from fingerpad.psychophysics.observer import (
@@ -264,12 +265,17 @@ def discriminate_spheres(
         ]
         for name, read in RESPONSE_MEASURES.items()
     }
-    encoded = {name: [taking_part(table, neighbours) for table in both] for name, both in tables.items()}
+    encoded = {
+        name: [
+            taking_part(table, neighbours, noise_offset(name, population.noise_offset_hz)) for table in both
+        ]
+        for name, both in tables.items()
+    }
     # A measure without responses has no hit rate and is left out.
     measures = {
         name: both
         for name, both in encoded.items()
-        if name == "static" or all(len(pairs) and table.any() for table, pairs in both)
+        if name == "static" or all(len(one.neighbours) and one.responses.any() for one in both)
     }
     draws = draws_of(population, seed)
     noise = fit_noise_to_goodwin(partial(expected_of_measure, measures["static"], draws))
@@ -326,7 +332,9 @@ def goodwin_misfit(hit_rates: FloatArray, axis: int | tuple[int, ...] | None = N
 
 def expected_of_measure(measures: Sequence[Measured], draws: FloatArray, noise_sigma: float) -> FloatArray:
     """Return the expected hit rates (n_positions, n_comparisons) of the Gradient Sum."""
-    return np.array([expected_hit_rates(*one, noise_sigma, draws) for one in measures])
+    return np.array(
+        [expected_hit_rates(one.responses, one.neighbours, one.noise(noise_sigma), draws) for one in measures]
+    )
 
 
 def fit_noise_to_goodwin(hit_rates: HitRatesOfNoise) -> NoiseFit:
@@ -363,19 +371,21 @@ def _judge(
 ) -> dict[str, HitRates]:
     """Hit rates of every observer at one position in one session."""
     static, usual = measures["static"], Experiment()
-    plans = {"static": (noise_sigma, usual)} | {f"sigma_{sigma:g}": (sigma, usual) for sigma in SWEPT_NOISE}
-    plans["ten_matrices"] = noise_sigma, Experiment(presentations=FEW)
+    noise = static.noise(noise_sigma)
+    plans = {"static": (noise, usual)}
+    plans |= {f"sigma_{sigma:g}": (static.noise(sigma), usual) for sigma in SWEPT_NOISE}
+    plans["ten_matrices"] = noise, Experiment(presentations=FEW)
     for sigma in CRITERION_SIGMAS:
-        plans[f"criterion_{sigma:g}"] = noise_sigma, Experiment(criterion_sigma=sigma)
+        plans[f"criterion_{sigma:g}"] = noise, Experiment(criterion_sigma=sigma)
     code, asked = GradientSum(static.neighbours), list(plans.values())
     found = compare_observers(code, static.responses, asked, seed, session=session)
     rates = dict(zip(plans, found, strict=True))
-    others: dict[str, tuple[Encoder, FloatArray]] = {
-        name: (GradientSum(one.neighbours), one.responses) for name, one in measures.items()
+    others: dict[str, tuple[Encoder, Measured]] = {
+        name: (GradientSum(one.neighbours), one) for name, one in measures.items() if name != "static"
     }
-    others["euclidean"] = EuclideanDistance(), others.pop("static")[1]
-    for name, (encoder, responses) in others.items():
-        rates[name] = discriminate_by(encoder, responses, noise_sigma, seed, session=session)
+    others["euclidean"] = EuclideanDistance(), static
+    for name, (encoder, one) in others.items():
+        rates[name] = discriminate_by(encoder, one.responses, one.noise(noise_sigma), seed, session=session)
     return rates
 
 
@@ -383,9 +393,9 @@ def _unsteady(
     measures: Mapping[str, Measured], noise_sigma: float, seed: int, session: int
 ) -> dict[int, float]:
     """How much the mean of few and of many hit rates varies (1 sd) between picks of the same sums."""
-    code, usual = GradientSum(measures["static"].neighbours), Experiment()
-    sigmas = np.array([noise_sigma])
-    (sums,) = code.values(measures["static"].responses, sigmas, seed, code.sizes(usual), session)
+    static, usual = measures["static"], Experiment()
+    code, noises = GradientSum(static.neighbours), [static.noise(noise_sigma)]
+    (sums,) = code.values(static.responses, noises, seed, code.sizes(usual), session)
     # Session numbers far beyond those of the study: no other step uses their random numbers.
     again = [session * 1000 + 1_000_000 + repeat for repeat in range(AGAIN)]
     found = {}
@@ -456,11 +466,11 @@ def discrepancy_analysis(
         name: partial(expected_of_measure, both, draws) for name, both in measures.items()
     }
     codes["euclidean"] = apart = lambda sigma: np.array(
-        [expected_euclidean_hit_rates(one.responses, sigma) for one in measures["static"]]
+        [expected_euclidean_hit_rates(one.responses, one.noise(sigma)) for one in measures["static"]]
     )
     static, paper_noise = measures["static"][0], psychophysics.NOISE_SIGMA.value
     # The mean error bar for each quantity that the criterion may multiply.
-    given = GradientSum(static.neighbours), static.responses, noise_sigma, seed
+    given = GradientSum(static.neighbours), static.responses, static.noise(noise_sigma), seed
     bars = {
         moves: [
             discriminate_by(*given, Experiment(criterion_sigma=sigma, criterion_moves=moves)).hit_rate_sd
@@ -503,7 +513,7 @@ def rise_needed(measured: Measured, noise_sigma: float, draws: FloatArray) -> fl
         return np.array([standard, standard + way * (farthest - standard)])
 
     def missed(way: float) -> float:
-        hit_rates = expected_hit_rates(pair(way), measured.neighbours, noise_sigma, draws)
+        hit_rates = expected_hit_rates(pair(way), measured.neighbours, measured.noise(noise_sigma), draws)
         return float(hit_rates[0]) - HIT_RATES[-1]
 
     if np.array_equal(standard, farthest) or missed(STEEPEST) < 0.0:
@@ -525,7 +535,7 @@ def _readings(
     early = [np.where(latency <= PATIENCE_MS, latency, np.nan) for latency in latency_ms]
     found = {
         USED["static"]: list(measures["static"]),
-        "static, four neighbours": [Measured(one.responses, four) for one in measures["static"]],
+        "static, four neighbours": [one._replace(neighbours=four) for one in measures["static"]],
         USED["dynamic"]: list(measures.get("dynamic", [])),
         USED["latency"]: list(measures.get("latency", [])),
         "latency of receptors that fire within the ramp under every sphere": [
@@ -539,7 +549,7 @@ def _readings(
             for latency in latency_ms
         ],
     }
-    return {name: both for name, both in found.items() if both and all(len(pairs) for _, pairs in both)}
+    return {name: both for name, both in found.items() if both and all(len(one.neighbours) for one in both)}
 
 
 def _interpretation(
@@ -551,7 +561,7 @@ def _interpretation(
     return Interpretation(
         reading=name,
         receptors=np.array([len(np.unique(one.neighbours)) for one in both]),
-        rise=np.array([_rise(*one) for one in both]),
+        rise=np.array([_rise(one.responses, one.neighbours) for one in both]),
         largest_shift=float(np.abs(aside - here).max()),
         **own_noise(rates),
     )

@@ -11,16 +11,20 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from functools import partial
 
 import numpy as np
 
 from fingerpad.core.checked import result_class
 from fingerpad.core.errors import ConvergenceError
-from fingerpad.core.values import Number, Vector
+from fingerpad.core.values import FloatArray, Number, Vector
 from fingerpad.data import psychophysics
 from fingerpad.experiments.conditions import CURVATURES, Conditions, Touch
-from fingerpad.experiments.gerling2014.percept import CENTRE_MM, GOODWIN_CURVATURES, draws_of
+from fingerpad.experiments.gerling2014.percept import (
+    CENTRE_MM,
+    GOODWIN_CURVATURES,
+    draws_of,
+    expected_of_measure,
+)
 from fingerpad.neuron.afferent import Afferent
 from fingerpad.neuron.population import Population
 from fingerpad.psychophysics import (
@@ -30,9 +34,9 @@ from fingerpad.psychophysics import (
     posterior,
     yes_no,
 )
-from fingerpad.psychophysics.encoding import neighbour_pairs
+from fingerpad.psychophysics.encoding import Measured, Noise, neighbour_pairs
 from fingerpad.psychophysics.ideal_observer import SMALLEST_SPREAD
-from fingerpad.psychophysics.observer import expected_hit_rates, fit_noise_sigma
+from fingerpad.psychophysics.observer import fit_noise_sigma
 from fingerpad.psychophysics.sensitivity import InterpolatedObserver
 from fingerpad.skin.sampling import SkinResponse
 
@@ -114,13 +118,14 @@ def curvature_thresholds(
         sigma = noise_sigma
         if name != "paper":
             table = static[np.searchsorted(curvatures, (CURVATURES[0], *GOODWIN_CURVATURES))]
-            predicted = partial(expected_hit_rates, table, neighbours, standard_normals=draws)
+            measured = Measured(table, neighbours, population.noise_offset_hz)
             try:
-                sigma = fit_noise_sigma(predicted).noise_sigma
+                sigma = _fitted_noise(measured, draws)
             except ConvergenceError as error:
                 sigma, missed = math.nan, [MissingThreshold(standard_per_m=None, why_not=str(error))]
-        observer = InterpolatedObserver(curvatures, static, neighbours, sigma, draws)
         for standard in STANDARDS_PER_M if math.isfinite(sigma) else ():
+            noise = Noise(sigma, population.noise_offset_hz)
+            observer = InterpolatedObserver(curvatures, static, neighbours, noise, draws)
             try:
                 standards.append(threshold_at(observer, standard))
             except ConvergenceError as error:
@@ -144,6 +149,11 @@ def curvature_thresholds(
     )
 
 
+def _fitted_noise(measured: Measured, draws: FloatArray) -> float:
+    """Noise for which the hit rates at Goodwin's points are closest to people's."""
+    return fit_noise_sigma(lambda sigma: expected_of_measure([measured], draws, sigma)[0]).noise_sigma
+
+
 def threshold_at(observer: InterpolatedObserver, standard_per_m: float) -> CurvatureThreshold:
     """Find the just noticeable difference at a standard, and the result of an experiment there."""
     jnd_per_m, farthest = observer.difference(standard_per_m, PROPORTION), observer.highest
@@ -157,7 +167,7 @@ def threshold_at(observer: InterpolatedObserver, standard_per_m: float) -> Curva
     counts = np.round(JUDGEMENTS * hit_rate)
     fit = fit_psychometric(steps, counts, np.full(steps.size, JUDGEMENTS), sigmoid="weibull", lapse=0.0)
     rates, slopes = observer.responses(standard_per_m), observer.slopes(standard_per_m)
-    information = gaussian_information(rates, slopes, observer.noise_sigma, SMALLEST_SPREAD)
+    information = gaussian_information(rates, slopes, observer.noise, SMALLEST_SPREAD)
     ideal_jnd_per_m = d_prime_of_proportion(PROPORTION, yes_no) / np.sqrt(information)
     return CurvatureThreshold(
         standard_per_m=standard_per_m,

@@ -115,7 +115,8 @@ class AfferentSettings(Part):
     adapting_share: Share | None = None
     adapting_ms: Positive | None = None
     end_organs: Count | None = None
-    reach_mm: NotNegative | None = None  #: As of `fingerpad.Afferent`.
+    reach_mm: NotNegative | None = None
+    noise_offset_hz: NotNegative | None = None  #: As of `fingerpad.Afferent`.
 
 
 def _form_of_afferent(value: Any) -> str:

@@ -18,7 +18,8 @@ from fingerpad.experiments.discrimination.analysis import SESSION, silent_stimul
 from fingerpad.experiments.requests.afferents import population_neighbours
 from fingerpad.experiments.requests.touch import estimate_press
 from fingerpad.experiments.sweep.request import ObserverSettings, SweepRequest
-from fingerpad.psychophysics.encoding import taking_part
+from fingerpad.neuron.population import Population
+from fingerpad.psychophysics.encoding import noise_offset, taking_part
 from fingerpad.psychophysics.observer import ENCODERS, compare_observers
 from fingerpad.skin.fields import FIELDS, Place, stored_fields, watched_elements
 from fingerpad.skin.sampling import SkinResponse
@@ -120,29 +121,29 @@ def observe(
     along, _ = sweep.stimuli_axis(observers[0])
     found = np.full((*sweep.shape, len(observers)), np.nan)
     by_stimulus = np.moveaxis(found, along, -2)
-    known: dict[str, tuple[IntArray, int]] = {}
+    known: dict[str, tuple[IntArray, Population]] = {}
     for place in np.ndindex(by_stimulus.shape[:-2]):
         index = (*place[:along], slice(None), *place[along:])
         if done[index].all():
-            pairs, count = _neighbours(sweep, index, along, known)
-            tables = {name: values[index][:, :count] for name, values in responses.items()}
-            by_stimulus[place] = _group(sweep, tables, pairs, observers)
+            pairs, population = _neighbours(sweep, index, along, known)
+            tables = {name: values[index][:, : len(population)] for name, values in responses.items()}
+            by_stimulus[place] = _group(sweep, tables, pairs, population, observers)
         on_finished()
     return found.reshape(*sweep.shape, *sweep.observer_shape)
 
 
 def _neighbours(
-    sweep: SweepRequest, index: Sequence[int | slice], along: int, known: dict[str, tuple[IntArray, int]]
-) -> tuple[IntArray, int]:
-    """Pairs of neighbours and number of receptors of a group; found once for equal afferents."""
+    sweep: SweepRequest,
+    index: Sequence[int | slice],
+    along: int,
+    known: dict[str, tuple[IntArray, Population]],
+) -> tuple[IntArray, Population]:
+    """Pairs of neighbours and population of a group; found once for equal afferents."""
     place = [0 if number == along else int(where) for number, where in enumerate(index)]  # type: ignore[arg-type]
     described = sweep.described(int(np.ravel_multi_index(place, sweep.shape)))
     key = f"{described.finger!r} {described.afferents!r}"
     if key not in known:
-        known[key] = (
-            population_neighbours(described.afferents, described.population),
-            len(described.population),
-        )
+        known[key] = (population_neighbours(described.afferents, described.population), described.population)
     return known[key]
 
 
@@ -150,6 +151,7 @@ def _group(
     sweep: SweepRequest,
     tables: Mapping[str, FloatArray],
     pairs: IntArray,
+    population: Population,
     observers: Sequence[ObserverSettings],
 ) -> FloatArray:
     """Hit rates of all observers of one group, (n_stimuli, n_observers)."""
@@ -167,9 +169,10 @@ def _group(
         if silent_stimuli(table, measure, latest_ms).size:
             continue
         order = np.concatenate([[standard], np.delete(np.arange(n_stimuli), standard)])
-        encoded, neighbours = taking_part(table[order], pairs)
-        plans = [(observers[n].noise, observers[n].experiment.plan) for n in numbers]
-        hits = compare_observers(ENCODERS[code](neighbours), encoded, plans, seed, session=SESSION)
+        encoded = taking_part(table[order], pairs, noise_offset(measure, population.noise_offset_hz))
+        plans = [(encoded.noise(observers[n].noise), observers[n].experiment.plan) for n in numbers]
+        code_of_pairs = ENCODERS[code](encoded.neighbours)
+        hits = compare_observers(code_of_pairs, encoded.responses, plans, seed, session=SESSION)
         for number, each in zip(numbers, hits, strict=True):
             found[order[1:], number] = each.hit_rate
     return found
