@@ -27,10 +27,10 @@ _LABORATORY = (published.LABORATORY_EPIDERMIS_SHEAR,)
 
 ELASTICITY: dict[str, tuple[Numbers, ...]] = {
     "human": (
-        (published.HUMAN_STRATUM_CORNEUM_SHEAR,),
-        (published.HUMAN_LIVING_EPIDERMIS_SHEAR,),
-        (published.HUMAN_DERMIS_SHEAR,),
-        (published.HUMAN_SUBCUTIS_SHEAR,),
+        (published.HUMAN_STRATUM_CORNEUM,),
+        (published.HUMAN_LIVING_EPIDERMIS,),
+        (published.HUMAN_DERMIS,),
+        (published.HUMAN_SUBCUTIS,),
     ),
     "paper": (_SOFT, _SOFT, *_IDENTIFIED),
     "trial1": (_SOFT, _SOFT, *_MAENO),
@@ -46,12 +46,6 @@ ELASTICITY: dict[str, tuple[Numbers, ...]] = {
         _LABORATORY,
         (published.LABORATORY_DERMIS_SHEAR,),
         (published.LABORATORY_SUBCUTIS_SHEAR,),
-    ),
-    "stiffening": (
-        (published.STIFFENING_STRATUM_CORNEUM,),
-        (published.STIFFENING_LIVING_EPIDERMIS,),
-        (published.STIFFENING_DERMIS,),
-        (published.STIFFENING_SUBCUTIS,),
     ),
 }  # Published numbers behind the moduli of every layer of every set, from the skin inwards.
 

@@ -80,22 +80,12 @@ def _paper() -> Tissues:
 
 
 def _human() -> Tissues:
-    layers = (
-        published.HUMAN_STRATUM_CORNEUM_SHEAR,
-        published.HUMAN_LIVING_EPIDERMIS_SHEAR,
-        published.HUMAN_DERMIS_SHEAR,
-        published.HUMAN_SUBCUTIS_SHEAR,
-    )
-    return Tissues(*(_shear(shear, LONG_TERM) for shear in layers))
-
-
-def _stiffer_under_load() -> Tissues:
     """Layers whose energy has a term in (I1 - 3)², by which they stiffen where they are strained."""
     layers = (
-        published.STIFFENING_STRATUM_CORNEUM,
-        published.STIFFENING_LIVING_EPIDERMIS,
-        published.STIFFENING_DERMIS,
-        published.STIFFENING_SUBCUTIS,
+        published.HUMAN_STRATUM_CORNEUM,
+        published.HUMAN_LIVING_EPIDERMIS,
+        published.HUMAN_DERMIS,
+        published.HUMAN_SUBCUTIS,
     )
     return Tissues(*(_polynomial(layer, LONG_TERM) for layer in layers))
 
@@ -107,7 +97,7 @@ def _laboratory() -> Tissues:
 
 
 TISSUES: dict[str, Callable[[], Tissues]] = {
-    # One set for deflection, force, firing and percept; compressive stress drives both terms.
+    # One set for deflection, force, firing and percept, with an afferent of its own.
     "human": _human,
     # Closest to the paper's printed numbers; strain energy density drives both terms.
     "paper": _paper,
@@ -134,8 +124,6 @@ TISSUES: dict[str, Callable[[], Tissues]] = {
     ),
     # Neo-Hookean fit of this fingertip, published later by the authors' laboratory.
     "gerling2014_fit": _laboratory,
-    # Layers that stiffen, for deep touches and small bodies; von Mises stress drives the static term.
-    "stiffening": _stiffer_under_load,
 }
 
 

@@ -60,6 +60,17 @@ class AnyAfferent(Follows, Protocol):
         """Simulate the spikes at every site."""
 
 
+_AS_IN_THE_PAPER: dict[str, Any] = {
+    "dynamic_quantity": STORED_ENERGY,
+    "static_quantity": STORED_ENERGY,
+    "adapting_share": 0.0,
+    "end_organs": 1,
+    "reach_mm": 0.0,
+    "noise_offset_hz": 0.0,
+}
+"""What the paper's afferent has in the place of our extensions."""
+
+
 def checked_afferent(afferent: AnyAfferent) -> AnyAfferent:
     """Return an afferent, or raise `InputError` if it is none: a class without parameters, for example."""
     needed = "dynamic_quantity", "static_quantity", "spikes"
@@ -101,7 +112,7 @@ class Afferent:
 
     This is the model of the paper, without a low pass; `SAI()` has one and is also right under vibration.
     The defaults are the fit with the default tissues, `human`, to the recordings under the shifted bar and to
-    two hit rates of people (`fingerpad.data.neuron`, names that begin with HUMAN). They hold for the finger
+    areas of receptive fields (`fingerpad.data.neuron`, names that begin with HUMAN). They hold for the finger
     and the tissues with which they were fitted; `for_tissues` has those of other sets.
 
     Examples
@@ -125,11 +136,11 @@ class Afferent:
     capacitance_mf: Finite = neuron.CAPACITANCE.value  #: Capacitance of the membrane, C. [mF]
     threshold_mv: Finite = neuron.THRESHOLD.value  #: Potential that elicits a spike, v. [mV]
     refractory_ms: Finite = neuron.REFRACTORY.value  #: Refractory period after each spike. [ms]
-    dynamic_quantity: SkinQuantity = neuron.HUMAN_QUANTITY
-    static_quantity: SkinQuantity = neuron.HUMAN_QUANTITY
-    """What the two terms follow, by the names of `SkinResponse.sample`: compressive stress, unless another
-    one is given. The paper's is strain energy density (SED), "stored"; any other is an extension of its
-    model. The units of k_d and k_s depend on them."""
+    dynamic_quantity: SkinQuantity = neuron.HUMAN_DYNAMIC_QUANTITY
+    static_quantity: SkinQuantity = neuron.HUMAN_STATIC_QUANTITY
+    """What the two terms follow, by the names of `SkinResponse.sample`: strain energy density (SED), "stored",
+    and von Mises stress, unless others are given. The paper's is SED in both; any other is an extension
+    of its model. The units of k_d and k_s depend on them."""
     initial_mv: Finite | None = None
     """Potential of the membrane at the start. By default that at rest, beta tau/C, so that spikes do not
     depend on how long nothing happened before a touch. [mV]"""
@@ -137,15 +148,15 @@ class Afferent:
     """Time constant tau_s of a low pass before the dynamic term, which then follows the absolute rate of S
     with tau_s dS/dt + S = Q; 0, as in the paper, for none. It makes an afferent right under vibration: the
     rate of change of a fast one would otherwise make it as sensitive at 400 Hz as at 20 Hz. [ms]"""
-    adapting_share: Share = 0.0
+    adapting_share: Share = neuron.HUMAN_ADAPTING_SHARE.value
     """Share a of the static term P that is lost while it lasts, as the generator current of Merkel cells
     adapts: k_s (P - a R) with tau_a dR/dt + R = P. The paper's does not adapt. [1]"""
-    adapting_ms: Positive = 200.0  #: Time constant of that loss, tau_a. [ms]
-    end_organs: Count = 1
-    reach_mm: NotNegative = 0.0
+    adapting_ms: Positive = neuron.HUMAN_ADAPTING_TIME.value  #: Time constant of that loss, tau_a. [ms]
+    end_organs: Count = int(neuron.HUMAN_END_ORGANS.value)
+    reach_mm: NotNegative = neuron.HUMAN_REACH.value
     """End organs of each afferent of a population, and the radius of the disc that they fill, as of
     `EndOrgans.about`. The paper's afferent has one. [mm]"""
-    noise_offset_hz: NotNegative = 0.0
+    noise_offset_hz: NotNegative = neuron.HUMAN_NOISE_OFFSET.value
     """Rate r_0 below which the rates vary between trials by an amount that hardly depends on them, as the
     numbers of spikes in recordings do: `fingerpad.psychophysics.Noise`. The paper's noise multiplies.
     [spikes/s]"""
@@ -164,32 +175,24 @@ class Afferent:
         Parameters
         ----------
         tissues : str or Tissues
-            "human", the default afferent, driven by compressive stress; "stiffening", with several end organs
-            and adaptation, driven by von Mises stress and the rate of strain energy density (SED); "paper" or
-            "trial3", driven by SED. Its membrane starts at 0, as the paper prints, and not at rest.
+            "human", the default afferent; "paper" or "trial3", driven by SED, with one end organ and without
+            adaptation. Its membrane starts at 0, as the paper prints, and not at rest.
             For any other name and for tissues of your own, no afferent was fitted; the one of "trial3" is
             returned.
 
         Examples
         --------
         >>> Afferent.for_tissues("human").static_quantity, Afferent.for_tissues("paper").static_quantity
-        ('compressive_stress', 'stored')
+        ('von_mises', 'stored')
         >>> Afferent.for_tissues("human") == Afferent()
         True
         """
         known = tissues if isinstance(tissues, str) else ""
         if known == "human":
             return cls()
-        if known == "stiffening":
-            numbers = {name: getattr(neuron, number).value for name, number in neuron.stiffening.items()}
-            numbers["end_organs"] = int(numbers["end_organs"])
-            return cls(**numbers, dynamic_quantity=STORED_ENERGY, static_quantity="von_mises")
         fitted = neuron.fitted["paper" if known == "paper" else "trial3"]
         return cls.from_parameters(
-            [getattr(neuron, name).value for name in fitted],
-            dynamic_quantity=STORED_ENERGY,
-            static_quantity=STORED_ENERGY,
-            initial_mv=neuron.PAPER_INITIAL.value,
+            [getattr(neuron, name).value for name in fitted], initial_mv=neuron.PAPER_INITIAL.value
         )
 
     @classmethod
@@ -202,7 +205,8 @@ class Afferent:
             beta [mA], k_d [mA ms/kPa], k_s [mA/kPa], tau [ms], C [mF], v [mV]: the order of
             `PARAMETER_NAMES`.
         **others
-            Any other field of `Afferent`.
+            Any other field of `Afferent`; what is absent is as in the paper: SED drives both terms, one end
+            organ, no adaptation, noise that multiplies.
 
         Examples
         --------
@@ -214,7 +218,7 @@ class Afferent:
             raise InputError(
                 "parameters", f"must hold {', '.join(PARAMETER_NAMES)}", f"{values.size} numbers"
             )
-        return cls(**dict(zip(PARAMETER_NAMES, values.tolist(), strict=True)), **others)
+        return cls(**dict(zip(PARAMETER_NAMES, values.tolist(), strict=True)), **(_AS_IN_THE_PAPER | others))
 
     @property
     def parameters(self) -> FloatArray:

@@ -49,6 +49,9 @@ CHECKED_SITES = 9  # Sites along and across at which errors are measured.
 
 EXPONENTS = tuple(0.05 * n for n in range(17))
 
+KEPT = ("compressive_stress", neuron.HUMAN_DYNAMIC_QUANTITY, neuron.HUMAN_STATIC_QUANTITY)
+"""What a reduced touch keeps by default: pressure, which RA follows too, and what the default SAI follows."""
+
 STREAM_MS = 5.0  # Longest step of the stream while errors are measured. [ms]
 
 Solve = Callable[[Sequence[Touch], str], list[SkinResponse]]
@@ -59,7 +62,7 @@ Solve = Callable[[Sequence[Touch], str], list[SkinResponse]]
 def reduce_touch(
     training: ReducedTraining,
     solve: Solve | None = None,
-    quantities: Sequence[str] = (neuron.HUMAN_QUANTITY, STORED_ENERGY),
+    quantities: Sequence[str] = KEPT,
     calibration: NotNegativeWhole = 20,
     seed: NotNegativeWhole = 1,
 ) -> ReducedModel:

@@ -353,8 +353,7 @@ def indent(*args: Any, **given: Any) -> SkinResponse:
     stimulus : RampAndHold, ForceRampAndHold or Trajectory, optional
         The motion, by depth or by force; the paper's by default.
     tissues : str or Tissues
-        "human" (one set for deflection, force, firing and percept), "stiffening" (layers that stiffen, for
-        deep touches and small bodies), "paper" (closest to the paper's numbers),
+        "human" (one set for deflection, force, firing and percept), "paper" (closest to the paper's numbers),
         "trial1", "trial2", "trial3" (paper, section 2.2.1), "trial2_wu", "trial3_wu",
         "trial3_stiffening", "maeno1998", "wu2007", "gerling2014_fit", or tissues of your own. The default
         afferent was fitted with the default tissues; `Afferent.for_tissues` has the one for others.

@@ -16,9 +16,8 @@ from pydantic import BeforeValidator, Field, Strict
 
 from fingerpad.core.checked import result_class
 from fingerpad.core.errors import InputError
-from fingerpad.core.signals import STORED_ENERGY, ResponseMap
+from fingerpad.core.signals import ResponseMap
 from fingerpad.core.values import Number, Numbers, Pair, Positive, Seed, Text, choice, some_of
-from fingerpad.data import neuron
 from fingerpad.data.tissues import DEFAULT_TISSUES
 from fingerpad.experiments.requests.afferents import (
     AFFERENT_OBJECTS,
@@ -35,7 +34,7 @@ from fingerpad.experiments.runner import Manifest, Runner
 from fingerpad.mechanics.press_settings import MOST_SOLVED
 from fingerpad.neuron.population import Population
 from fingerpad.neuron.spikes import rate_windows_ms
-from fingerpad.reduction.building import reduce_touch
+from fingerpad.reduction.building import KEPT, reduce_touch
 from fingerpad.reduction.model import ReducedModel
 from fingerpad.reduction.training import ReducedRange, ReducedTraining
 from fingerpad.skin.indentation import Touch
@@ -225,7 +224,6 @@ class TouchResult:
         return TouchFile(touch=self.request, summary=self.summary, manifest=self.manifest)
 
 
-KEPT = (neuron.HUMAN_QUANTITY, STORED_ENERGY)  # What every reduced touch keeps.
 NO_WAY = (0.0, 0.0)
 
 
@@ -250,8 +248,8 @@ class ReductionRequest(StimulusDescription, FingerRequest):
     range: RangeSettings  #: The poses.
     afferents: Afferents = AfferentsSettings()  #: Who will respond: what they follow is kept.
     quantities: Annotated[tuple[str, ...], Strict(False), BeforeValidator(as_list)] = KEPT
-    """What is kept beside that, by the names of `SkinResponse.sample`; by default compressive stress and
-    strain energy density."""
+    """What is kept beside that, by the names of `SkinResponse.sample`; by default compressive stress,
+    strain energy density and von Mises stress."""
     calibration: Annotated[int, Field(ge=0)] = 20
     """Number of random touches from which the error is measured: 0 for none, else 19 or more."""
     seed: Seed = 1  #: Of these touches.
