@@ -18,6 +18,7 @@ from fingerpad.experiments.gerling2014 import nerve
 from fingerpad.inference.afferent_fit import response_surface, start_points
 from fingerpad.inference.fitting.methods import Method, cross_validate, interleaved_folds
 from fingerpad.inference.rate_model import AfferentModel, RateProblem
+from fingerpad.neuron.afferent import Afferent
 from fingerpad.skin.store import Store, solve_missing
 
 JOBS, REPEATS = 2, 3
@@ -40,7 +41,7 @@ def press(folder: str, traces: str) -> dict[str, Any]:
     """
     touches, store = Conditions(resolution=RESOLUTION).bar_touches(), Store(Path(folder))
     solve_missing(store.missing(touches), JOBS)
-    sed = nerve.traces_at_receptor([store.load(touch) for touch in touches])
+    sed = nerve.sed_at_receptor([store.load(touch) for touch in touches])
     np.savez(traces, times_ms=sed.times_ms, sed_kpa=sed.values, kinks_ms=sed.kinks_ms)
     return {"times": sed.times_ms.size, "shifts": sed.n_sites}
 
@@ -61,7 +62,7 @@ def fit(traces: str) -> dict[str, Any]:
     with np.load(traces) as stored:
         sed = Traces(stored["times_ms"], stored["sed_kpa"], stored["kinks_ms"])
     model = AfferentModel.of_traces(sed)
-    six = nerve.rate_problem(sed)
+    six = nerve.rate_problem(sed, Afferent.for_tissues("paper"))
     folds = interleaved_folds(six.n_observations)
     cases: list[tuple[RateProblem, Method]] = [(six, response_surface())]
     for name in ("least_squares", "closed_form", "cma_es"):

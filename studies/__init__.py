@@ -2,8 +2,6 @@
 
 | command | what it does |
 | --- | --- |
-| `tissue-search` | compares sets of tissues and drives on deflection, force, firing and percept |
-| `tissue-posterior` | draws tissues, afferent and noise from one posterior, and tests its calibration |
 | `held-out` | predicts what no search has used, and compares it with what was published |
 | `sai-search` | finds an SAI afferent by rates under a bar and areas of receptive fields |
 | `mesh-refinement` | measures the error of the meshes of the paper's finger against finer ones |
@@ -11,5 +9,6 @@
 
 A study writes NAME.md, its page of docs/ with new blocks, and NAME.json, its numbers. It keeps finished
 indentations in indentations/, so that studies and reproductions of one folder share them. Studies that are
-answered were deleted: the pages of decisions have their answers, and commit 0b18c70 has their scripts.
+answered were deleted: the pages of decisions have their answers, and commits 0b18c70 and fe3b9dbe have their
+scripts.
 """

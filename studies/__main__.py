@@ -4,25 +4,11 @@ from __future__ import annotations
 
 import fingerpad.cli
 from fingerpad.cli import Program
-from studies import held_out, mesh_refinement, sai_search, tissue_page, tissue_posterior, tissue_search
+from studies import held_out, mesh_refinement, sai_search
 from studies.results_command import RESULTS
 from studies.study import Study, command_of
 
 STUDIES = (
-    Study(
-        "tissue-search",
-        "Compare tissues and drives on deflection, plate force, firing and percept.",
-        tissue_search.run,
-        tissue_page.search_blocks,
-        "tissues.md",
-    ),
-    Study(
-        "tissue-posterior",
-        "Draw tissues, afferent and noise from one posterior, and test its calibration.",
-        tissue_posterior.run,
-        tissue_page.posterior_blocks,
-        "tissues.md",
-    ),
     Study(
         "held-out",
         "Predict what no search has used: force, spheres by force, gratings, adaptation, volume, thresholds.",
@@ -35,7 +21,7 @@ STUDIES = (
         "Search for one SAI afferent by rates under a bar and areas of receptive fields.",
         sai_search.run,
         sai_search.blocks,
-        "decisions/stiffening.md",
+        "decisions/paper-and-human.md",
     ),
     Study(
         "mesh-refinement",

@@ -1,4 +1,4 @@
-"""A search for one SAI afferent of the set `stiffening`: some recordings decide, others are predicted.
+"""A search for one SAI afferent of the set `human`: some recordings decide, others are predicted.
 
 Fitted: rates under the bar at 36 shifts (Phillips & Johnson 1981) and areas of receptive fields at five
 depths (Vega-Bermudez & Johnson 1999). Six numbers of the afferent are free. Predicted: when the fastest
@@ -23,6 +23,7 @@ from fingerpad.experiments.conditions import RECEPTOR_X_MM, Conditions
 from fingerpad.experiments.runner import Manifest, Runner
 from fingerpad.experiments.validation.validation import PROBE, probing, within_field
 from fingerpad.geometry.bodies import Bar
+from fingerpad.geometry.grading import Grading
 from fingerpad.inference.fitting.methods import fractional_sum_of_squares, interleaved_folds
 from fingerpad.neuron.afferent import Afferent
 from fingerpad.neuron.population import Population
@@ -31,7 +32,6 @@ from fingerpad.report.tables import number
 from fingerpad.skin.indentation import touch_of
 from fingerpad.skin.sampling import SkinResponse
 from studies.pages import table
-from studies.tissue_search import wide_bar_grading
 
 BOUNDS: dict[str, tuple[float, float]] = {
     "dynamic_gain": (1e-5, 1e-2),
@@ -47,6 +47,9 @@ LOGARITHMIC = ("dynamic_gain", "static_gain", "time_constant_ms")
 LARGEST_RESTING_SHARE = 0.8  # Of the threshold, by the intercept alone: the afferent is silent at rest.
 WEIGHT_OF_AREAS = 0.25  # Of the mean factor by which areas are missed, against FSS.
 GENERATIONS, SIZE, POLISHING = 15, 8, 120
+
+SITE_MARGIN_MM = 0.3
+"""Fine zone of the one bar beyond its outermost shifted site. [mm]"""
 
 RAYS, RADII_MM = 8, np.arange(0.0, 3.01, 0.1)
 ANGLES = 2.0 * np.pi * np.arange(RAYS) / RAYS
@@ -113,6 +116,12 @@ class Recordings:
         return 1.0 - self.fss(afferent, chosen) + WEIGHT_OF_AREAS * float(np.clip(factors, 0.0, 2.0).mean())
 
 
+def wide_bar_grading(conditions: Conditions) -> Grading:
+    """Mesh of the single-unit study, fine over all shifted sites and not only about the receptor."""
+    farthest = max(abs(shift) for shift in protocol.BAR_SHIFTS.value)
+    return replace(conditions.bar_grading(), half_length_mm=farthest + SITE_MARGIN_MM)
+
+
 def touches(conditions: Conditions) -> dict[Any, Any]:
     """Bar, read at shifted sites, and the probe at each depth."""
     bar = conditions.touch(
@@ -168,7 +177,7 @@ def run(runner: Runner, conditions: Conditions) -> SaiSearch:
     """Press what is missing, search with all shifts and with each fold left out, and predict."""
     named = touches(conditions)
     recordings = Recordings(runner.responses({"sai": named})["sai"], conditions)
-    start = Afferent.for_tissues("stiffening")
+    start = Afferent()
     found = search(recordings, start, conditions.seed)
     folds = interleaved_folds(recordings.observed.shift_mm.size)
     tested = [
@@ -223,4 +232,4 @@ def blocks(result: SaiSearch) -> dict[str, str]:
         ("decline in the first second", "predicted", number(result.decline), "0.15 to 0.40"),
         ("index of Eq. 11, edge against flat face", "predicted", number(result.edge_index), "0.71"),
     ]
-    return {"sai": table(("what", "role", "`stiffening`", "recorded"), rows)}
+    return {"sai": table(("what", "role", "`human`", "recorded"), rows)}

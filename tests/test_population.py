@@ -85,8 +85,8 @@ test_what_cannot_be_used_is_refused = refusals(
     (lambda: fp.Population([[1.0, 2.0]], 1.0, places_mm=[[1.0, 2.0, 3.0]]), "a pair per receptor"),
     (lambda: fp.Population.grid(afferent=SED_DRIVEN).respond(OneTrace()),
      "one trace per receptor: got 1 for"),
-    (lambda: fp.Population.grid(afferent=fp.Afferent(static_quantity="von_mises")).respond(OneTrace()),
-     r"'compressive_stress' and 'von_mises': got OneTrace\.sed\(sites\); add them, or use an afferent"),
+    (lambda: fp.Population.grid(afferent=fp.Afferent()).respond(OneTrace()),
+     r"'stored' and 'von_mises': got OneTrace\.sed\(sites\); add them, or use an afferent"),
 )  # fmt: skip
 
 
@@ -95,7 +95,8 @@ class BumpWithStress(Bump):
 
     def sed(self, sites, dynamic_quantity="stored", static_quantity="stored"):
         traces = super().sed(sites)
-        values = {"stored": traces.values, "compressive_stress": np.sqrt(traces.values)}
+        stress = np.sqrt(traces.values)
+        values = {"stored": traces.values, "compressive_stress": stress, "von_mises": 8.0 * stress}
         followed = {
             name: fp.Traces(traces.times_ms, values[name], traces.kinks_ms, quantity=name)
             for name in (dynamic_quantity, static_quantity)

@@ -1,5 +1,7 @@
 """Phases of a motion, and windows of rates that follow them."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -98,11 +100,12 @@ def test_each_stimulus_of_a_task_has_its_own_windows():
             self.phases, self.end_ms = motion.phases, motion.end_ms
             self.asked = []
 
-        def sed(self, sites, quantity, _):
+        def sed(self, sites, dynamic_quantity, quantity):
             ones = np.ones((3, len(sites)))
             times, kinks = [0.0, self.phases[0].end_ms, self.end_ms], [self.phases[0].end_ms]
             height = 50.0 * ones * np.array([[0.0], [1.0], [1.0]])
-            return Traces(times, height, kinks, quantity=quantity)
+            dynamic = Traces(times, height, kinks, quantity=dynamic_quantity)
+            return replace(dynamic, quantity=quantity, dynamic=dynamic)
 
     quick, slow = task.responses({each.name: Pressed(each.motion) for each in task.pressed})
     assert (quick.dynamic_rate_hz > slow.dynamic_rate_hz).all()

@@ -56,8 +56,8 @@ def test_only_the_deviator_relaxes():
 
 def test_a_changed_constant_moves_its_rows_and_no_other(monkeypatch):
     before = tissue_table(tissue_layers()).rows
-    changed = replace(published.HUMAN_DERMIS_SHEAR, value=2.0 * published.HUMAN_DERMIS_SHEAR.value)
-    monkeypatch.setattr(published, "HUMAN_DERMIS_SHEAR", changed)
+    changed = replace(published.HUMAN_DERMIS, value=tuple(2.0 * c for c in published.HUMAN_DERMIS.value))
+    monkeypatch.setattr(published, "HUMAN_DERMIS", changed)
     after = tissue_table(tissue_layers()).rows
     moved = [old.cells[:2] for old, new in zip(before, after, strict=True) if old != new]
     assert moved == [("human", "dermis")]

@@ -62,7 +62,7 @@ test_numbers_that_cannot_be_fitted_are_refused = refusals(
     ((fp.RA(), ["treshold"]), r"free must be one of .*did you mean threshold"),
     ((fp.RA(), []), "free must name at least one number of RA, one of .*: got none"),
     ((fp.RA(), ["quantity"]), r"quantity must be greater than 0|must be a finite number"),
-    ((fp.Afferent(), ["intercept_ma"]), "intercept_ma must be greater than 0"),
+    ((fp.Afferent(intercept_ma=0.0), ["intercept_ma"]), "intercept_ma must be greater than 0"),
     ((len, ["threshold"]), "afferent must be like AnyAfferent, with"),
     call=lambda chosen: fp.fit_afferent(*chosen, *TWO),
 )

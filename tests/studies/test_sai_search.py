@@ -11,8 +11,8 @@ from fingerpad.experiments.conditions import RECEPTOR_X_MM, Conditions
 from studies import sai_search
 from studies.sai_search import BOUNDS, Recordings, afferent_at, search
 
-CONDITIONS = Conditions(resolution="quick", tissues="stiffening")
-START = fp.Afferent.for_tissues("stiffening")
+CONDITIONS = Conditions(resolution="quick")
+START = fp.Afferent()
 STRONG = replace(START, end_organs=1, intercept_ma=0.0, dynamic_gain=0.0, static_gain=1e-6)
 
 

@@ -70,11 +70,6 @@ class Conditions:
         return Afferent.for_tissues(self.tissues)
 
     @property
-    def quantity(self) -> str:
-        """Quantity that drives both terms of the current of that afferent."""
-        return self.afferent.static_quantity
-
-    @property
     def receptor_x_mm(self) -> float:
         """Where the single receptor lies on the midline, and the middle of the population. [mm]"""
         return self.finger.contact_mm[0]

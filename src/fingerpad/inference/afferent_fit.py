@@ -8,13 +8,12 @@ afferent silent at rest (docs/decisions.md#silent-at-rest).
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, cast
 
 import numpy as np
 from numpy.typing import ArrayLike
-from pydantic import SkipValidation
 
 from fingerpad.core.checked import checked
 from fingerpad.core.errors import InputError
@@ -23,11 +22,9 @@ from fingerpad.core.values import FloatArray, IntArray, finite, float_array, inc
 from fingerpad.data import neuron
 from fingerpad.inference.fitting.methods import (
     Bounds,
-    Continued,
     CovarianceAdaptation,
     CrossValidation,
     Fit,
-    FitStep,
     LeastSquares,
     Method,
     Problem,
@@ -43,7 +40,6 @@ from fingerpad.inference.identifiable import (
 )
 from fingerpad.inference.rate_model import (
     AfferentModel,
-    RateModel,
     RateProblem,
     Rates,
     Reparametrised,
@@ -53,7 +49,6 @@ from fingerpad.inference.recordings import RateRecordings
 from fingerpad.neuron.afferent import AnyAfferent, type_of
 from fingerpad.neuron.spikes import RATE_OF, Windows, rate_windows_ms
 from fingerpad.neuron.transduction import Drive
-from fingerpad.psychophysics.observer import expected_euclidean_hit_rates, expected_hit_rates
 
 OFFSET_NAME = "offset_mm"  # Name of the parameter; positive is distal. [mm]
 
@@ -391,103 +386,18 @@ def fit_afferent(
     )
 
 
-WEIGHT = 2.0
-"""Weight of the squared differences of hit rates: 0.05 in each of eight costs as much as 0.04 of FSS."""
-
-CHANCE = 0.5  # Hit rate of an observer of a silent population. [0-1]
-
-
 @dataclass(frozen=True)
-class RatesAndHitRates:
-    """Recorded rates and hit rates h of people, to which one afferent is fitted.
+class FourOfSix:
+    """Method that fits the paper's six parameters: least squares in the four numbers that rates determine."""
 
-        score = FSS - w sum (h - h_people)^2
-
-    FSS is flat along some directions. The hit rates choose among parameters that explain the rates equally
-    well (docs/decisions/paper-and-human.md). All hit rates enter whichever rates are chosen, so that a cross
-    validation leaves out rates only.
-    """
-
-    rates: RateProblem  #: Recorded rates and the model that predicts them.
-    hit_rates: Callable[[FloatArray], FloatArray]
-    """From the parameters of that model to predicted hit rates (n,). [0-1]"""
-    observed: FloatArray  #: Hit rates of people, (n,). [0-1]
-    weight: float = WEIGHT  #: Weight w of the squared differences against FSS.
-
-    @property
-    def n_observations(self) -> int:
-        """Number of stimuli under which rates were recorded."""
-        return self.rates.n_observations
-
-    def residuals(self, parameters: FloatArray, chosen: IntArray) -> FloatArray:
-        """Residuals of the chosen rates, then those of all hit rates times the root of the weight."""
-        missed = self.hit_rates(parameters) - self.observed
-        return np.concatenate([self.rates.residuals(parameters, chosen), np.sqrt(self.weight) * missed])
-
-    def score(self, parameters: FloatArray, chosen: IntArray) -> float:
-        """FSS of the chosen rates less the weighted sum of the squared differences of hit rates."""
-        residuals = self.residuals(parameters, chosen)
-        return 1.0 - float(residuals @ residuals)
-
-
-@dataclass(frozen=True)
-class SphereHitRates:
-    """Hit rates of two codes, predicted from the parameters of every afferent of a population."""
-
-    model: SkipValidation[RateModel]
-    """Rates, a column per receptor, sphere and position, receptors fastest and positions slowest."""
-    n_positions: int
-    n_receptors: int  #: Sizes; the number of spheres, the standard first, follows.
-    neighbours: np.ndarray  #: Pairs of the Gradient Sum, (n_pairs, 2).
-    noise_sigma: float
-    standard_normals: FloatArray  #: Common random presentations of the Gradient Sum, (n_draws, n_receptors).
-
-    def __call__(self, parameters: FloatArray) -> FloatArray:
-        """Hit rates (n,): by position Gradient Sum, then Euclidean Distance, one per comparison. [0-1]"""
-        static = self.model.evaluate(parameters)[1].reshape(self.n_positions, -1, self.n_receptors)
-        return np.concatenate([self._at(table) for table in static])
-
-    def _at(self, static_hz: FloatArray) -> FloatArray:
-        if not static_hz.any():
-            return np.full(2 * (len(static_hz) - 1), CHANCE)
-        gradient = expected_hit_rates(static_hz, self.neighbours, self.noise_sigma, self.standard_normals)
-        return np.concatenate([gradient, expected_euclidean_hit_rates(static_hz, self.noise_sigma)])
-
-
-FIRST_SPREAD = 0.3  # Of `ToRatesAndHitRates`: standard deviation of the first generation, in scales.
-
-
-@dataclass(frozen=True)
-class ToRatesAndHitRates:
-    """Method that fits recorded rates in the paper's six parameters, and hit rates of people with them.
-
-    Least squares finds the four numbers that explain the rates best. From there CMA-ES maximises the score of
-    `RatesAndHitRates`. The scores of the result are FSS of the rates alone.
-    """
-
-    hit_rates: SphereHitRates  #: Predicts hit rates from the paper's six parameters.
-    observed: FloatArray  #: Hit rates of people, in the same order, (n,). [0-1]
-    seed: int = 0  #: Of CMA-ES.
-    name: str = "rates and hit rates"
+    name: str = "least squares in four numbers"
 
     def fit(self, problem: Problem, chosen: IntArray) -> Fit:
-        """Fit the chosen rates, and all hit rates."""
+        """Fit the chosen rates."""
         if not (isinstance(problem, RateProblem) and isinstance(problem.model, AfferentModel)):
             raise InputError("problem", "must have the paper's six parameters", type(problem).__name__)
         search = four_numbers(problem.model, problem.recordings)
-        both = RatesAndHitRates(
-            search.problem, lambda numbers: self.hit_rates(fitted_six(numbers)), self.observed
-        )
-        method = Continued(
-            search.by_differences(),
-            lambda begun: replace(search.by_evolution(begun, self.seed), first_spread=FIRST_SPREAD),
-            first_problem=search.problem,
-        )
-        found = method.fit(both, chosen)
-
-        def in_six(step: FitStep) -> FitStep:
-            return FitStep(fitted_six(step.parameters), search.problem.score(step.parameters, chosen))
-
-        history = tuple(in_six(step) for step in found.history)
-        fit = replace(found, parameters=history[-1].parameters, score=history[-1].score, history=history)
+        found = search.by_differences().fit(search.problem, chosen)
+        history = tuple(replace(step, parameters=fitted_six(step.parameters)) for step in found.history)
+        fit = replace(found, parameters=fitted_six(found.parameters), history=history)
         return replace(fit, attempts=(fit,))

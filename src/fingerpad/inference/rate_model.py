@@ -35,7 +35,7 @@ from fingerpad.data import neuron, protocol
 from fingerpad.inference.fitting.methods import fractional_sum_of_squares
 from fingerpad.inference.identifiable import six_parameters
 from fingerpad.inference.recordings import RateRecordings
-from fingerpad.neuron.afferent import PARAMETER_NAMES, Afferent
+from fingerpad.neuron.afferent import PARAMETER_NAMES, Afferent, adapted_drive
 from fingerpad.neuron.exact_spikes import exact_trains
 from fingerpad.neuron.spikes import Windows, check_windows, common_rate_windows_ms, window_rates_hz
 from fingerpad.neuron.transduction import PIECES_PER_INTERVAL, Drive, drive
@@ -108,6 +108,7 @@ class AfferentModel:
         refractory_ms: Finite = neuron.REFRACTORY.value,
         initial_mv: Finite | None = None,
         pieces: Count = PIECES_PER_INTERVAL,
+        adapting: Afferent | None = None,
     ) -> AfferentModel:
         """Make the model for what drives the afferent, stimuli grouped by their times.
 
@@ -119,6 +120,8 @@ class AfferentModel:
             As of the class.
         pieces : int, optional
             As of `drive`.
+        adapting : Afferent, optional
+            Its static term adapts; by default none does, as in the paper.
         """
         parts = [traces] if isinstance(traces, Traces) else list(traces)
         quantities = sorted({f"{part.dynamic_quantity} and {part.static_quantity}" for part in parts})
@@ -133,7 +136,8 @@ class AfferentModel:
             first += trace.n_sites
         drives, columns = [], []
         for group in groups.values():
-            drives.append(drive(Traces.joined([trace for _, trace in group]), pieces=pieces))
+            driven = drive(Traces.joined([trace for _, trace in group]), pieces=pieces)
+            drives.append(driven if adapting is None else adapted_drive(adapting, driven))
             columns.append(np.concatenate([start + np.arange(trace.n_sites) for start, trace in group]))
         return cls(tuple(drives), tuple(columns), windows_ms, refractory_ms, initial_mv)
 

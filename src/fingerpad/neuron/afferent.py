@@ -138,9 +138,9 @@ class Afferent:
     refractory_ms: Finite = neuron.REFRACTORY.value  #: Refractory period after each spike. [ms]
     dynamic_quantity: SkinQuantity = neuron.HUMAN_DYNAMIC_QUANTITY
     static_quantity: SkinQuantity = neuron.HUMAN_STATIC_QUANTITY
-    """What the two terms follow, by the names of `SkinResponse.sample`: strain energy density (SED), "stored",
-    and von Mises stress, unless others are given. The paper's is SED in both; any other is an extension
-    of its model. The units of k_d and k_s depend on them."""
+    """What the two terms follow, by the names of `SkinResponse.sample`: strain energy density (SED),
+    "stored", and von Mises stress, unless others are given. The paper's is SED in both; any other is an
+    extension of its model. The units of k_d and k_s depend on them."""
     initial_mv: Finite | None = None
     """Potential of the membrane at the start. By default that at rest, beta tau/C, so that spikes do not
     depend on how long nothing happened before a touch. [mV]"""
@@ -294,10 +294,7 @@ class Afferent:
     def current(self, traces: Traces | Drive) -> Traces:
         """Compute the current through the membrane at every site, Eq. 1. [mA]"""
         driven = traces if isinstance(traces, Drive) else self._driven(traces)
-        if self.adapting_share:
-            values = adapted(self, driven.times_ms, driven.values, driven.values[0].copy())
-            driven = replace(driven, values=values)
-        return self.transduction.current(driven)
+        return self.transduction.current(adapted_drive(self, driven))
 
     def _fired(self, traces: Traces | Drive) -> SpikeTrains:
         return self.membrane.spikes(self.current(traces))
@@ -347,6 +344,14 @@ class Afferent:
         )
         spikes = self.spikes(traces)
         return firing_rate_hz(spikes, dynamic), firing_rate_hz(spikes, static)
+
+
+def adapted_drive(afferent: Afferent, driven: Drive) -> Drive:
+    """Return a drive without what the static term loses from its start on."""
+    if not afferent.adapting_share:
+        return driven
+    values = adapted(afferent, driven.times_ms, driven.values, driven.values[0].copy())
+    return replace(driven, values=values)
 
 
 def adapted(afferent: Afferent, times_ms: FloatArray, values: FloatArray, state: FloatArray) -> FloatArray:

@@ -353,6 +353,11 @@ class Population:
         places = pad_mm + (self.positions_mm - self.centre_mm)
         return replace(self, positions_mm=places, places_mm=places, centre_mm=pad_mm)
 
+    def followed(self, skin: Skin) -> Traces:
+        """Sample what the afferents of a population of one type follow, (n_afferents,) traces."""
+        traces = traces_below(skin, self.sites_mm, *self.quantities, self.depth_mm)
+        return traces if self.branches is None else self.branches.combined(traces)
+
     def respond(
         self, skin: Skin, dynamic_window_ms: Window | None = None, static_window_ms: Window | None = None
     ) -> ResponseMap:

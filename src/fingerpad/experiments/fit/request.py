@@ -223,8 +223,11 @@ class FitRequest(FingerRequest):
         """Quantities of the dynamic and of the static term."""
         if self.free:
             return self.shape_of_fit.dynamic_quantity, self.shape_of_fit.static_quantity
-        default = self.settings.quantity
-        return self.dynamic_quantity or default, self.static_quantity or default
+        default = self.settings.afferent
+        return (
+            self.dynamic_quantity or default.dynamic_quantity,
+            self.static_quantity or default.static_quantity,
+        )
 
     def further_files(self) -> list[Path]:
         """Files of the recordings, the stimuli and the afferent."""

@@ -183,13 +183,10 @@ def _row(claim: Mapping[str, Any], found: SetResult, known: Mapping[str, Any]) -
 
 
 def _texts(found: SetResult) -> dict[str, str | float]:
-    """Texts that depend on the tissues and on the method that fitted the afferent."""
+    """Texts that depend on the tissues."""
     texts = dict(_FILE["texts"])
     for case in _FILE["cases"]:
-        holds = found.tissues in case.get("tissues", ()) or found.single_unit.method in case.get(
-            "methods", ()
-        )
-        texts |= case.get("then" if holds else "otherwise", {})
+        texts |= case.get("then" if found.tissues in case["tissues"] else "otherwise", {})
     return texts
 
 

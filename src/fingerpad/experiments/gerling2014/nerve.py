@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from scipy.interpolate import interp1d
 
 from fingerpad.core.checked import result_class
-from fingerpad.core.signals import STORED_ENERGY, Skin, Traces, traces_below
+from fingerpad.core.signals import Skin, Traces
 from fingerpad.core.units import MM_PER_M
 from fingerpad.core.values import FloatArray, Matrix, Number, Vector
 from fingerpad.data import bar_firing_rates, protocol
@@ -90,19 +91,21 @@ class SingleUnitResult:
     initial_mv: Number | None = None  #: Potential of the membrane at the start; by default at rest. [mV]
 
 
-def traces_at_receptor(
-    responses: Sequence[SkinResponse],
-    dynamic_quantity: str = STORED_ENERGY,
-    static_quantity: str = STORED_ENERGY,
-) -> Traces:
-    """Quantities of the two terms at the one receptor, one column per shift of the bar."""
-    quantities = (dynamic_quantity, static_quantity)
-    return Traces.joined([traces_below(skin, RECEPTOR, *quantities) for skin in responses])
+def traces_at_receptor(responses: Sequence[SkinResponse], afferent: Afferent) -> Traces:
+    """Quantities that one afferent follows, one column per shift of the bar."""
+    receptor = Population(np.array(RECEPTOR), 1.0, afferent)
+    return Traces.joined([receptor.followed(skin) for skin in responses])
 
 
-def rate_problem(traces: Traces, initial_mv: float | None = None) -> RateProblem:
-    """Observed rates at all shifts, and the paper's model of the afferent driven by traces."""
-    return RateProblem(AfferentModel.of_traces(traces, initial_mv=initial_mv), bar_recordings())
+def sed_at_receptor(responses: Sequence[SkinResponse]) -> Traces:
+    """Strain energy density at the one receptor, one column per shift of the bar."""
+    return Traces.joined([skin.sed(RECEPTOR) for skin in responses])
+
+
+def rate_problem(traces: Traces, afferent: Afferent) -> RateProblem:
+    """Observed rates at all shifts, and the six parameters of an afferent that is driven by traces."""
+    model = AfferentModel.of_traces(traces, initial_mv=afferent.initial_mv, adapting=afferent)
+    return RateProblem(model, bar_recordings())
 
 
 def bar_recordings() -> RateRecordings:
@@ -234,7 +237,8 @@ def dynamic_share(drive: Traces, afferent: Afferent, start_ms: float, end_ms: fl
 
     def charge(silenced: str) -> FloatArray:
         # Its knots include both times; where it jumps there are two at one time.
-        term = replace(afferent.transduction, intercept_ma=0.0, **{silenced: 0.0}).current(drive)
+        alone: dict[str, Any] = {"intercept_ma": 0.0, silenced: 0.0}
+        term = replace(afferent, **alone).current(drive)
         first = np.searchsorted(term.times_ms, start_ms, side="right") - 1
         within = slice(first, np.searchsorted(term.times_ms, end_ms, side="left") + 1)
         return np.asarray(np.trapezoid(term.values[within], term.times_ms[within], axis=0))
@@ -253,13 +257,11 @@ CHAINS = {"smallest_effective_size": 200.0}
 """Of the posterior: the error of the ends of a 95 % interval is a seventh of a standard deviation."""
 
 
-def bar_uncertainty(
-    traces: Traces, fitted: FloatArray, seed: int, initial_mv: float | None = None
-) -> UncertaintyResult:
+def bar_uncertainty(traces: Traces, fitted: Afferent, seed: int) -> UncertaintyResult:
     """Find what the rates under the bar determine of the afferent; neighbouring shifts may miss alike."""
-    model = AfferentModel.of_traces(traces, initial_mv=initial_mv, pieces=PIECES)
+    model = AfferentModel.of_traces(traces, initial_mv=fitted.initial_mv, pieces=PIECES, adapting=fitted)
     shift_mm = bar_firing_rates().shift_mm
-    return uncertainty(model, bar_recordings(), fitted, shift_mm, seed, **CHAINS)
+    return uncertainty(model, bar_recordings(), fitted.parameters, shift_mm, seed, **CHAINS)
 
 
 # One sphere on all levels, and afferents all over the pad
@@ -308,14 +310,14 @@ def three_levels(standard: SkinResponse, afferent: Afferent) -> ThreeLevels:
     foot = np.array([x_mm, np.interp(x_mm, midline[:, 0], midline[:, 1])])
     centre = foot + (float(standard.depth_mm[-1]) - MM_PER_M / curvature) * standard.direction[:2]
     sites = np.stack([RECEPTOR_X_MM + OFFSETS_MM, 0.0 * OFFSETS_MM], axis=-1)
-    sed = standard.sed(sites, afferent.dynamic_quantity, afferent.static_quantity)
+    sed = Population(sites, 1.0, afferent).followed(standard)
     trains, (dynamic_hz, static_hz) = tuple(afferent.spikes(sed)), afferent.rates(sed)
     early = trains[0][trains[0] < UNTIL_MS]
     # A reset is drawn upright.
     reset = early + 1e-6 * membrane.refractory_ms
     regular = np.arange(0.0, UNTIL_MS + POTENTIAL_STEP_MS, POTENTIAL_STEP_MS)
     times = np.unique(np.concatenate([regular, early, reset, early + membrane.refractory_ms]))
-    below = afferent.transduction.current(sed.part(slice(0, 1)))
+    below = afferent.current(sed.part(slice(0, 1)))
     return ThreeLevels(
         curvature_per_m=curvature,
         centre_mm=(float(centre[0]), float(centre[1])),

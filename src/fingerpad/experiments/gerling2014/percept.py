@@ -21,13 +21,11 @@ from scipy.special import ndtr, ndtri
 from fingerpad.core.checked import result_class
 from fingerpad.core.errors import ConvergenceError
 from fingerpad.core.random_streams import Purpose, normals
-from fingerpad.core.signals import HitRates, Traces
+from fingerpad.core.signals import HitRates
 from fingerpad.core.values import FloatArray, IntArray, Number, Vector, WholeVector
 from fingerpad.data import protocol, psychophysics
 from fingerpad.experiments.conditions import CURVATURES, POSITIONS_MM, RECEPTOR_X_MM
 from fingerpad.experiments.scores import Estimate, difference, estimate, extreme, largest
-from fingerpad.inference.afferent_fit import SphereHitRates, ToRatesAndHitRates
-from fingerpad.inference.rate_model import AfferentModel
 from fingerpad.neuron.afferent import Afferent
 from fingerpad.neuron.population import Population
 from fingerpad.psychophysics.curve import binomial_interval
@@ -64,15 +62,6 @@ TRIALS = int(psychophysics.GOODWIN_TRIALS.value)
 COLUMNS = [CURVATURES.index(curvature) - 1 for curvature in GOODWIN_CURVATURES]  # Among the comparisons.
 BETWEEN = [column for column in range(len(CURVATURES) - 1) if column not in COLUMNS]
 NOISE_BOUNDS = (1e-4, 2.0)  # Bounds of the noise fitted to the observed hit rates.
-
-FITTED_SPHERES = tuple(
-    (position, curvature) for position in POSITIONS_MM for curvature in (CURVATURES[0], *GOODWIN_CURVATURES)
-)
-"""Position and curvature of the spheres that people discriminated, the standard first. [mm, 1/m]"""
-
-FIT_SEED, FIT_DRAWS = 0, 1000
-"""Seed of a fit, and number of random presentations behind its hit rates. It is not the seed of the run:
-another seed of the observers keeps the afferent."""
 
 SESSIONS = 5  # Sessions of a study. The first is drawn; all of them give the Monte-Carlo error.
 SWEPT_NOISE = tuple(round(0.015 + 0.01 * step, 3) for step in range(8))  # Over the paper's range of sigma_1.
@@ -219,33 +208,6 @@ class Observers:
 def draws_of(population: Population, seed: int, count: int = NOISE_DRAWS) -> FloatArray:
     """Draw common random presentations of a population for expected hit rates, (count, n_receptors)."""
     return normals(seed, 1, len(population.positions_mm), Purpose.RESPONSE, count)[0].T
-
-
-def to_rates_and_hit_rates(
-    responses: Mapping[tuple[float, float], SkinResponse], quantity: str
-) -> ToRatesAndHitRates:
-    """Return `fit_to_people` for the drives under pressed spheres."""
-    sites = Population.grid(centre_mm=CENTRE_MM).positions_mm
-    return fit_to_people([responses[sphere].sed(sites, quantity, quantity) for sphere in FITTED_SPHERES])
-
-
-def fit_to_people(traces: Sequence[Traces]) -> ToRatesAndHitRates:
-    """Return the method that fits an afferent to its rates and to Goodwin's two points at once.
-
-    The two points are those of people at 296 and 365 /m, at both positions, by the Gradient Sum and by the
-    Euclidean Distance of static rates, with the paper's noise.
-    """
-    population = Population.grid(centre_mm=CENTRE_MM)
-    hit_rates = SphereHitRates(
-        AfferentModel.of_traces(traces),
-        n_positions=len(POSITIONS_MM),
-        n_receptors=len(population.positions_mm),
-        neighbours=neighbour_pairs(population.positions_mm, population.pitch_mm),
-        noise_sigma=psychophysics.NOISE_SIGMA.value,
-        standard_normals=draws_of(population, FIT_SEED, FIT_DRAWS),
-    )
-    n_codes = 2
-    return ToRatesAndHitRates(hit_rates, np.tile(HIT_RATES, n_codes * len(POSITIONS_MM)), FIT_SEED)
 
 
 def discriminate_spheres(

@@ -10,8 +10,7 @@ from typing import Any, Literal
 
 from fingerpad.core.checked import result_class
 from fingerpad.core.engine import Processes
-from fingerpad.core.signals import STORED_ENERGY
-from fingerpad.data import Published, all_published, neuron
+from fingerpad.data import Published, all_published
 from fingerpad.experiments.conditions import CURVATURES, POSITIONS_MM, RECEPTOR_X_MM, Conditions, Touch
 from fingerpad.experiments.fit.results import UncertaintyResult
 from fingerpad.experiments.gerling2014 import nerve, percept, skin
@@ -23,9 +22,9 @@ from fingerpad.experiments.gerling2014.thresholds import (
 )
 from fingerpad.experiments.runner import Manifest, Runner, StageSummary
 from fingerpad.experiments.tissue_sets import TissueLayer, tissue_layers
-from fingerpad.inference.afferent_fit import response_surface
+from fingerpad.inference.afferent_fit import FourOfSix, response_surface
 from fingerpad.inference.fitting.methods import Method
-from fingerpad.neuron.afferent import Afferent
+from fingerpad.neuron.afferent import PARAMETER_NAMES
 from fingerpad.skin.sampling import SkinResponse
 
 STANDARD_SPHERE = (POSITIONS_MM[0], CURVATURES[0])
@@ -138,19 +137,16 @@ def set_result(
 ) -> SetResult:
     """Fit the afferent of one set of tissues, let observers judge its spikes, and compare with the paper."""
     bars, spheres, seed = list(responses["bar, 36 shifts"].values()), responses["spheres"], conditions.seed
-    quantity, tissues = conditions.quantity, str(conditions.tissues)
-    # The paper's own system is fitted by the paper's method; its membrane starts at 0, as the paper prints.
-    initial_mv: float | None = neuron.PAPER_INITIAL.value
-    method: Method = response_surface()
-    if quantity != STORED_ENERGY:
-        initial_mv, method = None, percept.to_rates_and_hit_rates(spheres, quantity)
-    traces = nerve.traces_at_receptor(bars, quantity, quantity)
-    problem = nerve.rate_problem(traces, initial_mv)
-    # The score of `human` has many maxima, between which last digits choose: its fit is that of Afferent().
-    best, folds = nerve.fit(problem, method, Afferent().parameters if tissues == HUMAN else None)
-    afferent = Afferent.from_parameters(
-        best.parameters, dynamic_quantity=quantity, static_quantity=quantity, initial_mv=initial_mv
-    )
+    tissues, afferent = str(conditions.tissues), conditions.afferent
+    # The paper's own system is fitted by the paper's method. The afferent of `human` was fitted to areas of
+    # receptive fields too (studies/sai_search.py) and is taken as it is.
+    is_known = tissues == HUMAN
+    method: Method = FourOfSix() if is_known else response_surface()
+    traces = nerve.traces_at_receptor(bars, afferent)
+    problem = nerve.rate_problem(traces, afferent)
+    best, folds = nerve.fit(problem, method, afferent.parameters if is_known else None)
+    fitted: dict[str, Any] = dict(zip(PARAMETER_NAMES, best.parameters.tolist(), strict=True))
+    afferent = replace(afferent, **fitted)
     standard = spheres[STANDARD_SPHERE]
     made = SetResult(
         tissues=tissues,
@@ -158,7 +154,7 @@ def set_result(
         levels=nerve.three_levels(standard, afferent),
         skin_force=skin.skin_force(responses["force"]),
         single_unit=nerve.single_unit_result(problem, best, folds, afferent, method.name),
-        firing=nerve.firing_course(traces, nerve.traces_at_receptor(bars), afferent, responses["force"]),
+        firing=nerve.firing_course(traces, nerve.sed_at_receptor(bars), afferent, responses["force"]),
         discrimination=percept.discriminate_spheres(spheres, afferent, seed),
         population=nerve.population_maps(standard, afferent),
         nail=skin.nail_border(responses["nail"]["nail"]),
@@ -169,7 +165,7 @@ def set_result(
         noise_sigma = made.discrimination.noise_sigma
         made = replace(
             made,
-            single_unit_uncertainty=nerve.bar_uncertainty(traces, best.parameters, seed, initial_mv),
+            single_unit_uncertainty=nerve.bar_uncertainty(traces, afferent, seed),
             curvature_thresholds=curvature_thresholds(centred | dict(others), afferent, noise_sigma, seed),
         )
     return replace(made, comparison=judged(made, deflection))
