@@ -53,11 +53,15 @@ TOUCHES = {
 SITES = {"SAI": 0.0, "RA": 0.0, "PC": 0.0, "SAII": 1.0}
 """Distance of the end organ from the middle of the probe at which a type is most sensitive. [mm]"""
 
-LIGHT = {"SAI": 0.7, "SAII": 0.0}
-"""Hold of the slowly adapting types: so light that they are silent. Others: that of the probe."""
+SLOW_TYPES = ("SAI", "SAII")
+"""Types whose hold is taken to be 0, since they fire in that of the probe."""
 
-OBSERVED = {"SAI": published.SAI_TUNING, "RA": published.RA_TUNING, "PC": published.PC_TUNING}
-FREQUENCIES_HZ = np.array(published.TUNING_FREQUENCIES.value)
+OBSERVED = {
+    "SAI": (published.SAI_TUNING_FREQUENCIES, published.SAI_TUNING),
+    "RA": (published.RA_TUNING_FREQUENCIES, published.RA_TUNING),
+    "PC": (published.PC_TUNING_FREQUENCIES, published.PC_TUNING),
+}
+FREQUENCIES_HZ = np.array([1.0, 2.0, 5.0, 10.0, 20.0, 40.0, 60.0, 100.0, 150.0, 200.0, 300.0, 400.0])
 SLOW_MM_PER_S = 4.0
 SPEEDS_MM_PER_S = (4.0, 20.0, 100.0)
 PROBING_MM_PER_S = 20.0
@@ -69,8 +73,8 @@ DEEPEST_MM = 1.6
 DEPTHS_UM = np.geomspace(2.0, 1e3 * DEEPEST_MM, 96)
 SPEEDS_OF_THRESHOLDS = np.geomspace(0.1, 100.0, 61)
 TIMES_THRESHOLD = (4.0, 5.0)
-BRANCHES = {"SAI": (6, 1.0), "RA": (14, 1.2)}
-"""End organs per afferent and the radius of the disc in which they are scattered. [mm]"""
+BRANCHES = {"RA": (14, 1.2)}
+"""End organs per afferent and the radius of the disc in which they are scattered, instead of its own. [mm]"""
 
 
 def indented(indenter: fp.Indenter, motion: Any, tissues: str = "human", **more: Any) -> SkinResponse:
@@ -121,12 +125,19 @@ def slow_ramp() -> SkinResponse:
     return indented(PROBE, motion, times_ms=times_ms.tolist())
 
 
-def linear_response(name: str, afferent: AnyAfferent) -> tuple[float, float]:
-    """Return the hold and the change per µm of what a type follows, at its most sensitive place."""
+Pair = tuple[float, float]
+
+
+def linear_response(name: str, afferent: AnyAfferent) -> tuple[Pair, Pair]:
+    """Return holds and changes per µm of what the two terms of a type follow, at its most sensitive place."""
     skin = step_on_hold()
-    values = skin.sample(afferent.static_quantity, [(X_MM, SITES.get(name, 0.0))])[:, 0]
     at = [int(np.argmin(np.abs(skin.times_ms - time_ms))) for time_ms in (600.0, 601.0, 603.0)]
-    return float(values[at[0]]), float((values[at[1]] - values[at[2]]) / 20.0)
+    holds, slopes = [], []
+    for quantity in (afferent.dynamic_quantity, afferent.static_quantity):
+        values = skin.sample(quantity, [(X_MM, SITES.get(name, 0.0))])[:, 0]
+        holds.append(0.0 if name in SLOW_TYPES else float(values[at[0]]))
+        slopes.append(float((values[at[1]] - values[at[2]]) / 20.0))
+    return (holds[0], holds[1]), (slopes[0], slopes[1])
 
 
 def tuning() -> None:
@@ -134,42 +145,41 @@ def tuning() -> None:
     curves, rows = {}, []
     for name, afferent in afferent_types().items():
         hold, per_um = linear_response(name, afferent)
-        curves[name] = tuning_curve(afferent, FREQUENCIES_HZ, per_um, LIGHT.get(name, hold))
-    seen = {name: observed_um(name) for name in OBSERVED}
+        curves[name] = tuning_curve(afferent, FREQUENCIES_HZ, per_um, hold)
+    ratios = {name: curves[name] / observed_um(name) for name in OBSERVED}
+    levels = {name: float(np.exp(np.nanmean(np.log(ratio)))) for name, ratio in ratios.items()}
     for number, frequency_hz in enumerate(FREQUENCIES_HZ):
         cells = [f"{frequency_hz:g}"]
         for name, curve in curves.items():
-            known = name in seen and np.isfinite(seen[name][number])
-            ratio = f" ({curve[number] / seen[name][number]:.2f})" if known else ""
-            cells.append(f"{_micrometres(curve[number])}{ratio}")
+            known = name in ratios and np.isfinite(ratios[name][number])
+            shape = f" ({ratios[name][number] / levels[name]:.2f})" if known else ""
+            cells.append(f"{_micrometres(curve[number])}{shape}")
         rows.append(cells)
+    rows.append(["level", *(f"{levels[name]:.2g}" if name in levels else "" for name in curves)])
     _write_table("tuning", ["frequency [Hz]", *(f"{name} [µm]" for name in curves)], rows)
     write_png(IMAGES / "afferent_tuning.png", draw_tuning, curves)
 
 
 def observed_um(name: str) -> FloatArray:
-    """Recalled thresholds at `FREQUENCIES_HZ`, NaN where there is none. [µm]"""
-    values = np.full(FREQUENCIES_HZ.size, np.nan)
-    known = np.array(OBSERVED[name].value)
-    start = FREQUENCIES_HZ.size - known.size if name == "PC" else 0
-    values[start : start + known.size] = known
-    return values
+    """Return recorded thresholds at `FREQUENCIES_HZ`, NaN beyond those that were recorded. [µm]"""
+    at_hz, thresholds_um = (np.log(each.value) for each in OBSERVED[name])
+    outside = {"left": np.nan, "right": np.nan}
+    return np.exp(np.interp(np.log(FREQUENCIES_HZ), at_hz, thresholds_um, **outside))
 
 
 def draw_tuning(curves: dict[str, FloatArray]) -> Figure:
-    """Draw thresholds over frequency, and the recalled ones with a band of a factor of two."""
+    """Draw thresholds over frequency, and the recorded ones."""
     figure = new_figure(7.0, 4.6)
     axes = figure.subplots()
     for (name, curve), (colour, marker) in zip(curves.items(), STYLES, strict=False):
         axes.loglog(FREQUENCIES_HZ, curve, color=colour, label=f"{name}, model")
         if name in OBSERVED:
-            seen = observed_um(name)
-            axes.fill_between(FREQUENCIES_HZ, 0.5 * seen, 2.0 * seen, color=colour, alpha=0.12, linewidth=0.0)
+            at_hz, thresholds_um = (each.value for each in OBSERVED[name])
             axes.plot(
-                FREQUENCIES_HZ, seen, marker, color=colour, markerfacecolor="white", markersize=5.5,
-                label=f"{name}, recalled",
+                at_hz, thresholds_um, marker, color=colour, markerfacecolor="white", markersize=5.5,
+                linestyle=":", linewidth=0.8, label=f"{name}, recorded",
             )  # fmt: skip
-    axes.set(xlabel="frequency [Hz]", ylabel="amplitude for one impulse per cycle [µm]", ylim=(0.3, 3000.0))
+    axes.set(xlabel="frequency [Hz]", ylabel="amplitude for one impulse per cycle [µm]", ylim=(0.02, 3000.0))
     axes.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
     return figure
 
@@ -188,8 +198,12 @@ def indented_by(traces: fp.Traces, depth_um: float, speed_mm_per_s: float) -> fp
     times_ms = np.append(np.linspace(0.0, ramp_ms, 17), ramp_ms + 200.0)
     wanted_um = np.minimum(speed_mm_per_s * times_ms, depth_um)
     rises[np.argmax(~rises)] = True
-    values = interp1d(known_um[rises], traces.values[rises], axis=0)(wanted_um)
-    return replace(traces, times_ms=times_ms, values=values, kinks_ms=np.array([ramp_ms]), phases=())
+
+    def resampled(term: fp.Traces, dynamic: fp.Traces | None = None) -> fp.Traces:
+        values = interp1d(known_um[rises], term.values[rises], axis=0)(wanted_um)
+        return fp.Traces(times_ms, values, [ramp_ms], term.quantity, dynamic)
+
+    return resampled(traces, None if traces.dynamic is None else resampled(traces.dynamic))
 
 
 def threshold_depths_um(afferent: AnyAfferent, traces: fp.Traces, speed_mm_per_s: float) -> FloatArray:
@@ -203,7 +217,7 @@ def threshold_depths_um(afferent: AnyAfferent, traces: fp.Traces, speed_mm_per_s
 
 def ramp_traces(afferent: AnyAfferent, sites: Any) -> fp.Traces:
     """Traces of the slow ramp at sites."""
-    return slow_ramp().sed(sites, afferent.dynamic_quantity, afferent.static_quantity)
+    return fp.Population(sites, 1.0, afferent).followed(slow_ramp())
 
 
 def field_area_mm2(depths_um: FloatArray, times: float) -> float:
@@ -268,7 +282,8 @@ def fields() -> None:
             branched = f"{np.median(areas[0]):.0f} to {np.median(areas[1]):.0f}"
         observed = published.FIELD_AREAS.value[list(published.TYPES).index(name)]
         rows.append([name, f"{low:.1f} to {high:.1f}", branched, f"{observed:g}"])
-    _write_table("fields", ["type", "one end organ [mm²]", "several [mm²]", "median of units [mm²]"], rows)
+    head = ["type", "model [mm²]", "with scattered end organs [mm²]", "median of units [mm²]"]
+    _write_table("fields", head, rows)
     write_png(IMAGES / "afferent_fields.png", draw_fields, depths, areas_of)
 
 
@@ -325,8 +340,7 @@ def adaptation() -> None:
     sites = [(X_MM + x, z) for x, z in product((-1.5, -1.0, -0.5, 0.0, 0.5, 1.0, 1.5), (0.0, 0.5, 1.0, 1.5))]
     found = {}
     for name, afferent in afferent_types().items():
-        traces = skin.sed(sites, afferent.dynamic_quantity, afferent.static_quantity)
-        trains = afferent.spikes(traces)
+        trains = afferent.spikes(fp.Population(sites, 1.0, afferent).followed(skin))
         found[name] = max((trains[n] for n in range(len(sites))), key=len)
     parts = ((0.0, 60.0), (60.0, 1000.0), (1000.0, 2500.0), (2500.0, 5000.0), FIRST_MS, LAST_MS)
     rows = [

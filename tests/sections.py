@@ -73,6 +73,14 @@ def sed_driven(parameters, refractory_ms=1.0):
     return Afferent.from_parameters(parameters, refractory_ms=refractory_ms, **quantities)
 
 
+def followed_by(afferent, traces):
+    """The same course of both quantities that an afferent follows."""
+    dynamic = replace(traces, quantity=afferent.dynamic_quantity)
+    if afferent.dynamic_quantity == afferent.static_quantity:
+        return dynamic
+    return replace(traces, quantity=afferent.static_quantity, dynamic=dynamic)
+
+
 SED_DRIVEN = sed_driven(Afferent.for_tissues("trial3").parameters)
 """It starts at rest and follows SED in both terms, the only quantity of the skins given by a formula."""
 

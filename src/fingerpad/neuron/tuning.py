@@ -7,11 +7,12 @@ frequencies.
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import ArrayLike
 
 from fingerpad.core.checked import checked
-from fingerpad.core.errors import InputError
 from fingerpad.core.signals import Traces
 from fingerpad.core.units import MS_PER_S
 from fingerpad.core.values import Finite, FloatArray, NotNegative, Positive, float_array
@@ -53,8 +54,8 @@ def impulses_per_cycle(afferent: AnyAfferent, traces: Traces) -> FloatArray:
 def tuning_curve(
     afferent: AnyAfferent,
     frequencies_hz: ArrayLike,
-    per_um: Positive,
-    hold: Finite = 0.0,
+    per_um: Positive | tuple[Positive, Positive],
+    hold: Finite | tuple[Finite, Finite] = 0.0,
     impulses: Positive = 1.0,
 ) -> FloatArray:
     """Smallest amplitude at which an afferent fires a given number of impulses per cycle. [µm]
@@ -64,13 +65,14 @@ def tuning_curve(
     Parameters
     ----------
     afferent : AnyAfferent
-        One that follows a single quantity.
+        An afferent of any type.
     frequencies_hz : array_like (n_frequencies,)
         Frequencies. [Hz]
-    per_um : float
-        Change of its quantity per indentation. [unit of the quantity per µm]
-    hold : float, optional
-        Its quantity in the hold.
+    per_um : float or (float, float)
+        Change of what it follows per indentation; two numbers where the dynamic and the static term follow
+        two quantities. [unit of the quantity per µm]
+    hold : float or (float, float), optional
+        What it follows in the hold.
     impulses : float, optional
         Impulses per cycle; 1 is entrainment, if they are equally distributed.
 
@@ -83,15 +85,18 @@ def tuning_curve(
     [50.0, 12.0, 56.0]
     """
     checked_afferent(afferent)
-    if afferent.dynamic_quantity != afferent.static_quantity:
-        got = f"{afferent.dynamic_quantity!r} and {afferent.static_quantity!r}"
-        raise InputError("tuning_curve", "needs an afferent that follows one quantity", got)
+    quantities = afferent.dynamic_quantity, afferent.static_quantity
+    slopes, holds = (each if isinstance(each, tuple) else (each, each) for each in (per_um, hold))
 
     def threshold_um(frequency_hz: float) -> float:
         low, high = _RANGE_UM
         for _ in range(_ROUNDS):
             amplitudes = np.geomspace(low, high, _AMPLITUDES)
-            traces = vibration(frequency_hz, amplitudes, per_um, hold, afferent.static_quantity)
+            dynamic, static = (
+                vibration(frequency_hz, amplitudes, *term)
+                for term in zip(slopes, holds, quantities, strict=True)
+            )
+            traces = static if quantities[0] == quantities[1] else replace(static, dynamic=dynamic)
             enough = impulses_per_cycle(afferent, traces) >= impulses
             if not enough.any():
                 return float("nan")
