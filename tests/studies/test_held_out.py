@@ -11,6 +11,7 @@ from fingerpad.core.signals import Traces
 from fingerpad.experiments.conditions import RECEPTOR_X_MM, Conditions
 from fingerpad.experiments.runner import Runner
 from fingerpad.geometry.mesh import block_mesh
+from fingerpad.neuron.afferent import Afferent
 from fingerpad.neuron.population import Population
 from sections import SENSITIVE
 from studies import held_out
@@ -112,7 +113,7 @@ def test_volume_is_at_most_the_observed_and_weber_fractions_are_judged_in_whole_
 
 
 def test_noise_proportional_to_a_power_of_the_curvature_gives_one_fraction_at_all_standards():
-    grid = Population.grid()
+    grid = Population.grid(afferent=Afferent(noise_offset_hz=0.0))
     pattern = 1.0 + np.random.default_rng(1).uniform(size=len(grid))
     rates = np.array(held_out.PRESSED_PER_M)[:, None] ** 0.8 * pattern
     found = weber_fractions_of(grid, rates, 0)
