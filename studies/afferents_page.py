@@ -217,7 +217,7 @@ def threshold_depths_um(afferent: AnyAfferent, traces: fp.Traces, speed_mm_per_s
 
 def ramp_traces(afferent: AnyAfferent, sites: Any) -> fp.Traces:
     """Traces of the slow ramp at sites."""
-    return fp.Population(sites, 1.0, afferent).followed(slow_ramp())
+    return fp.Population(np.array(sites), 1.0, afferent).followed(slow_ramp())
 
 
 def field_area_mm2(depths_um: FloatArray, times: float) -> float:
@@ -340,7 +340,7 @@ def adaptation() -> None:
     sites = [(X_MM + x, z) for x, z in product((-1.5, -1.0, -0.5, 0.0, 0.5, 1.0, 1.5), (0.0, 0.5, 1.0, 1.5))]
     found = {}
     for name, afferent in afferent_types().items():
-        trains = afferent.spikes(fp.Population(sites, 1.0, afferent).followed(skin))
+        trains = afferent.spikes(fp.Population(np.array(sites), 1.0, afferent).followed(skin))
         found[name] = max((trains[n] for n in range(len(sites))), key=len)
     parts = ((0.0, 60.0), (60.0, 1000.0), (1000.0, 2500.0), (2500.0, 5000.0), FIRST_MS, LAST_MS)
     rows = [

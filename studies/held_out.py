@@ -19,7 +19,6 @@ from fingerpad.core.values import FloatArray, Number
 from fingerpad.data import paper, protocol, psychophysics
 from fingerpad.data.published import Published
 from fingerpad.experiments.conditions import RECEPTOR_X_MM, Conditions
-from fingerpad.experiments.gerling2014.skin import PLATE_DEPTHS_MM
 from fingerpad.experiments.runner import Manifest, Runner
 from fingerpad.experiments.validation.observations import KINDS, Observation, Observations, read_observations
 from fingerpad.experiments.validation.validation import (
@@ -51,8 +50,8 @@ from studies.pages import joined, table
 Fact = Published[float] | Published[tuple[float, ...]]
 OBSERVATIONS = Path(__file__).with_name("observations")
 
-CHOSEN, PREDICTED, PARTLY = "chosen in sample", "predicted", "partly chosen"
-ROLES = {"plate_force": CHOSEN, "plate_force_mean": PARTLY, "cylinder_deflection": CHOSEN}
+CHOSEN, PREDICTED = "chosen in sample", "predicted"
+ROLES = {"plate_force": CHOSEN, "plate_force_mean": CHOSEN, "cylinder_deflection": CHOSEN}
 """How the tissues `human` came to the observations of each file."""
 
 FORCE_DEPTHS_MM = (0.5, 1.0, 1.5, 2.0)
@@ -226,7 +225,7 @@ def force_checks(force_n: Mapping[str, FloatArray]) -> Iterable[Check]:
                 statement=f"plate at {depth:g} mm, {loading.replace('_', ' ')}",
                 source="Dandekar 1995, as quoted in later public material; four subjects",
                 status="read",
-                role=CHOSEN if depth in PLATE_DEPTHS_MM else PREDICTED,
+                role=CHOSEN,
                 predicted=force,
                 unit="N",
                 low=min(subjects, default=PLATE_SHARES[0] * mean),
@@ -509,7 +508,8 @@ def threshold_checks(fractions: Sequence[float]) -> Iterable[Check]:
     fact = psychophysics.WEBER_FRACTIONS
     for standard, fraction in zip(STANDARDS_PER_M, fractions, strict=True):
         statement = f"Weber fraction at {standard:g} /m"
-        yield _check("percept", statement, fact, round(fraction, 2), "1", *fact.value)
+        found = _check("percept", statement, fact, round(fraction, 2), "1", *fact.value)
+        yield replace(found, role=CHOSEN)  # The offset of the noise was chosen by them.
 
 
 # Page

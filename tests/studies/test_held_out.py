@@ -69,10 +69,10 @@ def test_a_check_is_inside_its_bounds_and_undecided_without_bounds_or_prediction
     assert check(value, low, high).inside is inside
 
 
-def test_forces_of_people_themselves_are_inside_and_only_the_depths_of_the_choice_are_chosen():
+def test_forces_of_people_themselves_are_inside_and_chosen_at_every_depth():
     found = list(force_checks({"slow": PEOPLE_N}))
     assert verdicts(found) == [True] * 4
-    assert [each.role for each in found] == [PREDICTED, CHOSEN, PREDICTED, CHOSEN]
+    assert [each.role for each in found] == [CHOSEN] * 4
     assert verdicts(force_checks({"slow": 1.5 * PEOPLE_N})) == [False] * 4
 
 
