@@ -201,7 +201,7 @@ def indented_by(traces: fp.Traces, depth_um: float, speed_mm_per_s: float) -> fp
 
     def resampled(term: fp.Traces, dynamic: fp.Traces | None = None) -> fp.Traces:
         values = interp1d(known_um[rises], term.values[rises], axis=0)(wanted_um)
-        return fp.Traces(times_ms, values, [ramp_ms], term.quantity, dynamic)
+        return fp.Traces(times_ms, values, np.array([ramp_ms]), term.quantity, dynamic)
 
     return resampled(traces, None if traces.dynamic is None else resampled(traces.dynamic))
 

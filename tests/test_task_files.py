@@ -187,6 +187,12 @@ def test_an_afferent_is_ours_or_ones_own_numbers_or_of_a_file_of_results(tmp_pat
         Path(name).write_text(json.dumps(results | {"format": named, "format_version": version}))
         found = read(changed(SPHERES, afferents=name)).population.afferent
         assert found == replace(expected, **quantities)
+    # A reproduction with the quantities of `human` was fitted with its end organs and adaptation.
+    human = fp.Afferent()
+    followed = {"dynamic_quantity": human.dynamic_quantity, "static_quantity": human.static_quantity}
+    results["human"]["single_unit"] |= followed
+    Path("results.json").write_text(json.dumps(results | {"format": named, "format_version": version}))
+    assert read(changed(SPHERES, afferents="results.json")).population.afferent == replace(human, **six)
 
 
 @pytest.mark.parametrize("name", tasks())

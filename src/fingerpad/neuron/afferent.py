@@ -60,15 +60,16 @@ class AnyAfferent(Follows, Protocol):
         """Simulate the spikes at every site."""
 
 
-_AS_IN_THE_PAPER: dict[str, Any] = {
+EXTENSIONS: dict[str, Any] = {
     "dynamic_quantity": STORED_ENERGY,
     "static_quantity": STORED_ENERGY,
     "adapting_share": 0.0,
+    "adapting_ms": neuron.HUMAN_ADAPTING_TIME.value,
     "end_organs": 1,
     "reach_mm": 0.0,
     "noise_offset_hz": 0.0,
 }
-"""What the paper's afferent has in the place of our extensions."""
+"""Fields that extend the paper's afferent, with what makes them its own."""
 
 
 def checked_afferent(afferent: AnyAfferent) -> AnyAfferent:
@@ -218,7 +219,7 @@ class Afferent:
             raise InputError(
                 "parameters", f"must hold {', '.join(PARAMETER_NAMES)}", f"{values.size} numbers"
             )
-        return cls(**dict(zip(PARAMETER_NAMES, values.tolist(), strict=True)), **(_AS_IN_THE_PAPER | others))
+        return cls(**dict(zip(PARAMETER_NAMES, values.tolist(), strict=True)), **(EXTENSIONS | others))
 
     @property
     def parameters(self) -> FloatArray:

@@ -41,7 +41,7 @@ from fingerpad.experiments.requests.parts import (
 )
 from fingerpad.geometry.fingertip import Finger, Fingertip
 from fingerpad.mechanics.materials import Tissues
-from fingerpad.neuron.afferent import PARAMETER_NAMES, Afferent, AnyAfferent, checked_afferent
+from fingerpad.neuron.afferent import EXTENSIONS, PARAMETER_NAMES, Afferent, AnyAfferent, checked_afferent
 from fingerpad.neuron.afferent_types import OwnAfferent, afferent_of, afferent_types
 from fingerpad.neuron.escape_rate import EscapeRate
 from fingerpad.neuron.population import Population, sensitivities
@@ -394,15 +394,19 @@ def fitted_afferent(path: Path, tissues: str | Tissues = DEFAULT_TISSUES) -> Any
         fitted = values["fit"] if "fit" in values else values[column]["single_unit"]
         named = values if "fit" in values else fitted
         parameters = [fitted["parameters"][name] for name in PARAMETER_NAMES]
-        quantities = {name: named[name] for name in ("dynamic_quantity", "static_quantity")}
+        others = {name: named[name] for name in ("dynamic_quantity", "static_quantity")}
     except StoreError as error:
         raise InputError(str(error)) from error
     except (LookupError, TypeError) as error:
         raise InputError(
             f"{path} must hold the parameters of a fit: {shown(error.args[0])} is missing there."
         ) from error
+    own = Afferent.for_tissues(tissues)
+    if "fit" not in values and all(getattr(own, name) == followed for name, followed in others.items()):
+        # A reproduction fits the afferent of its tissues with its end organs and its adaptation.
+        others |= {name: getattr(own, name) for name in EXTENSIONS}
     try:
-        return Afferent.from_parameters(parameters, **quantities, initial_mv=named.get("initial_mv"))
+        return Afferent.from_parameters(parameters, **others, initial_mv=named.get("initial_mv"))
     except InputError as error:
         raise InputError(f"{path}: {error}") from error
 
