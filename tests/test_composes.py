@@ -123,7 +123,7 @@ def fit(row, folder):
 def discriminate(row, folder):
     own, pressed = keys(row)
     found = fp.discriminate(
-        stimuli={"vary": "motion.depth_mm", "values": [0.9, 1.2]}, standard=0.9, noise=0.1,
+        stimuli={"vary": "motion.depth_mm", "values": [1.2, 1.6]}, standard=1.2, noise=0.1,
         measure="static" if row == "SAII" else "dynamic", motion={"ramp_ms": 50, "hold_ms": 100},
         afferents=own | {"windows_ms": WINDOWS},
         experiment={"presentations": 50, "distributions": 5, "pairs": 5, "hit_rates": 5},

@@ -42,6 +42,7 @@ from fingerpad.psychophysics.observer import Experiment, GradientSum, discrimina
 from fingerpad.report.style import new_figure, png
 from fingerpad.skin.sampling import SurfaceProfile
 from fingerpad.skin.store import Store, touch_key
+from sections import SED_DRIVEN
 
 HUGE = 10**400
 PAIRS = np.array([[0, 1], [1, 2]])
@@ -95,7 +96,7 @@ def test_windows_of_rates_lie_in_what_was_recorded(window):
     skin = SimpleNamespace(sed=lambda sites, *quantities: TRACES)
     for ask in (
         lambda: fp.Afferent().rates(TRACES, window, (600, 950)),
-        lambda: fp.Population.grid(rows=1, columns=4).respond(skin, dynamic_window_ms=window),
+        lambda: fp.Population.grid(rows=1, columns=4, afferent=SED_DRIVEN).respond(skin, window),
         lambda: AfferentModel.of_traces(TRACES, (window, (600, 950))),
         lambda: fit_recordings(TRACES, recorded, memberships=[0, 1, 0, 1], windows_ms=(window, (600, 950))),
     ):

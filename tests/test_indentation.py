@@ -120,7 +120,7 @@ def test_touches_are_values_and_settings_of_your_own_replace_those_of_the_resolu
 
 
 test_unusable_arguments_are_refused = refusals(
-    ({"tissues": "steel"}, "stiffening: got 'steel'"),
+    ({"tissues": "steel"}, "gerling2014_fit: got 'steel'"),
     ({"tissues": None}, ("tissues",)),
     ({"resolution": "fine"}, ("resolution",)),
     ({"stimulus": fp.RampAndHold(depth_mm=6.0)}, ("depth_mm",)),

@@ -357,7 +357,7 @@ def test_a_fit_writes_page_figures_numbers_and_their_origin(call, tmp_path):
     assert manifest["command"] == shlex.join(["fingerpad", "fit", *arguments])
     assert manifest["inputs"] == {"mine.csv": hashlib.sha256(Path("mine.csv").read_bytes()).hexdigest()}
     assert (manifest["seed"], manifest["resolution"], manifest["materials"]) == (3, "quick", "human")
-    assert results["dynamic_quantity"] == results["static_quantity"] == "compressive_stress"
+    assert (results["dynamic_quantity"], results["static_quantity"]) == ("stored", "von_mises")
     assert results["windows_ms"] == [[30.0, 50.0], [600.0, 950.0]]
     page = (tmp_path / "fit" / "fit.html").read_text()
     assert "<h1>An afferent fitted to recordings</h1>" in page

@@ -326,7 +326,7 @@ def test_streamed_spikes_are_those_of_one_go(afferent: fp.Afferent) -> None:
 
 
 def test_a_stream_refuses_wrong_samples() -> None:
-    stream = fp.AfferentStream(fp.Afferent(), 2)
+    stream = fp.AfferentStream(fp.Afferent.for_tissues("paper"), 2)
     with pytest.raises(fp.InputError, match="follows one quantity"):
         stream.step(1.0, [0.0, 0.0], [0.0, 0.0])
     stream.step(1.0, [0.0, 0.0])

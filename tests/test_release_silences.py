@@ -40,4 +40,4 @@ def test_its_skin_is_unloaded_then_and_holds_less_and_less_energy(skin):
     assert not skin.contact_area_mm2[released].any()
     sed = skin.sed([CONTACT_POINT_MM]).values[:, 0]
     assert (np.diff(sed[released]) < 0.0).all()
-    assert sed[released[0]] < 0.05 * sed.max()
+    assert sed[released[0]] < 0.1 * sed.max()

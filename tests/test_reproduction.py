@@ -159,7 +159,7 @@ def test_the_summary_repeats_numbers_of_the_sections(first, name):
 
 def test_the_first_column_is_the_papers_own_system(first):
     paper, human = (first.results[name]["single_unit"] for name in SETS)
-    assert (paper["method"], human["method"]) == ("response surface", "rates and hit rates")
+    assert (paper["method"], human["method"]) == ("response surface", "least squares in four numbers")
     assert (paper["dynamic_quantity"], paper["static_quantity"]) == ("stored", "stored")
     assert [len(fold["climbs"]) for fold in paper["folds"]] == [2] * 6
     met = [each["verdict_paper"] for each in first.results["statements"]].count("met")
@@ -175,7 +175,7 @@ def test_one_set_serves_four_levels(first):
     assert 0.50 <= found["force_plate_2mm_n"] <= 1.04
     assert found["fss_out_of_sample"] >= 0.90
     assert found["resting_rate_hz"] == 0.0
-    assert 0.049 <= found["noise_sigma"] <= 0.061
+    assert 0.015 <= found["noise_sigma"] <= 0.03  # 3 to 6 spikes/s at low rates
     assert found["hit_rate_296"] == pytest.approx([0.58, 0.58], abs=0.03)
     assert found["hit_rate_365"] == pytest.approx([0.95, 0.95], abs=0.03)
 

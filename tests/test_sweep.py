@@ -22,6 +22,7 @@ from fingerpad.experiments.sweep.request import Constraint
 from fingerpad.experiments.sweep.settings import observe
 from fingerpad.export.sweep import DONE, FAILED, LEFT_OUT, SweepFile
 from fingerpad.export.sweep_results import observe_sweep, open_sweep, setting_response, write_sweep_spikes
+from fingerpad.psychophysics.encoding import Noise
 from fingerpad.psychophysics.observer import ENCODERS, Experiment, discriminate_by
 from fingerpad.skin.indentation import Touch
 
@@ -444,9 +445,8 @@ def test_hit_rates_are_those_of_each_observer_alone(responses, code):
         count = 2 + receptors
         table, pairs = rates[[1, 0, 2], receptors, :count], np.array([[0, 1], [1, 2]][: count - 1])
         observer = Experiment(criterion=[0.4, 0.6][criterion])
-        expected = discriminate_by(
-            ENCODERS[code](pairs), table, [0.05, 0.2][noise], 0, observer, session=SESSION
-        )
+        law = Noise([0.05, 0.2][noise], fp.Afferent().noise_offset_hz)
+        expected = discriminate_by(ENCODERS[code](pairs), table, law, 0, observer, session=SESSION)
         got = found[:, receptors, noise, criterion]
         assert got[[0, 2]].tolist() == expected.hit_rate.tolist()
         assert np.isnan(got[1])

@@ -202,7 +202,7 @@ def test_punch_that_goes_between_two_nodes_is_refused_instead_of_pressing_with_n
     # What its size does not tell is told by the force.
     monkeypatch.setattr("fingerpad.geometry.size_field.FEWEST_BELOW", 1)
     with pytest.raises(fp.ConvergenceError, match=r"The skin slips past the indenter: its force falls from"):
-        fp.touch_of(fp.Fingertip(), tiny, fp.RampAndHold(depth_mm=0.3)).solve()
+        fp.touch_of(fp.Fingertip(), tiny, fp.RampAndHold(depth_mm=0.3), "trial3").solve()
 
 
 def test_a_vibration_of_ones_own_is_one_phase_and_taps_stay_apart():

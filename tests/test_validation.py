@@ -406,6 +406,7 @@ def test_a_layer_is_compressed_as_its_nodes_come_closer(tmp_path):
     assert mesh.nodes_mm is rest
 
 
+@pytest.mark.filterwarnings("ignore::fingerpad.core.errors.InertiaWarning")
 def test_a_receptive_field_holds_the_places_from_which_a_probe_elicits_a_tenth(tmp_path):
     file = written(tmp_path, "afferent,depth_mm,area_mm2\nRA,0.3,5\nRA,0.1,5\nRA,0,0\n")
     deep, shallow, none = (
