@@ -167,6 +167,14 @@ def test_stable_laws_and_published_foams_are_taken_without_a_word():
         (tissues.WU_SUBCUTIS_HYPERFOAM_MU, tissues.WU_SUBCUTIS_HYPERFOAM_ALPHA),
     ):
         assert instability(Hyperfoam(moduli.value, exponents.value, tissues.WU_HYPERFOAM_POISSON.value)) == ""
+    # Convex by a formula, and by numbers.
+    for coefficients in (
+        tissues.HUMAN_STRATUM_CORNEUM,
+        tissues.HUMAN_LIVING_EPIDERMIS,
+        tissues.HUMAN_SUBCUTIS,
+    ):
+        law = Polynomial(*coefficients.value, bulk_linear=100.0)
+        assert instability(law) == instability(law.energy) == ""
 
 
 def stiffness_by_differences(formula, coefficients, logs):

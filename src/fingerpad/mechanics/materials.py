@@ -324,8 +324,10 @@ def instability(law: Law) -> str:
     with its own volumetric energy at constant volume. Uniaxial, equibiaxial and planar stretch are examined,
     from 1 outwards; for a law that couples shape and volume with stress-free sides, and change of volume.
     """
-    if isinstance(law, Polynomial) and not (law.c01 or law.c20 or law.c11 or law.c02):
-        return ""  # neo-Hooke's energy is a sum of exponentials of the logarithmic strains
+    if isinstance(law, Polynomial) and law.c10 > 0.0 <= law.c20 and not (law.c01 or law.c11 or law.c02):
+        # I1 - 3 is a sum of exponentials of the logarithmic strains and not below 0: it and its square are
+        # convex.
+        return ""
     energy = law.energy
     for far in STABLE_STRETCHES:
         for mode, path in (_COUPLED_PATHS if energy.is_coupled else _ISOCHORIC_PATHS).items():
