@@ -361,7 +361,7 @@ def test_a_fit_writes_page_figures_numbers_and_their_origin(call, tmp_path):
     assert results["windows_ms"] == [[30.0, 50.0], [600.0, 950.0]]
     page = (tmp_path / "fit" / "fit.html").read_text()
     assert "<h1>An afferent fitted to recordings</h1>" in page
-    assert "its dynamic term follows compressive stress, its static term compressive stress" in page
+    assert "its dynamic term follows strain energy density, its static term von Mises stress" in page
     assert page.count("data:image/png;base64,") == 1
     assert f"<td>{fit['fss_out_of_sample']:.3f}</td>" in page.replace("−", "-")
 

@@ -62,7 +62,7 @@ def span(ends: Iterable[float | None] | None, absent: str = ABSENT) -> str:
     return ABSENT if ends is None else " … ".join(absent if end is None else number(end) for end in ends)
 
 
-WORDS = {"stored": "strain energy density", "work": "work of the stress"}
+WORDS = {"stored": "strain energy density", "von_mises": "von Mises stress", "work": "work of the stress"}
 """Names in words, where these are not those of the code."""
 
 
