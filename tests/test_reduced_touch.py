@@ -145,10 +145,10 @@ def test_a_released_spring_stays_behind_and_recovers_in_closed_form() -> None:
 @pytest.mark.parametrize(
     ("times_ms", "depth_mm", "bounds"),
     [
-        ([0.0, 60.0, 800.0], [0.0, 0.8, 0.8], (0.009, 0.014, 0.005)),
-        ([0.0, 40.0, 300.0, 340.0, 600.0], [0.0, 0.95, 0.95, 0.4, 0.4], (0.006, 0.012, 0.0035)),
+        ([0.0, 60.0, 800.0], [0.0, 0.8, 0.8], (0.009, 0.014, 0.009, 0.005)),
+        ([0.0, 40.0, 300.0, 340.0, 600.0], [0.0, 0.95, 0.95, 0.4, 0.4], (0.006, 0.012, 0.006, 0.0035)),
         ([0.0, 40.0, 1000.0, 1030.0, 1300.0, 1330.0, 1600.0], [0.0, 0.95, 0.95, 0.15, 0.15, 0.9, 0.9],
-         (0.015, 0.045, 0.015)),
+         (0.03, 0.045, 0.045, 0.015)),
     ],
     ids=["press and hold", "partial release", "almost released, and again"],
 )  # fmt: skip
@@ -157,7 +157,7 @@ def test_it_agrees_with_the_full_solver_on_touches_not_used(
     model: ReducedModel,
     times_ms: list[float],
     depth_mm: list[float],
-    bounds: tuple[float, float, float],
+    bounds: tuple[float, ...],
 ) -> None:
     skin = training.touch_with((), fp.Trajectory(tuple(times_ms), depth_mm=tuple(depth_mm))).solve()
     found = largest_errors(model, skin)
@@ -165,7 +165,7 @@ def test_it_agrees_with_the_full_solver_on_touches_not_used(
     if len(times_ms) == 3:  # without relaxation it is wrong
         at_once = np.arange(model.totals.shape[1]) < AT_ONCE
         elastic = replace(model, totals=model.totals * at_once[:, None])
-        assert largest_errors(elastic, skin)[2] > 0.02
+        assert largest_errors(elastic, skin)[-1] > 0.02
 
 
 def test_bounds_hold_for_all_quantities_together() -> None:
