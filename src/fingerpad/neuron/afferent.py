@@ -245,7 +245,7 @@ class Afferent:
         Examples
         --------
         >>> round(Afferent().static_threshold, 2), round(Afferent.for_tissues("trial3").static_threshold, 3)
-        (2.91, 0.038)
+        (0.16, 0.038)
         """
         return (self.rheobase_ma - self.intercept_ma) / self._lasting_gain
 

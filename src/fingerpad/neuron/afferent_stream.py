@@ -36,7 +36,7 @@ class AfferentStream:
     --------
     >>> import fingerpad as fp
     >>> stream = fp.AfferentStream(fp.Afferent(), n_sites=1)
-    >>> trains = [stream.step(float(time), [0.4 * time]) for time in range(1, 31)]
+    >>> trains = [stream.step(float(time), [0.4 * time], [0.02 * time]) for time in range(1, 31)]
     >>> sum(len(train[0]) for train in trains) > 1
     True
     """

@@ -141,10 +141,10 @@ def SAI(**numbers: Any) -> Afferent:
     Examples
     --------
     >>> from fingerpad.neuron.tuning import tuning_curve
-    >>> tuning_curve(SAI(), [10.0, 100.0], per_um=0.02).round(-1).tolist()
-    [70.0, 210.0]
-    >>> tuning_curve(Afferent(), [10.0, 100.0], per_um=0.02).round(-1).tolist()
-    [50.0, 30.0]
+    >>> tuning_curve(SAI(), [10.0, 100.0], per_um=(0.001, 0.03)).round(-1).tolist()
+    [30.0, 240.0]
+    >>> tuning_curve(Afferent(), [10.0, 100.0], per_um=(0.001, 0.03)).round(-1).tolist()
+    [20.0, 30.0]
     """
     return cast(Afferent, afferent_of("SAI", **numbers))
 
@@ -163,7 +163,7 @@ def RA(**numbers: Any) -> RapidlyAdapting:
     >>> stress = Traces([0.0, 50.0, 1000.0], [[0.0], [5.0], [5.0]], kinks_ms=[50.0],
     ...                 quantity="compressive_stress")
     >>> spikes = RA().spikes(stress)[0]
-    >>> bool(spikes.size > 2), bool((spikes < 60.0).all())
+    >>> bool(spikes.size > 2), bool((spikes < 100.0).all())
     (True, True)
     """
     return cast(RapidlyAdapting, afferent_of("RA", **numbers))

@@ -82,7 +82,7 @@ def tuning_curve(
 
     >>> from fingerpad.neuron.afferent_types import RA
     >>> tuning_curve(RA(), [5.0, 40.0, 200.0], per_um=0.02, hold=10.0).round().tolist()
-    [50.0, 12.0, 56.0]
+    [14.0, 5.0, 34.0]
     """
     checked_afferent(afferent)
     quantities = afferent.dynamic_quantity, afferent.static_quantity
