@@ -19,6 +19,7 @@ from fingerpad.core.values import FloatArray, Number
 from fingerpad.data import paper, protocol, psychophysics
 from fingerpad.data.published import Published
 from fingerpad.experiments.conditions import RECEPTOR_X_MM, Conditions
+from fingerpad.experiments.gerling2014.thresholds import fitted_noise
 from fingerpad.experiments.runner import Manifest, Runner
 from fingerpad.experiments.validation.observations import KINDS, Observation, Observations, read_observations
 from fingerpad.experiments.validation.validation import (
@@ -37,8 +38,8 @@ from fingerpad.mechanics.press_settings import PressSettings
 from fingerpad.neuron.afferent import Afferent
 from fingerpad.neuron.population import Population
 from fingerpad.neuron.spikes import firing_rate_hz, modulation_index
-from fingerpad.psychophysics.encoding import Noise, neighbour_pairs
-from fingerpad.psychophysics.observer import NOISE_DRAWS, expected_hit_rates, fit_noise_sigma
+from fingerpad.psychophysics.encoding import Measured, neighbour_pairs
+from fingerpad.psychophysics.observer import NOISE_DRAWS
 from fingerpad.psychophysics.sensitivity import InterpolatedObserver
 from fingerpad.report.page import edition
 from fingerpad.report.tables import ABSENT, fixed, number
@@ -496,9 +497,8 @@ def weber_fractions_of(grid: Population, static_hz: FloatArray, seed: int) -> li
     draws = normals(seed, 1, len(grid), Purpose.RESPONSE, NOISE_DRAWS)[0].T
     people = (psychophysics.SPHERE_287.value, *psychophysics.GOODWIN_CURVATURES.value)
     rows = static_hz[[PRESSED_PER_M.index(curvature) for curvature in people]]
-    offset = grid.noise_offset_hz
-    fit = fit_noise_sigma(lambda sigma: expected_hit_rates(rows, pairs, Noise(sigma, offset), draws))
-    noise = Noise(fit.noise_sigma, offset)
+    measured = Measured(rows, pairs, grid.noise_offset_hz)
+    noise = measured.noise(fitted_noise(measured, draws))
     observer = InterpolatedObserver(np.array(PRESSED_PER_M), static_hz, pairs, noise, draws)
     return [observer.difference(standard) / standard for standard in STANDARDS_PER_M]
 

@@ -120,7 +120,7 @@ def curvature_thresholds(
             table = static[np.searchsorted(curvatures, (CURVATURES[0], *GOODWIN_CURVATURES))]
             measured = Measured(table, neighbours, population.noise_offset_hz)
             try:
-                sigma = _fitted_noise(measured, draws)
+                sigma = fitted_noise(measured, draws)
             except ConvergenceError as error:
                 sigma, missed = math.nan, [MissingThreshold(standard_per_m=None, why_not=str(error))]
         for standard in STANDARDS_PER_M if math.isfinite(sigma) else ():
@@ -149,7 +149,7 @@ def curvature_thresholds(
     )
 
 
-def _fitted_noise(measured: Measured, draws: FloatArray) -> float:
+def fitted_noise(measured: Measured, draws: FloatArray) -> float:
     """Noise for which the hit rates at Goodwin's points are closest to people's."""
     return fit_noise_sigma(lambda sigma: expected_of_measure([measured], draws, sigma)[0]).noise_sigma
 

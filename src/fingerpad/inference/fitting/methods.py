@@ -201,6 +201,9 @@ class LeastSquares:
         return Fit(best.parameters, best.score, n_evaluations, seconds, tuple(steps))
 
 
+FIRST_SPREAD = 0.5  # Standard deviation of the first generation of CMA-ES, in units of the scales.
+
+
 @dataclass(frozen=True)
 class CovarianceAdaptation:
     """CMA-ES from one start, with the package `cma`.
@@ -210,7 +213,6 @@ class CovarianceAdaptation:
 
     start: ArrayLike  #: Mean of the first generation, (n_parameters,).
     bounds: Bounds  #: Limits of the parameters, and the scales that set their units in the search.
-    first_spread: float = 0.5  #: Standard deviation of the first generation, in units of the scales.
     most_evaluations: int = 2000
     """The search ends with the generation that reaches this number, or when it has converged."""
     seed: int = 0  #: Seed of the random numbers; the same seed gives the same bits.
@@ -224,7 +226,7 @@ class CovarianceAdaptation:
         generator = published_generator(self.seed)
         search = CMAEvolutionStrategy(
             np.asarray(self.start) / scales,
-            self.first_spread,
+            FIRST_SPREAD,
             {
                 "bounds": [list(side / scales) for side in (self.bounds.low, self.bounds.high)],
                 "maxfevals": self.most_evaluations,
