@@ -3,6 +3,7 @@
 import json
 import re
 import shutil
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -423,6 +424,46 @@ def test_a_receptive_field_holds_the_places_from_which_a_probe_elicits_a_tenth(t
         for away in (0.0, radius - 0.25, radius + 0.25)
     )
     assert inside >= max(1.0, 0.1 * middle) > outside
+
+
+class Drum(SimpleNamespace):
+    """Skin over which dots pass, and that has dents of its own until they have moved by one spacing."""
+
+    def sed(self, sites, dynamic_quantity, static_quantity):
+        motion, since_mm = self.motion, np.asarray(self.motion.x_mm)
+        lag = np.asarray(sites)[:, 1]
+        heights = 1.0 + np.cos(2 * np.pi * (since_mm[:, None] - lag) / self.spacing_mm)
+        heights[since_mm < self.spacing_mm] *= 5.0
+        times = np.asarray(motion.times_ms)
+        both = [
+            fp.Traces(times, 9.0 * heights, quantity=each) for each in (dynamic_quantity, static_quantity)
+        ]
+        return replace(both[1], dynamic=both[0])
+
+
+def test_dots_are_counted_while_one_spacing_passes_again_and_again(tmp_path):
+    file = written(tmp_path, "afferent,spacing_mm,speed_mm_s,force_n,rate_hz\nSAI,3,60,0.6,60\nRA,3,60,0,0\n")
+    request = validation.ValidationRequest(observations=file, resolution="quick")
+    moving, none = (
+        validation.planned(
+            KINDS["dots"], dict(zip(KINDS["dots"].conditions, row.condition, strict=True)), request
+        )
+        for row in request.observed.rows
+    )
+    assert (none.touch, none.of(None)) == (None, 0.0)
+    body, motion = moving.touch.indenter, moving.touch.stimulus
+    assert set(np.diff(sorted({x for x, _ in body.at_mm})).round(9)) == {3.0}
+    assert motion.x_mm[-1] == 6.0
+    assert motion.end_ms == pytest.approx(50.0 + 150.0 + 2 * 50.0)
+    # The same afferents in a skin under which dots have passed since ever.
+    steps = np.arange(1.0, 481.0)
+    forever = SimpleNamespace(times_ms=50.0 / 12 * steps, x_mm=3.0 + 0.25 * steps)
+    places = np.column_stack([np.full(4, RECEPTOR_X_MM), 1.5 * (np.arange(4) + 0.5) / 4])
+    traces = fp.Population(places, 1.0).followed(Drum(motion=forever, spacing_mm=3.0))
+    counts = [((train >= 500.0) & (train < 1500.0)).sum() for train in fp.Afferent().spikes(traces)]
+    found = moving.of(Drum(motion=motion, spacing_mm=3.0))
+    assert found > 10.0
+    assert found == pytest.approx(np.mean(counts), abs=1.0)
 
 
 def test_adaptation_is_the_interval_at_a_time_of_the_hold(tmp_path):

@@ -280,6 +280,30 @@ class Traces(Result):
             raise InputError("sites", f"must have one truth value per site, {self.n_sites}", str(sites.size))
         return self.with_values(lambda values: values[:, sites])
 
+    def repeated(self, start_ms: Finite, count: Whole) -> Traces:
+        """Traces of the part from one of the times to the end, one after the other, from time 0.
+
+        The part is one period of a motion: what its end has takes the place of what its start has.
+
+        Examples
+        --------
+        >>> passed = Traces([0.0, 5.0, 10.0, 15.0], [[0.0], [2.0], [3.0], [2.5]])
+        >>> twice = passed.repeated(5.0, count=2)
+        >>> twice.times_ms.tolist(), twice.values.ravel().tolist()
+        ([0.0, 5.0, 10.0, 15.0, 20.0], [2.5, 3.0, 2.5, 3.0, 2.5])
+        """
+        inside = np.flatnonzero(self.times_ms > start_ms)
+        since_ms = self.times_ms[inside] - start_ms
+        times_ms = np.append(0.0, np.arange(count)[:, None] * since_ms[-1] + since_ms)
+
+        def again(values: FloatArray) -> FloatArray:
+            return np.concatenate([values[-1:], np.tile(values[inside], (count, 1))])
+
+        dynamic = self.dynamic
+        if dynamic is not None:
+            dynamic = Traces(times_ms, again(dynamic.values), quantity=dynamic.quantity)
+        return Traces(times_ms, again(self.values), quantity=self.quantity, dynamic=dynamic)
+
     def scaled(self, factors: ArrayLike) -> Traces:
         """Traces with each site's values multiplied by a factor of its own, (n_sites,), not negative.
 

@@ -31,6 +31,7 @@ QUANTITY_UNITS = {**SKIN_QUANTITY_UNITS, "current": "mA", "relative_current": ""
 UNITS = {
     "_per_cm2": "1/cm²",
     "_mm_per_s": "mm/s",
+    "_mm_s": "mm/s",
     "_per_kpa_ms": "1/(kPa ms)",
     "_per_kpa": "1/kPa",
     "_per_ms": "1/ms",

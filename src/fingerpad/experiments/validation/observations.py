@@ -1,4 +1,4 @@
-"""Files of observations: eight kinds, each known by its header."""
+"""Files of observations: nine kinds, each known by its header."""
 
 from __future__ import annotations
 
@@ -45,6 +45,8 @@ COLUMNS: dict[str, Callable[..., float]] = {
     "curvature_per_m": not_concave,
     "ridge_mm": positive,
     "groove_mm": positive,
+    "spacing_mm": positive,
+    "speed_mm_s": positive,
     "force_n": not_negative,
     "deflection_mm": finite,
     "rate_hz": not_negative,
@@ -88,6 +90,7 @@ KINDS: dict[str, Kind] = {
         Kind("rate_position", ("force_n", "curvature_per_m", "position_mm"), "rate_hz"),
         Kind("grating", ("force_n", "ridge_mm", "groove_mm", "position_mm"), "rate_hz"),
         Kind("receptive_field", ("afferent", "depth_mm"), "area_mm2"),
+        Kind("dots", ("afferent", "spacing_mm", "speed_mm_s", "force_n"), "rate_hz"),
         Kind("adaptation", ("depth_mm", "time_ms"), "rate_hz"),
         Kind("strain", ("force_n", "layer"), "strain"),
     )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -14,7 +15,8 @@ from pydantic import Field
 
 from fingerpad.core.checked import result_class
 from fingerpad.core.errors import ConvergenceError, InputError
-from fingerpad.core.signals import INTERVAL, Traces
+from fingerpad.core.regions import around_zero
+from fingerpad.core.signals import COUNT, INTERVAL, Traces
 from fingerpad.core.units import MN_PER_N, MS_PER_S, unit_of
 from fingerpad.core.values import FloatArray, Number, Pair, Positive, Text, choice
 from fingerpad.data import fingertip, protocol
@@ -42,10 +44,10 @@ from fingerpad.experiments.scores import (
     observed_ranges,
 )
 from fingerpad.experiments.validation.observations import WORDS, Kind, Observations, Value, read_observations
-from fingerpad.geometry.bodies import FlatPunch, Grating, Plate, Sphere
+from fingerpad.geometry.bodies import Dots, FlatPunch, Grating, Plate, Sphere
 from fingerpad.geometry.grading import RESOLUTIONS, Grading, resolution_grading
 from fingerpad.geometry.indenters import Indenter
-from fingerpad.geometry.motion import ForceRampAndHold, Motion, RampAndHold
+from fingerpad.geometry.motion import ForceRampAndHold, Motion, RampAndHold, Trajectory
 from fingerpad.neuron.afferent import AnyAfferent, type_of
 from fingerpad.neuron.population import Population
 from fingerpad.neuron.spikes import RATE_OF
@@ -61,6 +63,11 @@ PROBE, PROBING_MM_PER_MS, PROBED_MS = FlatPunch(1.0, 0.2), 0.02, 300.0
 FIELD_MM, PLACES_MM = 4.0, 0.2  # Places are probed so far from the receptor, so far apart.
 SHARE_OF_PEAK = 0.1
 """Share of the spikes at the most sensitive place that a place within a receptive field elicits; assumed."""
+DOT_MM, DOTS_MM = 1.0, (8.0, 6.0)
+"""Diameter of the dots, half of which they are high; the lattice reaches so far along and across."""
+DOTS_STEP_MM, DOTS_HELD_MS, DOTS_MS = 0.25, 150.0, 1000.0
+"""Way of the lattice in one step, how long it is held before it moves, and how long spikes are counted."""
+DOTS_LINES = 4  # Lines across half a spacing on which afferents lie.
 STEADY, HELD_STEPS = FlatPunch(2.0), 12  # Probe of adaptation, assumed, and the steps of its hold.
 
 
@@ -146,6 +153,8 @@ class Prediction:
     curvature_per_m: float | None = None  #: Of the sphere. [1/m]
     ridge_mm: float | None = None
     groove_mm: float | None = None  #: Of the grating. [mm]
+    spacing_mm: float | None = None  #: Of the dots, along and across. [mm]
+    speed_mm_s: float | None = None  #: Of the dots, along the finger. [mm/s]
     position_mm: float | None = None  #: Of the receptor from the middle of the touch, proximal positive. [mm]
     observed: float
     predicted: Number  #: In the unit of the kind; no prediction where a touch failed.
@@ -224,6 +233,7 @@ def validate(request: ValidationRequest, runner: Runner) -> ValidationFile:
         "force": loading,
         "deflection": loading,
         "receptive_field": of_afferent,
+        "dots": of_afferent,
         "adaptation": of_afferent,
         "strain": {},
     }
@@ -290,7 +300,7 @@ def predict(model: ValidationRequest, runner: Runner) -> Predictions:
     given: dict[Condition, Given] = {
         row.condition: dict(zip(kind.conditions, row.condition, strict=True)) for row in observations.rows
     }
-    plans = {condition: _plan(kind, values, model) for condition, values in given.items()}
+    plans = {condition: planned(kind, values, model) for condition, values in given.items()}
     touches = [plan.touch for plan in plans.values() if isinstance(plan, Reading) and plan.touch]
     failed: dict[Touch, ConvergenceError | InputError] = {}
     wanted = {kind.name: {touch: touch for touch in touches}}
@@ -307,12 +317,13 @@ def predict(model: ValidationRequest, runner: Runner) -> Predictions:
     values, reasons = read(plans)
     mirrored = None
     if axis:
-        turned = {key: _plan(kind, {**each, axis: -each[axis]}, model) for key, each in given.items()}
+        turned = {key: planned(kind, {**each, axis: -each[axis]}, model) for key, each in given.items()}
         mirrored, _ = read(turned)
     return Predictions(values, mirrored, reasons, next(iter(skins.values()), None))
 
 
-def _plan(kind: Kind, given: Given, model: ValidationRequest) -> Plan:
+def planned(kind: Kind, given: Given, model: ValidationRequest) -> Plan:
+    """Return how the prediction of a condition is obtained, or why it cannot be."""
     try:
         return _READING[kind.name](given, model)
     except InputError as error:
@@ -416,19 +427,69 @@ def _area(given: Given, model: ValidationRequest) -> Reading:
     depth_mm, name = given["depth_mm"], str(given["afferent"])
     if depth_mm == 0.0:
         return Reading(None, lambda _: 0.0)
-    own = model.responding
-    afferent = own if type_of(own) == name else chosen_afferent(name, model.tissues)
     touch = _probed(model, PROBE, probing(depth_mm))
     # The receptor moves instead of the probe: its places are those of the probe about a receptor, mirrored.
     away = np.arange(-FIELD_MM, FIELD_MM + PLACES_MM / 2, PLACES_MM)
     x, z = np.meshgrid(model.settings.receptor_x_mm + model.settings.along_skin * away, away, indexing="ij")
     places = np.stack([x.ravel(), z.ravel()], axis=1)
-    population = Population(places, PLACES_MM, afferent, depth_mm=model.depth_mm)
+    population = Population(places, PLACES_MM, _of_type(name, model), depth_mm=model.depth_mm)
 
     def read(skin: SkinResponse | None) -> float:
         assert skin is not None
         counts = population.respond(skin).spikes.counts
         return float(PLACES_MM**2 * within_field(counts).sum())
+
+    return Reading(touch, read)
+
+
+def _of_type(name: str, model: ValidationRequest) -> AnyAfferent:
+    """Return the afferent whose rates are asked for: the one given, or that of its tissues and type."""
+    own = model.responding
+    return own if type_of(own) == name else chosen_afferent(name, model.tissues)
+
+
+def lattice_of_dots(spacing_mm: float, along_mm: float, across_mm: float) -> Dots:
+    """Return half balls on a square lattice that reaches so far to both sides."""
+    x, z = (spacing_mm * around_zero(2 * int(reach // spacing_mm) + 1) for reach in (along_mm, across_mm))
+    return Dots(tuple((float(at), float(beside)) for at in x for beside in z), DOT_MM, DOT_MM / 2)
+
+
+def scanning(spacing_mm: float, speed_mm_per_s: float, force_mn: float) -> Trajectory:
+    """Motion of a lattice of dots by two spacings at a constant force, after a hold."""
+    steps = math.ceil(spacing_mm / DOTS_STEP_MM)
+    way_mm = spacing_mm * np.arange(-steps, steps + 1) / steps
+    begin_ms = protocol.RAMP.value + DOTS_HELD_MS
+    times_ms = np.r_[0.0, protocol.RAMP.value, begin_ms + MS_PER_S * (way_mm + spacing_mm) / speed_mm_per_s]
+    forces_mn = np.r_[0.0, np.full(times_ms.size - 1, force_mn)]
+    # The lattice is in the same place half-way and at the end, and furthest from it in the beginning.
+    return Trajectory(times_ms, force_mn=forces_mn, x_mm=np.r_[0.0, 0.0, way_mm + spacing_mm])
+
+
+def _dots(given: Given, model: ValidationRequest) -> Reading:
+    """Mean rate while a lattice of dots moves over the skin, over places across a spacing. [spikes/s]"""
+    spacing_mm, force_n = given["spacing_mm"], given["force_n"]
+    afferent = _of_type(str(given["afferent"]), model)
+    if force_n == 0.0:
+        return Reading(None, lambda _: _resting_rate(model))
+    if spacing_mm <= DOT_MM:
+        raise InputError(
+            "spacing_mm", f"must be above {DOT_MM:g} mm, the diameter of the dots", f"{spacing_mm:g}"
+        )
+    body = lattice_of_dots(spacing_mm, DOTS_MM[0] + 2 * spacing_mm, DOTS_MM[1])
+    motion = scanning(spacing_mm, given["speed_mm_s"], MN_PER_N * force_n)
+    touch = _probed(model, body, motion)
+    across = spacing_mm / 2 * (np.arange(DOTS_LINES) + 0.5) / DOTS_LINES
+    places = np.column_stack([np.full(DOTS_LINES, model.settings.receptor_x_mm), across])
+    receptors = Population(places, spacing_mm, afferent, depth_mm=model.depth_mm)
+    period_ms = MS_PER_S * spacing_mm / given["speed_mm_s"]
+    settling, counted = (math.ceil(of_ms / period_ms) for of_ms in (DOTS_HELD_MS, DOTS_MS))
+
+    def read(skin: SkinResponse | None) -> float:
+        assert skin is not None
+        again = receptors.followed(skin).repeated(motion.end_ms - period_ms, settling + counted)
+        spikes = afferent.spikes(again)
+        window_ms = settling * period_ms, (settling + counted) * period_ms
+        return float(RATE_OF[COUNT](spikes, window_ms).mean())
 
     return Reading(touch, read)
 
@@ -518,6 +579,7 @@ _READING: Mapping[str, Callable[[Given, ValidationRequest], Reading]] = {
     "rate_position": _rate,
     "grating": _rate,
     "receptive_field": _area,
+    "dots": _dots,
     "adaptation": _adapted,
     "strain": _strain,
 }  # By the kind.
