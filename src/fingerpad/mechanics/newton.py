@@ -56,10 +56,6 @@ MOST_FREE = 0.5
 """Share of the points pressed before that a guess may set free: beyond it a Newton step drives skin into the
 indenter. A slide of 2 mm takes 690 assemblies, and 874 if such steps are tried first."""
 
-PATIENCE = 15
-"""Newton steps of one search after which the potential must fall in each: nodes at an edge may change sides
-for ever, and the residual with them."""
-
 CONTACT_FORCING, MOST_CONTACT_CHANGES = 0.02, 8
 """Force, over the residual, of points on the wrong side after a Newton step with which it is taken, and most
 solutions for one step, each for the points that the one before presses."""
@@ -221,11 +217,6 @@ class _Search:
         """Residual over contact force, or the share of the force that is missing if that is larger."""
         return max(now.relative_residual, self.missing(now))
 
-    @property
-    def is_monotone(self) -> bool:
-        """Whether every Newton step must lower the potential."""
-        return self.persistent and (self.shift > 0.0 or len(self.history) > PATIENCE)
-
     def beginning(self, displacement_mm: FloatArray) -> Configuration:
         where = displacement_mm, self.load.depth_mm, self.lagging
         return self.equations.at(*where, pressure_kpa=self.load.pressure_kpa)
@@ -254,7 +245,12 @@ class _Search:
                     return self.line_search(*self.closed_direction(now, forcing), potentials)
                 if not self.persistent:
                     raise
-                self.shift = CHANGE_SHIFT * max(CHANGE_SHIFT * self.shift, FIRST_SHIFT)
+                self.raise_shift()
+
+    def raise_shift(self) -> None:
+        """Let the next tangent be shifted more, where the search is persistent."""
+        if self.persistent:
+            self.shift = CHANGE_SHIFT * max(CHANGE_SHIFT * self.shift, FIRST_SHIFT)
 
     def direction_from(self, now: Configuration, forcing: float) -> tuple[Configuration, FloatArray]:
         """Solve for a Newton step, and of a persistent search for the points that are in contact after it."""
@@ -444,7 +440,8 @@ class _Search:
         # Nodes that come into contact raise the potential for a step or two until the next steps push them
         # out again; a comparison with several earlier potentials allows this (Grippo, Lampariello & Lucidi
         # 1986).
-        highest_uj = max(potentials[-(1 if self.is_monotone else REMEMBERED_POTENTIALS) :])
+        is_shifted = self.shift > 0.0
+        highest_uj = max(potentials[-(1 if is_shifted else REMEMBERED_POTENTIALS) :])
         slope = -float(direction @ start.residual_mn)
         at_rest = start.relative_residual < LAST_STEP
         shortest = SHORTEST_NEAR_REST if self.persistent and at_rest else SHORTEST_STEP
@@ -456,8 +453,8 @@ class _Search:
             # not compared relative to the contact force of each: a retreat sets all nodes free at first, and
             # any step that drives skin into the indenter would then count as better. With a shifted tangent
             # a smaller residual may be that of a saddle, so only the potential counts until near the end.
-            near = not self.is_monotone or at_rest
-            if falls and length == 1.0 and self.shift > 0.0:
+            near = not is_shifted or at_rest
+            if falls and length == 1.0 and is_shifted:
                 return self.lengthened(start, direction, trial)
             if falls or (near and trial.residual_norm_mn < 0.9 * start.residual_norm_mn):
                 return trial
@@ -484,13 +481,22 @@ class _Search:
         # minimises the quadratic model after x, however loosely x and y are solved. The usual c - b'y for the
         # stiffness along t would not do: contact is so stiff that the two nearly cancel.
         axis, free = self.load.contact.placement.axis, self.body.free
-        coupling = np.zeros_like(start.displacement_mm)
-        self.load.contact.add_to_nodes(coupling, -start.contact_stiffness @ axis)
-        b = coupling.ravel()[free]
-        c = float(axis @ start.contact_stiffness.sum(axis=0) @ axis)
-        x = self.solver.solve(self.equations.blocks, start.residual_mn, FORCING_RANGE[1])
-        y = self.solver.solve(self.equations.blocks, b, DEPTH_FORCING)
-
+        while True:
+            start, x = self.newton_direction(start, FORCING_RANGE[1])
+            coupling = np.zeros_like(start.displacement_mm)
+            self.load.contact.add_to_nodes(coupling, -start.contact_stiffness @ axis)
+            b = coupling.ravel()[free]
+            c = float(axis @ start.contact_stiffness.sum(axis=0) @ axis)
+            try:
+                y = self.solver.solve(self.equations.blocks, b, DEPTH_FORCING)
+                break
+            except NotPositiveDefiniteError:
+                # What is indefinite may show for one of two right-hand sides only.
+                if not self.persistent:
+                    if not start.is_curved:
+                        raise
+                    start = self.with_tangent(start, curved=False)
+                self.raise_shift()
         force = start.missing_force_mn(self.load) - b @ x - y @ (start.residual_mn - self.solver.multiply(x))
         stiffness = y @ self.solver.multiply(y) - 2.0 * (b @ y) + c
         if not stiffness > 0.0:
