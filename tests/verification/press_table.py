@@ -11,15 +11,13 @@ from __future__ import annotations
 
 import csv
 import io
-import itertools
-import math
 import re
 import signal
 import sys
 import time
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -30,7 +28,6 @@ from fingerpad.core.values import FloatArray
 from fingerpad.data.tissues import DEFAULT_TISSUES
 from fingerpad.geometry.bodies import Bar, Cylinder, Edge, FlatPunch, Gap, Grating, Line, Sphere
 from fingerpad.geometry.fingertip import Fingertip
-from fingerpad.geometry.grading import Grading, Strip
 from fingerpad.geometry.indenters import Indenter
 from fingerpad.geometry.mesh import LAYERS, Mesh
 from fingerpad.geometry.motion import RampAndHold, Trajectory
@@ -125,9 +122,7 @@ BY_MOTION: tuple[tuple[Indenter, str, tuple[float, float]], ...] = (
 )
 MOVING_STEPS = PressSettings(ramp_steps=6, hold_steps=2)
 
-RESOLUTIONS = ("quick", "standard", "finer")
-FINER = 1.5
-"""Sizes of the elements at standard over those of the finer mesh, along, across and through the layers."""
+RESOLUTIONS = ("quick", "standard")
 
 
 @dataclass(frozen=True)
@@ -178,45 +173,16 @@ def depth_of(press: Press) -> float:
     return min(DEEP_MM if wide else DEPTH_MM, 0.79 * to_bone_mm)
 
 
-def resolutions_of(press: Press) -> tuple[str, ...]:
-    """Names of the meshes of a press: the finer one for the default tissues with friction, or for a wire."""
-    holds = (press.friction > 0.0 or press.body.grips) and not press.motion
-    finer = holds and press.tissues == DEFAULT_TISSUES and press.at_mm == CONTACT_POINT_MM
-    return RESOLUTIONS if finer else RESOLUTIONS[:2]
-
-
-def finer(grading: Grading) -> Grading:
-    """Divide all elements of a grading by `FINER` in each direction."""
-
-    def strips(coarse: tuple[Strip, ...]) -> tuple[Strip, ...]:
-        return tuple((begin, end, size / FINER) for begin, end, size in coarse)
-
-    fields = ("stratum_corneum", "living_epidermis", "dermis", "subcutis")
-    layers = {name: math.ceil(FINER * getattr(grading, name)) for name in fields}
-    return replace(
-        grading,
-        size_x_mm=grading.size_x_mm / FINER,
-        size_z_mm=grading.size_z_mm / FINER,
-        largest_mm=grading.largest_mm / FINER,
-        finer_along=strips(grading.finer_along),
-        finer_across=strips(grading.finer_across),
-        **layers,
-    )
-
-
 def solved(press: Press, resolution: str, depth_mm: float | None = None) -> Outcome:
     """Solve one press of the table."""
-    named = "standard" if resolution == "finer" else resolution
     if press.motion:
         motion, settings = MOTIONS[press.motion], MOVING_STEPS
     else:
         motion, settings = RampAndHold(depth_mm=depth_mm or depth_of(press)), None
     touch = touch_of(
-        Fingertip(), press.body, motion, press.tissues, named, press.at_mm, settings=settings,
+        Fingertip(), press.body, motion, press.tissues, resolution, press.at_mm, settings=settings,
         friction=press.friction,
     )  # fmt: skip
-    if resolution == "finer":
-        touch = replace(touch, grading=finer(touch.grading))
     start = time.process_time()
     skin = touch.solve()
     seconds = time.process_time() - start
@@ -292,9 +258,7 @@ def press_all(resolutions: Sequence[str], part: int = 0, parts: int = 1) -> int:
     """
     failed = 0
     for number, press in enumerate(presses()):
-        for resolution in resolutions_of(press) if number % parts == part else ():
-            if resolution not in resolutions:
-                continue
+        for resolution in resolutions if number % parts == part else ():
             key = (*press.cells, resolution)
             row = read_rows().get(key)
             if row is None or row["code"] != code_hash():
@@ -329,17 +293,17 @@ its largest force, largest strain energy density (SED) of the living epidermis, 
 processor and the code that pressed it. `make verification` presses what has no row of the present code, and
 writes this page. [Small bodies](decisions/small-bodies.md) tells how such bodies are meshed.
 
-| resolution | presses | reach their depth | energy imbalance: median, largest |
-|---|---|---|---|
+| resolution | presses | with the present tissues | reach their depth | energy imbalance: median, largest |
+|---|---|---|---|---|
 """
 BETWEEN = """
-The same presses on two meshes. `finer` divides all elements of `standard` by 1.5 in each direction; default
-tissues, with friction. Wanted are 5 % of force and 10 % of SED for `quick`, 2 % and 4 % for `standard`.
+The same presses on both meshes: wanted of `quick` are 5 % of force and 10 % of SED.
+[Mesh resolutions](decisions/mesh-resolutions.md) compares both with a finer mesh.
 
-| mesh | against | presses | force: median, largest difference | SED: median, largest | within both |
-|---|---|---|---|---|---|
+| presses | force: median, largest difference | SED: median, largest | within both |
+|---|---|---|---|
 """
-WANTED = {"quick": (0.05, 0.1), "standard": (0.02, 0.04)}
+WANTED = 0.05, 0.1
 SNAPPED = """
 These leave more than 0.5 % of the indenter's work unexplained, since the skin snaps from one state to another
 within a step. Their results have a caveat that says so.
@@ -357,19 +321,17 @@ These do not reach their depth. A press that stops ends in an error, and nothing
 
 def page_text(rows: Rows) -> str:
     """docs/presses.md from the rows."""
-    lines = []
+    lines, wanted = [], len(list(presses()))
     for name in RESOLUTIONS:
-        wanted = sum(name in resolutions_of(press) for press in presses())
-        own = [row for key, row in rows.items() if key[-1] == name and not row["failure"]]
-        missing = [float(row["energy_imbalance"]) for row in own]
-        lines.append(f"| {name} | {wanted} | {len(own)} | {np.median(missing):.1e}, {max(missing):.1e} |\n")
-    between = []
-    for coarse, fine in itertools.pairwise(RESOLUTIONS):
-        found = np.array([each for press in presses() if (each := differences(rows, press, coarse, fine))])
-        middle, most = np.median(found, axis=0), found.max(axis=0)
-        within = (found <= WANTED[coarse]).all(axis=1).sum()
-        cells = [f"{100 * middle[n]:.1f} %, {100 * most[n]:.1f} %" for n in (0, 1)]
-        between.append(f"| {coarse} | {fine} | {len(found)} | {cells[0]} | {cells[1]} | {within} |\n")
+        pressed = [row for key, row in rows.items() if key[-1] == name]
+        missing = [float(row["energy_imbalance"]) for row in pressed if not row["failure"]]
+        counts = f"{wanted} | {len(pressed)} | {len(missing)}"
+        lines.append(f"| {name} | {counts} | {np.median(missing):.1e}, {max(missing):.1e} |\n")
+    found = np.array([each for press in presses() if (each := differences(rows, press))])
+    middle, most = np.median(found, axis=0), found.max(axis=0)
+    cells = [f"{100 * middle[n]:.1f} %, {100 * most[n]:.1f} %" for n in (0, 1)]
+    within = (found <= WANTED).all(axis=1).sum()
+    between = f"| {len(found)} | {cells[0]} | {cells[1]} | {within} |\n"
     stopped = [
         "| " + " | ".join([*key, row["failure"].partition(" (stratum")[0].partition(", where")[0]]) + " |\n"
         for key, row in rows.items()
@@ -380,12 +342,12 @@ def page_text(rows: Rows) -> str:
         for key, row in rows.items()
         if not row["failure"] and float(row["energy_imbalance"]) > LARGEST_IMBALANCE
     ]
-    return "".join([INTRODUCTION, *lines, BETWEEN, *between, SNAPPED, *snapped, STOPPED, *stopped])
+    return "".join([INTRODUCTION, *lines, BETWEEN, between, SNAPPED, *snapped, STOPPED, *stopped])
 
 
-def differences(rows: Rows, press: Press, coarse: str, fine: str) -> tuple[float, float] | None:
-    """Force and SED of one mesh less those of a finer one, as shares; none if one of them is missing."""
-    one, other = (rows.get((*press.cells, name)) for name in (coarse, fine))
+def differences(rows: Rows, press: Press) -> tuple[float, float] | None:
+    """Force and SED at quick less those at standard, as shares; none if one of them is missing."""
+    one, other = (rows.get((*press.cells, name)) for name in RESOLUTIONS)
     if one is None or other is None or one["failure"] or other["failure"]:
         return None
     force, sed = (abs(float(one[name]) / float(other[name]) - 1) for name in ("force_mn", "sed_kpa"))

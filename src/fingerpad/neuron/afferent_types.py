@@ -136,7 +136,8 @@ def SAI(**numbers: Any) -> Afferent:
 
     It is the fitted `Afferent` with a low pass, `smoothing_ms`. Without it, as in a request that names no
     afferent and in the laboratory, SAI means `Afferent.for_tissues`: right under the ramps to which it was
-    fitted, where the rates of this one are 3 to 9 % lower; those in a hold are equal.
+    fitted. There the rates of this one are 2 to 32 % lower under a ball and a bar, and 0 where the others are
+    below 50 spikes/s; those in a hold are equal.
 
     Examples
     --------
