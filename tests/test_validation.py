@@ -466,6 +466,12 @@ def test_dots_are_counted_while_one_spacing_passes_again_and_again(tmp_path):
     assert found == pytest.approx(np.mean(counts), abs=1.0)
 
 
+def test_traces_are_repeated_from_a_time_that_is_there_but_for_rounding():
+    times = [0.0, 0.1 + 0.2, 1.0]
+    passed = fp.Traces(times, [[0.0], [2.0], [3.0]])
+    assert passed.repeated(0.3, count=2).times_ms == pytest.approx([0.0, 0.7, 1.4])
+
+
 def test_adaptation_is_the_interval_at_a_time_of_the_hold(tmp_path):
     file = written(tmp_path, "depth_mm,time_ms,rate_hz\n0.8,100,60\n0.8,900,45\n0,5,0\n")
     early, late, none = (

@@ -292,8 +292,10 @@ class Traces(Result):
         >>> twice.times_ms.tolist(), twice.values.ravel().tolist()
         ([0.0, 5.0, 10.0, 15.0, 20.0], [2.5, 3.0, 2.5, 3.0, 2.5])
         """
-        inside = np.flatnonzero(self.times_ms > start_ms)
-        since_ms = self.times_ms[inside] - start_ms
+        # A start that is there but for rounding is no time of the part.
+        first = int(np.abs(self.times_ms - start_ms).argmin())
+        inside = slice(first + 1, None)
+        since_ms = self.times_ms[inside] - self.times_ms[first]
         times_ms = np.append(0.0, np.arange(count)[:, None] * since_ms[-1] + since_ms)
 
         def again(values: FloatArray) -> FloatArray:
