@@ -248,9 +248,8 @@ class _Search:
                 self.raise_shift()
 
     def raise_shift(self) -> None:
-        """Let the next tangent be shifted more, where the search is persistent."""
-        if self.persistent:
-            self.shift = CHANGE_SHIFT * max(CHANGE_SHIFT * self.shift, FIRST_SHIFT)
+        """Let the next tangent be shifted more."""
+        self.shift = CHANGE_SHIFT * max(CHANGE_SHIFT * self.shift, FIRST_SHIFT)
 
     def direction_from(self, now: Configuration, forcing: float) -> tuple[Configuration, FloatArray]:
         """Solve for a Newton step, and of a persistent search for the points that are in contact after it."""
@@ -492,11 +491,12 @@ class _Search:
                 break
             except NotPositiveDefiniteError:
                 # What is indefinite may show for one of two right-hand sides only.
-                if not self.persistent:
-                    if not start.is_curved:
-                        raise
+                if self.persistent:
+                    self.raise_shift()
+                elif start.is_curved:
                     start = self.with_tangent(start, curved=False)
-                self.raise_shift()
+                else:
+                    raise
         force = start.missing_force_mn(self.load) - b @ x - y @ (start.residual_mn - self.solver.multiply(x))
         stiffness = y @ self.solver.multiply(y) - 2.0 * (b @ y) + c
         if not stiffness > 0.0:
