@@ -48,6 +48,7 @@ from fingerpad.geometry.bodies import Dots, FlatPunch, Grating, Plate, Sphere
 from fingerpad.geometry.grading import RESOLUTIONS, Grading, resolution_grading
 from fingerpad.geometry.indenters import Indenter
 from fingerpad.geometry.motion import ForceRampAndHold, Motion, RampAndHold, Trajectory
+from fingerpad.geometry.motions import stroke
 from fingerpad.neuron.afferent import AnyAfferent, type_of
 from fingerpad.neuron.population import Population
 from fingerpad.neuron.spikes import RATE_OF
@@ -456,13 +457,11 @@ def lattice_of_dots(spacing_mm: float, along_mm: float, across_mm: float) -> Dot
 
 def scanning(spacing_mm: float, speed_mm_per_s: float, force_mn: float) -> Trajectory:
     """Motion of a lattice of dots by two spacings at a constant force, after a hold."""
-    steps = math.ceil(spacing_mm / DOTS_STEP_MM)
-    way_mm = spacing_mm * np.arange(-steps, steps + 1) / steps
-    begin_ms = protocol.RAMP.value + DOTS_HELD_MS
-    times_ms = np.r_[0.0, protocol.RAMP.value, begin_ms + MS_PER_S * (way_mm + spacing_mm) / speed_mm_per_s]
-    forces_mn = np.r_[0.0, np.full(times_ms.size - 1, force_mn)]
-    # The lattice is in the same place half-way and at the end, and furthest from it in the beginning.
-    return Trajectory(times_ms, force_mn=forces_mn, x_mm=np.r_[0.0, 0.0, way_mm + spacing_mm])
+    steps = 2 * math.ceil(spacing_mm / DOTS_STEP_MM)
+    way_mm = 2 * spacing_mm * np.arange(1, steps + 1) / steps
+    return stroke(
+        force_mn=force_mn, speed_mm_per_s=speed_mm_per_s, x_mm=way_mm.tolist(), hold_ms=DOTS_HELD_MS
+    )
 
 
 def _dots(given: Given, model: ValidationRequest) -> Reading:
