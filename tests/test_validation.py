@@ -470,6 +470,8 @@ def test_traces_are_repeated_from_a_time_that_is_there_but_for_rounding():
     times = [0.0, 0.1 + 0.2, 1.0]
     passed = fp.Traces(times, [[0.0], [2.0], [3.0]])
     assert passed.repeated(0.3, count=2).times_ms == pytest.approx([0.0, 0.7, 1.4])
+    with pytest.raises(fp.InputError, match="start_ms must be before the end, 1 ms"):
+        passed.repeated(1.0, count=2)
 
 
 def test_adaptation_is_the_interval_at_a_time_of_the_hold(tmp_path):

@@ -31,6 +31,7 @@ from fingerpad.core.errors import InputError
 from fingerpad.core.phases import Phase, from_onset, ramp_and_hold_phases
 from fingerpad.core.units import MS_PER_S, QUANTITY_UNITS, unit_of, with_unit
 from fingerpad.core.values import (
+    Count,
     Finite,
     FiniteMatrix,
     FiniteVector,
@@ -280,7 +281,7 @@ class Traces(Result):
             raise InputError("sites", f"must have one truth value per site, {self.n_sites}", str(sites.size))
         return self.with_values(lambda values: values[:, sites])
 
-    def repeated(self, start_ms: Finite, count: Whole) -> Traces:
+    def repeated(self, start_ms: Finite, count: Count) -> Traces:
         """Traces of the part from one of the times to the end, one after the other, from time 0.
 
         The part is one period of a motion: what its end has takes the place of what its start has.
@@ -294,6 +295,8 @@ class Traces(Result):
         """
         # A start that is there but for rounding is no time of the part.
         first = int(np.abs(self.times_ms - start_ms).argmin())
+        if first == len(self.times_ms) - 1:
+            raise InputError("start_ms", f"must be before the end, {self.times_ms[-1]:g} ms", f"{start_ms:g}")
         inside = slice(first + 1, None)
         since_ms = self.times_ms[inside] - self.times_ms[first]
         times_ms = np.append(0.0, np.arange(count)[:, None] * since_ms[-1] + since_ms)
