@@ -524,8 +524,8 @@ def blocks(results: HeldOut) -> dict[str, str]:
     return {
         "checks": joined(
             f"{inside} of {len(judged)} predictions lie inside what was published. Outside are some of: "
-            f"{outside}. Written by `python -m studies held-out`: {edition(results.manifest)}, tissues "
-            f"`{results.manifest.materials}`.",
+            f"{outside}. Written by `python -m studies held-out`: tissues `{results.manifest.materials}`, "
+            f"{edition(results.manifest)}",
             table(
                 ("of", "what", "predicted", "published", "verdict"), [_row(each) for each in results.checks]
             ),

@@ -61,8 +61,9 @@ def test_figures_and_manifests_show_caveats(skin, tmp_path):
     runner = Runner(tmp_path)
     with runner.stage("press", 1):
         pass
-    runner.note([skin, deep, deep])
+    deeper = skin.with_fields(sed_kpa=skin.sed_kpa * 1e5)
+    runner.note([skin, deep, deeper, deep])
     (stage,) = runner._stages
     assert isinstance(stage, StageSummary)
-    assert stage.indentations == 3
-    assert stage.caveats == (deep.caveats[0].text,)
+    assert stage.indentations == 4
+    assert stage.caveats == deeper.caveats

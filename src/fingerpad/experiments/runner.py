@@ -27,6 +27,7 @@ from fingerpad.experiments.conditions import Conditions
 from fingerpad.geometry.mesh import Mesh
 from fingerpad.geometry.mesh_checks import jacobian_at_gauss, scaled_jacobian
 from fingerpad.mechanics.kernels import KERNELS
+from fingerpad.skin.caveats import Caveat, worst
 from fingerpad.skin.code_hash import code_hash
 from fingerpad.skin.indentation import Touch
 from fingerpad.skin.sampling import SkinResponse
@@ -62,7 +63,7 @@ class StageSummary:
     largest_energy_imbalance: float | None = None
     """Largest relative imbalance of the forces and of the energies of an indentation."""
     linear_solvers: tuple[str, ...] = ()  #: Which solvers served the Newton steps.
-    caveats: tuple[str, ...] = ()  #: Where indentations lie outside of what was verified, each sentence once.
+    caveats: tuple[Caveat, ...] = ()  #: Where indentations lie farthest outside of what was verified.
 
 
 @result_class
@@ -87,9 +88,9 @@ class Manifest:
     inputs: dict[str, str]  #: SHA-256 of the input files, by name.
 
     @property
-    def caveats(self) -> tuple[str, ...]:
-        """Where the results lie outside of what was verified, each sentence once."""
-        return tuple(dict.fromkeys(text for stage in self.stages for text in stage.caveats))
+    def caveats(self) -> tuple[Caveat, ...]:
+        """Where the results lie farthest outside of what was verified."""
+        return worst(each for stage in self.stages for each in stage.caveats)
 
 
 def software() -> dict[str, Any]:
@@ -166,7 +167,7 @@ class Runner:
             largest_force_imbalance=max((skin.force_imbalance for skin in skins), default=None),
             largest_energy_imbalance=max((skin.energy_imbalance for skin in skins), default=None),
             linear_solvers=tuple(sorted({skin.linear_solver for skin in skins})),
-            caveats=tuple(dict.fromkeys(caveat.text for skin in skins for caveat in skin.caveats)),
+            caveats=worst(each for skin in skins for each in skin.caveats),
         )
 
     def responses(

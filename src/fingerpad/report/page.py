@@ -161,6 +161,8 @@ def manifest_tables(manifest: Manifest) -> list[Table]:
     """Return facts about the run, its stages, and versions of packages."""
     facts = asdict(manifest)
     stages, packages = facts.pop("stages"), facts.pop("packages")
+    for stage in stages:
+        stage["caveats"] = [caveat["text"] for caveat in stage["caveats"]]
     made = [facts_table("The run", facts), facts_table("Packages", packages)]
     if stages:
         names = [name for name in stages[0] if any(stage[name] for stage in stages)]
@@ -172,7 +174,8 @@ def manifest_tables(manifest: Manifest) -> list[Table]:
 def edition(manifest: Manifest) -> str:
     """Return the version, resolution and seed of a run, and its caveats: what was not verified."""
     made = f"fingerpad {manifest.version}, {manifest.resolution} resolution, seed {manifest.seed}"
-    return made if not manifest.caveats else f"{made}. Not verified: {' '.join(manifest.caveats)}"
+    caveats = " ".join(each.text for each in manifest.caveats)
+    return f"{made}. Not verified: {caveats}" if caveats else made
 
 
 VERDICTS = {"✓": "met", "✗": "missed", "?": "open"}  # How a cell is marked by the sign that it begins with.

@@ -6,12 +6,13 @@ it in `CHECKS`.
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from fingerpad.core.checked import result_class
+from fingerpad.core.values import Number
 from fingerpad.mechanics.inertia import LARGEST_SHARE, inertial_share
 from fingerpad.mechanics.materials import STABLE_STRETCHES
 
@@ -29,13 +30,13 @@ LARGEST_IMBALANCE = 5e-3
 presses whose meshes docs/presses.md compares. Skin that snaps round an edge within one step loses more."""
 
 
-@dataclass(frozen=True)
+@result_class
 class Caveat:
     """One quantity of a result that lies outside of what was verified."""
 
     name: str  #: The quantity, such as "strain".
-    value: float
-    limit: float  #: What it is, and up to where results were verified.
+    value: Number
+    limit: Number  #: What it is, and up to where results were verified.
     text: str  #: A sentence with both.
 
 
@@ -49,7 +50,7 @@ def strain(skin: SkinResponse) -> Caveat | None:
         f"The living epidermis is compressed to a stretch of {np.exp(-largest):.2g}; that its law is stable "
         f"was checked down to {STABLE_STRETCHES[0]:g}."
     )
-    return Caveat("strain", largest, limit, text) if largest > limit else None
+    return Caveat(name="strain", value=largest, limit=limit, text=text) if largest > limit else None
 
 
 def energy_density(skin: SkinResponse) -> Caveat | None:
@@ -63,7 +64,7 @@ def energy_density(skin: SkinResponse) -> Caveat | None:
         f"The strain energy density reaches {largest:.3g} kPa; meshes were compared up to {limit:.3g} kPa "
         "with these tissues."
     )
-    return Caveat("energy density", largest, limit, text) if largest > limit else None
+    return Caveat(name="energy density", value=largest, limit=limit, text=text) if largest > limit else None
 
 
 def frequency(skin: SkinResponse) -> Caveat | None:
@@ -76,7 +77,8 @@ def frequency(skin: SkinResponse) -> Caveat | None:
         f"The motion is as fast as a vibration of {fastest_hz:.3g} Hz, at which the neglected inertia of the "
         f"tissue is about {share:.2g} times its elastic force; up to {LARGEST_SHARE:g} it was compared."
     )
-    return Caveat("inertia", share, LARGEST_SHARE, text) if share > LARGEST_SHARE else None
+    found = Caveat(name="inertia", value=share, limit=LARGEST_SHARE, text=text)
+    return found if share > LARGEST_SHARE else None
 
 
 def features(skin: SkinResponse) -> Caveat | None:
@@ -85,7 +87,7 @@ def features(skin: SkinResponse) -> Caveat | None:
         return None
     size_mm, body = skin.touch.grading.finest_strip_mm, type(skin.touch.indenter).__name__
     text = f"Edges of the {body} are sharper than the elements, so they were pressed with {size_mm:.3g} mm."
-    return Caveat("edge radius", 0.0, size_mm, text)
+    return Caveat(name="edge radius", value=0.0, limit=size_mm, text=text)
 
 
 def energy_balance(skin: SkinResponse) -> Caveat | None:
@@ -96,7 +98,8 @@ def energy_balance(skin: SkinResponse) -> Caveat | None:
         "the skin snapped from one state to another, or the steps are too long; press at a finer "
         "resolution, or with more steps (PressSettings in Python)."
     )
-    return Caveat("energy balance", share, LARGEST_IMBALANCE, text) if share > LARGEST_IMBALANCE else None
+    found = Caveat(name="energy balance", value=share, limit=LARGEST_IMBALANCE, text=text)
+    return found if share > LARGEST_IMBALANCE else None
 
 
 CHECKS: tuple[Callable[[SkinResponse], Caveat | None], ...] = (
@@ -112,3 +115,9 @@ CHECKS: tuple[Callable[[SkinResponse], Caveat | None], ...] = (
 def caveats_of(skin: SkinResponse) -> tuple[Caveat, ...]:
     """Find what lies outside of what was verified; empty if nothing does."""
     return tuple(found for found in (check(skin) for check in CHECKS) if found is not None)
+
+
+def worst(caveats: Iterable[Caveat]) -> tuple[Caveat, ...]:
+    """Of several results, the caveat of each quantity that lies farthest outside, by its name."""
+    ordered = sorted(caveats, key=lambda each: (each.name, abs(each.value - each.limit)))
+    return tuple({each.name: each for each in ordered}.values())
