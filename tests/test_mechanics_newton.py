@@ -7,9 +7,10 @@ import numpy as np
 import pytest
 
 import fingerpad as fp
+from fingerpad.mechanics import newton
 from fingerpad.mechanics.linear import LinearSolver, NotPositiveDefiniteError
 from fingerpad.mechanics.moments import Press
-from fingerpad.mechanics.newton import DEPTH_FORCING, NewtonSettings, _Search
+from fingerpad.mechanics.newton import NewtonSettings, _Search
 from presses import RELAXING, block, press_into
 
 BALL = fp.Sphere(curvature_per_m=500.0)
@@ -141,17 +142,26 @@ def test_an_indefinite_tangent_does_not_stop_the_search_for_a_depth(persistent, 
     motion = fp.ForceRampAndHold(force_mn=60.0, ramp_ms=50.0, hold_ms=200.0)
     settings = fp.PressSettings(4, 3, NewtonSettings(persistent=persistent))
     usual = press_into(block(), RELAXING, BALL, motion, settings)
-    solve, refused = LinearSolver.solve, []
+    solve, refused, only_here = LinearSolver.solve, [], 1.1 * newton.DEPTH_FORCING
 
     def refusing(solver, blocks, right, forcing):
-        if forcing == DEPTH_FORCING and len(refused) % 2 == 0:
+        if forcing == only_here and len(refused) % 2 == 0:
             refused.append(forcing)
             raise NotPositiveDefiniteError
-        if forcing == DEPTH_FORCING:
+        if forcing == only_here:
             refused.clear()
         return solve(solver, blocks, right, forcing)
 
     monkeypatch.setattr(LinearSolver, "solve", refusing)
+    monkeypatch.setattr(newton, "DEPTH_FORCING", only_here)
     done = press_into(block(), RELAXING, BALL, motion, settings)
     np.testing.assert_allclose(done.depth_mm, usual.depth_mm, rtol=2e-3)  # penetrations are bound by 5e-3
     assert done.times_ms.tolist() == usual.times_ms.tolist()
+
+
+def test_each_step_towards_a_force_goes_the_whole_way():
+    """With stiff contact and a response solved to 1e-3 it took 48 steps: each went half of the way."""
+    motion = fp.ForceRampAndHold(force_mn=60.0, ramp_ms=50.0, hold_ms=200.0)
+    limits = {"deepest_mm": 1.0, "finest_mm": 0.1}
+    found = press_into(block(), RELAXING, fp.Bar(1.7, 0.1), motion, fp.PressSettings(4, 3), **limits)
+    assert found.newton_steps <= 43

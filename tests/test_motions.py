@@ -209,6 +209,14 @@ def test_a_hold_that_drifts_is_solved_in_growing_steps():
     assert len(slow.step_times_ms(5, 5)) == 1 + 5 + 5 + 20
 
 
+def test_a_way_aside_takes_more_steps_where_skin_sticks():
+    slide = fp.Trajectory((0.0, 50.0, 150.0), (0.0, 1.0, 1.0), x_mm=(0.0, 0.0, 2.0))
+    counts = [len(slide.step_times_ms(5, 5, sticks)) for sticks in (False, True)]
+    assert counts == [1 + 5 + 10, 1 + 5 + 2 + 30]
+    touches = [fp.touch_of(fp.Fingertip(), fp.Sphere(), slide, friction=friction) for friction in (0.0, 0.5)]
+    assert [touch.steps_ms().size for touch in touches] == counts
+
+
 def test_a_file_is_read_with_its_units_from_its_first_row(tmp_path):
     path = written(
         tmp_path, "# robot\nx_mm,time_s,depth_um,tilt_deg\n7,3.0,-100,1\n7,3.1,900,1\n9.5,3.6,900,6\n"

@@ -32,7 +32,7 @@ STRESS_KPA = 100.0  # Of all skin: every afferent fires.
 
 def respond_to_stress(touch: Touch) -> None:
     """Call the kernels of receptors and neurons."""
-    times_ms = touch.settings.steps_ms(touch.stimulus)
+    times_ms = touch.steps_ms()
     sizes = touch.mesh, times_ms.size, watched_elements(touch.mesh).size
     fields = {field.name: np.full(field.shape(*sizes), STRESS_KPA) for field in stored_fields()}
     nothing_solved = dict.fromkeys(

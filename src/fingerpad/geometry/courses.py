@@ -155,7 +155,9 @@ def corners_of(times: FloatArray, course: FloatArray) -> NDArray[np.bool_]:
     return (change > CORNER_SHARE * largest) | ((change > SAME * largest) & ~smooth)
 
 
-STEPS_ASIDE = 3.0  # Steps per mm aside over those of a ramp: skin passes an edge within a few of them.
+STEPS_ASIDE = 3.0
+"""Steps per mm aside over those of a ramp, with friction: skin passes an edge within a few of them. Without,
+what is found does not depend on the way, and the steps of a ramp are enough."""
 
 ONSET_SHARES = (0.25, 0.5)
 """Where the first of several steps aside is divided, over its length: at 0.025 and 0.05 mm at quick. Friction
@@ -163,9 +165,10 @@ grows over about a tenth of a mm until skin slips."""
 
 
 def step_times_of(
-    times: FloatArray, course: FloatArray, first_ms: float, ramp_steps: int, hold_steps: int
+    times: FloatArray, course: FloatArray, first_ms: float, ramp_steps: int, hold_steps: int, sticks: bool
 ) -> FloatArray:
     """List the times to solve a course at; what ends until `first_ms` is one step a sample. [ms]"""
+    steps_aside = STEPS_ASIDE if sticks else 1.0
     found, last_ms = [0.0], np.inf
     moved_by = np.linalg.norm(np.diff(course, axis=0), axis=1)
     aside = np.linalg.norm(np.diff(course[:, 1:3], axis=0), axis=1)
@@ -176,9 +179,9 @@ def step_times_of(
         length_ms = end - start
         drifts = moved <= SAME_VALUE and length_ms > hold_steps * last_ms
         if moved > SAME and not drifts:
-            steps = int(np.ceil(ramp_steps * max(moved, STEPS_ASIDE * way) - SAME))
+            steps = int(np.ceil(ramp_steps * max(moved, steps_aside * way) - SAME))
             since, last_ms = np.linspace(0.0, length_ms, steps + 1)[1:], length_ms / steps
-            if steps > 1 and way > SAME:
+            if sticks and steps > 1 and way > SAME:
                 since = np.concatenate([since[0] * np.array(ONSET_SHARES), since])
         elif length_ms > last_ms * (1.0 + SAME):
             # The first step is as long as the one before, or shorter: relaxation is fastest at its beginning.

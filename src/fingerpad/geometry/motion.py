@@ -185,16 +185,17 @@ class Motion(ABC):
         """Where the motion is at a time [ms], as of `courses`, (5,)."""
         return np.array([self.prescribed_at(time_ms), *vars(self.pose_at(time_ms)).values()]) / self._units
 
-    def step_times_ms(self, ramp_steps: Whole, hold_steps: Whole) -> FloatArray:
+    def step_times_ms(self, ramp_steps: Whole, hold_steps: Whole, sticks: bool = True) -> FloatArray:
         """List the times to solve at: all samples, and times between them where they are far apart. [ms]
 
         First touch is one of them, and the way straight through the air before it is one step. A part of the
-        way takes its share of `ramp_steps`, and a mm aside three times as many. A hold longer than the step
-        before it takes `hold_steps`, which grow geometrically, because relaxation is fastest at its
-        beginning; a long part in which a recording drifts is a hold.
+        way takes its share of `ramp_steps`, and a mm aside as many, or three times as many if skin `sticks`.
+        A hold longer than the step before it takes `hold_steps`, which grow geometrically, because relaxation
+        is fastest at its beginning; a long part in which a recording drifts is a hold.
         """
         times, course = self._course([self.onset_ms])
-        return step_times_of(times, course, self.onset_ms if self.stays else 0.0, ramp_steps, hold_steps)
+        first_ms = self.onset_ms if self.stays else 0.0
+        return step_times_of(times, course, first_ms, ramp_steps, hold_steps, sticks)
 
     @property
     def _units(self) -> FloatArray:

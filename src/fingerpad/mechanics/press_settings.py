@@ -138,9 +138,9 @@ class PressSettings:
             if tolerance is not None and tolerance >= 1.0:
                 raise InputError(name, "must be below 1", repr(tolerance))
 
-    def steps_ms(self, motion: Motion) -> FloatArray:
+    def steps_ms(self, motion: Motion, sticks: bool = True) -> FloatArray:
         """List the times to solve a motion at, from 0, without a tolerance of SED. [ms]"""
-        return self._with_wanted(motion, motion.step_times_ms(self.ramp_steps, self.hold_steps))
+        return self._with_wanted(motion, motion.step_times_ms(self.ramp_steps, self.hold_steps, sticks))
 
     def smooth_ends_ms(self, motion: Motion) -> FloatArray:
         """List the ends of the parts of a motion within which a tolerance of SED chooses the steps. [ms]"""

@@ -134,7 +134,7 @@ class Touch:
                 "progress", "must have a method stage, as fp.notebook_progress() has", shown(self.progress)
             )
         check_path(self.finger, self.stimulus, self.at_mm)
-        self.settings.steps_ms(self.stimulus)
+        self.steps_ms()  # refuses times that lie outside of the motion
         depths_mm = sorted({positive("receptor_depths_mm", depth, "mm") for depth in self.receptor_depths_mm})
         object.__setattr__(self, "receptor_depths_mm", tuple(depths_mm))
         if depths_mm:
@@ -147,6 +147,10 @@ class Touch:
         depths = self.finger.layer_depths_mm
         to_bone_mm = float(self.finger.depth_available_mm(*self.at_mm))
         return np.diff([0.0, *depths, max(to_bone_mm, depths[-1])])
+
+    def steps_ms(self) -> FloatArray:
+        """List the times to solve at, from 0, without a tolerance of SED. [ms]"""
+        return self.settings.steps_ms(self.stimulus, self.friction > 0.0 or self.indenter.grips)
 
     def check_sites(self, sites_mm: ArrayLike) -> None:
         """Raise `InputError` if the skin could not be sampled at a site, as `SkinResponse.sed` would.

@@ -351,7 +351,7 @@ def _interpolated_steps(touch: Touch) -> int:
         return 0
     if touch.friction or touch.settings.cycle_tolerance is None:
         return 0
-    times_ms = touch.settings.steps_ms(touch.stimulus)
+    times_ms = touch.steps_ms()
     inside = np.count_nonzero((times_ms > cycles.start_ms) & (times_ms <= cycles.end_ms))
     return int(inside * (cycles.count - MOST_SOLVED) / cycles.count)
 
@@ -360,7 +360,7 @@ def estimate_press(request: TouchRequest) -> PressEstimate:
     """Estimate a press from the sizes of its mesh and its steps; the mesh is built for it."""
     touch = request.touch
     nodes = len(touch.mesh.nodes_mm)
-    steps = touch.settings.steps_ms(touch.stimulus).size - 1 - _interpolated_steps(touch)
+    steps = touch.steps_ms().size - 1 - _interpolated_steps(touch)
     factor = BY_FORCE if touch.stimulus.by_force else 1.0
     if touch.friction:
         factor *= WITH_FRICTION if touch.stimulus.stays else ASIDE_WITH_FRICTION
