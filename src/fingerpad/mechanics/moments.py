@@ -222,9 +222,9 @@ class Press:
         """Return the number of equal steps between two times, none of them longer than allowed."""
         before, after = self.stimulus.pose_at(begin_ms), self.stimulus.pose_at(end_ms)
         aside_mm = float(np.hypot(after.x_mm - before.x_mm, after.z_mm - before.z_mm))
-        slide = steps_of_advance(aside_mm, self.finest_mm)
-        if self.contact.friction > 0.0 and aside_mm > 0.0 and self.is_sharp:
-            slide = steps_of_slide(aside_mm, self.contact.indenter)
+        slide, sticks = 1, self.contact.friction > 0.0
+        if aside_mm > 0.0 and self.is_sharp:
+            slide = steps_of_slide(aside_mm, self.contact.indenter, self.finest_mm, sticks)
         if self.stimulus.by_force:
             return slide
         before_mm, after_mm = self.stimulus.prescribed_at([begin_ms, end_ms])

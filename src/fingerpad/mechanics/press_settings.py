@@ -26,9 +26,10 @@ LONGEST_STEP = 1.0
 """Largest advance of the indenter in one step, over the smallest elements. In longer steps, skin at the rim
 of a punch of 1 mm slid off it where shorter ones hold it."""
 
-LONGEST_SLIDE = 1.0 / 6
-"""Longest way aside of an edge in one step, over its radius. The force on a node rises and falls as it passes
-the edge, and with longer steps the heat of friction there is not found."""
+LONGEST_SLIDE, LONGEST_FREE_SLIDE = 1.0 / 6, 0.5
+"""Longest way aside of an edge in one step, over its radius, with and without friction. The force on a node
+rises and falls as it passes the edge, and with longer steps the heat of friction there is not found. Without
+friction half balls of 0.5 mm take 11 Newton steps for 0.25 mm as for 0.06 mm."""
 
 LEAST_PENETRATION = 0.1  # Penetration that is accepted at any depth, over the smallest elements.
 
@@ -80,12 +81,15 @@ def steps_of_advance(advance_mm: float, finest_mm: float) -> int:
     return _steps(advance_mm, LONGEST_STEP * finest_mm)
 
 
-def steps_of_slide(way_mm: float, indenter: Indenter) -> int:
+def steps_of_slide(way_mm: float, indenter: Indenter, finest_mm: float, sticks: bool) -> int:
     """Return the number of equal steps of a way aside, none of them longer than the edges allow.
 
-    Edges that are sharper than any mesh made for them count as round as the sharpest of these.
+    Edges that are sharper than any mesh made for them count as round as the sharpest of these. Without
+    friction a step may always be as long as the smallest elements.
     """
-    return _steps(way_mm, LONGEST_SLIDE * max(details_of(indenter).sharpest_mm, STEP_MM))
+    radius_mm = max(details_of(indenter).sharpest_mm, STEP_MM)
+    freely_mm = max(LONGEST_FREE_SLIDE * radius_mm, LONGEST_STEP * finest_mm)
+    return _steps(way_mm, LONGEST_SLIDE * radius_mm if sticks else freely_mm)
 
 
 def _steps(way_mm: float, longest_mm: float) -> int:
