@@ -107,7 +107,7 @@ def press(
     job = Press(discretised, contact, stimulus, solver, newton, follow, *limits_mm)
     moment = job.unloaded()
     reached, slips, values = [], [], [moment.fields.values]
-    planned_ms = settings.steps_ms(stimulus, sticks=friction > 0.0 or body.grips)
+    planned_ms = settings.steps_ms(stimulus, sticks=friction > 0.0)
     for moment in _moments(job, settings, planned_ms[1:]):
         share_done(float(np.searchsorted(planned_ms, moment.time_ms)) / (planned_ms.size - 1))
         LOGGER.debug(

@@ -40,6 +40,10 @@ class Caveat:
     text: str  #: A sentence with both.
 
 
+def _beyond(name: str, value: float, limit: float, text: str) -> Caveat | None:
+    return Caveat(name=name, value=value, limit=limit, text=text) if value > limit else None
+
+
 def strain(skin: SkinResponse) -> Caveat | None:
     """Compression of the living epidermis beyond the stretches at which the stability of laws is checked."""
     if "compressive_strain" not in skin.fields:
@@ -50,7 +54,7 @@ def strain(skin: SkinResponse) -> Caveat | None:
         f"The living epidermis is compressed to a stretch of {np.exp(-largest):.2g}; that its law is stable "
         f"was checked down to {STABLE_STRETCHES[0]:g}."
     )
-    return Caveat(name="strain", value=largest, limit=limit, text=text) if largest > limit else None
+    return _beyond("strain", largest, limit, text)
 
 
 def energy_density(skin: SkinResponse) -> Caveat | None:
@@ -64,7 +68,7 @@ def energy_density(skin: SkinResponse) -> Caveat | None:
         f"The strain energy density reaches {largest:.3g} kPa; meshes were compared up to {limit:.3g} kPa "
         "with these tissues."
     )
-    return Caveat(name="energy density", value=largest, limit=limit, text=text) if largest > limit else None
+    return _beyond("energy density", largest, limit, text)
 
 
 def frequency(skin: SkinResponse) -> Caveat | None:
@@ -77,8 +81,7 @@ def frequency(skin: SkinResponse) -> Caveat | None:
         f"The motion is as fast as a vibration of {fastest_hz:.3g} Hz, at which the neglected inertia of the "
         f"tissue is about {share:.2g} times its elastic force; up to {LARGEST_SHARE:g} it was compared."
     )
-    found = Caveat(name="inertia", value=share, limit=LARGEST_SHARE, text=text)
-    return found if share > LARGEST_SHARE else None
+    return _beyond("inertia", share, LARGEST_SHARE, text)
 
 
 def features(skin: SkinResponse) -> Caveat | None:
@@ -98,8 +101,7 @@ def energy_balance(skin: SkinResponse) -> Caveat | None:
         "the skin snapped from one state to another, or the steps are too long; press at a finer "
         "resolution, or with more steps (PressSettings in Python)."
     )
-    found = Caveat(name="energy balance", value=share, limit=LARGEST_IMBALANCE, text=text)
-    return found if share > LARGEST_IMBALANCE else None
+    return _beyond("energy balance", share, LARGEST_IMBALANCE, text)
 
 
 CHECKS: tuple[Callable[[SkinResponse], Caveat | None], ...] = (

@@ -150,7 +150,7 @@ class Touch:
 
     def steps_ms(self) -> FloatArray:
         """List the times to solve at, from 0, without a tolerance of SED. [ms]"""
-        return self.settings.steps_ms(self.stimulus, self.friction > 0.0 or self.indenter.grips)
+        return self.settings.steps_ms(self.stimulus, sticks=self.friction > 0.0)
 
     def check_sites(self, sites_mm: ArrayLike) -> None:
         """Raise `InputError` if the skin could not be sampled at a site, as `SkinResponse.sed` would.
