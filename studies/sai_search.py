@@ -20,8 +20,8 @@ from fingerpad.core.values import FloatArray, Vector
 from fingerpad.data import afferents as published
 from fingerpad.data import bar_firing_rates, protocol
 from fingerpad.experiments.conditions import RECEPTOR_X_MM, Conditions
+from fingerpad.experiments.receptive_field import PROBE, probing, within_field
 from fingerpad.experiments.runner import Manifest, Runner
-from fingerpad.experiments.validation.validation import PROBE, probing, within_field
 from fingerpad.geometry.bodies import Bar
 from fingerpad.geometry.grading import Grading
 from fingerpad.inference.fitting.methods import fractional_sum_of_squares, interleaved_folds

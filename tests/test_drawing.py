@@ -17,6 +17,7 @@ from fingerpad.core.displayed import Result
 from fingerpad.core.signals import RECEPTOR_COLUMNS, HitRates
 from fingerpad.experiments.discrimination.analysis import analyse
 from fingerpad.experiments.fit.fit import fit_recordings
+from fingerpad.experiments.receptive_field import ReceptiveField
 from fingerpad.inference.spike_likelihood import SpikeFit
 from fingerpad.psychophysics.curve_fit import fit_psychometric
 from fingerpad.reduction.streaming import ReducedSample
@@ -100,6 +101,12 @@ def results():
         ),
         "PsychometricFit": fit_psychometric([10.0, 20.0, 40.0], [55, 70, 95], [100] * 3),
         "Fingertip": finger,
+        "ReceptiveField": ReceptiveField(
+            x_mm=[-1.0, 0.0, 1.0],
+            z_mm=[0.0, 1.0],
+            spike_count=np.array([[0, 1], [9, 3], [0, 1]]),
+            depth_mm=0.2,
+        ),
     }
 
 
@@ -189,7 +196,7 @@ def test_a_notebook_shows_a_small_picture_and_one_line(results, kind):
         table, data = results[kind].to_frame(), results[kind].to_dataset()
         assert len(table) > 0
         assert table.index.name
-        numbers = [values for values in data.data_vars.values() if values.dtype.kind == "f"]
+        numbers = [values for values in data.variables.values() if values.dtype.kind == "f"]
         assert numbers
         assert all("units" in values.attrs for values in numbers)
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import fingerpad as fp
-from fingerpad.inference.afferent_fit import TypedModel
+from fingerpad.inference.afferent_fit import TypedModel, fit_afferent
 from fingerpad.neuron.lif import LeakyIntegrateAndFire
 from refusals import refusals
 
@@ -47,7 +47,7 @@ def test_numbers_of_any_type_are_found_again(afferent, free, factor, heights):
     dynamic, static = TypedModel(known, (), [traces]).evaluate(np.empty(0))
     assert dynamic.all()
     recorded = fp.RateRecordings(NAMES, dynamic, static if static.all() else None)
-    found = fp.fit_afferent(afferent, free, traces, recorded)
+    found = fit_afferent(afferent, free, traces, recorded)
     assert found.fss_in_sample > 0.98
     assert found.fss_out_of_sample > 0.9
     for name in free:  # one to three spikes of a PC determine its threshold within a fifth
@@ -64,5 +64,5 @@ test_numbers_that_cannot_be_fitted_are_refused = refusals(
     ((fp.RA(), ["quantity"]), r"quantity must be greater than 0|must be a finite number"),
     ((fp.Afferent(intercept_ma=0.0), ["intercept_ma"]), "intercept_ma must be greater than 0"),
     ((len, ["threshold"]), "afferent must be like AnyAfferent, with"),
-    call=lambda chosen: fp.fit_afferent(*chosen, *TWO),
+    call=lambda chosen: fit_afferent(*chosen, *TWO),
 )

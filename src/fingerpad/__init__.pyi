@@ -17,6 +17,7 @@ from fingerpad.core.signals import Traces as Traces
 from fingerpad.experiments.cluster import Cluster as Cluster
 from fingerpad.experiments.discrimination.request import DiscriminationRequest as DiscriminationRequest
 from fingerpad.experiments.fit.request import FitRequest as FitRequest
+from fingerpad.experiments.receptive_field import receptive_field as receptive_field
 from fingerpad.experiments.requests.touch import ReductionRequest as ReductionRequest
 from fingerpad.experiments.requests.touch import RespondRequest as RespondRequest
 from fingerpad.experiments.requests.touch import TouchRequest as TouchRequest
@@ -68,7 +69,6 @@ from fingerpad.geometry.motions import sine as sine
 from fingerpad.geometry.motions import staircase as staircase
 from fingerpad.geometry.motions import stroke as stroke
 from fingerpad.geometry.surface_files import read_surface as read_surface
-from fingerpad.inference.afferent_fit import fit_afferent as fit_afferent
 from fingerpad.inference.recordings import RateRecordings as RateRecordings
 from fingerpad.mechanics.materials import Energy as Energy
 from fingerpad.mechanics.materials import Material as Material

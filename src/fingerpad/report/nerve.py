@@ -17,6 +17,7 @@ from fingerpad.core.values import FloatArray, one_of
 from fingerpad.data import paper, protocol
 from fingerpad.experiments.fit.results import CredibleInterval, FitResult, ParameterProfile, UncertaintyResult
 from fingerpad.experiments.gerling2014.nerve import PopulationMaps, SingleUnitResult
+from fingerpad.experiments.receptive_field import ReceptiveField
 from fingerpad.inference.spike_likelihood import SpikeFit
 from fingerpad.report.page import DRAW, DRAWINGS, ROWS, Rows, enter
 from fingerpad.report.style import (
@@ -128,6 +129,19 @@ def draw_map(axes: Axes, response: ResponseMap, quantity: str | None = None) -> 
     drawn = axes.scatter(x, z, c=getattr(response, quantity), **dots)
     axes.figure.colorbar(drawn, ax=axes, label=f"{phase}: {label}")
     axes.set(**MAP_AXES)
+
+
+@enter(DRAWINGS, ("ReceptiveField", "field"))
+def draw_field(axes: Axes, field: ReceptiveField) -> None:
+    """Draw the spikes by the place of the probe, the border of the field and its hot spots."""
+    drawn = axes.pcolormesh(field.x_mm, field.z_mm, field.spike_count.T, cmap="viridis", shading="nearest")
+    axes.figure.colorbar(drawn, ax=axes, label="spikes of the whole touch")
+    axes.contour(field.x_mm, field.z_mm, field.within.T, levels=[0.5], colors="white", linewidths=1.5)
+    axes.plot(*field.hot_spots_mm.T, "o", color="white", markeredgecolor=BLACK, markersize=6.0)
+    area = f"{'at least ' if field.is_cut_off else ''}{field.area_mm2:.1f} mm²"
+    axes.set(title=f"{field.depth_mm:.2g} mm deep: {area}", aspect="equal")
+    axes.set(xlabel="probe along the finger [mm]", ylabel="probe across [mm]")
+    axes.grid(visible=False)
 
 
 @enter(DRAWINGS, ("Traces", "traces"))

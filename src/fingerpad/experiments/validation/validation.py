@@ -21,6 +21,7 @@ from fingerpad.core.units import MN_PER_N, MS_PER_S, unit_of
 from fingerpad.core.values import FloatArray, Number, Pair, Positive, Text, choice
 from fingerpad.data import fingertip, protocol
 from fingerpad.experiments.conditions import Conditions
+from fingerpad.experiments.receptive_field import PROBE, afferents_at, field_of, places_about, probing
 from fingerpad.experiments.requests.afferents import (
     DEFAULT,
     AfferentChoice,
@@ -59,11 +60,6 @@ RAMP_AND_HOLD, QUASI_STATIC = "ramp_and_hold", "quasi_static"
 LOADINGS = (RAMP_AND_HOLD, QUASI_STATIC)  # Read at the end of the paper's hold, or with relaxed tissues.
 QUASI_STATIC_MS = 1e12  # After such a ramp all Prony terms have relaxed to 1 in 10⁶. [ms]
 
-PROBE, PROBING_MM_PER_MS, PROBED_MS = FlatPunch(1.0, 0.2), 0.02, 300.0
-"""Probe of receptive fields, its speed and its hold, as assumed of Vega-Bermudez & Johnson 1999."""
-FIELD_MM, PLACES_MM = 4.0, 0.2  # Places are probed so far from the receptor, so far apart.
-SHARE_OF_PEAK = 0.1
-"""Share of the spikes at the most sensitive place that a place within a receptive field elicits; assumed."""
 DOT_MM, DOTS_MM = 1.0, (8.0, 6.0)
 """Diameter of the dots, half of which they are high; the lattice reaches so far along and across."""
 DOTS_STEP_MM, DOTS_HELD_MS, DOTS_MS = 0.25, 150.0, 1000.0
@@ -413,32 +409,17 @@ def _rate(given: Given, model: ValidationRequest) -> Reading:
     return Reading(touch, read)
 
 
-def probing(depth_mm: float) -> RampAndHold:
-    """Motion of the probe of receptive fields."""
-    return RampAndHold(depth_mm, depth_mm / PROBING_MM_PER_MS, PROBED_MS)
-
-
-def within_field(counts: np.ndarray) -> np.ndarray:
-    """Whether places lie within a receptive field, by the spikes that a probe elicits from each."""
-    return counts >= max(1.0, SHARE_OF_PEAK * counts.max())
-
-
 def _area(given: Given, model: ValidationRequest) -> Reading:
-    """Area within which a probe elicits `SHARE_OF_PEAK` of the spikes at the most sensitive place. [mm²]"""
+    """Area within which a probe elicits a tenth of the spikes at the most sensitive place. [mm²]"""
     depth_mm, name = given["depth_mm"], str(given["afferent"])
     if depth_mm == 0.0:
         return Reading(None, lambda _: 0.0)
-    touch = _probed(model, PROBE, probing(depth_mm))
-    # The receptor moves instead of the probe: its places are those of the probe about a receptor, mirrored.
-    away = np.arange(-FIELD_MM, FIELD_MM + PLACES_MM / 2, PLACES_MM)
-    x, z = np.meshgrid(model.settings.receptor_x_mm + model.settings.along_skin * away, away, indexing="ij")
-    places = np.stack([x.ravel(), z.ravel()], axis=1)
-    population = Population(places, PLACES_MM, _of_type(name, model), depth_mm=model.depth_mm)
+    touch, places_mm = _probed(model, PROBE, probing(depth_mm)), places_about()
+    population = afferents_at(model.settings, places_mm, _of_type(name, model), model.depth_mm)
 
     def read(skin: SkinResponse | None) -> float:
         assert skin is not None
-        counts = population.respond(skin).spikes.counts
-        return float(PLACES_MM**2 * within_field(counts).sum())
+        return field_of(skin, population, places_mm).area_mm2
 
     return Reading(touch, read)
 
