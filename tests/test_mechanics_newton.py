@@ -8,9 +8,11 @@ import pytest
 
 import fingerpad as fp
 from fingerpad.mechanics import newton
+from fingerpad.mechanics.contact import PlacedIndenter, place
 from fingerpad.mechanics.linear import LinearSolver, NotPositiveDefiniteError
 from fingerpad.mechanics.moments import Press
 from fingerpad.mechanics.newton import NewtonSettings, _Search
+from fingerpad.mechanics.press import Specimen, press
 from presses import RELAXING, block, press_into
 
 BALL = fp.Sphere(curvature_per_m=500.0)
@@ -165,3 +167,15 @@ def test_each_step_towards_a_force_goes_the_whole_way():
     limits = {"deepest_mm": 1.0, "finest_mm": 0.1}
     found = press_into(block(), RELAXING, fp.Bar(1.7, 0.1), motion, fp.PressSettings(4, 3), **limits)
     assert found.newton_steps <= 43
+
+
+def test_a_force_leads_on_from_an_indenter_that_touches_at_depth_0():
+    """Middles of facets may lie a few micrometres in it, and no multiple of a depth of 0 leads deeper."""
+    motion, settings = fp.ForceRampAndHold(force_mn=20.0, ramp_ms=50.0, hold_ms=200.0), fp.PressSettings(4, 3)
+    mesh = block()
+    above = place(BALL, mesh.nodes_mm[mesh.skin_nodes], np.zeros(3), np.eye(3))
+    inside = replace(above, origin_mm=above.origin_mm + 0.01 * above.axis)
+    specimen = Specimen(mesh, RELAXING)
+    far, near = (press(specimen, PlacedIndenter(BALL, each), motion, settings) for each in (above, inside))
+    np.testing.assert_allclose(near.force_mn, far.force_mn, rtol=1e-4)
+    np.testing.assert_allclose(near.depth_mm[1:] + 0.01, far.depth_mm[1:], atol=2e-4)

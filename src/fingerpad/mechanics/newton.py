@@ -505,7 +505,9 @@ class _Search:
         if not stiffness > 0.0:
             raise ConvergenceError("The indenter meets no resistance.")
         # More and more skin resists an indenter that advances: a tangent from a light touch leads too deep.
-        shallowest, deepest = start.depth_mm / MOST_ADVANCE, start.depth_mm * MOST_ADVANCE
+        # Middles of facets may touch at depth 0, of which no multiple leads deeper.
+        shallowest = start.depth_mm / MOST_ADVANCE
+        deepest = max(start.depth_mm * MOST_ADVANCE, FIRST_DEPTH_MM)
         advance = float(np.clip(start.depth_mm + force / stiffness, shallowest, deepest)) - start.depth_mm
         length = 1.0
         while length >= SHORTEST_STEP:

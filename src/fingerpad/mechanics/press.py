@@ -92,7 +92,7 @@ def press(
     sparsity = Sparsity.of(mesh.elements, len(mesh.nodes_mm))
     contact = Contact(body, placement, nodes, area_mm2, friction=check_friction(friction, body))
     if np.isfinite(indenter.finest_mm):
-        contact = contact_about(contact, mesh, sparsity, indenter.finest_mm)
+        contact = contact_about(contact, mesh, sparsity, indenter.finest_mm, stimulus)
     gripped = nodes if body.grips else NO_NODES
     free = free_degrees_of_freedom(len(mesh.nodes_mm), mesh.fixed_nodes, mesh.symmetry_nodes, gripped)
     poisson = max(materials[layer].poisson for layer in np.unique(mesh.layer))
