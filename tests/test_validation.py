@@ -408,12 +408,22 @@ def test_a_layer_is_compressed_as_its_nodes_come_closer(tmp_path):
 
 
 @pytest.mark.filterwarnings("ignore::fingerpad.core.errors.InertiaWarning")
-def test_a_receptive_field_grows_with_the_depth_of_the_probe(tmp_path):
+def test_a_receptive_field_holds_the_places_from_which_a_probe_elicits_a_tenth(tmp_path):
     file = written(tmp_path, "afferent,depth_mm,area_mm2\nRA,0.3,5\nRA,0.1,5\nRA,0,0\n")
     deep, shallow, none = (
         row.predicted for row in fp.validate(observations=file, resolution="quick").predictions
     )
     assert 0.0 == none < shallow < deep
+    # The probe itself goes to places beside the receptor.
+    motion, radius = fp.RampAndHold(0.3, 15.0, 300.0), np.sqrt(deep / np.pi)
+    receptor = fp.Population(np.array([[RECEPTOR_X_MM, 0.0]]), 1.0, fp.RA())
+    middle, inside, outside = (
+        receptor.respond(
+            fp.indent(QUICK.finger, fp.FlatPunch(1.0, 0.2), motion, at_mm=(RECEPTOR_X_MM, away))
+        ).spikes.counts[0]
+        for away in (0.0, radius - 0.25, radius + 0.25)
+    )
+    assert inside >= max(1.0, 0.1 * middle) > outside
 
 
 class Drum(SimpleNamespace):

@@ -8,19 +8,19 @@ from typing import Annotated
 import numpy as np
 
 from fingerpad.core.checked import value_class
-from fingerpad.core.values import Finite, Numbers, Seed, choice
+from fingerpad.core.values import Count, Finite, Numbers, Seed, choice
 from fingerpad.data import protocol, psychophysics
 from fingerpad.data.tissues import DEFAULT_TISSUES
 from fingerpad.geometry.bodies import Bar, Sphere
 from fingerpad.geometry.fingertip import Finger, Fingertip
 from fingerpad.geometry.grading import RESOLUTIONS, Grading, resolution_grading
 from fingerpad.geometry.indenters import Indenter
-from fingerpad.geometry.motion import RampAndHold
+from fingerpad.geometry.motion import Motion, RampAndHold
 from fingerpad.geometry.size_field import grading_below
 from fingerpad.mechanics.materials import Tissues
 from fingerpad.mechanics.tissues import TISSUES
 from fingerpad.neuron.afferent import Afferent
-from fingerpad.skin.indentation import CONTACT_POINT_MM, touch_of
+from fingerpad.skin.indentation import CONTACT_POINT_MM, settings_of, touch_of
 from fingerpad.skin.indentation import Touch as Touch
 
 CURVATURES = psychophysics.SPHERE_CURVATURES.value
@@ -101,6 +101,28 @@ class Conditions:
             at_mm=(x_mm, 0.0),
             grading=grading,
             tilt_deg=tilt_deg,
+        )
+
+    def probe_touch(
+        self,
+        indenter: Indenter,
+        motion: Motion,
+        hold_steps: Count | None = None,
+        depths_mm: Numbers = (),
+        grading: Grading | None = None,
+    ) -> Touch:
+        """One touch along the normal of the skin at the middle of the pad, above the receptor."""
+        settings = settings_of(self.resolution)
+        return touch_of(
+            self.finger,
+            indenter,
+            motion,
+            self.tissues,
+            self.resolution,
+            grading=grading or self.grading,
+            tilt_deg=self.skin_tilt_deg,
+            settings=replace(settings, hold_steps=hold_steps) if hold_steps else settings,
+            receptor_depths_mm=depths_mm or self.receptor_depths_mm,
         )
 
     def sphere_touch(

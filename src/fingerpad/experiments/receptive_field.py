@@ -25,7 +25,6 @@ from fingerpad.neuron.afferent import AnyAfferent
 from fingerpad.neuron.afferent_types import afferent_of
 from fingerpad.neuron.end_organs import EndOrgans
 from fingerpad.neuron.population import Population
-from fingerpad.skin.indentation import touch_of
 from fingerpad.skin.sampling import SkinResponse
 
 PROBE, PROBING_MM_PER_MS, PROBED_MS = FlatPunch(1.0, 0.2), 0.02, 300.0
@@ -183,15 +182,7 @@ def receptive_field(
         afferent = afferent_of(afferent, tissues)
     places_mm = places_about(reach_mm, spacing_mm)
     population = afferents_at(settings, places_mm, afferent or settings.afferent, receptor_depth_mm, ends)
-    touch = touch_of(
-        settings.finger,
-        probe,
-        probing(depth_mm),
-        tissues,
-        resolution,
-        tilt_deg=settings.skin_tilt_deg,
-        receptor_depths_mm=population.kept_depths_mm,
-    )
+    touch = settings.probe_touch(probe, probing(depth_mm), depths_mm=population.kept_depths_mm)
     touch.check_sites(population.sites_mm)
     return field_of(touch.solve(), population, places_mm)
 
@@ -220,7 +211,7 @@ def afferents_at(
             raise InputError("ends", "must be those of one afferent, x and z about (0, 0)", f"{len(ends)}")
         of_each = places[:, None] + ends.positions_mm[0] * (settings.along_skin, 1.0)
         ends = replace(ends, positions_mm=of_each, weights=np.asarray(ends.weights)[0])
-    return Population(places, PLACES_MM, afferent, ends=ends, depth_mm=depth_mm)
+    return Population(places, float(places_mm[1] - places_mm[0]), afferent, ends=ends, depth_mm=depth_mm)
 
 
 def field_of(skin: SkinResponse, population: Population, places_mm: FloatArray) -> ReceptiveField:

@@ -46,9 +46,9 @@ from fingerpad.experiments.scores import (
 )
 from fingerpad.experiments.validation.observations import WORDS, Kind, Observations, Value, read_observations
 from fingerpad.geometry.bodies import Dots, FlatPunch, Grating, Plate, Sphere
-from fingerpad.geometry.grading import RESOLUTIONS, Grading, resolution_grading
+from fingerpad.geometry.grading import RESOLUTIONS, resolution_grading
 from fingerpad.geometry.indenters import Indenter
-from fingerpad.geometry.motion import ForceRampAndHold, Motion, RampAndHold, Trajectory
+from fingerpad.geometry.motion import ForceRampAndHold, RampAndHold, Trajectory
 from fingerpad.geometry.motions import stroke
 from fingerpad.neuron.afferent import AnyAfferent, type_of
 from fingerpad.neuron.population import Population
@@ -399,7 +399,7 @@ def _rate(given: Given, model: ValidationRequest) -> Reading:
     conditions.finger.skin_point(*site)
     if force_n == 0.0:
         return Reading(None, lambda _: _resting_rate(model))
-    touch = _probed(model, body, ForceRampAndHold(force_mn=MN_PER_N * force_n), grading=grading)
+    touch = model.settings.probe_touch(body, ForceRampAndHold(force_mn=MN_PER_N * force_n), grading=grading)
     receptor = Population(np.array([site]), 1.0, model.responding, depth_mm=model.depth_mm)
 
     def read(skin: SkinResponse | None) -> float:
@@ -414,7 +414,7 @@ def _area(given: Given, model: ValidationRequest) -> Reading:
     depth_mm, name = given["depth_mm"], str(given["afferent"])
     if depth_mm == 0.0:
         return Reading(None, lambda _: 0.0)
-    touch, places_mm = _probed(model, PROBE, probing(depth_mm)), places_about()
+    touch, places_mm = model.settings.probe_touch(PROBE, probing(depth_mm)), places_about()
     population = afferents_at(model.settings, places_mm, _of_type(name, model), model.depth_mm)
 
     def read(skin: SkinResponse | None) -> float:
@@ -457,7 +457,7 @@ def _dots(given: Given, model: ValidationRequest) -> Reading:
         )
     body = lattice_of_dots(spacing_mm, DOTS_MM[0] + 2 * spacing_mm, DOTS_MM[1])
     motion = scanning(spacing_mm, given["speed_mm_s"], MN_PER_N * force_n)
-    touch = _probed(model, body, motion)
+    touch = model.settings.probe_touch(body, motion)
     across = spacing_mm / 2 * (np.arange(DOTS_LINES) + 0.5) / DOTS_LINES
     places = np.column_stack([np.full(DOTS_LINES, model.settings.receptor_x_mm), across])
     receptors = Population(places, spacing_mm, afferent, depth_mm=model.depth_mm)
@@ -485,7 +485,7 @@ def _adapted(given: Given, model: ValidationRequest) -> Reading:
     )
     # Slow spikes need a while until the interval of the last time is closed.
     motion = RampAndHold(depth_mm, hold_ms=longest_ms + MS_PER_S)
-    touch = _probed(model, STEADY, motion, HELD_STEPS)
+    touch = model.settings.probe_touch(STEADY, motion, HELD_STEPS)
     site = np.array([(model.settings.receptor_x_mm, 0.0)])
     receptor = Population(site, 1.0, model.responding, depth_mm=model.depth_mm)
 
@@ -510,7 +510,7 @@ def _strain(given: Given, model: ValidationRequest) -> Reading:
     middles_mm = tuple(0.5 * (above + below) for above, below in pairwise(borders))
     depth_mm = middles_mm[WORDS["layer"].index(str(given["layer"]))]
     motion = ForceRampAndHold(force_mn=MN_PER_N * force_n)
-    touch = _probed(model, Plate(), motion, depths_mm=middles_mm)  # the same for all layers
+    touch = model.settings.probe_touch(Plate(), motion, depths_mm=middles_mm)  # the same for all layers
 
     def read(skin: SkinResponse | None) -> float:
         assert skin is not None
@@ -518,30 +518,6 @@ def _strain(given: Given, model: ValidationRequest) -> Reading:
         return 1.0 - float(np.exp(-skin.sample("compressive_strain", site, depth_mm)[-1, 0]))
 
     return Reading(touch, read)
-
-
-def _probed(
-    model: ValidationRequest,
-    body: Indenter,
-    motion: Motion,
-    hold_steps: int = 0,
-    depths_mm: tuple[float, ...] = (),
-    grading: Grading | None = None,
-) -> Touch:
-    """Touch along the normal of the skin at the middle of the pad, above the receptor."""
-    conditions = model.settings
-    settings = settings_of(conditions.resolution)
-    return touch_of(
-        conditions.finger,
-        body,
-        motion,
-        conditions.tissues,
-        conditions.resolution,
-        grading=grading or conditions.grading,
-        tilt_deg=conditions.skin_tilt_deg,
-        settings=replace(settings, hold_steps=hold_steps) if hold_steps else settings,
-        receptor_depths_mm=depths_mm or conditions.receptor_depths_mm,
-    )
 
 
 def _resting_rate(model: ValidationRequest) -> float:
