@@ -208,7 +208,7 @@ FEBIO_LAWS = [*LAWS[:3], *LAWS[4:7]]
 def test_every_line_is_in_the_manual(write):
     known = ABAQUS if write is abaqus_deck else CALCULIX
     relaxing = NEO_HOOKE.with_prony(PRONY) if write is abaqus_deck else NEO_HOOKE
-    jobs = [block_job(indenter) for indenter in [*INDENTERS, fp.Line(2.5)]]
+    jobs = [block_job(indenter) for indenter in [*INDENTERS, fp.bodies.Line(2.5)]]
     jobs.append(replace(block_job(), friction=0.4))
     for job in [*jobs, *(block_job(material=law) for law in LAWS), block_job(material=relaxing)]:
         deck = write(job)
@@ -435,7 +435,7 @@ def test_a_full_body_has_no_plane_of_symmetry_and_a_line_holds_the_skin_that_it_
     cards = read_cards(abaqus_deck(block_job(symmetric=False)))
     assert not of(cards, "NSET", NSET="SYMMETRY")
     assert of(cards, "BOUNDARY")[0][1] == ["FIXED, 1, 3", "REFERENCE, 4, 6"]
-    job = block_job(fp.Line(2.5))
+    job = block_job(fp.bodies.Line(2.5))
     for write in (abaqus_deck, calculix_deck):
         cards = read_cards(write(job))
         gripped = {int(value) - 1 for value in numbers(only(cards, "NSET", NSET="GRIPPED")[1])}

@@ -63,7 +63,7 @@ def examples(count):
 BALL = fp.Sphere(curvature_per_m=287)
 FOAM = fp.Material(Hencky(5.0, 100.0))
 VALUES = [
-    fp.Sphere(curvature_per_m=287.0), fp.Cylinder(3.0), fp.Line(0.3), fp.Bar(3.0, 0.3), fp.Edge(0.1),
+    fp.Sphere(curvature_per_m=287.0), fp.Cylinder(3.0), fp.bodies.Line(0.3), fp.Bar(3.0, 0.3), fp.Edge(0.1),
     fp.FlatPunch(3.0, 0.3), fp.Gap(1.0, 8.0, 0.1, 0.1), fp.Grating(1.0, 1.0, 0.1),
     Dots(((0.0, 0.0), (2.5, 0.0)), 1.4, 0.5),
     Embossed((((-1, -1), (1, -1), (1, 1.0)),), height_mm=0.5, edge_radius_mm=0.1),

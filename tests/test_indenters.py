@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 from scipy.optimize import minimize_scalar
 
-from fingerpad import Bar, Cylinder, Edge, FlatPunch, Grating, Line, Plate, Sphere
+from fingerpad import Bar, Cylinder, Edge, FlatPunch, Grating, Plate, Sphere
+from fingerpad.geometry.bodies import Line
 from refusals import refusals
 
 RADIUS = 1.5

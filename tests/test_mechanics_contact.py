@@ -46,7 +46,7 @@ def test_first_touch_of_one_node_beside_the_axis_and_of_none():
     placement = place(SPHERE, np.array([[1.2, 0.0, 0.0]]), np.array([0.0, -7.0, 0.0]), np.eye(3))
     expected = [0.0, RADIUS - np.sqrt(RADIUS**2 - 1.2**2), 0.0]
     np.testing.assert_allclose(placement.origin_mm, expected, atol=1e-14)
-    for body in (SPHERE, fp.Line()):
+    for body in (SPHERE, fp.bodies.Line()):
         with pytest.raises(fp.InputError, match=r"never touches.*\.$"):
             place(body, np.array([[5.0, 0.0, 0.0]]), np.zeros(3), np.eye(3))
 

@@ -6,7 +6,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from fingerpad import ConvergenceError, FlatPunch, Line, Plate, PressSettings, RampAndHold, Sphere
+from fingerpad import ConvergenceError, FlatPunch, Plate, PressSettings, RampAndHold, Sphere
+from fingerpad.geometry.bodies import Line
 from fingerpad.geometry.mesh import block_mesh
 from fingerpad.mechanics.assembly import Sparsity
 from fingerpad.mechanics.configuration import Body, Load

@@ -8,13 +8,13 @@ from fingerpad import (
     Cylinder,
     Fingertip,
     InputError,
-    Line,
     PressSettings,
     Sphere,
     Trajectory,
     stroke,
     touch_of,
 )
+from fingerpad.geometry.bodies import Line
 from fingerpad.geometry.mesh import block_mesh
 from fingerpad.geometry.motion import Pose, RampAndHold
 from fingerpad.mechanics.contact import PlacedIndenter, Placement, place, rotation_of

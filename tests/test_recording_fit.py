@@ -262,7 +262,7 @@ test_what_cannot_be_fitted_or_pressed_is_refused = refusals(
      "^Stimulus 1 cannot be used: motion.depth_mm must stay"),
     (lambda: touches(ShiftedBar().named("-80")),
      "^Stimulus -80 cannot be used: place must lie on the finger"),
-    (lambda: touches(NamedStimulus(fp.Line(), tilt_deg=5.0, name="deep")), ("place", "tilt_deg")),
+    (lambda: touches(NamedStimulus(fp.bodies.Line(), tilt_deg=5.0, name="deep")), ("place", "tilt_deg")),
 )  # fmt: skip
 
 
@@ -291,7 +291,7 @@ def test_stimuli_are_indented_at_their_position_with_their_motion():
     sphere = fp.Sphere(curvature_per_m=340.0)
     stimuli = [
         NamedStimulus(sphere, fp.RampAndHold(0.4), x_mm=1.0, z_mm=0.5, tilt_deg=3.0, name="beside"),
-        NamedStimulus(fp.Line(), fp.ForceRampAndHold(50.0), name="wire"),
+        NamedStimulus(fp.bodies.Line(), fp.ForceRampAndHold(50.0), name="wire"),
         NamedStimulus(fp.Gap(gap_mm=0.5), x_mm=0.2, friction=0.3, name="gap"),
         NamedStimulus(fp.Bar(), spin_deg=30.0, name="turned"),
     ]

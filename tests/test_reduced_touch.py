@@ -289,7 +289,7 @@ def test_a_tilted_face_meets_the_skin_where_it_does_in_closed_form(
 
 def test_a_wire_meets_the_skin_at_its_place() -> None:
     """Its gap is that of a plate: it was lifted to the highest place of the pad."""
-    touch = fp.touch_of(fp.Fingertip(), fp.Line())
+    touch = fp.touch_of(fp.Fingertip(), fp.bodies.Line())
     assert [pose.meets_mm for pose in ReducedTraining(touch, ReducedRange(0.5)).poses()] == [0.0]
 
 

@@ -105,7 +105,7 @@ def test_bodies_of_the_paper_keep_the_largest_elements(resolution):
         (fp.Sphere(radius_mm=0.25), 0.25 / 4, 3), (fp.Sphere(radius_mm=1.1), 1.1 / 4, 2),
         (fp.Sphere(radius_mm=1.3), 0.45, 2), (fp.Cylinder(0.5), 0.25 / 4, 3), (fp.Bar(3.0, 0.3), 0.18, 2),
         (fp.Bar(3.0, 0.05), 0.05, 4), (fp.Edge(0.0), SMALLEST_MM, 4), (fp.FlatPunch(1.0, 0.1), 0.06, 4),
-        (fp.FlatPunch(10.0, 0.3), 0.18, 2), (fp.Line(), 0.025, 4), (fp.Grating(1.5, 1.5), 0.12, 2),
+        (fp.FlatPunch(10.0, 0.3), 0.18, 2), (fp.bodies.Line(), 0.025, 4), (fp.Grating(1.5, 1.5), 0.12, 2),
     ],
     ids=lambda value: str(value) if not isinstance(value, float) else "",
 )  # fmt: skip

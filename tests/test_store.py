@@ -125,7 +125,7 @@ def test_key_changes_with_the_last_bit_of_every_input():
 def test_indenters_of_equal_numbers_have_different_keys():
     relaxing = replace(TINY.tissues.dermis, prony=fp.Prony((0.1,), (9.0,)))
     assert touch_key(replace(TINY, tissues=replace(TINY.tissues, dermis=relaxing))) != touch_key(TINY)
-    straight = [kind(3.5) for kind in (fp.Line, fp.Cylinder, fp.Bar, fp.FlatPunch, fp.Edge)]
+    straight = [kind(3.5) for kind in (fp.bodies.Line, fp.Cylinder, fp.Bar, fp.FlatPunch, fp.Edge)]
     bodies = [*straight, fp.Sphere(radius_mm=3.5), fp.Plate(), fp.Bar(3.5, 0.1)]
     assert len({touch_key(replace(TINY, indenter=body)) for body in bodies}) == len(bodies)
 

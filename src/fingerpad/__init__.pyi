@@ -46,7 +46,6 @@ from fingerpad.geometry.bodies import Edge as Edge
 from fingerpad.geometry.bodies import FlatPunch as FlatPunch
 from fingerpad.geometry.bodies import Gap as Gap
 from fingerpad.geometry.bodies import Grating as Grating
-from fingerpad.geometry.bodies import Line as Line
 from fingerpad.geometry.bodies import Plate as Plate
 from fingerpad.geometry.bodies import Sphere as Sphere
 from fingerpad.geometry.bodies import braille as braille
@@ -69,6 +68,7 @@ from fingerpad.geometry.motions import sine as sine
 from fingerpad.geometry.motions import staircase as staircase
 from fingerpad.geometry.motions import stroke as stroke
 from fingerpad.geometry.surface_files import read_surface as read_surface
+from fingerpad.inference.afferent_fit import fit_afferent as fit_afferent
 from fingerpad.inference.recordings import RateRecordings as RateRecordings
 from fingerpad.mechanics.materials import Energy as Energy
 from fingerpad.mechanics.materials import Material as Material

@@ -46,7 +46,7 @@ CASES: dict[str, tuple[Any, dict[str, Any]]] = {
         {"stimulus": fp.RampAndHold(depth_mm=0.8), "friction": 0.5, "tissues": "trial2_wu"},
     ),
     "grating": (fp.Grating(1.0, 1.0), {"stimulus": fp.RampAndHold(depth_mm=1.0), "friction": 0.5}),
-    "wire": (fp.Line(0.3), {"stimulus": fp.RampAndHold(depth_mm=1.0)}),
+    "wire": (fp.bodies.Line(0.3), {"stimulus": fp.RampAndHold(depth_mm=1.0)}),
 }
 """Presses at quick; of each the paper's ramp of 1 mm with the hold, unless it says otherwise."""
 
