@@ -144,6 +144,15 @@ def test_sizes_follow_place_turn_and_motion():
         )
 
 
+def test_dots_that_enter_and_leave_have_elements_of_one_size():
+    places_mm = 2.0 * np.arange(-5, 6)
+    field = Dots([(x, z) for x in places_mm for z in places_mm], 1.0, 0.5)
+    slides = below(field, fp.stroke(depth_mm=0.6, speed_mm_per_s=20.0, x_mm=[4.0]))
+    sizes_mm = {size for _, _, size in slides.finer_along + slides.finer_across}
+    assert max(sizes_mm) < 1.01 * min(sizes_mm)
+    assert min(sizes_mm) > 0.5 / 4
+
+
 def test_what_never_touches_costs_nothing():
     """A spike that lies 2 mm deeper than the press goes, and one beside the finger."""
     spike = fp.Sphere(radius_mm=0.3)

@@ -238,9 +238,10 @@ def grading_below(
     count, scale = skin.places_mm.size, min(finger.relative_size, 1.0)
     sizes_mm = [np.full(count, np.inf), np.full(count, np.inf)]
     pressed = [np.zeros(count, dtype=bool), np.zeros(count, dtype=bool)]
-    for part in _touching(skin, indenter, poses, motion, tilt_deg, spin_deg):
+    contacts = [*_touching(skin, indenter, poses, motion, tilt_deg, spin_deg)]
+    for part, extents_mm in zip(contacts, _extents_mm(contacts), strict=True):
         for axis, radius_mm in enumerate((part.face.along_mm, part.face.across_mm)):
-            place, extent_mm = part.places[axis], _extent_mm(part.touches, axis)
+            place, extent_mm = part.places[axis], extents_mm[axis]
             size_mm = scale * _size_mm(SHARES[resolution], radius_mm, part.face.round_mm, extent_mm)
             np.minimum.at(sizes_mm[axis], place[part.touches], size_mm[part.touches])
             pressed[axis][place[part.presses]] = True
@@ -337,6 +338,7 @@ class _Skin:
 class _Contact:
     """Where a body meets the undeformed skin in one place of its way."""
 
+    spin_deg: float  #: By which the body is turned about its axis.
     face: Face
     places: tuple[np.ndarray, np.ndarray]  #: Of the skin below the face, along and across, (n, m) each.
     touches: np.ndarray  #: Whether the face reaches the skin there, bool (n, m).
@@ -372,7 +374,23 @@ def _touching(
             reached = np.nonzero(touches)
             half_mm = _whole(face.x_mm[reached[0]]), _whole(face.z_mm[reached[1]])
         else:
-            yield _Contact(face, places, touches, clear_mm <= PRESSED * depth_mm)
+            yield _Contact(pose.spin_deg, face, places, touches, clear_mm <= PRESSED * depth_mm)
+
+
+def _extents_mm(contacts: Sequence[_Contact]) -> list[tuple[FloatArray, FloatArray]]:
+    """Largest extents on the way, along and across, of the part of the body at each place of a contact. [mm]
+
+    Of a dot that enters or leaves the contact only a sliver touches, which is no reason for small elements.
+    """
+    middle = max(max(part.touches.shape) for part in contacts) // 2
+    found, widest_mm = [], {}
+    for part in contacts:
+        grid = tuple(slice(middle - count // 2, middle + count // 2 + 1) for count in part.touches.shape)
+        both_mm = widest_mm.setdefault(part.spin_deg, np.zeros((2, 2 * middle + 1, 2 * middle + 1)))
+        for axis, all_mm in enumerate(both_mm):
+            np.maximum(all_mm[grid], _extent_mm(part.touches, axis), out=all_mm[grid])
+        found.append(tuple(all_mm[grid] for all_mm in both_mm))
+    return found
 
 
 def _whole(places_mm: FloatArray) -> float:
