@@ -10,6 +10,7 @@ from typing import Annotated
 
 import numpy as np
 from pydantic import Field
+from scipy.spatial import cKDTree
 
 from fingerpad.core.checked import checked, checked_class, value_class
 from fingerpad.core.errors import InputError
@@ -377,9 +378,12 @@ class Dots(Indenter):
         """Radius of the balls. [mm]"""
         return (self.diameter_mm**2 / 4 + self.height_mm**2) / (2 * self.height_mm)
 
+    @cached_property
+    def _tree(self) -> cKDTree:
+        return cKDTree(np.array(self.at_mm))
+
     def gap(self, points_mm: PointsMm) -> tuple[FloatArray, FloatArray]:
-        at = np.array(self.at_mm)
-        nearest = at[np.linalg.norm(points_mm[:, None, [0, 2]] - at, axis=2).argmin(axis=1)]
+        nearest = np.array(self.at_mm)[self._tree.query(points_mm[:, [0, 2]])[1]]
         centre = np.column_stack([nearest[:, 0], np.full(len(points_mm), -self.radius_mm), nearest[:, 1]])
         # Behind the plate the ball goes on, and the plate is nearer.
         plate = points_mm[:, 1] + self.height_mm, np.broadcast_to(UP, points_mm.shape)

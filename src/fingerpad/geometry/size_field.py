@@ -355,26 +355,31 @@ def _touching(
 ) -> Iterator[_Contact]:
     """Yield the contact in each place of the way, found on a coarse grid and looked at on a fine one."""
     first_mm: dict[float, float] = {}  # Way to first touch, on each grid.
-    for pose, depth_mm in poses.items():
-        half_mm = REACH_MM
-        for step_mm in (COARSE_MM, STEP_MM):
-            face = face_of(indenter, spin_deg + pose.spin_deg, half_mm, step_mm)
-            places, height_mm = skin.below(face, pose, tilt_deg)
-            clear_mm = height_mm - face.front_mm
-            clear_mm -= first_mm.setdefault(step_mm, float(clear_mm.min()))
-            if motion.by_force:
-                touched = min(int(motion.largest / PRESSURE_KPA / step_mm**2), clear_mm.size - 1)
-                depth_mm = min(float(np.partition(clear_mm, touched, axis=None)[touched]), skin.deepest_mm)
-            touches = clear_mm <= depth_mm
-            if not touches.any():
-                # On the way to first touch the fine grid is wanted too.
-                touches = clear_mm <= clear_mm.min()
-                if step_mm == STEP_MM:
-                    break
-            reached = np.nonzero(touches)
-            half_mm = _whole(face.x_mm[reached[0]]), _whole(face.z_mm[reached[1]])
-        else:
-            yield _Contact(pose.spin_deg, face, places, touches, clear_mm <= PRESSED * depth_mm)
+
+    def contact(pose: Pose, prescribed: float, half_mm: tuple[float, float], step_mm: float) -> _Contact:
+        face = face_of(indenter, spin_deg + pose.spin_deg, half_mm, step_mm)
+        places, height_mm = skin.below(face, pose, tilt_deg)
+        clear_mm = height_mm - face.front_mm
+        clear_mm -= first_mm.setdefault(step_mm, float(clear_mm.min()))
+        depth_mm = prescribed
+        if motion.by_force:
+            touched = min(int(motion.largest / PRESSURE_KPA / step_mm**2), clear_mm.size - 1)
+            depth_mm = min(float(np.partition(clear_mm, touched, axis=None)[touched]), skin.deepest_mm)
+        # On the way to first touch the fine grid is wanted too.
+        least_mm = float(clear_mm.min()) if step_mm == COARSE_MM else -np.inf
+        touches = clear_mm <= max(depth_mm, least_mm)
+        return _Contact(pose.spin_deg, face, places, touches, clear_mm <= PRESSED * depth_mm)
+
+    half_mm = 0.0, 0.0
+    for pose, prescribed in poses.items():
+        coarse = contact(pose, prescribed, REACH_MM, COARSE_MM)
+        along, across = np.nonzero(coarse.touches)
+        reached_mm = _whole(coarse.face.x_mm[along]), _whole(coarse.face.z_mm[across])
+        half_mm = max(half_mm[0], reached_mm[0]), max(half_mm[1], reached_mm[1])
+    for pose, prescribed in poses.items():
+        fine = contact(pose, prescribed, half_mm, STEP_MM)
+        if fine.touches.any():
+            yield fine
 
 
 def _extents_mm(contacts: Sequence[_Contact]) -> list[tuple[FloatArray, FloatArray]]:
@@ -382,14 +387,13 @@ def _extents_mm(contacts: Sequence[_Contact]) -> list[tuple[FloatArray, FloatArr
 
     Of a dot that enters or leaves the contact only a sliver touches, which is no reason for small elements.
     """
-    middle = max(max(part.touches.shape) for part in contacts) // 2
-    found, widest_mm = [], {}
+    found: list[tuple[FloatArray, FloatArray]] = []
+    widest_mm: dict[float, FloatArray] = {}
     for part in contacts:
-        grid = tuple(slice(middle - count // 2, middle + count // 2 + 1) for count in part.touches.shape)
-        both_mm = widest_mm.setdefault(part.spin_deg, np.zeros((2, 2 * middle + 1, 2 * middle + 1)))
-        for axis, all_mm in enumerate(both_mm):
-            np.maximum(all_mm[grid], _extent_mm(part.touches, axis), out=all_mm[grid])
-        found.append(tuple(all_mm[grid] for all_mm in both_mm))
+        along_mm, across_mm = widest_mm.setdefault(part.spin_deg, np.zeros((2, *part.touches.shape)))
+        for axis, extent_mm in enumerate((along_mm, across_mm)):
+            np.maximum(extent_mm, _extent_mm(part.touches, axis), out=extent_mm)
+        found.append((along_mm, across_mm))
     return found
 
 
