@@ -65,7 +65,6 @@ WITHOUT: dict[str, Any] = {
     "LONGEST_SHIFTED_STEP": 1.0,
     "MOST_FULL_AUGMENTATIONS": EVER,
     "MOST_PLAIN_RENEWALS": EVER,
-    "AT_REST": math.inf,
     "MOST_ADVANCE": 1e3,
     "MOST_CONTINUED": 1.0,
     "LARGEST_DROP": 1.0,

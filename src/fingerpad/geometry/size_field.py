@@ -383,10 +383,8 @@ def _touching(
 
 
 def _extents_mm(contacts: Sequence[_Contact]) -> list[tuple[FloatArray, FloatArray]]:
-    """Largest extents on the way, along and across, of the part of the body at each place of a contact. [mm]
-
-    Of a dot that enters or leaves the contact only a sliver touches, which is no reason for small elements.
-    """
+    """Largest extents on the way, along and across, of the part at each place of each contact. [mm]"""
+    # Of a dot that enters or leaves the contact only a sliver touches, which is no reason for small elements.
     found: list[tuple[FloatArray, FloatArray]] = []
     widest_mm: dict[float, FloatArray] = {}
     for part in contacts:

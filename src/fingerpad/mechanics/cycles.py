@@ -40,7 +40,7 @@ SETTLING_SHARE = 1e-3
 """Length of the step that lets the shape follow the stress after a gap, over that of the next step."""
 
 NOT_BLENDED = frozenset({
-    "history", "ledger", "step_mm", "step_depth_mm", "advance", "reached", "stiffness", "multipliers_mn",
+    "history", "ledger", "step_mm", "advance", "reached", "stiffness", "multipliers_mn",
     "anchors", "convected_kpa", "friction",
 })  # fmt: skip
 """Parts of a moment that only the next step needs; none starts from a moment that is interpolated."""
@@ -187,7 +187,7 @@ class CycleJumps:
         settling_ms = SETTLING_SHARE * (self.times_ms[number, 0] - start_ms)
         before = replace(end, time_ms=start_ms - settling_ms, history=history)
         settled = self.step(before, start_ms)
-        return replace(settled, step_mm=end.step_mm, step_depth_mm=end.step_depth_mm, advance=end.advance)
+        return replace(settled, step_mm=end.step_mm, advance=end.advance)
 
     def error_kpa(
         self, before: _Cycle, last: _Cycle, found: _Cycle, prony: PronyCycle, drift: FloatArray

@@ -175,8 +175,14 @@ class LinearSolver:
         vector = self.approximate.enter(direction)
         return self.approximate.leave(self.approximate.multiply(vector))
 
-    def solve(self, blocks: np.ndarray, residual: FloatArray, relative_tolerance: float) -> FloatArray:
-        """Solve K x = r for the free degrees of freedom."""
+    def solve(
+        self,
+        blocks: np.ndarray,
+        residual: FloatArray,
+        relative_tolerance: float,
+        guess: FloatArray | None = None,
+    ) -> FloatArray:
+        """Solve K x = r for the free degrees of freedom, beginning with a guess of x."""
         digits = -np.log10(relative_tolerance)
         for _ in range(2):
             fresh = self._stale
@@ -187,13 +193,15 @@ class LinearSolver:
                     self._stale = False
                 else:
                     self.approximate.follow(blocks)
-                solution, count, failed = _conjugate_gradients(self.approximate, residual, relative_tolerance)
+                solution, count, failed = _conjugate_gradients(
+                    self.approximate, residual, relative_tolerance, guess
+                )
             except (NotPositiveDefiniteError, ZeroDivisionError):  # the latter of a node's own block
                 self._stale = True
                 raise NotPositiveDefiniteError from None
             self.iterations += count
-            if fresh:
-                self._renewed_rate = count / digits
+            if fresh:  # from a guess fewer digits are missing
+                self._renewed_rate = max(count / digits, self._renewed_rate if guess is not None else 0.0)
             self._stale = count > self._renewed_rate * digits + self.approximate.patience
             if not failed and np.isfinite(solution).all():
                 return solution
@@ -204,7 +212,10 @@ class LinearSolver:
 
 
 def _conjugate_gradients(
-    approximate: Preconditioner, residual: FloatArray, relative_tolerance: float
+    approximate: Preconditioner,
+    residual: FloatArray,
+    relative_tolerance: float,
+    guess: FloatArray | None = None,
 ) -> tuple[FloatArray, int, bool]:
     """Solution, iterations, and whether the tolerance was missed."""
     count = 0
@@ -224,13 +235,14 @@ def _conjugate_gradients(
         return product
 
     right = approximate.enter(residual)
+    first = None if guess is None else approximate.enter(guess)
     shape = (right.size, right.size)
     try:
         with np.errstate(over="raise", divide="raise", invalid="raise"):
             solution, failed = cg(
-                LinearOperator(shape, matvec=multiply, dtype=right.dtype), right, rtol=relative_tolerance,
-                maxiter=MOST_ITERATIONS, M=LinearOperator(shape, matvec=approximate.apply, dtype=right.dtype),
-                callback=counted,
+                LinearOperator(shape, matvec=multiply, dtype=right.dtype), right, first,
+                rtol=relative_tolerance, maxiter=MOST_ITERATIONS,
+                M=LinearOperator(shape, matvec=approximate.apply, dtype=right.dtype), callback=counted,
             )  # fmt: skip
     except FloatingPointError:  # with the preconditioner of another tangent they may diverge
         return residual, count, True
