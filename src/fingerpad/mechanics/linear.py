@@ -184,8 +184,9 @@ class LinearSolver:
     ) -> FloatArray:
         """Solve K x = r for the free degrees of freedom, beginning with a guess of x."""
         digits = -np.log10(relative_tolerance)
-        for _ in range(2):
-            fresh = self._stale
+        for attempt in range(2):
+            # How a new preconditioner serves shows when a whole solution is sought, not the rest of one.
+            fresh = self._stale and (guess is None or attempt > 0)
             try:
                 if fresh:
                     self.approximate.renew(blocks)
@@ -200,9 +201,9 @@ class LinearSolver:
                 self._stale = True
                 raise NotPositiveDefiniteError from None
             self.iterations += count
-            if fresh:  # from a guess fewer digits are missing
-                self._renewed_rate = max(count / digits, self._renewed_rate if guess is not None else 0.0)
-            self._stale = count > self._renewed_rate * digits + self.approximate.patience
+            if fresh and guess is None:
+                self._renewed_rate = count / digits
+            self._stale |= count > self._renewed_rate * digits + self.approximate.patience
             if not failed and np.isfinite(solution).all():
                 return solution
             self._stale = True

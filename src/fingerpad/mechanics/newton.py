@@ -79,7 +79,7 @@ limit of jamming a plain renewal changes them by as much as the one before, or m
 DEPTH_FORCING = 1e-4
 """Tolerance of the linear solve for the body's response to the indenter's displacement. Contact at an edge is
 a thousand times as stiff as the body; at 1e-3 the body seemed twice as stiff as it is, and each step towards
-a force went half of the way: a bar that slides by 1 mm at 60 mN took 1,078 Newton steps, now 165."""
+a force went half of the way."""
 FIRST_DEPTH_MM, MOST_ADVANCE = 0.05, 4.0
 """Where the search for the depth of a force begins, and the factor by which one step may change it. [mm]"""
 
