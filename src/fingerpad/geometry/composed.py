@@ -383,7 +383,7 @@ class Dots(Indenter):
         return cKDTree(np.array(self.at_mm))
 
     def gap(self, points_mm: PointsMm) -> tuple[FloatArray, FloatArray]:
-        nearest = np.array(self.at_mm)[self._tree.query(points_mm[:, [0, 2]])[1]]
+        nearest = self._tree.data[self._tree.query(points_mm[:, [0, 2]])[1]]
         centre = np.column_stack([nearest[:, 0], np.full(len(points_mm), -self.radius_mm), nearest[:, 1]])
         # Behind the plate the ball goes on, and the plate is nearer.
         plate = points_mm[:, 1] + self.height_mm, np.broadcast_to(UP, points_mm.shape)

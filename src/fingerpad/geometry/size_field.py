@@ -382,17 +382,14 @@ def _touching(
             yield fine
 
 
-def _extents_mm(contacts: Sequence[_Contact]) -> list[tuple[FloatArray, FloatArray]]:
+def _extents_mm(contacts: Sequence[_Contact]) -> list[FloatArray]:
     """Largest extents on the way, along and across, of the part at each place of each contact. [mm]"""
     # Of a dot that enters or leaves the contact only a sliver touches, which is no reason for small elements.
-    found: list[tuple[FloatArray, FloatArray]] = []
     widest_mm: dict[float, FloatArray] = {}
     for part in contacts:
-        along_mm, across_mm = widest_mm.setdefault(part.spin_deg, np.zeros((2, *part.touches.shape)))
-        for axis, extent_mm in enumerate((along_mm, across_mm)):
-            np.maximum(extent_mm, _extent_mm(part.touches, axis), out=extent_mm)
-        found.append((along_mm, across_mm))
-    return found
+        extents_mm = np.stack([_extent_mm(part.touches, axis) for axis in (0, 1)])
+        widest_mm[part.spin_deg] = np.maximum(widest_mm.get(part.spin_deg, 0.0), extents_mm)
+    return [widest_mm[part.spin_deg] for part in contacts]
 
 
 def _whole(places_mm: FloatArray) -> float:

@@ -260,7 +260,7 @@ class _Search:
         self.shift = CHANGE_SHIFT * max(CHANGE_SHIFT * self.shift, FIRST_SHIFT)
 
     def step_from(self, now: Configuration, forcing: float) -> Step:
-        """Solve for a Newton step; of a persistent search for the points that are in contact after it."""
+        """Solve for a Newton step; towards a force or persistently for the points in contact after it."""
         while True:
             now, direction = self.newton_direction(self.with_tangent(now), forcing)
             if not self.persistent and self.load.force_mn is None:
@@ -290,8 +290,8 @@ class _Search:
         stiffness = contact.stiffness[:, None, None] * touch.normal[:, :, None] * touch.normal[:, None]
         stiffness[assumed] += (now.contact_stiffness - touch.stiffness)[assumed]  # the curvature
         here_mn = self.lagging.multipliers_mn - contact.stiffness * touch.gap_mm
-        missing_mn = now.missing_force_mn(self.load)
-        enough_mn = CONTACT_FORCING * max(now.residual_norm_mn, abs(missing_mn))
+        lacking_mn = missing_mn = now.missing_force_mn(self.load)
+        enough_mn = CONTACT_FORCING * max(now.residual_norm_mn, abs(lacking_mn))
         found = at_depth = direction
         residual_mn, acting = now.residual_mn, now.contact_stiffness
         best, least, advance_mm = (direction, 0.0), np.inf, 0.0
@@ -311,7 +311,7 @@ class _Search:
             there_mn = here_mn - contact.stiffness * closing_mm
             changed = (there_mn > 0.0) != assumed
             wrong_mn = float(np.linalg.norm(there_mn[changed]))
-            falls = found @ now.residual_mn + advance_mm * now.missing_force_mn(self.load) > 0.0
+            falls = found @ now.residual_mn + advance_mm * lacking_mn > 0.0
             if wrong_mn < least and falls:
                 best, least = (found, advance_mm), wrong_mn
             if wrong_mn <= enough_mn or len(seen) > MOST_CONTACT_CHANGES:
@@ -322,7 +322,7 @@ class _Search:
             contact.add_to_tangent(blocks, self.body.sparsity.diagonal, more)
             acting = acting + more
             more_mn = np.where(assumed, here_mn, 0.0) - touch.pressed_mn
-            missing_mn = now.missing_force_mn(self.load) - float(more_mn @ along)
+            missing_mn = lacking_mn - float(more_mn @ along)
             forces = np.zeros_like(now.displacement_mm)
             contact.add_to_nodes(forces, more_mn[:, None] * touch.normal)
             residual_mn = now.residual_mn + forces.ravel()[free]
