@@ -1,4 +1,4 @@
-"""The press that most benchmarks measure: one sphere, ramp and hold, into a finger of some resolution."""
+"""The press that most benchmarks measure, one sphere into a finger of some resolution, and a few others."""
 
 from __future__ import annotations
 
@@ -14,6 +14,16 @@ if TYPE_CHECKING:  # a benchmark is listed and reported without importing what i
 
 CURVATURE_PER_M = 287.0
 PRESSED = f"A sphere of {CURVATURE_PER_M:g} per m indented by 1.0 mm, ramp of 50 ms and hold of 950 ms"
+CASES = {
+    "sphere": "sphere of 287 per m, 1 mm",
+    "cylinder": "cylinder of 3.17 mm, 1 mm",
+    "bar": "bar of 3 mm, 1 mm",
+    "force": "sphere of 287 per m, 0.5 N",
+    "slide": "sphere of 287 per m, 1 mm, slides 2 mm with friction 0.5",
+    "punch": "punch of 1 mm, 1 mm, with friction 0.5",
+}
+"""Presses at `quick`."""
+
 COLUMNS = ("nodes", "elements", "Newton steps", "factors")
 """Headings of what `work` tells."""
 
@@ -45,6 +55,38 @@ def press(
     started = perf_counter()
     skin = touch.solve()
     return {"solve_s": perf_counter() - started, "before_mb": before_mb, **summary(skin)}
+
+
+def press_case(case: str) -> dict[str, Any]:
+    """Make one of the presses of `CASES` at `quick`, and return its seconds, size and work."""
+    touch = touch_of_case(case)
+    started = perf_counter()
+    skin = touch.solve()
+    return {"solve_s": perf_counter() - started, **summary(skin)}
+
+
+def touch_of_case(case: str) -> Touch:
+    """Describe a press of `CASES`.
+
+    Examples
+    --------
+    >>> [touch_of_case(case).friction for case in CASES]
+    [0.0, 0.0, 0.0, 0.0, 0.5, 0.5]
+    """
+    import fingerpad as fp
+
+    sphere = fp.Sphere(curvature_per_m=CURVATURE_PER_M)
+    slide = fp.stroke(depth_mm=1.0, speed_mm_per_s=20.0, x_mm=[2.0])
+    press: dict[str, tuple[Any, Any, float]] = {
+        "sphere": (sphere, fp.RampAndHold(1.0), 0.0),
+        "cylinder": (fp.Cylinder(), fp.RampAndHold(1.0), 0.0),
+        "bar": (fp.Bar(3.0), fp.RampAndHold(1.0), 0.0),
+        "force": (sphere, fp.ForceRampAndHold(500.0), 0.0),
+        "slide": (sphere, slide, 0.5),
+        "punch": (fp.FlatPunch(1.0), fp.RampAndHold(1.0), 0.5),
+    }
+    body, motion, friction = press[case]
+    return fp.touch_of(fp.Fingertip(), body, motion, friction=friction, resolution="quick")
 
 
 def touch_of_sphere(

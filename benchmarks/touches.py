@@ -21,7 +21,7 @@ from benchmarks.results import Report, Table
 from fingerpad.core.threads import available_threads
 
 FOLDER = Path(__file__).parent / ".touches"
-SIZES = (10, 100, 1000, 2000)
+SIZES = (10, 100, 500)
 TOUCH = {"object": "cylinder", "motion": {"ramp_ms": 50, "hold_ms": 60}}
 DEPTHS_MM = (0.2, 0.6)
 
