@@ -284,7 +284,7 @@ def test_one_capsule_is_a_cylinder_in_its_middle_and_files_know_the_new_bodies()
 def test_bodies_are_values_with_names_of_their_own():
     assert Transformed(Box(), (1, 2, 3)) == Transformed(Box(), (1.0, 2.0, 3.0))
     assert hash(Pattern(Torus(), 7.0)) == hash(Pattern(Torus(), 7.0))
-    assert fp.bodies.Union is fp.Union
+    assert fp.bodies.Union is Union
     assert fp.bodies.ridges([0.0], [1.0]) == Union([Bar(1.0, 0.1), Plate()], [(0, 0, 0), (0, -1, 0)])
 
 

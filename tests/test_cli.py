@@ -27,7 +27,7 @@ BALL = ["touch", "--object", "sphere"]
 
 def of_requests():
     """Names of the commands that run a request."""
-    return [name for name, row in commands.TABLE.items() if "request" in row]
+    return [name for name, row in commands.TABLE.items() if "out" in row]
 
 
 @pytest.fixture
@@ -291,8 +291,9 @@ def test_every_example_can_be_written_and_is_possible(call):
         if command == "check":
             assert call(command, path)[::2] == (0, ""), name
         else:
-            fp_request = getattr(fp, commands.TABLE[command]["request"])
-            fp_request.read({{"fit": "recordings", "validate": "observations"}[command]: path}).check()
+            runs.REQUESTS[command].read(
+                {{"fit": "recordings", "validate": "observations"}[command]: path}
+            ).check()
 
 
 def test_the_exit_status_says_what_is_incomplete(call, monkeypatch):

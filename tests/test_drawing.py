@@ -18,6 +18,7 @@ from fingerpad.core.signals import RECEPTOR_COLUMNS, HitRates
 from fingerpad.experiments.discrimination.analysis import analyse
 from fingerpad.experiments.fit.fit import fit_recordings
 from fingerpad.experiments.receptive_field import ReceptiveField
+from fingerpad.experiments.scan import ScanRequest, ScanResult
 from fingerpad.inference.spike_likelihood import SpikeFit
 from fingerpad.psychophysics.curve_fit import fit_psychometric
 from fingerpad.reduction.streaming import ReducedSample
@@ -67,6 +68,16 @@ def fitted():
     return fit_recordings(traces, fp.RateRecordings(names, *afferent.rates(traces)), np.arange(6) % 2)
 
 
+def scanned():
+    asked = ScanRequest.read(
+        {"object": "sphere", "x_mm": 2.0, "afferents": fp.Population([[17.0, 0.0]], 1.0)}
+    )
+    response = fp.ResponseMap(
+        [[17.0, 0.0]], 1.0, fp.SpikeTrains.from_lists([[10.0, 210.0, 260.0]]), [0.0], [0.0], [10.0]
+    )
+    return ScanResult(asked, (), (response,), None)
+
+
 @pytest.fixture(scope="module")
 def results():
     """One result of each type that draws itself, by the name of the type."""
@@ -107,6 +118,8 @@ def results():
             spike_count=np.array([[0, 1], [9, 3], [0, 1]]),
             depth_mm=0.2,
         ),
+        "ScanResult": scanned(),
+        "TactileImage": scanned().image("SAI"),
     }
 
 

@@ -67,7 +67,7 @@ VALUES = [
     fp.FlatPunch(3.0, 0.3), fp.Gap(1.0, 8.0, 0.1, 0.1), fp.Grating(1.0, 1.0, 0.1),
     Dots(((0.0, 0.0), (2.5, 0.0)), 1.4, 0.5),
     Embossed((((-1, -1), (1, -1), (1, 1.0)),), height_mm=0.5, edge_radius_mm=0.1),
-    fp.Union((BALL, fp.Plate()), ((0, 0, 0), (3, 0, 0)), seam_mm=0.0),
+    fp.bodies.Union((BALL, fp.Plate()), ((0, 0, 0), (3, 0, 0)), seam_mm=0.0),
     Surface([[-1.0, 0, -1], [1.0, 0, -1], [0.0, 0, 1]], [[0, 2, 1]], 10.0),
     fp.RampAndHold(1.0, 50.0, 950.0), fp.ForceRampAndHold(100.0, 50.0, 950.0),
     fp.Trajectory((0.0, 10.0, 20.0), depth_mm=(0.0, 1.0, 1.0), x_mm=(0.0, 0.0, 0.5)),

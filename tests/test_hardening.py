@@ -285,7 +285,7 @@ def test_sequences_become_tuples_so_that_values_hash():
         lambda: fp.Population.grid(afferent="x"),
         lambda: TactileStimulus(None),
         lambda: fp.Afferent(dynamic_quantity="x"),
-        lambda: fp.Union([fp.Sphere()], at_mm=None),
+        lambda: fp.bodies.Union([fp.Sphere()], at_mm=None),
         lambda: gradient_sum([1.0, np.nan, 2.0], PAIRS),
         lambda: discriminate_by(GradientSum(PAIRS), [[1, 2, 3], [3, 4, 2]], 0.1, 1, silent_value=np.nan),
         lambda: discriminate_by(GradientSum(np.empty((0, 2), int)), [[1, 2, 3], [3, 4, 2]], 0.1, 1),
@@ -472,8 +472,8 @@ def test_what_is_no_data_set_of_a_sweep_is_refused(use):
 
 def test_an_estimate_counts_the_cycles_that_are_solved():
     motion = {"kind": "sine", "depth_mm": 0.3, "amplitude_mm": 0.02, "frequency_hz": 20, "cycles": 100}
-    many = estimate_press(fp.TouchRequest.read({"object": "sphere", "motion": motion}))
-    ten = estimate_press(fp.TouchRequest.read({"object": "sphere", "motion": motion | {"cycles": 10}}))
+    many = estimate_press(fp.TouchRequest.read({"object": "sphere", "motion": motion}).touch)
+    ten = estimate_press(fp.TouchRequest.read({"object": "sphere", "motion": motion | {"cycles": 10}}).touch)
     assert many.steps == ten.steps
     assert closest("depth", ["time_ms", "depth_mm", "depth_um"]) == "depth_mm"
 

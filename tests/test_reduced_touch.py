@@ -272,7 +272,7 @@ class Leaf(fp.Indenter):
 
 @pytest.mark.parametrize(
     "body",
-    [Leaf(), fp.Plate(), fp.Union([Leaf(), fp.Sphere(radius_mm=1.0)], [(0, 0, 0), (2, -3, 0)])],
+    [Leaf(), fp.Plate(), fp.bodies.Union([Leaf(), fp.Sphere(radius_mm=1.0)], [(0, 0, 0), (2, -3, 0)])],
     ids=["thin", "without an end", "of parts"],
 )
 @pytest.mark.parametrize("tilt_deg", [-40.0, 0.0, 15.0])

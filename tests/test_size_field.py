@@ -157,10 +157,10 @@ def test_what_never_touches_costs_nothing():
     """A spike that lies 2 mm deeper than the press goes, and one beside the finger."""
     spike = fp.Sphere(radius_mm=0.3)
     for at_mm in ((1.0, -2.0, 0.0), (0.0, 0.0, 12.0)):
-        both = fp.Union([BALL, spike], [(0.0, 0.0, 0.0), at_mm])
+        both = fp.bodies.Union([BALL, spike], [(0.0, 0.0, 0.0), at_mm])
         grading = below(both)
         assert grading.finer_along == grading.finer_across == ()
-    near = fp.Union([BALL, spike], [(0.0, 0.0, 0.0), (1.0, 0.2, 0.0)])
+    near = fp.bodies.Union([BALL, spike], [(0.0, 0.0, 0.0), (1.0, 0.2, 0.0)])
     assert below(near).finest_x_mm == pytest.approx(0.3 / 4, rel=0.1)
 
 

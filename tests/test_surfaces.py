@@ -195,7 +195,7 @@ def profile_surface(body, fillet_mm, step_deg, path):
 
 
 GRATING = ridges([-2.5, 0.0, 2.5], [1.5, 1.5, 1.5], fillet_mm=0.2)
-RIDGES = {fp.Bar: ((0.0, 3.0),), fp.Union: ((-2.5, 1.5), (0.0, 1.5), (2.5, 1.5))}
+RIDGES = {fp.Bar: ((0.0, 3.0),), fp.bodies.Union: ((-2.5, 1.5), (0.0, 1.5), (2.5, 1.5))}
 
 
 @pytest.mark.parametrize(
@@ -237,7 +237,7 @@ def test_rounded_edges_are_those_of_the_analytic_bar(radius_mm, kind):
         body = Surface(CUBE * [1.5, 2.0, 10.0], SIDES, edge_radius_mm=radius_mm)
     elif kind == "union":
         halves = fp.Bar(2.5, 0.0), fp.Bar(2.5, 0.0)
-        body = fp.Union(halves, [(-0.25, 0.0, 0.0), (0.25, 0.0, 0.0)], edge_radius_mm=radius_mm)
+        body = fp.bodies.Union(halves, [(-0.25, 0.0, 0.0), (0.25, 0.0, 0.0)], edge_radius_mm=radius_mm)
     else:
         heights = np.where(np.abs(np.arange(-2.0, 2.0005, 0.001)) < 1.5, 0.0, -4.0) * np.ones((2, 1))
         wide = fp.height_surface(heights, 0.001)
@@ -291,7 +291,7 @@ def test_fine_relief_asks_for_a_mesh_that_resolves_it():
 def test_two_balls_are_meshed_for_what_touches_and_not_for_the_seam():
     """They needed 700,000 to 980,000 nodes: between them their gap becomes as narrow as one likes."""
     at = [(-1.0, 0.0, 0.0), (1.0, 0.0, 0.0)]
-    pair = fp.Union([fp.Sphere(radius_mm=2.0), fp.Sphere(radius_mm=2.0)], at)
+    pair = fp.bodies.Union([fp.Sphere(radius_mm=2.0), fp.Sphere(radius_mm=2.0)], at)
     from_file = fp.height_surface(map_of(pair, 4.0, 0.1), 0.1)
     for body in (pair, from_file):
         assert len(fp.touch_of(fp.Fingertip(), body).mesh.nodes_mm) < 30_000
@@ -361,7 +361,7 @@ TOO_ROUND = "edge_radius_mm must not exceed half of the narrowest part"
 
 test_a_surface_that_cannot_be_pressed_is_refused_in_one_sentence = refusals(
     (lambda: Surface(CUBE * [0.3, 1.0, 1.0], SIDES, edge_radius_mm=0.5), TOO_ROUND),
-    (lambda: fp.Union([fp.Bar(0.5, 0.0), fp.Plate()], [(0, 0, 0), (0, -1, 0)], edge_radius_mm=0.3),
+    (lambda: fp.bodies.Union([fp.Bar(0.5, 0.0), fp.Plate()], [(0, 0, 0), (0, -1, 0)], edge_radius_mm=0.3),
      TOO_ROUND),
     (lambda: Surface(*SHUT_AT_2), "must overlap or stand apart by more than 0.01 mm"),
     (lambda: Surface(*NEAR_WALLS), "walls of two are 0.0001 mm apart"),
@@ -455,7 +455,7 @@ def test_shades_of_every_depth_are_shares_of_white_and_signed_numbers_are_number
 
 
 RIDGE_ROW = ridges([-2.0, 0.0, 1.4], [1.0, 0.6, 0.8])
-BALL_IN_A_PLATE = fp.Union(
+BALL_IN_A_PLATE = fp.bodies.Union(
     [fp.Sphere(curvature_per_m=1000.0), fp.Plate()], [(0.2, 0.0, 0.0), (0.0, -0.6, 0.0)], seam_mm=0.4
 )
 

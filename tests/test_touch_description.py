@@ -397,8 +397,8 @@ def test_the_estimate_of_a_mesh_of_ones_own_counts_its_nodes_and_its_elimination
     coarse = fp.Grading(17.37, 2.0, 2.0, 0.8, 0.8, 3.0, stratum_corneum=1, dermis=2, subcutis=2)
     touch = fp.touch_of(fp.Fingertip(), fp.Sphere(), fp.RampAndHold(0.5), grading=coarse)
     path = fp.export_touch(tmp_path, touch, "abaqus")[0]
-    own = estimate_press(read({"object": "sphere", "finger": str(path)}))
-    ours = estimate_press(read({"object": "sphere"}))
+    own = estimate_press(read({"object": "sphere", "finger": str(path)}).touch)
+    ours = estimate_press(read({"object": "sphere"}).touch)
     assert own.nodes == len(touch.mesh.nodes_mm) > OWN_NODES
     assert own.time_s / own.nodes == pytest.approx(ours.time_s / ours.nodes * own.nodes / OWN_NODES)
     assert own.memory_mb > BASE_MB + OWN_NODE_MB * own.nodes**OWN_EXPONENT
@@ -406,12 +406,12 @@ def test_the_estimate_of_a_mesh_of_ones_own_counts_its_nodes_and_its_elimination
 
 def test_the_estimate_grows_with_mesh_steps_force_and_friction():
     ball = {"object": "sphere"}
-    base = estimate_press(read(ball))
+    base = estimate_press(read(ball).touch)
     thrice = {"kind": "repeated", "depth_mm": 1, "touches": 3, "ramp_ms": 50, "hold_ms": 99, "pause_ms": 9}
     changes = (
         {"resolution": "standard"}, {"motion": {"force_mn": 100}}, {"friction": 0.3}, {"motion": thrice},
     )  # fmt: skip
-    more = [estimate_press(read(ball | change)) for change in changes]
+    more = [estimate_press(read(ball | change).touch) for change in changes]
     assert all(other.time_s > 1.5 * base.time_s for other in more)
     assert more[0].memory_mb > base.memory_mb
 

@@ -23,15 +23,14 @@ from fingerpad.core.units import unit_of
 from fingerpad.core.values import JsonSchema
 from fingerpad.experiments import schemas
 from fingerpad.experiments.discrimination.analysis import DiscriminationFile
-from fingerpad.experiments.discrimination.request import DiscriminationRequest
-from fingerpad.experiments.fit.request import ChosenNumbersFile, FitFile, FitRequest
+from fingerpad.experiments.fit.request import ChosenNumbersFile, FitFile
 from fingerpad.experiments.gerling2014.reproduction import ReproductionResult
-from fingerpad.experiments.requests.parts import Made, OneOfKinds, Part, Request
+from fingerpad.experiments.requests.parts import Made, OneOfKinds, Part
 from fingerpad.experiments.requests.stimulus import MEASURED, RAMP_AND_HOLD
-from fingerpad.experiments.requests.touch import ReductionRequest, RespondRequest, TouchFile, TouchRequest
-from fingerpad.experiments.run import ReproductionRequest
-from fingerpad.experiments.sweep.request import SweepRequest
-from fingerpad.experiments.validation.validation import ValidationFile, ValidationRequest
+from fingerpad.experiments.requests.touch import TouchFile
+from fingerpad.experiments.run import REQUESTS
+from fingerpad.experiments.scan import ScanFile
+from fingerpad.experiments.validation.validation import ValidationFile
 
 RESULT_FILES: tuple[type, ...] = (
     ReproductionResult,
@@ -40,20 +39,9 @@ RESULT_FILES: tuple[type, ...] = (
     DiscriminationFile,
     ValidationFile,
     TouchFile,
+    ScanFile,
 )
 """Classes of results that are written to a file of their own."""
-
-REQUESTS: dict[str, type[Request]] = {
-    "touch": TouchRequest,
-    "respond": RespondRequest,
-    "fit": FitRequest,
-    "discriminate": DiscriminationRequest,
-    "validate": ValidationRequest,
-    "sweep": SweepRequest,
-    "reduce": ReductionRequest,
-    "reproduce": ReproductionRequest,
-}
-"""Requests by the names of their commands."""
 
 
 def write_schemas(folder: Path = Path(schemas.__file__).parent) -> None:

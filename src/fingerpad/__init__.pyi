@@ -19,7 +19,6 @@ from fingerpad.experiments.discrimination.request import DiscriminationRequest a
 from fingerpad.experiments.fit.request import FitRequest as FitRequest
 from fingerpad.experiments.receptive_field import receptive_field as receptive_field
 from fingerpad.experiments.requests.touch import ReductionRequest as ReductionRequest
-from fingerpad.experiments.requests.touch import RespondRequest as RespondRequest
 from fingerpad.experiments.requests.touch import TouchRequest as TouchRequest
 from fingerpad.experiments.run import ReproductionRequest as ReproductionRequest
 from fingerpad.experiments.sweep.request import SweepRequest as SweepRequest
@@ -30,6 +29,7 @@ from fingerpad.export.requests import fit as fit
 from fingerpad.export.requests import reduce as reduce
 from fingerpad.export.requests import reproduce as reproduce
 from fingerpad.export.requests import respond as respond
+from fingerpad.export.requests import scan as scan
 from fingerpad.export.requests import touch as touch
 from fingerpad.export.requests import validate as validate
 from fingerpad.export.responses import write_responses_nwb as write_responses_nwb
@@ -49,7 +49,6 @@ from fingerpad.geometry.bodies import Grating as Grating
 from fingerpad.geometry.bodies import Plate as Plate
 from fingerpad.geometry.bodies import Sphere as Sphere
 from fingerpad.geometry.bodies import braille as braille
-from fingerpad.geometry.composed import Union as Union
 from fingerpad.geometry.embossed import embossed_text as embossed_text
 from fingerpad.geometry.fingertip import Fingertip as Fingertip
 from fingerpad.geometry.grading import Grading as Grading

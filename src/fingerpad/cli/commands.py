@@ -82,7 +82,8 @@ def plain(text: str, option: str, schema: Mapping[str, Any]) -> Any:
     """Return the value that a text of the command line means, as YAML has it; 30,50 is a list."""
     from fingerpad.core.plain_yaml import read_yaml
 
-    kinds = {each.get("type") for each in (schema, *schema.get("anyOf", ()), *schema.get("oneOf", ()))}
+    given = [each.get("type") for each in (schema, *schema.get("anyOf", ()), *schema.get("oneOf", ()))]
+    kinds = {kind for each in given for kind in (each if isinstance(each, list) else [each])}
     if schema and not {"number", "integer", "array", "boolean", "object"} & kinds:
         return text
     if "," in text and text[0] not in "[{" and (not schema or "array" in kinds):
@@ -117,7 +118,7 @@ def _read(kind: type[int] | type[float], text: str) -> float:
 
 def _add(name: str, parser: argparse.ArgumentParser) -> None:
     row = TABLE[name]
-    if "request" in row:
+    if "out" in row:
         _add_request(name, row, parser)
     for each in row.get("options", ()):
         kind = OPTION_KINDS[each.get("kind", "path")]
@@ -149,7 +150,9 @@ def _add_request(name: str, row: Mapping[str, str], parser: argparse.ArgumentPar
 
 def _run_request(name: str, given: argparse.Namespace, **more: Any) -> Any:
     """Run a request, with its files in --out."""
-    schema, kind = request_schema(name), getattr(fp, TABLE[name]["request"])
+    from fingerpad.experiments.run import REQUESTS
+
+    schema, kind = request_schema(name), REQUESTS[name]
     keys = {
         key: value if isinstance(value, bool) else plain(value, key, schema["properties"].get(key, {}))
         for key, value in ((at.removeprefix(KEY), value) for at, value in vars(given).items() if KEY in at)
@@ -268,18 +271,21 @@ def _check(given: argparse.Namespace) -> None:
     from fingerpad.core.files import read_text
     from fingerpad.core.plain_yaml import read_yaml
     from fingerpad.experiments.requests.touch import estimate_press
+    from fingerpad.experiments.run import REQUESTS
     from fingerpad.experiments.sweep.settings import estimate_sweep
     from fingerpad.export.requests import check_outputs
 
     content = read_yaml(read_text(given.file), str(given.file)) or {}
     keys = {"grid": "sweep", "zip": "sweep", "sample": "sweep", "range": "reduce", "standard": "discriminate",
-            "recordings": "fit", "observations": "validate"}  # fmt: skip
+            "recordings": "fit", "observations": "validate", "x_mm": "scan", "z_mm": "scan"}  # fmt: skip
     name = next((kind for key, kind in keys.items() if key in content), "touch")
-    request = getattr(fp, TABLE[name]["request"]).read(given.file, allow_python=given.allow_python)
+    request: Any = REQUESTS[name].read(given.file, allow_python=given.allow_python)
     request.check()
     if name == "touch":
         check_outputs(request)
-        _tell(*estimate_press(request).lines)
+        _tell(*estimate_press(request.touch).lines)
+    elif name == "scan":
+        _tell(f"Lines: {request.lines}. The first:", *estimate_press(request.touches[0]).lines)
     elif name == "sweep":
         _tell(*estimate_sweep(request, processes(None)).lines)
     else:

@@ -14,6 +14,8 @@ from fingerpad.experiments.gerling2014.reproduction import HUMAN, PAPER, Reprodu
 from fingerpad.experiments.requests.parts import Request
 from fingerpad.experiments.requests.touch import ReductionRequest, RespondRequest, TouchRequest
 from fingerpad.experiments.runner import Runner
+from fingerpad.experiments.scan import ScanRequest
+from fingerpad.experiments.sweep.request import SweepRequest
 from fingerpad.experiments.validation.validation import ValidationRequest, validate
 from fingerpad.geometry.grading import RESOLUTIONS
 from fingerpad.mechanics.tissues import TISSUES
@@ -45,12 +47,25 @@ class ReproductionRequest(Request):
         return reproduce(columns, self.goes_beyond, runner)
 
 
+REQUESTS: Mapping[str, type[Request]] = {
+    "touch": TouchRequest,
+    "respond": RespondRequest,
+    "scan": ScanRequest,
+    "fit": FitRequest,
+    "discriminate": DiscriminationRequest,
+    "validate": ValidationRequest,
+    "sweep": SweepRequest,
+    "reduce": ReductionRequest,
+    "reproduce": ReproductionRequest,
+}  # Requests by the names of their functions and commands.
+
 RUNS: Mapping[type[Request], Callable[[Any, Runner], Any]] = {
     TouchRequest: TouchRequest.run,
     RespondRequest: RespondRequest.run,
     FitRequest: run_fit,
     DiscriminationRequest: discriminate,
     ValidationRequest: validate,
+    ScanRequest: ScanRequest.run,
     ReductionRequest: ReductionRequest.run,
     ReproductionRequest: ReproductionRequest.run,
 }  # What runs a request, by its class.

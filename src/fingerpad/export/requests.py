@@ -28,6 +28,7 @@ from fingerpad.experiments.requests.parts import Request, at
 from fingerpad.experiments.requests.touch import ReductionRequest, RespondRequest, TouchRequest, TouchResult
 from fingerpad.experiments.run import ReproductionRequest, run
 from fingerpad.experiments.runner import Runner
+from fingerpad.experiments.scan import ScanRequest, ScanResult
 from fingerpad.experiments.validation.validation import ValidationFile, ValidationRequest
 from fingerpad.export.decks import DECKS, RESULTS, write_deck
 from fingerpad.export.job import job_of
@@ -191,6 +192,37 @@ def respond(found: ResponseMap, folder: Path) -> None:
     'count'
     """
     found.save(folder / "spikes.csv")
+
+
+@runs(ScanRequest)
+def scan(found: ScanResult, folder: Path) -> None:
+    """Move an object over the finger at a constant force, in one line or many, and let afferents respond.
+
+    Parameters
+    ----------
+    request : str, Path, mapping or ScanRequest, optional
+        A YAML file with the keys of `ScanRequest` (docs/scan.md), or its content.
+    out : str or Path, optional
+        Folder for the page `scan.html`, the spikes by their place on the object in `events.csv`, the numbers
+        in `scan.json` and the stored lines; without it nothing is written or stored.
+    jobs, progress, command, allow_python, given
+        As of `touch`.
+
+    Returns
+    -------
+    ScanResult
+        Skin and responses of each line; `image("SAI")` is the tactile image of a type.
+
+    Examples
+    --------
+    >>> import fingerpad as fp
+    >>> found = fp.scan(object="sphere:radius_mm=3", x_mm=0.5, force_mn=60, afferents="RA")
+    >>> found.image("RA").pixel_mm, list(found.summary.types)
+    (0.25, ['RA'])
+    """
+    write_page("scan", found, folder)
+    found.save(folder / "events.csv")
+    schemas.write(folder / "scan.json", found.result)
 
 
 @runs(FitRequest)

@@ -12,7 +12,7 @@ from fingerpad.core.errors import ConvergenceError, InputError
 from fingerpad.core.values import FloatArray
 from fingerpad.geometry.mesh import Mesh
 from fingerpad.geometry.mesh_checks import element_place, squeezed_most
-from fingerpad.geometry.motion import Motion
+from fingerpad.geometry.motion import STILL, Motion
 from fingerpad.mechanics.balance import (
     Entry,
     TissueEnergies,
@@ -181,7 +181,9 @@ class Press:
 
     def check_depth(self, time_ms: float, depth_mm: float) -> None:
         """Refuse a force as soon as it has pushed the indenter too deep."""
-        if depth_mm > self.deepest_mm and self.stimulus.by_force and self.stimulus.stays:
+        # It is that at the place of first touch; aside the finger may be thicker.
+        is_there = self.stimulus.pose_at(time_ms) == STILL
+        if depth_mm > self.deepest_mm and self.stimulus.by_force and is_there:
             raise InputError(
                 "force_mn",
                 f"must not push the indenter deeper than {self.deepest_mm:.2f} mm",

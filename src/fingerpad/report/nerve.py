@@ -18,6 +18,7 @@ from fingerpad.data import paper, protocol
 from fingerpad.experiments.fit.results import CredibleInterval, FitResult, ParameterProfile, UncertaintyResult
 from fingerpad.experiments.gerling2014.nerve import PopulationMaps, SingleUnitResult
 from fingerpad.experiments.receptive_field import ReceptiveField
+from fingerpad.experiments.scan import ScanResult, TactileImage
 from fingerpad.inference.spike_likelihood import SpikeFit
 from fingerpad.report.page import DRAW, DRAWINGS, ROWS, Rows, enter
 from fingerpad.report.style import (
@@ -129,6 +130,61 @@ def draw_map(axes: Axes, response: ResponseMap, quantity: str | None = None) -> 
     drawn = axes.scatter(x, z, c=getattr(response, quantity), **dots)
     axes.figure.colorbar(drawn, ax=axes, label=f"{phase}: {label}")
     axes.set(**MAP_AXES)
+
+
+ON_OBJECT: Any = {"xlabel": "along the object [mm]", "ylabel": "across [mm]", "aspect": "equal"}
+
+
+@enter(DRAWINGS, ("ScanResult", "events"))
+def draw_events(axes: Axes, found: ScanResult, name: str | None = None) -> None:
+    """Draw the spikes of a type of afferents where they lay on the object: the spatial event plot."""
+    name = one_of("name", name or next(iter(found.of_type)), tuple(found.of_type))
+    places = np.concatenate([event[-1] for event in found.events(name)])
+    if not len(places):
+        say_nothing_to_draw(axes, f"no {name} afferent fires")
+        return
+    axes.plot(*places.T, ".", color=BLACK, markersize=1.5, markeredgewidth=0.0)
+    axes.set(title=f"{name}, {len(places)} spikes", **ON_OBJECT)
+
+
+@enter(DRAWINGS, ("TactileImage", "image"))
+def draw_image(axes: Axes, image: TactileImage, largest_hz: float | None = None) -> None:
+    """Draw the firing rate of a type of afferents by where they lie on the object."""
+    rates_hz = np.ma.masked_invalid(image.rate_hz.T)
+    drawn = axes.pcolormesh(
+        image.along_mm,
+        image.across_mm,
+        rates_hz,
+        cmap="viridis",
+        shading="nearest",
+        vmin=0.0,
+        vmax=largest_hz,
+    )
+    axes.figure.colorbar(drawn, ax=axes, label="rate [spikes/s]", shrink=0.6)
+    axes.set(title=image.type, **ON_OBJECT)
+
+
+@enter(DRAW, "scan_events")
+def figure_of_events(found: ScanResult) -> Figure:
+    figure = new_figure(len(found.of_type) * 0.5 * COLUMN_IN, 5.5)
+    panels = figure.subplots(2, len(found.of_type), squeeze=False, sharex=True, sharey=True)
+    for name, (events, image) in zip(found.of_type, panels.T, strict=True):
+        draw_events(events, found, name)
+        draw_image(image, found.image(name))
+    return figure
+
+
+@enter(DRAW, "scan_course")
+def figure_of_course(found: ScanResult) -> Figure:
+    figure = new_figure(COLUMN_IN, 4.0)
+    force, depth = figure.subplots(2, 1, sharex=True)
+    for number, skin in enumerate(found.skins):
+        shade = {"color": BLACK, "alpha": 1.0 if number == 0 else 0.3, "linewidth": 1.0}
+        force.plot(skin.times_ms, skin.force_mn, **shade)
+        depth.plot(skin.times_ms, skin.depth_mm, **shade)
+    force.set(ylabel="force [mN]", ylim=(0.0, None))
+    depth.set(ylabel="depth [mm]", xlabel="time [ms]")
+    return figure
 
 
 @enter(DRAWINGS, ("ReceptiveField", "field"))

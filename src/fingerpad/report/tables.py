@@ -156,6 +156,7 @@ FORMS: dict[str, Callable[[Any], str]] = {
     # The record of what was used: nothing is rounded or left out.
     "exact": partial(plain, digits=12, longest=1000),
     "words": in_words,
+    "span": span,
 }
 """Forms of values in texts of `pages.toml`, beside a number of decimals."""
 

@@ -239,22 +239,35 @@ class FingerRequest(Request, FingerDescription):
         return []
 
 
-class StimulusDescription(Part):
-    """What is pressed in, and how."""
+class PlacedObject(Part):
+    """What is pressed in, where and in which direction."""
 
     object: ObjectPart  #: What is pressed in: `kind` and its sizes, or a text such as "sphere:radius_mm=3.5".
-    motion: MotionPart = Field(default={}, validate_default=True)
-    """How: `kind` and its numbers; a ramp and hold by default."""
     place: PlaceSettings = PlaceSettings()  #: Where, and in which direction.
     friction: NotNegative = 0.0  #: Coulomb's coefficient between skin and object.
+
+    def body(self, beside: Path = Path()) -> Indenter:
+        """Make the object."""
+        with at("object"):
+            return object_of(self.object, beside)
+
+    def files(self, beside: Path = Path()) -> list[Path]:
+        """Files that the object names."""
+        return named_files(self.object, beside)
+
+
+class StimulusDescription(PlacedObject):
+    """What is pressed in, and how."""
+
+    motion: MotionPart = Field(default={}, validate_default=True)
+    """How: `kind` and its numbers; a ramp and hold by default."""
 
     def stimulus(self, beside: Path = Path(), made: MadeObjects | None = None) -> TactileStimulus:
         """Make what is described."""
         known = [] if made is None else made
         indenter = next((body for part, body in known if part == self.object), None)
         if indenter is None:
-            with at("object"):
-                indenter = object_of(self.object, beside)
+            indenter = self.body(beside)
             known.append((self.object, indenter))
         with at("motion"):
             motion = made_of(self.motion, beside)
@@ -262,7 +275,7 @@ class StimulusDescription(Part):
 
     def files(self, beside: Path = Path()) -> list[Path]:
         """Files that object and motion name."""
-        return [*named_files(self.object, beside), *named_files(self.motion, beside)]
+        return [*super().files(beside), *named_files(self.motion, beside)]
 
 
 @value_class

@@ -356,9 +356,8 @@ def _interpolated_steps(touch: Touch) -> int:
     return int(inside * (cycles.count - MOST_SOLVED) / cycles.count)
 
 
-def estimate_press(request: TouchRequest) -> PressEstimate:
+def estimate_press(touch: Touch) -> PressEstimate:
     """Estimate a press from the sizes of its mesh and its steps; the mesh is built for it."""
-    touch = request.touch
     nodes = len(touch.mesh.nodes_mm)
     steps = touch.steps_ms().size - 1 - _interpolated_steps(touch)
     factor = BY_FORCE if touch.stimulus.by_force else 1.0

@@ -211,7 +211,7 @@ def estimate_sweep(sweep: SweepRequest, processes: int) -> SweepEstimate:
     for press in chosen:
         described = sweep.described(next(filter(sweep.allowed, sweep.settings_of(press))))
         try:
-            found.append(estimate_press(described))
+            found.append(estimate_press(described.touch))
         except InputError:
             continue  # it fails at once, and its reason is in the result
         mesh = described.touch.mesh
