@@ -6,6 +6,7 @@ import argparse
 import logging
 import os
 import shlex
+import socket
 import sys
 import time
 import tomllib
@@ -15,7 +16,7 @@ from datetime import UTC, datetime
 from functools import partial
 from importlib.resources import files
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TextIO
 
 import fingerpad as fp
 from fingerpad.core.errors import InputError, StoreError
@@ -33,6 +34,7 @@ INCOMPLETE = 3  # Exit status of a validation of which some rows have no predict
 MOST_FAILED = 99  # Largest exit status for settings of a sweep that failed: larger ones have other meanings.
 SECONDS_PER_DAY = 86_400.0
 ENDING = "The same command continues after the last finished indentation."
+LOOPBACK = "127.0.0.1"
 KEY = "key:"  # Begin of what argparse calls the value of a key of the request.
 
 TABLE: dict[str, Any] = tomllib.loads((files(__package__) / "commands.toml").read_text(encoding="utf-8"))
@@ -316,6 +318,32 @@ def _lab(given: argparse.Namespace) -> None:
     _tell(f"Open: {written} ({written.stat().st_size / 1e6:.1f} MB)")
 
 
+def _stream(given: argparse.Namespace) -> None:
+    from fingerpad.experiments.requests.touch import ReductionRequest
+    from fingerpad.experiments.stream import SpikeStream, answered
+
+    request = ReductionRequest.read(given.file, allow_python=given.allow_python)
+    model = fp.read_reduced(given.model, request.training.touch)
+    stream = SpikeStream(model, request.population).warmed()
+    if given.port is None:
+        _exchange(answered(stream, sys.stdin), sys.stdout)
+        return
+    with socket.create_server((LOOPBACK, given.port)) as server:
+        _tell(f"Samples: {LOOPBACK}:{server.getsockname()[1]}")
+        sys.stdout.flush()
+        connection, _ = server.accept()
+        with connection, connection.makefile("rw", encoding="utf-8") as both:
+            connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+            _exchange(answered(stream, iter(both.readline, "")), both)
+
+
+def _exchange(answers: Iterator[str], out: TextIO) -> None:
+    """Write each answer at once."""
+    for answer in answers:
+        out.write(answer)
+        out.flush()
+
+
 def _store(given: argparse.Namespace) -> int:
     from fingerpad.core.values import not_negative, one_of
     from fingerpad.experiments.runner import STORE_FOLDER
@@ -364,6 +392,7 @@ RUNS = {
     "view": _view,
     "lab": _lab,
     "store": _store,
+    "stream": _stream,
 }  # What runs; for any other command `_ask`.
 COMMANDS: dict[str, Command] = {
     name: (row["what"], partial(_add, name), RUNS.get(name, partial(_ask, name)))

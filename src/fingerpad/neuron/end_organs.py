@@ -146,12 +146,12 @@ class EndOrgans:
 
     def combined(self, traces: Traces) -> Traces:
         """Traces of the afferents from those of `sites_mm`."""
+        return traces.with_values(self.of_afferents)
+
+    def of_afferents(self, values: FloatArray) -> FloatArray:
+        """Values of the afferents (n_times, n_afferents) from those at `sites_mm` (n_times, n_sites)."""
         weights = np.asarray(self.weights)
         if self.combine == "largest":
             weights = weights / weights.max(axis=1, keepdims=True)
         together = np.sum if self.combine == "sum" else np.max
-
-        def of_afferents(values: FloatArray) -> FloatArray:
-            return together(values.reshape(len(values), *self.positions_mm.shape[:2]) * weights, axis=2)
-
-        return traces.with_values(of_afferents)
+        return together(values.reshape(len(values), *self.positions_mm.shape[:2]) * weights, axis=2)
