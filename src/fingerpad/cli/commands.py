@@ -332,9 +332,10 @@ def _stream(given: argparse.Namespace) -> None:
         _tell(f"Samples: {LOOPBACK}:{server.getsockname()[1]}")
         sys.stdout.flush()
         connection, _ = server.accept()
-        with connection, connection.makefile("rw", encoding="utf-8") as both:
-            connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-            _exchange(answered(stream, iter(both.readline, "")), both)
+        connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        # One file for both ways would forget what it has read ahead when it writes.
+        with connection, connection.makefile() as samples, connection.makefile("w") as spikes:
+            _exchange(answered(stream, samples), spikes)
 
 
 def _exchange(answers: Iterator[str], out: TextIO) -> None:
