@@ -10,7 +10,7 @@ import pytest
 import fingerpad as fp
 from fingerpad.core.errors import InputError
 from fingerpad.experiments.requests.touch import ReductionRequest
-from fingerpad.experiments.stream import SpikeStream, answered
+from fingerpad.experiments.stream import answered
 
 RANGE = """
 object: {kind: sphere, radius_mm: 4}
@@ -37,7 +37,7 @@ def population(folder):
 
 @pytest.fixture
 def stream(folder, population):
-    return SpikeStream(fp.read_reduced(folder / "reduced.npz"), population)
+    return fp.SpikeStream(fp.read_reduced(folder / "reduced.npz"), population)
 
 
 @pytest.mark.slow

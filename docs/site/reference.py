@@ -46,7 +46,6 @@ FURTHER = {
     "experiments.requests.stimuli": ("read_stimuli",),
     "experiments.requests.stimulus": ("ramp_and_hold",),
     "experiments.scan": ("ScanRequest", "ScanResult", "TactileImage"),
-    "experiments.stream": ("SpikeStream",),
     "experiments.validation.observations": ("read_observations",),
     "export.sweep_results": ("observe_sweep", "setting_response", "write_sweep_spikes"),
     "geometry.bodies": tuple(fingerpad.bodies.__all__),

@@ -21,6 +21,7 @@ from fingerpad.experiments.receptive_field import receptive_field as receptive_f
 from fingerpad.experiments.requests.touch import ReductionRequest as ReductionRequest
 from fingerpad.experiments.requests.touch import TouchRequest as TouchRequest
 from fingerpad.experiments.run import ReproductionRequest as ReproductionRequest
+from fingerpad.experiments.stream import SpikeStream as SpikeStream
 from fingerpad.experiments.sweep.request import SweepRequest as SweepRequest
 from fingerpad.experiments.validation.validation import ValidationRequest as ValidationRequest
 from fingerpad.export.decks import export_touch as export_touch

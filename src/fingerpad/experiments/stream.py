@@ -38,7 +38,7 @@ class SpikeStream:
     --------
     >>> import fingerpad as fp
     >>> model = fp.reduce(object=fp.Sphere(radius_mm=4), range={"depth_mm": 0.4}, calibration=0)
-    >>> stream = SpikeStream(model, fp.Population.grid(afferent=fp.RA()))
+    >>> stream = fp.SpikeStream(model, fp.Population.grid(afferent=fp.RA()))
     >>> fired = [stream.step(float(time), 0.01 * time)["RA"] for time in range(1, 31)]
     >>> sum(trains.times_ms.size for trains in fired) > 1
     True
