@@ -73,7 +73,7 @@ def test_one_set_of_tissues_is_the_default_everywhere():
         if "tissues" in request_schema(name)["properties"]
     }
     assert defaults.pop("reproduce") == "paper"  # the first column; the default tissues are the second
-    assert set(defaults) == {"touch", "fit", "discriminate", "validate", "reduce"}
+    assert set(defaults) == {"touch", "scan", "fit", "discriminate", "validate", "reduce"}
     functions = [inspect.signature(function).parameters["tissues"] for function in (fp.indent, fp.touch_of)]
     found = {*defaults.values(), *(each.default for each in functions), Conditions().tissues}
     assert found | {FingerDescription().tissues} == {DEFAULT_TISSUES}
