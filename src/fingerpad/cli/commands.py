@@ -339,10 +339,14 @@ def _stream(given: argparse.Namespace) -> None:
 
 
 def _exchange(answers: Iterator[str], out: TextIO) -> None:
-    """Write each answer at once."""
-    for answer in answers:
-        out.write(answer)
-        out.flush()
+    """Write each answer at once, with one thread for libraries."""
+    from threadpoolctl import threadpool_limits
+
+    # The search for libraries behind it takes as long as a step: it must not run for every sample.
+    with threadpool_limits(limits=1):
+        for answer in answers:
+            out.write(answer)
+            out.flush()
 
 
 def _store(given: argparse.Namespace) -> int:

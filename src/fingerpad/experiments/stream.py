@@ -6,7 +6,6 @@ import copy
 from collections.abc import Iterable, Iterator
 
 import numpy as np
-from threadpoolctl import threadpool_limits
 
 from fingerpad.core.checked import checked_class
 from fingerpad.core.errors import InputError
@@ -116,8 +115,7 @@ def answered(stream: SpikeStream, lines: Iterable[str]) -> Iterator[str]:
             if start_ms is None:
                 start_ms = given["time_ms"]
                 continue
-            with threadpool_limits(limits=1):
-                fired = stream.step(**given | {"time_ms": given["time_ms"] - start_ms})
+            fired = stream.step(**given | {"time_ms": given["time_ms"] - start_ms})
         except InputError as error:
             raise InputError(f"line {number}: {error}") from error
         yield "".join(
