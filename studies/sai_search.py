@@ -29,7 +29,6 @@ from fingerpad.neuron.afferent import Afferent
 from fingerpad.neuron.population import Population
 from fingerpad.neuron.spikes import modulation_index
 from fingerpad.report.tables import number
-from fingerpad.skin.indentation import touch_of
 from fingerpad.skin.sampling import SkinResponse
 from studies.pages import table
 
@@ -128,14 +127,7 @@ def touches(conditions: Conditions) -> dict[Any, Any]:
         Bar(), RECEPTOR_X_MM, wide_bar_grading(conditions), tilt_deg=conditions.skin_tilt_deg
     )
     probes = {
-        depth_mm: touch_of(
-            conditions.finger,
-            PROBE,
-            probing(depth_mm),
-            conditions.tissues,
-            conditions.resolution,
-            tilt_deg=conditions.skin_tilt_deg,
-        )
+        depth_mm: conditions.probe_touch(PROBE, probing(depth_mm))
         for depth_mm in published.FIELD_DEPTHS.value
     }
     return {"bar": bar, **probes}

@@ -151,21 +151,36 @@ def test_sites_that_are_not_simulated_would_be_silent():
     peaks = np.concatenate([near, 2.0 - near / near[-1], np.linspace(0.0, 0.2, 40)])
     sed = Traces(times, course * np.maximum(peaks, 0.0), kinks_ms=[50.0])
     slow = Traces(20.0 * times, sed.values, kinks_ms=[1000.0])
-    for each, traces in product((afferent, replace(afferent, adapting_share=0.4)), (sed, slow)):
+    others = replace(afferent, adapting_share=0.4), replace(afferent, saturation_per_ma=1e5)
+    for each, traces in product((afferent, *others), (sed, slow)):
         found, all_simulated = each.spikes(traces), each.spikes(drive(traces))
         assert_array_equal(found.times_ms, all_simulated.times_ms)
         assert_array_equal(found.offsets, all_simulated.offsets)
         assert 0 < np.count_nonzero(np.diff(found.offsets)) < peaks.size
 
 
-def test_a_threshold_holds_for_what_lasts_once_the_afferent_has_adapted():
-    afferent = Afferent().with_static_threshold(2.0)
+@pytest.mark.parametrize("saturation_per_ma", [0.0, 4e5])
+def test_a_threshold_holds_for_what_lasts_once_the_afferent_has_adapted(saturation_per_ma):
+    afferent = Afferent(saturation_per_ma=saturation_per_ma).with_static_threshold(2.0)
     assert afferent.static_threshold == pytest.approx(2.0, rel=1e-12)
     course = np.outer([0.0, 1.0, 1.0], 2.0 * np.array([0.99, 1.01]))
     stress = Traces([0.0, 1.0, 20_000.0], course, kinks_ms=[1.0], quantity="von_mises")
     stress = replace(stress, dynamic=Traces(stress.times_ms, 0.0 * course, quantity="stored"))
     late = [train[train > 5000.0].size for train in afferent.spikes(stress)]
     assert late[0] == 0 < late[1]
+
+
+def test_the_sum_of_both_terms_saturates_and_the_intercept_does_not():
+    afferent = replace(Afferent.for_tissues("trial3"), intercept_ma=0.0)
+    sed = ramp_and_hold(0.0, 1.0, 1e3, 1e9)
+    both_ma = afferent.current(sed).values
+    least = replace(afferent, saturation_per_ma=2.0 / both_ma[-1, 1], intercept_ma=1.0).current(sed).values
+    assert_allclose(least, 1.0 + both_ma / (1.0 + 2.0 * both_ma / both_ma[-1, 1]), rtol=1e-12)
+    assert least[-1, 3] - 1.0 == pytest.approx(0.5 * both_ma[-1, 1], rel=1e-6)
+    # Whoever saturates below the threshold never fires.
+    silent = replace(afferent, saturation_per_ma=2.0 / afferent.rheobase_ma)
+    assert silent.static_threshold == np.inf
+    assert silent.spikes(sed).times_ms.size == 0
 
 
 def test_a_held_static_term_loses_its_share_as_an_exponential():

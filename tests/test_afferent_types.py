@@ -232,6 +232,15 @@ def test_ra_and_pc_respond_to_ramps_only():
     assert replace(fp.RA(), retraction=0.0).spikes(released)[0].size == 0
 
 
+def test_saturation_keeps_the_threshold_and_bounds_the_rate():
+    """i (1 + s) / (1 + s i) is 1 at the threshold, and 1 + 1/s where the skin moves by any more."""
+    kept, saturating = fp.RA(saturation=0.0), fp.RA(saturation=0.5)
+    passed = kept.threshold * np.array([0.0, 1.0, 2.0, 1e9])
+    np.testing.assert_allclose(kept.rectified(passed), [0.0, 1.0, 2.0, 1e9], rtol=1e-12)
+    np.testing.assert_allclose(saturating.rectified(passed), [0.0, 1.0, 1.5, 3.0], rtol=1e-8)
+    assert saturating.rectified(-passed)[3] == pytest.approx(3.0, rel=1e-8)
+
+
 def test_saii_fires_regularly_while_the_skin_is_stretched():
     (spikes,) = fp.SAII().spikes(press("skin_stretch", 0.06))
     intervals = np.diff(spikes[spikes > 600.0])

@@ -34,6 +34,7 @@ UNITS = {
     "_mm_s": "mm/s",
     "_per_kpa_ms": "1/(kPa ms)",
     "_per_kpa": "1/kPa",
+    "_per_ma": "1/mA",
     "_per_ms": "1/ms",
     "_per_mm": "1/mm",
     "_per_m": "1/m",

@@ -38,7 +38,7 @@ from fingerpad.inference.recordings import RateRecordings
 from fingerpad.neuron.afferent import PARAMETER_NAMES, Afferent, adapted_drive
 from fingerpad.neuron.exact_spikes import exact_trains
 from fingerpad.neuron.spikes import Windows, check_windows, common_rate_windows_ms, window_rates_hz
-from fingerpad.neuron.transduction import PIECES_PER_INTERVAL, Drive, drive
+from fingerpad.neuron.transduction import PIECES_PER_INTERVAL, Drive, drive, saturated
 
 Rates = tuple[FloatArray, FloatArray]  # Dynamic and static rates, one column per stimulus. [spikes/s]
 ROWS_PER_BLOCK = 4  # Rows of parameters that a thread evaluates at a time.
@@ -90,6 +90,7 @@ class AfferentModel:
     refractory_ms: NotNegative = neuron.REFRACTORY.value  #: Refractory period, which is not fitted. [ms]
     initial_mv: Finite | None = None
     """Potential at the start, as of `Afferent`: that at rest by default. [mV]"""
+    saturation_per_ma: NotNegative = 0.0  #: As of `Afferent`. [1/mA]
 
     def __post_init__(self) -> None:
         if self.windows_ms is not None:
@@ -108,7 +109,7 @@ class AfferentModel:
         refractory_ms: Finite = neuron.REFRACTORY.value,
         initial_mv: Finite | None = None,
         pieces: Count = PIECES_PER_INTERVAL,
-        adapting: Afferent | None = None,
+        like: Afferent | None = None,
     ) -> AfferentModel:
         """Make the model for what drives the afferent, stimuli grouped by their times.
 
@@ -120,8 +121,8 @@ class AfferentModel:
             As of the class.
         pieces : int, optional
             As of `drive`.
-        adapting : Afferent, optional
-            Its static term adapts; by default none does, as in the paper.
+        like : Afferent, optional
+            The model adapts and saturates as it does; by default it does neither, as in the paper.
         """
         parts = [traces] if isinstance(traces, Traces) else list(traces)
         quantities = sorted({f"{part.dynamic_quantity} and {part.static_quantity}" for part in parts})
@@ -137,9 +138,10 @@ class AfferentModel:
         drives, columns = [], []
         for group in groups.values():
             driven = drive(Traces.joined([trace for _, trace in group]), pieces=pieces)
-            drives.append(driven if adapting is None else adapted_drive(adapting, driven))
+            drives.append(driven if like is None else adapted_drive(like, driven))
             columns.append(np.concatenate([start + np.arange(trace.n_sites) for start, trace in group]))
-        return cls(tuple(drives), tuple(columns), windows_ms, refractory_ms, initial_mv)
+        saturation = 0.0 if like is None else like.saturation_per_ma
+        return cls(tuple(drives), tuple(columns), windows_ms, refractory_ms, initial_mv, saturation)
 
     @cached_property
     def used_windows_ms(self) -> Windows:
@@ -167,10 +169,12 @@ class AfferentModel:
         membrane = tau, capacitance, threshold, self.refractory_ms, initial
         rates = np.empty((2, self.n_stimuli))
         for driven, columns in zip(self.drives, self.stimuli, strict=True):
-            # I = beta + k_d U' + k_s U, in the order of Transduction.current.
+            # I = beta + G, in the order of Transduction.current.
             current = dynamic_gain * driven.rate_per_ms
-            current += intercept
             current += static_gain * driven.values
+            if self.saturation_per_ma:
+                current = saturated(current, self.saturation_per_ma)
+            current += intercept
             trains = exact_trains(driven.times_ms, current, membrane)
             rates[:, columns] = [window_rates_hz(*trains, *window) for window in self.used_windows_ms]
         return rates[0], rates[1]
@@ -237,14 +241,18 @@ def closed_form_rates(stimuli: AfferentModel, four: FloatArray) -> tuple[Rates, 
     and their derivatives are cheap.
     """
     intercept, dynamic_gain, static_gain, tau = four
+    saturation = stimuli.saturation_per_ma * neuron.CAPACITANCE.value * neuron.THRESHOLD.value
     rates, slopes = np.empty((2, stimuli.n_stimuli)), np.empty((2, stimuli.n_stimuli, 4))
     for phase, window_ms in enumerate(stimuli.used_windows_ms):
         for driven, columns in zip(stimuli.drives, stimuli.stimuli, strict=True):
             speed, value = _samples(driven, window_ms)
-            g = intercept + dynamic_gain * speed + static_gain * value
+            both = dynamic_gain * speed + static_gain * value
+            passed = 1.0 / (1.0 + saturation * np.abs(both))
+            g = intercept + both * passed
             rate, per_drive, per_tau = constant_drive_rate(g, float(tau), stimuli.refractory_ms, BEND)
             rates[phase, columns] = rate.mean(axis=0)
-            for number, slope in enumerate((per_drive, per_drive * speed, per_drive * value, per_tau)):
+            per_both = per_drive * passed**2
+            for number, slope in enumerate((per_drive, per_both * speed, per_both * value, per_tau)):
                 slopes[phase, columns, number] = slope.mean(axis=0)
     return (rates[0], rates[1]), (slopes[0], slopes[1])
 

@@ -19,7 +19,7 @@ from fingerpad.data import neuron
 from fingerpad.neuron.band_pass import continued_stage, resampled, smoothed_rate
 from fingerpad.neuron.lif import LeakyIntegrateAndFire
 from fingerpad.neuron.spikes import Window, firing_rate_hz, rate_windows_ms
-from fingerpad.neuron.transduction import Drive, Transduction, drive
+from fingerpad.neuron.transduction import Drive, Transduction, drive, saturated
 
 PARAMETER_NAMES = (
     "intercept_ma",
@@ -65,6 +65,7 @@ EXTENSIONS: dict[str, Any] = {
     "static_quantity": STORED_ENERGY,
     "adapting_share": 0.0,
     "adapting_ms": neuron.HUMAN_ADAPTING_TIME.value,
+    "saturation_per_ma": 0.0,
     "end_organs": 1,
     "reach_mm": 0.0,
     "noise_offset_hz": 0.0,
@@ -153,6 +154,9 @@ class Afferent:
     """Share a of the static term P that is lost while it lasts, as the generator current of Merkel cells
     adapts: k_s (P - a R) with tau_a dR/dt + R = P. The paper's does not adapt. [1]"""
     adapting_ms: Positive = neuron.HUMAN_ADAPTING_TIME.value  #: Time constant of that loss, tau_a. [ms]
+    saturation_per_ma: NotNegative = neuron.HUMAN_SATURATION.value
+    """Saturation s of the sum G of both terms, I = beta + G / (1 + s |G|), as recorded SAI afferents saturate
+    (Ge & Khalsa 2002, J Neurophysiol 87:1686). The paper's has none, 0. [1/mA]"""
     end_organs: Count = int(neuron.HUMAN_END_ORGANS.value)
     reach_mm: NotNegative = neuron.HUMAN_REACH.value
     """End organs of each afferent of a population, and the radius of the disc that they fill, as of
@@ -229,7 +233,7 @@ class Afferent:
     @property
     def transduction(self) -> Transduction:
         """The first stage, Eqs. 1-2."""
-        return Transduction(self.intercept_ma, self.dynamic_gain, self.static_gain)
+        return Transduction(self.intercept_ma, self.dynamic_gain, self.static_gain, self.saturation_per_ma)
 
     @property
     def membrane(self) -> LeakyIntegrateAndFire:
@@ -240,14 +244,19 @@ class Afferent:
 
     @property
     def static_threshold(self) -> float:
-        """Constant quantity above which the afferent fires, (C v / tau - beta) / (k_s (1 - a)). [its unit]
+        """Constant quantity above which the afferent fires, G / (k_s (1 - a)). [its unit]
+
+        Without saturation the sum of both terms at the threshold is G = C v / tau - beta. It is infinite if
+        saturation lets no current reach the threshold.
 
         Examples
         --------
         >>> round(Afferent().static_threshold, 2), round(Afferent.for_tissues("trial3").static_threshold, 3)
         (0.16, 0.038)
         """
-        return (self.rheobase_ma - self.intercept_ma) / self._lasting_gain
+        needed_ma = self.rheobase_ma - self.intercept_ma
+        passed = 1.0 - self.saturation_per_ma * abs(needed_ma)
+        return needed_ma / (passed * self._lasting_gain) if passed > 0.0 else np.inf
 
     @property
     def _lasting_gain(self) -> float:
@@ -267,8 +276,8 @@ class Afferent:
         >>> round(Afferent().with_static_threshold(5.0).static_threshold, 9)
         5.0
         """
-        raised = quantity - self.static_threshold
-        return replace(self, intercept_ma=self.intercept_ma - self._lasting_gain * raised)
+        passed_ma = float(saturated(np.array(self._lasting_gain * quantity), self.saturation_per_ma))
+        return replace(self, intercept_ma=self.rheobase_ma - passed_ma)
 
     def spikes(self, traces: Traces | Drive) -> SpikeTrains:
         """Simulate the spikes of this afferent, a train per site.
@@ -320,7 +329,8 @@ class Afferent:
         static = (self.static_gain * traces.values).max(axis=0)
         # What a negative gain has lost is a current that remains when the static term is gone.
         remains = max(-self.static_gain, 0.0) * self.adapting_share * traces.values.max(axis=0)
-        return self.intercept_ma + max(self.dynamic_gain, 0.0) * fastest + static + remains
+        both = max(self.dynamic_gain, 0.0) * fastest + static + remains
+        return self.intercept_ma + saturated(both, self.saturation_per_ma)
 
     def rates(
         self,

@@ -18,7 +18,7 @@ from fingerpad.neuron.afferent import Afferent, AnyAfferent, adapted, checked_af
 from fingerpad.neuron.afferent_types import RapidlyAdapting
 from fingerpad.neuron.band_pass import continued_stage, knots_between
 from fingerpad.neuron.exact_spikes import continued_trains
-from fingerpad.neuron.transduction import PIECES_PER_INTERVAL, SHORTEST_PIECE_MS, knots_of
+from fingerpad.neuron.transduction import PIECES_PER_INTERVAL, SHORTEST_PIECE_MS, knots_of, saturated
 
 
 @checked_class
@@ -100,7 +100,7 @@ class AfferentStream:
         knots_ms = ends
         if filters:
             knots_ms = knots_between(self._time_ms, time_ms, tau_ms)
-        elif isinstance(afferent, Afferent) and afferent.adapting_share:
+        elif isinstance(afferent, Afferent) and (afferent.adapting_share or afferent.saturation_per_ma):
             knots_ms = knots_of(ends, PIECES_PER_INTERVAL, SHORTEST_PIECE_MS)  # those of `drive`
         share = (knots_ms - self._time_ms) / (time_ms - self._time_ms)
         values = between(self._dynamic, dynamic)
@@ -113,11 +113,11 @@ class AfferentStream:
             continued_stage(knots_ms, values, tau_ms, True, self._filtered[0])
             rate = values / tau_ms
         gains = afferent.transduction
-        driven = gains.intercept_ma + gains.dynamic_gain * np.abs(rate)
         followed = between(self._static, static)
         if afferent.adapting_share:
             followed = adapted(afferent, knots_ms, followed, self._lost)
-        return knots_ms, driven + gains.static_gain * followed
+        both = gains.dynamic_gain * np.abs(rate) + gains.static_gain * followed
+        return knots_ms, gains.intercept_ma + saturated(both, gains.saturation_per_ma)
 
     def _replayed(self, time_ms: float, static: FloatArray, dynamic: FloatArray) -> SpikeTrains:
         """Spikes since the last sample of an afferent that is given the whole trace."""

@@ -4,10 +4,12 @@ Whatever names the quantities of the skin that it follows and makes spikes of th
 (`fingerpad.neuron.afferent.AnyAfferent`). RA and PC share one chain:
 
     quantity Q -> band pass -> rectification -> leaky membrane -> spikes
-    i = max(q, 0) + r max(-q, 0),    tau du/dt = i / threshold - u,    spike and reset at u = 1,
+    i = (max(q, 0) + r max(-q, 0)) / threshold,
+    tau du/dt = i (1 + s) / (1 + s i) - u,    spike and reset at u = 1,
 
-with the band-passed quantity q, and r the share of retraction. Both are silent in a hold, because a band pass
-transmits no constant. SAII has the chain of SAI (Eqs. 1-5), but follows the stretch of the skin.
+with the band-passed quantity q, r the share of retraction, and s the saturation. Both are silent in a hold,
+because a band pass transmits no constant. SAII has the chain of SAI (Eqs. 1-5), but follows the stretch of
+the skin.
 """
 
 from __future__ import annotations
@@ -30,12 +32,13 @@ from fingerpad.core.signals import (
     SpikeTrains,
     Traces,
 )
-from fingerpad.core.values import Finite, FloatArray, Positive, Share, Whole, choice
+from fingerpad.core.values import Finite, FloatArray, NotNegative, Positive, Share, Whole, choice
 from fingerpad.data.afferents import TYPES
 from fingerpad.data.tissues import DEFAULT_TISSUES
 from fingerpad.neuron.afferent import Afferent, AnyAfferent, SkinQuantity, check_quantities, spikes_where
 from fingerpad.neuron.band_pass import BandPass
 from fingerpad.neuron.lif import LeakyIntegrateAndFire
+from fingerpad.neuron.transduction import saturated
 
 
 @value_class
@@ -55,6 +58,8 @@ class RapidlyAdapting:
     membrane_ms: Finite  #: Time constant of the membrane. [ms]
     refractory_ms: Finite  #: Refractory period. [ms]
     quantity: str  #: What is followed, by the names of `SkinResponse.sample`.
+    saturation: NotNegative = 0.0
+    """Saturation s: i thresholds at the end organ charge the membrane as i (1 + s) / (1 + s i). [1]"""
     type: str = "rapidly adapting"  #: Name of its type.
 
     def __post_init__(self) -> None:
@@ -84,8 +89,9 @@ class RapidlyAdapting:
         return Traces(times_ms, self.rectified(passed), quantity=RELATIVE_CURRENT)
 
     def rectified(self, passed: FloatArray) -> FloatArray:
-        """Rectify what the band pass transmits, over the threshold. [1]"""
-        return (np.maximum(passed, 0.0) + self.retraction * np.maximum(-passed, 0.0)) / self.threshold
+        """Rectify what the band pass transmits, over the threshold, and let it saturate. [1]"""
+        both = (np.maximum(passed, 0.0) + self.retraction * np.maximum(-passed, 0.0)) / self.threshold
+        return (1.0 + self.saturation) * saturated(both, self.saturation)
 
     def spikes(self, traces: Traces) -> SpikeTrains:
         """Simulate the spikes of this afferent at every site."""

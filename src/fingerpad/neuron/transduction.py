@@ -9,7 +9,7 @@ A `Drive` holds what does not depend on the gains: SED and its rate on fine knot
 current for any gains is then a linear combination.
 
 In the paper both terms use SED. As an extension, another quantity may take its place in either term:
-I = beta + k_d |Q'| + k_s P (docs/decisions.md#dynamic-term-quantity).
+I = beta + k_d |Q'| + k_s P (docs/decisions.md#dynamic-term-quantity), and the sum of both terms saturates.
 """
 
 from __future__ import annotations
@@ -24,7 +24,16 @@ from fingerpad.core.checked import checked, value_class
 from fingerpad.core.errors import InputError
 from fingerpad.core.phases import Phase
 from fingerpad.core.signals import CURRENT, STORED_ENERGY, Traces
-from fingerpad.core.values import Count, Finite, FiniteMatrix, FiniteVector, FloatArray, Many, Positive
+from fingerpad.core.values import (
+    Count,
+    Finite,
+    FiniteMatrix,
+    FiniteVector,
+    FloatArray,
+    Many,
+    NotNegative,
+    Positive,
+)
 
 PIECES_PER_INTERVAL = 32  # Largest number of linear pieces that replace the cubic between two given times.
 SHORTEST_PIECE_MS = 0.25  # Shortest linear piece: shorter intervals are divided into fewer pieces. [ms]
@@ -81,6 +90,8 @@ class Transduction:
     dynamic_gain: Finite
     """Gain on the rate of change of SED, or of another quantity, k_d. [mA ms/kPa, or per its unit]"""
     static_gain: Finite  #: Gain on SED itself, or on another quantity, k_s. [mA/kPa, or per its unit]
+    saturation_per_ma: NotNegative = 0.0
+    """Inverse of the sum of both terms of which half is transmitted; 0, as in the paper, for all. [1/mA]"""
 
     def current(self, traces: Traces | Drive) -> Traces:
         """Compute the current through the membrane at every site, Eq. 1: I = beta + k_d U' + k_s U. [mA]
@@ -88,10 +99,14 @@ class Transduction:
         Traces are resampled with the defaults of `drive`. The current jumps where the rate jumps.
         """
         driven = traces if isinstance(traces, Drive) else drive(traces)
-        current_ma = (
-            self.intercept_ma + self.dynamic_gain * driven.rate_per_ms + self.static_gain * driven.values
-        )
+        both_ma = self.dynamic_gain * driven.rate_per_ms + self.static_gain * driven.values
+        current_ma = self.intercept_ma + saturated(both_ma, self.saturation_per_ma)
         return Traces(driven.times_ms, current_ma, quantity=CURRENT)
+
+
+def saturated(values: FloatArray, per_value: float) -> FloatArray:
+    """Let values x saturate, x / (1 + s |x|): at 1/s a half is left, and none exceeds 1/s."""
+    return values / (1.0 + per_value * np.abs(values))
 
 
 @checked

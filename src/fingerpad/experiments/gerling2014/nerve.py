@@ -104,7 +104,7 @@ def sed_at_receptor(responses: Sequence[SkinResponse]) -> Traces:
 
 def rate_problem(traces: Traces, afferent: Afferent) -> RateProblem:
     """Observed rates at all shifts, and the six parameters of an afferent that is driven by traces."""
-    model = AfferentModel.of_traces(traces, initial_mv=afferent.initial_mv, adapting=afferent)
+    model = AfferentModel.of_traces(traces, initial_mv=afferent.initial_mv, like=afferent)
     return RateProblem(model, bar_recordings())
 
 
@@ -259,7 +259,7 @@ CHAINS = {"smallest_effective_size": 200.0}
 
 def bar_uncertainty(traces: Traces, fitted: Afferent, seed: int) -> UncertaintyResult:
     """Find what the rates under the bar determine of the afferent; neighbouring shifts may miss alike."""
-    model = AfferentModel.of_traces(traces, initial_mv=fitted.initial_mv, pieces=PIECES, adapting=fitted)
+    model = AfferentModel.of_traces(traces, initial_mv=fitted.initial_mv, pieces=PIECES, like=fitted)
     shift_mm = bar_firing_rates().shift_mm
     return uncertainty(model, bar_recordings(), fitted.parameters, shift_mm, seed, **CHAINS)
 

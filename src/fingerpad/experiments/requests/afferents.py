@@ -114,6 +114,7 @@ class AfferentSettings(Part):
     static_quantity: Annotated[str, choice(sampled_fields())] | None = None  #: What the two terms follow.
     adapting_share: Share | None = None
     adapting_ms: Positive | None = None
+    saturation_per_ma: NotNegative | None = None
     end_organs: Count | None = None
     reach_mm: NotNegative | None = None
     noise_offset_hz: NotNegative | None = None  #: As of `fingerpad.Afferent`.
