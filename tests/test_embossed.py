@@ -64,6 +64,15 @@ def test_the_normal_is_the_gradient_of_the_gap(text):
     assert differs.mean() < 0.02  # only where a crease lies within a step
 
 
+def test_edges_are_rounded_as_far_as_height_and_stroke_allow():
+    letter = embossed_text("I", capital_mm=6.0)  # 1.5 mm wide, 0.5 mm high
+    assert letter.rounded_to(0.3).edge_radius_mm == 0.3
+    assert letter.rounded_to(0.05) == letter
+    assert letter.rounded_to(2.0).edge_radius_mm == letter.height_mm
+    ridge = Embossed([rectangle(0.2, 3.0)], 0.5, 0.1)
+    assert ridge.rounded_to(0.4).edge_radius_mm == pytest.approx(ridge.stroke_mm / 2)
+
+
 def test_letters_are_read_by_a_finger_that_points_up():
     across = embossed_text("L")  # as seen from the skin: x up, z to the right
     assert is_raised(across, -2.6, 1.2)

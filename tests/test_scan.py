@@ -65,6 +65,19 @@ def test_the_half_width_of_the_autocorrelation_is_that_of_a_gaussian_image():
     assert seen.half_width_mm == pytest.approx(image.half_width_mm, rel=0.1)
 
 
+def test_a_scan_solves_each_step_once_on_elements_as_fine_as_is_asked_for():
+    letter = {"kind": "embossed_text", "text": "A"}
+    asked = {"object": letter, "place": {"x_mm": -4.0}, "x_mm": 8.0, "force_mn": 300.0}
+    (full,) = ScanRequest.read(asked).touches
+    (touch,) = ScanRequest.read(asked | {"detail_mm": 0.35}).touches
+    assert full.grading.finest_strip_mm < 0.25
+    assert touch.grading.finest_strip_mm == 0.35
+    assert len(touch.mesh.nodes_mm) < 0.6 * len(full.mesh.nodes_mm)
+    assert touch.body.edge_radius_mm == 0.35
+    moving_ms = np.diff(touch.steps_ms()[touch.steps_ms() >= 200.0])
+    np.testing.assert_allclose(moving_ms, 0.25 / 20.0 * 1e3)
+
+
 @pytest.mark.parametrize(
     ("more", "path", "said"),
     [

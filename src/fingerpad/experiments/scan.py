@@ -6,8 +6,9 @@ and Lamb (1981, J. Physiol. 310, 117): all afferents of a type and all lines tog
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
 from pathlib import Path
@@ -54,7 +55,8 @@ from fingerpad.skin.sampling import SkinResponse
 FORCE_MN, SPEED_MM_PER_S = 300.0, 20.0  # Of a hand that reads letters; assumed.
 FASTEST_MM_PER_S = 1000.0  # Faster than any hand explores a surface; assumed.
 HELD_MS = 150.0  # Hold before the object moves: the burst of the ramp is over. [ms]
-STEP_MM = 0.25  # Way between two times at which the skin is solved: the size of its elements below dots. [mm]
+STEP_MM = 0.25  # Way between two times at which the skin is solved. [mm]
+TOLERANCE = 1e-3  # Of the balance of forces at every step, over the force.
 PIXEL_MM = 0.25  # Of images.
 DWELL_MS = 1.0  # Between looks at where afferents are, for the time that they spend in a pixel. [ms]
 TOUCHED_MM = (8.0, 8.0)  # Skin that is in contact, along and across, in which afferents lie by default.
@@ -89,6 +91,8 @@ class ScanRequest(PlacedObject, FingerRequest):
     ramp_ms: Positive = protocol.RAMP.value
     hold_ms: NotNegative = HELD_MS  #: Until the object moves. [ms]
     step_mm: Positive = STEP_MM  #: Way between two times at which the skin is solved. [mm]
+    detail_mm: Positive | None = None
+    """Size below which no element goes, however fine the object: larger is faster and less exact. [mm]"""
     afferents: Afferents = _touched()  #: Who responds: by default SAI, RA and PC below the object.
 
     @cached_property
@@ -141,11 +145,20 @@ class ScanRequest(PlacedObject, FingerRequest):
                 where = place | {"z_mm": place["z_mm"] + offset_mm}
                 made = TactileStimulus(body, motion, **where, friction=self.friction)
                 try:
-                    found.append(made.touch(*pressed, receptor_depths_mm=depths_mm))
+                    found.append(self._scanned(made.touch(*pressed, receptor_depths_mm=depths_mm)))
                 except InputError as error:  # of a motion, whose numbers are keys of a scan
                     of_motion = error.path[:1] == ("motion",)
                     raise (error.at(error.path[1:] or ("x_mm",)) if of_motion else error) from error
         return found
+
+    def _scanned(self, touch: Touch) -> Touch:
+        """Return a touch with the mesh, steps and tolerances of a scan."""
+        grading, settings = touch.grading, touch.settings
+        if self.detail_mm is not None:
+            grading = grading.no_finer_than(self.detail_mm)
+        newton = replace(settings.newton, residual_tolerance=TOLERANCE, balance_tolerance=TOLERANCE)
+        settings = replace(settings, ramp_steps=math.ceil(1.0 / self.step_mm), newton=newton)
+        return replace(touch, grading=grading, settings=settings)
 
     def _checked_body(self) -> Indenter:
         """Make the object; letters that are larger than the finger are refused."""

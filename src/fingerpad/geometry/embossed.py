@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from functools import cached_property
 from typing import Annotated
 
@@ -94,6 +95,10 @@ class Embossed(Indenter):
         shape, normal = rounded(beyond + radius, points_mm[:, 1] + radius, outward, radius)
         plate = points_mm[:, 1] + self.height_mm
         return np.minimum(shape, plate), np.where((shape < plate)[:, None], normal, [0.0, 1.0, 0.0])
+
+    def rounded_to(self, radius_mm: Finite) -> Embossed:
+        most_mm = min(radius_mm, self.height_mm, self.stroke_mm / 2)
+        return replace(self, edge_radius_mm=max(self.edge_radius_mm, most_mm))
 
     @cached_property
     def _pieces(self) -> FloatArray:

@@ -105,6 +105,19 @@ class Grading:
         """Size of the smallest elements in strips; infinite without any. [mm]"""
         return min((size for _, _, size in self.finer_along + self.finer_across), default=np.inf)
 
+    def no_finer_than(self, size_mm: float) -> Grading:
+        """Return the grading with elements of at least this size in its strips."""
+
+        def coarse(strips: tuple[Strip, ...], largest_mm: float) -> tuple[Strip, ...]:
+            larger = ((begin, end, max(size, size_mm)) for begin, end, size in strips)
+            return tuple(strip for strip in larger if strip[2] < largest_mm)
+
+        return replace(
+            self,
+            finer_along=coarse(self.finer_along, self.size_x_mm),
+            finer_across=coarse(self.finer_across, self.size_z_mm),
+        )
+
     @property
     def counts(self) -> tuple[int, int, int, int]:
         """Number of elements through each of `LAYERS`."""
