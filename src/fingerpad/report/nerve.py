@@ -164,13 +164,21 @@ def draw_image(axes: Axes, image: TactileImage, largest_hz: float | None = None)
     axes.set(title=image.type, **ON_OBJECT)
 
 
+ROOM_IN, HIGHEST_PANEL = 0.8, 1.2  # Of a panel: room for its title and labels [in], height over width.
+
+
 @enter(DRAW, "scan_events")
 def figure_of_events(found: ScanResult) -> Figure:
-    figure = new_figure(len(found.of_type) * 0.5 * COLUMN_IN, 5.5)
-    panels = figure.subplots(2, len(found.of_type), squeeze=False, sharex=True, sharey=True)
-    for name, (events, image) in zip(found.of_type, panels.T, strict=True):
-        draw_events(events, found, name)
-        draw_image(image, found.image(name))
+    images = [found.image(name) for name in found.of_type]
+    first = images[0]
+    along_mm, across_mm = (np.ptp(axis) + first.pixel_mm for axis in (first.along_mm, first.across_mm))
+    panel_in = 0.5 * COLUMN_IN
+    height_in = ROOM_IN + panel_in * min(across_mm / along_mm, HIGHEST_PANEL)
+    figure = new_figure(len(images) * panel_in, 2.0 * height_in)
+    panels = figure.subplots(2, len(images), squeeze=False, sharex=True, sharey=True)
+    for image, (events, rates) in zip(images, panels.T, strict=True):
+        draw_events(events, found, image.type)
+        draw_image(rates, image)
     return figure
 
 

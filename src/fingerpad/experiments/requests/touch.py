@@ -307,7 +307,7 @@ class ReductionRequest(StimulusDescription, FingerRequest):
         )
 
 
-STEP_S = 1.8e-5
+STEP_S = 3.0e-5
 """Time of a step per node, by depth, straight and without friction, on two cores with compiled kernels: mean
 of benchmarks/results/growth.json. [s]"""
 
