@@ -95,7 +95,9 @@ def _step_times(model: ReducedModel) -> dict[str, float]:
             begun = perf_counter()
             sample = stream.step(time, depth_mm, force_mn, x_mm=0.001 * time)
             solved = perf_counter()
-            responding.step(time, sample.fields[afferent.static_quantity])
+            responding.step(
+                time, sample.fields[afferent.static_quantity], sample.fields[afferent.dynamic_quantity]
+            )
             took[way].append(1e3 * (solved - begun))
             took["spikes"].append(1e3 * (perf_counter() - solved))
             if way == "depth":
@@ -123,14 +125,17 @@ def _rate_errors(model: ReducedModel, skin: SkinResponse) -> list[list[float]]:
     First those of the reduced touch, then those of the full touch with its stress changed.
     """
     sites, afferent = _places(), fp.Afferent()
-    quantity, motion = afferent.static_quantity, cast(Touch, skin.touch).stimulus
+    motion = cast(Touch, skin.touch).stimulus
     stream = fp.ReducedTouch(model, sites)
-    values = [stream.step(float(t), float(motion.prescribed_at(t))).fields[quantity] for t in skin.times_ms]
-    full = skin.sed(sites, quantity, quantity)
+    fields = [stream.step(float(t), float(motion.prescribed_at(t))).fields for t in skin.times_ms]
+    full = skin.sed(sites, afferent.dynamic_quantity, afferent.static_quantity)
+    names = afferent.static_quantity, afferent.dynamic_quantity
+    values, driving = (np.array([each[name] for each in fields]) for name in names)
+    reduced = replace(full, values=values, dynamic=replace(full.dynamic_term, values=driving))
     wanted = np.array(afferent.rates(full))
     errors = []
-    for stress_kpa in (np.array(values), *((1.0 + change) * full.values for change in STRESS_CHANGES)):
-        wrong = np.abs(np.array(afferent.rates(replace(full, values=stress_kpa))) - wanted)
+    for traces in (reduced, *(full.scaled(np.full(len(sites), 1.0 + change)) for change in STRESS_CHANGES)):
+        wrong = np.abs(np.array(afferent.rates(traces)) - wanted)
         within = (wrong <= np.array(RATE_ERRORS)[:, None]).mean(axis=1)
         errors.append([*wrong.max(axis=1).tolist(), *within.tolist()])
     return errors
