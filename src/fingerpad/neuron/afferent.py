@@ -155,7 +155,7 @@ class Afferent:
     adapts: k_s (P - a R) with tau_a dR/dt + R = P. The paper's does not adapt. [1]"""
     adapting_ms: Positive = neuron.HUMAN_ADAPTING_TIME.value  #: Time constant of that loss, tau_a. [ms]
     saturation_per_ma: NotNegative = neuron.HUMAN_SATURATION.value
-    """Saturation s of the sum G of both terms, I = beta + G / (1 + s |G|), as recorded SAI afferents saturate
+    """Saturation s of the sum G of both terms, I = beta + G / (1 + s abs(G)). Recorded SAI afferents saturate
     (Ge & Khalsa 2002, J Neurophysiol 87:1686). The paper's has none, 0. [1/mA]"""
     end_organs: Count = int(neuron.HUMAN_END_ORGANS.value)
     reach_mm: NotNegative = neuron.HUMAN_REACH.value
