@@ -305,7 +305,7 @@ OWN = fp.OwnAfferent(
     [
         *(fp.Afferent(), *afferent_types().values(), fp.Afferent(static_quantity="stored"), OWN),
         *(fp.Afferent(adapting_share=0.5, adapting_ms=20.0), fp.SAI(adapting_share=0.5, adapting_ms=20.0)),
-        *(fp.Afferent(saturation_per_ma=1e6), fp.SAI(saturation_per_ma=1e6), fp.RA(saturation=0.5)),
+        *(fp.Afferent(saturation_per_ma=2e5), fp.SAI(saturation_per_ma=2e5), fp.RA(saturation=0.5)),
     ],
     ids=lambda afferent: type(afferent).__name__,
 )
