@@ -1,5 +1,7 @@
 """A batch of evaluations of a rate model is bit-equal to single ones, and these to the afferent's rates."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -54,6 +56,14 @@ def test_single_runs_equal_the_afferent_to_the_bit():
         np.testing.assert_array_equal(MODEL.evaluate(point), sed_driven(point).rates(driven))
         rested = sed_driven(point, 2.0).rates(driven, *windows)
         np.testing.assert_array_equal(chosen.evaluate(point), rested)
+
+
+def test_a_model_like_an_afferent_adapts_and_saturates_as_it_does():
+    like = replace(SED_DRIVEN, adapting_share=0.3, saturation_per_ma=2e5)
+    model = AfferentModel.of_traces(SED, initial_mv=like.initial_mv, like=like)
+    rates = model.evaluate(like.parameters)
+    np.testing.assert_array_equal(rates, like.rates(MODEL.drives[0]))
+    assert rates[0].max() < 0.9 * MODEL.evaluate(like.parameters)[0].max()
 
 
 test_a_row_that_is_no_afferent_is_refused = refusals(

@@ -56,7 +56,9 @@ FORCE_MN, SPEED_MM_PER_S = 300.0, 20.0  # Of a hand that reads letters; assumed.
 FASTEST_MM_PER_S = 1000.0  # Faster than any hand explores a surface; assumed.
 HELD_MS = 150.0  # Hold before the object moves: the burst of the ramp is over. [ms]
 STEP_MM = 0.25  # Way between two times at which the skin is solved. [mm]
-TOLERANCE = 1e-3  # Of the balance of forces at every step, over the force.
+TOLERANCE = 1e-3
+"""Of the balance of forces at every step, over the force: 2 mm of a letter took 106 Newton steps, and 125
+with a tenth of it."""
 PIXEL_MM = 0.25  # Of images.
 DWELL_MS = 1.0  # Between looks at where afferents are, for the time that they spend in a pixel. [ms]
 TOUCHED_MM = (8.0, 8.0)  # Skin that is in contact, along and across, in which afferents lie by default.

@@ -169,7 +169,7 @@ class AfferentModel:
         membrane = tau, capacitance, threshold, self.refractory_ms, initial
         rates = np.empty((2, self.n_stimuli))
         for driven, columns in zip(self.drives, self.stimuli, strict=True):
-            # I = beta + G, in the order of Transduction.current.
+            # I = beta + G, in the order of `current_of`.
             current = dynamic_gain * driven.rate_per_ms
             current += static_gain * driven.values
             if self.saturation_per_ma:

@@ -18,7 +18,7 @@ from fingerpad.neuron.afferent import Afferent, AnyAfferent, adapted, checked_af
 from fingerpad.neuron.afferent_types import RapidlyAdapting
 from fingerpad.neuron.band_pass import continued_stage, knots_between
 from fingerpad.neuron.exact_spikes import continued_trains
-from fingerpad.neuron.transduction import PIECES_PER_INTERVAL, SHORTEST_PIECE_MS, knots_of, saturated
+from fingerpad.neuron.transduction import PIECES_PER_INTERVAL, SHORTEST_PIECE_MS, current_of, knots_of
 
 
 @checked_class
@@ -112,12 +112,10 @@ class AfferentStream:
         if filters:
             continued_stage(knots_ms, values, tau_ms, True, self._filtered[0])
             rate = values / tau_ms
-        gains = afferent.transduction
         followed = between(self._static, static)
         if afferent.adapting_share:
             followed = adapted(afferent, knots_ms, followed, self._lost)
-        both = gains.dynamic_gain * np.abs(rate) + gains.static_gain * followed
-        return knots_ms, gains.intercept_ma + saturated(both, gains.saturation_per_ma)
+        return knots_ms, current_of(afferent.transduction, np.abs(rate), followed)
 
     def _replayed(self, time_ms: float, static: FloatArray, dynamic: FloatArray) -> SpikeTrains:
         """Spikes since the last sample of an afferent that is given the whole trace."""

@@ -9,7 +9,7 @@ A `Drive` holds what does not depend on the gains: SED and its rate on fine knot
 current for any gains is then a linear combination.
 
 In the paper both terms use SED. As an extension, another quantity may take its place in either term:
-I = beta + k_d |Q'| + k_s P (docs/decisions.md#dynamic-term-quantity), and the sum of both terms saturates.
+I = beta + k_d |Q'| + k_s P (docs/decisions.md#dynamic-term-quantity), and the sum of both terms may saturate.
 """
 
 from __future__ import annotations
@@ -99,9 +99,13 @@ class Transduction:
         Traces are resampled with the defaults of `drive`. The current jumps where the rate jumps.
         """
         driven = traces if isinstance(traces, Drive) else drive(traces)
-        both_ma = self.dynamic_gain * driven.rate_per_ms + self.static_gain * driven.values
-        current_ma = self.intercept_ma + saturated(both_ma, self.saturation_per_ma)
-        return Traces(driven.times_ms, current_ma, quantity=CURRENT)
+        return Traces(driven.times_ms, current_of(self, driven.rate_per_ms, driven.values), quantity=CURRENT)
+
+
+def current_of(gains: Transduction, rate_per_ms: FloatArray, values: FloatArray) -> FloatArray:
+    """Compute Eq. 1 from the rate of change and the value that the two terms follow, with saturation. [mA]"""
+    both_ma = gains.dynamic_gain * rate_per_ms + gains.static_gain * values
+    return gains.intercept_ma + saturated(both_ma, gains.saturation_per_ma)
 
 
 def saturated(values: FloatArray, per_value: float) -> FloatArray:
